@@ -1,0 +1,1 @@
+"""The built-in plugins: one file, one plugin. They enter by the entry point a stranger would use."""

@@ -1,0 +1,1 @@
+"""Identify the parameters of a railway traction load from recorded voltage dips."""

@@ -1,0 +1,28 @@
+"""The one exception a user may meet: a sentence that says what, where, the value, what is allowed, how to mend it."""
+
+import difflib
+from collections.abc import Iterable
+
+
+class UserError(Exception):
+    """Wrong input. The message is a complete sentence for the person who gave it; no traceback is shown."""
+
+
+def nearest(name: str, allowed: Iterable[str]) -> str:
+    """Return "; did you mean 'x'?" for the closest allowed name, or "" when nothing is close."""
+    close = difflib.get_close_matches(str(name), list(allowed), n=1, cutoff=0.5)
+    return f"; did you mean '{close[0]}'?" if close else ""
+
+
+def check_choice(where: str, value: object, allowed: Iterable[str]) -> None:
+    """Raise `UserError` unless `value` is one of `allowed`; `where` is the setting's full key."""
+    allowed = tuple(allowed)
+    if value not in allowed:
+        raise UserError(f"{where}={value} is not one of {', '.join(allowed)}{nearest(str(value), allowed)}")
+
+
+def check_range(where: str, value: float, low: float = float("-inf"), high: float = float("inf")) -> None:
+    """Raise `UserError` unless low <= value <= high (nan fails); `where` is the setting's full key."""
+    if not low <= value <= high:
+        limits = [f"at least {low:g}"] * (low > float("-inf")) + [f"at most {high:g}"] * (high < float("inf"))
+        raise UserError(f"{where}={value} is out of range: it must be {' and '.join(limits)}")

@@ -1,0 +1,165 @@
+"""The one search loop: it clips, evaluates, keeps the best, counts, enforces the budget and records the history.
+
+No optimizer does any of this, so none can misreport, and all are compared by the same count of simulations.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from tractexp.identify.optimizer import Box, Optimizer
+
+REFUSED = 1e12  # objectives from here up mark candidates that could not be simulated, ranked by how far they miss
+
+
+class Objective(Protocol):
+    """A problem in the unit cube: what an identification or a benchmark function offers."""
+
+    lower: np.ndarray  # (d,) raw bounds
+    upper: np.ndarray  # (d,)
+
+    def objective(self, values: np.ndarray) -> np.ndarray:
+        """Raw values (n, d) -> objectives (n,); `REFUSED` plus a measure of the miss where there is none."""
+        ...
+
+    def residuals(self, values: np.ndarray) -> np.ndarray:
+        """Raw values (n, d) -> residuals (n, m), nan in the rows that cannot be simulated."""
+        ...
+
+
+@dataclass(frozen=True)
+class Limits:
+    """When a search ends, beside its own end. None: no such limit."""
+
+    simulations: int | None = None
+    seconds: float | None = None
+    target: float | None = None  # objective
+
+
+@dataclass(frozen=True)
+class History:
+    """The search, one row per iteration, shapes (n_iterations,) except `values` (n_iterations, d)."""
+
+    simulations: np.ndarray  # simulations spent by the end of the iteration
+    objective: np.ndarray  # best so far
+    values: np.ndarray  # where
+    seconds: np.ndarray
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search found. `status` is the sentence the user reads."""
+
+    values: np.ndarray  # (d,) raw
+    objective: float
+    simulations: int
+    refused: int
+    iterations: int
+    seconds: float
+    status: str
+    history: History
+
+
+class _Stop(Exception):
+    """A limit is reached; the message is the status sentence."""
+
+
+class _Counter:
+    """The batch objective handed to an optimizer, in that optimizer's own box."""
+
+    def __init__(self, problem: Objective, unit: bool, limits: Limits):
+        self.problem, self.unit, self.limits = problem, unit, limits
+        self.width = problem.upper - problem.lower
+        d = len(problem.lower)
+        self.box = Box(np.zeros(d), np.ones(d)) if unit else Box(problem.lower, problem.upper)
+        self.simulations = self.refused = 0
+        self.best, self.best_values = np.inf, np.full(d, np.nan)
+        self.started = time.perf_counter()
+
+    @property
+    def seconds(self) -> float:
+        return time.perf_counter() - self.started
+
+    def _raw(self, x: np.ndarray) -> np.ndarray:
+        if not self.unit:
+            return x
+        return np.clip(self.problem.lower + x * self.width, self.problem.lower, self.problem.upper)
+
+    def _admit(self, x: np.ndarray) -> np.ndarray:
+        """The points a limit still allows, clipped; raises when there is none."""
+        limits = self.limits
+        if limits.seconds is not None and self.seconds >= limits.seconds:
+            raise _Stop(f"stopped at the time limit of {limits.seconds:g} s")
+        x = self.box.clip(np.atleast_2d(x))
+        if limits.simulations is not None:
+            left = limits.simulations - self.simulations
+            if left <= 0:
+                raise _Stop(f"stopped at the budget of {limits.simulations} simulations")
+            x = x[:left]
+        return x
+
+    def _note(self, x: np.ndarray, raw: np.ndarray, f: np.ndarray, asked: int) -> None:
+        self.simulations += len(f)
+        self.refused += int(np.count_nonzero(f >= REFUSED))
+        first = int(np.argmin(f))
+        if f[first] < self.best:
+            self.best, self.best_values = float(f[first]), raw[first].copy()
+        if self.limits.target is not None and self.best <= self.limits.target:
+            raise _Stop(f"reached the target objective {self.limits.target:g}")
+        if len(x) < asked:
+            raise _Stop(f"stopped at the budget of {self.limits.simulations} simulations")
+
+    def __call__(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        asked = len(np.atleast_2d(x))
+        x = self._admit(x)
+        raw = self._raw(x)
+        f = self.problem.objective(raw)
+        self._note(x, raw, f, asked)
+        return x, f
+
+    def residuals(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        asked = len(np.atleast_2d(x))
+        x = self._admit(x)
+        raw = self._raw(x)
+        r = self.problem.residuals(raw)
+        f = np.einsum("nm,nm->n", r, r)
+        self._note(x, raw, np.where(np.isfinite(f), f, REFUSED), asked)
+        return x, r
+
+
+def search(
+    problem: Objective,
+    optimizer: Optimizer,
+    seed: int,
+    limits: Limits = Limits(),
+    progress: Callable[[int, float, int], None] | None = None,
+) -> Found:
+    """Run `optimizer` on `problem` with one seed. The same seed gives the same history, bit for bit.
+
+    `progress(iteration, best objective, simulations)` is called after each iteration.
+    """
+    counter = _Counter(problem, optimizer.space == "unit", limits)
+    rows: list[tuple[int, float, np.ndarray, float]] = []
+
+    def note() -> None:
+        rows.append((counter.simulations, counter.best, counter.best_values, counter.seconds))
+        if progress is not None:
+            progress(len(rows) - 1, counter.best, counter.simulations)
+
+    try:
+        for _ in optimizer.search(counter, counter.box, np.random.default_rng(seed)):
+            note()
+        status = f"finished its {max(len(rows) - 1, 0)} iterations"
+    except _Stop as stop:
+        status = str(stop)
+    if not rows or rows[-1][0] < counter.simulations:
+        note()
+    simulations, best, values, seconds = zip(*rows, strict=True)
+    history = History(np.array(simulations), np.array(best), np.array(values), np.array(seconds))
+    return Found(
+        counter.best_values, counter.best, counter.simulations, counter.refused,
+        len(rows) - 1, counter.seconds, status, history,
+    )

@@ -1,0 +1,133 @@
+"""Plugins: one file, one class, one registered name.
+
+A plugin subclasses one of the framework's bases (`Motor`, `Static`, `Optimizer`, `Reader`, ...), is decorated
+with `@plugin`, and is chosen in YAML or on the command line by its file's name. Its annotated fields are its
+settings: from them the Hydra schema is derived, so unknown keys and wrong types are refused when the
+configuration is composed. Its `Parameter` attributes are what an identification may estimate.
+
+Packages are found through the entry point group `tractexp.plugins`; every module of such a package that does
+not start with an underscore is imported, and its `conf/` folder, if any, joins Hydra's search path. The
+built-in plugins come in by that same door.
+"""
+
+import dataclasses
+import functools
+import importlib
+import importlib.metadata
+import pkgutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar, TypeVar, dataclass_transform, get_type_hints
+
+from tractexp.errors import UserError, nearest
+from tractexp.parameter import Parameter
+
+ENTRY_POINTS = "tractexp.plugins"
+
+
+class Plugin:
+    """Base of all plugin bases. `group` is the Hydra group its plugins are chosen in."""
+
+    group: ClassVar[str]
+    name: ClassVar[str]
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
+
+    def check(self) -> None:
+        """Raise `UserError` for a setting out of range. Called once, when the plugin is built."""
+
+
+Class = TypeVar("Class", bound=type[Plugin])
+_registry: dict[str, dict[str, type[Plugin]]] = {}
+_schemas: dict[type[Plugin], type] = {}
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True)
+def plugin(cls: Class) -> Class:
+    """Register a plugin class under its module's name, in its base's group.
+
+    Raises `UserError` when the name is taken, when the class belongs to no group, or when its docstring does
+    not say where its equations come from (a line starting with "Source:").
+    """
+    name = cls.__module__.rpartition(".")[2]
+    where = f"plugin {cls.__module__}.{cls.__qualname__}"
+    group = getattr(cls, "group", None)
+    if group is None:
+        raise UserError(f"{where} must subclass one of the framework's bases (Motor, Static, Optimizer, Reader, ...)")
+    if "Source:" not in (cls.__doc__ or ""):
+        raise UserError(f"{where} needs a docstring with a line 'Source: author year, equation'")
+    known = _registry.setdefault(group, {})
+    if name in known and known[name].__module__ != cls.__module__:
+        raise UserError(
+            f"{where}: the name '{name}' in group '{group}' is taken by {known[name].__module__}; rename the file"
+        )
+    made = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
+    made.name = name
+    made.parameters = tuple(p for c in reversed(cls.__mro__) for p in vars(c).values() if isinstance(p, Parameter))
+    known[name] = made
+    return made
+
+
+def schema(cls: type[Plugin]) -> type:
+    """The dataclass Hydra checks a plugin's configuration against: its name and its settings."""
+    if cls not in _schemas:
+        fields: list[Any] = [("name", str, dataclasses.field(default=cls.name))]
+        types = get_type_hints(cls)
+        for item in dataclasses.fields(cls):  # type: ignore[arg-type]
+            if item.default_factory is not dataclasses.MISSING:
+                default: Any = dataclasses.field(default_factory=item.default_factory)
+            else:
+                default = dataclasses.field(default=item.default)
+            fields.append((item.name, types[item.name], default))
+        _schemas[cls] = dataclasses.make_dataclass(f"{cls.__name__}Config", fields)
+    return _schemas[cls]
+
+
+@functools.cache
+def packages() -> tuple[Any, ...]:
+    """The packages behind the entry points, imported, in order of name."""
+    found = []
+    for point in sorted(importlib.metadata.entry_points(group=ENTRY_POINTS), key=lambda p: (p.name, p.value)):
+        try:
+            found.append(point.load())
+        except ImportError as error:
+            raise UserError(
+                f"the plugin package '{point.value}' (entry point '{point.name}') cannot be imported: {error}"
+            ) from error
+    return tuple(dict.fromkeys(found))
+
+
+@functools.cache
+def discover() -> Mapping[str, Mapping[str, type[Plugin]]]:
+    """Import every plugin module once and return {group: {name: class}}."""
+    for package in packages():
+        for module in pkgutil.walk_packages(package.__path__, package.__name__ + "."):
+            if not module.name.rpartition(".")[2].startswith("_"):
+                importlib.import_module(module.name)
+    return _registry
+
+
+def configuration_folders() -> list[Path]:
+    """The `conf/` folders of the installed plugin packages."""
+    folders = (Path(p) / "conf" for package in packages() for p in package.__path__)
+    return [folder for folder in folders if folder.is_dir()]
+
+
+def get(group: str, name: str) -> type[Any]:
+    """The plugin class registered as `name` in `group`; raises `UserError` with the nearest name."""
+    known = discover().get(group, {})
+    if name not in known:
+        raise UserError(f"there is no {group} '{name}'{nearest(name, known)} Available: {', '.join(sorted(known))}")
+    return known[name]
+
+
+def build(group: str, settings: Mapping[str, Any]) -> Any:
+    """The plugin described by a configuration node: `name` chooses the class, the rest are its settings."""
+    chosen = dict(settings)
+    cls = get(group, chosen.pop("name"))
+    allowed = [item.name for item in dataclasses.fields(cls)]
+    for key in chosen:
+        if key not in allowed:
+            raise UserError(f"{group} '{cls.name}' has no setting '{key}'{nearest(key, allowed)}")
+    made = cls(**chosen)
+    made.check()
+    return made
