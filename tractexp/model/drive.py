@@ -1,0 +1,70 @@
+"""What drives a simulation: recorded voltage and the steady state before it, laid out for the kernel."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Excitation:
+    """One event: uniformly sampled input, and measured power where there is any.
+
+    U [pu] (N,); P, Q [pu] (N,), nan where missing; step [s]; U0, P0, Q0 [pu] and omega_s0 are the steady state
+    before the event; omega_s (N,) is the synchronous speed relative to nominal [rad/s]; omega_n is nominal.
+    """
+
+    step: float
+    U: np.ndarray
+    P: np.ndarray
+    Q: np.ndarray
+    U0: float
+    P0: float
+    Q0: float
+    omega_s: np.ndarray | None = None
+    omega_s0: float = 0.0
+    omega_n: float = 2 * np.pi * 50.0
+    weight_P: float = 1.0
+    weight_Q: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """One or several events end to end. Shapes: N samples in all, E events."""
+
+    inputs: np.ndarray  # (2, N): U, omega_s
+    measured: np.ndarray  # (2, N): P, Q, gaps filled with 0
+    weights: np.ndarray  # (2, N): 0 in a gap
+    first: np.ndarray  # (E + 1,)
+    event: np.ndarray  # (E, 4): U0, omega_s0, omega_n, step
+    before: np.ndarray  # (E, 2): P0, Q0
+
+    @classmethod
+    def of(cls, events: Sequence[Excitation]) -> "Drive":
+        """Lay events end to end."""
+        speed = [np.zeros(len(e.U)) if e.omega_s is None else e.omega_s for e in events]
+        inputs = np.stack([np.concatenate([e.U for e in events]), np.concatenate(speed)])
+        measured = np.stack([np.concatenate([e.P for e in events]), np.concatenate([e.Q for e in events])])
+        lengths = [len(e.U) for e in events]
+        weights = np.repeat([[e.weight_P for e in events], [e.weight_Q for e in events]], lengths, axis=1)
+        gaps = np.isnan(measured)
+        return cls(
+            inputs=np.ascontiguousarray(inputs, dtype=float),
+            measured=np.where(gaps, 0.0, measured),
+            weights=np.where(gaps, 0.0, weights),
+            first=np.concatenate([[0], np.cumsum(lengths)]),
+            event=np.array([[e.U0, e.omega_s0, e.omega_n, e.step] for e in events]),
+            before=np.array([[e.P0, e.Q0] for e in events]),
+        )
+
+    @property
+    def events(self) -> int:
+        return len(self.event)
+
+    @property
+    def samples(self) -> int:
+        return self.inputs.shape[1]
+
+    def part(self, event: int) -> slice:
+        """The samples of one event."""
+        return slice(int(self.first[event]), int(self.first[event + 1]))

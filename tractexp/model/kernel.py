@@ -1,0 +1,52 @@
+"""Kernel modules on disk: named by the hash of their source, imported as real modules, compiled once."""
+
+import functools
+import hashlib
+import importlib.util
+import os
+import sys
+import tempfile
+from pathlib import Path
+from types import ModuleType
+
+
+def cache_folder() -> Path:
+    """Where kernels are kept: $TRACTEXP_CACHE_DIR, or `tractexp` in the user's cache folder, or a temporary one."""
+    if chosen := os.environ.get("TRACTEXP_CACHE_DIR"):
+        candidates = [Path(chosen)]
+    else:
+        user = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or Path.home() / ".cache"
+        candidates = [Path(user) / "tractexp", Path(tempfile.gettempdir()) / f"tractexp-{os.getpid()}"]
+    for folder in candidates:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        if os.access(folder, os.W_OK):
+            return folder
+    raise OSError(f"no kernel cache can be written; tried {', '.join(map(str, candidates))}; set TRACTEXP_CACHE_DIR")
+
+
+@functools.cache
+def load(source: str) -> ModuleType:
+    """Import the kernel with this source, writing it first where it is new. Safe in parallel processes."""
+    name = f"kernel_{hashlib.sha256(source.encode()).hexdigest()[:20]}"
+    path = cache_folder() / f"{name}.py"
+    if not path.exists() or path.read_text() != source:
+        _write(path, source)
+    spec = importlib.util.spec_from_file_location(f"tractexp_kernels.{name}", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def _write(path: Path, source: str) -> None:
+    """Write in one move and with a fixed time stamp: Numba's cache is keyed by it, whoever writes first."""
+    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
+    with os.fdopen(handle, "w") as file:
+        file.write(source)
+    os.utime(temporary, (0, 0))
+    os.replace(temporary, path)

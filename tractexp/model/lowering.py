@@ -1,0 +1,135 @@
+"""From declared equations to the expressions a kernel evaluates: hoisted, split by when they must be computed.
+
+What depends on parameters only is computed once per candidate (a *constant*), what depends on the recorded
+input only once per sample (a *signal*); the rest is left for the inner loop. A power with a symbolic exponent
+becomes exp(exponent * log(base)), whose logarithm is then a signal.
+"""
+
+from dataclasses import dataclass
+
+import sympy
+from sympy import Symbol
+
+from tractexp.model.equations import Equations, phasor_parts, start_symbol
+
+
+@dataclass(frozen=True)
+class Phase:
+    """One group of expressions evaluated together, with the signals they need."""
+
+    signals: tuple[tuple[Symbol, sympy.Expr], ...]
+    temporaries: tuple[tuple[Symbol, sympy.Expr], ...]
+    expressions: tuple[sympy.Expr, ...]
+
+
+@dataclass(frozen=True)
+class Lowered:
+    """Everything the code generator prints, in real arithmetic."""
+
+    parameters: tuple[Symbol, ...]
+    inputs: tuple[Symbol, ...]  # sampled
+    event: tuple[Symbol, ...]  # one number per event
+    states: tuple[Symbol, ...]
+    starts: tuple[Symbol, ...]  # the states before the event
+    start: Phase  # states before the event, then the slack of each requirement
+    constants: tuple[tuple[Symbol, sympy.Expr], ...]
+    derivative: Phase
+    output: Phase
+
+
+class _Hoister:
+    """Collects constants and signals while rewriting expressions."""
+
+    def __init__(self, lane: set[Symbol], event: set[Symbol], inputs: set[Symbol]):
+        self.lane, self.event, self.inputs = lane, event, inputs
+        self.constants: dict[sympy.Expr, Symbol] = {}
+        self.signals: dict[sympy.Expr, Symbol] = {}
+
+    def is_constant(self, e: sympy.Expr) -> bool:
+        return e.free_symbols <= self.lane | self.event
+
+    def is_signal(self, e: sympy.Expr) -> bool:
+        return e.free_symbols <= self.inputs | self.event
+
+    def constant(self, e: sympy.Expr) -> sympy.Expr:
+        if e.is_number or e in self.lane:
+            return e
+        return self.constants.setdefault(e, Symbol(f"c{len(self.constants)}", real=True))
+
+    def signal(self, e: sympy.Expr) -> sympy.Expr:
+        if e.is_number or e in self.inputs or -e in self.inputs:
+            return e
+        return self.signals.setdefault(e, Symbol(f"s{len(self.signals)}", real=True))
+
+    def __call__(self, e: sympy.Expr) -> sympy.Expr:
+        if self.is_constant(e):
+            return self.constant(e)
+        if self.is_signal(e):
+            return self.signal(e)
+        if e.is_Symbol:
+            return e
+        if isinstance(e, sympy.Pow) and not e.exp.is_number:
+            return self(sympy.exp(e.exp * sympy.log(e.base)))
+        if isinstance(e, sympy.Add | sympy.Mul):
+            return self._grouped(e)
+        return e.func(*map(self, e.args))
+
+    def _grouped(self, e: sympy.Expr) -> sympy.Expr:
+        constant = [a for a in e.args if self.is_constant(a)]
+        signal = [a for a in e.args if a not in constant and self.is_signal(a)]
+        rest = [self(a) for a in e.args if a not in constant and a not in signal]
+        if constant:
+            rest.append(self.constant(e.func(*constant)))
+        if signal:
+            rest.append(self.signal(e.func(*signal)))
+        return e.func(*rest)
+
+
+def lower(eq: Equations) -> Lowered:
+    """Lower a complete declaration. Raises ValueError where a symbol is used that nothing declares."""
+    rows = eq.real_states()
+    states = tuple(symbol for symbol, _, _ in rows)
+    starts = tuple(s for state in eq.states for s in _real_parts(start_symbol(state)))
+    parameters = tuple(map(_symbol, eq.parameters))
+    lane = {*parameters, eq.P0, eq.Q0, *starts}
+    event = (eq.U0, eq.omega_s0, eq.omega_n)
+    inputs = (eq.U, eq.omega_s)
+
+    hoist = _Hoister(lane, set(event), set(inputs))
+    derivative = _phase(hoist, [d for _, d, _ in rows])
+    output = _phase(hoist, [eq.real(eq.expand(eq.P)), eq.real(eq.expand(eq.Q))])
+    slack = [eq.expand(r.slack) for r in eq.requirements]
+    start = _phase(None, [i for _, _, i in rows] + slack)
+    lowered = Lowered(
+        parameters, inputs, event, states, starts, start,
+        tuple((s, e) for e, s in hoist.constants.items()), derivative, output,
+    )  # fmt: skip
+    _check_closed(lowered, lane)
+    return lowered
+
+
+def _phase(hoist: _Hoister | None, expressions: list[sympy.Expr]) -> Phase:
+    signals = ()
+    if hoist is not None:
+        hoist.signals = {}
+        expressions = [hoist(e) for e in expressions]
+        signals = tuple((s, e) for e, s in hoist.signals.items())
+    temporaries, reduced = sympy.cse(expressions, symbols=sympy.numbered_symbols("x", real=True), order="none")
+    return Phase(signals, tuple(temporaries), tuple(reduced))
+
+
+def _check_closed(lowered: Lowered, lane: set[Symbol]) -> None:
+    known = lane | {*lowered.inputs, *lowered.event, *lowered.states}
+    for phase in (lowered.start, lowered.derivative, lowered.output):
+        own = {s for s, _ in (*phase.temporaries, *phase.signals, *lowered.constants)}
+        used = set().union(*(e.free_symbols for e in (*phase.expressions, *(e for _, e in phase.temporaries))))
+        if stray := used - known - own:
+            raise ValueError(f"the equations use {sorted(map(str, stray))}, which nothing declares")
+
+
+def _symbol(name: str) -> Symbol:
+    return Symbol(name, real=True)
+
+
+def _real_parts(symbol: Symbol) -> tuple[Symbol, ...]:
+    return (symbol,) if symbol.is_real else phasor_parts(symbol)

@@ -1,0 +1,168 @@
+"""A composed load model: parameters, simulation and objective of many candidates at once, equations in LaTeX."""
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tractexp.model.drive import Drive
+from tractexp.model.parts import Motor, Static
+from tractexp.parameter import Parameter
+
+TOLERANCE = 1e-7  # pu, largest step-doubling error of P or Q an automatic substep may leave
+MOST_SUBSTEPS = 256
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """Simulated power. `miss` is 0 where a steady state exists; there P and Q are valid."""
+
+    P: np.ndarray  # (n, N) pu
+    Q: np.ndarray  # (n, N) pu
+    miss: np.ndarray  # (E, n)
+
+
+@dataclass(frozen=True, eq=False)
+class Errors:
+    """Weighted sums of squared errors; `refused` candidates have no steady state or diverged."""
+
+    sums: np.ndarray  # (E, 2, n) pu²: P, Q
+    miss: np.ndarray  # (n,)
+
+    @property
+    def refused(self) -> np.ndarray:
+        return (self.miss > 0) | ~np.isfinite(self.sums).all(axis=(0, 1))
+
+
+class Model:
+    """A motor in parallel with a static load, Eq. (7). Make one with `compose`.
+
+    Candidates are arrays `values` (n, d) in the order of `parameters`, or (E, n, d) where they differ by event.
+    """
+
+    def __init__(self, motor: Motor, static: Static):
+        self.motor, self.static = motor, static
+        self.title = f"{motor.name} motor and {static.name} static load"
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (*self.motor.parameters, *self.static.parameters)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(p.name for p in self.parameters)
+
+    @functools.cached_property
+    def equations(self) -> Any:
+        """The declaration both parts were written into (an `Equations`)."""
+        from tractexp.model.equations import Equations
+
+        eq = Equations()
+        P_d, Q_d = self.motor.declare(eq)
+        P_s0 = eq.define("P_s0", eq.P0 - eq.before(P_d), "P_{s0}")
+        Q_s0 = eq.define("Q_s0", eq.Q0 - eq.before(Q_d), "Q_{s0}")
+        P_s, Q_s = self.static.declare(eq, P_s0, Q_s0)
+        eq.consume(P_d + P_s, Q_d + Q_s)
+        return eq
+
+    @functools.cached_property
+    def source(self) -> str:
+        """Source text of the kernel."""
+        from tractexp.model.codegen import source
+        from tractexp.model.lowering import lower
+
+        return source(lower(self.equations), self.title)
+
+    @functools.cached_property
+    def kernel(self) -> Any:
+        """The compiled kernel module."""
+        from tractexp.model.kernel import load
+
+        return load(self.source)
+
+    def simulate(self, drive: Drive, values: np.ndarray, substeps: Sequence[int] | int = 1) -> Response:
+        """P and Q of every candidate over every event, (n, N)."""
+        candidates = self._candidates(drive, values)
+        n = candidates.shape[2]
+        outputs = np.empty((2, n, drive.samples))
+        outputs.fill(np.nan)
+        _, miss = self._run(drive, candidates, substeps, outputs)
+        return Response(outputs[0], outputs[1], miss)
+
+    def errors(self, drive: Drive, values: np.ndarray, substeps: Sequence[int] | int = 1) -> Errors:
+        """Weighted squared errors of every candidate over every event, in one pass and without storing responses."""
+        sums, miss = self._run(drive, self._candidates(drive, values), substeps, np.empty((0, 0, 0)))
+        return Errors(sums, miss.sum(axis=0))
+
+    def substeps(self, drive: Drive, values: np.ndarray, tolerance: float = TOLERANCE) -> tuple[np.ndarray, np.ndarray]:
+        """Runge-Kutta steps per sample that each event needs, and the error left [pu], found by step doubling.
+
+        The error is the largest difference of P or Q between n and 2 n steps over the candidates that have a
+        steady state. Both results have shape (E,).
+        """
+        chosen, left = np.ones(drive.events, dtype=np.int64), np.full(drive.events, np.inf)
+        coarse = self.simulate(drive, values, chosen)
+        while True:
+            fine = self.simulate(drive, values, 2 * chosen)
+            for e in range(drive.events):
+                good, part = coarse.miss[e] == 0, drive.part(e)
+                gaps = [np.abs(a[good, part] - b[good, part]) for a, b in ((coarse.P, fine.P), (coarse.Q, fine.Q))]
+                left[e] = np.max(gaps, initial=0.0)
+            short = ~(left <= tolerance) & (chosen < MOST_SUBSTEPS)
+            if not short.any():
+                return chosen, left
+            chosen, coarse = np.where(short, 2 * chosen, chosen), fine
+            if not short.all():
+                coarse = self.simulate(drive, values, chosen)
+
+    def refusal(self, values: np.ndarray, drive: Drive, event: int = 0) -> str | None:
+        """Why these values (d,) have no steady state before an event, as a sentence; None where they have one."""
+        eq = self.equations
+        U0, omega_s0, omega_n, _ = drive.event[event]
+        known = dict(zip(self.names, map(float, values), strict=True))
+        known |= {"U0": U0, "omega_s0": omega_s0, "omega_n": omega_n, "P0": drive.before[event, 0]}
+        known |= {"Q0": drive.before[event, 1]}
+        number = lambda e: complex(eq.expand(e).subs({s: known[s.name] for s in eq.expand(e).free_symbols})).real  # noqa: E731
+        missed = [r.sentence.format(value=number(r.shown)) for r in eq.requirements if not number(r.slack) >= 0]
+        return "; ".join(missed) or None
+
+    def latex(self) -> list[str]:
+        """The model's equations, one a line."""
+        return self.equations.latex()
+
+    def _candidates(self, drive: Drive, values: np.ndarray) -> np.ndarray:
+        """Kernel rows (E, d + 2, n): the parameters, then P0 and Q0 of the event."""
+        values = np.atleast_2d(np.asarray(values, dtype=float))
+        if values.shape[-1] != len(self.names):
+            raise ValueError(f"values {values.shape} must end in {len(self.names)} columns: {', '.join(self.names)}")
+        n = values.shape[-2]
+        rows = np.empty((drive.events, len(self.names) + 2, n))
+        rows[:, :-2] = np.swapaxes(values, -1, -2)
+        rows[:, -2:] = drive.before[:, :, None]
+        return rows
+
+    def _run(self, drive, candidates, substeps, outputs):
+        n = candidates.shape[2]
+        sums, miss = np.empty((drive.events, 2, n)), np.empty((drive.events, n))
+        steps = np.broadcast_to(np.asarray(substeps, dtype=np.int64), (drive.events,)).copy()
+        sums.fill(np.nan)
+        self.kernel.run(
+            candidates,
+            drive.event,
+            drive.first,
+            drive.inputs,
+            drive.measured,
+            drive.weights,
+            steps,
+            sums,
+            miss,
+            outputs,
+        )
+        return sums, miss
+
+
+def compose(motor: Motor, static: Static) -> Model:
+    """A composite load of these parts."""
+    return Model(motor, static)
