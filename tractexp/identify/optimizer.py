@@ -6,7 +6,10 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
+from tractexp.errors import check_choice
 from tractexp.plugin import Plugin
+
+REFUSED = 1e12  # objectives from here up mark candidates that could not be simulated, ranked by how far they miss
 
 
 @dataclass(frozen=True)
@@ -29,7 +32,15 @@ class Box:
 
     def uniform(self, rng: np.random.Generator, n: int) -> np.ndarray:
         """(n, d) points drawn uniformly."""
-        return self.lower + self.width * rng.random((n, self.dimension))
+        return self.from_unit(rng.random((n, self.dimension)))
+
+    def from_unit(self, unit: np.ndarray) -> np.ndarray:
+        """Points (..., d) of the unit cube in this box's coordinates."""
+        return self.lower + self.width * unit
+
+    def to_unit(self, x: np.ndarray) -> np.ndarray:
+        """Points (..., d) of this box in the unit cube."""
+        return (x - self.lower) / self.width
 
 
 class Evaluate(Protocol):
@@ -48,11 +59,16 @@ class Evaluate(Protocol):
         ...
 
 
+@dataclass(frozen=True, kw_only=True)
 class Optimizer(Plugin):
-    """Base of the optimizer plugins, chosen by `optimizer=NAME`."""
+    """Base of the optimizer plugins, chosen by `optimizer=NAME`. Its fields are settings of every optimizer."""
 
     group: ClassVar[str] = "optimizer"
     space: str = "unit"  # "unit": search in the unit cube; "raw": in the parameters' own units
+    polish: bool = False  # end with bounded least squares from the best points, inside the same budget
+
+    def check(self) -> None:
+        check_choice("optimizer.space", self.space, ("unit", "raw"))
 
     def search(self, evaluate: Evaluate, box: Box, rng: np.random.Generator) -> Iterator[None]:
         """Search `box`, yielding once at the end of each iteration (the initial population is iteration 0).
@@ -60,3 +76,4 @@ class Optimizer(Plugin):
         A generator: the search loop runs it until it returns or a budget is spent, in which case `evaluate`
         raises and the generator simply ends. All randomness comes from `rng`.
         """
+        raise NotImplementedError

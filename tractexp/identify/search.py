@@ -4,15 +4,19 @@ No optimizer does any of this, so none can misreport, and all are compared by th
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from tractexp.identify.optimizer import Box, Optimizer
+from tractexp.errors import UserError
+from tractexp.identify.optimizer import REFUSED, Box, Optimizer
+from tractexp.identify.polish import Elite, polish
 
-REFUSED = 1e12  # objectives from here up mark candidates that could not be simulated, ranked by how far they miss
+UNKNOWN = 1e30  # stands for an objective that is not a finite number: worse than any miss
+POLISH_STEPS = 160  # least-squares steps, of d + 2 simulations, that a budget keeps back for the polish,
+POLISH_SHARE = 1 / 3  # but never more than this share of it
 
 
 class Objective(Protocol):
@@ -67,6 +71,10 @@ class _Stop(Exception):
     """A limit is reached; the message is the status sentence."""
 
 
+class _Reached(_Stop):
+    """The target is reached: there is nothing left to polish."""
+
+
 class _Counter:
     """The batch objective handed to an optimizer, in that optimizer's own box."""
 
@@ -77,6 +85,7 @@ class _Counter:
         self.box = Box(np.zeros(d), np.ones(d)) if unit else Box(problem.lower, problem.upper)
         self.simulations = self.refused = 0
         self.best, self.best_values = np.inf, np.full(d, np.nan)
+        self.elite: Elite | None = None
         self.started = time.perf_counter()
 
     @property
@@ -94,6 +103,8 @@ class _Counter:
         if limits.seconds is not None and self.seconds >= limits.seconds:
             raise _Stop(f"stopped at the time limit of {limits.seconds:g} s")
         x = self.box.clip(np.atleast_2d(x))
+        if np.isnan(x).any():
+            raise UserError("the optimizer proposed a point that is not a number; this is a fault of its plugin")
         if limits.simulations is not None:
             left = limits.simulations - self.simulations
             if left <= 0:
@@ -107,8 +118,10 @@ class _Counter:
         first = int(np.argmin(f))
         if f[first] < self.best:
             self.best, self.best_values = float(f[first]), raw[first].copy()
+        if self.elite is not None:
+            self.elite.add(x, f)
         if self.limits.target is not None and self.best <= self.limits.target:
-            raise _Stop(f"reached the target objective {self.limits.target:g}")
+            raise _Reached(f"reached the target objective {self.limits.target:g}")
         if len(x) < asked:
             raise _Stop(f"stopped at the budget of {self.limits.simulations} simulations")
 
@@ -117,6 +130,7 @@ class _Counter:
         x = self._admit(x)
         raw = self._raw(x)
         f = self.problem.objective(raw)
+        f = np.where(np.isfinite(f), f, UNKNOWN)
         self._note(x, raw, f, asked)
         return x, f
 
@@ -128,6 +142,31 @@ class _Counter:
         f = np.einsum("nm,nm->n", r, r)
         self._note(x, raw, np.where(np.isfinite(f), f, REFUSED), asked)
         return x, r
+
+
+def _before_polish(limits: Limits, dimension: int) -> Limits:
+    """The part of `limits` that a polished search may spend before the polish."""
+    simulations, seconds = limits.simulations, limits.seconds
+    if simulations is not None:
+        simulations -= min(int(simulations * POLISH_SHARE), POLISH_STEPS * (dimension + 2))
+    return Limits(simulations, None if seconds is None else seconds * (1 - POLISH_SHARE), limits.target)
+
+
+def _iterations(counter: _Counter, optimizer: Optimizer, rng: np.random.Generator) -> Iterator[None]:
+    """The optimizer's iterations, then, where asked for, the polish in what the limits have kept back for it."""
+    if not optimizer.polish:
+        yield from optimizer.search(counter, counter.box, rng)
+        return
+    limits, counter.elite = counter.limits, Elite(counter.box)
+    counter.limits = _before_polish(limits, counter.box.dimension)
+    try:
+        yield from optimizer.search(counter, counter.box, rng)
+    except _Reached:
+        raise
+    except _Stop:
+        pass  # its share is spent: the polish has the rest
+    counter.limits = limits
+    yield from polish(counter, counter.box, counter.elite)
 
 
 def search(
@@ -150,7 +189,7 @@ def search(
             progress(len(rows) - 1, counter.best, counter.simulations)
 
     try:
-        for _ in optimizer.search(counter, counter.box, np.random.default_rng(seed)):
+        for _ in _iterations(counter, optimizer, np.random.default_rng(seed)):
             note()
         status = f"finished its {max(len(rows) - 1, 0)} iterations"
     except _Stop as stop:
@@ -160,6 +199,12 @@ def search(
     simulations, best, values, seconds = zip(*rows, strict=True)
     history = History(np.array(simulations), np.array(best), np.array(values), np.array(seconds))
     return Found(
-        counter.best_values, counter.best, counter.simulations, counter.refused,
-        len(rows) - 1, counter.seconds, status, history,
+        counter.best_values,
+        counter.best,
+        counter.simulations,
+        counter.refused,
+        len(rows) - 1,
+        counter.seconds,
+        status,
+        history,
     )

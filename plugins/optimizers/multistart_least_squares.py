@@ -1,0 +1,57 @@
+"""Least squares from several starts: the fastest way to the bottom of a smooth fit."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from tractexp.errors import check_range
+from tractexp.identify.optimizer import REFUSED, Box, Evaluate, Optimizer
+from tractexp.identify.polish import descend, spread
+from tractexp.plugin import plugin
+
+CLOSER = 10  # scatters drawn ever closer about the least refused point before a search gives up
+
+
+def latin_hypercube(n: int, d: int, rng: np.random.Generator) -> np.ndarray:
+    """(n, d) points of the unit cube, each coordinate with one point in every n-th (McKay et al. 1979)."""
+    cells = rng.permuted(np.tile(np.arange(n), (d, 1)), axis=1).T
+    return (cells + rng.random((n, d))) / n
+
+
+@plugin
+class MultistartLeastSquares(Optimizer):
+    """A Latin hypercube, then bounded least squares from its best points that lie apart, best first.
+
+    Candidates without a steady state are never started from. Where the whole scatter is refused, it is drawn
+    again about its least refused point, half as wide. One iteration is the scatter or one start.
+
+    Source: Branch, Coleman and Li 1999 (SciPy's trust region reflective); McKay, Beckman and Conover 1979.
+    Departures: the hypercube is our own, as importing scipy.stats for it takes longer than the search.
+    """
+
+    scatter: int = 100
+    starts: int = 20
+    trials: int = 100  # steps tried from one start
+    tolerance: float = 1e-8  # relative change of objective, step or gradient that ends a start
+
+    def check(self) -> None:
+        super().check()
+        check_range("optimizer.scatter", self.scatter, 1)
+        check_range("optimizer.starts", self.starts, 1, self.scatter)
+        check_range("optimizer.trials", self.trials, 1)
+        check_range("optimizer.tolerance", self.tolerance, 1e-15, 0.1)
+
+    def search(self, evaluate: Evaluate, box: Box, rng: np.random.Generator) -> Iterator[None]:
+        center, width = np.full(box.dimension, 0.5), 1.0
+        for _ in range(CLOSER):
+            unit = latin_hypercube(self.scatter, box.dimension, rng)
+            x, f = evaluate(box.from_unit(center + width * (unit - 0.5)))
+            yield
+            if f.min() < REFUSED:
+                break
+            center, width = box.to_unit(x[f.argmin()]), width / 2
+        feasible = f < REFUSED
+        x, f = x[feasible], f[feasible]
+        for i in spread(box.to_unit(x), f, self.starts):
+            descend(evaluate, box, x[i], f[i], self.tolerance, self.trials)
+            yield

@@ -1,0 +1,31 @@
+"""Uniform random search, the negative control."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from tractexp.errors import check_range
+from tractexp.identify.optimizer import Box, Evaluate, Optimizer
+from tractexp.plugin import plugin
+
+
+@plugin
+class RandomSearch(Optimizer):
+    """Points drawn uniformly, none better informed than the last: what any other optimizer must beat.
+
+    Source: Anderson 1953, "Recent advances in finding best operating conditions".
+    Departures: none; the points come in batches of `population`.
+    """
+
+    population: int = 50
+    iterations: int = 300
+
+    def check(self) -> None:
+        super().check()
+        check_range("optimizer.population", self.population, 1)
+        check_range("optimizer.iterations", self.iterations, 1)
+
+    def search(self, evaluate: Evaluate, box: Box, rng: np.random.Generator) -> Iterator[None]:
+        for _ in range(self.iterations + 1):
+            evaluate(box.uniform(rng, self.population))
+            yield

@@ -1,0 +1,96 @@
+"""Bounded least squares from good starts: the end of a polished search and the body of a multi-start one.
+
+A step costs d + 1 simulations: one trial, and a Jacobian whose d forward differences are one batch.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from tractexp.identify.optimizer import REFUSED, Box, Evaluate
+
+DIFFERENCE = 1e-6  # of the box's width; rounding (3e-13 relative) and curvature both stay below 1e-6 of a column
+EDGE = 1e-9  # SciPy's interior method starts strictly inside the box
+
+
+def spread(unit: np.ndarray, f: np.ndarray, count: int, apart: float = 0.1) -> np.ndarray:
+    """Indices of at most `count` points, best first, each further than `apart` from every better one chosen.
+
+    `unit` (n, d) in the unit cube, `f` (n,) objectives; the distance is the largest coordinate's.
+    """
+    left, chosen = np.argsort(f, kind="stable"), []
+    while len(left) and len(chosen) < count:
+        chosen.append(left[0])
+        left = left[np.abs(unit[left] - unit[left[0]]).max(axis=1) > apart]
+    return np.array(chosen, dtype=int)
+
+
+class Elite:
+    """The best points a search has met that lie apart from each other, best first: where a polish starts."""
+
+    def __init__(self, box: Box, size: int = 4):
+        self.box, self.size = box, size
+        self.x, self.f = np.empty((0, box.dimension)), np.empty(0)
+
+    def add(self, x: np.ndarray, f: np.ndarray) -> None:
+        """Consider points (n, d) with objectives (n,); those refused or worse than a full elite are passed over."""
+        better = f < (self.f[-1] if len(self.f) == self.size else REFUSED)
+        if better.any():
+            x, f = np.concatenate((self.x, x[better])), np.concatenate((self.f, f[better]))
+            chosen = spread(self.box.to_unit(x), f, self.size)
+            self.x, self.f = x[chosen], f[chosen]
+
+
+class _Residuals:
+    """Scaled residuals and their Jacobian at points of the unit cube, as SciPy asks for them."""
+
+    def __init__(self, evaluate: Evaluate, box: Box, scale: float):
+        self.evaluate, self.box, self.scale = evaluate, box, scale
+        self.unit, self.value = np.empty(0), np.empty(0)
+
+    def _rows(self, unit: np.ndarray) -> np.ndarray:
+        return self.evaluate.residuals(self.box.from_unit(unit))[1] * self.scale
+
+    def __call__(self, unit: np.ndarray) -> np.ndarray:
+        if not np.array_equal(unit, self.unit):  # asked again, as for the Jacobian: no second simulation
+            self.unit, self.value = unit.copy(), self._rows(unit[None])[0]
+        return self.value
+
+    def jacobian(self, unit: np.ndarray) -> np.ndarray:
+        """(m, d). A difference steps away from the nearer wall.
+
+        One that cannot be simulated steps the other way, and is left at zero where that fails as well: the
+        parameter then rests for one step.
+        """
+        h = np.where(unit > 0.5, -DIFFERENCE, DIFFERENCE)
+        rows = self._rows(unit + np.diag(h))
+        lost = np.isnan(rows).any(axis=1)
+        if lost.any():
+            h[lost] *= -1
+            rows[lost] = self._rows((unit + np.diag(h))[lost])
+        return np.nan_to_num((rows - self(unit)) / h[:, None], nan=0.0).T
+
+
+def descend(evaluate: Evaluate, box: Box, start: np.ndarray, objective: float, tolerance: float, trials: int) -> None:
+    """Bounded least squares (SciPy's trust region reflective) from `start` (d,), whose objective is known.
+
+    Works in the unit cube and on residuals scaled to a sum of squares of one, so that `tolerance` is relative:
+    the descent ends when the objective, the step or the gradient is below it, or after `trials` trials. The
+    search loop that owns `evaluate` keeps the best; a start that cannot be simulated is left at once.
+    """
+    from scipy.optimize import least_squares
+
+    residuals = _Residuals(evaluate, box, 1 / np.sqrt(objective) if objective > 0 else 1.0)
+    unit = np.clip(box.to_unit(start), EDGE, 1 - EDGE)
+    if np.isfinite(residuals(unit)).all():
+        least_squares(
+            residuals, unit, residuals.jacobian, (0.0, 1.0), ftol=tolerance, xtol=tolerance, gtol=tolerance,
+            x_scale="jac", max_nfev=trials,
+        )  # fmt: skip
+
+
+def polish(evaluate: Evaluate, box: Box, elite: Elite) -> Iterator[None]:
+    """Descend from each elite point, best first; one iteration each."""
+    for start, objective in list(zip(elite.x, elite.f, strict=True)):
+        descend(evaluate, box, start, objective, tolerance=1e-8, trials=100)
+        yield
