@@ -14,6 +14,12 @@ def nearest(name: str, allowed: Iterable[str]) -> str:
     return f"; did you mean '{close[0]}'?" if close else ""
 
 
+def among(name: object, allowed: Iterable[str], label: str = "Available") -> str:
+    """The end of a sentence about an unknown name: the nearest one, and all there are."""
+    allowed = sorted(map(str, allowed))
+    return f"{nearest(str(name), allowed) or '.'} {label}: {', '.join(allowed) or 'none'}"
+
+
 def check_choice(where: str, value: object, allowed: Iterable[str]) -> None:
     """Raise `UserError` unless `value` is one of `allowed`; `where` is the setting's full key."""
     allowed = tuple(allowed)

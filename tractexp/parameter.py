@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tractexp.errors import UserError, nearest
+from tractexp.errors import UserError, among
 
 
 @dataclass(frozen=True)
@@ -65,8 +65,5 @@ class Space:
 
     def index(self, name: str) -> int:
         if name not in self.names:
-            raise UserError(
-                f"'{name}' is not a parameter of this model, which has {', '.join(self.names)}"
-                f"{nearest(name, self.names)}"
-            )
+            raise UserError(f"this model has no parameter '{name}'{among(name, self.names, 'Parameters')}")
         return self.names.index(name)

@@ -19,7 +19,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar, dataclass_transform, get_type_hints
 
-from tractexp.errors import UserError, nearest
+from tractexp.errors import UserError, among
 from tractexp.parameter import Parameter
 
 ENTRY_POINTS = "tractexp.plugins"
@@ -31,6 +31,7 @@ class Plugin:
     group: ClassVar[str]
     name: ClassVar[str]
     parameters: ClassVar[tuple[Parameter, ...]] = ()
+    sourced: ClassVar[bool] = True  # the docstring must say where the equations come from
 
     def check(self) -> None:
         """Raise `UserError` for a setting out of range. Called once, when the plugin is built."""
@@ -53,7 +54,7 @@ def plugin(cls: Class) -> Class:
     group = getattr(cls, "group", None)
     if group is None:
         raise UserError(f"{where} must subclass one of the framework's bases (Motor, Static, Optimizer, Reader, ...)")
-    if "Source:" not in (cls.__doc__ or ""):
+    if cls.sourced and "Source:" not in (cls.__doc__ or ""):
         raise UserError(f"{where} needs a docstring with a line 'Source: author year, equation'")
     known = _registry.setdefault(group, {})
     if name in known and known[name].__module__ != cls.__module__:
@@ -116,7 +117,7 @@ def get(group: str, name: str) -> type[Any]:
     """The plugin class registered as `name` in `group`; raises `UserError` with the nearest name."""
     known = discover().get(group, {})
     if name not in known:
-        raise UserError(f"there is no {group} '{name}'{nearest(name, known)} Available: {', '.join(sorted(known))}")
+        raise UserError(f"there is no {group} '{name}'{among(name, known)}")
     return known[name]
 
 
@@ -127,7 +128,7 @@ def build(group: str, settings: Mapping[str, Any]) -> Any:
     allowed = [item.name for item in dataclasses.fields(cls)]
     for key in chosen:
         if key not in allowed:
-            raise UserError(f"{group} '{cls.name}' has no setting '{key}'{nearest(key, allowed)}")
+            raise UserError(f"{group} '{cls.name}' has no setting '{key}'{among(key, allowed, 'Settings')}")
     made = cls(**chosen)
     made.check()
     return made

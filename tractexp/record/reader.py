@@ -2,18 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from tractexp.plugin import Plugin
-from tractexp.record.record import Record
 
 
 @dataclass(frozen=True)
 class Events:
-    """The recorded events of one run: those that are fitted and those held out."""
+    """The recorded events of one run, fitted and held out: as records, or with their dips found."""
 
-    train: Sequence[Record]
-    validate: Sequence[Record] = ()
+    train: Sequence[Any]
+    validate: Sequence[Any] = ()
 
 
 class Reader(Plugin):

@@ -1,0 +1,66 @@
+"""Command line: compose the configuration, run the task, end with a sentence where the input is wrong."""
+
+import os
+import sys
+from pathlib import Path
+
+from tractexp.errors import UserError
+
+HERE = Path(__file__).resolve().parent
+CONF = next(p for p in (HERE / "conf", HERE.parent / "conf") if (p / "config.yaml").is_file())
+FULL_ERROR = "HYDRA_FULL_ERROR"  # Hydra's own switch: set it to see tracebacks
+
+
+def main() -> int:
+    """Entry point of `tractexp` and `python -m tractexp`; returns the exit code."""
+    traceback = os.environ.get(FULL_ERROR, "0") not in ("", "0")
+    try:
+        if sys.argv[1:2] == ["ui"]:
+            from tractexp.tasks.ui import ui
+
+            return ui(sys.argv[2:])
+        return _run()
+    except UserError as error:
+        if traceback:
+            raise
+        print(f"tractexp: {error}", file=sys.stderr)
+    except KeyboardInterrupt:
+        print("tractexp: interrupted; nothing was logged for this run", file=sys.stderr)
+        return 130
+    return 2
+
+
+def _run() -> int:
+    import hydra
+
+    from tractexp.config import register
+    from tractexp.refusal import explained
+
+    register()
+    os.environ[FULL_ERROR] = "1"  # let exceptions through: they are told below, in one sentence
+    sys.argv[1:] = map(opened, sys.argv[1:])
+    refusals: list[UserError] = []
+
+    @hydra.main(version_base="1.3", config_path=str(CONF), config_name="config")
+    def job(config: object) -> None:
+        from tractexp.tasks.run import run
+
+        try:
+            run(config)
+        except UserError as error:  # raised again below, beyond the lines Hydra would print about it
+            refusals.append(error)
+
+    with explained():
+        job()
+    for error in refusals:
+        raise error
+    return 0
+
+
+def opened(argument: str) -> str:
+    """Let `model.bounds.C=[0.5,0.9]` add the entry it names: Hydra would ask for a plus sign."""
+    return f"++{argument}" if argument.startswith(("model.bounds.", "model.fixed.")) else argument
+
+
+if __name__ == "__main__":
+    sys.exit(main())

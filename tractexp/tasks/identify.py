@@ -1,0 +1,109 @@
+"""Identify a load model's parameters from recorded dips."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tractexp.identify.search import REFUSED, Limits, search
+from tractexp.plugin import plugin
+from tractexp.tasks.console import say, searching, table
+from tractexp.tasks.task import Job, Task
+
+
+@plugin
+class Identify(Task):
+    """Fit the model's free parameters to the training events, judge it on all events, show and log the outcome."""
+
+    def run(self, job: Job) -> None:
+        from tractexp.identify.problem import Problem
+        from tractexp.identify.result import conclude
+
+        config = job.config
+        events = job.events()
+        node = config["model"]
+        problem = Problem(job.model, events.train, node["bounds"], node["fixed"], node["substeps"])
+        optimizer = job.optimizer
+        announce(job, events, problem)
+
+        limits = Limits(config["budget"], config["time_limit"], config["target"])
+        with searching(getattr(optimizer, "iterations", None), limits.simulations) as progress:
+            found = search(problem, optimizer, job.seed, limits, progress)
+        settings = {part: node[part] for part in ("motor", "static")}
+        result, fits = conclude(problem, found, events.validate, job.seed, settings, job.choices["optimizer"])
+
+        report(problem, result)
+        paths = [*draw(job, found, result, fits), result.write(job.folder / "result.json")]
+        for path in paths:
+            say(f"  {path}")
+        track(job, found, result, paths)
+
+
+def announce(job: Job, events: Any, problem: Any) -> None:
+    """Say what was read and what will be done."""
+    from tractexp.record import describe
+
+    for role, group in (("fit", events.train), ("validate", events.validate)):
+        for event in group:
+            say(f"{role}: {describe(event)}")
+            for note in event.record.notes:
+                say(f"  note: {note}")
+    free = f"{problem.space.dimension} parameters"
+    say(f"model: {problem.model.title}, {free}; Runge-Kutta steps: {problem.step.describe(problem.events)}")
+    say(f"optimizer: {job.choices['optimizer']}, seed {job.seed}")
+
+
+def report(problem: Any, result: Any) -> None:
+    """Print the parameters and how well they fit."""
+    rows = []
+    for name, value in result.parameters.items():
+        low, high = result.bounds[name]
+        mark = "fixed" if name in problem.fixed else "at its bound" if name in result.at_bound else ""
+        rows.append([name, f"{value:.5g}", result.units[name], f"{low:g} .. {high:g}", mark])
+    say()
+    table(["parameter", "value", "unit", "bounds", ""], rows)
+    rows = [[e["name"], e["role"], f"{e['epsilon_p']:.3%}", f"{e['epsilon_q']:.3%}"] for e in result.events]
+    table(["event", "role", "epsilon_p", "epsilon_q"], rows)
+    verdict = "holds" if result.acceptable else "does NOT hold"
+    say(f"objective {result.objective:.4e} pu², {result.simulations} simulations in {result.seconds:.2f} s")
+    if result.refused:
+        say(f"  {result.refused} of them had no steady state or diverged and were refused")
+    say(f"the search {result.status}")
+    say(f"acceptance of Eq. (20), epsilon_p and epsilon_q below 5 %: {verdict}")
+    say()
+
+
+def draw(job: Job, found: Any, result: Any, fits: Any) -> list[Path]:
+    """Write fit.svg (one per event beyond the first) and fitness.svg."""
+    from tractexp.report import figures
+
+    paths = []
+    for k, fit in enumerate(fits):
+        suffix = "" if k == 0 else f"_{k + 1}"
+        paths.append(figures.fit(job.folder / f"fit{suffix}.svg", fit, job.choices["optimizer"]))
+    history = found.history
+    known = history.objective < REFUSED
+    curves = {job.choices["optimizer"]: (np.arange(len(known)), history.simulations, history.objective)}
+    return [*paths, figures.fitness(job.folder / "fitness.svg", curves)]
+
+
+def track(job: Job, found: Any, result: Any, paths: list[Path]) -> None:
+    """Log figures, metrics, the fitness curve and the identified model."""
+    metrics = {key: getattr(result, key) for key in ("objective", "epsilon_p", "epsilon_q", "simulations", "seconds")}
+    for k, event in enumerate(result.events, start=1):
+        metrics |= {f"{event['role']}_{k}_{e}": event[e] for e in ("epsilon_p", "epsilon_q")}
+    history = found.history
+    known = history.objective < REFUSED
+    best = history.objective[known]
+    job.log(
+        name=f"{job.choices['optimizer']} seed {job.seed}",
+        values=result.parameters,
+        metrics=metrics,
+        curves={
+            "fitness": (np.flatnonzero(known), best),
+            "fitness_by_simulations": (history.simulations[known], best),
+        },
+        artifacts=[*paths, job.folder / ".hydra"],
+        seconds=result.seconds,
+        model=job.folder / "result.json",
+    )

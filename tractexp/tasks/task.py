@@ -1,0 +1,81 @@
+"""What a task is, and what it is given: the configuration turned into records, a model and an optimizer."""
+
+import functools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+from tractexp.plugin import Plugin, build
+
+
+class Task(Plugin):
+    """Base of the tasks, chosen by `task=NAME`. A task's `run` reads as the story of what it does."""
+
+    group: ClassVar[str] = "task"
+    sourced: ClassVar[bool] = False
+
+    def run(self, job: "Job") -> None:
+        """Do the task. Raises `UserError` before anything is logged where the input is wrong."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run: its configuration as plain data, and the folder it writes to."""
+
+    config: Mapping[str, Any]
+    choices: Mapping[str, str]  # what was chosen in each group: {"optimizer": "issa_no_levy", ...}
+    folder: Path
+    sweep: str | None = None  # run id of the sweep this job belongs to
+
+    def events(self) -> Any:
+        """The recorded events, read and with their dips found (`Events` of `Event`)."""
+        from tractexp.record import Events, detect
+
+        records = build("data", self.config["data"]).read()
+        return Events([detect(r) for r in records.train], [detect(r) for r in records.validate])
+
+    @functools.cached_property
+    def optimizer(self) -> Any:
+        return build("optimizer", self.config["optimizer"])
+
+    @functools.cached_property
+    def model(self) -> Any:
+        from tractexp.model.model import compose
+
+        node = self.config["model"]
+        return compose(build("model/motor", node["motor"]), build("model/static", node["static"]))
+
+    @property
+    def seed(self) -> int:
+        return int(self.config["seed"])
+
+    @property
+    def experiment(self) -> str:
+        """The MLflow experiment: named by the configuration, or after task and data."""
+        return self.config["tracking"]["experiment"] or f"{self.choices['task']} {self.choices['data']}"
+
+    def log(self, name: str, values: Mapping[str, float], **content: Any) -> None:
+        """Log this job in MLflow with its configuration and tags, and say how to look at it.
+
+        `values` are identified parameters; `content` are further fields of `tractexp.tracking.Run`.
+        """
+        node = self.config["tracking"]
+        if not node["enabled"]:
+            return
+        from tractexp import tracking
+        from tractexp.tasks.console import say
+
+        parts = {group: self.choices[group] for group in ("task", "model", "optimizer", "data")}
+        run = tracking.Run(
+            experiment=self.experiment,
+            name=name,
+            parameters={**tracking.flatten(self.config), **values},
+            tags={**parts, "seed": str(self.seed), "git_commit": tracking.git_commit()},
+            parent=self.sweep,
+            **content,
+        )
+        uri = node["uri"] or tracking.default_uri(Path.cwd())
+        tracking.log(run, uri)
+        chosen = f" --uri {node['uri']}" if node["uri"] else ""
+        say(f"logged in experiment '{self.experiment}'; to see it: tractexp ui{chosen}")
