@@ -1,0 +1,262 @@
+"""The model core against the paper's equations, SciPy, and what physics says must hold."""
+
+import itertools
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from tractexp.model.drive import Drive, Excitation
+from tractexp.model.model import compose
+from tractexp.plugin import get
+
+OMEGA_S = 2 * np.pi * 50
+TRUTH = np.array([0.12, 0.25, 0.9, 0.006, 0.55, 1.4, 3.0])  # T', X', C, M, T_m, p_v, q_v
+
+
+@pytest.fixture(scope="module")
+def model():
+    return compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
+
+
+def dip(step=1e-3, length=1.0, depth=0.5, start=0.2, duration=0.15, P0=1.0, Q0=0.6, U0=1.0):
+    """A dip with 20 ms edges, sampled uniformly."""
+    t = np.arange(round(length / step) + 1) * step
+    fall, rise = np.clip((t - start) / 0.02, 0, 1), np.clip((t - start - duration) / 0.02, 0, 1)
+    U = U0 * (1 - depth * (fall - rise))
+    return Excitation(step, U, np.full(len(t), P0), np.full(len(t), Q0), U0, P0, Q0)
+
+
+def candidates(n, rng):
+    """Parameter sets around the truth, all with a steady state."""
+    return TRUTH * rng.uniform(0.85, 1.1, (n, 7))
+
+
+def polar_right_hand_side(t, y, U, omega_s, p):
+    """Eq. (1) exactly as printed: E', delta, omega."""
+    T_prime, X_prime, C, M, T_m = p
+    E, delta, omega = y
+    return [
+        (-E + C * U * np.cos(delta)) / T_prime,
+        -C * U * np.sin(delta) / (T_prime * E) + omega - omega_s,
+        (-U * E * np.sin(delta) / X_prime - T_m) / M,
+    ]
+
+
+def reference(excitation, values, rtol=1e-12):
+    """P and Q by DOP853 on the printed polar equations, restarted at each sample (the input has kinks there)."""
+    *p, p_v, q_v = values
+    T_prime, X_prime, C, _, T_m = p
+    U, U0, h = excitation.U, excitation.U0, excitation.step
+    delta = 0.5 * np.arcsin(-2 * T_m * X_prime / (C * U0**2))  # Eq. (3)
+    state = [C * U0 * np.cos(delta), delta, np.sin(delta) * C * U0 / (T_prime * C * U0 * np.cos(delta))]
+    states = [state]
+    for a, b in itertools.pairwise(U):
+        f = lambda t, y, a=a, b=b: polar_right_hand_side(t, y, a + (b - a) * t / h, 0.0, p)  # noqa: E731
+        state = solve_ivp(f, (0, h), state, method="DOP853", rtol=rtol, atol=1e-13).y[:, -1]
+        states.append(state)
+    E, delta, _ = np.array(states).T
+    P_d, Q_d = -U * E * np.sin(delta) / X_prime, U * (U - E * np.cos(delta)) / X_prime  # Eq. (2)
+    P_s0, Q_s0 = excitation.P0 - P_d[0], excitation.Q0 - Q_d[0]
+    return P_d + P_s0 * (U / U0) ** p_v, Q_d + Q_s0 * (U / U0) ** q_v  # Eqs. (6), (7)
+
+
+def test_right_hand_side_is_the_printed_polar_equation(model):
+    """E = E' exp(j delta): dE/dt = (dE'/dt + j E' ddelta/dt) exp(j delta), at random points."""
+    rng = np.random.default_rng(1)
+    eq = model.equations
+    rows = eq.real_states()
+    for _ in range(20):
+        values = candidates(1, rng)[0]
+        E, delta, omega, omega_s = (
+            rng.uniform(0.3, 1.1),
+            rng.uniform(-1.2, 0.3),
+            rng.uniform(-20, 5),
+            rng.uniform(-2, 2),
+        )
+        U = rng.uniform(0.2, 1.2)
+        dE, ddelta, domega = polar_right_hand_side(0, (E, delta, omega), U, omega_s, values[:5])
+        phasor = (dE + 1j * E * ddelta) * np.exp(1j * delta)
+        known = dict(zip(model.names, values, strict=True)) | {"U": U, "omega_s": omega_s, "omega": omega}
+        known |= {"E_re": E * np.cos(delta), "E_im": E * np.sin(delta)}
+        got = [float(d.subs({s: known[s.name] for s in d.free_symbols})) for _, d, _ in rows]
+        assert got == pytest.approx([phasor.real, phasor.imag, domega], rel=1e-12, abs=1e-12)
+
+
+def test_response_agrees_with_dop853_to_1e_8(model):
+    excitation = dip()
+    response = model.simulate(Drive.of([excitation]), TRUTH, substeps=8)
+    P, Q = reference(excitation, TRUTH)
+    assert np.abs(response.P[0] - P).max() < 1e-8
+    assert np.abs(response.Q[0] - Q).max() < 1e-8
+
+
+@pytest.mark.parametrize("step", [10e-3, 20e-3])
+def test_a_slow_record_is_as_accurate_as_a_fast_one(model, step):
+    excitation = dip(step=step)
+    drive = Drive.of([excitation])
+    substeps, error = model.substeps(drive, TRUTH)
+    response = model.simulate(drive, TRUTH, substeps)
+    P, _ = reference(excitation, TRUTH)
+    assert substeps[0] > 1
+    assert np.abs(response.P[0] - P).max() < 1e-7
+    assert error[0] < 1e-7
+
+
+def test_halving_the_step_shows_order_four(model):
+    drive = Drive.of([dip(step=20e-3)])
+    fine = model.simulate(drive, TRUTH, 256)
+    counts = np.array([4, 8, 16, 32])
+    errors = [np.abs(model.simulate(drive, TRUTH, n).P - fine.P).max() for n in counts]
+    slope = np.polyfit(np.log2(counts), np.log2(errors), 1)[0]
+    assert slope == pytest.approx(-4, abs=0.15)
+
+
+@pytest.mark.parametrize("U0", [0.93, 1.0, 1.05])
+def test_flat_input_stays_flat(model, U0):
+    t = np.arange(2000) * 1e-3
+    flat = Excitation(1e-3, np.full(len(t), U0), np.ones(len(t)), np.full(len(t), 0.6), U0, 1.0, 0.6)
+    response = model.simulate(Drive.of([flat]), candidates(20, np.random.default_rng(2)))
+    assert np.abs(response.P - 1.0).max() < 1e-12
+    assert np.abs(response.Q - 0.6).max() < 1e-12
+
+
+def test_recorded_frequency_moves_the_synchronous_speed(model):
+    """At a constant off-nominal frequency the load is in the same steady state: flat stays flat, slip unchanged."""
+    t = np.arange(500) * 1e-3
+    speed = np.full(len(t), -3.0)
+    flat = Excitation(1e-3, np.ones(len(t)), np.ones(len(t)), np.full(len(t), 0.6), 1.0, 1.0, 0.6, speed, -3.0)
+    response = model.simulate(Drive.of([flat]), TRUTH)
+    assert np.abs(response.P - 1.0).max() < 1e-12
+
+
+def test_steady_state_is_the_equivalent_circuit(model):
+    """With R_s = 0: Z = j X_s + (j X_m) || (R_r/s + j X_r), slip s from omega, same P and Q."""
+    X_s, X_m, X_r, R_r, U = 0.1, 3.0, 0.12, 0.02, 1.02
+    X, X_prime = X_s + X_m, X_s + X_m * X_r / (X_m + X_r)
+    T_prime = X_prime / X * (X_m + X_r) / (OMEGA_S * R_r)
+    slip = 0.015
+    rotor = R_r / slip + 1j * X_r
+    S = U**2 / np.conj(1j * X_s + 1j * X_m * rotor / (1j * X_m + rotor))
+    values = [T_prime, X_prime, (X - X_prime) / X, 0.006, S.real, 1.5, 2.0]
+    t = np.arange(50) * 1e-3
+    flat = Excitation(1e-3, np.full(50, U), np.zeros(50), np.zeros(50), U, S.real, S.imag)
+    eq = model.equations
+    known = dict(zip(model.names, values, strict=True)) | {"U0": U, "omega_s0": 0.0}
+    starts = {s.name: complex(i.subs({x: known[x.name] for x in i.free_symbols})).real for s, _, i in eq.real_states()}
+    assert starts["omega"] == pytest.approx(-slip * OMEGA_S, rel=1e-9)
+    # all of P and Q is the motor's, so nothing is left to the static part: flat at S whatever its exponents
+    response = model.simulate(Drive.of([flat]), values)
+    assert response.Q[0] == pytest.approx(np.full(50, S.imag), abs=1e-12)
+    assert U * (U - starts["E_re"]) / X_prime == pytest.approx(S.imag, rel=1e-9)
+    assert len(t) == 50
+
+
+def test_one_candidate_gives_the_bits_of_a_batch(model):
+    values = candidates(37, np.random.default_rng(3))
+    drive = Drive.of([dip()])
+    batch = model.errors(drive, values).sums
+    responses = model.simulate(drive, values)
+    for k in (0, 15, 16, 36):
+        alone = model.simulate(drive, values[k])
+        assert np.array_equal(model.errors(drive, values[k]).sums[..., 0], batch[..., k])
+        assert np.array_equal(alone.P[0], responses.P[k])
+        assert np.array_equal(alone.Q[0], responses.Q[k])
+
+
+def test_sums_are_those_of_the_responses(model):
+    rng = np.random.default_rng(4)
+    excitation = dip()
+    P, Q = rng.normal(1, 0.1, len(excitation.U)), rng.normal(0.6, 0.1, len(excitation.U))
+    drive = Drive.of([Excitation(1e-3, excitation.U, P, Q, 1.0, 1.0, 0.6)])
+    values = candidates(5, rng)
+    response, errors = model.simulate(drive, values), model.errors(drive, values)
+    assert errors.sums[0, 0] == pytest.approx(((response.P - P) ** 2).sum(axis=1), rel=1e-12)
+    assert errors.sums[0, 1] == pytest.approx(((response.Q - Q) ** 2).sum(axis=1), rel=1e-12)
+
+
+def test_events_in_one_pass_are_the_events_one_by_one(model):
+    events = [dip(), dip(step=2e-3, depth=0.3, P0=0.8, Q0=0.5, U0=0.98), dip(depth=0.65, duration=0.1)]
+    values = candidates(20, np.random.default_rng(5))
+    substeps = [1, 3, 2]
+    together = model.errors(Drive.of(events), values, substeps).sums
+    for e, (event, n) in enumerate(zip(events, substeps, strict=True)):
+        assert np.array_equal(model.errors(Drive.of([event]), values, n).sums[0], together[e])
+
+
+def test_a_gap_in_the_measurement_is_left_out(model):
+    whole = dip()
+    P = whole.P.copy()
+    P[100:140] = np.nan
+    gappy = Excitation(whole.step, whole.U, P, whole.Q, 1.0, 1.0, 0.6)
+    sums = [model.errors(Drive.of([e]), TRUTH).sums[0, :, 0] for e in (whole, gappy)]
+    response = model.simulate(Drive.of([whole]), TRUTH)
+    left_out = ((response.P[0, 100:140] - 1.0) ** 2).sum()
+    assert sums[1][0] == pytest.approx(sums[0][0] - left_out, rel=1e-12)
+    assert sums[1][1] == sums[0][1]
+
+
+def test_candidates_without_a_steady_state_are_refused_and_ranked(model):
+    """|2 T_m X'/(C U0^2)| = 1.25, 2.5, 5: each misses by what exceeds 1; a feasible neighbor is untouched."""
+    values = np.tile(TRUTH, (4, 1))
+    values[1:, 1] = np.array([1.25, 2.5, 5.0]) * 0.9 / (2 * 0.55)
+    errors = model.errors(Drive.of([dip()]), values)
+    assert errors.miss == pytest.approx([0, 0.25, 1.5, 4.0])
+    assert errors.refused.tolist() == [False, True, True, True]
+    assert np.array_equal(errors.sums[..., 0], model.errors(Drive.of([dip()]), TRUTH).sums[..., 0])
+
+
+@pytest.mark.parametrize(
+    ("column", "values", "limit"),
+    [
+        ("ISSA", [4.1354, 1.6654, -2.6241, 0.82, 3.378, 3.5867, 3.056], "4.29"),
+        ("SSA", [-3.8726, 1.8054, 1.8197, 0.3427, 3.0239, 1.9803, 2.128], "6"),
+        ("PSO", [2.1863, 0.75606, 0.627, 1.7738, 1.2298, 2.5629, 1.286], "2.97"),
+    ],
+)
+def test_the_papers_own_values_get_the_reason_why_they_cannot_be_simulated(model, column, values, limit):
+    sentence = model.refusal(values, Drive.of([dip()]))
+    assert f"it is {limit}" in sentence, column
+    assert "Eq. (3)" in sentence
+    assert ("C = (X - X')/X must lie between 0 and 1" in sentence) == (column != "PSO")
+    assert ("T_prime must be positive" in sentence) == (column == "SSA")
+
+
+def test_good_values_are_not_refused(model):
+    assert model.refusal(TRUTH, Drive.of([dip()])) is None
+
+
+@pytest.mark.parametrize("bound", range(14))
+def test_every_parameter_at_each_bound_is_finite_or_refused(model, bound):
+    values = TRUTH.copy()
+    values[bound // 2] = model.parameters[bound // 2].bounds[bound % 2]
+    drive = Drive.of([dip()])
+    errors = model.errors(drive, values, 16)
+    assert errors.refused[0] == (errors.miss[0] > 0)
+
+
+def test_equations_in_latex_name_every_parameter(model):
+    text = " ".join(model.latex())
+    for parameter in model.parameters:
+        assert parameter.symbol in text
+
+
+def test_a_kernel_is_shared_by_processes_that_start_together(tmp_path):
+    program = (
+        "from tractexp.plugin import get; from tractexp.model.model import compose;"
+        "m = compose(get('model/motor', 'electromechanical')(), get('model/static', 'exponential')());"
+        "print(m.kernel.__file__)"
+    )
+    environment = os.environ | {"TRACTEXP_CACHE_DIR": str(tmp_path)}
+    started = [
+        subprocess.Popen([sys.executable, "-c", program], env=environment, stdout=subprocess.PIPE, text=True)
+        for _ in range(3)
+    ]
+    files = {p.communicate()[0].strip() for p in started}
+    assert all(p.returncode == 0 for p in started)
+    assert len(files) == 1
+    assert len(list(tmp_path.glob("*.py"))) == 1
+    assert not list(tmp_path.glob("*.part"))
