@@ -1,0 +1,158 @@
+"""The figures of a run: the fit of a recorded event, and how the search got there. Arrays in, a file out.
+
+Matplotlib is used through its objects and imported when the first figure is drawn. Labels avoid mathematical
+typesetting, whose parser costs more than a figure.
+"""
+
+import textwrap
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.identify.search import REFUSED
+from tractexp.report import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Power = tuple[np.ndarray, np.ndarray]  # P, Q [pu], each (N,)
+SMALLEST = 1e-30  # stands for the objective 0 of a perfect fit, which has no logarithm
+Curves = Mapping[str, tuple[np.ndarray, np.ndarray]]  # label -> (x (n,), objective (n,))
+
+
+def fit(
+    path: Path,
+    t: np.ndarray,
+    U: np.ndarray,
+    measured: Power,
+    calculated: Power,
+    *,
+    title: str,
+    epsilon: tuple[float, float],
+    notes: Sequence[str] = (),
+) -> Path:
+    """Draw voltage, measured against calculated P and Q, and their residuals over time [s]; all in pu, shape (N,).
+
+    `epsilon` is (epsilon_p, epsilon_q) of Eq. (20), fractions. `notes` are set under the title: say there when the
+    data are synthetic. nan in the power is a gap. Raises `UserError` when there is nothing to draw.
+    """
+    _check_lengths(path, t=t, U=U, P=measured[0], Q=measured[1], calculated_P=calculated[0], calculated_Q=calculated[1])
+    from matplotlib import rc_context
+
+    with rc_context(style.SETTINGS):
+        figure, top = _page(8.0, 7.8, title, notes)
+        panels = figure.subplots(4, 1, sharex=True, height_ratios=(1.0, 1.7, 1.7, 1.1))
+        figure.subplots_adjust(left=0.1, right=0.975, bottom=0.06, top=top, hspace=0.13)
+        panels[0].plot(*style.thin(t, U), color=style.VOLTAGE, label="voltage")
+        for panel, name, color, seen, made, error in zip(
+            panels[1:3], "PQ", (style.ACTIVE, style.REACTIVE), measured, calculated, epsilon, strict=True
+        ):
+            label = f"{name} calculated (epsilon_{name.lower()} = {100 * error:.3g} %)"
+            panel.plot(*style.thin(t, seen), color=style.MEASURED, linewidth=2.6, label=f"{name} measured")
+            panel.plot(*style.thin(t, made), color=color, label=label)
+            panels[3].plot(*style.thin(t, seen - made), color=color, linewidth=0.8, alpha=0.75, label=name)
+        panels[3].axhline(0.0, color=style.FAINT, linewidth=0.7, zorder=0.5)
+        for panel, label in zip(panels, ("U [pu]", "P [pu]", "Q [pu]", "residual [pu]"), strict=True):
+            _label_axis(panel, label, -0.085)
+            _legend_above(panel)
+        panels[3].set_xlabel("t [s]")
+        return style.save(figure, path)
+
+
+def fitness(
+    path: Path, by_iteration: Curves, by_simulations: Curves, *, title: str = "", notes: Sequence[str] = ()
+) -> Path:
+    """Draw the best objective [pu²] by iteration and by simulations, on a logarithmic axis, one curve per label.
+
+    Objectives that are not finite or mark a refused candidate are left out. Raises `UserError` when none is left.
+    """
+    from matplotlib import rc_context
+
+    with rc_context(style.SETTINGS):
+        figure, top = _page(8.0, 3.9, title, notes)
+        panels = figure.subplots(1, 2, sharey=True)
+        figure.subplots_adjust(left=0.1, right=0.975, bottom=0.13, top=top, wspace=0.07)
+        drawn = np.concatenate(
+            [_draw_curves(path, panels[0], by_iteration), _draw_curves(path, panels[1], by_simulations)]
+        )
+        _logarithmic(panels[0], drawn.min(), drawn.max())
+        _label_axis(panels[0], "best objective [pu²]", -0.18)
+        panels[0].set_xlabel("iteration")
+        panels[1].set_xlabel("simulations")
+        panels[1].locator_params(axis="x", nbins=6)
+        if len(by_iteration) > 1:
+            panels[1].legend(loc="upper right")
+        return style.save(figure, path)
+
+
+def _check_lengths(path: Path, **columns: np.ndarray) -> None:
+    samples = len(columns["t"])
+    if samples < 2:
+        raise UserError(f"{path}: a figure needs at least 2 samples, there are {samples}")
+    for name, values in columns.items():
+        if len(values) != samples:
+            raise UserError(f"{path}: t has {samples} samples and {name} has {len(values)}; they must be as many")
+        if not np.isfinite(values).any():
+            raise UserError(f"{path}: {name} has no finite value to draw")
+
+
+def _page(width: float, height: float, title: str, notes: Sequence[str]) -> "tuple[Figure, float]":
+    """An empty figure [inch] with its heading, and how far up the panels may reach (a share of the height)."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height))
+    lines = [line for note in notes for line in textwrap.wrap(note, 118)]
+    figure.text(0.015, 1 - 0.1 / height, title, va="top", fontsize=11, fontweight="bold")
+    figure.text(0.015, 1 - 0.31 / height, "\n".join(lines), va="top", color=style.FAINT, fontsize=8, linespacing=1.25)
+    return figure, 1 - (0.52 + 0.14 * len(lines)) / height
+
+
+def _legend_above(panel: "Axes") -> None:
+    panel.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=3, borderpad=0, borderaxespad=0, handlelength=1.6)
+
+
+def _label_axis(panel: "Axes", label: str, x: float) -> None:
+    """Set the label of the vertical axis at a fixed place, where it lines up with its neighbors'."""
+    panel.set_ylabel(label)
+    panel.yaxis.set_label_coords(x, 0.5)
+
+
+def _draw_curves(path: Path, panel: "Axes", curves: Curves) -> np.ndarray:
+    """Draw each curve as the steps that a best value takes, and return all objectives drawn."""
+    drawn = []
+    for (label, (x, y)), line in zip(curves.items(), style.lines(), strict=False):
+        x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+        if len(x) != len(y):
+            raise UserError(f"{path}: the curve '{label}' has {len(x)} steps and {len(y)} objectives")
+        shown = np.isfinite(y) & (y >= 0) & (y < REFUSED)
+        x, y = x[shown], np.maximum(y[shown], SMALLEST)
+        panel.plot(*style.thin(x, y), **line, drawstyle="steps-post", label=label)
+        drawn.append(y)
+    if not any(map(len, drawn)):
+        raise UserError(
+            f"{path}: there is no objective to draw: the history is empty or every candidate was refused "
+            f"(objective {REFUSED:g} or more)"
+        )
+    return np.concatenate(drawn)
+
+
+def _logarithmic(panel: "Axes", lowest: float, highest: float) -> None:
+    """Ticks at powers of ten, or where the curves span less than that, at round numbers between."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
+
+    def text(value: float, _: int) -> str:
+        """0.01 is 0.01, 0.00001234 is 1.234e-5."""
+        if 1e-2 <= value < 1e4:
+            return f"{value:.4g}"
+        digits, power = f"{value:.3e}".split("e")
+        return f"{digits.rstrip('0').rstrip('.')}e{int(power)}"
+
+    panel.set_yscale("log")
+    narrow = highest < 30 * lowest
+    panel.yaxis.set_major_locator(MaxNLocator(6) if narrow else LogLocator(numticks=8))
+    panel.yaxis.set_minor_locator(NullLocator())
+    panel.yaxis.set_major_formatter(FuncFormatter(text))
