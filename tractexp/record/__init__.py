@@ -1,0 +1,10 @@
+"""Records of voltage dips: what they hold, where they come from, and the event inside."""
+
+from tractexp.record.event import Event as Event
+from tractexp.record.event import describe as describe
+from tractexp.record.event import detect as detect
+from tractexp.record.event import find_dips as find_dips
+from tractexp.record.reader import Events as Events
+from tractexp.record.reader import Reader as Reader
+from tractexp.record.record import Base as Base
+from tractexp.record.record import Record as Record

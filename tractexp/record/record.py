@@ -1,8 +1,17 @@
 """A recorded event: the measured voltage and the power the load drew from it."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
+
+from tractexp.errors import UserError
+
+JITTER = 0.01  # of a step: times closer than this to a uniform grid count as uniform
+LONGEST_STEP = 0.2  # s: slower sampling cannot show a motor's response
+FEWEST_SAMPLES = 20
+PLAUSIBLE_VOLTAGE = (0.5, 1.5)  # pu, at the start of a record
+PLAUSIBLE_POWER = 20.0  # pu, at the start of a record
 
 
 @dataclass(frozen=True)
@@ -42,3 +51,119 @@ class Record:
     def step(self) -> float:
         """Time between samples [s]."""
         return float((self.t[-1] - self.t[0]) / (len(self.t) - 1))
+
+    @property
+    def rate(self) -> float:
+        """Samples per second [Hz]."""
+        return 1 / self.step
+
+    @property
+    def where(self) -> str:
+        """What messages call this record: its source, else its name."""
+        return self.source or self.name
+
+    @property
+    def channels(self) -> dict[str, np.ndarray]:
+        """The arrays present, by name, time first."""
+        every = {"t": self.t, "U": self.U, "P": self.P, "Q": self.Q, "f": self.f, "U2": self.U2}
+        return {name: values for name, values in every.items() if values is not None}
+
+    def check(self, place: Callable[[int], str] | None = None) -> "Record":
+        """Return the record; raise `UserError` with the source, the place and the value of what is wrong.
+
+        `place(i)` says where sample i stands in the file ("line 17"); by default sample and time are named.
+        """
+        place = place or self._place
+        self._check_values(place)
+        self._check_times(place)
+        self._check_per_unit()
+        return self
+
+    def uniform(self, place: Callable[[int], str] | None = None) -> "Record":
+        """The record on a uniform time grid of as many samples; a note says so where more than `JITTER` moved.
+
+        Raises `UserError` where a step differs by half from the usual one, which means missing rows, not jitter.
+        """
+        place = place or self._place
+        self._check_values(place)
+        grid = np.linspace(self.t[0], self.t[-1], len(self.t))
+        off = float(np.abs(self.t - grid).max() / self.step)
+        if off == 0:
+            return self
+        if off <= JITTER:
+            return replace(self, t=grid)
+        steps = np.diff(self.t)
+        usual = float(np.median(steps))
+        wrong = np.abs(steps - usual) > 0.5 * usual
+        if wrong.any():
+            i = int(np.argmax(wrong)) + 1
+            raise UserError(
+                f"{self.where}: {place(i)}: t advances by {steps[i - 1]:g} s where {usual:g} s is usual: rows are "
+                "missing; fill them in (P and Q may be nan, U may not) or cut the record there"
+            )
+        moved = {name: np.interp(grid, self.t, values) for name, values in self.channels.items()}
+        moved["t"] = grid
+        note = f"times were up to {100 * off:.2g} % of a step off a uniform grid: resampled linearly"
+        return replace(self, **moved, notes=(*self.notes, note))
+
+    def _place(self, i: int) -> str:
+        return f"sample {i + 1} (t = {self.t[i]:g} s)"
+
+    def _check_values(self, place: Callable[[int], str]) -> None:
+        n = self.samples
+        for name, values in self.channels.items():
+            if values.shape != (n,):
+                raise UserError(f"{self.where}: {name} has shape {values.shape} where t has {n} samples")
+            bad = np.isinf(values) if name in ("P", "Q") else ~np.isfinite(values)
+            if bad.any():
+                i = int(np.argmax(bad))
+                gap = "" if name in ("P", "Q") else "; only P and Q may have gaps (nan)"
+                raise UserError(f"{self.where}: {place(i)}: {name} = {values[i]} is not a finite number{gap}")
+            if np.isnan(values).all():
+                raise UserError(f"{self.where}: {name} holds no number at all")
+        if n < FEWEST_SAMPLES:
+            raise UserError(f"{self.where}: only {n} samples; a record needs at least {FEWEST_SAMPLES}")
+        back = np.diff(self.t) <= 0
+        if back.any():
+            i = int(np.argmax(back)) + 1
+            raise UserError(
+                f"{self.where}: {place(i)}: time does not increase: t = {self.t[i]:.9g} s after {self.t[i - 1]:.9g} s"
+            )
+        if (self.U <= 0).any():
+            i = int(np.argmax(self.U <= 0))
+            raise UserError(f"{self.where}: {place(i)}: U = {self.U[i]:g}, but voltage must be above zero everywhere")
+
+    def _check_times(self, place: Callable[[int], str]) -> None:
+        off = np.abs(self.t - np.linspace(self.t[0], self.t[-1], self.samples)) / self.step
+        if off.max() > JITTER:
+            i = int(np.argmax(off))
+            raise UserError(
+                f"{self.where}: {place(i)}: sampling is not uniform: t = {self.t[i]:.9g} s is {100 * off[i]:.2g} % of "
+                f"a step off the uniform grid; at most {100 * JITTER:g} % is allowed"
+            )
+        if self.step > LONGEST_STEP:
+            raise UserError(
+                f"{self.where}: one sample every {self.step:g} is too slow; t must be in seconds and its step at most "
+                f"{LONGEST_STEP:g} s"
+            )
+
+    def _check_per_unit(self) -> None:
+        low, high = PLAUSIBLE_VOLTAGE
+        U = float(np.median(self.U[:FEWEST_SAMPLES]))
+        if not low <= U <= high:
+            raise UserError(
+                f"{self.where}: U starts at {U:g}, which is not per unit ({low:g} to {high:g} is expected); if it is "
+                "in kV, give the base as data.base_voltage (kV, line to line)"
+            )
+        S = float(np.nanmax(np.abs([self.P, self.Q])))
+        if S > PLAUSIBLE_POWER:
+            raise UserError(
+                f"{self.where}: P or Q reaches {S:g}, which is not per unit (up to {PLAUSIBLE_POWER:g} is expected); "
+                "if it is in MW, give the base as data.base_power (MVA)"
+            )
+        if self.f is not None and np.abs(self.f / self.base.frequency - 1).max() > 0.2:
+            i = int(np.argmax(np.abs(self.f - self.base.frequency)))
+            raise UserError(
+                f"{self.where}: {self._place(i)}: f = {self.f[i]:g} is more than 20 % off the nominal "
+                f"{self.base.frequency:g} Hz; f must be in Hz and data.frequency the nominal frequency"
+            )

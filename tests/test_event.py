@@ -1,0 +1,157 @@
+"""Where a dip is found, how deep, and what is refused."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tractexp.errors import UserError
+from tractexp.record import Record, describe, detect, find_dips
+from tractexp.record.event import noise
+
+
+def dip(step=1e-3, length=1.0, start=0.3, duration=0.15, depth=0.5, sigma=0.002, slow=0.0, seed=0):
+    """A voltage that falls at once and recovers, all but the share `slow` of the depth, at once."""
+    t = np.arange(round(length / step)) * step
+    inside = (t > start - step / 2) & (t < start + duration - step / 2)
+    U = np.where(inside, 1 - depth, 1.0)
+    after = t >= start + duration - step / 2
+    U[after] -= slow * depth * np.exp(-(t[after] - start - duration) / 0.2)
+    rng = np.random.default_rng(seed)
+    P, Q = 0.8 * U**1.5, 0.4 * U**2
+    U, P, Q = (x + sigma * rng.standard_normal(len(t)) for x in (U, P, Q))
+    return Record(name="dip", t=t, U=U, P=P, Q=Q, source="dip.csv")
+
+
+@pytest.mark.parametrize("depth", [0.08, 0.3, 0.5, 0.65])
+@pytest.mark.parametrize("step", [1e-3, 5e-3, 10e-3, 20e-3])
+def test_a_clean_cut_dip_is_found_to_the_sample(step, depth):
+    event = detect(dip(step=step, start=0.4, duration=0.2, depth=depth))
+    assert (event.t_start, event.t_end) == (pytest.approx(0.4, abs=1e-9), pytest.approx(0.6, abs=1e-9))
+    assert event.depth == pytest.approx(depth, abs=4 * 0.002)
+    assert event.start == round(0.4 / step)
+
+
+def test_steady_state_and_noise_are_those_of_the_samples_before():
+    event = detect(dip(length=3.0, start=2.0, sigma=0.004))
+    assert event.steady == slice(1000, 2000)
+    error_of_mean, error_of_sigma = 4 * 0.004 / np.sqrt(1000), 4 * 0.004 / np.sqrt(2000)
+    np.testing.assert_allclose([event.U0, event.P0, event.Q0], [1.0, 0.8, 0.4], atol=error_of_mean)
+    np.testing.assert_allclose([event.noise_U, event.noise_P, event.noise_Q], 0.004, atol=error_of_sigma)
+    assert event.f0 == 50.0
+
+
+def test_noise_ignores_a_linear_trend_and_gaps():
+    t = np.linspace(0, 1, 1000)
+    wave = 0.01 * np.random.default_rng(3).standard_normal(1000)
+    values = 5 + 3 * t + wave
+    values[100:110] = np.nan
+    x = np.column_stack([np.ones(990), t[np.isfinite(values)]])
+    rest = np.linalg.lstsq(x, values[np.isfinite(values)], rcond=None)[1][0]
+    assert noise(t, values) == pytest.approx(np.sqrt(rest / 988), rel=1e-9)
+
+
+def test_recorded_frequency_gives_f0():
+    made = dip()
+    f = np.where(made.t < 0.3, 49.9, 50.3)
+    with_f = Record(name="dip", t=made.t, U=made.U, P=made.P, Q=made.Q, f=f)
+    assert detect(with_f).f0 == pytest.approx(49.9)
+
+
+def test_slow_recovery_ends_the_dip_when_a_tenth_of_the_depth_is_left():
+    event = detect(dip(slow=0.4, sigma=0.0))
+    assert event.t_end == pytest.approx(0.45 + 0.2 * np.log(4), abs=0.002)  # 0.4 exp(-t/0.2) = 0.1
+
+
+def test_a_voltage_that_settles_a_little_lower_has_recovered():
+    made = dip(sigma=0.0005)
+    U = np.where(made.t >= 0.449, 0.96, made.U)
+    assert detect(Record(name="dip", t=made.t, U=U, P=made.P, Q=made.Q)).t_end == pytest.approx(0.45, abs=0.002)
+
+
+def test_a_noisy_record_without_dip_stays_silent():
+    for seed in range(20):
+        t = np.arange(5000) * 1e-3
+        assert find_dips(t, 1 + 0.02 * np.random.default_rng(seed).standard_normal(5000)) == []
+
+
+def test_slow_drift_of_ten_percent_is_no_dip():
+    t = np.arange(20000) * 1e-3
+    U = 1 - 0.005 * t + 0.001 * np.random.default_rng(0).standard_normal(len(t))
+    assert find_dips(t, U) == []
+
+
+def test_several_dips_are_found_in_order_and_close_ones_are_one():
+    t = np.arange(10000) * 1e-3
+    U = np.ones(10000)
+    for start, end in ((1000, 1150), (4000, 4040), (7000, 7100), (7110, 7200)):
+        U[start:end] = 0.7
+    assert find_dips(t, U) == [(1000, 1150), (4000, 4040), (7000, 7200)]
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    depth=st.floats(0.05, 0.9),
+    start=st.integers(10, 500),
+    duration=st.integers(5, 400),
+    scale=st.floats(0.6, 1.4),
+    seed=st.integers(0, 1000),
+)
+def test_any_noisy_dip_is_found_once_to_two_samples(depth, start, duration, scale, seed):
+    U = np.ones(1000)
+    U[start : start + duration] -= depth
+    U = scale * (U + 0.001 * np.random.default_rng(seed).standard_normal(1000))
+    [(a, b)] = find_dips(np.arange(1000) * 1e-3, U)
+    assert abs(a - start) <= 2
+    assert abs(b - start - duration) <= 2
+
+
+def test_no_dip_is_refused_with_the_largest_deviation():
+    with pytest.raises(UserError, match=r"dip.csv: no dip found: .* falls at most 2 % below it .* must exceed 3 %"):
+        detect(dip(depth=0.02, sigma=0.0))
+
+
+def test_a_swell_alone_is_refused_and_said():
+    made = dip(depth=-0.1, sigma=0.0)
+    with pytest.raises(UserError, match=r"it rises by 10 % at t = 0.3 s: a swell is not fitted"):
+        detect(made)
+
+
+def test_a_record_that_starts_inside_the_dip_is_refused():
+    with pytest.raises(UserError, match="starts inside a dip lacks the steady state"):
+        detect(dip(start=-0.05, sigma=0.0))
+
+
+def test_too_few_samples_before_are_refused():
+    with pytest.raises(UserError, match=r"dip.csv: the dip starts at sample 9 \(t = 0.008 s\): .* at least 10 samples"):
+        detect(dip(start=0.008, sigma=0.0))
+
+
+def test_a_record_shorter_than_the_dip_is_refused():
+    with pytest.raises(
+        UserError, match=r"dip.csv: the record is shorter than the dip: it ends at t = 0.999 s with U = "
+    ):
+        detect(dip(start=0.9, duration=0.5))
+
+
+def test_lost_power_before_the_dip_is_refused():
+    made = dip()
+    P = np.where(made.t < 0.295, np.nan, made.P)
+    with pytest.raises(UserError, match="P and Q have fewer than 10 values"):
+        detect(Record(name="dip", t=made.t, U=made.U, P=P, Q=made.Q))
+
+
+def test_the_sentence_a_user_reads():
+    said = describe(detect(dip(sigma=0.0)))
+    assert said == (
+        "dip of 50 % lasting 150 ms at t = 0.300 s, 300 samples before it, 1000 Hz, "
+        "noise 0.00 % in P and 0.00 % in Q, of P"
+    )
+
+
+def test_the_sentence_mentions_what_is_unusual():
+    made = dip()
+    P = np.where(np.arange(made.samples) == 700, np.nan, -made.P)
+    said = describe(detect(Record(name="dip", t=made.t, U=made.U, P=P, Q=made.Q)))
+    assert "P is -0.8 before the dip" in said
+    assert "1 samples lack P or Q" in said

@@ -1,0 +1,189 @@
+"""The event inside a record: where the dip is, what came before it, and how noisy the recording is."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.record.record import Record
+
+SHALLOWEST = 0.03  # of the voltage before: anything less is no dip
+NOISE_FACTOR = 6.0  # standard deviations of noise that a dip must exceed
+RECOVERED = 0.1  # of the depth: the dip ends when no more than this is missing, or the threshold if that is more
+FEWEST_BEFORE = 10  # samples before a dip, for the steady state and the noise
+MERGED = 0.02  # s: dips closer than one cycle are one
+STEADY = 1.0  # s: the steady state is the mean over at most so long before the dip
+
+
+@dataclass(frozen=True, eq=False)
+class Event:
+    """The first dip of `record`. Means and noise are those of the samples `steady`, before the dip.
+
+    Noise is the standard deviation about a straight line. `end` is the first sample after the dip, where the
+    voltage has regained all but a tenth of the depth (or all but 3 %, if that is more).
+    """
+
+    record: Record
+    start: int  # first sample of the dip
+    end: int
+    depth: float  # 1 - U_min / U0
+    U0: float  # pu
+    P0: float  # pu
+    Q0: float  # pu
+    f0: float  # Hz
+    noise_U: float  # pu
+    noise_P: float  # pu
+    noise_Q: float  # pu
+    steady: slice
+    dips: int  # in the whole record
+
+    @property
+    def t_start(self) -> float:
+        return float(self.record.t[self.start])
+
+    @property
+    def t_end(self) -> float:
+        return float(self.record.t[self.end])
+
+    @property
+    def duration(self) -> float:
+        """Length of the dip [s]."""
+        return self.t_end - self.t_start
+
+    @property
+    def rate(self) -> float:
+        """Samples per second [Hz]."""
+        return self.record.rate
+
+
+def noise(t: np.ndarray, values: np.ndarray) -> float:
+    """Standard deviation of `values` (N,) about their least-squares line, gaps (nan) left out."""
+    known = np.isfinite(values)
+    if np.count_nonzero(known) < 3:
+        return float("nan")
+    x, y = t[known] - t[known].mean(), values[known] - values[known].mean()
+    rest = y - x * (x @ y) / (x @ x)
+    return float(np.sqrt(rest @ rest / (len(y) - 2)))
+
+
+def find_dips(t: np.ndarray, U: np.ndarray) -> list[tuple[int, int]]:
+    """All dips of a voltage (N,), in order of time, as (start, end) sample numbers; end = N if never recovered.
+
+    A dip falls by more than 3 % (or six standard deviations of the sample noise) below a reference that starts at
+    the level of the first samples, follows slow changes, and starts anew after each dip. Rises are not dips.
+    """
+    spread = np.median(np.abs(np.diff(U))) / 0.6745 / np.sqrt(2)
+    margin = max(SHALLOWEST, NOISE_FACTOR * float(spread / np.median(U)))
+    block = max(FEWEST_BEFORE, round(0.1 * (len(t) - 1) / float(t[-1] - t[0])))
+    reference = float(np.median(U[:FEWEST_BEFORE]))
+    dips: list[tuple[int, int]] = []
+    k = 0
+    while k < len(U):
+        part = U[k : k + block]
+        below = part < (1 - margin) * reference
+        if not below.any():
+            reference += 0.1 * (float(np.median(part)) - reference)
+            k += len(part)
+            continue
+        crossing = k + int(np.argmax(below))
+        start = _onset(U, dips[-1][1] if dips else 0, crossing, reference, margin)
+        end = _recovery(U, crossing, reference, margin)
+        if dips and t[start] - t[dips[-1][1]] < MERGED:
+            start = dips.pop()[0]
+        dips.append((start, end))
+        if end < len(U):  # the higher: the short one where another dip follows soon, the long one while U still rises
+            reference = max(float(np.median(U[end : end + n])) for n in (FEWEST_BEFORE, block))
+        k = end
+    return dips
+
+
+def _onset(U: np.ndarray, first: int, crossing: int, reference: float, margin: float) -> int:
+    """The sample after the last one, not before `first`, that was still within a tenth of the margin."""
+    high = np.flatnonzero(U[first:crossing] >= (1 - margin / 10) * reference)
+    return first + int(high[-1]) + 1 if len(high) else crossing
+
+
+def _recovery(U: np.ndarray, crossing: int, reference: float, margin: float) -> int:
+    """The first sample that has recovered from the lowest voltage so far, or len(U)."""
+    after = U[crossing:]
+    missing = reference - np.minimum.accumulate(after)
+    recovered = after >= reference - np.maximum(margin * reference, RECOVERED * missing)
+    return crossing + int(np.argmax(recovered)) if recovered.any() else len(U)
+
+
+def detect(record: Record) -> Event:
+    """The first dip of a record; raises `UserError` for none, one that does not end, or one that comes too early."""
+    dips = find_dips(record.t, record.U)
+    if not dips:
+        raise UserError(_no_dip(record))
+    start, end = dips[0]
+    if start < FEWEST_BEFORE:
+        raise UserError(
+            f"{record.where}: the dip starts at sample {start + 1} (t = {record.t[start]:g} s): the steady state "
+            f"before it needs at least {FEWEST_BEFORE} samples; give a record that starts earlier"
+        )
+    if end == record.samples:
+        raise UserError(
+            f"{record.where}: the record is shorter than the dip: it ends at t = {record.t[-1]:g} s with U = "
+            f"{record.U[-1]:.3g} where it was {record.U[:start].mean():.3g} before the dip of t = "
+            f"{record.t[start]:g} s; give a record that shows the recovery"
+        )
+    steady = slice(max(0, start - max(FEWEST_BEFORE, round(STEADY * record.rate))), start)
+    t, U, P, Q = (values[steady] for values in (record.t, record.U, record.P, record.Q))
+    if np.count_nonzero(np.isfinite(P) & np.isfinite(Q)) < FEWEST_BEFORE:
+        raise UserError(
+            f"{record.where}: P and Q have fewer than {FEWEST_BEFORE} values in the {steady.stop - steady.start} "
+            f"samples before the dip at t = {record.t[start]:g} s; the steady state cannot be told"
+        )
+    U0 = float(U.mean())
+    return Event(
+        record=record,
+        start=start,
+        end=end,
+        depth=1 - float(record.U[start:end].min()) / U0,
+        U0=U0,
+        P0=float(np.nanmean(P)),
+        Q0=float(np.nanmean(Q)),
+        f0=record.base.frequency if record.f is None else float(record.f[steady].mean()),
+        noise_U=noise(t, U),
+        noise_P=noise(t, P),
+        noise_Q=noise(t, Q),
+        steady=steady,
+        dips=len(dips),
+    )
+
+
+def _no_dip(record: Record) -> str:
+    reference = float(np.median(record.U[:FEWEST_BEFORE]))
+    low, high = int(np.argmin(record.U)), int(np.argmax(record.U))
+    fall, rise = 1 - record.U[low] / reference, record.U[high] / reference - 1
+    sentence = (
+        f"{record.where}: no dip found: the voltage starts at {reference:.4g} and falls at most {100 * fall:.2g} % "
+        f"below it (t = {record.t[low]:g} s), but a dip must exceed {100 * SHALLOWEST:g} % and the noise"
+    )
+    if rise > SHALLOWEST:
+        sentence += (
+            f"; it rises by {100 * rise:.2g} % at t = {record.t[high]:g} s: a swell is not fitted, and a record that "
+            "starts inside a dip lacks the steady state before it"
+        )
+    return sentence
+
+
+def describe(event: Event) -> str:
+    """What a run prints about the record it read, one sentence, a second one where something is unusual."""
+    record = event.record
+    P = max(abs(event.P0), 1e-9)
+    sentence = (
+        f"dip of {100 * event.depth:.0f} % lasting {1000 * event.duration:.0f} ms at t = {event.t_start:.3f} s, "
+        f"{event.start} samples before it, {event.rate:.0f} Hz, noise {100 * event.noise_P / P:.2f} % in P "
+        f"and {100 * event.noise_Q / P:.2f} % in Q, of P"
+    )
+    odd = []
+    if event.dips > 1:
+        odd.append(f"the record holds {event.dips} dips, and the first is meant")
+    if event.P0 <= 0:
+        odd.append(f"P is {event.P0:.3g} before the dip, so this is no load or its current is reversed")
+    gaps = int(np.count_nonzero(np.isnan(record.P) | np.isnan(record.Q)))
+    if gaps:
+        odd.append(f"{gaps} samples lack P or Q and are left out")
+    return sentence + (f". Note: {'; '.join(odd)}." if odd else "")
