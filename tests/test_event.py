@@ -58,9 +58,9 @@ def test_recorded_frequency_gives_f0():
     assert detect(with_f).f0 == pytest.approx(49.9)
 
 
-def test_slow_recovery_ends_the_dip_when_a_tenth_of_the_depth_is_left():
+def test_slow_recovery_ends_the_dip_when_a_fifth_of_the_depth_is_left():
     event = detect(dip(slow=0.4, sigma=0.0))
-    assert event.t_end == pytest.approx(0.45 + 0.2 * np.log(4), abs=0.002)  # 0.4 exp(-t/0.2) = 0.1
+    assert event.t_end == pytest.approx(0.45 + 0.2 * np.log(2), abs=0.002)  # 0.4 exp(-t/0.2) = 0.2
 
 
 def test_a_voltage_that_settles_a_little_lower_has_recovered():
@@ -144,7 +144,7 @@ def test_lost_power_before_the_dip_is_refused():
 def test_the_sentence_a_user_reads():
     said = describe(detect(dip(sigma=0.0)))
     assert said == (
-        "dip of 50 % lasting 150 ms at t = 0.300 s, 300 samples before it, 1000 Hz, "
+        "dip: dip of 50 % lasting 150 ms at t = 0.300 s, 300 samples before it, 1000 Hz, "
         "noise 0.00 % in P and 0.00 % in Q, of P"
     )
 

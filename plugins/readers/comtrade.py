@@ -71,17 +71,17 @@ class COMTRADE(Reader):
             spans = ", ".join(f"{s.t[0]:.3f} to {s.t[-1]:.3f} s" for s in streams)
             raise UserError(f"{self.path}: no dip found in the waveforms ({spans}): the voltage never falls by 3 %")
         base = self._base(dips, recording.frequency)
-        notes = self._notes(recording, dips)
-        tried = {number: self._record(number, dip, base, notes) for number, dip in enumerate(dips, 1)}
+        tried = {number: self._record(number, dip, base) for number, dip in enumerate(dips, 1)}
         usable = [number for number, made in tried.items() if isinstance(made, Record)]
         fitted = self.train or usable[:1] or [1]
-        train = [self._pick(number, tried) for number in fitted]
+        first, *rest = [self._pick(number, tried) for number in fitted]
+        notes = self._notes(recording, dips)  # of the whole file: said once, on the first record
         if self.validate is not None:
-            return Events(train, [self._pick(number, tried) for number in self.validate])
+            held = [self._pick(number, tried) for number in self.validate]
+            return Events([replace(first, notes=notes), *rest], held)
         others = [made for number, made in tried.items() if number not in fitted]
-        refused = tuple(f"not used for validation: {made}" for made in others if isinstance(made, UserError))
-        train = [replace(record, notes=record.notes + refused) for record in train]
-        return Events(train, [made for made in others if isinstance(made, Record)])
+        notes += tuple(f"not used for validation: {made}" for made in others if isinstance(made, UserError))
+        return Events([replace(first, notes=notes), *rest], [made for made in others if isinstance(made, Record)])
 
     def _pick(self, number: int, tried: dict[int, Record | UserError]) -> Record:
         """Dip `number`; raises `UserError` naming the dips that can be used where this one cannot."""
@@ -131,7 +131,7 @@ class COMTRADE(Reader):
             raise UserError(f"{self.path}: data.currents carry no power before the first dip ({1e6 * S:.2g} VA)")
         return Base(U, S, frequency)
 
-    def _record(self, number: int, dip: Dip, base: Base, notes: tuple[str, ...]) -> Record | UserError:
+    def _record(self, number: int, dip: Dip, base: Base) -> Record | UserError:
         """The record of a dip, or why it cannot be used."""
         t = dip.phasors.t
         window = slice(
@@ -149,7 +149,6 @@ class COMTRADE(Reader):
             U2=np.sqrt(3) * np.abs(dip.phasors.V2[window]) / base.voltage,
             base=base,
             source=f"{self.path} dip {number}",
-            notes=notes,
         )
         try:
             detect(record.check())

@@ -9,7 +9,7 @@ from tractexp.record.record import Record
 
 SHALLOWEST = 0.03  # of the voltage before: anything less is no dip
 NOISE_FACTOR = 6.0  # standard deviations of noise that a dip must exceed
-RECOVERED = 0.1  # of the depth: the dip ends when no more than this is missing, or the threshold if that is more
+RECOVERED = 0.2  # of the depth: the dip ends when no more than this is missing, or the threshold if that is more
 FEWEST_BEFORE = 10  # samples before a dip, for the steady state and the noise
 MERGED = 0.02  # s: dips closer than one cycle are one
 STEADY = 1.0  # s: the steady state is the mean over at most so long before the dip
@@ -20,7 +20,7 @@ class Event:
     """The first dip of `record`. Means and noise are those of the samples `steady`, before the dip.
 
     Noise is the standard deviation about a straight line. `end` is the first sample after the dip, where the
-    voltage has regained all but a tenth of the depth (or all but 3 %, if that is more).
+    voltage has regained all but a fifth of the depth (or all but the threshold, if that is more).
     """
 
     record: Record
@@ -174,7 +174,8 @@ def describe(event: Event) -> str:
     record = event.record
     P = max(abs(event.P0), 1e-9)
     sentence = (
-        f"dip of {100 * event.depth:.0f} % lasting {1000 * event.duration:.0f} ms at t = {event.t_start:.3f} s, "
+        f"{record.name}: dip of {100 * event.depth:.0f} % lasting {1000 * event.duration:.0f} ms "
+        f"at t = {event.t_start:.3f} s, "
         f"{event.start} samples before it, {event.rate:.0f} Hz, noise {100 * event.noise_P / P:.2f} % in P "
         f"and {100 * event.noise_Q / P:.2f} % in Q, of P"
     )

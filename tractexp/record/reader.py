@@ -22,3 +22,4 @@ class Reader(Plugin):
 
     def read(self) -> Events:
         """Read and check everything; raises `UserError` naming the file, the place and the value."""
+        raise NotImplementedError
