@@ -47,7 +47,7 @@ def searching(iterations: int | None, budget: int | None) -> Iterator[Any]:
 
 def share(iteration: int, simulations: int, iterations: int | None, budget: int | None) -> float | None:
     """How much of the search is done, in [0, 1], by whichever end comes first; None where neither is known."""
-    parts = [iteration / iterations] * bool(iterations) + [simulations / budget] * bool(budget)
+    parts = [done / end for done, end in ((iteration, iterations), (simulations, budget)) if end]
     return min(max(parts), 1.0) if parts else None
 
 

@@ -33,7 +33,7 @@ class Identify(Task):
         result, fits = conclude(problem, found, events.validate, job.seed, settings, job.choices["optimizer"])
 
         report(problem, result)
-        paths = [*draw(job, found, result, fits), result.write(job.folder / "result.json")]
+        paths = [*draw(job, found, fits), result.write(job.folder / "result.json")]
         for path in paths:
             say(f"  {path}")
         track(job, found, result, paths)
@@ -73,18 +73,29 @@ def report(problem: Any, result: Any) -> None:
     say()
 
 
-def draw(job: Job, found: Any, result: Any, fits: Any) -> list[Path]:
-    """Write fit.svg (one per event beyond the first) and fitness.svg."""
+def draw(job: Job, found: Any, fits: Any) -> list[Path]:
+    """Write fit.svg (fit_2.svg and so on for further events) and fitness.svg."""
     from tractexp.report import figures
 
-    paths = []
-    for k, fit in enumerate(fits):
-        suffix = "" if k == 0 else f"_{k + 1}"
-        paths.append(figures.fit(job.folder / f"fit{suffix}.svg", fit, job.choices["optimizer"]))
+    optimizer, paths = job.choices["optimizer"], []
+    for k, fit in enumerate(fits, start=1):
+        record, role = fit.event.record, "fitted" if fit.role == "train" else "held out"
+        path = figures.fit(
+            job.folder / ("fit.svg" if k == 1 else f"fit_{k}.svg"),
+            record.t,
+            record.U,
+            (record.P, record.Q),
+            (fit.P, fit.Q),
+            title=f"{record.name} ({role}), {optimizer}",
+            epsilon=(fit.epsilon_p, fit.epsilon_q),
+            notes=record.notes,
+        )
+        paths.append(path)
     history = found.history
-    known = history.objective < REFUSED
-    curves = {job.choices["optimizer"]: (np.arange(len(known)), history.simulations, history.objective)}
-    return [*paths, figures.fitness(job.folder / "fitness.svg", curves)]
+    by_iteration = {optimizer: (np.arange(len(history.objective)), history.objective)}
+    by_simulations = {optimizer: (history.simulations, history.objective)}
+    title = f"search of {optimizer}, seed {job.seed}, on {job.choices['data']}"
+    return [*paths, figures.fitness(job.folder / "fitness.svg", by_iteration, by_simulations, title=title)]
 
 
 def track(job: Job, found: Any, result: Any, paths: list[Path]) -> None:

@@ -1,0 +1,1 @@
+"""Loads and an optimizer by ACME."""

@@ -1,0 +1,22 @@
+"""A static load linear in the voltage."""
+
+from tractexp.model.parts import Static
+from tractexp.parameter import Parameter
+from tractexp.plugin import plugin
+
+
+@plugin
+class AcmeLinear(Static):
+    """P_s = P_s0 (1 + a (U/U_0 - 1)), and the same for Q with b.
+
+    Source: ACME handbook 2026, Eq. (1).
+    Departures: none.
+    """
+
+    slope_p = Parameter(1.0, (0.0, 3.0), "1", "slope of active power", "ACME handbook 2026")
+    slope_q = Parameter(2.0, (0.0, 6.0), "1", "slope of reactive power", "ACME handbook 2026")
+
+    def declare(self, eq, P_s0, Q_s0):
+        a, b = eq.declare(self.parameters)
+        u = eq.U / eq.U0
+        return P_s0 * (1 + a * (u - 1)), Q_s0 * (1 + b * (u - 1))

@@ -1,0 +1,239 @@
+"""The command line as a person uses it: the main job, its files and its log, and every refusal in one sentence."""
+
+import json
+import os
+import sqlite3
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+SHIPPED = "pkg://tractexp.data/tibet_50pct.csv"
+QUICK = ("optimizer.iterations=8", "optimizer.population=20", "tracking.enabled=false")
+EXACT = ("optimizer=multistart_least_squares", "optimizer.starts=2", "tracking.enabled=false")
+
+
+def tractexp(*arguments, cwd):
+    """Run `python -m tractexp` in a folder."""
+    command = [sys.executable, "-m", "tractexp", *arguments]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, env=os.environ | {"COLUMNS": "140"})
+
+
+@pytest.fixture(scope="module")
+def main_job(tmp_path_factory):
+    """The README's main job in an empty folder, run once."""
+    folder = tmp_path_factory.mktemp("main")
+    done = tractexp("optimizer=issa", "data=tibet_50pct", "hydra.run.dir=run", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return folder, done
+
+
+def test_the_main_job_prints_what_it_read_did_and_found(main_job):
+    _, done = main_job
+    for part in (
+        "dip of 50 %", "500 Hz", "noise", "synthetic stand-in for an unpublished record", "7 parameters",
+        "Runge-Kutta steps", "T_prime", "pu s²/rad", "0.0005 .. 0.03", "epsilon_p", "objective", "simulations in",
+        "below 5 %: holds", "fit.svg", "fitness.svg", "result.json", "tractexp ui",
+    ):  # fmt: skip
+        assert part in done.stdout, part
+    assert done.stderr == ""
+
+
+def test_the_main_job_writes_the_contracted_result(main_job):
+    folder, _ = main_job
+    result = json.loads((folder / "run" / "result.json").read_text())
+    assert list(result["parameters"]) == ["T_prime", "X_prime", "C", "M", "T_m", "p_v", "q_v"]
+    for name, value in result["parameters"].items():
+        low, high = result["bounds"][name]
+        assert low <= value <= high
+    assert result["seed"] == 0
+    assert result["iterations"] == 300
+    assert result["simulations"] > 15000
+    assert result["status"] == "finished its 300 iterations"
+    (event,) = result["events"]
+    assert event["role"] == "train"
+    assert event["epsilon_p"] == result["epsilon_p"] < 0.05
+    assert event["epsilon_q"] == result["epsilon_q"] < 0.05
+    assert {p.name for p in (folder / "run").iterdir()} == {".hydra", "fit.svg", "fitness.svg", "result.json"}
+
+
+def test_the_objective_is_that_of_the_calculated_power(main_job):
+    """Eq. (8) and Eq. (20) recomputed from predictions for the recorded voltage."""
+    from tractexp.identify.result import load
+    from tractexp.plugin import build
+    from tractexp.record import detect
+
+    folder, _ = main_job
+    result = load(folder / "run" / "result.json")
+    record = build("data", {"name": "csv", "train": [SHIPPED]}).read().train[0]
+    assert result.before["P0"] == detect(record).P0
+    P, Q = result.predict(record.t, record.U)
+    objective = np.mean((P - record.P) ** 2 + (Q - record.Q) ** 2)
+    assert objective == pytest.approx(result.objective, rel=1e-4)
+    assert np.sqrt(np.mean((P - record.P) ** 2) / np.mean(record.P**2)) == pytest.approx(result.epsilon_p, rel=1e-4)
+
+
+def test_the_main_job_is_logged_as_contracted(main_job):
+    folder, _ = main_job
+    result = json.loads((folder / "run" / "result.json").read_text())
+    with sqlite3.connect(folder / "outputs" / "mlflow.db") as store:
+        ask = lambda text: store.execute(text).fetchall()  # noqa: E731
+        assert ask("select status from runs") == [("FINISHED",)]
+        assert ("identify tibet_50pct",) in ask("select name from experiments")
+        parameters = dict(ask("select key, value from params"))
+        metrics = dict(ask("select key, value from latest_metrics"))
+        tags = dict(ask("select key, value from tags"))
+        curves = dict(ask("select key, count(*) from metrics group by key"))
+    assert parameters["optimizer.population"] == "50"
+    assert float(parameters["T_prime"]) == result["parameters"]["T_prime"]
+    assert metrics["objective"] == result["objective"]
+    assert metrics["train_1_epsilon_p"] == result["epsilon_p"]
+    assert curves["fitness"] == curves["fitness_by_simulations"] == 301
+    assert {tags[key] for key in ("optimizer", "data", "model", "seed")} == {
+        "issa", "tibet_50pct", "third_order_exponential", "0",
+    }  # fmt: skip
+    artifacts = {path.name for path in folder.rglob("outputs/*/**/*") if path.is_file()}
+    assert {"fit.svg", "fitness.svg", "result.json", "config.yaml", "MLmodel"} <= artifacts
+
+
+def test_the_logged_model_predicts_in_a_clean_process(main_job):
+    folder, _ = main_job
+    (model,) = (path.parent for path in folder.rglob("MLmodel"))
+    program = (
+        "import sys, json, numpy as np, pandas as pd, mlflow.pyfunc;"
+        "t = np.arange(600) * 2e-3; U = 1 - 0.3 * ((t > 0.3) & (t < 0.5));"
+        "frame = mlflow.pyfunc.load_model(sys.argv[1]).predict(pd.DataFrame({'t': t, 'U': U}));"
+        "print(json.dumps([list(frame.columns), frame.P.iloc[0], frame.P.min(), frame.Q.iloc[0]]))"
+    )
+    done = subprocess.run([sys.executable, "-c", program, str(model)], capture_output=True, text=True, cwd="/")
+    assert done.returncode == 0, done.stderr
+    columns, before, dipped, Q = json.loads(done.stdout.splitlines()[-1])
+    result = json.loads((folder / "run" / "result.json").read_text())
+    assert columns == ["P", "Q"]
+    assert before == pytest.approx(result["before"]["P0"], abs=1e-9)
+    assert pytest.approx(result["before"]["Q0"], abs=1e-9) == Q
+    assert dipped < 0.8
+
+
+def test_the_same_seed_gives_the_same_bits_and_another_seed_does_not(tmp_path):
+    values = []
+    for k, seed in enumerate((3, 3, 4)):
+        done = tractexp(*QUICK, f"seed={seed}", f"hydra.run.dir=run{k}", cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        values.append(json.loads((tmp_path / f"run{k}" / "result.json").read_text())["parameters"])
+    assert values[0] == values[1] != values[2]
+
+
+def test_a_held_out_event_is_judged_but_not_fitted(tmp_path):
+    held = "data.validate=[pkg://tractexp.data/tibet_30pct.csv]"
+    for folder, extra in (("alone", ()), ("both", (held,))):
+        done = tractexp(*QUICK, *extra, f"hydra.run.dir={folder}", cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+    alone, both = (json.loads((tmp_path / f / "result.json").read_text()) for f in ("alone", "both"))
+    assert alone["parameters"] == both["parameters"]
+    assert [e["role"] for e in both["events"]] == ["train", "validate"]
+    assert both["epsilon_p"] == alone["epsilon_p"] != both["events"][1]["epsilon_p"]
+    assert (tmp_path / "both" / "fit_2.svg").exists()
+
+
+def test_bounds_and_fixed_values_are_kept_and_a_value_at_its_bound_is_marked(tmp_path):
+    done = tractexp(*EXACT, "model.bounds.q_v=[0.2,0.4]", "model.fixed.C=0.85", "hydra.run.dir=run", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    assert 0.2 <= result["parameters"]["q_v"] <= 0.4
+    assert result["parameters"]["C"] == 0.85
+    assert result["at_bound"] == ["q_v"]
+    assert "at its bound" in done.stdout
+    assert "fixed" in done.stdout
+
+
+def test_a_budget_is_spent_to_the_last_simulation(tmp_path):
+    done = tractexp("budget=333", "tracking.enabled=false", "hydra.run.dir=run", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    assert result["simulations"] == 333
+    assert result["status"] == "stopped at the budget of 333 simulations"
+
+
+def test_a_sweep_runs_each_combination(tmp_path):
+    done = tractexp("-m", *QUICK, "optimizer=ssa,pso", "seed=range(0,2)", "hydra.sweep.dir=sweep", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    results = [json.loads(p.read_text()) for p in sorted(tmp_path.glob("sweep/*/result.json"))]
+    assert sorted((r["optimizer"], r["seed"]) for r in results) == [("pso", 0), ("pso", 1), ("ssa", 0), ("ssa", 1)]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["optimizer=isa"], "optimizer=isa: there is no such choice; did you mean 'issa'? Available:"),
+        (["optimzer=issa"], "optimzer: the configuration has no key 'optimzer'; did you mean 'optimizer'?"),
+        (["optimizer.populatoin=9"], "'optimizer' has no key 'populatoin'; did you mean 'population'?"),
+        (["+sede=3"], "sede: there is no such key; did you mean 'seed'?"),
+        (["+optimizer.sede=3"], "optimizer 'issa' has no setting 'sede'"),
+        (["seed=abc"], "seed: value 'abc' of type 'str' could not be converted to Integer"),
+        (["seed=-1"], "seed=-1 is out of range: it must be at least 0"),
+        (["budget=0"], "budget=0 is out of range: it must be at least 1"),
+        (["optimizer.population=1"], "optimizer.population=1 is out of range"),
+        (["optimizer.acceptance=best"], "optimizer.acceptance=best is not one of"),
+        (["model/motor=electromechancal"], "there is no such choice; did you mean 'electromechanical'?"),
+        (["model.bounds.C=[0.9,0.1]"], "model.bounds.C: bounds [0.9, 0.1] must be two finite numbers, the lower one"),
+        (["model.bounds.C=[0.9]"], "model.bounds.C=[0.9] must be two numbers, [lower, upper]"),
+        (["model.bounds.X_prim=[0,1]"], "this model has no parameter 'X_prim'; did you mean 'X_prime'?"),
+        (["model.fixed.Cc=0.5"], "model.fixed.Cc: this model has no parameter 'Cc'"),
+        (["model.substeps=0"], "model.substeps=0 is out of range: it must be 1 to"),
+        (["data=tibet_40pct"], "data=tibet_40pct: there is no such choice; did you mean 'tibet_50pct'?"),
+        (["data=csv"], "data.train"),
+        (["data=csv", "data.train=[nowhere.csv]"], "nowhere.csv"),
+        (["data=csv", f"data.train=[{SHIPPED}]", "data.validate=[nowhere.csv]"], "nowhere.csv"),
+        (["task=identfy"], "task=identfy: there is no such choice; did you mean 'identify'?"),
+    ],
+)
+def test_bad_input_gets_one_sentence_and_leaves_nothing_behind(arguments, sentence, tmp_path):
+    done = tractexp(*arguments, "hydra.run.dir=run", cwd=tmp_path)
+    assert done.returncode != 0
+    assert sentence in done.stderr
+    assert done.stderr.startswith("tractexp: ")
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert not (tmp_path / "run").exists()
+    assert not (tmp_path / "outputs").exists()
+
+
+def test_the_papers_values_get_the_reason_they_cannot_be_simulated(tmp_path):
+    """Table 2, fixed all but one: no candidate has a steady state, and Eq. (3) is named."""
+    paper = {"T_prime": 4.1354, "X_prime": 1.6654, "C": -2.6241, "M": 0.82, "T_m": 3.378, "p_v": 3.5867}
+    fixed = [f"model.fixed.{name}={value}" for name, value in paper.items()]
+    done = tractexp(*QUICK, *fixed, "hydra.run.dir=run", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "none of the" in done.stderr
+    assert "parameter sets tried could be simulated" in done.stderr
+    assert "Eq. (3) needs |2 T_m X'/(C U0²)| at most 1 and it is 4.2" in done.stderr
+    assert "C = (X - X')/X must lie between 0 and 1 and is -2.6241" in done.stderr
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_traceback_is_shown_when_asked_for(tmp_path):
+    command = [sys.executable, "-m", "tractexp", "seed=-1"]
+    done = subprocess.run(
+        command, cwd=tmp_path, capture_output=True, text=True, env=os.environ | {"HYDRA_FULL_ERROR": "1"}
+    )
+    assert "Traceback" in done.stderr
+
+
+def test_help_and_configuration_load_none_of_the_heavy_libraries(tmp_path):
+    for argument in ("--help", "--cfg=job"):
+        program = (
+            f"import sys; sys.argv = ['tractexp', *{argument.split('=')!r}];"
+            "import tractexp.__main__ as m; code = m.main();"
+            "heavy = {'mlflow', 'numba', 'sympy', 'scipy', 'matplotlib', 'pandas', 'comtrade'} & sys.modules.keys();"
+            "assert not heavy, heavy; sys.exit(code)"
+        )
+        done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+
+
+def test_the_console_script_completes_words(tmp_path):
+    script = os.path.join(os.path.dirname(sys.executable), "tractexp")
+    done = subprocess.run([script, "-sc", "query=bash"], cwd=tmp_path, capture_output=True, text=True,
+                          env=os.environ | {"COMP_LINE": "tractexp optimizer=is", "COMP_POINT": "21"})  # fmt: skip
+    assert "optimizer=issa" in done.stdout
