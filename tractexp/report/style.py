@@ -4,7 +4,7 @@ import itertools
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,7 +20,7 @@ PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 FAINT = "#666666"
 
 POINTS = 800  # a line has at most about this many: a page is narrower than that
-SETTINGS = {
+SETTINGS: Any = {
     "svg.fonttype": "none",  # text stays text: searchable, readable by machines, no fonts to embed
     "svg.hashsalt": "tractexp",
     "font.size": 9,
@@ -41,7 +41,7 @@ SETTINGS = {
 }
 
 
-def lines() -> Iterator[dict[str, str]]:
+def lines() -> Iterator[dict[str, Any]]:
     """Line styles that differ, one for each curve of a figure: the palette solid, then dashed, then dotted."""
     return itertools.cycle({"color": color, "linestyle": style} for style in ("-", "--", ":") for color in PALETTE)
 

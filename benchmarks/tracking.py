@@ -1,0 +1,82 @@
+"""What one logged run costs: python benchmarks/tracking.py [--json] [--repeat 3]
+
+Each row is a fresh Python process that logs one run (60 parameters, two curves of 300 points, one artifact, the
+model) to SQLite. `fresh` creates the store, `existing` finds it. Seconds of wall time, the median of the repeats;
+`process` is the whole process from start to end, NumPy and the interpreter included.
+"""
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+JOB = """
+import json, sys, time
+laps, last = {}, time.perf_counter()
+def lap(name):
+    global last
+    laps[name], last = time.perf_counter() - last, time.perf_counter()
+import numpy as np
+from pathlib import Path
+from tractexp import tracking
+lap("import_tractexp")
+folder = Path(sys.argv[1])
+uri = tracking.default_uri(folder)
+tracking._import(sql=True)
+lap("import_mlflow")
+tracking.prepare(uri)
+lap("open_store")
+steps, fitness = np.arange(300), np.geomspace(1, 1e-5, 300)
+result = folder / "result.json"
+result.write_text("{}")
+tracking.log(tracking.Run(
+    "benchmark", "run",
+    parameters={f"key.{i}": i for i in range(60)},
+    metrics={"objective": 1e-5, "epsilon_p": 0.01, "epsilon_q": 0.01},
+    curves={"fitness": (steps, fitness), "fitness_by_simulations": (50 * steps, fitness)},
+    artifacts=[result], model=result,
+), uri)
+lap("log_run")
+print(json.dumps(laps))
+"""
+
+
+def once(folder: Path) -> dict[str, float]:
+    """One process, timed from outside and by its own laps."""
+    started, before = time.perf_counter(), os.times()
+    done = subprocess.run([sys.executable, "-c", JOB, str(folder)], capture_output=True, text=True, check=True)
+    after = os.times()
+    cpu = after.children_user + after.children_system - before.children_user - before.children_system
+    laps: dict[str, float] = json.loads(done.stdout)
+    seconds = time.perf_counter() - started
+    return laps | {"process": seconds, "logging": seconds - laps["import_tractexp"], "process_cpu": cpu}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
+    parser.add_argument("--repeat", type=int, default=3, help="repetitions (default 3)")
+    options = parser.parse_args()
+    rows: dict[str, list[dict[str, float]]] = {"fresh": [], "existing": []}
+    for _ in range(options.repeat):
+        with tempfile.TemporaryDirectory() as folder:
+            for store in rows:
+                rows[store].append(once(Path(folder)))
+    table = {
+        store: {lap: statistics.median(run[lap] for run in runs) for lap in runs[0]} for store, runs in rows.items()
+    }
+    if options.json:
+        print(json.dumps(table))
+        return
+    print(f"{'seconds':<16}" + "".join(f"{store:>10}" for store in table))
+    for lap in table["fresh"]:
+        print(f"{lap:<16}" + "".join(f"{row[lap]:>10.3f}" for row in table.values()))
+
+
+if __name__ == "__main__":
+    main()

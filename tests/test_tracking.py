@@ -1,0 +1,358 @@
+"""What a run leaves in MLflow, read back through MLflow's own public client."""
+
+import json
+import os
+import signal
+import socket
+import sqlite3
+import subprocess
+import sys
+import time
+import urllib.request
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tractexp import tracking
+from tractexp.errors import UserError
+from tractexp.tracking import Run
+
+STEPS = np.arange(300)
+FITNESS = np.geomspace(1.0, 1e-5, 300)
+
+
+@pytest.fixture(scope="session")
+def empty_store(tmp_path_factory) -> Path:
+    """One migrated database, copied by the tests that do not care how it came about."""
+    folder = tmp_path_factory.mktemp("store")
+    tracking.prepare(tracking.default_uri(folder))
+    return folder / "outputs" / "mlflow.db"
+
+
+@pytest.fixture
+def uri(tmp_path, empty_store) -> str:
+    (tmp_path / "outputs").mkdir()
+    (tmp_path / "outputs" / "mlflow.db").write_bytes(empty_store.read_bytes())
+    return tracking.default_uri(tmp_path)
+
+
+def client(uri: str):
+    from mlflow import MlflowClient
+
+    return MlflowClient(uri)
+
+
+def python(script: str, *arguments: str, **more) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-c", script, *arguments], capture_output=True, text=True, **more)
+
+
+def test_importing_tracking_does_not_import_mlflow():
+    script = "import sys, tractexp.tracking, tractexp.tracking_model; print({'mlflow', 'pandas'} & set(sys.modules))"
+    assert python(script, check=True).stdout.strip() == "set()"
+
+
+def test_a_run_comes_back_as_it_was_logged(tmp_path, uri):
+    (tmp_path / "result.json").write_text("{}")
+    run = Run(
+        "identify tibet_50pct",
+        "issa-s0",
+        parameters={"optimizer.population": 50, "T_prime": 0.25, "optimizer.levy": True},
+        metrics={"objective": 8.1e-6, "epsilon_p": 0.012},
+        curves={"fitness": (STEPS, FITNESS), "fitness_by_simulations": (50 * STEPS, FITNESS)},
+        tags={"optimizer": "issa"},
+        artifacts=[tmp_path / "result.json"],
+        description="A **synthetic** record.",
+        seconds=12.5,
+    )
+    found = client(uri).get_run(tracking.log(run, uri))
+    assert found.info.run_name == "issa-s0"
+    assert found.info.status == "FINISHED"
+    assert found.info.end_time - found.info.start_time == pytest.approx(12_500, abs=1000)
+    assert found.data.params == {"optimizer.population": "50", "T_prime": "0.25", "optimizer.levy": "true"}
+    last = {"fitness": FITNESS[-1], "fitness_by_simulations": FITNESS[-1]}
+    assert found.data.metrics == {"objective": 8.1e-6, "epsilon_p": 0.012} | last
+    assert found.data.tags["optimizer"] == "issa"
+    assert found.data.tags["mlflow.note.content"] == "A **synthetic** record."
+    assert "mlflow.parentRunId" not in found.data.tags
+    assert client(uri).get_experiment(found.info.experiment_id).name == "identify tibet_50pct"
+    assert [a.path for a in client(uri).list_artifacts(found.info.run_id)] == ["result.json"]
+
+
+def test_curves_keep_their_steps_and_every_point(uri):
+    run_id = tracking.log(Run("e", "r", curves={"fitness_by_simulations": (50 * STEPS, FITNESS)}), uri)
+    points = client(uri).get_metric_history(run_id, "fitness_by_simulations")
+    assert sorted((p.step, p.value) for p in points) == list(zip((50 * STEPS).tolist(), FITNESS.tolist(), strict=True))
+
+
+def test_a_very_long_curve_is_thinned_but_keeps_its_ends(uri):
+    n = 15_000
+    run_id = tracking.log(Run("e", "r", curves={"fitness": (np.arange(n), np.linspace(1, 0, n))}), uri)
+    steps = sorted(p.step for p in client(uri).get_metric_history(run_id, "fitness"))
+    assert len(steps) == tracking.CURVE_POINTS
+    assert (steps[0], steps[-1]) == (0, n - 1)
+
+
+def test_more_than_one_batch_of_everything_arrives(uri):
+    parameters = {f"p{i}": i for i in range(250)}
+    curves = {f"c{i}": (STEPS, FITNESS) for i in range(7)}
+    found = client(uri).get_run(tracking.log(Run("e", "r", parameters=parameters, curves=curves), uri))
+    assert found.data.params == {name: str(i) for name, i in parameters.items()}
+    for name in curves:
+        assert len(client(uri).get_metric_history(found.info.run_id, name)) == 300
+
+
+def test_children_point_to_their_sweep_which_closes_with_its_status(tmp_path, uri):
+    (tmp_path / "table.html").write_text("<p>")
+    parent = tracking.start_parent(Run("e", "issa,pso x 30", parameters={"seeds": 30}), uri)
+    assert client(uri).get_run(parent).info.status == "RUNNING"
+    child = tracking.log(Run("e", "issa-s0", parent=parent), uri)
+    tracking.finish_parent(parent, uri, "FAILED", {"jobs_failed": 1}, [tmp_path / "table.html"])
+    assert client(uri).get_run(child).data.tags["mlflow.parentRunId"] == parent
+    closed = client(uri).get_run(parent)
+    assert (closed.info.status, closed.data.metrics) == ("FAILED", {"jobs_failed": 1.0})
+    assert closed.info.end_time is not None
+    assert [a.path for a in client(uri).list_artifacts(parent)] == ["table.html"]
+
+
+def test_a_run_that_cannot_be_written_whole_is_marked_failed(uri):
+    with pytest.raises(UserError, match="Names may only contain"):
+        tracking.log(Run("e", "r", metrics={"a*b": 1.0}), uri)
+    (found,) = client(uri).search_runs([client(uri).get_experiment_by_name("e").experiment_id])
+    assert found.info.status == "FAILED"
+
+
+def test_experiment_tags_carry_a_shared_view(uri):
+    number = tracking.tag_experiment("e", {"mlflow.sharedViewState.tractexp": "deflate;abc"}, uri)
+    assert client(uri).get_experiment(number).tags["mlflow.sharedViewState.tractexp"] == "deflate;abc"
+
+
+def test_artifacts_lie_beside_the_database_wherever_the_process_runs(tmp_path, empty_store):
+    home, elsewhere = tmp_path / "a home", tmp_path / "elsewhere"
+    (home / "outputs").mkdir(parents=True)
+    (home / "outputs" / "mlflow.db").write_bytes(empty_store.read_bytes())
+    elsewhere.mkdir()
+    (elsewhere / "note.txt").write_text("hello")
+    script = """
+import sys; from pathlib import Path; from tractexp import tracking
+run = tracking.Run("identify: tibet/50", "r", artifacts=[Path("note.txt")])
+print(tracking.log(run, tracking.default_uri(Path(sys.argv[1]))))"""
+    run_id = python(script, str(home), cwd=elsewhere, check=True).stdout.strip()
+    kept = home / "outputs" / "mlartifacts" / "identify_tibet_50" / run_id / "artifacts" / "note.txt"
+    assert kept.read_text() == "hello"
+    assert [p.name for p in elsewhere.iterdir()] == ["note.txt"]
+
+
+def test_processes_that_meet_on_a_fresh_store_all_log_their_run(tmp_path):
+    """MLflow's own migrations break when two processes start them together."""
+    script = """
+import sys; from pathlib import Path; from tractexp import tracking
+run = tracking.Run("sweep", f"job-{sys.argv[2]}", metrics={"x": 1.0})
+tracking.log(run, tracking.default_uri(Path(sys.argv[1])))"""
+    jobs = [
+        subprocess.Popen([sys.executable, "-c", script, str(tmp_path), str(i)], stdout=-1, stderr=-1, text=True)
+        for i in range(4)
+    ]
+    said = [job.communicate(timeout=120) for job in jobs]
+    assert [(job.returncode, *words) for job, words in zip(jobs, said, strict=True)] == [(0, "", "")] * 4
+    uri = tracking.default_uri(tmp_path)
+    runs = client(uri).search_runs([client(uri).get_experiment_by_name("sweep").experiment_id])
+    assert sorted(run.info.run_name for run in runs) == [f"job-{i}" for i in range(4)]
+    assert sorted(p.name for p in (tmp_path / "outputs").iterdir()) == ["mlflow.db", "mlflow.db.lock"]
+
+
+def test_a_creation_that_was_killed_leaves_nothing_that_hinders_the_next(tmp_path):
+    script = """
+import os, sys; from pathlib import Path; from tractexp import tracking
+os.replace = lambda *_: os._exit(9)
+tracking.prepare(tracking.default_uri(Path(sys.argv[1])))"""
+    assert python(script, str(tmp_path)).returncode == 9
+    assert not (tmp_path / "outputs" / "mlflow.db").exists()
+    tracking.prepare(tracking.default_uri(tmp_path))
+    assert (tmp_path / "outputs" / "mlflow.db").is_file()
+
+
+def test_flatten_joins_keys_and_spells_values_as_the_configuration_does():
+    config = {
+        "optimizer": {"name": "issa", "levy": {"beta": 1.5, "on": True}},
+        "seed": 0,
+        "budget": None,
+        "train": ["a.csv", 1],
+        "bounds": np.array([0.0, 1.0]),
+        "share": np.float64(0.2),
+        "folder": Path("a"),
+    }
+    assert tracking.flatten(config) == {
+        "optimizer.name": "issa",
+        "optimizer.levy.beta": "1.5",
+        "optimizer.levy.on": "true",
+        "seed": "0",
+        "budget": "null",
+        "train": '["a.csv", 1]',
+        "bounds": "[0.0, 1.0]",
+        "share": "0.2",
+        "folder": "a",
+    }
+
+
+def test_the_commit_is_that_of_the_folder_and_says_when_files_were_changed(tmp_path):
+    assert tracking.git_commit(tmp_path / "nowhere") == ""
+    if tracking.git_commit(tmp_path):
+        pytest.skip("the temporary folder lies inside a repository")
+
+    def git(*arguments: str) -> str:
+        who = ["-c", "user.name=n", "-c", "user.email=e@x", "-c", "commit.gpgsign=false"]
+        done = subprocess.run(["git", *who, *arguments], cwd=tmp_path, capture_output=True, text=True, check=True)
+        return done.stdout.strip()
+
+    git("init", "-q")
+    (tmp_path / "a").write_text("1")
+    git("add", "a")
+    git("commit", "-q", "-m", "first")
+    git("tag", "-a", "v1", "-m", "a tag must not hide the commit")
+    commit = git("rev-parse", "HEAD")
+    tracking.git_commit.cache_clear()
+    assert tracking.git_commit(tmp_path) == commit
+    (tmp_path / "a").write_text("2")
+    tracking.git_commit.cache_clear()
+    assert tracking.git_commit(tmp_path) == f"{commit}-dirty"
+
+
+@pytest.mark.parametrize(
+    ("run", "message"),
+    [
+        (Run("", "r"), "needs experiment"),
+        (Run("e", " "), "needs name"),
+        (Run("e", "r", status="DONE"), "status=DONE is not one of FINISHED, FAILED, KILLED"),
+        (Run("e", "r", artifacts=[Path("gone.json")]), "gone.json of run 'r' does not exist"),
+        (Run("e", "r", curves={"c": ([1, 2], [1.0])}), "'c' has 2 steps and 1 values"),
+    ],
+)
+def test_a_run_that_is_not_right_is_refused_before_a_store_is_made(tmp_path, run, message):
+    with pytest.raises(UserError, match=message):
+        tracking.log(run, tracking.default_uri(tmp_path))
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_store_that_cannot_be_used_is_named_with_the_reason(tmp_path, empty_store):
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(UserError, match=r"file/outputs/mlflow\.db cannot be used: .*File exists|Not a directory"):
+        tracking.prepare(tracking.default_uri(tmp_path / "file"))
+    (tmp_path / "junk.db").write_bytes(b"not a database " * 100)
+    with pytest.raises(UserError, match=r"junk\.db cannot be used: .*not a database"):
+        tracking.prepare(f"sqlite:///{tmp_path / 'junk.db'}")
+    (tmp_path / "folder.db").mkdir()
+    with pytest.raises(UserError, match=r"folder\.db cannot be used: .*unable to open"):
+        tracking.prepare(f"sqlite:///{tmp_path / 'folder.db'}")
+    with pytest.raises(UserError, match="address of the MLflow store is empty"):
+        tracking.prepare(" ")
+    with pytest.raises(UserError, match="foo://x cannot be used"):
+        tracking.prepare("foo://x")
+
+
+def test_a_server_that_does_not_answer_is_reported_at_once():
+    with socket.socket() as taken:  # bound but not listening: connections are refused
+        taken.bind(("127.0.0.1", 0))
+        address = f"http://127.0.0.1:{taken.getsockname()[1]}"
+        with pytest.raises(UserError, match=rf"{address} cannot be used: .*refused"):
+            tracking.prepare(address)
+
+
+def test_the_store_of_another_version_of_mlflow_is_refused_with_the_remedy(tmp_path, empty_store):
+    database = tmp_path / "newer.db"
+    database.write_bytes(empty_store.read_bytes())
+    connection = sqlite3.connect(database)
+    connection.execute("UPDATE alembic_version SET version_num = 'ffff00000000'")
+    connection.commit()
+    connection.close()
+    with pytest.raises(UserError, match=r"another version of MLflow: 'mlflow db upgrade sqlite:.*newer\.db'"):
+        tracking.prepare(f"sqlite:///{database}")
+
+
+def test_an_experiment_that_was_deleted_is_reported_with_the_way_back(uri):
+    number = client(uri).create_experiment("gone")
+    client(uri).delete_experiment(number)
+    with pytest.raises(UserError, match=f"'gone' .*restore --experiment-id {number}'"):
+        tracking.log(Run("gone", "r"), uri)
+
+
+STAND_IN = '''
+import json, sys, types
+class Model:
+    """Stands in for the identified model: P is a share of U, Q follows the frequency where it is known."""
+    def __init__(self, path): self.share = json.loads(path.read_text())["share"]
+    def predict(self, t, U, f=None): return self.share * U, (U if f is None else f / 50.0)
+stand_in = types.ModuleType("tractexp.identify.result")
+stand_in.load = Model
+sys.modules["tractexp.identify.result"] = stand_in
+import mlflow, pandas as pd
+mlflow.set_tracking_uri(sys.argv[1])
+model = mlflow.pyfunc.load_model(sys.argv[2])
+frame = pd.DataFrame({"t": [0.0, 0.1], "U": [1.0, 0.5]}, index=[7, 8])
+plain, driven = model.predict(frame), model.predict(frame.assign(f=[50.0, 49.0]))
+print(json.dumps([list(plain.columns), list(plain.index), plain.values.tolist(), driven.Q.tolist()]))
+try:
+    model.predict(frame[["t"]])
+except Exception as error:
+    print("U" in str(error))
+'''
+
+
+def test_the_model_predicts_in_another_process_by_either_address(tmp_path, uri):
+    (tmp_path / "result.json").write_text('{"share": 0.8}')
+    run_id = tracking.log(Run("e", "r", model=tmp_path / "result.json"), uri)
+    (logged,) = client(uri).search_logged_models([client(uri).get_run(run_id).info.experiment_id])
+    assert logged.status.value == "READY"
+    assert logged.source_run_id == run_id
+    (tmp_path / "result.json").unlink()
+    for address in (f"runs:/{run_id}/model", f"models:/{logged.model_id}"):
+        done = python(STAND_IN, uri, address)
+        assert done.returncode == 0, done.stderr
+        answer, refused = done.stdout.splitlines()
+        assert json.loads(answer) == [["P", "Q"], [7, 8], [[0.8, 1.0], [0.4, 0.5]], [1.0, 0.98]]
+        assert refused == "True"
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def answers(address: str) -> bool:
+    try:
+        with urllib.request.urlopen(address, timeout=5) as answer:
+            return answer.status == 200
+    except OSError:
+        return False
+
+
+@pytest.mark.skipif(os.name == "nt", reason="ends the server by a signal")
+def test_the_ui_answers_on_loopback_and_leaves_no_process_behind(uri):
+    port = free_port()
+    script = "import sys; from tractexp import tracking; sys.exit(tracking.serve(sys.argv[1], port=int(sys.argv[2])))"
+    ui = subprocess.Popen([sys.executable, "-c", script, uri, str(port)], stdout=-1, stderr=-1, text=True)
+    try:
+        said = ui.stdout.readline()
+        assert said.startswith(f"MLflow UI: http://127.0.0.1:{port}/")
+        assert answers(f"http://127.0.0.1:{port}/")
+        assert answers(f"http://127.0.0.1:{port}/health")
+        with pytest.raises(UserError, match=f"port {port} on 127.0.0.1 cannot be used"):
+            tracking.serve(uri, port=port)
+    finally:
+        ui.send_signal(signal.SIGTERM)
+        said = ui.communicate(timeout=30)
+    assert (ui.returncode, *said) == (0, "", "")
+    deadline = time.monotonic() + 10
+    while answers(f"http://127.0.0.1:{port}/health"):
+        assert time.monotonic() < deadline, "the server outlived the command"
+        time.sleep(0.1)
+
+
+def test_the_ui_says_why_it_cannot_open(tmp_path, uri):
+    with pytest.raises(UserError, match=r"no MLflow store .*mlflow\.db yet: the first run"):
+        tracking.serve(tracking.default_uri(tmp_path / "new"))
+    with pytest.raises(UserError, match=r"port 70000 on 127\.0\.0\.1 cannot be used"):
+        tracking.serve(uri, port=70_000)
+    with pytest.raises(UserError, match="is a running MLflow server already"):
+        tracking.serve("http://127.0.0.1:5000")

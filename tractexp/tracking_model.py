@@ -1,0 +1,85 @@
+"""The identified model as MLflow stores it and as `mlflow.pyfunc.load_model` brings it back.
+
+What is stored is the result file, the name of this module and the versions it needs: data, no pickled code.
+"""
+
+import shutil
+import sys
+import tempfile
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tractexp.tracking import light_import
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+RESULT = "result.json"
+
+
+def log_model(client: Any, run_id: str, result: Path, name: str = "model") -> str:
+    """Log the model of the file `result` under a run, with an open `MlflowClient`, and return the model id.
+
+    `mlflow.pyfunc.log_model` is not used: it lists every file of every installed package (0.4 s) to find
+    requirements that are known here.
+    """
+    from mlflow.entities import LoggedModelOutput
+
+    experiment_id = client.get_run(run_id).info.experiment_id
+    logged = client.create_logged_model(experiment_id, name, run_id, model_type="traction load")
+    client.log_outputs(run_id, [LoggedModelOutput(logged.model_id, step=0)])
+    with tempfile.TemporaryDirectory() as folder:
+        _save(Path(folder), result, run_id, logged)
+        client.log_model_artifacts(logged.model_id, folder)
+    client.finalize_logged_model(logged.model_id, "READY")
+    return logged.model_id
+
+
+def _save(folder: Path, result: Path, run_id: str, logged: Any) -> None:
+    """Write the folder MLflow calls a model: its description, the data, and the environment it needs."""
+    with light_import():
+        import mlflow.pyfunc
+        from mlflow.models import Model, ModelSignature
+        from mlflow.types import ColSpec, DataType, Schema
+
+    def schema(names: str, optional: str = "") -> Schema:
+        return Schema([ColSpec(DataType.double, name, required=name not in optional) for name in names + optional])
+
+    model = Model(
+        artifact_path=logged.artifact_location,
+        run_id=run_id,
+        model_id=logged.model_id,
+        model_uuid=logged.model_id,
+        signature=ModelSignature(schema("tU", optional="f"), schema("PQ")),
+    )
+    environment = "python_env.yaml"
+    mlflow.pyfunc.add_to_model(model, loader_module=__name__, data=RESULT, python_env=environment)
+    model.save(str(folder / "MLmodel"))
+    shutil.copyfile(result, folder / RESULT)
+    packages = {f"{p.dist.name}=={p.dist.version}" for p in entry_points(group="tractexp.plugins") if p.dist}
+    (folder / "requirements.txt").write_text("\n".join([f"mlflow=={mlflow.__version__}", *sorted(packages)]))
+    python = ".".join(map(str, sys.version_info[:3]))
+    (folder / environment).write_text(f"python: {python}\ndependencies:\n- -r requirements.txt\n")
+
+
+def _load_pyfunc(path: str) -> "Predictor":
+    """What `mlflow.pyfunc.load_model` calls with the stored result file."""
+    from tractexp.identify.result import load
+
+    return Predictor(load(Path(path)))
+
+
+class Predictor:
+    """Predicts a data frame with columns P, Q [pu] from one with t [s], U [pu] and, where recorded, f [Hz]."""
+
+    def __init__(self, model: Any):
+        self.model = model
+
+    def predict(self, frame: "pd.DataFrame", params: dict[str, Any] | None = None) -> "pd.DataFrame":
+        import pandas as pd
+
+        t, U = (frame[name].to_numpy(dtype=float) for name in ("t", "U"))
+        f = frame["f"].to_numpy(dtype=float) if "f" in frame else None
+        P, Q = self.model.predict(t, U, f)
+        return pd.DataFrame({"P": P, "Q": Q}, index=frame.index)
