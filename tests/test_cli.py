@@ -55,7 +55,13 @@ def test_the_main_job_writes_the_contracted_result(main_job):
     assert event["role"] == "train"
     assert event["epsilon_p"] == result["epsilon_p"] < 0.05
     assert event["epsilon_q"] == result["epsilon_q"] < 0.05
-    assert {p.name for p in (folder / "run").iterdir()} == {".hydra", "fit.svg", "fitness.svg", "result.json"}
+    assert {p.name for p in (folder / "run").iterdir()} == {
+        ".hydra", "fit.svg", "fitness.svg", "history.csv", "result.json",
+    }  # fmt: skip
+    rows = np.genfromtxt(folder / "run" / "history.csv", delimiter=",", names=True)
+    assert rows["objective"][-1] == result["objective"]
+    assert rows["simulations"][-1] == result["simulations"]
+    assert (np.diff(rows["objective"]) <= 0).all()
 
 
 def test_the_objective_is_that_of_the_calculated_power(main_job):

@@ -17,6 +17,7 @@ import pytest
 from tractexp import tracking
 from tractexp.errors import UserError
 from tractexp.tracking import Run
+from tractexp.tracking_process import Logger
 
 STEPS = np.arange(300)
 FITNESS = np.geomspace(1.0, 1e-5, 300)
@@ -356,3 +357,28 @@ def test_the_ui_says_why_it_cannot_open(tmp_path, uri):
         tracking.serve(uri, port=70_000)
     with pytest.raises(UserError, match="is a running MLflow server already"):
         tracking.serve("http://127.0.0.1:5000")
+
+
+def test_a_second_process_logs_as_this_one_would(tmp_path, uri):
+    (tmp_path / "result.json").write_text("{}")
+    run = Run("e", "r", curves={"fitness": (STEPS, FITNESS)}, artifacts=[tmp_path / "result.json"])
+    with Logger(uri) as logger:
+        found = client(uri).get_run(logger.log(run))
+    assert (found.info.status, found.data.metrics) == ("FINISHED", {"fitness": FITNESS[-1]})
+    assert [a.path for a in client(uri).list_artifacts(found.info.run_id)] == ["result.json"]
+
+
+def test_a_second_process_that_is_given_no_run_ends_without_one(uri):
+    with pytest.raises(ZeroDivisionError), Logger(uri) as logger:
+        raise ZeroDivisionError
+    assert logger._process.returncode == 0
+    assert [e.name for e in client(uri).search_experiments()] == ["Default"]
+
+
+def test_a_second_process_passes_its_sentence_on(tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    with (
+        Logger(tracking.default_uri(tmp_path / "file")) as logger,
+        pytest.raises(UserError, match=r"outputs/mlflow\.db cannot be used"),
+    ):
+        logger.log(Run("e", "r"))

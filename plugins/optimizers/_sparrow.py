@@ -28,13 +28,13 @@ def produce(x: np.ndarray, alarmed: bool, iterations: int, rng: np.random.Genera
 def follow(
     x: np.ndarray, leader: np.ndarray, flight: np.ndarray | float, scalar: bool, rng: np.random.Generator
 ) -> np.ndarray:
-    """Scroungers up to rank n/2, Eqs. (12) and (16): X_P + s |x - X_P| A+ L, where A+ = A^T / d and A is +-1.
+    """Scroungers up to rank n/2, Eqs. (12) and (16): X_P + s |x - X_P| A+ L, where A is +-1 and A+ = A^T (A A^T)^-1.
 
-    The product of shapes (1, d), (d, 1) and (1, d) is one number for all coordinates: `scalar`. Element-wise,
-    each coordinate moves by its own signed distance over d.
+    As printed, shapes (1, d), (d, 1) and (1, d) make one number for all coordinates, with A+ = A^T / d: `scalar`.
+    Element-wise, the equation holds for each coordinate by itself, d = 1, where A+ = A.
     """
     signed = flight * np.abs(x - leader) * (2.0 * rng.integers(0, 2, x.shape) - 1.0)
-    return leader + (signed.sum(axis=1, keepdims=True) if scalar else signed) / x.shape[1]
+    return leader + (signed.mean(axis=1, keepdims=True) if scalar else signed)
 
 
 def starve(x: np.ndarray, worst: np.ndarray, rank: np.ndarray, rng: np.random.Generator) -> np.ndarray:

@@ -35,7 +35,8 @@ class CMAES(Optimizer):
 
     def check(self) -> None:
         super().check()
-        check_range("optimizer.population", self.population, 0)
+        if self.population != 0:
+            check_range("optimizer.population", self.population, 4)
         check_range("optimizer.iterations", self.iterations, 1)
         check_range("optimizer.restarts", self.restarts, 0)
         check_range("optimizer.sigma", self.sigma, 1e-6, 1)

@@ -31,7 +31,7 @@ def levy_sigma(beta: float) -> float:
     return (numerator / (2 ** ((beta - 1) / 2) * beta * math.gamma((1 + beta) / 2))) ** (1 / beta)
 
 
-def levy(shape: tuple[int, ...], formula: str, rng: np.random.Generator) -> np.ndarray:
+def levy_flight(shape: tuple[int, ...], formula: str, rng: np.random.Generator) -> np.ndarray:
     """Levy steps: Mantegna's mu / |nu|^(1/beta), or Eq. (15) as "printed", -mu / |nu|^beta."""
     mu = levy_sigma(LEVY_BETA) * rng.standard_normal(shape)
     nu = np.abs(rng.standard_normal(shape))
@@ -84,7 +84,7 @@ class ISSA(Sparrow):
         return box.from_unit(np.array(orbit))
 
     def flight(self, shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray | float:
-        return levy(shape, self.levy_formula, rng) if self.levy else super().flight(shape, rng)
+        return levy_flight(shape, self.levy_formula, rng) if self.levy else super().flight(shape, rng)
 
     def perturbation(self, box: Box, rng: np.random.Generator) -> Callable[[int, Flock], None]:
         if not (self.gaussian or self.tent_perturbation):

@@ -11,6 +11,8 @@ from tractexp.identify.optimizer import REFUSED, Box, Evaluate
 
 DIFFERENCE = 1e-6  # of the box's width; rounding (3e-13 relative) and curvature both stay below 1e-6 of a column
 EDGE = 1e-9  # SciPy's interior method starts strictly inside the box
+ELITE = 10  # starts of a polish, and
+APART = 0.3  # how far from each other: a search that has settled in one valley must not fill the elite with it
 
 
 def spread(unit: np.ndarray, f: np.ndarray, count: int, apart: float = 0.1) -> np.ndarray:
@@ -28,16 +30,16 @@ def spread(unit: np.ndarray, f: np.ndarray, count: int, apart: float = 0.1) -> n
 class Elite:
     """The best points a search has met that lie apart from each other, best first: where a polish starts."""
 
-    def __init__(self, box: Box, size: int = 4):
-        self.box, self.size = box, size
+    def __init__(self, box: Box):
+        self.box = box
         self.x, self.f = np.empty((0, box.dimension)), np.empty(0)
 
     def add(self, x: np.ndarray, f: np.ndarray) -> None:
         """Consider points (n, d) with objectives (n,); those refused or worse than a full elite are passed over."""
-        better = f < (self.f[-1] if len(self.f) == self.size else REFUSED)
+        better = f < (self.f[-1] if len(self.f) == ELITE else REFUSED)
         if better.any():
             x, f = np.concatenate((self.x, x[better])), np.concatenate((self.f, f[better]))
-            chosen = spread(self.box.to_unit(x), f, self.size)
+            chosen = spread(self.box.to_unit(x), f, ELITE, APART)
             self.x, self.f = x[chosen], f[chosen]
 
 

@@ -13,7 +13,7 @@ from tractexp.parameter import Parameter, Space
 from tractexp.record import Event
 
 PROBES = 64  # candidates across the box on which the Runge-Kutta step is judged
-FINE = 1e-6  # pu, largest error of the automatic step on those candidates; noise of records starts near 1e-4
+FINE = 5e-6  # pu, largest error of the automatic step on those candidates; noise of records starts near 1e-4
 
 
 def excitation(event: Event) -> Excitation:

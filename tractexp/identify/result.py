@@ -10,7 +10,7 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.identify.problem import Problem, excitation
-from tractexp.identify.search import REFUSED, Found
+from tractexp.identify.search import REFUSED, Found, History
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import Model, compose
 from tractexp.plugin import build
@@ -123,6 +123,14 @@ class Result:
             raise UserError(refusal)
         response = model.simulate(drive, values, model.substeps(drive, values)[0])
         return response.P[0], response.Q[0]
+
+
+def write_history(path: Path, history: History) -> Path:
+    """Write the search as CSV, one row per iteration: simulations and seconds spent, best objective so far [pu²]."""
+    rows = zip(history.simulations, history.seconds, history.objective, strict=True)
+    lines = [f"{k},{n},{s:.4f},{f!r}" for k, (n, s, f) in enumerate((int(n), float(s), float(f)) for n, s, f in rows)]
+    path.write_text("\n".join(["iteration,simulations,seconds,objective", *lines]) + "\n", encoding="utf-8")
+    return path
 
 
 def load(path: Path) -> Result:

@@ -17,7 +17,7 @@ class Identify(Task):
 
     def run(self, job: Job) -> None:
         from tractexp.identify.problem import Problem
-        from tractexp.identify.result import conclude
+        from tractexp.identify.result import conclude, write_history
 
         config = job.config
         events = job.events()
@@ -33,7 +33,8 @@ class Identify(Task):
         result, fits = conclude(problem, found, events.validate, job.seed, settings, job.choices["optimizer"])
 
         report(problem, result)
-        paths = [*draw(job, found, fits), result.write(job.folder / "result.json")]
+        paths = [*draw(job, found, fits), write_history(job.folder / "history.csv", found.history)]
+        paths.append(result.write(job.folder / "result.json"))
         for path in paths:
             say(f"  {path}")
         track(job, found, result, paths)
