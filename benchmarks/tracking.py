@@ -2,7 +2,7 @@
 
 Each row is a fresh Python process that logs one run (60 parameters, two curves of 300 points, one artifact, the
 model) to SQLite. `fresh` creates the store, `existing` finds it, `second process` finds it and logs through
-`tractexp.tracking_process` beside a computation of 1.5 s, which is not counted. Seconds of wall time, the median
+`tractexp.tracking.process` beside a computation of 1.5 s, which is not counted. Seconds of wall time, the median
 of the repeats; `process` is the whole process from start to end, NumPy and the interpreter included.
 """
 
@@ -25,7 +25,8 @@ def lap(name):
 import numpy as np
 from pathlib import Path
 from tractexp import tracking
-from tractexp.tracking_process import Logger
+from tractexp.tracking import store
+from tractexp.tracking.process import Logger
 lap("import_tractexp")
 folder, compute = Path(sys.argv[1]), float(sys.argv[2])
 uri = tracking.default_uri(folder)
@@ -36,7 +37,7 @@ if compute:
         pass
     last += compute
 else:
-    tracking._import(sql=True)
+    store._import(sql=True)
     lap("import_mlflow")
     tracking.prepare(uri)
     lap("open_store")

@@ -17,7 +17,9 @@ import pytest
 from tractexp import tracking
 from tractexp.errors import UserError
 from tractexp.tracking import Run
-from tractexp.tracking_process import Logger
+from tractexp.tracking.process import Logger
+from tractexp.tracking.run import CURVE_POINTS
+from tractexp.tracking.ui import serve
 
 STEPS = np.arange(300)
 FITNESS = np.geomspace(1.0, 1e-5, 300)
@@ -49,7 +51,7 @@ def python(script: str, *arguments: str, **more) -> subprocess.CompletedProcess[
 
 
 def test_importing_tracking_does_not_import_mlflow():
-    script = "import sys, tractexp.tracking, tractexp.tracking_model; print({'mlflow', 'pandas'} & set(sys.modules))"
+    script = "import sys, tractexp.tracking.model, tractexp.tracking.ui; print({'mlflow', 'pandas'} & set(sys.modules))"
     assert python(script, check=True).stdout.strip() == "set()"
 
 
@@ -90,7 +92,7 @@ def test_a_very_long_curve_is_thinned_but_keeps_its_ends(uri):
     n = 15_000
     run_id = tracking.log(Run("e", "r", curves={"fitness": (np.arange(n), np.linspace(1, 0, n))}), uri)
     steps = sorted(p.step for p in client(uri).get_metric_history(run_id, "fitness"))
-    assert len(steps) == tracking.CURVE_POINTS
+    assert len(steps) == CURVE_POINTS
     assert (steps[0], steps[-1]) == (0, n - 1)
 
 
@@ -329,17 +331,26 @@ def answers(address: str) -> bool:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="ends the server by a signal")
-def test_the_ui_answers_on_loopback_and_leaves_no_process_behind(uri):
+def test_the_ui_answers_on_loopback_and_leaves_nothing_behind(tmp_path, uri):
+    (tmp_path / "note.txt").write_text("hello")
+    run_id = tracking.log(Run("e", "r", artifacts=[tmp_path / "note.txt"]), uri)
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
     port = free_port()
-    script = "import sys; from tractexp import tracking; sys.exit(tracking.serve(sys.argv[1], port=int(sys.argv[2])))"
-    ui = subprocess.Popen([sys.executable, "-c", script, uri, str(port)], stdout=-1, stderr=-1, text=True)
+    script = "import sys; from tractexp.tracking.ui import serve; sys.exit(serve(sys.argv[1], port=int(sys.argv[2])))"
+    ui = subprocess.Popen(
+        [sys.executable, "-c", script, uri, str(port)], stdout=-1, stderr=-1, text=True, cwd=elsewhere
+    )
     try:
         said = ui.stdout.readline()
         assert said.startswith(f"MLflow UI: http://127.0.0.1:{port}/")
         assert answers(f"http://127.0.0.1:{port}/")
         assert answers(f"http://127.0.0.1:{port}/health")
+        artifact = f"http://127.0.0.1:{port}/get-artifact?path=note.txt&run_uuid={run_id}"
+        with urllib.request.urlopen(artifact, timeout=20) as answer:
+            assert answer.read() == b"hello"
         with pytest.raises(UserError, match=f"port {port} on 127.0.0.1 cannot be used"):
-            tracking.serve(uri, port=port)
+            serve(uri, port=port)
     finally:
         ui.send_signal(signal.SIGTERM)
         said = ui.communicate(timeout=30)
@@ -348,15 +359,16 @@ def test_the_ui_answers_on_loopback_and_leaves_no_process_behind(uri):
     while answers(f"http://127.0.0.1:{port}/health"):
         assert time.monotonic() < deadline, "the server outlived the command"
         time.sleep(0.1)
+    assert not list(elsewhere.iterdir())
 
 
 def test_the_ui_says_why_it_cannot_open(tmp_path, uri):
     with pytest.raises(UserError, match=r"no MLflow store .*mlflow\.db yet: the first run"):
-        tracking.serve(tracking.default_uri(tmp_path / "new"))
+        serve(tracking.default_uri(tmp_path / "new"))
     with pytest.raises(UserError, match=r"port 70000 on 127\.0\.0\.1 cannot be used"):
-        tracking.serve(uri, port=70_000)
+        serve(uri, port=70_000)
     with pytest.raises(UserError, match="is a running MLflow server already"):
-        tracking.serve("http://127.0.0.1:5000")
+        serve("http://127.0.0.1:5000")
 
 
 def test_a_second_process_logs_as_this_one_would(tmp_path, uri):

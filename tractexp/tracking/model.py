@@ -10,7 +10,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tractexp.tracking import light_import
+from tractexp.tracking.store import light_import
 
 if TYPE_CHECKING:
     import pandas as pd

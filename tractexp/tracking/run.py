@@ -1,0 +1,221 @@
+"""A run as plain data, and how it is written: at its end and in one go.
+
+A job that is killed therefore leaves no run that claims to be running. Only the run of a sweep is opened first.
+"""
+
+import functools
+import getpass
+import json
+import re
+import subprocess
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tractexp.errors import UserError, check_choice
+from tractexp.tracking.store import database_of, open_store, sentences
+
+STATUSES = ("FINISHED", "FAILED", "KILLED")
+CURVE_POINTS = 1000  # a longer curve is thinned evenly; the files of the run keep every point
+BATCH_METRICS, BATCH_PARAMETERS = 900, 100  # MLflow takes at most 1000 entries a batch, 100 of them parameters
+VALUE_LENGTH = 6000  # characters MLflow stores of a parameter
+
+
+@dataclass(frozen=True)
+class Run:
+    """What one job leaves in MLflow.
+
+    `parameters` is the flattened configuration with the identified values, `metrics` the figures of the result.
+    `curves` maps a name to (steps (n,) whole numbers, values (n,)), such as "fitness" by iteration. `artifacts` are
+    files or folders to be copied. `parent` is the run id of the sweep. `seconds` is what the job took: MLflow shows
+    it as the run's duration. `model` is a result file that `tractexp.identify.result.load` reads; with it the run
+    offers a model for `mlflow.pyfunc.load_model`. `description` is Markdown.
+    """
+
+    experiment: str
+    name: str
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    metrics: Mapping[str, float] = field(default_factory=dict)
+    curves: Mapping[str, tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray]] = field(
+        default_factory=dict
+    )
+    tags: Mapping[str, str] = field(default_factory=dict)
+    artifacts: Sequence[Path] = ()
+    description: str = ""
+    parent: str | None = None
+    status: str = "FINISHED"
+    seconds: float = 0.0
+    model: Path | None = None
+
+    def check(self) -> None:
+        """Raise `UserError` for a missing name, an unknown status, a file that is not there or a lopsided curve."""
+        for key in ("experiment", "name"):
+            if not getattr(self, key).strip():
+                raise UserError(f"tracking: a run needs {key}, which is empty")
+        check_choice("status", self.status, STATUSES)
+        for path in (*self.artifacts, *([self.model] if self.model else [])):
+            if not Path(path).exists():
+                raise UserError(f"tracking: the artifact {path} of run '{self.name}' does not exist")
+        for name, (steps, values) in self.curves.items():
+            if len(steps) != len(values):
+                raise UserError(f"tracking: the curve '{name}' has {len(steps)} steps and {len(values)} values")
+
+
+def flatten(config: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
+    """A nested configuration as {"optimizer.population": "50"}; lists stay whole, values are spelled as in JSON."""
+    flat: dict[str, str] = {}
+    for key, value in config.items():
+        if isinstance(value, Mapping):
+            flat |= flatten(value, f"{prefix}{key}.")
+        else:
+            flat[f"{prefix}{key}"] = _text(value)
+    return flat
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, str):
+        return value
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if value is None or isinstance(value, bool | int | float | list | tuple):
+        return json.dumps(value, default=str, ensure_ascii=False)
+    return str(value)
+
+
+@functools.cache
+def git_commit(folder: Path | None = None) -> str:
+    """The commit of the repository around `folder` (default: where the process runs), "" where there is none.
+
+    Uncommitted changes to tracked files add "-dirty".
+    """
+    command = ["git", "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
+    try:
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=5)
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    return done.stdout.strip() if done.returncode == 0 else ""
+
+
+def log(run: Run, uri: str) -> str:
+    """Write one finished run and return its id. Raises `UserError`; nothing is logged for a run that fails `check`."""
+    run.check()
+    client = open_store(uri)
+    with sentences(uri):
+        run_id, ended = _create(client, run, uri), _milliseconds()
+        try:
+            _write(client, run_id, run)
+        except BaseException:
+            client.set_terminated(run_id, "FAILED")
+            raise
+        client.set_terminated(run_id, run.status, end_time=ended)
+    return run_id
+
+
+def start_parent(run: Run, uri: str) -> str:
+    """Open the run of a sweep and return its id, for `Run.parent` of the jobs. Close it in a `finally`."""
+    run.check()
+    client = open_store(uri)
+    with sentences(uri):
+        run_id = _create(client, run, uri)
+        _write(client, run_id, run)
+    return run_id
+
+
+def finish_parent(
+    run_id: str, uri: str, status: str, metrics: Mapping[str, float] | None = None, artifacts: Sequence[Path] = ()
+) -> None:
+    """Close the run of a sweep with its status, adding the figures and files of the sweep as a whole."""
+    run = Run("sweep", run_id, metrics=metrics or {}, artifacts=artifacts, status=status)
+    run.check()
+    client = open_store(uri)
+    with sentences(uri):
+        _write(client, run_id, run)
+        client.set_terminated(run_id, status)
+
+
+def tag_experiment(experiment: str, tags: Mapping[str, str], uri: str) -> str:
+    """Set tags on an experiment, such as a stored view of its runs, and return the experiment's id."""
+    client = open_store(uri)
+    with sentences(uri):
+        experiment_id = _experiment(client, experiment, uri)
+        for key, value in tags.items():
+            client.set_experiment_tag(experiment_id, key, value)
+    return experiment_id
+
+
+def _create(client: Any, run: Run, uri: str) -> str:
+    tags = {
+        "mlflow.user": _user(),
+        "mlflow.source.name": "tractexp",
+        "mlflow.source.type": "LOCAL",
+        "mlflow.source.git.commit": git_commit(),
+        "mlflow.note.content": run.description,
+        "mlflow.parentRunId": run.parent or "",
+    }
+    tags = {key: value for key, value in tags.items() if value} | {k: str(v) for k, v in run.tags.items()}
+    started = _milliseconds() - round(1000 * run.seconds)
+    return client.create_run(_experiment(client, run.experiment, uri), started, tags, run.name).info.run_id
+
+
+def _write(client: Any, run_id: str, run: Run) -> None:
+    from mlflow.entities import Metric, Param
+
+    now = _milliseconds()
+    points = [(name, value, 0) for name, value in run.metrics.items()]
+    for name, (steps, values) in run.curves.items():
+        keep = np.unique(np.linspace(0, len(steps) - 1, min(len(steps), CURVE_POINTS)).round().astype(int))
+        points += [(name, values[i], steps[i]) for i in keep]
+    metrics = [Metric(name, float(value), now, int(step)) for name, value, step in points]
+    parameters = [Param(key, _text(value)[:VALUE_LENGTH]) for key, value in run.parameters.items()]
+    chunks = zip_longest(_chunks(metrics, BATCH_METRICS), _chunks(parameters, BATCH_PARAMETERS), fillvalue=[])
+    for some_metrics, some_parameters in chunks:
+        client.log_batch(run_id, some_metrics, some_parameters)
+    for path in run.artifacts:
+        client.log_artifact(run_id, str(path))
+    if run.model:
+        from tractexp.tracking.model import log_model
+
+        log_model(client, run_id, run.model)
+
+
+def _chunks(items: list[Any], size: int) -> list[list[Any]]:
+    return [items[i : i + size] for i in range(0, len(items), size)]
+
+
+def _experiment(client: Any, name: str, uri: str) -> str:
+    """The id of the experiment `name`, made if need be, its artifacts beside the database wherever the process runs."""
+    from mlflow.exceptions import MlflowException
+
+    found = client.get_experiment_by_name(name)
+    if found is None:
+        database = database_of(uri)
+        folder = re.sub(r"[^\w.-]+", "_", name)
+        location = (database.parent / "mlartifacts" / folder).as_uri() if database else None
+        try:
+            return client.create_experiment(name, artifact_location=location)
+        except MlflowException:  # another process made it first; if not, the next line raises
+            found = client.get_experiment_by_name(name)
+            if found is None:
+                raise
+    if found.lifecycle_stage == "deleted":
+        raise UserError(
+            f"the experiment '{name}' in {uri} was deleted: restore it with "
+            f"'mlflow experiments restore --experiment-id {found.experiment_id}' or log under another name"
+        )
+    return found.experiment_id
+
+
+def _milliseconds() -> int:
+    return round(1000 * time.time())
+
+
+def _user() -> str:
+    try:
+        return getpass.getuser()
+    except (OSError, KeyError):  # a container without an entry for this user
+        return ""

@@ -1,0 +1,84 @@
+"""MLflow's own page on the runs, on this machine only."""
+
+import contextlib
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+import webbrowser
+from typing import IO
+
+from tractexp.errors import UserError
+from tractexp.tracking.store import database_of
+
+
+def serve(uri: str, host: str = "127.0.0.1", port: int = 5000, page: str = "", open_browser: bool = False) -> int:
+    """Run the MLflow UI on the store at `uri` until Ctrl-C or SIGTERM, and return the exit code.
+
+    `page` is what follows the address, such as "#/experiments/1". Raises `UserError` when there is no store yet,
+    the port is taken or the server does not start.
+    """
+    _check_servable(uri, host, port)
+    address = f"http://{host}:{port}/"
+    command = [sys.executable, "-m", "mlflow", "server", "--backend-store-uri", uri, "--registry-store-uri", uri]
+    command += ["--host", host, "--port", str(port), "--workers", "1"]
+    settings = {"MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false", "MLFLOW_DISABLE_TELEMETRY": "true"}
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    with tempfile.TemporaryFile() as output:
+        server = subprocess.Popen(
+            command, env=settings | os.environ, stdout=output, stderr=output, start_new_session=True
+        )
+        try:
+            _wait_until_up(server, address, output)
+            print(f"MLflow UI: {address}{page}  (Ctrl-C ends it)", flush=True)
+            if open_browser:
+                webbrowser.open(address + page)
+            return server.wait()
+        except KeyboardInterrupt:
+            return 0
+        finally:
+            _end(server)
+
+
+def _check_servable(uri: str, host: str, port: int) -> None:
+    database = database_of(uri)
+    if database is None and uri.startswith("http"):
+        raise UserError(f"{uri} is a running MLflow server already: open it in a browser")
+    if database is not None and not database.is_file():
+        raise UserError(f"there is no MLflow store {database} yet: the first run, 'python -m tractexp', creates it")
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except (OSError, OverflowError) as error:
+            reason = error.strerror if isinstance(error, OSError) else "it must be 0 to 65535"
+            raise UserError(f"port {port} on {host} cannot be used ({reason}): choose another, such as 5001") from error
+
+
+def _wait_until_up(server: subprocess.Popen[bytes], address: str, output: IO[bytes], seconds: float = 120.0) -> None:
+    """Return when the server answers; raises `UserError` with its last words if it ends or never does."""
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline and server.poll() is None:
+        with contextlib.suppress(OSError), urllib.request.urlopen(address + "health", timeout=2):
+            return
+        time.sleep(0.1)
+    output.seek(0)
+    last = output.read().decode(errors="replace").strip().rpartition("\n")[2]
+    raise UserError(f"the MLflow UI did not start on {address}: {last or 'it said nothing'}")
+
+
+def _end(server: subprocess.Popen[bytes]) -> None:
+    """End the server with the workers it started, which share its session."""
+    if os.name == "nt":
+        server.terminate()
+    else:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(server.pid, signal.SIGTERM)
+    try:
+        server.wait(10)
+    except subprocess.TimeoutExpired:
+        server.kill()
