@@ -11,19 +11,19 @@ from tractexp.identify.optimizer import REFUSED, Box, Evaluate
 
 DIFFERENCE = 1e-6  # of the box's width; rounding (3e-13 relative) and curvature both stay below 1e-6 of a column
 EDGE = 1e-9  # SciPy's interior method starts strictly inside the box
-ELITE = 10  # starts of a polish, and
-APART = 0.3  # how far from each other: a search that has settled in one valley must not fill the elite with it
+ELITE = 10  # starts of a polish
+APART = 0.3  # between starts: a search that has settled in one valley must not fill the elite with points of it
 
 
-def spread(unit: np.ndarray, f: np.ndarray, count: int, apart: float = 0.1) -> np.ndarray:
-    """Indices of at most `count` points, best first, each further than `apart` from every better one chosen.
+def spread(unit: np.ndarray, f: np.ndarray, count: int) -> np.ndarray:
+    """Indices of at most `count` points, best first, each further than `APART` from every better one chosen.
 
     `unit` (n, d) in the unit cube, `f` (n,) objectives; the distance is the largest coordinate's.
     """
     left, chosen = np.argsort(f, kind="stable"), []
     while len(left) and len(chosen) < count:
         chosen.append(left[0])
-        left = left[np.abs(unit[left] - unit[left[0]]).max(axis=1) > apart]
+        left = left[np.abs(unit[left] - unit[left[0]]).max(axis=1) > APART]
     return np.array(chosen, dtype=int)
 
 
@@ -39,7 +39,7 @@ class Elite:
         better = f < (self.f[-1] if len(self.f) == ELITE else REFUSED)
         if better.any():
             x, f = np.concatenate((self.x, x[better])), np.concatenate((self.f, f[better]))
-            chosen = spread(self.box.to_unit(x), f, ELITE, APART)
+            chosen = spread(self.box.to_unit(x), f, ELITE)
             self.x, self.f = x[chosen], f[chosen]
 
 
@@ -73,7 +73,9 @@ class _Residuals:
         return np.nan_to_num((rows - self(unit)) / h[:, None], nan=0.0).T
 
 
-def descend(evaluate: Evaluate, box: Box, start: np.ndarray, objective: float, tolerance: float, trials: int) -> None:
+def descend(
+    evaluate: Evaluate, box: Box, start: np.ndarray, objective: float, tolerance: float = 1e-8, trials: int = 100
+) -> None:
     """Bounded least squares (SciPy's trust region reflective) from `start` (d,), whose objective is known.
 
     Works in the unit cube and on residuals scaled to a sum of squares of one, so that `tolerance` is relative:
@@ -87,12 +89,12 @@ def descend(evaluate: Evaluate, box: Box, start: np.ndarray, objective: float, t
     if np.isfinite(residuals(unit)).all():
         least_squares(
             residuals, unit, residuals.jacobian, (0.0, 1.0), ftol=tolerance, xtol=tolerance, gtol=tolerance,
-            x_scale="jac", max_nfev=trials,
+            max_nfev=trials,
         )  # fmt: skip
 
 
-def polish(evaluate: Evaluate, box: Box, elite: Elite) -> Iterator[None]:
+def polish(evaluate: Evaluate, elite: Elite) -> Iterator[None]:
     """Descend from each elite point, best first; one iteration each."""
-    for start, objective in list(zip(elite.x, elite.f, strict=True)):
-        descend(evaluate, box, start, objective, tolerance=1e-8, trials=100)
+    for start, objective in zip(elite.x, elite.f, strict=True):
+        descend(evaluate, elite.box, start, objective)
         yield

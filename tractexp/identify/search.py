@@ -157,7 +157,8 @@ def _iterations(counter: _Counter, optimizer: Optimizer, rng: np.random.Generato
     if not optimizer.polish:
         yield from optimizer.search(counter, counter.box, rng)
         return
-    limits, counter.elite = counter.limits, Elite(counter.box)
+    limits, elite = counter.limits, Elite(counter.box)
+    counter.elite = elite
     counter.limits = _before_polish(limits, counter.box.dimension)
     try:
         yield from optimizer.search(counter, counter.box, rng)
@@ -165,8 +166,8 @@ def _iterations(counter: _Counter, optimizer: Optimizer, rng: np.random.Generato
         raise
     except _Stop:
         pass  # its share is spent: the polish has the rest
-    counter.limits = limits
-    yield from polish(counter, counter.box, counter.elite)
+    counter.limits, counter.elite = limits, None
+    yield from polish(counter, elite)
 
 
 def search(
