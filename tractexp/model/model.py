@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.model.drive import Drive
+from tractexp.model.drive import EVENT, Drive
 from tractexp.model.parts import Motor, Static
 from tractexp.parameter import Parameter
 
@@ -60,11 +60,11 @@ class Model:
         from tractexp.model.equations import Equations
 
         eq = Equations()
-        P_d, Q_d = self.motor.declare(eq)
-        P_s0 = eq.define("P_s0", eq.P0 - eq.before(P_d), "P_{s0}")
-        Q_s0 = eq.define("Q_s0", eq.Q0 - eq.before(Q_d), "Q_{s0}")
-        P_s, Q_s = self.static.declare(eq, P_s0, Q_s0)
-        eq.consume(P_d + P_s, Q_d + Q_s)
+        self.motor.declare(eq)
+        self.static.declare(eq)
+        for effect in self.effects:
+            effect.edit(eq)
+        eq.close()
         return eq
 
     @functools.cached_property
@@ -82,9 +82,14 @@ class Model:
 
         return load(self.source)
 
-    def simulate(self, drive: Drive, values: np.ndarray, substeps: Sequence[int] | int = 1) -> Response:
-        """P and Q of every candidate over every event, (n, N)."""
-        candidates = self._candidates(drive, values)
+    def simulate(
+        self, drive: Drive, values: np.ndarray, substeps: Sequence[int] | int = 1, before: np.ndarray | None = None
+    ) -> Response:
+        """P and Q of every candidate over every event, (n, N).
+
+        `before` (E, n, 2) are P0 and Q0 [pu] where candidates differ in them; by default the drive's own.
+        """
+        candidates = self._candidates(drive, values, before)
         n = candidates.shape[2]
         outputs = np.empty((2, n, drive.samples))
         outputs.fill(np.nan)
@@ -120,10 +125,8 @@ class Model:
     def refusal(self, values: np.ndarray, drive: Drive, event: int = 0) -> str | None:
         """Why these values (d,) have no steady state before an event, as a sentence; None where they have one."""
         eq = self.equations
-        U0, omega_s0, omega_n, _ = drive.event[event]
-        known = dict(zip(self.names, map(float, values), strict=True))
-        known |= {"U0": U0, "omega_s0": omega_s0, "omega_n": omega_n, "P0": drive.before[event, 0]}
-        known |= {"Q0": drive.before[event, 1]}
+        known = dict(zip(self.names, map(float, values), strict=True)) | dict(zip(EVENT, drive.event[event], strict=True))
+        known |= dict(zip(("P0", "Q0"), drive.before[event], strict=True))
         number = lambda e: complex(eq.expand(e).subs({s: known[s.name] for s in eq.expand(e).free_symbols})).real  # noqa: E731
         missed = [r.sentence.format(value=number(r.shown)) for r in eq.requirements if not number(r.slack) >= 0]
         return "; ".join(missed) or None
@@ -132,7 +135,7 @@ class Model:
         """The model's equations, one a line."""
         return self.equations.latex()
 
-    def _candidates(self, drive: Drive, values: np.ndarray) -> np.ndarray:
+    def _candidates(self, drive: Drive, values: np.ndarray, before: np.ndarray | None = None) -> np.ndarray:
         """Kernel rows (E, d + 2, n): the parameters, then P0 and Q0 of the event."""
         values = np.atleast_2d(np.asarray(values, dtype=float))
         if values.shape[-1] != len(self.names):
@@ -140,7 +143,7 @@ class Model:
         n = values.shape[-2]
         rows = np.empty((drive.events, len(self.names) + 2, n))
         rows[:, :-2] = np.swapaxes(values, -1, -2)
-        rows[:, -2:] = drive.before[:, :, None]
+        rows[:, -2:] = drive.before[:, :, None] if before is None else np.swapaxes(before, -1, -2)
         return rows
 
     def _run(self, drive, candidates, substeps, outputs):
