@@ -19,6 +19,7 @@ class ModelConfig:
 
     motor: Any = None
     static: Any = None
+    effects: list[str] = field(default_factory=list)  # names of effects added to the equations
     bounds: dict[str, list[float]] = field(default_factory=dict)  # {name: [lower, upper]}
     fixed: dict[str, float] = field(default_factory=dict)  # {name: value}
     substeps: int | None = None  # Runge-Kutta steps per sample; null: as many as needed

@@ -22,7 +22,9 @@ class Exponential(Static):
     p_v = Parameter(1.5, (0.0, 4.0), "1", "voltage exponent of active power", PAPER)
     q_v = Parameter(2.5, (0.0, 8.0), "1", "voltage exponent of reactive power", PAPER)
 
-    def declare(self, eq, P_s0, Q_s0):
+    def declare(self, eq):
         p_v, q_v = eq.declare(self.parameters)
-        u = eq.U / eq.U0
-        return P_s0 * u**p_v, Q_s0 * u**q_v
+        u = eq.define("static_voltage", eq.U / eq.U0, "u")
+        P = eq.define("P_static", eq.P_s0 * u**p_v, "P_s")
+        Q = eq.define("Q_static", eq.Q_s0 * u**q_v, "Q_s")
+        eq.consume(P, Q)

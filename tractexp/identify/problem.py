@@ -30,6 +30,8 @@ def excitation(event: Event) -> Excitation:
         omega_s=None if record.f is None else 2 * np.pi * record.f - nominal,
         omega_s0=0.0 if record.f is None else 2 * np.pi * event.f0 - nominal,
         omega_n=nominal,
+        U2=record.U2,
+        U20=float("nan") if record.U2 is None else float(record.U2[event.steady].mean()),
     )
 
 

@@ -19,6 +19,12 @@ from tractexp.record import Event, find_dips
 ACCEPTED = 0.05  # Eq. (20): a load model is acceptable below 5 %
 
 
+def parts(node: Mapping[str, Any]) -> tuple[Any, Any, list[Any]]:
+    """The motor, static load and effects a model configuration names, built."""
+    effects = [build("effect", {"name": name}) for name in node.get("effects", ())]
+    return build("model/motor", node["motor"]), build("model/static", node["static"]), effects
+
+
 @dataclass(frozen=True, eq=False)
 class Fit:
     """Measured and calculated power of one event, (N,) each, and the relative errors of Eq. (20), as fractions."""
@@ -96,7 +102,7 @@ class Result:
         The voltage before the first dip (all of it where there is none) gives the steady state. P0 and Q0 are
         the power drawn there; by default that of the event the model was identified on.
         """
-        model = compose(*(build(f"model/{part}", self.model[part]) for part in ("motor", "static")))
+        model = compose(*parts(self.model))
         t, U = np.asarray(t, dtype=float), np.asarray(U, dtype=float)
         dips = find_dips(t, U)
         steady = slice(0, max(dips[0][0], 1) if dips else None)

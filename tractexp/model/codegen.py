@@ -10,9 +10,12 @@ from collections.abc import Iterable
 import sympy
 from sympy.printing.pycode import PythonCodePrinter
 
-from tractexp.model.lowering import Lowered, Phase
+from tractexp.model.drive import INPUTS
+from tractexp.model.lowering import Lowered, Phase, symbols
 
 LANES = 16
+PHASES = ("derivative", "renewal", "output")  # what is evaluated lane by lane
+STAGES = (("k1", "a", None), ("k2", "b", ("0.5 * h", "k1")), ("k3", "b", ("0.5 * h", "k2")), ("k4", "c", ("h", "k3")))
 
 HEADER = '''"""Generated from the equations of {title}. Do not edit: the file's name is the hash of its content."""
 
@@ -50,8 +53,9 @@ RUN = '''
 def run(candidates, event, first, inputs, measured, weights, substeps, sums, miss, outputs):
     """Simulate candidates over events and sum their weighted squared errors.
 
-    candidates (events, rows, n): {rows}; event (events, {n_event}): {event}, step [s];
-    first (events + 1,): where each event starts in the samples; inputs ({n_input}, N): {inputs};
+    candidates (events, rows, n): {rows};
+    event (events, {n_event}): {event}; first (events + 1,): where each event starts in the samples;
+    inputs (rows as in INPUTS, N), of which are used: {inputs};
     measured, weights (2, N): P, Q; substeps (events,); sums (events, 2, n) and miss (events, n) are written;
     outputs (2, n, N) or empty.
     """
@@ -60,9 +64,8 @@ def run(candidates, event, first, inputs, measured, weights, substeps, sums, mis
     W = np.empty({rows_W} * {L})
     signals = np.empty(({n_signal}, inputs.shape[1]))
     for e in range(candidates.shape[0]):
-        step = event[e, {i_step}]
-        h = step / substeps[e]
 {unpack_event}
+        h = step / substeps[e]
 {fill_signals}
         for block in range((n + {L} - 1) // {L}):
             reachable = False
@@ -121,36 +124,32 @@ _printer = _Printer({"fully_qualified_modules": True, "precision": 17})
 
 def source(lowered: Lowered, title: str) -> str:
     """The kernel module's source text. Deterministic: the same equations give the same text."""
-    constants = [s for s, _ in lowered.constants]
-    at = _Rows(lowered, constants)
-    derivative_signals = [s for s, _ in lowered.derivative.signals]
-    output_signals = [s for s, _ in lowered.output.signals]
+    at = _Rows(lowered)
+    sample_signals = _sample_signals(lowered)
     scalars = [*lowered.inputs, *lowered.event]
     rows = [*lowered.parameters, sympy.Symbol("P0"), sympy.Symbol("Q0")]
 
     text = HEADER.format(title=title)
     text += _start(lowered, rows)
     own = [*rows, *lowered.event, *lowered.starts]
+    if lowered.rest is not None:
+        text += _phase("_rest", own, lowered.rest) + _settle(lowered, rows)
     text += _function("_constants", own, (), [e for _, e in lowered.constants])
     text += _function("_drive", scalars, (), [e for _, e in lowered.derivative.signals])
-    text += _function("_signals", scalars, (), [e for _, e in lowered.output.signals])
-    moving = [*lowered.states, *lowered.inputs]
-    lane = at.needed
-    text += _phase("_derivative", [*moving, *derivative_signals, *lane["derivative"]], lowered.derivative)
-    text += _phase("_output", [*moving, *output_signals, *lane["output"]], lowered.output)
+    text += _function("_signals", scalars, (), [e for _, e in sample_signals])
+    for name in PHASES:
+        text += _phase(f"_{name}", _arguments(lowered, at, name), getattr(lowered, name))
     text += RUN.format(
         L=LANES,
         rows=_names(rows),
         event=_names(lowered.event),
         inputs=_names(lowered.inputs),
-        n_event=len(lowered.event) + 1,
-        i_step=len(lowered.event),
-        n_input=len(lowered.inputs),
-        n_signal=max(len(output_signals), 1),
+        n_event=len(lowered.event),
+        n_signal=max(len(sample_signals), 1),
         rows_W=at.count,
         row_P=at["P"], row_Q=at["Q"], row_sum_P=at["sum_P"], row_sum_Q=at["sum_Q"], row_miss=at["miss"],
         unpack_event=_indent(8, (f"{s} = event[e, {i}]" for i, s in enumerate(lowered.event))),
-        fill_signals=_indent(8, _fill_signals(lowered, output_signals)),
+        fill_signals=_indent(8, _fill_signals(lowered)),
         start=_indent(16, _load_candidate(lowered, rows, at)),
         sample=_indent(20, _sample(lowered, at)),
         advance=_indent(24, _advance(lowered, at)),
@@ -161,17 +160,14 @@ def source(lowered: Lowered, title: str) -> str:
 class _Rows:
     """Offsets of the rows of the work array: what the lanes carry."""
 
-    def __init__(self, lowered: Lowered, constants: list[sympy.Symbol]):
-        used = {
-            name: set().union(*(e.free_symbols for e in (*p.expressions, *(e for _, e in p.temporaries))))
-            for name, p in (("derivative", lowered.derivative), ("output", lowered.output))
-        }
+    def __init__(self, lowered: Lowered):
         lane = [*lowered.parameters, sympy.Symbol("P0", real=True), sympy.Symbol("Q0", real=True)]
-        lane += [*lowered.starts, *constants]
-        self.needed = {name: [s for s in lane if s in symbols] for name, symbols in used.items()}
+        lane += [*lowered.starts, *(s for s, _ in lowered.constants)]
+        used = {name: symbols(getattr(lowered, name)) for name in PHASES}
+        self.needed = {name: [s for s in lane if s in used[name]] for name in PHASES}
         self.carried = [s for s in lane if any(s in needed for needed in self.needed.values())]
-        names = [*map(str, lowered.states), *map(str, self.carried), "P", "Q", "sum_P", "sum_Q", "miss"]
-        self.offset = {name: LANES * i for i, name in enumerate(names)}
+        names = [*lowered.states, *lowered.memories, *self.carried, "P", "Q", "sum_P", "sum_Q", "miss"]
+        self.offset = {str(name): LANES * i for i, name in enumerate(names)}
         self.count = len(names)
 
     def __getitem__(self, name: object) -> int:
@@ -181,34 +177,63 @@ class _Rows:
         return [f"{s} = W[{self[s]} + l]" for s in symbols]
 
 
-def _fill_signals(lowered: Lowered, signals: list[sympy.Symbol]) -> list[str]:
-    if not signals:
+def _sample_signals(lowered: Lowered) -> list[tuple[sympy.Symbol, sympy.Expr]]:
+    """The signals read once a sample: those of the output and of the memories' renewal."""
+    return list(dict([*lowered.output.signals, *lowered.renewal.signals]).items())
+
+
+def _arguments(lowered: Lowered, at: _Rows, name: str, suffix: str = "") -> list[str]:
+    """What the function of a phase is called with; `suffix` marks sampled values at a stage of the step."""
+    sampled = [f"{s}{suffix}" for s in (*lowered.inputs, *(s for s, _ in getattr(lowered, name).signals))]
+    return [*map(str, (*lowered.states, *lowered.memories)), *sampled, *map(str, at.needed[name])]
+
+
+def _targets(names: Iterable[object]) -> str:
+    """The left side of an assignment from a tuple."""
+    listed = [str(name) for name in names]
+    return ", ".join(listed) + "," * (len(listed) == 1)
+
+
+def _row(symbol: sympy.Symbol) -> int:
+    return INPUTS.index(symbol.name)
+
+
+def _fill_signals(lowered: Lowered) -> list[str]:
+    count = len(_sample_signals(lowered))
+    if not count:
         return []
-    sampled = [f"inputs[{j}, i]" for j in range(len(lowered.inputs))]
-    targets = ", ".join(f"signals[{j}, i]" for j in range(len(signals)))
-    call = f"_signals({', '.join([*sampled, *map(str, lowered.event)])})"
-    return ["for i in range(first[e], first[e + 1]):", f"    {targets}{',' * (len(signals) == 1)} = {call}"]
+    sampled = [f"inputs[{_row(s)}, i]" for s in lowered.inputs]
+    targets = _targets(f"signals[{j}, i]" for j in range(count))
+    call = f"    {targets} = _signals({_names([*sampled, *lowered.event])})"
+    return ["for i in range(first[e], first[e + 1]):", call]
 
 
 def _load_candidate(lowered: Lowered, rows: list[sympy.Symbol], at: _Rows) -> list[str]:
     constants = [s for s, _ in lowered.constants]
     lines = [f"{s} = candidates[e, {i}, k]" for i, s in enumerate(rows)]
     lines.append(f"{_names([*lowered.starts, 'm'])} = _start({_names([*rows, *lowered.event])})")
+    arguments = _names([*rows, *lowered.event, *lowered.starts])
+    if lowered.rest is not None:
+        lines.append(f"{_targets([*lowered.starts[: len(lowered.states)], 'unsettled'])} = _settle({arguments})")
+        lines.append("m = min(m + unsettled, 1e6)")
     if constants:
-        arguments = _names([*rows, *lowered.event, *lowered.starts])
-        lines.append(f"{_names(constants)}{',' * (len(constants) == 1)} = _constants({arguments})")
-    lines += [f"W[{at[s]} + l] = {begin}" for s, begin in zip(lowered.states, lowered.starts, strict=True)]
+        lines.append(f"{_targets(constants)} = _constants({arguments})")
+    carried = zip((*lowered.states, *lowered.memories), lowered.starts, strict=True)
+    lines += [f"W[{at[s]} + l] = {begin}" for s, begin in carried]
     return lines + [f"W[{at[s]} + l] = {s}" for s in at.carried]
 
 
 def _sample(lowered: Lowered, at: _Rows) -> list[str]:
-    signals = [s for s, _ in lowered.output.signals]
-    lines = [f"{s} = inputs[{j}, i]" for j, s in enumerate(lowered.inputs)]
-    lines += [f"{s} = signals[{j}, i]" for j, s in enumerate(signals)]
+    carried = [*lowered.states, *lowered.memories]
+    lines = [f"{s} = inputs[{_row(s)}, i]" for s in lowered.inputs]
+    lines += [f"{s} = signals[{j}, i]" for j, (s, _) in enumerate(_sample_signals(lowered))]
     lines += ["p, q, w_p, w_q = measured[0, i], measured[1, i], weights[0, i], weights[1, i]"]
-    arguments = _names([*lowered.states, *lowered.inputs, *signals, *at.needed["output"]])
-    body = at.load([*lowered.states, *at.needed["output"]])
-    body += [f"P, Q = _output({arguments})"]
+    needed = dict.fromkeys([*at.needed["renewal"], *at.needed["output"]])
+    body = at.load([*carried, *needed])
+    if lowered.memories:
+        body.append(f"{_targets(lowered.memories)} = _renewal({_names(_arguments(lowered, at, 'renewal'))})")
+        body += [f"W[{at[s]} + l] = {s}" for s in lowered.memories]
+    body += [f"P, Q = _output({_names(_arguments(lowered, at, 'output'))})"]
     body += [f"W[{at['P']} + l] = P", f"W[{at['Q']} + l] = Q"]
     body += [f"W[{at['sum_P']} + l] += w_p * (p - P) * (p - P)", f"W[{at['sum_Q']} + l] += w_q * (q - Q) * (q - Q)"]
     return [*lines, f"for l in range({LANES}):", *_nested(body)]
@@ -216,47 +241,107 @@ def _sample(lowered: Lowered, at: _Rows) -> list[str]:
 
 def _advance(lowered: Lowered, at: _Rows) -> list[str]:
     """Classical Runge-Kutta, order 4 (Eq. (4) with its stage steps corrected), inputs linear between samples."""
-    lines = ["for j in range(substeps[e]):"]
+    if not lowered.states:
+        return ["pass"]
     inner = []
     for point, fraction in (("a", "j"), ("b", "(j + 0.5)"), ("c", "(j + 1)")):
-        for k, s in enumerate(lowered.inputs):
-            rise = f"(inputs[{k}, i + 1] - inputs[{k}, i])"
-            inner.append(f"{s}{point} = inputs[{k}, i] + {rise} * ({fraction} / substeps[e])")
+        inner += [_between(s, point, fraction) for s in lowered.inputs]
         if signals := [s for s, _ in lowered.derivative.signals]:
-            targets = _names(f"{s}{point}" for s in signals)
             inputs = [f"{s}{point}" for s in lowered.inputs]
-            inner.append(f"{targets}{',' * (len(signals) == 1)} = _drive({_names([*inputs, *lowered.event])})")
-    body = at.load([*lowered.states, *at.needed["derivative"]])
-    stages = [
-        ("k1", "a", None),
-        ("k2", "b", ("0.5 * h", "k1")),
-        ("k3", "b", ("0.5 * h", "k2")),
-        ("k4", "c", ("h", "k3")),
-    ]
-    for slope, point, ahead in stages:
-        body.append(_stage(lowered, at, slope, point, ahead))
+            inner.append(f"{_targets(f'{s}{point}' for s in signals)} = _drive({_names([*inputs, *lowered.event])})")
+    body = at.load([*lowered.states, *lowered.memories, *at.needed["derivative"]])
+    body += [_stage(lowered, at, *stage) for stage in STAGES]
     for s in lowered.states:
         body.append(f"W[{at[s]} + l] = {s} + h / 6.0 * (k1_{s} + 2.0 * (k2_{s} + k3_{s}) + k4_{s})")
     inner += [f"for l in range({LANES}):", *_nested(body)]
-    return lines + _nested(inner)
+    return ["for j in range(substeps[e]):", *_nested(inner)]
+
+
+def _between(symbol: sympy.Symbol, point: str, fraction: str) -> str:
+    """An input between samples i and i + 1: linear, but its slope is the same all the way."""
+    k = _row(symbol)
+    if symbol.name == "U_rate":
+        return f"{symbol}{point} = inputs[{k}, i + 1]"
+    rise = f"(inputs[{k}, i + 1] - inputs[{k}, i])"
+    return f"{symbol}{point} = inputs[{k}, i] + {rise} * ({fraction} / substeps[e])"
 
 
 def _stage(lowered: Lowered, at: _Rows, slope: str, point: str, ahead: tuple[str, str] | None) -> str:
+    n = len(lowered.states)
     states = [f"{s} + {ahead[0]} * {ahead[1]}_{s}" if ahead else str(s) for s in lowered.states]
-    sampled = [f"{s}{point}" for s in (*lowered.inputs, *(s for s, _ in lowered.derivative.signals))]
-    results = [f"{slope}_{s}" for s in lowered.states]
-    arguments = _names([*states, *sampled, *at.needed["derivative"]])
-    return f"{_names(results)}{',' * (len(results) == 1)} = _derivative({arguments})"
+    arguments = states + _arguments(lowered, at, "derivative", point)[n:]
+    return f"{_targets(f'{slope}_{s}' for s in lowered.states)} = _derivative({_names(arguments)})"
 
 
 def _start(lowered: Lowered, rows: list[sympy.Symbol]) -> str:
     """States before the event and by how much the requirements are missed (0: a steady state exists)."""
-    states, slacks = lowered.start.expressions[: len(lowered.states)], lowered.start.expressions[len(lowered.states) :]
+    states, slacks = lowered.start.expressions[: len(lowered.starts)], lowered.start.expressions[len(lowered.starts) :]
     short = [f"max(0.0, -({_printer.doprint(s)}))" for s in slacks]
     lines = [f"{s} = {_printer.doprint(e)}" for s, e in lowered.start.temporaries]
     lines.append(f"miss = min({' + '.join(short) or '0.0'}, 1e6)")
     lines.append(f"return {', '.join([*map(_printer.doprint, states), 'miss if miss >= 0.0 else 1e6'])}")
     return _text("_start", [*rows, *lowered.event], lines)
+
+
+SETTLE = """
+
+@compiled
+def _settle({arguments}):
+    \"\"\"Solve for the steady state before the event by Newton's method; last, how far it misses.\"\"\"
+    x, f, g, J = np.array([{states}]), np.empty({n}), np.empty({n}), np.empty(({n}, {n}))
+    for _ in range(40):
+        {f} = _rest({known}, {x})
+        for k in range({n}):
+            keep, d = x[k], 1e-7 * (1.0 + abs(x[k]))
+            x[k] = keep + d
+            {g} = _rest({known}, {x})
+            x[k] = keep
+            for r in range({n}):
+                J[r, k] = (g[r] - f[r]) / d
+        moved = 0.0
+        for k in range({n}):  # Gaussian elimination with partial pivoting; f becomes the step
+            p = k
+            for r in range(k + 1, {n}):
+                if abs(J[r, k]) > abs(J[p, k]):
+                    p = r
+            for c in range({n}):
+                J[k, c], J[p, c] = J[p, c], J[k, c]
+            f[k], f[p] = f[p], f[k]
+            for r in range(k + 1, {n}):
+                factor = J[r, k] / J[k, k]
+                for c in range(k, {n}):
+                    J[r, c] -= factor * J[k, c]
+                f[r] -= factor * f[k]
+        for k in range({n} - 1, -1, -1):
+            for c in range(k + 1, {n}):
+                f[k] -= J[k, c] * f[c]
+            f[k] /= J[k, k]
+            moved = max(moved, abs(f[k]) / (1.0 + abs(x[k])))
+        shorter = 1.0 if moved < 0.5 else 0.5 / moved
+        for k in range({n}):
+            x[k] -= shorter * f[k]
+        if not moved > 1e-12:
+            break
+    {f} = _rest({known}, {x})
+    off = 0.0
+    for k in range({n}):
+        off = max(off, abs(f[k]))
+    settled = moved <= 1e-9 and off < 1e-6
+    return {x}, 0.0 if settled else (min(1.0 + off, 1e6) if off >= 0.0 else 1e6)
+"""
+
+
+def _settle(lowered: Lowered, rows: list[sympy.Symbol]) -> str:
+    n = len(lowered.states)
+    states, remembered = lowered.starts[:n], lowered.starts[n:]
+    known = _names([*rows, *lowered.event])
+    x = _names([*(f"x[{k}]" for k in range(n)), *remembered])
+    moving = {"f": _targets(f"f[{k}]" for k in range(n)), "g": _targets(f"g[{k}]" for k in range(n))}
+    arguments = _names([*rows, *lowered.event, *lowered.starts])
+    if not n:
+        return f"\n\n@compiled\ndef _settle({arguments}):\n    return (0.0,)\n"
+    text = SETTLE.format(arguments=arguments, states=_names(states), n=n, known=known, x=x, **moving)
+    return text.replace(f"return {x},", f"return {_names(f'x[{k}]' for k in range(n))},")
 
 
 def _phase(name: str, arguments: list, phase: Phase) -> str:

@@ -1,9 +1,12 @@
 """What drives a simulation: recorded voltage and the steady state before it, laid out for the kernel."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
+INPUTS = ("U", "omega_s", "U_rate", "U2")  # rows of `Drive.inputs`; U_rate is the slope up to the sample
+EVENT = ("U0", "omega_s0", "U20", "omega_n", "step")  # columns of `Drive.event`
 
 
 @dataclass(frozen=True, eq=False)
@@ -11,7 +14,8 @@ class Excitation:
     """One event: uniformly sampled input, and measured power where there is any.
 
     U [pu] (N,); P, Q [pu] (N,), nan where missing; step [s]; U0, P0, Q0 [pu] and omega_s0 are the steady state
-    before the event; omega_s (N,) is the synchronous speed relative to nominal [rad/s]; omega_n is nominal.
+    before the event; omega_s (N,) is the synchronous speed relative to nominal [rad/s]; omega_n is nominal;
+    U2 (N,) and U20 are the negative-sequence voltage [pu], where recorded.
     """
 
     step: float
@@ -24,6 +28,8 @@ class Excitation:
     omega_s: np.ndarray | None = None
     omega_s0: float = 0.0
     omega_n: float = 2 * np.pi * 50.0
+    U2: np.ndarray | None = None
+    U20: float = float("nan")
     weight_P: float = 1.0
     weight_Q: float = 1.0
 
@@ -32,19 +38,29 @@ class Excitation:
 class Drive:
     """One or several events end to end. Shapes: N samples in all, E events."""
 
-    inputs: np.ndarray  # (2, N): U, omega_s
+    inputs: np.ndarray  # (4, N), rows as in INPUTS; omega_s is 0 and U2 nan where not recorded
     measured: np.ndarray  # (2, N): P, Q, gaps filled with 0
     weights: np.ndarray  # (2, N): 0 in a gap
     first: np.ndarray  # (E + 1,)
-    event: np.ndarray  # (E, 4): U0, omega_s0, omega_n, step
+    event: np.ndarray  # (E, 5), columns as in EVENT
     before: np.ndarray  # (E, 2): P0, Q0
 
     @classmethod
     def of(cls, events: Sequence[Excitation]) -> "Drive":
         """Lay events end to end."""
-        speed = [np.zeros(len(e.U)) if e.omega_s is None else e.omega_s for e in events]
-        inputs = np.stack([np.concatenate([e.U for e in events]), np.concatenate(speed)])
-        measured = np.stack([np.concatenate([e.P for e in events]), np.concatenate([e.Q for e in events])])
+
+        def joined(channel: Callable[[Excitation], np.ndarray]) -> np.ndarray:
+            return np.concatenate([channel(e) for e in events])
+
+        inputs = np.stack(
+            [
+                joined(lambda e: e.U),
+                joined(lambda e: np.zeros(len(e.U)) if e.omega_s is None else e.omega_s),
+                joined(lambda e: np.diff(e.U, prepend=e.U[0]) / e.step),
+                joined(lambda e: np.full(len(e.U), np.nan) if e.U2 is None else e.U2),
+            ]
+        )
+        measured = np.stack([joined(lambda e: e.P), joined(lambda e: e.Q)])
         lengths = [len(e.U) for e in events]
         weights = np.repeat([[e.weight_P for e in events], [e.weight_Q for e in events]], lengths, axis=1)
         gaps = np.isnan(measured)
@@ -53,7 +69,7 @@ class Drive:
             measured=np.where(gaps, 0.0, measured),
             weights=np.where(gaps, 0.0, weights),
             first=np.concatenate([[0], np.cumsum(lengths)]),
-            event=np.array([[e.U0, e.omega_s0, e.omega_n, e.step] for e in events]),
+            event=np.array([[getattr(e, name) for name in EVENT] for e in events]),
             before=np.array([[e.P0, e.Q0] for e in events]),
         )
 

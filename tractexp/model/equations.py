@@ -5,12 +5,13 @@ derivatives and steady state, and the power they draw. Kernel, steady state, par
 derived from it. A named quantity can be edited after it was declared: that is what a missing effect does.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import sympy
-from sympy import I, Symbol, im, re
+from sympy import I, Symbol, conjugate, im, re
 
+from tractexp.model.drive import EVENT, INPUTS
 from tractexp.parameter import Parameter
 
 
@@ -33,31 +34,48 @@ class Requirement:
     shown: sympy.Expr
 
 
+@dataclass
+class Memory:
+    """A discrete memory, such as a relay: renewed once a sample, before the power of that sample is read."""
+
+    symbol: Symbol
+    latex: str
+    renewal: sympy.Expr | None = None
+    initial: sympy.Expr | None = None
+
+
 class Equations:
     """The declaration of one composite load, Eq. (7) of Wu et al. 2022.
 
     Symbols given, all per unit of the record's base except angular speeds [rad/s], which are relative to the
     nominal synchronous speed `omega_n`:
 
-    - inputs, recorded: `U` voltage, `omega_s` synchronous speed (0 where the frequency is not recorded);
-    - before the event: `U0`, `omega_s0`, `P0`, `Q0`;
-    - `omega_n`, the nominal synchronous speed.
+    - inputs, recorded: `U` voltage, `omega_s` synchronous speed (0 where the frequency is not recorded), `U2`
+      negative-sequence voltage; and `U_rate`, the slope of U [pu/s];
+    - before the event: `U0`, `omega_s0`, `U20`, `P0`, `Q0`;
+    - `omega_n`, the nominal synchronous speed; `step`, the time between samples [s];
+    - `P_s0`, `Q_s0`, what all other parts leave to the static load before the event.
 
     A phasor state is one complex symbol; its real and imaginary part become two real states of the kernel.
+    `settled` says whether the states' `initial` values are exact; where an effect has edited the equations they
+    are only a first guess, and the kernel solves for the steady state.
     """
 
     def __init__(self) -> None:
-        self.U, self.omega_s = _real("U"), _real("omega_s")
-        self.U0, self.omega_s0 = _real("U0"), _real("omega_s0")
+        self.U, self.omega_s, self.U_rate, self.U2 = map(_real, INPUTS)
+        self.U0, self.omega_s0, self.U20, self.omega_n, self.step = map(_real, EVENT)
         self.P0, self.Q0 = _real("P0"), _real("Q0")
-        self.omega_n = _real("omega_n")
+        self.P_s0, self.Q_s0 = _real("P_s0"), _real("Q_s0")
+        self.settled = True
         self.parameters: dict[str, Parameter] = {}
         self.definitions: dict[Symbol, sympy.Expr] = {}
         self.states: dict[Symbol, State] = {}
+        self.memories: dict[Symbol, Memory] = {}
         self.requirements: list[Requirement] = []
         self.latex_names: dict[Symbol, str] = {
             self.omega_s: r"\omega_s", self.U0: "U_0", self.omega_s0: r"\omega_{s0}",
-            self.P0: "P_0", self.Q0: "Q_0", self.omega_n: r"\omega_n",
+            self.P0: "P_0", self.Q0: "Q_0", self.omega_n: r"\omega_n", self.U2: "U_2", self.U20: "U_{20}",
+            self.P_s0: "P_{s0}", self.Q_s0: "Q_{s0}", self.U_rate: r"\dot U", self.step: r"\Delta t",
         }  # fmt: skip
         self.P: sympy.Expr = sympy.Integer(0)
         self.Q: sympy.Expr = sympy.Integer(0)
@@ -82,9 +100,28 @@ class Equations:
         self.definitions[symbol] = expression
         return symbol
 
+    def has(self, name: str) -> bool:
+        """Whether this model has a quantity, state or parameter called `name`."""
+        return any(s.name == name for s in self._symbols())
+
     def symbol(self, name: str) -> Symbol:
-        """The defined quantity or state called `name`; KeyError where this model has none."""
-        return next(s for s in (*self.definitions, *self.states) if s.name == name)
+        """The quantity, state or parameter called `name`; KeyError where this model has none."""
+        for symbol in self._symbols():
+            if symbol.name == name:
+                return symbol
+        raise KeyError(name)
+
+    def _symbols(self) -> list[Symbol]:
+        return [*self.definitions, *self.states, *self.memories, *map(_real, self.parameters)]
+
+    def edit(self, name: str, change: Callable[[sympy.Expr], sympy.Expr]) -> None:
+        """Replace the expression behind a named quantity by `change` of it: what a missing effect does.
+
+        The quantity keeps its name, so effects stack in any order. A quantity that was real must stay real.
+        """
+        symbol = self.symbol(name)
+        self.definitions[symbol] = sympy.sympify(change(self.definitions[symbol]))
+        self.settled = False
 
     def state(self, name: str, latex: str) -> Symbol:
         """A real state."""
@@ -104,19 +141,41 @@ class Equations:
         self.states[state].derivative = sympy.sympify(derivative)
         self.states[state].initial = sympy.sympify(initial)
 
+    def memory(self, name: str, latex: str) -> Symbol:
+        """A discrete memory (real)."""
+        symbol = _real(name)
+        self.memories[symbol] = Memory(symbol, latex)
+        self.latex_names[symbol] = latex
+        return symbol
+
+    def renews(self, memory: Symbol, renewal: sympy.Expr, initial: sympy.Expr) -> None:
+        """Give a memory its value at a sample, from itself, inputs and states there, and its value before."""
+        self.memories[memory].renewal = sympy.sympify(renewal)
+        self.memories[memory].initial = sympy.sympify(initial)
+
     def require(self, slack: sympy.Expr, sentence: str, shown: sympy.Expr) -> None:
         """A steady state exists only where `slack` >= 0. `{value}` in the sentence prints `shown`."""
         self.requirements.append(Requirement(sympy.sympify(slack), sentence, sympy.sympify(shown)))
 
     def consume(self, P: sympy.Expr, Q: sympy.Expr) -> None:
-        """Add power to what the load draws, P and Q positive when consumed."""
+        """Add a part that draws P and Q (positive when consumed); before the event the static load gives way."""
         self.P, self.Q = self.P + P, self.Q + Q
+
+    def close(self) -> None:
+        """Give the static load what the other parts leave before the event. Called once all parts have declared."""
+        without_static = {self.P_s0: sympy.Integer(0), self.Q_s0: sympy.Integer(0)}
+        others = [self.real(self.before(self.expand(power).xreplace(without_static))) for power in (self.P, self.Q)]
+        self.definitions[self.P_s0] = self.P0 - others[0]
+        self.definitions[self.Q_s0] = self.Q0 - others[1]
 
     def before(self, expression: sympy.Expr) -> sympy.Expr:
         """An expression's value in the steady state before the event, as an expression of constants."""
-        at_start = {self.U: self.U0, self.omega_s: self.omega_s0}
-        at_start |= {state: start_symbol(state) for state in self.states}
-        return self.expand(expression).xreplace(at_start)
+        at_start = {symbol: start_symbol(symbol) for symbol in (*self.states, *self.memories)}
+        return self.expand(expression).xreplace(self.at_rest() | at_start)
+
+    def at_rest(self) -> dict[Symbol, sympy.Expr]:
+        """The inputs' values before the event."""
+        return {self.U: self.U0, self.omega_s: self.omega_s0, self.U2: self.U20, self.U_rate: sympy.Integer(0)}
 
     def expand(self, expression: sympy.Expr) -> sympy.Expr:
         """The expression with every named quantity replaced by what it stands for."""
@@ -139,29 +198,38 @@ class Equations:
 
     def parts(self, expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
         """Real and imaginary part, with phasor symbols replaced by their real parts."""
-        split = {}
+        split: dict[Symbol, sympy.Expr] = {}
         for state in self.states:
             if not state.is_real:
                 a, b = phasor_parts(state)
                 a0, b0 = phasor_parts(start_symbol(state))
                 split |= {state: a + I * b, start_symbol(state): a0 + I * b0}
         lowered = expression.xreplace(split)
-        return (lowered, sympy.Integer(0)) if lowered.is_real else lowered.as_real_imag()
+        if lowered.is_real:
+            return lowered, sympy.Integer(0)
+        real, imaginary = lowered.as_real_imag()
+        return _shorter(real), _shorter(imaginary)
 
     def real(self, expression: sympy.Expr) -> sympy.Expr:
         """The real part of an expression that is meant to be real."""
         return self.parts(expression)[0]
 
     def latex(self) -> list[str]:
-        """The equations one a line: states, named quantities, power, steady state."""
+        """The equations one a line: states, memories, named quantities, power, steady state."""
         show = {"symbol_names": self.latex_names, "imaginary_unit": "j", "mul_symbol": r" \, "}
         tex = lambda e: sympy.latex(e, **show)  # noqa: E731
         lines = [rf"\frac{{d {s.latex}}}{{dt}} = {tex(s.derivative)}" for s in self.states.values()]
+        lines += [rf"{m.latex} \leftarrow {tex(m.renewal)}" for m in self.memories.values()]
         lines += [f"{tex(symbol)} = {tex(expression)}" for symbol, expression in self.definitions.items()]
         lines += [f"P = {tex(self.P)}", f"Q = {tex(self.Q)}"]
-        starts = {start_symbol(s.symbol): f"{{{s.latex}}}|_0" for s in self.states.values()}
+        starts = {start_symbol(s.symbol): f"{{{s.latex}}}|_0" for s in (*self.states.values(), *self.memories.values())}
         show["symbol_names"] = self.latex_names | starts
         return lines + [f"{starts[start_symbol(s.symbol)]} = {tex(s.initial)}" for s in self.states.values()]
+
+
+def _shorter(expression: sympy.Expr) -> sympy.Expr:
+    """The expression or its expansion, whichever has fewer operations: products of phasors cancel when expanded."""
+    return min(expression, sympy.expand(expression), key=sympy.count_ops)
 
 
 def _real(name: str) -> Symbol:
@@ -178,4 +246,7 @@ def phasor_parts(state: Symbol) -> tuple[Symbol, Symbol]:
     return _real(f"{state.name}_re"), _real(f"{state.name}_im")
 
 
-__all__ = ["Equations", "I", "Requirement", "State", "im", "phasor_parts", "re", "start_symbol"]
+__all__ = [
+    "Equations", "I", "Memory", "Requirement", "State",
+    "conjugate", "im", "phasor_parts", "re", "start_symbol", "sympy",
+]  # fmt: skip

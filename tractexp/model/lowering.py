@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import sympy
 from sympy import Symbol
 
+from tractexp.model.drive import EVENT, INPUTS
 from tractexp.model.equations import Equations, phasor_parts, start_symbol
 
 
@@ -27,13 +28,16 @@ class Lowered:
     """Everything the code generator prints, in real arithmetic."""
 
     parameters: tuple[Symbol, ...]
-    inputs: tuple[Symbol, ...]  # sampled
+    inputs: tuple[Symbol, ...]  # sampled; those of `INPUTS` that the equations use
     event: tuple[Symbol, ...]  # one number per event
     states: tuple[Symbol, ...]
-    starts: tuple[Symbol, ...]  # the states before the event
-    start: Phase  # states before the event, then the slack of each requirement
+    memories: tuple[Symbol, ...]
+    starts: tuple[Symbol, ...]  # states and memories before the event
+    start: Phase  # states and memories before the event, then the slack of each requirement
+    rest: Phase | None  # derivatives before the event, where the start is only a guess to be solved
     constants: tuple[tuple[Symbol, sympy.Expr], ...]
     derivative: Phase
+    renewal: Phase
     output: Phase
 
 
@@ -88,42 +92,55 @@ class _Hoister:
 def lower(eq: Equations) -> Lowered:
     """Lower a complete declaration. Raises ValueError where a symbol is used that nothing declares."""
     rows = eq.real_states()
-    states = tuple(symbol for symbol, _, _ in rows)
-    starts = tuple(s for state in eq.states for s in _real_parts(start_symbol(state)))
+    states, memories = tuple(symbol for symbol, _, _ in rows), tuple(eq.memories)
+    starts = tuple(p for s in (*eq.states, *eq.memories) for p in _real_parts(start_symbol(s)))
     parameters = tuple(map(_symbol, eq.parameters))
     lane = {*parameters, eq.P0, eq.Q0, *starts}
-    event = (eq.U0, eq.omega_s0, eq.omega_n)
-    inputs = (eq.U, eq.omega_s)
+    event = tuple(map(_symbol, EVENT))
+    inputs = tuple(map(_symbol, INPUTS))
 
     hoist = _Hoister(lane, set(event), set(inputs))
     derivative = _phase(hoist, [d for _, d, _ in rows])
+    renewal = _phase(hoist, [eq.real(eq.expand(m.renewal)) for m in eq.memories.values()])
     output = _phase(hoist, [eq.real(eq.expand(eq.P)), eq.real(eq.expand(eq.Q))])
     slack = [eq.expand(r.slack) for r in eq.requirements]
-    start = _phase(None, [i for _, _, i in rows] + slack)
+    remembered = [eq.real(eq.expand(m.initial)) for m in eq.memories.values()]
+    start = _phase(None, [i for _, _, i in rows] + remembered + slack)
+    at_rest = eq.at_rest() | dict(zip((*states, *memories), starts, strict=True))
+    rest = None if eq.settled else _phase(None, [d.xreplace(at_rest) for _, d, _ in rows])
+    phases = (derivative, renewal, output)
+    used = tuple(s for s in inputs if s == eq.U or any(s in symbols(p) for p in phases))
     lowered = Lowered(
-        parameters, inputs, event, states, starts, start,
-        tuple((s, e) for e, s in hoist.constants.items()), derivative, output,
+        parameters, used, event, states, memories, starts, start, rest,
+        tuple((s, e) for e, s in hoist.constants.items()), *phases,
     )  # fmt: skip
     _check_closed(lowered, lane)
     return lowered
 
 
+def symbols(phase: Phase) -> set[Symbol]:
+    """All symbols a phase reads or makes."""
+    parts = (*phase.expressions, *(e for _, e in (*phase.temporaries, *phase.signals)))
+    return set().union(*(e.free_symbols for e in parts))
+
+
 def _phase(hoist: _Hoister | None, expressions: list[sympy.Expr]) -> Phase:
     signals = ()
     if hoist is not None:
-        hoist.signals = {}
         expressions = [hoist(e) for e in expressions]
-        signals = tuple((s, e) for e, s in hoist.signals.items())
+        used = set().union(*(e.free_symbols for e in expressions))
+        signals = tuple((s, e) for e, s in hoist.signals.items() if s in used)
     temporaries, reduced = sympy.cse(expressions, symbols=sympy.numbered_symbols("x", real=True), order="none")
     return Phase(signals, tuple(temporaries), tuple(reduced))
 
 
 def _check_closed(lowered: Lowered, lane: set[Symbol]) -> None:
-    known = lane | {*lowered.inputs, *lowered.event, *lowered.states}
-    for phase in (lowered.start, lowered.derivative, lowered.output):
+    known = lane | {*lowered.inputs, *lowered.event, *lowered.states, *lowered.memories}
+    for phase in (lowered.start, lowered.rest, lowered.derivative, lowered.renewal, lowered.output):
+        if phase is None:
+            continue
         own = {s for s, _ in (*phase.temporaries, *phase.signals, *lowered.constants)}
-        used = set().union(*(e.free_symbols for e in (*phase.expressions, *(e for _, e in phase.temporaries))))
-        if stray := used - known - own:
+        if stray := symbols(phase) - known - own:
             raise ValueError(f"the equations use {sorted(map(str, stray))}, which nothing declares")
 
 

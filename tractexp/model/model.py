@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from tractexp.errors import UserError
 from tractexp.model.drive import EVENT, Drive
-from tractexp.model.parts import Motor, Static
+from tractexp.model.parts import Effect, Measurement, Motor, Static
 from tractexp.parameter import Parameter
 
 TOLERANCE = 1e-7  # pu, largest step-doubling error of P or Q an automatic substep may leave
@@ -42,13 +43,16 @@ class Model:
     Candidates are arrays `values` (n, d) in the order of `parameters`, or (E, n, d) where they differ by event.
     """
 
-    def __init__(self, motor: Motor, static: Static):
+    def __init__(self, motor: Motor, static: Static, effects: Sequence[Effect] = ()):
         self.motor, self.static = motor, static
-        self.title = f"{motor.name} motor and {static.name} static load"
+        self.effects = tuple(sorted(effects, key=lambda e: (e.order, e.name)))  # the same model in whatever order given
+        self.chain = tuple(e for e in self.effects if isinstance(e, Measurement))
+        load = f"{motor.name} motor and {static.name} static load"
+        self.title = " with ".join([load, *(effect.name for effect in self.effects)])
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        return (*self.motor.parameters, *self.static.parameters)
+        return tuple(p for part in (self.motor, self.static, *self.effects) for p in part.parameters)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -56,13 +60,15 @@ class Model:
 
     @functools.cached_property
     def equations(self) -> Any:
-        """The declaration both parts were written into (an `Equations`)."""
+        """The declaration all parts wrote into (an `Equations`). Raises `UserError` for parts that do not fit."""
         from tractexp.model.equations import Equations
 
         eq = Equations()
         self.motor.declare(eq)
         self.static.declare(eq)
         for effect in self.effects:
+            if why := effect.refusal(eq):
+                raise UserError(f"the effect '{effect.name}' cannot be added to this model: {why}")
             effect.edit(eq)
         eq.close()
         return eq
@@ -94,12 +100,24 @@ class Model:
         outputs = np.empty((2, n, drive.samples))
         outputs.fill(np.nan)
         _, miss = self._run(drive, candidates, substeps, outputs)
+        for effect in self.chain:
+            columns = {p.name: candidates[:, self.names.index(p.name)] for p in effect.parameters}
+            outputs = effect.observe(outputs, drive, columns)
         return Response(outputs[0], outputs[1], miss)
 
     def errors(self, drive: Drive, values: np.ndarray, substeps: Sequence[int] | int = 1) -> Errors:
         """Weighted squared errors of every candidate over every event, in one pass and without storing responses."""
+        if self.chain:
+            return self._errors_of(self.simulate(drive, values, substeps), drive)
         sums, miss = self._run(drive, self._candidates(drive, values), substeps, np.empty((0, 0, 0)))
         return Errors(sums, miss.sum(axis=0))
+
+    @staticmethod
+    def _errors_of(response: Response, drive: Drive) -> Errors:
+        """Squared errors of stored responses: where the measurement chain stands between kernel and sums."""
+        square = (np.stack([response.P, response.Q]) - drive.measured[:, None]) ** 2 * drive.weights[:, None]
+        sums = np.add.reduceat(square, drive.first[:-1], axis=2)
+        return Errors(np.moveaxis(sums, 2, 0), response.miss.sum(axis=0))
 
     def substeps(self, drive: Drive, values: np.ndarray, tolerance: float = TOLERANCE) -> tuple[np.ndarray, np.ndarray]:
         """Runge-Kutta steps per sample that each event needs, and the error left [pu], found by step doubling.
@@ -125,9 +143,13 @@ class Model:
     def refusal(self, values: np.ndarray, drive: Drive, event: int = 0) -> str | None:
         """Why these values (d,) have no steady state before an event, as a sentence; None where they have one."""
         eq = self.equations
-        known = dict(zip(self.names, map(float, values), strict=True)) | dict(zip(EVENT, drive.event[event], strict=True))
-        known |= dict(zip(("P0", "Q0"), drive.before[event], strict=True))
-        number = lambda e: complex(eq.expand(e).subs({s: known[s.name] for s in eq.expand(e).free_symbols})).real  # noqa: E731
+        known = dict(zip(self.names, map(float, values), strict=True))
+        known |= dict(zip((*EVENT, "P0", "Q0"), (*drive.event[event], *drive.before[event]), strict=True))
+
+        def number(expression: Any) -> float:
+            whole = eq.expand(expression)
+            return complex(whole.subs({s: known[s.name] for s in whole.free_symbols})).real
+
         missed = [r.sentence.format(value=number(r.shown)) for r in eq.requirements if not number(r.slack) >= 0]
         return "; ".join(missed) or None
 
@@ -166,6 +188,9 @@ class Model:
         return sums, miss
 
 
-def compose(motor: Motor, static: Static) -> Model:
-    """A composite load of these parts."""
-    return Model(motor, static)
+def compose(motor: Motor, static: Static, effects: Sequence[Effect] = ()) -> Model:
+    """A composite load of these parts. Raises `UserError` for an effect named twice."""
+    names = [effect.name for effect in effects]
+    if twice := next((n for n in names if names.count(n) > 1), None):
+        raise UserError(f"model.effects names '{twice}' twice; name each effect once")
+    return Model(motor, static, effects)

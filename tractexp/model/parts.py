@@ -1,28 +1,66 @@
-"""The two bases a load is composed of. A plugin declares its equations; nothing else."""
+"""The bases a load is composed of. A part writes its equations into the declaration; nothing else."""
 
 from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
 
 from tractexp.plugin import Plugin
 
 if TYPE_CHECKING:
-    import sympy
-
+    from tractexp.model.drive import Drive
     from tractexp.model.equations import Equations
 
 
-class Motor(Plugin):
+class Part(Plugin):
+    """A part of a load that draws power of its own."""
+
+    def declare(self, eq: "Equations") -> None:
+        """Declare parameters, states and named quantities in `eq`, and what the part draws (`eq.consume`)."""
+
+
+class Motor(Part):
     """Base of the motor plugins, chosen by `model/motor=NAME`."""
 
     group: ClassVar[str] = "model/motor"
 
-    def declare(self, eq: "Equations") -> "tuple[sympy.Expr, sympy.Expr]":
-        """Write the states into `eq` and return the motor's P and Q in its states and inputs."""
 
+class Static(Part):
+    """Base of the static load plugins, chosen by `model/static=NAME`.
 
-class Static(Plugin):
-    """Base of the static load plugins, chosen by `model/static=NAME`."""
+    A static load draws `eq.P_s0` and `eq.Q_s0` before the event: what the other parts leave.
+    """
 
     group: ClassVar[str] = "model/static"
 
-    def declare(self, eq: "Equations", P_s0: "sympy.Symbol", Q_s0: "sympy.Symbol") -> "tuple[sympy.Expr, sympy.Expr]":
-        """Return the static load's P and Q; `P_s0`, `Q_s0` are what the motor leaves before the event."""
+
+class Effect(Plugin):
+    """Base of the effects a model may lack, named in `model.effects=[...]`: an edit of the equations.
+
+    Every parameter has a `null` at which the edited equations are the unedited ones. `reads` names the recorded
+    channels without which the effect cannot be seen (`f`, `U2`); `relevant` the smallest size of each parameter's
+    departure from its null that matters; `confused_with` the effects that look alike on ordinary dips.
+    """
+
+    group: ClassVar[str] = "effect"
+    order: ClassVar[int] = 0  # edits of a higher order come later: those that copy what others have edited
+    reads: ClassVar[tuple[str, ...]] = ()
+    relevant: ClassVar[dict[str, float]] = {}
+    confused_with: ClassVar[tuple[str, ...]] = ()
+
+    def refusal(self, eq: "Equations") -> str | None:
+        """Why this effect makes no sense for the equations in `eq`, as a sentence; None where it does."""
+        return None
+
+    def edit(self, eq: "Equations") -> None:
+        """Edit the declared equations: rename nothing, add what is new, call `eq.edit` on what changes."""
+
+
+class Measurement(Effect):
+    """Base of the effects of the measurement chain: they act on the calculated power, not on the equations."""
+
+    def edit(self, eq: "Equations") -> None:
+        eq.declare(self.parameters)
+
+    def observe(self, power: np.ndarray, drive: "Drive", values: dict[str, np.ndarray]) -> np.ndarray:
+        """P and Q (2, n, N) as the recorder would show them; `values` {parameter: (E, n)}."""
+        return power

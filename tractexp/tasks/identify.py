@@ -29,7 +29,7 @@ class Identify(Task):
         limits = Limits(config["budget"], config["time_limit"], config["target"])
         with searching(getattr(optimizer, "iterations", None), limits.simulations) as progress:
             found = search(problem, optimizer, job.seed, limits, progress)
-        settings = {part: node[part] for part in ("motor", "static")}
+        settings = {part: node[part] for part in ("motor", "static", "effects")}
         result, fits = conclude(problem, found, events.validate, job.seed, settings, job.choices["optimizer"])
 
         report(problem, result)

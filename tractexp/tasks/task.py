@@ -41,10 +41,10 @@ class Job:
 
     @functools.cached_property
     def model(self) -> Any:
+        from tractexp.identify.result import parts
         from tractexp.model.model import compose
 
-        node = self.config["model"]
-        return compose(build("model/motor", node["motor"]), build("model/static", node["static"]))
+        return compose(*parts(self.config["model"]))
 
     @property
     def seed(self) -> int:

@@ -16,7 +16,7 @@ class AcmeLinear(Static):
     slope_p = Parameter(1.0, (0.0, 3.0), "1", "slope of active power", "ACME handbook 2026")
     slope_q = Parameter(2.0, (0.0, 6.0), "1", "slope of reactive power", "ACME handbook 2026")
 
-    def declare(self, eq, P_s0, Q_s0):
+    def declare(self, eq):
         a, b = eq.declare(self.parameters)
         u = eq.U / eq.U0
-        return P_s0 * (1 + a * (u - 1)), Q_s0 * (1 + b * (u - 1))
+        eq.consume(eq.P_s0 * (1 + a * (u - 1)), eq.Q_s0 * (1 + b * (u - 1)))

@@ -1,0 +1,32 @@
+"""Stator resistance of the motor."""
+
+from tractexp.model.parts import Effect
+from tractexp.parameter import Parameter
+from tractexp.plugin import plugin
+
+SOURCE = "Milano 2010, Power System Modelling and Scripting, ch. 15"
+
+
+@plugin
+class StatorResistance(Effect):
+    """Copper loss and voltage drop in the motor's stator, which the base model neglects.
+
+        I = (U - E)/(R_s + j X')
+
+    At R_s = 0 the base model. The air-gap torque Re(E I*) is then less than the motor's power by R_s |I|^2.
+
+    Source: Milano 2010, ch. 15 (third-order motor with r_S).
+    Departures: none.
+    """
+
+    R_s = Parameter(0.0, (-0.02, 0.2), "pu", "stator resistance on the record's base", SOURCE, null=0.0)
+
+    relevant = {"R_s": 0.01}
+    confused_with = ("feeder_impedance", "dc_link_lag", "time_skew")
+
+    def refusal(self, eq):
+        return None if eq.has("stator_impedance") else "it has no stator impedance to add a resistance to"
+
+    def edit(self, eq):
+        (R_s,) = eq.declare(self.parameters)
+        eq.edit("stator_impedance", lambda Z: R_s + Z)
