@@ -29,8 +29,11 @@ def main() -> int:
         if traceback:
             raise
         print(f"tractexp: {error}", file=sys.stderr)
-    except KeyboardInterrupt:
-        print("tractexp: interrupted; nothing was logged for this run", file=sys.stderr)
+    except KeyboardInterrupt as stop:
+        print(
+            f"tractexp: {stop}" if str(stop) else "tractexp: interrupted; nothing was logged for this run",
+            file=sys.stderr,
+        )
         return 130
     return 2
 
@@ -48,10 +51,14 @@ def _run() -> int:
 
     @hydra.main(version_base="1.3", config_path=str(CONF), config_name="config")
     def job(config: object) -> None:
+        from hydra.core.hydra_config import HydraConfig
+        from hydra.types import RunMode
+
+        from tractexp.sweep.job import run_job
         from tractexp.tasks.run import run
 
         try:
-            run(config)
+            (run_job if HydraConfig.get().mode == RunMode.MULTIRUN else run)(config)
         except UserError as error:  # raised again below, beyond the lines Hydra would print about it
             refusals.append(error)
 

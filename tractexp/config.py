@@ -1,13 +1,18 @@
 """The configuration's schema, and the door through which plugins enter Hydra's groups."""
 
 import dataclasses
+import hashlib
+import importlib
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import ModuleType
 from typing import Any
 
 from hydra.core.config_store import ConfigStore
 from hydra.core.plugins import Plugins
 from hydra.plugins.search_path_plugin import SearchPathPlugin
+from omegaconf import OmegaConf
 
 from tractexp import plugin
 from tractexp.errors import UserError, among, check_range
@@ -71,9 +76,37 @@ class PluginSearchPath(SearchPathPlugin):
 
 def register() -> None:
     """Discover all plugins and give Hydra their schemas. Raises `UserError` for a plugin that cannot be loaded."""
+    Plugins.instance()  # executes Hydra's own sweepers anew: before ours are derived from them
+    from tractexp.sweep.launcher import Cores, CoresConfig
+    from tractexp.sweep.sweeper import Grid, GridConfig
+
     store = ConfigStore.instance()
     store.store(name="config_schema", node=Config)
     for group, classes in plugin.discover().items():
         for name, cls in classes.items():
             store.store(group=group, name=name, node=plugin.schema(cls))
+    store.store(group="hydra/sweeper", name="grid", node=GridConfig)
+    store.store(group="hydra/launcher", name="cores", node=CoresConfig)
     Plugins.instance().register(PluginSearchPath)
+    for cls in (Grid, Cores):
+        _admit(cls)
+    OmegaConf.register_new_resolver("fingerprint", _fingerprint, replace=True)
+
+
+def _admit(cls: type) -> None:
+    """Make a sweeper or launcher known to Hydra, which takes them from modules below `hydra_plugins` only."""
+    Plugins.instance().register(cls)
+    package, _, name = cls.__module__.partition(".")
+    try:
+        parent = importlib.import_module(package)
+    except ModuleNotFoundError:
+        parent = sys.modules[package] = ModuleType(package)
+        parent.__path__ = []
+    door = sys.modules.setdefault(cls.__module__, ModuleType(cls.__module__))
+    setattr(door, cls.__name__, cls)
+    setattr(parent, name, door)
+
+
+def _fingerprint(overrides: Any) -> str:
+    """Eight letters that stand for a sweep's overrides: the same command writes to the same folder."""
+    return hashlib.sha256("\n".join(overrides).encode()).hexdigest()[:8]

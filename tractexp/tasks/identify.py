@@ -15,6 +15,9 @@ from tractexp.tasks.task import Job, Task
 class Identify(Task):
     """Fit the model's free parameters to the training events, judge it on all events, show and log the outcome."""
 
+    figures: bool | None = None  # draw the fit and the search; null: in single runs, not in sweeps
+    predictor: bool | None = None  # log the model for mlflow.pyfunc; null: in single runs, not in sweeps
+
     def run(self, job: Job) -> None:
         from tractexp.identify.problem import Problem
         from tractexp.identify.result import conclude, write_history
@@ -33,11 +36,16 @@ class Identify(Task):
         result, fits = conclude(problem, found, events.validate, job.seed, settings, job.choices["optimizer"])
 
         report(problem, result)
-        paths = [*draw(job, found, fits), write_history(job.folder / "history.csv", found.history)]
+        paths = draw(job, found, fits) if _wanted(self.figures, job) else []
+        paths.append(write_history(job.folder / "history.csv", found.history))
         paths.append(result.write(job.folder / "result.json"))
         for path in paths:
             say(f"  {path}")
-        track(job, found, result, paths)
+        track(job, found, result, paths, _wanted(self.predictor, job))
+
+
+def _wanted(setting: bool | None, job: Job) -> bool:
+    return not job.in_sweep if setting is None else setting
 
 
 def announce(job: Job, events: Any, problem: Any) -> None:
@@ -99,8 +107,8 @@ def draw(job: Job, found: Any, fits: Any) -> list[Path]:
     return [*paths, figures.fitness(job.folder / "fitness.svg", by_iteration, by_simulations, title=title)]
 
 
-def track(job: Job, found: Any, result: Any, paths: list[Path]) -> None:
-    """Log figures, metrics, the fitness curve and the identified model."""
+def track(job: Job, found: Any, result: Any, paths: list[Path], predictor: bool) -> None:
+    """Log figures, metrics, the fitness curve and, as a predictor, the identified model."""
     metrics = {key: getattr(result, key) for key in ("objective", "epsilon_p", "epsilon_q", "simulations", "seconds")}
     for k, event in enumerate(result.events, start=1):
         metrics |= {f"{event['role']}_{k}_{e}": event[e] for e in ("epsilon_p", "epsilon_q")}
@@ -117,5 +125,5 @@ def track(job: Job, found: Any, result: Any, paths: list[Path]) -> None:
         },
         artifacts=[*paths, job.folder / ".hydra"],
         seconds=result.seconds,
-        model=job.folder / "result.json",
+        model=job.folder / "result.json" if predictor else None,
     )

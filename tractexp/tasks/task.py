@@ -26,7 +26,8 @@ class Job:
     config: Mapping[str, Any]
     choices: Mapping[str, str]  # what was chosen in each group: {"optimizer": "issa_no_levy", ...}
     folder: Path
-    sweep: str | None = None  # run id of the sweep this job belongs to
+    sweep: str | None = None  # run id of the sweep this job belongs to, where that is logged
+    in_sweep: bool = False  # one of many: what only a person looks at may be left out
 
     def events(self) -> Any:
         """The recorded events, read and with their dips found (`Events` of `Event`)."""

@@ -5,6 +5,7 @@ from tractexp.tracking.run import finish_parent as finish_parent
 from tractexp.tracking.run import flatten as flatten
 from tractexp.tracking.run import git_commit as git_commit
 from tractexp.tracking.run import log as log
+from tractexp.tracking.run import reopen_parent as reopen_parent
 from tractexp.tracking.run import start_parent as start_parent
 from tractexp.tracking.run import tag_experiment as tag_experiment
 from tractexp.tracking.store import default_uri as default_uri

@@ -126,6 +126,18 @@ def start_parent(run: Run, uri: str) -> str:
     return run_id
 
 
+def reopen_parent(run_id: str, uri: str) -> bool:
+    """Mark the run of a sweep that goes on as running again; False where the store has it no more."""
+    client = open_store(uri)
+    from mlflow.exceptions import MlflowException
+
+    try:
+        client.update_run(run_id, status="RUNNING")
+    except MlflowException:
+        return False
+    return True
+
+
 def finish_parent(
     run_id: str, uri: str, status: str, metrics: Mapping[str, float] | None = None, artifacts: Sequence[Path] = ()
 ) -> None:

@@ -1,0 +1,68 @@
+"""What makes two jobs the same: what they are told to do, and the code and data they do it with."""
+
+import functools
+import glob
+import hashlib
+import importlib.resources
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import tractexp
+from tractexp import plugin
+
+PACKAGE = "pkg://"
+
+
+def configuration(config: Mapping[str, Any], choices: Mapping[str, str]) -> str:
+    """SHA-256 of a job's settings. Where it is logged does not belong to what it does."""
+    told = {key: value for key, value in config.items() if key != "tracking"}
+    return _digest(json.dumps([told, dict(choices)], sort_keys=True, default=str).encode())
+
+
+def inputs(config: Mapping[str, Any]) -> str:
+    """SHA-256 of the installed code, plugins of all packages included, and of the data files the job names."""
+    named = sorted(set(_strings(config.get("data") or {})))
+    return _digest("".join([_code(), *map(_file, named)]).encode())
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+@functools.cache
+def _code() -> str:
+    folders = {Path(p) for package in (tractexp, *plugin.packages()) for p in package.__path__}
+    files = sorted({file for folder in folders for file in folder.rglob("*.py")})
+    return "".join(_digest(file.read_bytes()) for file in files)
+
+
+@functools.cache
+def _file(name: str) -> str:
+    """The content of the file `name` and of its companions of the same stem (a sidecar, a .dat); "" for no file."""
+    if name.startswith(PACKAGE):
+        package, _, rest = name.removeprefix(PACKAGE).partition("/")
+        try:
+            name = str(importlib.resources.files(package) / rest)
+        except (ImportError, ValueError):
+            return ""
+    path = Path(name)
+    try:
+        if not path.is_file():
+            return ""
+        files = sorted(path.parent.glob(glob.escape(path.stem) + ".*"))
+        return "".join(_digest(file.read_bytes()) for file in files if file.is_file())
+    except OSError:  # the job will say what is wrong with it
+        return ""
+
+
+def _strings(value: Any) -> Iterator[str]:
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, Mapping):
+        for item in value.values():
+            yield from _strings(item)
+    elif isinstance(value, list | tuple):
+        for item in value:
+            yield from _strings(item)

@@ -1,0 +1,75 @@
+"""The parent run of a sweep in MLflow, and `sweep.json`, by which its jobs and later tasks find it."""
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from tractexp.sweep.status import FAILED, FINISHED, objective, read, write
+
+FILE = "sweep.json"
+
+
+def parent_of(folder: Path) -> str | None:
+    """The run id of the sweep in `folder`; None where it is not logged."""
+    try:
+        return json.loads((folder / FILE).read_text(encoding="utf-8"))["run"]
+    except (OSError, ValueError, KeyError):
+        return None
+
+
+@contextmanager
+def parent_run(folder: Path, jobs: list[Any], overrides: list[str], afresh: bool) -> Iterator[None]:
+    """Open the parent run of a sweep's jobs, or open it again, and close it with the status the sweep ends with.
+
+    FINISHED where every job is, KILLED where the sweep is interrupted, FAILED otherwise. `afresh` never opens an
+    old one again.
+    """
+    node = jobs[0].config["tracking"]
+    if not node["enabled"]:
+        (folder / FILE).unlink(missing_ok=True)
+        yield
+        return
+    from tractexp import tracking
+
+    uri = node["uri"] or tracking.default_uri(Path.cwd())
+    run_id = parent_of(folder)
+    if afresh or run_id is None or not tracking.reopen_parent(run_id, uri):
+        run_id = tracking.start_parent(_described(folder, jobs, overrides), uri)
+    write(folder / FILE, {"run": run_id, "uri": uri, "jobs": len(jobs), "overrides": overrides})
+    status = "FAILED"
+    try:
+        yield
+        status = (
+            "FAILED" if any((s := read(job.folder)) is None or s.status != FINISHED for job in jobs) else "FINISHED"
+        )
+    except KeyboardInterrupt:
+        status = "KILLED"
+        raise
+    finally:
+        tracking.finish_parent(run_id, uri, status, metrics(jobs))
+
+
+def metrics(jobs: list[Any]) -> dict[str, float]:
+    """The figures of a sweep as a whole."""
+    ends = [(s.status, job.folder) for job in jobs if (s := read(job.folder)) is not None]
+    best = [f for _, folder in ends if (f := objective(folder)) is not None]
+    counts = {f"jobs_{kind}": sum(status == kind for status, _ in ends) for kind in (FINISHED, FAILED)}
+    return {"jobs": len(jobs), **counts, **({"best_objective": min(best)} if best else {})}
+
+
+def _described(folder: Path, jobs: list[Any], overrides: list[str]) -> Any:
+    from tractexp import tracking
+    from tractexp.tasks.task import Job
+
+    first = Job(jobs[0].config, jobs[0].choices, folder)
+    shared = {key: value for key, value in tracking.flatten(jobs[0].config).items()
+              if all(tracking.flatten(job.config).get(key) == value for job in jobs[1:])}  # fmt: skip
+    return tracking.Run(
+        experiment=first.experiment,
+        name=f"sweep {folder.name}",
+        parameters=shared,
+        tags={"task": first.choices["task"], "sweep": " ".join(overrides), "git_commit": tracking.git_commit()},
+        description=f"A sweep of {len(jobs)} jobs: `{' '.join(overrides)}`",
+    )

@@ -1,0 +1,109 @@
+"""What a person sees while a sweep runs: jobs done, the best of each optimizer so far, the time left."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from tractexp.sweep.job import SweepJob
+from tractexp.sweep.status import FAILED, Status, objective
+from tractexp.tasks.console import FIRST_LINE, NEXT_LINES, console, say
+
+SHOWN = 3  # optimizers named in a line of a log file
+
+
+class Tally:
+    """Counts the ends of a sweep's jobs."""
+
+    def __init__(self, jobs: Sequence[SweepJob]):
+        self.total, self.done, self.failed = len(jobs), 0, 0
+        self.jobs: dict[str, int] = {}  # done, by optimizer
+        self.best: dict[str, float] = {}
+        self.started = time.perf_counter()
+
+    def add(self, job: SweepJob, end: Status) -> None:
+        optimizer = job.choices["optimizer"]
+        self.done += 1
+        self.failed += end.status == FAILED
+        self.jobs[optimizer] = self.jobs.get(optimizer, 0) + 1
+        value = objective(job.folder)
+        if value is not None:
+            self.best[optimizer] = min(value, self.best.get(optimizer, value))
+
+    def ranked(self) -> list[tuple[str, float]]:
+        return sorted(self.best.items(), key=lambda item: item[1])
+
+    @property
+    def left(self) -> float:
+        """Seconds left, by the pace so far."""
+        return (time.perf_counter() - self.started) * (self.total - self.done) / max(self.done, 1)
+
+    def line(self) -> str:
+        """The state in one line."""
+        parts = [f"{self.done} of {self.total} jobs"]
+        if self.failed:
+            parts.append(f"{self.failed} failed")
+        if self.best:
+            parts.append("best objectives " + ", ".join(f"{n} {f:.4g}" for n, f in self.ranked()[:SHOWN]))
+        return f"  {', '.join(parts)}; about {self.left:.0f} s left"
+
+
+@contextmanager
+def progress(jobs: Sequence[SweepJob]) -> Iterator[Callable[[SweepJob, Status], None]]:
+    """Yield what is to be called with each job's end: a live bar on a terminal, a line now and then in a log file."""
+    tally = Tally(jobs)
+    if console().is_terminal:
+        with _live(tally) as callback:
+            yield callback
+        return
+    due = FIRST_LINE
+
+    def note(job: SweepJob, end: Status) -> None:
+        nonlocal due
+        tally.add(job, end)
+        spent = time.perf_counter() - tally.started
+        if spent >= due and tally.done < tally.total:
+            due = spent + NEXT_LINES
+            say(tally.line())
+
+    yield note
+
+
+@contextmanager
+def _live(tally: Tally) -> Iterator[Callable[[SweepJob, Status], None]]:
+    from rich.console import Group
+    from rich.live import Live
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = [
+        TextColumn("  jobs"),
+        BarColumn(bar_width=30),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[note]}"),
+        TimeElapsedColumn(),
+    ]
+    bar = Progress(*columns, console=console())
+    line = bar.add_task("", total=tally.total, note="")
+
+    def shown() -> Any:
+        return Group(bar, _table(tally))
+
+    with Live(shown(), console=console(), transient=True, refresh_per_second=4) as live:
+
+        def note(job: SweepJob, end: Status) -> None:
+            tally.add(job, end)
+            failed = f"{tally.failed} failed, " if tally.failed else ""
+            bar.update(line, completed=tally.done, note=f"{failed}about {tally.left:.0f} s left;")
+            live.update(shown())
+
+        yield note
+
+
+def _table(tally: Tally) -> Any:
+    """The best objective of each optimizer so far, best first."""
+    from rich.table import Table
+
+    made = Table.grid(padding=(0, 2))
+    for name, value in tally.ranked():
+        made.add_row(f"  {name}", f"best {value:.4e}", f"{tally.jobs[name]} jobs")
+    return made

@@ -1,0 +1,50 @@
+"""What became of a job of a sweep: `status.json` in its folder."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+FILE = "status.json"
+RUNNING, FINISHED, FAILED = "running", "finished", "failed"
+
+
+@dataclass(frozen=True)
+class Status:
+    """The content of `status.json`. A job that was killed has no end to report and stays "running"."""
+
+    status: str
+    message: str  # a sentence where it failed, "" otherwise
+    configuration: str  # SHA-256 of what the job was told to do
+    inputs: str  # SHA-256 of the code and the data files it did it with
+    seconds: float = 0.0
+    choices: Mapping[str, str] = field(default_factory=dict)
+    seed: int | None = None
+
+    def write(self, folder: Path) -> None:
+        """Write the file in one move, so that no half-written one is ever read."""
+        write(folder / FILE, asdict(self))
+
+
+def write(path: Path, content: Mapping[str, Any]) -> None:
+    """Write a JSON file in one move."""
+    part = path.with_suffix(".part")
+    part.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    part.replace(path)
+
+
+def read(folder: Path) -> Status | None:
+    """The status of the job in `folder`; None where there is none that can be read."""
+    try:
+        return Status(**json.loads((folder / FILE).read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError):
+        return None
+
+
+def objective(folder: Path) -> float | None:
+    """The objective in the job's `result.json`; None where its task writes none."""
+    try:
+        return float(json.loads((folder / "result.json").read_text(encoding="utf-8"))["objective"])
+    except (OSError, ValueError, TypeError, KeyError):
+        return None

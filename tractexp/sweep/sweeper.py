@@ -1,0 +1,174 @@
+"""`hydra/sweeper=grid`: every combination once, whatever launcher runs it."""
+
+import contextlib
+import shutil
+import signal
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from hydra._internal.core_plugins.basic_sweeper import BasicSweeper
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from omegaconf import OmegaConf
+
+from tractexp.errors import UserError
+from tractexp.sweep import status
+from tractexp.sweep.compose import Composer
+from tractexp.sweep.job import SweepJob
+from tractexp.sweep.launcher import Cores
+from tractexp.sweep.parent import parent_run
+from tractexp.sweep.status import FAILED, FINISHED, RUNNING
+from tractexp.tasks.console import say, table
+
+REPEAT = "repeat the command to go on with the jobs that are left"
+
+
+@dataclass
+class GridConfig:
+    """Schema of `hydra.sweeper`."""
+
+    _target_: str = "hydra_plugins.tractexp.Grid"
+    params: dict[str, str] | None = None  # as on the command line: {"seed": "range(0,30)"}
+    redo: bool = False  # run finished jobs again
+
+
+class Grid(BasicSweeper):
+    """Runs every combination of the swept values that is not finished yet, and says what became of them.
+
+    Raises `UserError` for a sweep without jobs, and at its end where jobs have failed.
+    """
+
+    __module__ = "hydra_plugins.tractexp"  # Hydra makes no plugin from elsewhere
+
+    def __init__(self, params: Mapping[str, str] | None, redo: bool):
+        super().__init__(None, dict(params or {}))
+        self.redo = redo
+
+    def sweep(self, arguments: list[str]) -> None:
+        assert self.config is not None
+        assert self.hydra_context is not None
+        told = [*self._parse_config(), *arguments]
+        folder = Path(self.config.hydra.sweep.dir).absolute()
+        jobs = place(self._composed(told), folder)
+        left = [job for job in jobs if self.redo or not finished(job)]
+        say(f"sweep: {len(jobs)} jobs in {folder}")
+        if len(left) < len(jobs):
+            say(f"  {len(jobs) - len(left)} of them are finished and kept; hydra.sweeper.redo=true runs them again")
+        if left:
+            folder.mkdir(parents=True, exist_ok=True)
+            OmegaConf.save(self.config, folder / "multirun.yaml")
+            with terminating(), parent_run(folder, jobs, told, afresh=self.redo):
+                self._run(left)
+        conclude(jobs)
+
+    def _composed(self, told: list[str]) -> list[SweepJob]:
+        """The jobs of the sweep, composed and without duplicates, not yet placed."""
+        loader = self.hydra_context.config_loader  # type: ignore[union-attr]
+        parsed = OverridesParser.create(config_loader=loader).parse_overrides(told)
+        for override in parsed:
+            if override.is_discrete_sweep() and not [*override.sweep_string_iterator()]:
+                raise UserError(
+                    f"the sweep has no jobs: {override.input_line} is empty; a range ends before its second number, "
+                    "as range(0,30) is 0 to 29, and a glob needs a name that matches"
+                )
+        compose = Composer(loader, self.config)  # type: ignore[arg-type]
+        made: dict[str, SweepJob] = {}
+        for overrides in self.split_arguments(parsed, None)[0]:
+            job = SweepJob.of(*compose(overrides), overrides, Path())
+            made.setdefault(job.configuration, job)
+        return list(made.values())
+
+    def _run(self, jobs: Sequence[SweepJob]) -> None:
+        for job in jobs:
+            if job.folder.exists():
+                shutil.rmtree(job.folder)
+        problem = "it ended without a word: its worker was killed or never started"
+        try:
+            if isinstance(self.launcher, Cores):
+                self.launcher.run(jobs)
+            else:
+                batch = [[*job.overrides, f"hydra.sweep.subdir={job.folder.name}"] for job in jobs]
+                self.launcher.launch(batch, initial_job_idx=0)  # type: ignore[union-attr]
+        except KeyboardInterrupt:
+            problem = "interrupted"
+            raise KeyboardInterrupt(f"the sweep is interrupted; {REPEAT}") from None
+        except UserError:
+            raise
+        except Exception as error:
+            problem = f"the launcher gave up: {str(error).strip().partition(chr(10))[0] or type(error).__name__}"
+        finally:
+            for job in jobs:
+                settle(job, problem)
+
+
+def place(jobs: Sequence[SweepJob], folder: Path) -> list[SweepJob]:
+    """Give each job its folder: that of the same configuration in an earlier sweep here, or the next free number."""
+    known = {s.configuration: p for p in _numbered(folder) if (s := status.read(p)) is not None}
+    number = max((int(p.name) for p in _numbered(folder)), default=-1)
+    placed = []
+    for job in jobs:
+        if job.configuration not in known:
+            number += 1
+            known[job.configuration] = folder / str(number)
+        placed.append(replace(job, folder=known[job.configuration]))
+    return placed
+
+
+def _numbered(folder: Path) -> list[Path]:
+    return [p for p in folder.iterdir() if p.name.isdecimal()] if folder.is_dir() else []
+
+
+def finished(job: SweepJob) -> bool:
+    """Whether this job, with the same code and data, has been done in its folder."""
+    found = status.read(job.folder)
+    same = found is not None and (found.configuration, found.inputs) == (job.configuration, job.inputs)
+    return same and found.status == FINISHED  # type: ignore[union-attr]
+
+
+def settle(job: SweepJob, problem: str) -> None:
+    """Write down that a job which has not said how it ended has failed."""
+    found = status.read(job.folder)
+    if found is None or found.status == RUNNING:
+        job.folder.mkdir(parents=True, exist_ok=True)
+        replace(job.status, status=FAILED, message=problem).write(job.folder)
+
+
+@contextlib.contextmanager
+def terminating() -> Iterator[None]:
+    """Let SIGTERM (a batch system's time limit) end the sweep in an orderly way, as Ctrl-C does."""
+
+    def interrupt(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def conclude(jobs: Sequence[SweepJob]) -> None:
+    """Print what the sweep found and which jobs failed. Raises `UserError` where any did."""
+    ends = [(job, status.read(job.folder)) for job in jobs]
+    found: dict[str, list[float]] = {}
+    for job, _ in ends:
+        value = status.objective(job.folder)
+        if value is not None:
+            found.setdefault(job.choices["optimizer"], []).append(value)
+    if found:
+        say()
+        rows = sorted((sorted(values), name) for name, values in found.items())
+        cells = [[n, str(len(v)), *(f"{x:.4e}" for x in (v[0], v[len(v) // 2], v[-1])), ""] for v, n in rows]
+        table(["optimizer", "jobs", "best objective", "median", "worst", ""], cells)
+    failed = [(job, end.message) for job, end in ends if end is not None and end.status == FAILED]
+    if not failed:
+        return
+    common = set.intersection(*(set(job.overrides) for job in jobs)) if len(jobs) > 1 else set()
+    rows = [[job.folder.name, " ".join(o for o in job.overrides if o not in common), why] for job, why in failed]
+    say()
+    table(["failed", "job", "why"], [[number, what, why] for number, what, why in rows])
+    raise UserError(
+        f"{len(failed)} of {len(jobs)} jobs failed, as listed; what they printed is in output.txt of their folders in "
+        f"{jobs[0].folder.parent}, an unexpected error in traceback.txt; {REPEAT}"
+    )
