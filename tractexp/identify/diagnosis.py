@@ -1,0 +1,59 @@
+"""Is what a fit leaves over noise? Tests of whitened residuals, in closed form."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+LAGS = 20
+REJECTED = 0.01  # p-value below which a test speaks
+
+
+@dataclass(frozen=True)
+class Test:
+    """One test: its statistic, degrees of freedom, p-value and what it says."""
+
+    name: str
+    statistic: float
+    freedom: int
+    p: float
+    says: str
+
+
+def autocorrelation(rows: np.ndarray, lags: int) -> np.ndarray:
+    """(lags,) correlation of `rows` (n,) with themselves 1, 2, ... samples later."""
+    centered = rows - rows.mean()
+    power = centered @ centered
+    return np.array([centered[k:] @ centered[:-k] for k in range(1, lags + 1)]) / (power or 1.0)
+
+
+def ljung_box(rows: np.ndarray, fitted: int = 0, lags: int = LAGS) -> Test:
+    """Whether `rows` (n,) are uncorrelated; `fitted` autoregressive coefficients cost as many degrees of freedom.
+
+    Source: Ljung and Box 1978.
+    """
+    from scipy.special import chdtrc
+
+    n = len(rows)
+    lags = max(min(max(lags, fitted + 5), n // 4), fitted + 1)
+    r = autocorrelation(rows, lags)
+    statistic = n * (n + 2) * float(np.sum(r**2 / (n - np.arange(1, lags + 1))))
+    p = float(chdtrc(lags - fitted, statistic))
+    return Test("whiteness (Ljung-Box)", statistic, lags - fitted, p, "colored" if p < REJECTED else "white")
+
+
+def jarque_bera(rows: np.ndarray) -> Test:
+    """Whether `rows` (n,) have the skewness and kurtosis of a normal distribution. Source: Jarque and Bera 1987."""
+    from scipy.special import chdtrc
+
+    z = (rows - rows.mean()) / (rows.std() or 1.0)
+    statistic = len(z) / 6 * float(np.mean(z**3) ** 2 + (np.mean(z**4) - 3) ** 2 / 4)
+    p = float(chdtrc(2, statistic))
+    return Test("normality (Jarque-Bera)", statistic, 2, p, "not normal" if p < REJECTED else "normal")
+
+
+def louder(inside: np.ndarray, outside: np.ndarray, level: float = 1e-3) -> bool:
+    """Whether the variance of `inside` (n,) exceeds that of `outside` (m,) by more than chance (F test)."""
+    from scipy.special import fdtri
+
+    ratio = float(np.mean(inside**2) / max(np.mean(outside**2), 1e-30))
+    return ratio > fdtri(len(inside), len(outside), 1 - level)

@@ -1,0 +1,108 @@
+"""What the records say about each parameter: the information matrix, its directions, and the intervals it gives."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+STRUCTURAL = 1e-6  # of the largest singular value: below it a direction changes nothing, whatever the noise
+SHARE = 0.02  # of a direction's largest component: smaller ones do not take part in it
+
+
+@dataclass(frozen=True, eq=False)
+class Information:
+    """The whitened sensitivities `J` (R, d) to the free parameters, in ranges, nuisances projected out.
+
+    `values` and `width` (d,) turn ranges into physical and relative changes.
+    """
+
+    names: tuple[str, ...]
+    values: np.ndarray
+    width: np.ndarray
+    J: np.ndarray
+
+    @classmethod
+    def of(
+        cls, names: Sequence[str], values: np.ndarray, width: np.ndarray, jacobian: np.ndarray, nuisances: np.ndarray
+    ) -> "Information":
+        """`jacobian` (R, d) per range of each parameter; `nuisances` (R, k) are left free beside them."""
+        seen = nuisances[:, np.any(nuisances != 0, axis=0)]
+        basis, _ = np.linalg.qr(seen)
+        return cls(tuple(names), values, width, jacobian - basis @ (basis.T @ jacobian))
+
+    def __post_init__(self) -> None:
+        size = np.linalg.norm(self.J, axis=0)
+        scale = np.where(size > 0, size, 1.0)
+        _, singular, directions = np.linalg.svd(self.J / scale, full_matrices=False)
+        seen = singular > STRUCTURAL * singular.max(initial=0.0)
+        object.__setattr__(self, "_directions", directions / scale)  # rows, in ranges
+        object.__setattr__(self, "_singular", singular)
+        object.__setattr__(self, "_seen", seen & (singular > 0))
+        object.__setattr__(self, "_blind", size == 0)
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """(d, d) physical, of the directions that the records see. See `unseen` for those they do not."""
+        seen = self._directions[self._seen] / self._singular[self._seen, None]
+        scaled = seen * self.width
+        return scaled.T @ scaled
+
+    @property
+    def unseen(self) -> np.ndarray:
+        """Directions (k, d) that change nothing, as relative changes (d value / value), made sparse.
+
+        Each is scaled to a largest component of 1. Where a value is 0 the change is in ranges.
+        """
+        null = self._directions[~self._seen] * self.width / np.where(self.values == 0, self.width, self.values)
+        alone = np.eye(len(self.names))[self._blind]
+        null = null * ~self._blind
+        return _echelon(np.concatenate((alone, null[np.any(null != 0, axis=1)])))
+
+    @property
+    def identifiable(self) -> np.ndarray:
+        """(d,) False for parameters that take part in a direction that changes nothing."""
+        return ~(np.abs(self.unseen) > SHARE).any(axis=0)
+
+    @property
+    def standard_errors(self) -> np.ndarray:
+        """(d,) physical; inf for parameters that cannot be identified."""
+        return np.where(self.identifiable, np.sqrt(np.diag(self.covariance)), np.inf)
+
+    @property
+    def correlation(self) -> np.ndarray:
+        """(d, d), of the directions that the records see."""
+        covariance = self.covariance
+        size = np.sqrt(np.diag(covariance))
+        outer = np.outer(size, size)
+        return np.divide(covariance, outer, out=np.eye(len(size)), where=outer > 0).clip(-1.0, 1.0)
+
+    def relative_error(self, exponents: np.ndarray) -> float:
+        """Standard error of log(prod value^exponent), i.e. relative, for `exponents` (d,)."""
+        slope = exponents / np.where(self.values == 0, 1.0, self.values)
+        return float(np.sqrt(slope @ self.covariance @ slope))
+
+    def logdet(self) -> float:
+        """log of the volume of what is known: the D-criterion, over all parameters (-inf where one is unseen)."""
+        sign, value = np.linalg.slogdet(self.J.T @ self.J)
+        return float(value) if sign > 0 else -np.inf
+
+
+def _echelon(rows: np.ndarray) -> np.ndarray:
+    """Reduced row echelon form by full pivoting: the same row space with as many zeros as it allows."""
+    rows, done = rows.copy(), 0
+    used: list[int] = []
+    while done < len(rows):
+        open_ = np.abs(rows[done:])
+        open_[:, used] = 0.0
+        i, j = np.unravel_index(open_.argmax(), open_.shape)
+        if open_[i, j] < 1e-9:
+            break
+        rows[[done, done + i]] = rows[[done + i, done]]
+        rows[done] /= rows[done, j]
+        others = np.arange(len(rows)) != done
+        rows[others] -= rows[others, j, None] * rows[done]
+        used.append(j)
+        done += 1
+    rows = rows[:done]
+    largest = np.abs(rows).max(axis=1, keepdims=True, initial=0.0)
+    return np.where(np.abs(rows) < 1e-4 * largest, 0.0, rows) / np.where(largest > 0, largest, 1.0)

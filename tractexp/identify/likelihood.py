@@ -1,0 +1,119 @@
+"""How likely the records are under a model: residuals whitened by the noise, the power before each event left free.
+
+Eq. (8) holds P0 and Q0 at the means before the dip, which are themselves uncertain, and counts every sample alike.
+The likelihood does neither: its least squares are the most precise estimate there is, and its curvature says how
+precise. Coordinates are the free parameters followed by P0 and Q0 of each event, in the unit cube.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.identify.noise import Autoregression, white_noise
+from tractexp.identify.problem import Problem
+
+POWER_RANGE = 0.2  # of the apparent power before the event: how far P0 and Q0 may move
+CENTRAL = 1e-5  # of a parameter's range: truncation and rounding both stay below 1e-7 of a column
+
+Noise = Sequence[tuple[Autoregression, Autoregression]]  # of P and of Q, one pair per event
+
+
+def before_the_event(problem: Problem) -> Noise:
+    """White noise of the level seen before each dip, where nothing better is known yet."""
+    return [(white_noise(e.noise_P), white_noise(e.noise_Q)) for e in problem.events]
+
+
+@dataclass(frozen=True, eq=False)
+class Likelihood:
+    """Whitened residuals of a problem. `known` (2, N) marks the samples of P and Q that count."""
+
+    problem: Problem
+    noise: Noise
+    known: np.ndarray
+
+    @classmethod
+    def of(cls, problem: Problem, noise: Noise | None = None) -> "Likelihood":
+        """The likelihood under white noise of the pre-event level, or under `noise`; gaps do not count."""
+        return cls(problem, noise or before_the_event(problem), problem.drive.weights > 0)
+
+    @property
+    def free(self) -> int:
+        """Number of free parameters; 2 coordinates per event follow."""
+        return self.problem.space.dimension
+
+    @property
+    def samples(self) -> int:
+        """Values of P and Q that count."""
+        return int(np.count_nonzero(self.known))
+
+    @property
+    def lower(self) -> np.ndarray:
+        return np.concatenate((self.problem.lower, (self.problem.drive.before - self._reach()).ravel()))
+
+    @property
+    def width(self) -> np.ndarray:
+        """Range of each coordinate, (D,)."""
+        reach = np.repeat(2 * self._reach(), 2, axis=1).ravel()
+        return np.concatenate((self.problem.upper - self.problem.lower, reach))
+
+    def _reach(self) -> np.ndarray:
+        return POWER_RANGE * np.maximum(np.linalg.norm(self.problem.drive.before, axis=1, keepdims=True), 0.1)
+
+    def to_unit(self, values: np.ndarray) -> np.ndarray:
+        """Free values (n, free), at the measured power before each event, as coordinates (n, D)."""
+        values = np.atleast_2d(values)
+        before = np.full((len(values), 2 * self.problem.drive.events), 0.5)
+        return np.concatenate((self.problem.space.to_unit(values), before), axis=1)
+
+    def values(self, unit: np.ndarray) -> np.ndarray:
+        """Free values (..., free) of coordinates (..., D)."""
+        return self.problem.space.from_unit(unit[..., : self.free])
+
+    def residuals(self, unit: np.ndarray) -> np.ndarray:
+        """Calculated minus measured (n, 2, N) [pu] at coordinates (n, D): 0 in gaps, nan where not simulated."""
+        problem, drive = self.problem, self.problem.drive
+        before = (self.lower + self.width * unit)[:, self.free :].reshape(len(unit), drive.events, 2)
+        response = problem.model.simulate(
+            drive, problem.full(self.values(unit)), problem.step.substeps, np.swapaxes(before, 0, 1)
+        )
+        rows = np.stack((response.P, response.Q), axis=1)
+        rows -= drive.measured
+        rows *= self.known
+        rows[response.miss.max(axis=0) > 0] = np.nan
+        return rows
+
+    def whiten(self, residuals: np.ndarray) -> np.ndarray:
+        """Residuals (n, 2, N) as rows (n, 2 N) of independent unit variance; samples that do not count are 0."""
+        rows = np.empty_like(residuals)
+        for e, pair in enumerate(self.noise):
+            part = self.problem.drive.part(e)
+            for c, noise in enumerate(pair):
+                rows[:, c, part] = noise.whiten(residuals[:, c, part], self.known[c, part])
+        return rows.reshape(len(rows), -1)
+
+    def rows(self, unit: np.ndarray, lanes: np.ndarray | None = None) -> np.ndarray:
+        """Whitened residuals (n, 2 N); their sum of squares is the deviance. Does not depend on the lane."""
+        return self.whiten(self.residuals(unit))
+
+    def jacobian(self, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Whitened rows (R,) and their central differences (R, D) at one point (D,): one batch of 2 D + 1.
+
+        Next to a wall, or where one side cannot be simulated, the difference is one-sided.
+        """
+        d = len(unit)
+        up = np.minimum(unit + CENTRAL, 1.0) - unit
+        down = unit - np.maximum(unit - CENTRAL, 0.0)
+        batch = np.concatenate((unit[None], unit + np.diag(up), unit - np.diag(down)))
+        rows = self.rows(batch)
+        above, below = rows[1 : d + 1], rows[d + 1 :]
+        lost_up, lost_down = np.isnan(above).any(axis=1), np.isnan(below).any(axis=1)
+        above[lost_up], below[lost_down] = rows[0], rows[0]
+        span = np.where(lost_up, 0.0, up) + np.where(lost_down, 0.0, down)
+        return rows[0], ((above - below) / np.where(span > 0, span, 1.0)[:, None]).T
+
+    def part_of(self, event: int) -> np.ndarray:
+        """Which rows (R,) belong to an event."""
+        mask = np.zeros((2, self.problem.drive.samples), dtype=bool)
+        mask[:, self.problem.drive.part(event)] = True
+        return mask.ravel()

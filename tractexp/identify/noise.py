@@ -1,0 +1,104 @@
+"""Noise of a recorded channel: how large it is, how one sample follows from those before it, and how to whiten it.
+
+Recorded power is rarely white: a phasor window, a filter or the load itself correlate its samples. Treating
+them as independent makes standard errors too small. An autoregressive model of the residual repairs that.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+HIGHEST_ORDER = 16
+SMALLEST = 1e-9  # pu: stands for the noise of a record that has none
+FEWEST = 20  # samples to estimate a noise model from
+
+
+@dataclass(frozen=True, eq=False)
+class Autoregression:
+    """x[t] = a_1 x[t-1] + ... + a_p x[t-p] + e[t], and the best predictors of each lower order.
+
+    `coefficients[k, :k]` predict from k known predecessors, with an error of standard deviation `deviation[k]`:
+    what the first samples of a stretch and those after a gap have. `deviation[0]` is that of x itself.
+    """
+
+    coefficients: np.ndarray  # (p + 1, p)
+    deviation: np.ndarray  # (p + 1,) pu
+
+    @property
+    def order(self) -> int:
+        return len(self.deviation) - 1
+
+    @property
+    def white(self) -> bool:
+        return self.order == 0
+
+    def scaled(self, factor: float) -> "Autoregression":
+        """The same color, `factor` times as loud."""
+        return Autoregression(self.coefficients, self.deviation * factor)
+
+    def whiten(self, rows: np.ndarray, known: np.ndarray) -> np.ndarray:
+        """Rows (..., N) to prediction errors of unit variance (..., N); 0 where `known` (N,) is False.
+
+        A gap ends the memory: the samples after it are predicted from fewer predecessors.
+        """
+        history = np.minimum(_run_lengths(known), self.order)
+        white = np.zeros_like(rows)
+        for k in range(self.order + 1):
+            at = np.flatnonzero(known & (history == k))
+            if not len(at):
+                continue
+            whole = len(at) == at[-1] - at[0] + 1  # consecutive samples are read without a copy
+            pick = (lambda lag, at=at: slice(at[0] - lag, at[-1] + 1 - lag)) if whole else (lambda lag, at=at: at - lag)
+            error = rows[..., pick(0)].copy()
+            for lag in range(1, k + 1):
+                error -= self.coefficients[k, lag - 1] * rows[..., pick(lag)]
+            white[..., pick(0)] = error / self.deviation[k]
+        return white
+
+
+def white_noise(deviation: float) -> Autoregression:
+    """Independent samples of one standard deviation [pu]."""
+    return Autoregression(np.empty((1, 0)), np.array([max(deviation, SMALLEST)]))
+
+
+def fit_autoregression(stretches: Sequence[np.ndarray], highest: int = HIGHEST_ORDER) -> Autoregression:
+    """The autoregression of least AICc, by Burg's method over several stretches (n_i,) of one channel.
+
+    The result is stationary whatever the data. Source: Burg 1975; Hurvich and Tsai 1989 (AICc).
+    """
+    count = sum(map(len, stretches))
+    power = sum(float(x @ x) for x in stretches) / max(count, 1)
+    highest = min(highest, count // 10, max(map(len, stretches), default=1) - 1)
+    forward, backward = [x[1:] for x in stretches], [x[:-1] for x in stretches]
+    table, variance = [np.empty(0)], [max(power, SMALLEST**2)]
+    for _ in range(highest):
+        both = sum(float(f @ b) for f, b in zip(forward, backward, strict=True))
+        energy = sum(float(f @ f + b @ b) for f, b in zip(forward, backward, strict=True))
+        reflection = 2 * both / energy if energy > 0 else 0.0
+        last = table[-1]
+        table.append(np.concatenate((last - reflection * last[::-1], [reflection])))
+        variance.append(max(variance[-1] * (1 - reflection**2), SMALLEST**2))
+        pairs = [(f - reflection * b, b - reflection * f) for f, b in zip(forward, backward, strict=True)]
+        forward, backward = [f[1:] for f, _ in pairs], [b[:-1] for _, b in pairs]
+    orders = np.arange(len(variance))
+    criterion = count * np.log(variance) + 2 * (orders + 1) * count / np.maximum(count - orders - 2, 1)
+    order = int(np.argmin(criterion))
+    coefficients = np.zeros((order + 1, order))
+    for k in range(order + 1):
+        coefficients[k, :k] = table[k]
+    return Autoregression(coefficients, np.sqrt(variance[: order + 1]))
+
+
+def stretches(values: np.ndarray, known: np.ndarray) -> list[np.ndarray]:
+    """The unbroken parts of `values` (N,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], known, [False])).astype(int)))
+    return [values[a:b] for a, b in edges.reshape(-1, 2)]
+
+
+def _run_lengths(known: np.ndarray) -> np.ndarray:
+    """How many known samples directly precede each sample, (N,)."""
+    index = np.arange(len(known))
+    last_gap = np.maximum.accumulate(np.where(known, -1, index))
+    before = np.concatenate(([-1], last_gap[:-1]))
+    return index - 1 - before

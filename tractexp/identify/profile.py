@@ -1,0 +1,219 @@
+"""Profile likelihood: the deviance of the best fit for each value of a parameter, all others free.
+
+Where the likelihood is no parabola, the interval of the information matrix misleads; the profile does not. All
+profiles advance in lockstep, two lanes (down and up) for each parameter, so that one simulation call carries a
+step of every one of them.
+"""
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from tractexp.identify.descent import descend
+from tractexp.identify.uncertainty import LEVEL, Uncertainty, conclude
+from tractexp.identify.verdict import UNIDENTIFIED, WEAK, Verdict
+
+BEYOND = 1.6  # of the threshold: a lane ends when its deviance has risen so far
+STEP = 0.5  # standard errors between the first points of a lane
+SMALLEST_STEP, LARGEST_STEP = 1e-5, 0.08  # of the range
+AIM = 0.8  # rise of the root of the deviance that a step aims at
+BETTER = 0.05  # fall of the deviance that makes a point a better optimum
+RISE = 0.5  # of the deviance between two minima, for them to count as two
+RESTARTS = 5
+
+
+class End(StrEnum):
+    """Why a side of a profile ends."""
+
+    CLOSED = "closed"  # it crosses the threshold
+    BOUND = "bound"  # it reaches the bound below the threshold: open on that side
+    POINTS = "points"  # it ran out of points below the threshold
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """One parameter: `deviance` (n,) above the optimum's at `values` (n,), in increasing order of value."""
+
+    name: str
+    values: np.ndarray
+    deviance: np.ndarray
+    interval: tuple[float, float]
+    ends: tuple[End, End]
+    minima: tuple[float, ...]  # values of further minima below the threshold
+
+    @property
+    def verdict(self) -> str:
+        """What the profile adds to the verdict, or ""."""
+        said = []
+        for end, side in zip(self.ends, ("downwards", "upwards"), strict=True):
+            if end is not End.CLOSED:
+                said.append(f"open {side}")
+        if self.minima:
+            said.append(f"two minima, another at {', '.join(f'{m:.4g}' for m in self.minima)}")
+        return ", ".join(said)
+
+
+@dataclass(frozen=True, eq=False)
+class Profiles:
+    """All profiles, the judgement they are drawn around, and what turned up on the way."""
+
+    known: Uncertainty
+    profiles: tuple[Profile, ...]
+    threshold: float
+    simulations: int
+    restarts: int
+
+    @property
+    def notes(self) -> list[str]:
+        if not self.restarts:
+            return []
+        times = "once" if self.restarts == 1 else f"{self.restarts} times"
+        return [f"a better optimum turned up along a profile; the profiles were restarted from it {times}"]
+
+    @property
+    def verdicts(self) -> dict[str, Verdict]:
+        """The verdicts of the information matrix, corrected by what the profiles show."""
+        return {p.name: revised(self.known.verdicts[p.name], p) for p in self.profiles}
+
+
+def revised(verdict: Verdict, profile: Profile) -> Verdict:
+    """A verdict in the light of a profile: a side that never closes is not an interval, two minima are not one."""
+    low, high = profile.interval
+    detail = f"{verdict.detail}; profile {low:.4g} .. {high:.4g}"
+    if not profile.verdict:
+        return replace(verdict, detail=detail)
+    both = all(end is not End.CLOSED for end in profile.ends)
+    word = UNIDENTIFIED if both or verdict.word == UNIDENTIFIED else WEAK
+    return Verdict(word, f"{detail}, {profile.verdict}")
+
+
+def threshold(level: float = LEVEL) -> float:
+    """What the deviance may rise by: the chi-squared quantile of one degree of freedom."""
+    from scipy.special import chdtri
+
+    return float(chdtri(1, 1 - level))
+
+
+def profiles(known: Uncertainty, points: int = 24) -> Profiles:
+    """Profiles of every free parameter around `known`, of at most `points` points a side.
+
+    Where a point fits better than the optimum did, everything starts again from there.
+    """
+    simulations, limit = 0, threshold()
+    for restarts in range(RESTARTS + 1):
+        lanes = _Lanes(known, limit)
+        for _ in range(points):
+            if not lanes.advance():
+                break
+            if lanes.better is not None:
+                break
+        simulations += lanes.simulations
+        if lanes.better is None or restarts == RESTARTS:
+            break
+        found = descend(known.likelihood.rows, lanes.better[None])
+        simulations += found.simulations
+        known = conclude(known.likelihood, found.unit[0], known.notes)
+    made = tuple(lanes.profile(j) for j in range(len(known.names)))
+    return Profiles(known, made, limit, simulations, restarts)
+
+
+class _Lanes:
+    """The state of all lanes: lane 2 j goes down, lane 2 j + 1 up from the optimum of parameter j."""
+
+    def __init__(self, known: Uncertainty, limit: float):
+        self.known, self.limit = known, limit
+        d = len(known.names)
+        self.column = np.repeat(np.arange(d), 2)
+        self.sign = np.tile([-1.0, 1.0], d)
+        self.unit = np.tile(known.unit, (2 * d, 1))
+        self.slope = np.zeros_like(self.unit)  # how the others move with the profiled one
+        errors = known.half / known.factor / (known.upper - known.lower)
+        self.step = np.repeat(np.clip(STEP * errors, SMALLEST_STEP, LARGEST_STEP), 2)
+        self.rise = np.zeros(2 * d)
+        self.open = np.ones(2 * d, dtype=bool)
+        self.path: list[list[tuple[float, float]]] = [[] for _ in range(2 * d)]
+        self.better: np.ndarray | None = None
+        self.simulations = 0
+
+    def advance(self) -> bool:
+        """One more point on every open lane; False when there is none left."""
+        lanes = np.flatnonzero(self.open)
+        if not len(lanes):
+            return False
+        pick = np.arange(len(lanes))
+        column, sign = self.column[lanes], self.sign[lanes]
+        here = self.unit[lanes, column]
+        target = np.clip(here + sign * self.step[lanes], 0.0, 1.0)
+        start = np.clip(self.unit[lanes] + self.slope[lanes] * (target - here)[:, None], 0.0, 1.0)
+        start[pick, column] = target
+        frozen = np.zeros(start.shape, dtype=bool)
+        frozen[pick, column] = True
+        found = descend(self.known.likelihood.rows, start, frozen, tolerance=0.01)
+        self.simulations += found.simulations
+        rise = found.deviance - self.known.deviance
+        moved = target - here
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slope = (found.unit - self.unit[lanes]) / moved[:, None]
+        self.slope[lanes] = np.where(np.isfinite(slope), slope, 0.0)
+        self.unit[lanes] = found.unit
+        self._adapt(lanes, rise, moved)
+        self.rise[lanes] = rise
+        for lane, value, height in zip(lanes, target, rise, strict=True):
+            if np.isfinite(height):
+                self.path[lane].append((value, height))
+        ended = (rise > BEYOND * self.limit) | (target <= 0) | (target >= 1) | ~np.isfinite(rise)
+        self.open[lanes[ended]] = False
+        if rise.min() < -BETTER:
+            self.better = found.unit[rise.argmin()]
+        return True
+
+    def _adapt(self, lanes: np.ndarray, rise: np.ndarray, moved: np.ndarray) -> None:
+        """Steps that raise the root of the deviance by about `AIM`, at most thrice or a third of the last."""
+        roots = np.sqrt(np.maximum(np.stack((rise, self.rise[lanes])), 0.0))
+        gained = np.maximum(roots[0] - roots[1], 1e-3)
+        factor = np.clip(np.where(np.isfinite(gained), AIM / gained, 1 / 3), 1 / 3, 3.0)
+        self.step[lanes] = np.clip(np.abs(moved) * factor, SMALLEST_STEP, LARGEST_STEP)
+
+    def profile(self, j: int) -> Profile:
+        """The profile of parameter j, from its two lanes."""
+        sides, ends, limits = [], [], []
+        optimum = (float(self.known.unit[j]), 0.0)
+        for lane in (2 * j, 2 * j + 1):
+            path = np.array([optimum, *self.path[lane]])
+            limit, end = self._crossing(path, lane)
+            sides.append(path)
+            ends.append(end)
+            limits.append(limit)
+        joined = np.concatenate((sides[0][:0:-1], sides[1]))
+        low = self.known.lower[j]
+        scale = self.known.upper[j] - low
+        return Profile(
+            name=self.known.names[j],
+            values=low + scale * joined[:, 0],
+            deviance=joined[:, 1],
+            interval=(float(low + scale * limits[0]), float(low + scale * limits[1])),
+            ends=(ends[0], ends[1]),
+            minima=tuple(float(low + scale * m) for side in sides for m in self._minima(side)),
+        )
+
+    def _crossing(self, path: np.ndarray, lane: int) -> tuple[float, End]:
+        """Where the path (n, 2) last rises through the threshold, on the root of the deviance."""
+        over = path[:, 1] > self.limit
+        if not over[-1]:
+            wall = path[-1, 0] in (0.0, 1.0)
+            return float(path[-1, 0]), End.BOUND if wall else End.POINTS
+        last = int(np.flatnonzero(~over)[-1])
+        roots = np.sqrt(np.maximum(path[last : last + 2, 1], 0.0))
+        share = (np.sqrt(self.limit) - roots[0]) / (roots[1] - roots[0])
+        return float(path[last, 0] + share * (path[last + 1, 0] - path[last, 0])), End.CLOSED
+
+    def _minima(self, path: np.ndarray) -> list[float]:
+        """Places of local minima below the threshold, beyond a rise that is no ripple."""
+        heights = path[:, 1]
+        found = []
+        for k in range(1, len(heights) - 1):
+            crest = heights[:k].max()
+            if heights[k] <= min(heights[k - 1], heights[k + 1], self.limit) and crest - heights[k] > RISE:
+                found.append(float(path[k, 0]))
+        return found

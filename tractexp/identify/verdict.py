@@ -1,0 +1,119 @@
+"""What an interval means, in words: identified, weakly identified and why, not identifiable and what is instead."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.identify.information import SHARE, Information
+
+IDENTIFIED, WEAK, UNIDENTIFIED, BOUND = (
+    "identified",
+    "weakly identified",
+    "not identifiable from this record",
+    "at its bound",
+)
+WITHIN = 0.2  # an interval of at most plus and minus this share of the value identifies a parameter
+NEAR_ZERO = 0.1  # of the range: what may be zero is measured against this where its value is smaller
+TRADES = 0.8  # correlation from which two parameters are said to trade against each other
+EDGE = 1e-3  # of the range: closer than this is at the bound
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One of the four words, and what stands behind it."""
+
+    word: str
+    detail: str
+
+    def __str__(self) -> str:
+        return f"{self.word} ({self.detail})" if self.word in (IDENTIFIED, BOUND) else f"{self.word}: {self.detail}"
+
+
+def size(value: float, low: float, high: float) -> float:
+    """What an interval is measured against: the value, or a tenth of the range for a small one that may be zero."""
+    return max(abs(value), NEAR_ZERO * (high - low)) if low <= 0 <= high else abs(value)
+
+
+def shown(value: float, half: float, low: float, high: float) -> str:
+    """A half-width in percent of the value, or as a number where the value is next to nothing."""
+    return f"± {100 * half / abs(value):.2g} %" if size(value, low, high) == abs(value) else f"± {half:.2g}"
+
+
+def judge(
+    information: Information, lower: np.ndarray, upper: np.ndarray, half: np.ndarray, factor: float
+) -> dict[str, Verdict]:
+    """A verdict for each parameter: `half` (d,) is half of its 95 % interval, `factor` times a standard error."""
+    width = upper - lower
+    unseen, identifiable = information.unseen, information.identifiable
+    verdicts = {}
+    for j, name in enumerate(information.names):
+        value = information.values[j]
+        low, high = value - half[j], value + half[j]
+        at = [f"{b:g}" for b in (lower[j], upper[j]) if abs(value - b) < EDGE * width[j]]
+        if not identifiable[j]:
+            verdicts[name] = Verdict(UNIDENTIFIED, _structural(information, unseen, j))
+        elif half[j] >= width[j] / 2:
+            span = f"its 95 % interval spans {2 * half[j]:.2g}, no less than its bounds' {width[j]:.2g}"
+            verdicts[name] = Verdict(UNIDENTIFIED, "; ".join([span, *_trade(information, j, factor)]))
+        elif half[j] > WITHIN * size(value, lower[j], upper[j]):
+            why = _trade(information, j, factor) or ["the record hardly changes with it"]
+            edge = [f"the estimate is at its bound {at[0]}"] if at else []
+            verdicts[name] = Verdict(WEAK, "; ".join([shown(value, half[j], lower[j], upper[j]), *why, *edge]))
+        elif at:
+            verdicts[name] = Verdict(
+                BOUND, f"{at[0]}; the record asks for a value beyond it: widen model.bounds.{name}"
+            )
+        else:
+            tight = "" if lower[j] <= low and high <= upper[j] else "; the interval reaches past its bounds"
+            verdicts[name] = Verdict(IDENTIFIED, shown(value, half[j], lower[j], upper[j]) + tight)
+    return verdicts
+
+
+def _trade(information: Information, j: int, factor: float) -> list[str]:
+    """Against which parameter this one trades, and which combination of the two is known; empty where none is."""
+    correlation = np.where(np.arange(len(information.names)) == j, 0.0, information.correlation[j])
+    k = int(np.abs(correlation).argmax())
+    if abs(correlation[k]) < TRADES:
+        return []
+    number = f"{correlation[k]:.2f}" if abs(correlation[k]) < 0.995 else f"{correlation[k]:.4f}"
+    said = [f"trades against {information.names[k]}, correlation {number}"]
+    covariance, values = information.covariance, information.values
+    if values[j] > 0 and values[k] > 0:
+        exponents = np.zeros(len(values))
+        exponents[j], exponents[k] = 1.0, -covariance[j, k] / covariance[k, k] * values[k] / values[j]
+        known = factor * information.relative_error(exponents)
+        said.append(f"{combination(information.names, exponents)} is known to ± {100 * known:.2g} %")
+    return said
+
+
+def _structural(information: Information, unseen: np.ndarray, j: int) -> str:
+    """Which changes leave the record unchanged, and which combinations of those parameters it does see."""
+    direction = min(
+        (row for row in unseen if abs(row[j]) > SHARE), key=lambda row: np.count_nonzero(np.abs(row) > SHARE)
+    )
+    members = [k for k in np.flatnonzero(np.abs(direction) > SHARE) if k != j]
+    if not members:
+        return "the record does not change with it at all"
+    moves = ", ".join(f"{information.names[k]} {direction[k] / direction[j]:+.3g} %" for k in members)
+    said = f"a change of {information.names[j]} by +1 % together with {moves} leaves the record unchanged"
+    seen = []
+    for k in members:
+        exponents = np.zeros(len(information.names))
+        exponents[j], exponents[k] = -direction[k] / direction[j], 1.0
+        if np.abs(unseen @ exponents).max() < SHARE * np.abs(exponents).max():
+            seen.append(combination(information.names, exponents))
+    return said + (f"; what it sees is {' and '.join(seen)}" if seen else "")
+
+
+def combination(names: Sequence[str], exponents: np.ndarray) -> str:
+    """A product of powers as text: 'X_prime^2/M'."""
+    above, below = [], []
+    for name, exponent in zip(names, exponents, strict=True):
+        size = abs(exponent)
+        if size < 0.005:
+            continue
+        power = name if abs(size - 1) < 0.005 else f"{name}^{size:.3g}"
+        (above if exponent > 0 else below).append(power)
+    top = " ".join(above) or "1"
+    return top + "".join(f" / {power}" for power in below)
