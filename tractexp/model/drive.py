@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-INPUTS = ("U", "omega_s", "U_rate", "U2")  # rows of `Drive.inputs`; U_rate is the slope up to the sample
+INPUTS = ("U", "omega_s", "U_rate", "U2", "t")  # rows of `Drive.inputs`; U_rate is the slope up to the sample
 EVENT = ("U0", "omega_s0", "U20", "omega_n", "step")  # columns of `Drive.event`
 
 
@@ -38,7 +38,7 @@ class Excitation:
 class Drive:
     """One or several events end to end. Shapes: N samples in all, E events."""
 
-    inputs: np.ndarray  # (4, N), rows as in INPUTS; omega_s is 0 and U2 nan where not recorded
+    inputs: np.ndarray  # (5, N), rows as in INPUTS; omega_s is 0 and U2 nan where not recorded
     measured: np.ndarray  # (2, N): P, Q, gaps filled with 0
     weights: np.ndarray  # (2, N): 0 in a gap
     first: np.ndarray  # (E + 1,)
@@ -58,6 +58,7 @@ class Drive:
                 joined(lambda e: np.zeros(len(e.U)) if e.omega_s is None else e.omega_s),
                 joined(lambda e: np.diff(e.U, prepend=e.U[0]) / e.step),
                 joined(lambda e: np.full(len(e.U), np.nan) if e.U2 is None else e.U2),
+                joined(lambda e: np.arange(len(e.U)) * e.step),
             ]
         )
         measured = np.stack([joined(lambda e: e.P), joined(lambda e: e.Q)])

@@ -15,6 +15,9 @@ from tractexp.model.drive import EVENT, INPUTS
 from tractexp.parameter import Parameter
 
 
+LONG_AGO = -(10**6)  # s: the time at which a load rests before the event
+
+
 @dataclass
 class State:
     """A continuous state: d(symbol)/dt = derivative, and its value in the steady state before the event."""
@@ -51,7 +54,7 @@ class Equations:
     nominal synchronous speed `omega_n`:
 
     - inputs, recorded: `U` voltage, `omega_s` synchronous speed (0 where the frequency is not recorded), `U2`
-      negative-sequence voltage; and `U_rate`, the slope of U [pu/s];
+      negative-sequence voltage; and `U_rate`, the slope of U [pu/s], `t`, the time since the first sample [s];
     - before the event: `U0`, `omega_s0`, `U20`, `P0`, `Q0`;
     - `omega_n`, the nominal synchronous speed; `step`, the time between samples [s];
     - `P_s0`, `Q_s0`, what all other parts leave to the static load before the event.
@@ -62,7 +65,7 @@ class Equations:
     """
 
     def __init__(self) -> None:
-        self.U, self.omega_s, self.U_rate, self.U2 = map(_real, INPUTS)
+        self.U, self.omega_s, self.U_rate, self.U2, self.t = map(_real, INPUTS)
         self.U0, self.omega_s0, self.U20, self.omega_n, self.step = map(_real, EVENT)
         self.P0, self.Q0 = _real("P0"), _real("Q0")
         self.P_s0, self.Q_s0 = _real("P_s0"), _real("Q_s0")
@@ -175,7 +178,8 @@ class Equations:
 
     def at_rest(self) -> dict[Symbol, sympy.Expr]:
         """The inputs' values before the event."""
-        return {self.U: self.U0, self.omega_s: self.omega_s0, self.U2: self.U20, self.U_rate: sympy.Integer(0)}
+        still = {self.U_rate: sympy.Integer(0), self.t: sympy.Integer(LONG_AGO)}
+        return {self.U: self.U0, self.omega_s: self.omega_s0, self.U2: self.U20} | still
 
     def expand(self, expression: sympy.Expr) -> sympy.Expr:
         """The expression with every named quantity replaced by what it stands for."""

@@ -1,0 +1,1 @@
+"""Where simulation and measurement disagree, which missing effect explains it, and how sure that is."""

@@ -1,0 +1,114 @@
+"""The effects that could be missing: which of them this data can show, and how each is scanned."""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.errors import UserError, among
+from tractexp.model.model import compose
+from tractexp.model.parts import Effect, Measurement, Motor, Static
+from tractexp.parameter import Parameter
+from tractexp.plugin import discover, get
+from tractexp.record import Event
+
+MOST_SETTINGS = 16  # combinations of an effect's scanned parameters
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """An effect that may be missing. `settings` are the values scanned of parameters that vanish at the null."""
+
+    name: str
+    effect: Effect
+    sizes: tuple[Parameter, ...]  # the parameters that have a null
+    settings: tuple[dict[str, float], ...]
+
+    @property
+    def measurement(self) -> bool:
+        """Whether it belongs to the measurement chain, not to the load."""
+        return isinstance(self.effect, Measurement)
+
+    def sign(self, parameter: Parameter) -> int:
+        """+1 or -1 where the null lies on a bound, 0 where the parameter may go both ways."""
+        low, high = parameter.bounds
+        return int(parameter.null == low) - int(parameter.null == high)
+
+    def relevant(self, parameter: Parameter) -> float:
+        """The smallest departure from the null that matters."""
+        low, high = parameter.bounds
+        return float(self.effect.relevant.get(parameter.name, 0.1 * (high - low)))
+
+
+@dataclass(frozen=True, eq=False)
+class Catalogue:
+    """All candidates that can be tested, and why the others cannot."""
+
+    candidates: tuple[Candidate, ...]
+    untestable: dict[str, str]
+
+    def __getitem__(self, name: str) -> Candidate:
+        return next(c for c in self.candidates if c.name == name)
+
+    @property
+    def effects(self) -> list[Effect]:
+        return [c.effect for c in self.candidates]
+
+    @property
+    def load(self) -> tuple[str, ...]:
+        """Names of the effects of the load itself."""
+        return tuple(c.name for c in self.candidates if not c.measurement)
+
+    @property
+    def chain(self) -> tuple[str, ...]:
+        """Names of the effects of the measurement chain."""
+        return tuple(c.name for c in self.candidates if c.measurement)
+
+
+def catalogue(
+    motor: Motor, static: Static, present: Sequence[Effect], events: Sequence[Event], only: Sequence[str] = ()
+) -> Catalogue:
+    """The registered effects that the model lacks. `only` restricts it; measurement-chain effects always stay.
+
+    Raises `UserError` for a name in `only` that no effect has.
+    """
+    known = discover().get("effect", {})
+    for name in only:
+        if name not in known:
+            raise UserError(f"task.effects names '{name}', which is no effect{among(name, known)}")
+    here = {effect.name for effect in present}
+    found, untestable = [], {}
+    for name in sorted(known):
+        effect = get("effect", name)()
+        if name in here or (only and name not in only and not isinstance(effect, Measurement)):
+            continue
+        if why := missing_channel(effect, events) or _refusal(effect, motor, static, present):
+            untestable[name] = why
+        else:
+            found.append(_candidate(effect))
+    return Catalogue(tuple(found), untestable)
+
+
+def missing_channel(effect: Effect, events: Sequence[Event]) -> str:
+    """The sentence why the recorded channels do not show this effect, "" where they do."""
+    for channel in effect.reads:
+        if any(getattr(e.record, channel) is None for e in events):
+            return f"it is seen through {channel}, which is not recorded"
+        if channel == "f" and all(np.ptp(e.record.f) < 0.05 for e in events):
+            return "it is seen through the frequency, which moves by less than 0.05 Hz"
+    return ""
+
+
+def _refusal(effect: Effect, motor: Motor, static: Static, present: Sequence[Effect]) -> str:
+    return effect.refusal(compose(motor, static, present).equations) or ""
+
+
+def _candidate(effect: Effect) -> Candidate:
+    sizes = tuple(p for p in effect.parameters if p.null is not None)
+    scanned = [p for p in effect.parameters if p.null is None]
+    grid = getattr(effect, "grid", {})
+    values = [grid.get(p.name, (p.default,)) for p in scanned]
+    settings = [dict(zip((p.name for p in scanned), choice, strict=True)) for choice in itertools.product(*values)]
+    step = -(-len(settings) // MOST_SETTINGS)
+    return Candidate(effect.name, effect, sizes, tuple(settings[::step]))
