@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from typing import ClassVar
 
 import numpy as np
 from tractexp_plugins.optimizers._sparrow import Flock, Sparrow
@@ -61,6 +62,7 @@ class ISSA(Sparrow):
     step 5 divides the flock: the mean fitness does. Each sparrow has its own chaotic orbit.
     """
 
+    plain: ClassVar[str] = "ssa"
     tent_initialization: bool = True
     levy: bool = True
     gaussian: bool = True

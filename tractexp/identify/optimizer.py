@@ -64,6 +64,7 @@ class Optimizer(Plugin):
     """Base of the optimizer plugins, chosen by `optimizer=NAME`. Its fields are settings of every optimizer."""
 
     group: ClassVar[str] = "optimizer"
+    plain: ClassVar[str] = ""  # the optimizer that this one is, bit for bit, with all its switches off
     space: str = "unit"  # "unit": search in the unit cube; "raw": in the parameters' own units
     polish: bool = False  # end with bounded least squares from the best points, inside the same budget
 

@@ -1,0 +1,157 @@
+"""Sentences to quote, each with its numbers and no more than the tests allow."""
+
+import numpy as np
+
+from tractexp.compare.ablation import Ablation, Effect
+from tractexp.compare.comparison import Comparison, Pair
+from tractexp.compare.statistics import ALPHA
+from tractexp.compare.summary import AT_FLOOR, Spread
+
+
+def number(value: float, digits: int = 3) -> str:
+    """0.0000081 as 8.1e-06, 15000 as 15,000, inf as never."""
+    if np.isnan(value):
+        return "-"
+    if np.isinf(value):
+        return "never"
+    if (abs(value) >= 1000 and value == round(value)) or abs(value) >= 10**digits:
+        return f"{value:,.0f}"
+    return f"{value:.{digits}g}"
+
+
+def p_value(p: float) -> str:
+    return f"{p:.2g}" if p >= 1e-4 else f"{p:.1e}"
+
+
+def headline(comparison: Comparison) -> str:
+    """The shortest true answer to the question which variant is best."""
+    if not comparison.pairs:
+        return "No difference between variants was tested."
+    best, *others = comparison.leaders
+    if others:
+        within = f"equal within {comparison.ties:.2%} of the floor"
+        said = f"{_listed([best, *others])} reach the lowest median objective ({within}); {best}, the fastest of them,"
+    else:
+        said = f"{best} has the lowest median objective; it"
+    own = [pair for pair in comparison.pairs if best in (pair.first, pair.second)]
+    beaten = [pair.second for pair in own if pair.significant and pair.first == best]
+    worse = [pair.first for pair in own if pair.significant and pair.second == best]
+    alike = [pair.second if pair.first == best else pair.first for pair in own if not pair.significant]
+    verdicts = [f"is significantly better than {_listed(beaten)}"] if beaten else []
+    verdicts += [f"is significantly worse than {_listed(worse)} over paired seeds"] if worse else []
+    verdicts += [f"shows no significant difference to {_listed(alike)}"] if alike else []
+    return f"{said} {' and '.join(verdicts) or 'was not tested'}."
+
+
+def near_and_far(comparison: Comparison) -> tuple[list[Pair], list[Pair]]:
+    """The pairs with the reference, or with the best variant where there is none; and the others."""
+    chosen = comparison.reference or comparison.leaders[0]
+    near = [pair for pair in comparison.pairs if chosen in (pair.first, pair.second)]
+    return near, [pair for pair in comparison.pairs if pair not in near]
+
+
+def _listed(names: list[str]) -> str:
+    names = sorted(names)
+    if len(names) > 6:
+        return f"{len(names)} other variants"
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def of_pair(comparison: Comparison, pair: Pair) -> str:
+    """One pair of variants, as it may be quoted."""
+    one, two = (comparison.gathered[name] for name in (pair.first, pair.second))
+    spent = [Spread.of([run.simulations[-1] for run in v.finished]) for v in (one, two)]
+    first, second = (number(median) if np.isfinite(median) else "no result" for median in pair.medians)
+    if len({x for s in spent for x in (s.best, s.worst)}) == 1:
+        start = f"On {pair.seeds} seeds and {number(spent[0].median)} simulations, "
+        reached = f"{pair.first} reaches a median objective of {first} pu² against {second} pu² for {pair.second}"
+    else:
+        start = f"On {pair.seeds} seeds, "
+        reached = (
+            f"{pair.first} reaches a median objective of {first} pu² with {number(spent[0].median)} simulations "
+            f"(median) against {second} pu² with {number(spent[1].median)} for {pair.second}"
+        )
+    verdict = "is significant" if pair.significant else "is not significant"
+    tests = len(comparison.pairs)
+    return (
+        f"{start}{reached}; the difference {verdict} (Wilcoxon signed-rank, Holm-corrected over {tests} "
+        f"{'pair' if tests == 1 else 'pairs'}, p = {p_value(pair.corrected)}; Vargha-Delaney A = {pair.effect:.2f})."
+    )
+
+
+def of_ranks(comparison: Comparison) -> str:
+    """Friedman's test, or "" where it was not made."""
+    ranks = comparison.ranks
+    if ranks is None:
+        return ""
+    order = np.argsort(ranks.mean, kind="stable")
+    listed = ", ".join(f"{ranks.names[i]} {ranks.mean[i]:.2f}" for i in order[:5])
+    more = f" and {len(order) - 5} more up to {max(ranks.mean):.2f}" if len(order) > 5 else ""
+    differ = "differ" if ranks.p < ALPHA else "do not differ significantly"
+    text = (
+        f"Over {ranks.seeds} seeds the mean ranks {differ} (Friedman chi-square = {ranks.chi2:.2f}, {len(order) - 1} "
+        f"degrees of freedom, p = {p_value(ranks.p)}): {listed}{more}"
+    )
+    if ranks.p < ALPHA:
+        text += f"; two ranks differ significantly at {ALPHA:.0%} when {ranks.critical_difference:.2f} or more apart"
+        text += " (Nemenyi)"
+    return text + "."
+
+
+def of_speed(comparison: Comparison) -> str:
+    """Who needs fewest simulations to the hardest target."""
+    target, index = min((target, i) for i, target in enumerate(comparison.targets))
+    rows = sorted((s.ert["simulations"][index], s.name) for s in comparison.summaries)
+    goal = f"{target:g} times the floor of {number(comparison.floor.value)} pu²"
+    if np.isinf(rows[0][0]):
+        return f"No variant ever reached {goal}."
+    said = [f"{name} needs {number(float(round(ert)))}" for ert, name in rows[:4] if np.isfinite(ert)]
+    text = f"To reach {goal}, {', '.join(said)} simulations in expectation (ERT)"
+    never = [name for ert, name in rows if np.isinf(ert)]
+    return text + (f"; {_listed(never)} never did." if never else ".")
+
+
+def of_floor(comparison: Comparison) -> str:
+    """How often the noise floor was reached."""
+    shares = sorted(((s.at_floor, s.runs, s.name) for s in comparison.summaries), key=lambda row: (-row[0], row[2]))
+    told = [f"{name} {round(share * n)} of {n}" for share, n, name in shares[:6]]
+    more = f" (the best six of {len(shares)})" if len(shares) > 6 else ""
+    value, source = number(comparison.floor.value, 5), comparison.floor.source
+    return f"Runs within {AT_FLOOR:.0%} of the floor of {value} pu² ({source}): {', '.join(told)}{more}."
+
+
+def of_effect(effect: Effect) -> str:
+    """A switch's own effect."""
+    (switch,) = effect.switches
+    verdict = "no effect is shown" if not effect.shown else "it helps" if effect.factor < 1 else "it harms"
+    return (
+        f"Switching on {switch} multiplies the objective by {number(effect.factor)} (geometric mean over "
+        f"{effect.seeds} seeds, 95 % bootstrap interval {number(effect.low)} to {number(effect.high)}, from "
+        f"{_listed_contrasts(effect)}): {verdict}."
+    )
+
+
+def _listed_contrasts(effect: Effect) -> str:
+    told = [f"{with_} against {without}" for with_, without in effect.contrasts]
+    return " and ".join(told) if len(told) < 3 else f"{len(told)} pairs of variants that differ in it alone"
+
+
+def of_unknown(ablation: Ablation) -> str:
+    """What these variants cannot tell, and which would; "" where nothing is missing."""
+    if not ablation.unknown:
+        return ""
+    names = "; ".join(" with ".join(key) for key in ablation.unknown)
+    return (
+        f"Not to be had from these {len(ablation.variants)} variants: {names}. A main effect takes two variants that "
+        "differ in that switch alone, an interaction of two switches takes four that differ in those alone."
+    )
+
+
+def sentences(comparison: Comparison) -> list[str]:
+    """All claims, the most general first."""
+    told = [headline(comparison), of_floor(comparison), of_speed(comparison), of_ranks(comparison)]
+    told += [of_pair(comparison, pair) for group in near_and_far(comparison) for pair in group]
+    if comparison.ablation:
+        told += [of_effect(effect) for effect in comparison.ablation.effects]
+        told.append(of_unknown(comparison.ablation))
+    return [text for text in told if text]

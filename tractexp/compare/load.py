@@ -1,0 +1,128 @@
+"""Where the runs of a comparison come from: the folders of a sweep, or runs found in MLflow."""
+
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tractexp.compare.runs import Run
+from tractexp.errors import UserError
+
+TASK = "identify"  # the task whose runs are compared
+FINISHED = "finished"  # what a job's status.json says when all went well
+
+
+def newest_sweep(folder: Path) -> Path:
+    """The sweep under `folder` begun last. Raises `UserError` where there is none."""
+    sweeps = [path for path in folder.iterdir() if _jobs(path)] if folder.is_dir() else []
+    if not sweeps:
+        raise UserError(
+            f"there is no sweep under {folder} to compare; make one, such as "
+            "tractexp -m optimizer=issa,ssa,pso 'seed=range(0,30)', or name one by task.sweep=FOLDER"
+        )
+    return max(sweeps, key=lambda path: (max(job.stat().st_mtime for job in _jobs(path)), path.name))
+
+
+def from_sweep(folder: Path) -> list[Run]:
+    """The runs of a sweep's job folders. Raises `UserError` where there is none."""
+    if not folder.is_dir():
+        raise UserError(f"task.sweep={folder} is not a folder; a sweep writes one under outputs/sweeps")
+    jobs = _jobs(folder)
+    if not jobs:
+        raise UserError(f"the sweep {folder} is empty: none of its folders holds a job (.hydra/config.yaml)")
+    runs = [run for run in map(_job, jobs) if run is not None]
+    if not runs:
+        raise UserError(f"the sweep {folder} has no job of task={TASK}, the only one whose runs can be compared")
+    return runs
+
+
+def _jobs(folder: Path) -> list[Path]:
+    """Job folders, numbered ones in order of their number."""
+    jobs = [config.parents[1] for config in folder.glob("*/.hydra/config.yaml")]
+    return sorted(jobs, key=lambda job: (int(job.name) if job.name.isdigit() else np.inf, job.name))
+
+
+def _job(folder: Path) -> Run | None:
+    config = _yaml(folder / ".hydra" / "config.yaml")
+    if config["task"]["name"] != TASK:
+        return None
+    choices = _yaml(folder / ".hydra" / "hydra.yaml")["hydra"]["runtime"]["choices"]
+    told = {
+        "optimizer": choices["optimizer"], "data": choices["data"], "seed": int(config["seed"]),
+        "config": flat(config), "where": folder.name,
+    }  # fmt: skip
+    if failure := _failure(folder):
+        return Run(**told, failure=failure)
+    result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    try:
+        columns = np.loadtxt(folder / "history.csv", delimiter=",", skiprows=1, ndmin=2).T
+        _, simulations, seconds, history = columns
+    except (OSError, ValueError) as error:
+        raise UserError(f"the history of a finished run, {folder / 'history.csv'}, cannot be read: {error}") from None
+    figures = {key: float(result[key]) for key in ("objective", "epsilon_p", "epsilon_q")}
+    return Run(**told, **figures, simulations=simulations, seconds=seconds, history=history)
+
+
+def _failure(folder: Path) -> str:
+    """Why a job has no result, "" where it has one."""
+    status, path = {}, folder / "status.json"
+    if path.is_file():
+        status = json.loads(path.read_text(encoding="utf-8"))
+        if str(status.get("status")).lower() != FINISHED:
+            return str(status.get("message") or status.get("status"))
+    return "" if (folder / "result.json").is_file() else "it left no result.json: it was ended, or still runs"
+
+
+def _yaml(path: Path) -> Any:
+    import yaml
+
+    try:
+        return yaml.load(path.read_text(encoding="utf-8"), getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+    except (OSError, yaml.YAMLError) as error:
+        raise UserError(f"{path} cannot be read: {str(error).splitlines()[0]}") from None
+
+
+def flat(node: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """A nested configuration as {"optimizer.population": 50}."""
+    made: dict[str, Any] = {}
+    for key, value in node.items():
+        made |= flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
+    return made
+
+
+def from_logged(logged: Iterable[Any], source: str) -> list[Run]:
+    """Runs from what `tractexp.tracking.find` returns, oldest first; only identifications count, no parent runs.
+
+    MLflow keeps no seconds along the search: the run's duration is divided evenly over its simulations. Raises
+    `UserError` where there is none.
+    """
+    runs = [_logged(one) for one in logged if one.tags.get("task") == TASK and "optimizer" in one.tags]
+    if not runs:
+        raise UserError(
+            f"{source} matches no run of task={TASK}; the tags to filter by are task, model, optimizer, data and seed, "
+            "as in task.filter=\"tags.data = 'tibet_50pct'\""
+        )
+    return runs
+
+
+def _logged(one: Any) -> Run:
+    told = {
+        "optimizer": one.tags["optimizer"], "data": one.tags["data"], "seed": int(one.tags["seed"]),
+        "config": {key: _value(text) for key, text in one.parameters.items()}, "where": one.name,
+    }  # fmt: skip
+    curve = one.curves.get("fitness_by_simulations")
+    if one.status != "FINISHED" or "objective" not in one.metrics or curve is None:
+        return Run(**told, failure=f"its status in MLflow is {one.status}")
+    simulations, history = curve
+    seconds = one.metrics["seconds"] * simulations / simulations[-1]
+    figures = {key: one.metrics[key] for key in ("objective", "epsilon_p", "epsilon_q")}
+    return Run(**told, **figures, simulations=simulations, seconds=seconds, history=history)
+
+
+def _value(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError:
+        return text
