@@ -28,6 +28,7 @@ class ModelConfig:
     bounds: dict[str, list[float]] = field(default_factory=dict)  # {name: [lower, upper]}
     fixed: dict[str, float] = field(default_factory=dict)  # {name: value}
     substeps: int | None = None  # Runge-Kutta steps per sample; null: as many as needed
+    per_event: list[str] = field(default_factory=list)  # parameters with a value of their own in each event
 
 
 @dataclass
@@ -47,6 +48,7 @@ class Config:
     model: ModelConfig = field(default_factory=ModelConfig)
     optimizer: Any = None
     data: Any = None
+    objective: Any = None
     seed: int = 0
     budget: int | None = None  # simulations; null: the optimizer's own end
     time_limit: float | None = None  # s

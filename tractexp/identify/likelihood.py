@@ -75,7 +75,7 @@ class Likelihood:
         problem, drive = self.problem, self.problem.drive
         before = (self.lower + self.width * unit)[:, self.free :].reshape(len(unit), drive.events, 2)
         response = problem.model.simulate(
-            drive, problem.full(self.values(unit)), problem.step.substeps, np.swapaxes(before, 0, 1)
+            drive, problem.candidates(self.values(unit)), problem.step.substeps, np.swapaxes(before, 0, 1)
         )
         rows = np.stack((response.P, response.Q), axis=1)
         rows -= drive.measured

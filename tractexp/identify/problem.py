@@ -1,11 +1,12 @@
 """The identification problem: free parameters of a model against recorded events, Eq. (8)."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tractexp.errors import UserError, among
+from tractexp.identify.loss import Loss
 from tractexp.identify.search import REFUSED
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import MOST_SUBSTEPS, Model
@@ -72,6 +73,14 @@ class Step:
         return f"{text} per sample" + (" (given)" if np.isnan(worst) else f" (largest error {worst:.1e} pu)")
 
 
+def even(n: int, d: int) -> np.ndarray:
+    """(n, d) points that fill the unit cube evenly. Source: Roberts 2018, the additive sequence R_d."""
+    ratio = 2.0
+    for _ in range(60):  # the root above 1 of x^(d + 1) = x + 1
+        ratio = (1 + ratio) ** (1 / (d + 1))
+    return (0.5 + np.outer(np.arange(1, n + 1), ratio ** -np.arange(1.0, d + 1))) % 1
+
+
 class Problem:
     """Free parameters (columns of `values`) of a model, fitted to events. What the search loop works on."""
 
@@ -82,50 +91,99 @@ class Problem:
         bounds: Mapping[str, Sequence[float]] | None = None,
         fixed: Mapping[str, float] | None = None,
         substeps: int | None = None,
+        per_event: Sequence[str] = (),
+        loss: Loss | None = None,
     ):
-        """Raises `UserError` for unknown names and values out of range; `substeps` None means automatic."""
+        """Raises `UserError` for unknown names and values out of range; `substeps` None means automatic.
+
+        Parameters in `per_event` have a value of their own in each of several events; their columns are called
+        `T_m[1]`, `T_m[2]`, ... `loss` None means least squares.
+        """
         self.model, self.events = model, tuple(events)
         self.parameters = narrowed(model.parameters, bounds or {})
         self.fixed = {name: float(value) for name, value in (fixed or {}).items()}
         for name in self.fixed:
             _known(name, {p.name: p for p in self.parameters}, "model.fixed")
-        free = tuple(p for p in self.parameters if p.name not in self.fixed)
+        for name in per_event:
+            _known(name, {p.name: p for p in self.parameters}, "model.per_event")
+            if name in self.fixed:
+                raise UserError(f"model.per_event names {name}, which model.fixed fixes; it can be only one of them")
+        own = set(per_event) if len(self.events) > 1 else set()
+        free = [
+            replace(p, name=f"{p.name}[{e}]") if e else p
+            for p in self.parameters
+            if p.name not in self.fixed
+            for e in (range(1, len(self.events) + 1) if p.name in own else (0,))
+        ]
         if not free:
             raise UserError("model.fixed fixes every parameter; leave at least one free to identify")
-        self.space = Space.of(free)
+        self.space = Space.of(tuple(free))
         self.lower, self.upper = self.space.lower, self.space.upper
-        self._columns = [model.names.index(name) for name in self.space.names]
+        self.per_event = tuple(name for name in model.names if name in own)
+        self.loss = loss or Loss()
         self._rest = np.array([self.fixed.get(name, np.nan) for name in model.names])
-        self.drive = Drive.of([excitation(e) for e in self.events])
+        self._columns = np.array([self._sources(e) for e in range(len(self.events))])  # (E, d), -1: fixed
+        weights = {"weight_P": self.loss.weight_P, "weight_Q": self.loss.weight_Q}
+        self.drive = Drive.of([replace(excitation(e), **weights) for e in self.events])
+        self._scale = self.loss.scales(self.events, self.drive)
         self.step = self._step(substeps)
 
-    def full(self, values: np.ndarray) -> np.ndarray:
-        """Free values (n, free) -> all parameters of the model (n, d)."""
+    def _sources(self, event: int) -> list[int]:
+        """Which free column each parameter of the model is taken from in an event, -1 where it is fixed."""
+        where = {name: k for k, name in enumerate(self.space.names)}
+        return [where.get(n, where.get(f"{n}[{event + 1}]", -1)) for n in self.model.names]
+
+    def by_event(self, values: np.ndarray) -> np.ndarray:
+        """Free values (n, free) -> all parameters of the model in each event (E, n, d)."""
         values = np.atleast_2d(values)
-        whole = np.tile(self._rest, (len(values), 1))
-        whole[:, self._columns] = values
-        return whole
+        return np.where(self._columns[:, None] < 0, self._rest, np.moveaxis(values[:, self._columns], 1, 0))
+
+    def full(self, values: np.ndarray) -> np.ndarray:
+        """Free values (n, free) -> all parameters of the model (n, d), a mean where they differ by event."""
+        return self.by_event(values).mean(axis=0) if self.per_event else self.by_event(values)[0]
+
+    def candidates(self, values: np.ndarray) -> np.ndarray:
+        """Free values (n, free) as the model simulates them: (n, d), or (E, n, d) where they differ by event."""
+        return self.by_event(values) if self.per_event else self.full(values)
 
     def objective(self, values: np.ndarray) -> np.ndarray:
         """Eq. (8) of free values (n, free): mean squared error of P plus that of Q, over all events [pu²].
 
+        With another loss or other weights, the mean of those.
+
         Candidates without a steady state get `REFUSED` times one plus how far they miss it; those that diverge
         get `REFUSED`.
         """
-        errors = self.model.errors(self.drive, self.full(values), self.step.substeps)
-        f = errors.sums.sum(axis=(0, 1)) / self.drive.samples
+        if self.loss.quadratic:
+            errors = self.model.errors(self.drive, self.candidates(values), self.step.substeps)
+            f, miss = errors.sums.sum(axis=(0, 1)) / self.drive.samples, errors.miss
+        else:
+            rows, misses = self._losses(values)
+            f, miss = rows.sum(axis=(1, 2)) / self.drive.samples, misses.sum(axis=0)
         f = np.where(f < REFUSED, f, REFUSED)
-        return np.where(errors.miss > 0, REFUSED * (1 + errors.miss), f)
+        return np.where(miss > 0, REFUSED * (1 + miss), f)
 
     def residuals(self, values: np.ndarray) -> np.ndarray:
-        """Calculated minus measured (n, 2 N), P then Q, scaled so that the sum of squares is Eq. (8)."""
+        """Calculated minus measured (n, 2 N), P then Q, scaled so that the sum of squares is the objective."""
         drive = self.drive
-        response = self.model.simulate(drive, self.full(values), self.step.substeps)
-        scale = np.sqrt(drive.weights / drive.samples)
-        sides = [(got - want) * s for got, want, s in zip((response.P, response.Q), drive.measured, scale, strict=True)]
-        rows = np.concatenate(sides, axis=1)
-        rows[response.miss.max(axis=0) > 0] = np.nan
-        return rows
+        if self.loss.quadratic:
+            errors, miss = self._errors(values)
+            rows = errors * np.sqrt(drive.weights / drive.samples)
+        else:
+            losses, miss = self._losses(values)
+            rows = np.sqrt(losses / drive.samples)
+        rows[miss.max(axis=0) > 0] = np.nan
+        return rows.reshape(len(rows), -1)
+
+    def _errors(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Calculated minus measured (n, 2, N) [pu], and how far each event misses a steady state (E, n)."""
+        response = self.model.simulate(self.drive, self.candidates(values), self.step.substeps)
+        return np.stack((response.P, response.Q), axis=1) - self.drive.measured, response.miss
+
+    def _losses(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Weighted losses (n, 2, N) [pu²], and the misses as above."""
+        errors, miss = self._errors(values)
+        return self.drive.weights * self._scale**2 * self.loss.rho((errors / self._scale) ** 2), miss
 
     def _step(self, substeps: int | None) -> Step:
         if substeps is not None:
@@ -133,10 +191,8 @@ class Problem:
                 raise UserError(f"model.substeps={substeps} is out of range: it must be 1 to {MOST_SUBSTEPS}")
             given = np.full(len(self.events), substeps)
             return Step(given, np.full(len(self.events), np.nan))
-        from scipy.stats import qmc
-
-        probes = self.space.from_unit(qmc.Sobol(len(self.space.names), scramble=False).random(PROBES))
-        chosen, error = self.model.substeps(self.drive, self.full(probes), FINE)
+        probes = self.space.from_unit(even(PROBES, self.space.dimension))
+        chosen, error = self.model.substeps(self.drive, self.candidates(probes), FINE)
         if not (error <= FINE).all():
             worst = int(np.argmax(error))
             raise UserError(

@@ -77,6 +77,11 @@ class Result:
     before: dict[str, float]
     optimizer: str = ""
     notes: list[str] = field(default_factory=list)
+    per_event: dict[str, list[float]] = field(default_factory=dict)  # of which `parameters` holds the mean
+    standard_errors: dict[str, float | None] = field(default_factory=dict)  # None: not identifiable
+    intervals: dict[str, list[float]] = field(default_factory=dict)  # 95 %, about the most likely values
+    verdicts: dict[str, str] = field(default_factory=dict)
+    uncertainty: dict[str, Any] = field(default_factory=dict)
 
     @property
     def acceptable(self) -> bool:
@@ -165,7 +170,8 @@ def conclude(
             " widen model.bounds or free model.fixed"
         )
     values = problem.full(found.values)[0]
-    fits = [respond(model, values, event, "train") for event in problem.events]
+    own = problem.by_event(found.values)[:, 0]
+    fits = [respond(model, v, event, "train") for v, event in zip(own, problem.events, strict=True)]
     fits += [respond(model, values, event, "validate") for event in validate]
     trained = [fit for fit in fits if fit.role == "train"]
     measured = {c: np.concatenate([getattr(f.event.record, c) for f in trained]) for c in "PQ"}
@@ -192,6 +198,7 @@ def conclude(
         model=dict(settings),
         before={"U0": first.U0, "P0": first.P0, "Q0": first.Q0, "frequency": first.record.base.frequency},
         optimizer=optimizer,
+        per_event={name: own[:, model.names.index(name)].tolist() for name in problem.per_event},
         notes=[note for f in fits for note in f.event.record.notes],
     )
     return result, fits

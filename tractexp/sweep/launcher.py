@@ -182,7 +182,6 @@ def warm(jobs: Sequence[SweepJob]) -> None:
     """Compile the kernels of the jobs' models, once for each, so that the workers find them on disk."""
     import json
 
-    from tractexp.identify.problem import Problem
     from tractexp.tasks.task import Job
 
     seen = set()
@@ -192,8 +191,8 @@ def warm(jobs: Sequence[SweepJob]) -> None:
             continue
         seen.add(key)
         with contextlib.suppress(UserError):  # the job itself will tell
-            made, node = Job(job.config, job.choices, job.folder), job.config["model"]
-            problem = Problem(made.model, made.events().train, node["bounds"], node["fixed"], node["substeps"])
+            made = Job(job.config, job.choices, job.folder)
+            problem = made.problem(made.events().train)
             middle = (problem.lower + problem.upper)[None] / 2
             problem.objective(middle)
             problem.residuals(middle)

@@ -47,6 +47,15 @@ class Job:
 
         return compose(*parts(self.config["model"]))
 
+    def problem(self, events: Any) -> Any:
+        """The identification problem of these events (a `Problem`)."""
+        from tractexp.identify.problem import Problem
+
+        node, loss = self.config["model"], build("objective", self.config["objective"])
+        return Problem(
+            self.model, events, node["bounds"], node["fixed"], node["substeps"], node["per_event"], loss=loss
+        )
+
     @property
     def seed(self) -> int:
         return int(self.config["seed"])

@@ -1,0 +1,53 @@
+"""How a residual counts in the objective: the base of the plugins chosen by `objective=NAME`."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from tractexp.errors import UserError, check_range
+from tractexp.model.drive import Drive
+from tractexp.plugin import Plugin
+from tractexp.record import Event
+
+
+@dataclass(frozen=True, kw_only=True)
+class Loss(Plugin):
+    """Base of the objectives. By itself it is that of Eq. (8), the squares, with equal weights.
+
+    A robust loss needs to know what residual is usual: the noise before each dip, or `scale`.
+    """
+
+    group: ClassVar[str] = "objective"
+    quadratic: ClassVar[bool] = True
+    weight_P: float = 1.0  # of the squared errors of P
+    weight_Q: float = 1.0
+
+    def check(self) -> None:
+        for name in ("weight_P", "weight_Q"):
+            check_range(f"objective.{name}", getattr(self, name), 0.0)
+        if self.weight_P == self.weight_Q == 0:
+            raise UserError("objective.weight_P and objective.weight_Q are both 0: nothing would be fitted")
+
+    def rho(self, z: np.ndarray) -> np.ndarray:
+        """The loss of squared residuals `z`, in squared scales; z itself where z is small."""
+        return z
+
+    def scales(self, events: Sequence[Event], drive: Drive) -> np.ndarray:
+        """The usual residual of each sample of P and Q (2, N) [pu]. Raises `UserError` where it is not known."""
+        if self.quadratic:
+            return np.ones((2, 1))
+        given = getattr(self, "scale", None)
+        usual = np.empty((2, drive.samples))
+        for e, event in enumerate(events):
+            for c, channel in enumerate("PQ"):
+                level = given or (event.noise_P, event.noise_Q)[c]
+                if not level > 0:
+                    raise UserError(
+                        f"{event.record.where}: {channel} shows no noise before the dip, so that a robust objective"
+                        " cannot tell an outlier; give the usual residual as objective.scale [pu], or take"
+                        " objective=squares"
+                    )
+                usual[c, drive.part(e)] = level
+        return usual
