@@ -190,7 +190,7 @@ def warm(jobs: Sequence[SweepJob]) -> None:
         if key in seen:
             continue
         seen.add(key)
-        with contextlib.suppress(UserError):  # the job itself will tell
+        with contextlib.suppress(Exception):  # the job itself will tell
             made = Job(job.config, job.choices, job.folder)
             problem = made.problem(made.events().train)
             middle = (problem.lower + problem.upper)[None] / 2

@@ -19,11 +19,13 @@ class Tally:
         self.total, self.done, self.failed = len(jobs), 0, 0
         self.jobs: dict[str, int] = {}  # done, by optimizer
         self.best: dict[str, float] = {}
-        self.started = time.perf_counter()
+        self.started = self.first = time.perf_counter()
 
     def add(self, job: SweepJob, end: Status) -> None:
         optimizer = job.choices["optimizer"]
         self.done += 1
+        if self.done == 1:
+            self.first = time.perf_counter()
         self.failed += end.status == FAILED
         self.jobs[optimizer] = self.jobs.get(optimizer, 0) + 1
         value = objective(job.folder)
@@ -35,8 +37,8 @@ class Tally:
 
     @property
     def left(self) -> float:
-        """Seconds left, by the pace so far."""
-        return (time.perf_counter() - self.started) * (self.total - self.done) / max(self.done, 1)
+        """Seconds left, by the pace since the first end: before it, the workers were starting."""
+        return (time.perf_counter() - self.first) * (self.total - self.done) / max(self.done - 1, 1)
 
     def line(self) -> str:
         """The state in one line."""
