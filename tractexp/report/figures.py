@@ -79,7 +79,7 @@ def fitness(
         drawn = np.concatenate(
             [_draw_curves(path, panels[0], by_iteration), _draw_curves(path, panels[1], by_simulations)]
         )
-        _logarithmic(panels[0], drawn.min(), drawn.max())
+        style.logarithmic(panels[0], "y", drawn.min(), drawn.max())
         _label_axis(panels[0], "best objective [pu²]", -0.18)
         panels[0].set_xlabel("iteration")
         panels[1].set_xlabel("simulations")
@@ -138,21 +138,3 @@ def _draw_curves(path: Path, panel: "Axes", curves: Curves) -> np.ndarray:
             f"(objective {REFUSED:g} or more)"
         )
     return np.concatenate(drawn)
-
-
-def _logarithmic(panel: "Axes", lowest: float, highest: float) -> None:
-    """Ticks at powers of ten, or where the curves span less than that, at round numbers between."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
-
-    def text(value: float, _: int) -> str:
-        """0.01 is 0.01, 0.00001234 is 1.234e-5."""
-        if 1e-2 <= value < 1e4:
-            return f"{value:.4g}"
-        digits, power = f"{value:.3e}".split("e")
-        return f"{digits.rstrip('0').rstrip('.')}e{int(power)}"
-
-    panel.set_yscale("log")
-    narrow = highest < 30 * lowest
-    panel.yaxis.set_major_locator(MaxNLocator(6) if narrow else LogLocator(numticks=8))
-    panel.yaxis.set_minor_locator(NullLocator())
-    panel.yaxis.set_major_formatter(FuncFormatter(text))

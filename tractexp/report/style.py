@@ -11,6 +11,7 @@ import numpy as np
 from tractexp.errors import UserError
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 # Okabe and Ito 2008, "Color universal design": told apart by color-blind readers.
@@ -18,6 +19,7 @@ MEASURED = "#9A9A9A"
 ACTIVE, REACTIVE, VOLTAGE = "#D55E00", "#0072B2", "#000000"
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 FAINT = "#666666"
+BEHIND = "#CFCFCF"  # what is there to compare with, behind what is shown
 
 POINTS = 800  # a line has at most about this many: a page is narrower than that
 SETTINGS: Any = {
@@ -64,6 +66,27 @@ def thin(x: np.ndarray, y: np.ndarray, points: int = POINTS) -> tuple[np.ndarray
     )
     index = np.unique(chosen[chosen < len(y)])
     return x[index], y[index]
+
+
+def logarithmic(panel: "Axes", which: str, lowest: float, highest: float) -> None:
+    """Make the axis `which` ("x" or "y") logarithmic, with ticks at powers of ten.
+
+    Where the values span less than a factor 30, at round numbers between.
+    """
+    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
+
+    def text(value: float, _: int) -> str:
+        """0.01 is 0.01, 0.00001234 is 1.234e-5."""
+        if 1e-2 <= value < 1e4:
+            return f"{value:.4g}"
+        digits, power = f"{value:.3e}".split("e")
+        return f"{digits.rstrip('0').rstrip('.')}e{int(power)}"
+
+    panel.set(**{f"{which}scale": "log"})
+    axis = panel.yaxis if which == "y" else panel.xaxis
+    axis.set_major_locator(MaxNLocator(6) if highest < 30 * lowest else LogLocator(numticks=8))
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter(FuncFormatter(text))
 
 
 def save(figure: "Figure", path: Path) -> Path:

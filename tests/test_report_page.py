@@ -1,0 +1,133 @@
+"""A page is one file that needs nothing else, whatever is written into it."""
+
+import html.parser
+import re
+
+import numpy as np
+import pytest
+
+from tractexp.errors import UserError
+from tractexp.report import figures
+from tractexp.report.page import Page
+
+HOSTILE = '<script>alert("x & y")</script>'
+VOID = {"meta", "br", "img", "path", "use", "rect", "line"}
+
+
+class Reader(html.parser.HTMLParser):
+    """Checks that elements nest, and collects ids, references and what would be loaded from elsewhere."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.tags, self.ids, self.references, self.words = [], [], [], [], ""
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+        if tag not in VOID:
+            self.open.append(tag)
+        for key, value in attributes:
+            if key == "id":
+                self.ids.append(value)
+            self.references += re.findall(r"url\((?:'|\")?([^)'\"]*)", value or "")
+            if key in ("src", "href", "xlink:href"):
+                self.references.append(value)
+
+    def handle_startendtag(self, tag, attributes):
+        self.handle_starttag(tag, attributes)
+        if tag not in VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag):
+        if tag not in VOID:
+            assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.words += data
+
+
+def read(path) -> Reader:
+    """A page read back, after checking that it is valid and self-contained."""
+    text = path.read_text(encoding="utf-8")
+    reader = Reader(text)
+    assert len(set(reader.ids)) == len(reader.ids)
+    assert all(reference.startswith("#") and reference[1:] in reader.ids for reference in reader.references)
+    assert not re.search(r"https?://|//[a-z]|@import", text)
+    assert not {"script", "link", "iframe", "img", "object", "embed", "metadata"} & set(reader.tags)
+    return reader
+
+
+@pytest.fixture
+def drawing(tmp_path):
+    curve = {"issa": (np.arange(50), np.geomspace(1, 1e-5, 50))}
+    return figures.fitness(tmp_path / "fitness.svg", curve, curve, title="search")
+
+
+def test_whatever_is_written_is_escaped(tmp_path, drawing):
+    page = Page(HOSTILE, HOSTILE).heading(HOSTILE).text(HOSTILE).verdict(HOSTILE, kind="bad").items([HOSTILE])
+    page.table([HOSTILE, "b"], [[HOSTILE, "1"]], HOSTILE).figure(drawing, HOSTILE).equation(HOSTILE)
+    with page.folded(HOSTILE):
+        page.text("inside")
+    reader = read(page.write(tmp_path / "page.html"))
+    assert reader.words.count(HOSTILE) >= 10
+    assert "inside" in reader.words
+
+
+def test_two_copies_of_a_figure_keep_apart(tmp_path, drawing):
+    reader = read(Page("twice").figure(drawing).figure(drawing).write(tmp_path / "page.html"))
+    assert reader.tags.count("svg") == 2
+    assert any(reference.startswith("#f1-") for reference in reader.references)
+    assert any(reference.startswith("#f2-") for reference in reader.references)
+    assert reader.words.count("simulations") == 2
+
+
+def test_the_same_page_has_the_same_bytes(tmp_path, drawing):
+    def write(name):
+        return Page("same").figure(drawing).equation(r"\frac{a}{b}").write(tmp_path / name).read_bytes()
+
+    assert write("one.html") == write("two.html")
+
+
+def test_every_equation_of_the_model_is_typeset(tmp_path):
+    from tractexp.model.model import compose
+    from tractexp.plugin import build
+
+    model = compose(build("model/motor", {"name": "electromechanical"}), build("model/static", {"name": "exponential"}))
+    page = Page("equations")
+    for latex in model.latex():
+        page.equation(latex)
+    reader = read(page.write(tmp_path / "page.html"))
+    assert reader.tags.count("svg") == len(model.latex()) > 5
+    assert "code" not in reader.tags
+
+
+def test_latex_beyond_mathtext_is_shown_as_it_is(tmp_path):
+    latex = r"\begin{pmatrix} 1 & 2 \end{pmatrix}"
+    reader = read(Page("matrix").equation(latex).write(tmp_path / "page.html"))
+    assert latex in reader.words
+    assert "svg" not in reader.tags
+
+
+def test_a_table_is_as_wide_as_its_columns(tmp_path):
+    reader = read(Page("t").table(["a", "b", "c"], [["1", "2", "3"]] * 4).write(tmp_path / "page.html"))
+    assert (reader.tags.count("th"), reader.tags.count("td"), reader.tags.count("tr")) == (3, 12, 5)
+    with pytest.raises(ValueError, match="shorter"):
+        Page("t").table(["a", "b"], [["1"]])
+
+
+def test_a_figure_that_is_not_there_or_not_svg_is_refused(tmp_path):
+    with pytest.raises(UserError, match=r"missing\.svg cannot be read: No such file"):
+        Page("p").figure(tmp_path / "missing.svg")
+    (tmp_path / "plain.svg").write_text("nothing")
+    with pytest.raises(UserError, match="is not SVG"):
+        Page("p").figure(tmp_path / "plain.svg")
+    with pytest.raises(UserError, match="did you mean 'good'"):
+        Page("p").verdict("x", kind="god")
+
+
+def test_a_page_that_cannot_be_written_is_one_sentence(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UserError, match=r"page\.html cannot be written: "):
+        Page("p").write(tmp_path / "file" / "page.html")
