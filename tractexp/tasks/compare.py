@@ -1,0 +1,141 @@
+"""Compare the runs of a sweep, or of any filter over MLflow."""
+
+import shutil
+from dataclasses import field
+from pathlib import Path
+from typing import Any
+
+from tractexp.errors import UserError, check_range
+from tractexp.plugin import discover, plugin
+from tractexp.tasks.console import say, table
+from tractexp.tasks.task import Job, Task
+
+SWEEPS = Path("outputs", "sweeps")
+SAID = 8  # sentences on the terminal; the page has all
+
+
+@plugin
+class Compare(Task):
+    """Settle which optimizer is better: tables, tests over paired seeds, figures, one page, sentences to quote."""
+
+    sweep: str | None = None  # folder of a sweep; null: the newest under outputs/sweeps
+    filter: str | None = None  # instead: a filter over MLflow, "tags.data = 'tibet_50pct'"
+    data: str | None = None  # compare the runs on this choice of data only
+    floor: float | None = None  # objective that the noise leaves; null: the best of all runs
+    targets: list[float] = field(default_factory=lambda: [10.0, 2.0, 1.01])  # of running times, times the floor
+    ties: float = 1e-3  # objectives within this share of the floor count as equal in the tests
+    reference: str | None = None  # test only against this variant; null: every pair
+
+    def check(self) -> None:
+        if self.sweep is not None and self.filter is not None:
+            raise UserError("task.sweep and task.filter are both given; the runs come from one or the other")
+        if self.floor is not None and not 0 < self.floor < float("inf"):
+            raise UserError(f"task.floor={self.floor:g} must be an objective above 0, in pu²")
+        if not self.targets:
+            raise UserError("task.targets is empty; it lists multiples of the floor, such as [10,2,1.01]")
+        for target in self.targets:
+            check_range("task.targets", target, 1.0)
+        check_range("task.ties", self.ties, 0.0, 1.0)
+
+    def run(self, job: Job) -> None:
+        from tractexp.compare.comparison import compare
+        from tractexp.compare.runs import gather
+        from tractexp.report.comparison import write_json, write_page
+
+        runs, source, folder = self._runs(job)
+        gathered = gather(runs, source, self.data)
+        comparison = compare(
+            gathered, targets=self.targets, ties=self.ties, floor=self.floor, reference=self.reference, plain=plain()
+        )
+        report(comparison, source)
+        paths = [
+            write_page(comparison, job.folder / "comparison.html", source),
+            write_json(comparison, job.folder / "comparison.json", source),
+        ]
+        if folder is not None:
+            paths = [Path(shutil.copy2(path, folder / path.name)) for path in paths] + paths
+        for path in paths:
+            say(f"  {path}")
+        track(job, comparison, folder, paths[-2:])
+
+    def _runs(self, job: Job) -> tuple[list[Any], str, Path | None]:
+        """The runs, where they are from in words, and the folder of the sweep."""
+        from tractexp.compare import load
+
+        if self.filter is None:
+            folder = Path(self.sweep) if self.sweep is not None else load.newest_sweep(SWEEPS)
+            return load.from_sweep(folder), f"the sweep {folder}", folder
+        from tractexp.tracking.find import find
+
+        node = job.config["tracking"]
+        logged = find(store(job), self.filter, node["experiment"])
+        source = f"the filter {self.filter}"
+        return load.from_logged(logged, source), source, None
+
+
+def store(job: Job) -> str:
+    """The address of the MLflow store."""
+    from tractexp import tracking
+
+    return job.config["tracking"]["uri"] or tracking.default_uri(Path.cwd())
+
+
+def plain() -> dict[str, str]:
+    """For each optimizer the one that it is with all its switches off, "" where there is none."""
+    return {name: cls.plain for name, cls in discover()["optimizer"].items()}
+
+
+def report(comparison: Any, source: str) -> None:
+    """Print the table and the sentences."""
+    from tractexp.compare import claims
+    from tractexp.compare.claims import number
+
+    target, hardest = min((target, i) for i, target in enumerate(comparison.targets))
+    say(f"{source}: {comparison.gathered.problem}")
+    rows = [
+        [
+            s.name,
+            str(s.runs),
+            str(s.failures),
+            number(s.objective.median),
+            number(s.objective.worst),
+            f"{s.at_floor:.0%}",
+        ]
+        for s in comparison.summaries
+    ]
+    rows = [[*row, number(s.ert["simulations"][hardest])] for row, s in zip(rows, comparison.summaries, strict=True)]
+    table(["variant", "failed", "median", "worst", "at floor", "ERT"], rows)
+    say(f"objectives in pu²; at floor: within 1 %; ERT: simulations expected to {target:g} times the floor")
+    told = claims.sentences(comparison)
+    for text in [*told[:SAID], *comparison.notes]:
+        say(f"- {text}")
+    if len(told) > SAID:
+        say(f"- and {len(told) - SAID} more sentences in comparison.html")
+    say()
+
+
+def track(job: Job, comparison: Any, folder: Path | None, paths: list[Path]) -> None:
+    """Add the page to the sweep's run; where that is not known, log a run of its own."""
+    node = job.config["tracking"]
+    if not node["enabled"]:
+        return
+    from tractexp import tracking
+    from tractexp.sweep.parent import parent_of
+    from tractexp.tracking.attach import attach
+
+    parent = parent_of(folder) if folder is not None else None
+    data = comparison.gathered.variants[0].runs[0].data
+    if parent is not None and attach(parent, store(job), paths):
+        say("logged on the run of the sweep; to see it: tractexp ui")
+        return
+    experiment = node["experiment"] or f"compare {data}"
+    run = tracking.Run(
+        experiment=experiment,
+        name=f"comparison of {len(comparison.summaries)} variants",
+        parameters=tracking.flatten({"task": job.config["task"]}),
+        metrics={f"median_{s.name}": s.objective.median for s in comparison.summaries if s.runs > s.failures},
+        tags={"task": "compare", "data": data},
+        artifacts=paths,
+    )
+    tracking.log(run, store(job))
+    say(f"logged in experiment '{experiment}'; to see it: tractexp ui")

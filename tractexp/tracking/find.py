@@ -1,0 +1,82 @@
+"""Runs read back from the store as plain data."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tractexp.errors import UserError, among
+from tractexp.tracking.store import open_store, sentences
+
+PAGE = 1000  # runs asked for at a time
+CURVES = ("fitness_by_simulations",)
+
+
+@dataclass(frozen=True)
+class Logged:
+    """One run as it lies in MLflow. `curves` are {name: (steps (n,), values (n,))}, by increasing step."""
+
+    run_id: str
+    name: str
+    status: str
+    experiment: str
+    parameters: Mapping[str, str]
+    metrics: Mapping[str, float]
+    tags: Mapping[str, str]
+    curves: Mapping[str, tuple[np.ndarray, np.ndarray]]
+
+
+def find(uri: str, filter: str, experiment: str | None = None, curves: tuple[str, ...] = CURVES) -> list[Logged]:
+    """Runs that match MLflow's `filter`, such as "tags.data = 'tibet_50pct'", oldest first, in one experiment or all.
+
+    Raises `UserError` where there is no such experiment or the filter is not one; an empty list where none match.
+    """
+    client = open_store(uri)
+    with sentences(uri):
+        names = {found.experiment_id: found.name for found in client.search_experiments()}
+    if experiment is not None:
+        chosen = [key for key, name in names.items() if name == experiment]
+        if not chosen:
+            raise UserError(
+                f"the MLflow store {uri} has no experiment '{experiment}'{among(experiment, names.values())}"
+            )
+        names = {chosen[0]: experiment}
+    with sentences(uri):
+        runs = _search(client, list(names), filter)
+        return [_logged(client, run, names[run.info.experiment_id], curves) for run in runs]
+
+
+def _search(client: Any, experiments: list[str], filter: str) -> list[Any]:
+    from mlflow.exceptions import MlflowException
+
+    runs, token = [], None
+    while True:
+        try:
+            page = client.search_runs(experiments, filter, max_results=PAGE, order_by=["start_time"], page_token=token)
+        except MlflowException as error:
+            if error.error_code != "INVALID_PARAMETER_VALUE":
+                raise
+            reason = str(error).strip().partition("\n")[0]
+            raise UserError(
+                f"task.filter={filter} is not a filter that MLflow understands ({reason}); one is "
+                "\"tags.data = 'tibet_50pct' and tags.optimizer = 'issa'\""
+            ) from error
+        runs += page
+        token = page.token
+        if not token:
+            return runs
+
+
+def _logged(client: Any, run: Any, experiment: str, curves: tuple[str, ...]) -> Logged:
+    read = {name: _curve(client, run.info.run_id, name) for name in curves if name in run.data.metrics}
+    return Logged(
+        run.info.run_id, run.info.run_name, run.info.status, experiment,
+        dict(run.data.params), dict(run.data.metrics), dict(run.data.tags), read,
+    )  # fmt: skip
+
+
+def _curve(client: Any, run_id: str, name: str) -> tuple[np.ndarray, np.ndarray]:
+    points = np.array([(m.step, m.value) for m in client.get_metric_history(run_id, name)], dtype=float)
+    points = points[np.argsort(points[:, 0], kind="stable")]
+    return points[:, 0], points[:, 1]
