@@ -3,13 +3,33 @@
 import argparse
 from pathlib import Path
 
+from tractexp.errors import UserError
+
 
 def ui(arguments: list[str]) -> int:
-    """Serve the store of the current folder (or `--uri`) on loopback until interrupted; returns the exit code."""
+    """Serve the store of the current folder (or `--uri`) on loopback until interrupted; returns the exit code.
+
+    The address printed opens on the comparison of the newest experiment, by optimizer.
+    """
     parser = argparse.ArgumentParser(prog="tractexp ui", description="Open the MLflow UI on this computer only.")
     parser.add_argument("--uri", help="tracking store; default: outputs/mlflow.db of the current folder")
     parser.add_argument("--port", type=int, default=5000)
+    parser.add_argument("--open", action="store_true", help="open it in the browser")
     chosen = parser.parse_args(arguments)
     from tractexp import tracking
+    from tractexp.tracking.ui import check_servable, serve
 
-    return tracking.serve(chosen.uri or tracking.default_uri(Path.cwd()), port=chosen.port)
+    uri = chosen.uri or tracking.default_uri(Path.cwd())
+    check_servable(uri, port=chosen.port)
+    return serve(uri, port=chosen.port, page=_page(uri), open_browser=chosen.open)
+
+
+def _page(uri: str) -> str:
+    """The view of the comparison; the plain page where the store cannot keep it."""
+    from tractexp.tracking.view import comparison_view
+
+    try:
+        return comparison_view(uri)
+    except UserError as error:
+        print(f"tractexp ui: opens on MLflow's plain page, because the comparison view could not be stored: {error}")
+        return ""

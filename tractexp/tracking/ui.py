@@ -22,7 +22,7 @@ def serve(uri: str, host: str = "127.0.0.1", port: int = 5000, page: str = "", o
     `page` is what follows the address, such as "#/experiments/1". Raises `UserError` when there is no store yet,
     the port is taken or the server does not start.
     """
-    _check_servable(uri, host, port)
+    check_servable(uri, host, port)
     address = f"http://{host}:{port}/"
     command = [sys.executable, "-m", "mlflow", "server", "--backend-store-uri", uri, "--registry-store-uri", uri]
     command += ["--host", host, "--port", str(port), "--workers", "1"]
@@ -44,7 +44,8 @@ def serve(uri: str, host: str = "127.0.0.1", port: int = 5000, page: str = "", o
             _end(server)
 
 
-def _check_servable(uri: str, host: str, port: int) -> None:
+def check_servable(uri: str, host: str = "127.0.0.1", port: int = 5000) -> None:
+    """Raise `UserError` when there is no store at `uri` yet or the port is taken; creates nothing."""
     database = database_of(uri)
     if database is None and uri.startswith("http"):
         raise UserError(f"{uri} is a running MLflow server already: open it in a browser")
