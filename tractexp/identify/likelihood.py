@@ -10,18 +10,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.identify.noise import Autoregression, white_noise
+from tractexp.identify.noise import SMALLEST, Autoregression, fit_autoregression, stretches
 from tractexp.identify.problem import Problem
+from tractexp.record import Event
 
 POWER_RANGE = 0.2  # of the apparent power before the event: how far P0 and Q0 may move
+QUIET_ORDER = 4  # of an autoregression of the few samples before a dip
 CENTRAL = 1e-5  # of a parameter's range: truncation and rounding both stay below 1e-7 of a column
 
 Noise = Sequence[tuple[Autoregression, Autoregression]]  # of P and of Q, one pair per event
 
 
-def before_the_event(problem: Problem) -> Noise:
-    """White noise of the level seen before each dip, where nothing better is known yet."""
-    return [(white_noise(e.noise_P), white_noise(e.noise_Q)) for e in problem.events]
+def before_the_event(event: Event) -> tuple[Autoregression, Autoregression]:
+    """Level and color of the noise of P and Q before the dip: what is known of it before anything is fitted."""
+    pair = []
+    for values, level in ((event.record.P, event.noise_P), (event.record.Q, event.noise_Q)):
+        quiet = values[event.steady]
+        known = np.isfinite(quiet)
+        made = fit_autoregression(stretches(quiet - quiet[known].mean(), known), QUIET_ORDER)
+        pair.append(made.scaled(max(level, SMALLEST) / made.deviation[0]))
+    return pair[0], pair[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,8 +42,8 @@ class Likelihood:
 
     @classmethod
     def of(cls, problem: Problem, noise: Noise | None = None) -> "Likelihood":
-        """The likelihood under white noise of the pre-event level, or under `noise`; gaps do not count."""
-        return cls(problem, noise or before_the_event(problem), problem.drive.weights > 0)
+        """The likelihood under `noise`, by default that of the samples before each dip; gaps do not count."""
+        return cls(problem, noise or [before_the_event(e) for e in problem.events], problem.drive.weights > 0)
 
     @property
     def free(self) -> int:

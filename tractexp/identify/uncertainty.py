@@ -13,7 +13,7 @@ import numpy as np
 from tractexp.identify.descent import Rows, descend
 from tractexp.identify.diagnosis import Test, jarque_bera, ljung_box, louder
 from tractexp.identify.information import Information
-from tractexp.identify.likelihood import Likelihood
+from tractexp.identify.likelihood import QUIET_ORDER, Likelihood
 from tractexp.identify.noise import FEWEST, fit_autoregression, stretches, white_noise
 from tractexp.identify.problem import Problem
 from tractexp.identify.verdict import Verdict, judge
@@ -56,8 +56,8 @@ class Uncertainty:
         ends = self.values[:, None] + self.half[:, None] * [-1.0, 1.0]
         return np.clip(ends, self.lower[:, None], self.upper[:, None])
 
-    def fields(self) -> dict[str, Any]:
-        """What `result.json` gains; numbers that do not exist are None."""
+    def fields(self, together: "Together | None" = None, notes: Sequence[str] = ()) -> dict[str, Any]:
+        """What `result.json` gains; numbers that do not exist are None. `notes` are added to our own."""
         number = lambda x: float(x) if np.isfinite(x) else None  # noqa: E731
         errors = self.information.standard_errors
         pairs = zip(self.names, self.intervals.tolist(), strict=True)
@@ -71,7 +71,9 @@ class Uncertainty:
                 "correlation": self.information.correlation.tolist(),
                 "noise": self.noise,
                 "tests": self.tests,
-                "notes": self.notes,
+                "notes": [*self.notes, *(together.notes if together else []), *notes],
+                "gains": together.fields() if together else {},
+                "odd_events": together.odd if together else [],
             },
         }
 
@@ -203,7 +205,7 @@ def misfit(likelihood: Likelihood, residual: np.ndarray, e: int, c: int) -> tupl
     before, dip = event.steady, slice(event.start, min(2 * event.end - event.start, event.record.samples))
     if min(np.count_nonzero(known[before]), np.count_nonzero(known[dip])) < FEWEST:
         return None, 1.0
-    quiet = fit_autoregression(stretches(residual[before], known[before]), highest=4).whiten(residual, known)
+    quiet = fit_autoregression(stretches(residual[before], known[before]), QUIET_ORDER).whiten(residual, known)
     own = likelihood.noise[e][c].whiten(residual, known)[dip][known[dip]]
     inside, outside = quiet[dip][known[dip]], quiet[before][known[before]]
     ratio = float(np.sqrt(np.mean(inside**2) / np.mean(outside**2))) if louder(inside, outside) else None
@@ -251,6 +253,11 @@ class Together:
     gains: dict[str, dict[str, float]]
     odd: list[str]
     notes: list[str]
+
+    def fields(self) -> dict[str, dict[str, float | None]]:
+        """The gains for a JSON file: None where a parameter is not identifiable without the event."""
+        kept = lambda ratio: ratio if np.isfinite(ratio) else None  # noqa: E731
+        return {event: {name: kept(ratio) for name, ratio in gain.items()} for event, gain in self.gains.items()}
 
 
 def compare_events(known: Uncertainty) -> Together:

@@ -1,7 +1,8 @@
 """Identify a load model's parameters from recorded dips."""
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -9,6 +10,13 @@ from tractexp.identify.search import REFUSED, Limits, search
 from tractexp.plugin import plugin
 from tractexp.tasks.console import say, searching, table
 from tractexp.tasks.task import Job, Task
+
+if TYPE_CHECKING:
+    from tractexp.identify.problem import Problem
+    from tractexp.identify.search import Found
+    from tractexp.identify.uncertainty import Together, Uncertainty
+
+ASTRAY = 0.99  # of the search's objective: least squares that get below it have left its valley or finished its work
 
 
 @plugin
@@ -19,13 +27,13 @@ class Identify(Task):
     predictor: bool | None = None  # log the model for mlflow.pyfunc; null: in single runs, not in sweeps
 
     def run(self, job: Job) -> None:
-        from tractexp.identify.problem import Problem
         from tractexp.identify.result import conclude, write_history
+        from tractexp.identify.uncertainty import assess, compare_events
 
         config = job.config
         events = job.events()
         node = config["model"]
-        problem = Problem(job.model, events.train, node["bounds"], node["fixed"], node["substeps"])
+        problem = job.problem(events.train)
         optimizer = job.optimizer
         announce(job, events, problem)
 
@@ -35,8 +43,15 @@ class Identify(Task):
         settings = {part: node[part] for part in ("motor", "static", "effects")}
         result, fits = conclude(problem, found, events.validate, job.seed, settings, job.choices["optimizer"])
 
+        known = assess(problem, found.values, robust=not problem.loss.quadratic)
+        together = compare_events(known) if len(problem.events) > 1 else None
+        result = replace(result, **known.fields(together, astray(problem, found, known)))
+
         report(problem, result)
+        advice = explain(known, together, result)
         paths = draw(job, found, fits) if _wanted(self.figures, job) else []
+        if paths:
+            paths += explained(job, result, known, together, advice, paths[:-1])
         paths.append(write_history(job.folder / "history.csv", found.history))
         paths.append(result.write(job.folder / "result.json"))
         for path in paths:
@@ -80,6 +95,52 @@ def report(problem: Any, result: Any) -> None:
     say(f"the search {result.status}")
     say(f"acceptance of Eq. (20), epsilon_p and epsilon_q below 5 %: {verdict}")
     say()
+
+
+def astray(problem: "Problem", found: "Found", known: "Uncertainty") -> list[str]:
+    """A sentence where the search's own values lie far from the most likely ones: it ended in another valley."""
+    better = float(problem.objective(known.values[None])[0])
+    if better >= ASTRAY * found.objective:
+        return []
+    return [
+        f"the search stopped short: least squares from where it ended lower the objective from {found.objective:.4g} to"
+        f" {better:.4g}; take the most likely values, or optimizer.polish=true"
+    ]
+
+
+def explain(known: "Uncertainty", together: "Together | None", result: Any) -> list[str]:
+    """Print how sure each parameter is, what is odd, and what to do next; return the advice."""
+    from tractexp.identify.advice import advise
+    from tractexp.identify.verdict import IDENTIFIED
+    from tractexp.report.identify import headline, rows
+
+    brief = [[name, value, interval, error, ""] for name, value, _, interval, error, _ in rows(known, result.units)]
+    for row in brief:
+        verdict = known.verdicts[row[0]]
+        row[-1] = f"{verdict.word} {verdict.detail.partition(';')[0]}" if verdict.word == IDENTIFIED else verdict.word
+    table(["parameter", "most likely", "95 % interval", "error", "verdict"], brief)
+    say(headline(known))
+    for name, verdict in known.verdicts.items():
+        if verdict.word != IDENTIFIED:
+            say(f"  {name}: {verdict}")
+    advice = advise(known, together.odd if together else ())
+    for label, sentences in (("note", result.uncertainty["notes"]), ("next", advice)):
+        for sentence in sentences:
+            say(f"  {label}: {sentence}")
+    say()
+    return advice
+
+
+def explained(
+    job: Job, result: Any, known: "Uncertainty", together: "Together | None", advice: list[str], fits: list[Path]
+) -> list[Path]:
+    """Write the figures of the uncertainty and the page an engineer reads."""
+    from tractexp.report import identify, uncertainty
+
+    correlation = uncertainty.correlation(job.folder / "correlation.svg", known)
+    residuals = uncertainty.residuals(job.folder / "residuals.svg", known)
+    page = identify.page(result, known, together, advice, fits, correlation, residuals)
+    return [correlation, residuals, page.write(job.folder / "report.html")]
 
 
 def draw(job: Job, found: Any, fits: Any) -> list[Path]:

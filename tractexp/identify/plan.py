@@ -1,0 +1,249 @@
+"""Before the recording: what a dip would tell, how deep it must be, and which events of an archive are worth fitting.
+
+The information matrix needs no measurement, only the voltage, the noise and a guess of the parameters.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tractexp.errors import UserError, among, check_range
+from tractexp.identify.descent import descend
+from tractexp.identify.information import Information
+from tractexp.identify.likelihood import Likelihood, Noise, before_the_event
+from tractexp.identify.noise import Autoregression
+from tractexp.identify.problem import Problem, even
+from tractexp.identify.uncertainty import LEVEL
+from tractexp.record import Base, Event, Record
+
+BEFORE, AFTER = 0.3, 1.5  # s recorded before and after a planned dip
+EDGE = 0.02  # s, fall and rise of a planned dip
+FINEST = 5e-4  # s, longest Runge-Kutta step of a forecast
+DEPTHS = np.arange(0.05, 0.951, 0.025)
+STARTS = 24  # of the quick fit that finds a guess
+INERTIA = "H"  # H = M omega_s / 2 has the relative precision of M
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A dip that might be recorded, from 1 pu, with trapezoidal edges. Noise [pu] forgets within `memory` [s]."""
+
+    depth: float
+    duration: float  # s
+    rate: float  # Hz
+    noise_P: float
+    noise_Q: float
+    P0: float = 1.0
+    Q0: float = 0.5
+    frequency: float = 50.0
+    memory: float = 0.0
+
+    @classmethod
+    def of(cls, event: Event) -> "Shape":
+        """The shape of a recorded event; the noise forgets as it does before the dip, where P tells."""
+        noise, _ = before_the_event(event)
+        neighbors = 0.0 if noise.white else float(noise.coefficients[1, 0])
+        return cls(
+            event.depth, event.duration, event.rate, event.noise_P, event.noise_Q, event.P0, event.Q0,
+            event.record.base.frequency, -event.record.step / math.log(neighbors) if neighbors > 0 else 0.0,
+        )  # fmt: skip
+
+    @property
+    def noise(self) -> tuple[Autoregression, Autoregression]:
+        """Noise of P and Q at this rate: a first-order autoregression."""
+        a = math.exp(-1 / (self.rate * self.memory)) if self.memory > 0 else 0.0
+        color, shock = np.array([[0.0], [a]]), math.sqrt(1 - a * a)
+        P, Q = (Autoregression(color, level * np.array([1.0, shock])) for level in (self.noise_P, self.noise_Q))
+        return P, Q
+
+    def check(self, where: str = "task") -> None:
+        """Raise `UserError` for what cannot be recorded."""
+        check_range(f"{where}.depth", self.depth, 0.03, 0.95)
+        check_range(f"{where}.duration", self.duration, 2 / self.rate, 10.0)
+        check_range(f"{where}.rate", self.rate, 5.0, 20_000.0)
+        if not min(self.noise_P, self.noise_Q) > 0:
+            raise UserError(
+                f"the records show no noise before the dip, and without noise every interval is zero; give it as"
+                f" {where}.noise, a fraction of P before the dip"
+            )
+
+    def event(self) -> Event:
+        """The event as if it had been recorded; P and Q hold the steady state, for no forecast looks at them."""
+        step = 1 / self.rate
+        t = np.arange(math.ceil((BEFORE + self.duration + AFTER) * self.rate)) * step
+        fall, back = (np.clip((t - s) / EDGE, 0.0, 1.0) for s in (BEFORE, BEFORE + self.duration))
+        U = 1 - self.depth * (fall - back)
+        start, end = (int(np.searchsorted(t, s)) for s in (BEFORE, BEFORE + self.duration + EDGE))
+        record = Record(
+            f"{100 * self.depth:.0f} % for {1000 * self.duration:.0f} ms", t, U,
+            np.full(len(t), self.P0), np.full(len(t), self.Q0), base=Base(frequency=self.frequency),
+        )  # fmt: skip
+        return Event(
+            record=record, start=start, end=min(end, len(t) - 1), depth=self.depth, U0=1.0, P0=self.P0, Q0=self.Q0,
+            f0=self.frequency, noise_U=0.0, noise_P=self.noise_P, noise_Q=self.noise_Q, steady=slice(0, start), dips=1,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast:
+    """What recording `shape` would tell: half 95 % intervals (d,) of the parameters `names`."""
+
+    shape: Shape
+    names: tuple[str, ...]
+    values: np.ndarray
+    half: np.ndarray
+
+    @property
+    def relative(self) -> np.ndarray:
+        """(d,) half intervals as a share of the value; inf where not identifiable."""
+        return self.half / np.maximum(np.abs(self.values), 1e-12)
+
+
+def normal_quantile(level: float = LEVEL) -> float:
+    from scipy.special import ndtri
+
+    return float(ndtri((1 + level) / 2))
+
+
+def like(problem: Problem, events: Sequence[Event]) -> Problem:
+    """The same free parameters, bounds and fixed values on other events."""
+    bounds = {p.name: p.bounds for p in problem.parameters}
+    substeps = max(1, math.ceil(max(e.record.step for e in events) / FINEST))
+    return Problem(problem.model, events, bounds, problem.fixed, substeps)
+
+
+def forecast(
+    problem: Problem, values: np.ndarray, shape: Shape, known: Information | None = None, noise: Noise | None = None
+) -> Forecast:
+    """The intervals that `shape` would give at free `values` (d,), added to what is `known` already.
+
+    `noise` replaces the shape's. Raises `UserError` where the values have no steady state.
+    """
+    planned = like(problem, [shape.event()])
+    informations = each(planned, values, noise or [shape.noise])
+    total = combined([*([known] if known else []), *informations])
+    return Forecast(shape, total.names, total.values, normal_quantile() * total.standard_errors)
+
+
+def each(problem: Problem, values: np.ndarray, noise: Noise | None = None) -> list[Information]:
+    """The information of each event of a problem at free `values` (d,), its own P0 and Q0 unknown.
+
+    Raises `UserError` where these values have no steady state before the first event.
+    """
+    if refusal := problem.model.refusal(problem.full(values)[0], problem.drive):
+        raise UserError(f"nothing can be planned at these parameters: {refusal}")
+    likelihood = Likelihood.of(problem, noise)
+    _, J = likelihood.jacobian(likelihood.to_unit(values)[0])
+    width, free = problem.upper - problem.lower, likelihood.free
+    return [
+        Information.of(problem.space.names, np.asarray(values), width, rows[:, :free], rows[:, free:])
+        for rows in (J * likelihood.part_of(e)[:, None] for e in range(problem.drive.events))
+    ]
+
+
+def combined(informations: Sequence[Information]) -> Information:
+    """What several independent records say together."""
+    return replace(informations[0], J=np.concatenate([i.J for i in informations]))
+
+
+@dataclass(frozen=True, eq=False)
+class Needed:
+    """How deep a dip must be to know a parameter within a share of its value; `depth` None: no dip is."""
+
+    parameter: str
+    within: float
+    depth: float | None
+    depths: np.ndarray  # (n,) tried
+    relative: np.ndarray  # (n,) half interval over value there
+
+    def __str__(self) -> str:
+        best = int(np.argmin(self.relative))
+        if self.depth is None:
+            return (
+                f"no dip of this kind gives {self.parameter} within {100 * self.within:g} %: the best, of"
+                f" {100 * self.depths[best]:.0f} %, gives ± {100 * self.relative[best]:.2g} %"
+            )
+        return f"a dip of {100 * self.depth:.0f} % gives {self.parameter} within {100 * self.within:g} %"
+
+
+def column(names: Sequence[str], parameter: str) -> int:
+    """The column of a parameter, `H` standing for `M`; raises `UserError` for one that is not free."""
+    name = "M" if parameter == INERTIA and "M" in names else parameter
+    if name not in names:
+        raise UserError(f"task.parameter={parameter} is not a free parameter{among(parameter, [*names, INERTIA])}")
+    return list(names).index(name)
+
+
+def over_depth(
+    problem: Problem, values: np.ndarray, shape: Shape, known: Information | None = None, noise: Noise | None = None
+) -> list[Forecast]:
+    """Forecasts for dips of every depth, otherwise of this `shape`."""
+    return [forecast(problem, values, replace(shape, depth=float(d)), known, noise) for d in DEPTHS]
+
+
+def depth_needed(forecasts: Sequence[Forecast], parameter: str, within: float) -> Needed:
+    """The shallowest of these dips whose 95 % interval is ± `within` of the parameter's value."""
+    j = column(forecasts[0].names, parameter)
+    depths, relative = np.array([(f.shape.depth, f.relative[j]) for f in forecasts]).T
+    enough = np.flatnonzero(relative <= within)
+    depth = None
+    if len(enough):
+        k = int(enough[0])
+        depth = float(depths[k])
+        if k and np.isfinite(relative[k - 1]):
+            a, b = np.log(relative[k - 1 : k + 1])
+            depth = float(depths[k - 1] + (np.log(within) - a) / (b - a) * (depths[k] - depths[k - 1]))
+    return Needed(parameter, within, depth, depths, relative)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One event of the best set, in the order of choice: by how much the intervals shrink with it, on average."""
+
+    event: int
+    name: str
+    gain: float  # 1 - geometric mean of (width with it / width before); 1 for the first
+    half: tuple[float, ...]  # half intervals of all parameters once it is added
+
+
+def best_events(problem: Problem, values: np.ndarray, least: float, most: int | None = None) -> list[Choice]:
+    """The events that tell most together, greedily by the determinant of the information (D-optimal).
+
+    Ends before the event whose gain is below `least`, or after `most`. The parameters' bounds count as what is
+    known beforehand, so that a set that leaves a parameter open still has a volume.
+    """
+    informations = each(problem, values)
+    prior = np.eye(problem.space.dimension) * 12.0  # per range: the variance of a uniform distribution
+    matrices = [i.J.T @ i.J for i in informations]
+    volume = lambda chosen: np.linalg.slogdet(prior + sum(matrices[e] for e in chosen))[1]  # noqa: E731
+    chosen: list[int] = []
+    choices: list[Choice] = []
+    while len(chosen) < min(most or len(matrices), len(matrices)):
+        rest = [e for e in range(len(matrices)) if e not in chosen]
+        volumes = [volume([*chosen, e]) for e in rest]
+        best = rest[int(np.argmax(volumes))]
+        gain = 1 - math.exp((volume(chosen) - max(volumes)) / (2 * len(prior)))
+        if chosen and gain < least:
+            break
+        chosen.append(best)
+        half = normal_quantile() * combined([informations[e] for e in chosen]).standard_errors
+        name = problem.events[best].record.name
+        choices.append(Choice(best, name, gain if len(chosen) > 1 else 1.0, tuple(half.tolist())))
+    return choices
+
+
+def guess(problem: Problem) -> np.ndarray:
+    """Free values (d,) from a quick fit from many starts, for a plan that has nothing better."""
+    likelihood = Likelihood.of(problem)
+    defaults = np.array([p.default for p in problem.parameters if p.name in problem.space.names])
+    scatter = problem.space.from_unit(even(STARTS - 1, problem.space.dimension))
+    found = descend(likelihood.rows, likelihood.to_unit(np.concatenate((defaults[None], scatter))), tolerance=0.1)
+    best = int(found.deviance.argmin())
+    if not np.isfinite(found.deviance[best]):
+        raise UserError(
+            f"no parameter set tried can be simulated before {problem.events[0].record.name}, so that nothing can be"
+            " planned; give values by task.values=<result.json>, or narrow model.bounds"
+        )
+    return likelihood.values(found.unit[best])
