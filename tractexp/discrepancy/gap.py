@@ -1,0 +1,100 @@
+"""The gap between simulation and measurement before and after an effect is added, fitted and held out."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.discrepancy.catalogue import Catalogue
+from tractexp.discrepancy.noise import Noise
+from tractexp.discrepancy.study import Refit, Study
+from tractexp.identify.result import relative_error
+from tractexp.model.model import Model
+from tractexp.record import Event
+
+BLOCKS = 40  # of the block bootstrap
+RESAMPLES = 999
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """Calculated power of all events end to end, (2, N) [pu], and what is left against the measurement."""
+
+    calculated: np.ndarray
+    epsilon_p: float
+    epsilon_q: float
+    deviance: float
+    chi2_per_sample: float
+
+
+@dataclass(frozen=True, eq=False)
+class Gap:
+    """Before and after; `closed` is the share of the explainable gap, `gain` the least of the gain at 95 %."""
+
+    before: Curves
+    after: Curves
+    closed: float
+    gain: float
+
+
+def curves(study: Study, unit: np.ndarray, noise: Noise) -> Curves:
+    """What a fit leaves."""
+    drive = study.problem.drive
+    residual = study.residuals(unit[None])
+    white = noise.whiten(residual, drive, study.likelihood.known)[0]
+    calculated = residual[0] + drive.measured
+    measured = np.where(study.likelihood.known, drive.measured, np.nan)
+    errors = [relative_error(measured[c], calculated[c]) for c in (0, 1)]
+    deviance = float(white @ white)
+    return Curves(calculated, *errors, deviance, deviance / max(study.likelihood.samples, 1))
+
+
+def gap(study: Study, base: np.ndarray, extended: np.ndarray, noise: Noise, free: int, seed: int) -> Gap:
+    """Compare two fits on the events of `study`; `free` parameters were fitted to them in the extended model."""
+    drive, known = study.problem.drive, study.likelihood.known
+    before, after = curves(study, base, noise), curves(study, extended, noise)
+    explainable = before.deviance - (study.likelihood.samples - free)
+    closed = (before.deviance - after.deviance) / explainable if explainable > 0 else float("nan")
+    white = noise.whiten(study.residuals(np.array([base, extended])), drive, known)
+    gains = (white[0] ** 2 - white[1] ** 2).reshape(2, -1).sum(axis=0)
+    return Gap(before, after, float(closed), _least(gains, seed))
+
+
+def _least(gains: np.ndarray, seed: int) -> float:
+    """Lower 95 % bound of the sum of serially dependent gains (N,), by resampling blocks."""
+    blocks = np.array([part.sum() for part in np.array_split(gains, min(BLOCKS, len(gains)))])
+    rng = np.random.default_rng(seed)
+    sums = blocks[rng.integers(len(blocks), size=(RESAMPLES, len(blocks)))].sum(axis=1)
+    return float(np.quantile(sums, 0.05))
+
+
+def held_out(
+    model: Model, catalogue: Catalogue, events: Sequence[Event], trained: Study, fits: Sequence[Refit],
+    bounds: dict, fixed: dict,
+) -> tuple[Study, list[np.ndarray], Noise]:  # fmt: skip
+    """Carry fits over to held-out events: everything keeps its trained value but P0 and Q0 of each event.
+
+    Returns the study of those events, the coordinates of each fit there, and the noise of the last one.
+    """
+    study = Study(model, catalogue, events, bounds, fixed, int(trained.problem.step.substeps.max()))
+    units = []
+    for fit in fits:
+        unit = study.null.copy()
+        unit[: trained.problem.space.dimension] = fit.unit[: trained.problem.space.dimension]
+        units.append(_settled(study, unit, study.white()))
+    noise = study.noise(units[-1])
+    return study, [_settled(study, unit, noise) for unit in units], noise
+
+
+def _settled(study: Study, unit: np.ndarray, noise: Noise) -> np.ndarray:
+    """Fit P0 and Q0 of each event alone."""
+    from tractexp.identify.descent import descend
+
+    def rows(x: np.ndarray, lanes: np.ndarray) -> np.ndarray:
+        whole = np.tile(unit, (len(x), 1))
+        whole[:, study.before] = x
+        return study.rows(whole, noise, ())
+
+    moved = unit.copy()
+    moved[study.before] = descend(rows, unit[study.before][None]).unit[0]
+    return moved

@@ -1,0 +1,215 @@
+"""The whole investigation, from records to a verdict: none, named, tied or unexplained."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.special import ndtr
+
+from tractexp.discrepancy.catalogue import Catalogue, catalogue
+from tractexp.discrepancy.gap import Gap, gap, held_out
+from tractexp.discrepancy.recommend import Decider, deciding_event
+from tractexp.discrepancy.study import Refit, Study
+from tractexp.discrepancy.sure import ADEQUATE, ONE_SIDED, Rival, surviving
+from tractexp.discrepancy.tangent import Score
+from tractexp.discrepancy.where import Place, where
+from tractexp.discrepancy.which import Explanation, Stage, explain
+from tractexp.errors import UserError
+from tractexp.model.model import Model
+from tractexp.record import Event
+
+TESTABLE = 0.8  # power at the smallest relevant size below which an effect cannot be tested on the data
+
+
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """Everything the investigation found. `names` are the effects added, `sets` all sets not rejected."""
+
+    verdict: str  # none, named, tied, unexplained
+    reason: str
+    names: tuple[str, ...]
+    sets: list[tuple[str, ...]]
+    places: list[Place]
+    catalogue: Catalogue
+    study: Study
+    explanation: Explanation
+    rivals: list[Rival]
+    bare: Refit  # the base model alone
+    extended: Refit  # with the names added
+    train: Gap
+    validate: Gap | None
+    validation: tuple[Study, list[np.ndarray]] | None  # held-out events, coordinates of base and extended there
+    decider: Decider | None
+    alpha: float
+
+    @property
+    def first(self) -> Stage:
+        """The tests of the base model."""
+        return self.explanation.stages[0]
+
+    @property
+    def last(self) -> Stage:
+        """The tests once the chosen effects are in."""
+        return self.explanation.stages[-1]
+
+
+def check_events(train: Sequence[Event], validate: Sequence[Event]) -> None:
+    """Raise `UserError` for events that do not belong together."""
+    held = [e.record.where for e in validate]
+    for event in train:
+        if event.record.where in held:
+            raise UserError(f"{event.record.where} is both in data.train and in data.validate; hold out another event")
+    for event in (*train, *validate):
+        for channel in ("f", "U2"):
+            has, first = getattr(event.record, channel) is not None, train[0]
+            if has != (getattr(first.record, channel) is not None):
+                one, other = (event, first) if has else (first, event)
+                raise UserError(
+                    f"{one.record.where} has the channel {channel} and {other.record.where} has not: events of one"
+                    " investigation need the same channels; remove the column or add it"
+                )
+
+
+def investigate(
+    model: Model,
+    train: Sequence[Event],
+    validate: Sequence[Event],
+    bounds: Mapping[str, Sequence[float]],
+    fixed: Mapping[str, float],
+    *,
+    only: Sequence[str] = (),
+    alpha: float = 0.05,
+    seed: int = 0,
+    tell: Callable[[str], None] = lambda line: None,
+) -> Finding:
+    """Find where model and records disagree, name what is missing, add it, and measure how the gap shrinks.
+
+    `alpha` is the probability of naming anything where nothing is missing. Raises `UserError` for wrong events or
+    names.
+    """
+    check_events(train, validate)
+    found = catalogue(model.motor, model.static, model.effects, train, only)
+    tell(f"testing {len(found.candidates)} effects, {len(found.untestable)} more cannot be tested on these events")
+    study = Study(model, found, train, bounds, fixed)
+    naming = alpha - ADEQUATE if alpha > 2 * ADEQUATE else alpha / 2  # the rest is spent on the adequacy test
+    explanation = explain(study, naming, seed, tell)
+    survivors, rivals = surviving(study, explanation, seed)
+    chain = tuple(explanation.stages[-1].chain(naming))
+    return _conclude(study, explanation, survivors, rivals, chain, validate, bounds, fixed, alpha, seed, tell)
+
+
+def _conclude(
+    study: Study, explanation: Explanation, survivors: list[Rival], rivals: list[Rival], chain: tuple[str, ...],
+    validate: Sequence[Event], bounds: Mapping, fixed: Mapping, alpha: float, seed: int, tell: Callable[[str], None],
+) -> Finding:  # fmt: skip
+    noise = explanation.stages[-1].noise
+    bare = study.refit(noise, [((), explanation.stages[0].fit.unit)], chain=())[0]
+    adequate = [s for s in survivors if s.adequate]
+    carried, validation, kept = None, None, adequate
+    extended_of = lambda r: study.refit(noise, [(r.fit.names, _unchained(study, r.fit, chain))], chain=chain)[0]  # noqa: E731
+    extended = {s.fit.names: extended_of(s) for s in (adequate or survivors[:1])}
+    if validate and any(s.fit.names or chain for s in adequate):
+        tell(f"judging {len(adequate)} explanation{'s' * (len(adequate) > 1)} on the held-out events")
+        fits = [bare, *(extended[s.fit.names] for s in adequate)]
+        other, units, other_noise = held_out(study.model, study.catalogue, validate, study, fits, bounds, fixed)
+        gaps = {s.fit.names: gap(other, units[0], u, other_noise, 2 * len(validate), seed)
+                for s, u in zip(adequate, units[1:], strict=True)}  # fmt: skip
+        kept = [s for s in adequate if gaps[s.fit.names].gain > 0]
+        shown = (kept or adequate)[0]
+        carried = gaps[shown.fit.names]
+        validation = (other, [units[0], units[1 + adequate.index(shown)]])
+    verdict, reason = _verdict(explanation, survivors, adequate, kept, chain, alpha)
+    chosen = (kept or adequate or survivors)[0]
+    sets = [tuple(sorted((*s.fit.names, *chain))) for s in kept] if verdict in ("named", "tied") else []
+    names = sets[0] if verdict in ("named", "tied") else ()
+    after = extended[chosen.fit.names] if names else bare
+    free = len(study.base) + len(study.before) + len(study.parameters(names))
+    stage = chosen.stage or explanation.stages[-1]
+    return Finding(
+        verdict, reason, names, sets,
+        where(explanation.stages[0].projection, explanation.stages[0].null, alpha) if verdict != "none" else [],
+        study.catalogue, study, explanation, rivals, bare, after,
+        gap(study, bare.unit, after.unit, stage.noise, free, seed), carried if names else None,
+        validation if names else None,
+        deciding_event(study, kept) if verdict == "tied" else None, alpha,
+    )  # fmt: skip
+
+
+def _unchained(study: Study, fit: Refit, chain: Sequence[str]) -> np.ndarray:
+    """A fit's coordinates with the insignificant part of the measurement chain back at its null."""
+    unit = fit.unit.copy()
+    for name in study.catalogue.chain:
+        if name not in chain:
+            unit[study.parameters([name])] = study.null[study.parameters([name])]
+    return unit
+
+
+def _verdict(
+    explanation: Explanation, survivors: list[Rival], adequate: list[Rival], kept: list[Rival],
+    chain: tuple[str, ...], alpha: float,
+) -> tuple[str, str]:  # fmt: skip
+    """The verdict and the sentence behind it."""
+    base = explanation.stages[0]
+    nothing = not explanation.chosen.names and not chain
+    if nothing and base.p_unrest >= ADEQUATE:
+        return "none", f"no disagreement above the noise, at a false-alarm rate of {alpha:.0%}"
+    if not adequate:
+        return "unexplained", (
+            "the model and the records disagree, and nothing in the catalogue explains it: what is left after the best"
+            f" explanation would come about by chance with p = {survivors[0].stage.p_unrest:.2g}"
+        )
+    if not kept:
+        return "unexplained", "what fits the training events does not help on the held-out ones"
+    names = " and ".join(sorted((*kept[0].fit.names, *chain)))
+    if len(kept) == 1:
+        return "named", f"{names} explains the disagreement, and no other set of this size does"
+    return "tied", f"{len(kept)} explanations fit equally well on these events and cannot be told apart"
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What the data say of one effect: relevant, irrelevant, ruled out, or not testable, and why."""
+
+    name: str
+    status: str
+    why: str
+    score: Score | None = None
+
+
+def judge(finding: Finding) -> list[Judgement]:
+    """Every effect of the catalogue classified (Saris, Satorra and van der Veld 2009), at the chosen model."""
+    critical = finding.first.null.critical_p(finding.alpha)
+    quantile = -_normal_quantile(critical)
+    scores = {s.name: s for s in finding.last.scores}
+    made = [Judgement(name, "not testable", why) for name, why in finding.catalogue.untestable.items()]
+    for candidate in finding.catalogue.candidates:
+        score = scores.get(candidate.name)
+        if candidate.name in finding.names:
+            made.append(Judgement(candidate.name, "relevant", "added"))
+        elif score is None:
+            made.append(Judgement(candidate.name, "irrelevant", "in the fit as a nuisance, not above its noise"))
+        else:
+            made.append(_judged(candidate, score, critical, quantile))
+    return sorted(made, key=lambda j: j.name)
+
+
+def _judged(candidate: Any, score: Score, critical: float, quantile: float) -> Judgement:
+    main = candidate.sizes[0]
+    size, deviation = score.size[main.name], score.deviation[main.name]
+    limit = abs(size) + ONE_SIDED * deviation
+    below = f"{main.name} within {limit:.2g} {main.unit} of its null"
+    if score.p < critical:
+        return Judgement(candidate.name, "relevant", f"its score stands out (p = {score.p:.2g})", score)
+    if ndtr(candidate.relevant(main) / max(deviation, 1e-300) - quantile) < TESTABLE:
+        why = f"a size of {candidate.relevant(main):g} {main.unit} would stay in the noise on these events ({below})"
+        return Judgement(candidate.name, "not testable", why, score)
+    if limit < candidate.relevant(main):
+        return Judgement(candidate.name, "ruled out", below, score)
+    return Judgement(candidate.name, "irrelevant", below, score)
+
+
+def _normal_quantile(p: float) -> float:
+    from scipy.special import ndtri
+
+    return float(ndtri(p))

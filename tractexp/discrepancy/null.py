@@ -1,0 +1,91 @@
+"""What chance alone does to the tests: the fit's own noise drawn again and put through the same projection.
+
+Thresholds hold for the largest of all candidates at once, for the noise as it was estimated, and, where the quiet
+samples are few, for the error of that estimate too: each draw then estimates its noise anew.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.discrepancy.noise import Noise
+from tractexp.discrepancy.tangent import Projection, Tangent, re_estimated, rich_residuals, windows
+
+DRAWS = 199
+FEW = 1500  # quiet samples below which the noise estimate is itself uncertain
+SMALLEST_P = 1e-300
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """A stretch of one channel of one event, as samples of the drive and as times of the record."""
+
+    event: int
+    channel: str
+    part: slice
+    start: float  # s
+    end: float
+
+
+@dataclass(frozen=True, eq=False)
+class Null:
+    """Draws of each statistic under the null, (b,), and of the energy in each cell, (b, cells)."""
+
+    least_p: np.ndarray  # over all candidates and the measurement chain
+    unrest: np.ndarray
+    energy: np.ndarray
+
+    def critical_p(self, alpha: float) -> float:
+        """The p a single candidate must undercut so that chance names any with probability `alpha`."""
+        return float(np.quantile(self.least_p, alpha, method="lower"))
+
+    def p_unrest(self, value: float) -> float:
+        """How often chance leaves as much unrest."""
+        return float((1 + np.count_nonzero(self.unrest >= value)) / (1 + len(self.unrest)))
+
+
+def null_of(t: Tangent, noise: Noise, seed: int, draws: int = DRAWS) -> Null:
+    """Draw the null of every statistic at a fit."""
+    study, drive = t.study, t.study.problem.drive
+    rng = np.random.default_rng(seed)
+    lengths = np.diff(drive.first)
+    made = np.array([np.concatenate([noise.draw(rng, n) for n in lengths], axis=1) for _ in range(draws)])
+    made *= study.likelihood.known
+    quiet = sum(p.stop - p.start for p in study.quiet)
+    if quiet >= FEW:
+        return _collect([t.whitened(noise, made)], study)
+    rest = rich_residuals(t, made)
+    return _collect([t.whitened(re_estimated(t, rest[b]), made[b : b + 1]) for b in range(draws)], study)
+
+
+def _collect(projections: list[Projection], study) -> Null:
+    everything, unrest, energy = [], [], []
+    for projection in projections:
+        _, p = projection.drops()
+        least = p.min(axis=0, initial=1.0)
+        chain = np.array(list(projection.chain_p().values())).reshape(-1, len(least))
+        everything.append(np.minimum(least, chain.min(axis=0, initial=1.0)))
+        unrest.append(projection.unrest())
+        energy.append(energies(projection, study))
+    return Null(np.maximum(np.concatenate(everything), SMALLEST_P), np.concatenate(unrest), np.concatenate(energy))
+
+
+def cells_of(study) -> list[Cell]:
+    """Every window of every event, for P and for Q."""
+    made = []
+    for e, event in enumerate(study.events):
+        first, step, origin = int(study.problem.drive.first[e]), event.record.step, event.record.t[0]
+        for a, b in windows(study, e):
+            i, j = round(a / step), min(round(b / step), event.record.samples)
+            if j - i < 2:
+                continue
+            part = slice(first + i, first + j)
+            made += [Cell(e, c, part, origin + i * step, origin + (j - 1) * step) for c in "PQ"]
+    return made
+
+
+def energies(projection: Projection, study) -> np.ndarray:
+    """Whitened, projected energy of each residual in each cell, (b, cells)."""
+    N = study.problem.drive.samples
+    square = projection.r[:, : 2 * N].reshape(len(projection.r), 2, N) ** 2
+    return np.stack([square[:, "PQ".index(c.channel), c.part].sum(axis=1) for c in cells_of(study)], axis=1)

@@ -1,0 +1,62 @@
+"""How sure: the set of names that the data do not reject, and whether any of them is an adequate explanation.
+
+A rival is rejected when, were it the truth, the chosen set would not fit as well as it does (a test of separate
+hypotheses, Cox 1961): with lambda the squared distance between the two fitted curves in standard deviations, the
+rival's advantage would be normal with mean lambda and variance 4 lambda. Adequacy is the injection test at each
+survivor: what is named must leave nothing that a push into some balance still explains.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.discrepancy.noise import Noise
+from tractexp.discrepancy.study import Refit, Study
+from tractexp.discrepancy.which import Explanation, Stage, stage
+
+ONE_SIDED = 1.6449  # standard deviations: 5 %
+ADEQUATE = 0.01  # probability of rejecting an adequate explanation
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """A set of names of the chosen size: how far behind, how far apart, and whether the data reject it."""
+
+    fit: Refit
+    behind: float  # of the deviance
+    distance: float  # lambda, squared standard deviations
+    rejected: bool
+    stage: Stage | None = None  # the tests at its fit, where they were made
+
+    @property
+    def adequate(self) -> bool:
+        """Whether nothing is left that a push into some balance explains."""
+        return self.stage is not None and self.stage.p_unrest >= ADEQUATE
+
+
+def rivals(study: Study, explanation: Explanation) -> tuple[list[Rival], Noise]:
+    """Every refitted set of the chosen size under the noise of the final stage, the best first."""
+    last = explanation.stages[-1]
+    size = len(last.fit.names)
+    wanted = [(f.names, f.unit) for f in explanation.refits.values() if len(f.names) == size]
+    fits = study.refit(last.noise, wanted)
+    chain = study.parameters(study.catalogue.chain)
+    rows = study.rows(np.array([f.unit for f in fits]), last.noise, chain)
+    distance = ((rows - rows[0]) ** 2).sum(axis=1)
+    found = []
+    for fit, apart in zip(fits, distance, strict=True):
+        behind = fit.deviance - fits[0].deviance
+        far = max(float(apart) - 2.0, 0.0)  # the fits' own noise moves the curves apart too
+        rejected = behind > ONE_SIDED * 2 * np.sqrt(far) - far
+        found.append(Rival(fit, behind, float(apart), bool(rejected and fit is not fits[0])))
+    return found, last.noise
+
+
+def surviving(study: Study, explanation: Explanation, seed: int, most: int = 6) -> tuple[list[Rival], list[Rival]]:
+    """(survivors with their adequacy tested, all rivals)."""
+    everyone, noise = rivals(study, explanation)
+    tested = []
+    for k, rival in enumerate([r for r in everyone if not r.rejected][:most]):
+        at = explanation.stages[-1] if k == 0 else stage(study, rival.fit, noise, seed + 100 + k)
+        tested.append(Rival(rival.fit, rival.behind, rival.distance, False, at))
+    return tested, everyone

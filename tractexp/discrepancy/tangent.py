@@ -1,0 +1,262 @@
+"""The linearised problem around a fit: what each candidate would change, with all nuisances projected out.
+
+Notation of the score test with nuisances (Rao 1948; Neyman 1959): r whitened residuals, N nuisance columns with
+their prior, M = I - N (N'N)^-1 N', s = M W dy/deta of a candidate. Adding the candidate lowers the deviance by
+(s'r)^2/s's; the one-step estimate of its size is -s'r/s's with standard deviation 1/|s|.
+"""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chdtrc
+
+from tractexp.discrepancy.catalogue import Candidate
+from tractexp.discrepancy.injection import PUSHES
+from tractexp.discrepancy.noise import Noise, estimate
+from tractexp.discrepancy.study import Refit, Study
+
+REACH = 0.5  # smallest relevant sizes: the step of a candidate's difference quotient
+NUISANCE_STEP = 1e-4  # of a coordinate's range
+WINDOWS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)  # s after the end of the dip
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """A candidate with one setting of its scanned parameters: differences (k, 2, N) per unit of each size."""
+
+    candidate: Candidate
+    setting: dict[str, float]
+    raw: np.ndarray
+
+
+@dataclass(frozen=True)
+class Score:
+    """What the score test says of one candidate, at its best setting."""
+
+    name: str
+    drop: float  # of the deviance
+    p: float  # of this drop alone, not corrected for the others
+    size: dict[str, float]  # one-step estimates
+    deviation: dict[str, float]
+    setting: dict[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Tangent:
+    """Raw residuals and differences at a fit; `whitened` turns them into a `Projection` under a noise model."""
+
+    study: Study
+    residual: np.ndarray  # (2, N)
+    nuisance: np.ndarray  # (k, 2, N)
+    prior: np.ndarray  # (k, k) prior rows of the nuisances, whitened
+    estimate: np.ndarray  # (k,) the nuisances' departure from their prior mean, in its standard deviations (or 0)
+    chain: dict[str, list[int]]  # which nuisances belong to which effect of the measurement chain
+    columns: tuple[Column, ...]
+    cells: np.ndarray  # (c, 2, N) responses to injections
+    groups: np.ndarray  # (c,) which balance an injection pushes
+
+    def whitened(self, noise: Noise, residuals: np.ndarray | None = None) -> "Projection":
+        """Project under this noise; `residuals` (b, 2, N) replace the fit's own (for the bootstrap)."""
+        drive, known = self.study.problem.drive, self.study.likelihood.known
+        white = lambda raw: noise.whiten(raw, drive, known)  # noqa: E731
+        padded = lambda raw: np.concatenate([white(raw), np.zeros((len(raw), len(self.prior)))], axis=1)  # noqa: E731
+        N = np.concatenate([white(self.nuisance), self.prior.T], axis=1)
+        Q, R = np.linalg.qr(N.T)
+        r = padded(self.residual[None] if residuals is None else residuals)
+        if residuals is None:
+            r[0, -len(self.prior) :] = self.prior @ self.estimate if len(self.prior) else 0.0
+        blocks = [padded(c.raw) for c in self.columns]
+        return Projection(self, Q, R, _off(r, Q), r @ Q, [_off(b, Q) for b in blocks], _off(padded(self.cells), Q))
+
+
+def _off(rows: np.ndarray, Q: np.ndarray) -> np.ndarray:
+    """Rows (n, R) with their part in the span of Q (R, k) taken away."""
+    return rows - (rows @ Q) @ Q.T
+
+
+@dataclass(frozen=True, eq=False)
+class Projection:
+    """Whitened and with the nuisances projected out; `r` has one row per residual (one, or the bootstrap's)."""
+
+    tangent: Tangent
+    Q: np.ndarray
+    R: np.ndarray
+    r: np.ndarray  # (b, R)
+    along: np.ndarray  # (b, k) the residuals' part along the nuisances
+    blocks: list[np.ndarray]  # per column (k, R)
+    cells: np.ndarray  # (c, R)
+
+    def drops(self) -> tuple[np.ndarray, np.ndarray]:
+        """Drop of the deviance (columns, b) by adding each column, sizes in their allowed direction, and its p."""
+        drops, ps = [], []
+        for column, block in zip(self.tangent.columns, self.blocks, strict=True):
+            signs = np.array([column.candidate.sign(p) for p in column.candidate.sizes])
+            drop, p = _signed_drop(block, self.r, signs)
+            drops.append(drop)
+            ps.append(p)
+        shape = (len(self.blocks), len(self.r))
+        return np.array(drops).reshape(shape), np.array(ps).reshape(shape)
+
+    def scores(self) -> list[Score]:
+        """The candidates by drop, each at its best setting, for the fit's own residual."""
+        best: dict[str, Score] = {}
+        drops, ps = self.drops()
+        for k, (column, block) in enumerate(zip(self.tangent.columns, self.blocks, strict=True)):
+            name = column.candidate.name
+            if name in best and best[name].drop >= drops[k, 0]:
+                continue
+            gram = block @ block.T
+            inverse = np.linalg.pinv(gram, rcond=1e-10, hermitian=True)
+            size = -inverse @ (block @ self.r[0])
+            labels = [p.name for p in column.candidate.sizes]
+            spread = np.sqrt(np.maximum(np.diag(inverse), 0.0))
+            spread = np.where(np.diag(gram) > 0, spread, np.inf)
+            best[name] = Score(
+                name, float(drops[k, 0]), float(ps[k, 0]), dict(zip(labels, size.tolist(), strict=True)),
+                dict(zip(labels, spread.tolist(), strict=True)), column.setting,
+            )  # fmt: skip
+        return sorted(best.values(), key=lambda s: (s.p, -s.drop))
+
+    def chain_p(self) -> dict[str, np.ndarray]:
+        """p of each measurement-chain effect, (b,): its estimate over its standard deviation, prior included."""
+        result = {}
+        inverse = np.linalg.pinv(self.R, rcond=1e-12)  # N'N = R'R
+        estimate = -self.along @ inverse.T  # departures of the nuisances, (b, k)
+        covariance = inverse @ inverse.T
+        for name, members in self.tangent.chain.items():
+            whole = estimate[:, members] + self.tangent.estimate[members] * (len(self.r) == 1)
+            inner = np.linalg.pinv(covariance[np.ix_(members, members)], rcond=1e-12, hermitian=True)
+            result[name] = chdtrc(len(members), np.einsum("bi,ij,bj->b", whole, inner, whole))
+        return result
+
+    def unrest(self) -> np.ndarray:
+        """How much injections of all balances and windows still find, (b,): the structured test of adequacy."""
+        power = np.einsum("cr,cr->c", self.cells, self.cells)
+        kept = power > 1e-8 * power.max(initial=1e-300)
+        z = (self.r @ self.cells[kept].T) ** 2
+        groups = self.tangent.groups[kept]
+        scale = np.array([power[kept][groups == g].mean() for g in groups])
+        return (z / scale).sum(axis=1)
+
+
+def _signed_drop(block: np.ndarray, r: np.ndarray, signs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Drop (b,) of |r|^2 by a least-squares multiple of the rows of `block` that keeps the signs, and its p.
+
+    A size on its bound loses half of its chi-square: p is that of a chi-bar-square (Self and Liang 1987).
+    """
+    gram = block @ block.T
+    top = np.diag(gram).max(initial=0.0)
+    if not top > 1e-12:
+        return np.zeros(len(r)), np.ones(len(r))
+    side = r @ block.T  # (b, k)
+    inverse = np.linalg.pinv(gram, rcond=1e-10, hermitian=True)
+    size = -side @ inverse
+    drop = np.einsum("bi,ij,bj->b", side, inverse, side)
+    if len(signs) == 1:
+        if signs[0]:
+            drop = np.where(size[:, 0] * signs[0] > 0, drop, 0.0)
+            return drop, np.where(drop > 0, 0.5 * chdtrc(1, drop), 1.0)
+        return drop, chdtrc(1, drop)
+    wrong = ((size * signs) < 0).any(axis=1)
+    if wrong.any():
+        single = np.where((-side * signs >= 0) | (signs == 0), side**2 / np.maximum(np.diag(gram), 1e-300), 0.0)
+        drop = np.where(wrong, single.max(axis=1), drop)
+    return drop, chdtrc(len(signs), drop)
+
+
+def tangent(study: Study, fit: Refit) -> Tangent:
+    """Differences of everything at a fit, in one batch. What is in the fit, and the chain, are nuisances."""
+    inside = [*study.base, *study.before, *study.parameters(fit.names)]
+    chain = {name: study.sizes([name]) for name in study.catalogue.chain}
+    nuisances = [*inside, *(k for members in chain.values() for k in members)]
+    up, down = _two_sided(fit.unit, nuisances)
+    points, spans, labels = _candidate_points(study, fit)
+    injected, groups = _injections(study, fit)
+    batch = np.concatenate([fit.unit[None], up, down, points, injected])
+    raw = study.residuals(batch)
+    k, m = len(nuisances), len(points)
+    base = raw[0]
+    up_rows, down_rows = raw[1 : 1 + k], raw[1 + k : 1 + 2 * k]
+    width = np.array([u[c] - d[c] for u, d, c in zip(up, down, nuisances, strict=True)])
+    nuisance = np.nan_to_num((up_rows - down_rows) / width[:, None, None])
+    moved = np.nan_to_num((raw[1 + 2 * k : 1 + 2 * k + m] - base) / spans[:, None, None])
+    cells = np.nan_to_num(raw[1 + 2 * k + m :] - base)
+    columns = [Column(c, s, moved[a:b]) for c, s, a, b in labels]
+    members = {name: [nuisances.index(c) for c in cols] for name, cols in chain.items()}
+    rows = sorted(i for group in members.values() for i in group)
+    prior = np.zeros((len(rows), k))
+    departure = np.zeros(k)
+    for row, i in enumerate(rows):
+        prior[row, i] = 1 / study.prior_deviation(nuisances[i])
+        departure[i] = fit.unit[nuisances[i]] - study.null[nuisances[i]]
+    return Tangent(study, base, nuisance, prior, departure, members, tuple(columns), cells, groups)
+
+
+def _two_sided(unit: np.ndarray, columns: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+    up, down = (np.tile(unit, (len(columns), 1)) for _ in "ud")
+    for row, k in enumerate(columns):
+        up[row, k] = min(unit[k] + NUISANCE_STEP, 1.0)
+        down[row, k] = max(unit[k] - NUISANCE_STEP, 0.0)
+    return up, down
+
+
+def _candidate_points(study: Study, fit: Refit) -> tuple[np.ndarray, np.ndarray, list]:
+    """One point per size and setting of each candidate outside the fit, and how far it steps [unit of the size]."""
+    points, spans, labels = [], [], []
+    for candidate in study.catalogue.candidates:
+        if candidate.measurement or candidate.name in fit.names:
+            continue
+        for setting in candidate.settings:
+            first = len(points)
+            for p in candidate.sizes:
+                step = REACH * candidate.relevant(p) * (candidate.sign(p) or 1)
+                point = fit.unit.copy()
+                for name, value in setting.items():
+                    point[study.column[name]] = study.to_unit(name, value)
+                point[study.column[p.name]] = study.to_unit(p.name, p.null + step)
+                points.append(point)
+                spans.append(step)
+            labels.append((candidate, setting, first, len(points)))
+    return np.array(points).reshape(-1, study.dimension), np.array(spans), labels
+
+
+def windows(study: Study, event: int) -> list[tuple[float, float]]:
+    """The windows [s since the first sample] of one event: before, both halves of the dip, then ever longer ones."""
+    e = study.events[event]
+    start, end = e.t_start - e.record.t[0], e.t_end - e.record.t[0]
+    last = e.record.t[-1] - e.record.t[0]
+    edges = [0.0, start, (start + end) / 2, *(end + w for w in WINDOWS if end + w < last), last]
+    return [(a, b) for a, b in itertools.pairwise(edges) if b > a]
+
+
+def _injections(study: Study, fit: Refit) -> tuple[np.ndarray, np.ndarray]:
+    """Pushes into each balance in each window of the union of the events' windows."""
+    spans = sorted({w for e in range(len(study.events)) for w in windows(study, e)})
+    points, groups = [], []
+    for g, push in enumerate(PUSHES):
+        for a, b in spans:
+            point = fit.unit.copy()
+            point[study.column[push]] += 1e-3 / study.width(push)
+            point[study.column["window_on"]] = study.to_unit("window_on", a)
+            point[study.column["window_off"]] = study.to_unit("window_off", b)
+            points.append(point)
+            groups.append(g)
+    return np.array(points), np.array(groups)
+
+
+def rich_residuals(t: Tangent, residuals: np.ndarray) -> np.ndarray:
+    """Residuals (b, 2, N) with everything any column explains taken away, unweighted: what noise is estimated from."""
+    basis = np.concatenate([t.nuisance, *(c.raw for c in t.columns)]).reshape(-1, residuals[0].size)
+    scale = np.linalg.norm(basis, axis=1)
+    basis = basis[scale > 0] / scale[scale > 0, None]
+    _left, values, right = np.linalg.svd(basis, full_matrices=False)
+    right = right[values > 1e-6 * values[0]]
+    flat = residuals.reshape(len(residuals), -1)
+    return (flat - (flat @ right.T) @ right).reshape(residuals.shape)
+
+
+def re_estimated(t: Tangent, residual: np.ndarray) -> Noise:
+    """Noise estimated anew from one residual (2, N)."""
+    return estimate(residual, t.study.likelihood.known, t.study.quiet)

@@ -1,0 +1,176 @@
+"""Which effects: candidates scored, the best refitted, and one more added as long as chance cannot explain the gain.
+
+Subsets are ranked exhaustively on the linearised problem, because forward selection alone stalls where effects
+look alike; the shortlist is refitted nonlinearly from several starts, side by side.
+"""
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.discrepancy.noise import Noise
+from tractexp.discrepancy.null import Null, null_of
+from tractexp.discrepancy.study import Refit, Study
+from tractexp.discrepancy.tangent import (
+    Column,
+    Projection,
+    Score,
+    Tangent,
+    re_estimated,
+    rich_residuals,
+    tangent,
+)
+
+MOST_EFFECTS = 3
+SHORTLIST = 8  # sets of one size that are refitted
+NESTED = 0.1  # a set may be worse than its own subset by no more than this, or the refit did not converge
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """The tests at one fit."""
+
+    fit: Refit
+    noise: Noise
+    tangent: Tangent
+    projection: Projection
+    null: Null
+    scores: list[Score]
+
+    @property
+    def p_unrest(self) -> float:
+        return self.null.p_unrest(float(self.projection.unrest()[0]))
+
+    def significant(self, alpha: float) -> bool:
+        """Whether any further effect of the load helps more than chance does."""
+        return bool(self.scores) and self.scores[0].p < self.null.critical_p(alpha)
+
+    def chain(self, alpha: float) -> list[str]:
+        """The measurement-chain effects that are not at their null."""
+        critical = self.null.critical_p(alpha)
+        return sorted(name for name, p in self.projection.chain_p().items() if p[0] < critical)
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """The chosen set of load effects, the tests at each step, and every set that was refitted."""
+
+    stages: list[Stage]  # before the first effect, after the first, ...
+    refits: dict[tuple[str, ...], Refit]
+
+    @property
+    def chosen(self) -> Refit:
+        return self.stages[-1].fit
+
+
+def stage(study: Study, fit: Refit, noise: Noise, seed: int) -> Stage:
+    """All tests at one fit, under the noise of what no candidate explains there."""
+    t = tangent(study, fit)
+    noise = re_estimated(t, rich_residuals(t, t.residual[None])[0])
+    fit = study.refit(noise, [(fit.names, fit.unit)])[0]
+    t = tangent(study, fit)
+    projection = t.whitened(noise)
+    return Stage(fit, noise, t, projection, null_of(t, noise, seed), projection.scores())
+
+
+def explain(study: Study, alpha: float, seed: int, tell: Callable[[str], None] = lambda line: None) -> Explanation:
+    """Add effects one by one as long as the best one helps more than chance, searching all sets of each size."""
+    fit, noise = study.base_fit()
+    stages = [stage(study, fit, noise, seed)]
+    refits = {(): fit}
+    while stages[-1].significant(alpha) and len(stages[-1].fit.names) < MOST_EFFECTS:
+        size = len(stages[-1].fit.names) + 1
+        wanted = shortlist(stages, size, study)
+        tell(f"refitting {len(wanted)} {'effect' if size == 1 else f'sets of {size}'}{'s' * (size == 1)}")
+        noise = stages[-1].noise
+        fits = study.refit(noise, [s for names in wanted for s in starts(study, stages, refits, names)])
+        refits |= {f.names: f for f in fits}
+        fits = nested(study, noise, refits, fits)
+        refits |= {f.names: f for f in fits}
+        best = min(fits, key=lambda f: (f.deviance, f.names))
+        stages.append(stage(study, best, noise, seed + size))
+    return Explanation(stages, refits)
+
+
+def shortlist(stages: Sequence[Stage], size: int, study: Study) -> list[tuple[str, ...]]:
+    """The sets of `size` effects that lower the linearised deviance most: from the base fit, and by adding one."""
+    sets: dict[tuple[str, ...], float] = {}
+    last = stages[-1]
+    for score in last.scores[:SHORTLIST]:
+        key = tuple(sorted((*last.fit.names, score.name)))
+        sets[key] = last.fit.deviance - score.drop
+    if size > 1:
+        base = stages[0]
+        names = [s.name for s in base.scores if s.drop > 0][:14]
+        columns = {s.name: _column(base, s) for s in base.scores}
+        for subset in itertools.combinations(sorted(names), size):
+            block = np.concatenate([columns[n] for n in subset])
+            side = block @ base.projection.r[0]
+            drop = side @ np.linalg.pinv(block @ block.T, rcond=1e-9, hermitian=True) @ side
+            value = base.fit.deviance - float(drop)
+            sets[subset] = min(sets.get(subset, np.inf), value)
+    return sorted(sets, key=lambda s: (sets[s], s))[: SHORTLIST if size == 1 else 2 * SHORTLIST]
+
+
+def _column(base: Stage, score: Score) -> np.ndarray:
+    """The projected column of a candidate at its best setting."""
+    pairs = zip(base.tangent.columns, base.projection.blocks, strict=True)
+    return next(b for c, b in pairs if c.candidate.name == score.name and c.setting == score.setting)
+
+
+def starts(
+    study: Study, stages: Sequence[Stage], refits: dict[tuple[str, ...], Refit], names: tuple[str, ...]
+) -> list[tuple[tuple[str, ...], np.ndarray]]:
+    """Starts for one set: each subset's fit with the others at their one-step size, at their best two settings."""
+    made = []
+    for left in names:
+        rest = tuple(n for n in names if n != left)
+        from_fit = refits.get(rest, stages[0].fit)
+        at = next((s for s in reversed(stages) if s.fit.names == rest), stages[0])
+        missing = [n for n in names if n not in from_fit.names]
+        for rank in range(2):
+            point = from_fit.unit.copy()
+            for name in missing:
+                _place(study, at if name in {s.name for s in at.scores} else stages[0], name, rank, point)
+            made.append((names, point))
+    return made
+
+
+def _place(study: Study, at: Stage, name: str, rank: int, point: np.ndarray) -> None:
+    """Put a candidate at its one-step size, with its `rank`-th best setting, into coordinates (D,)."""
+    column, sizes = ranked_settings(at, name)[min(rank, len(ranked_settings(at, name)) - 1)]
+    for label, value in column.setting.items():
+        point[study.column[label]] = study.to_unit(label, value)
+    for p, size in zip(column.candidate.sizes, sizes, strict=True):
+        least = column.candidate.relevant(p) * 0.1
+        sign = column.candidate.sign(p)
+        moved = max(size * sign, least) * sign if sign else size
+        low, high = p.bounds
+        point[study.column[p.name]] = study.to_unit(p.name, float(np.clip(p.null + moved, low, high)))
+
+
+def ranked_settings(at: Stage, name: str) -> list[tuple[Column, np.ndarray]]:
+    """A candidate's settings by how much they lower the deviance, each with its one-step sizes."""
+    drops, _ = at.projection.drops()
+    rows = []
+    for k, (column, block) in enumerate(zip(at.tangent.columns, at.projection.blocks, strict=True)):
+        if column.candidate.name == name:
+            size = -np.linalg.pinv(block @ block.T, rcond=1e-10, hermitian=True) @ (block @ at.projection.r[0])
+            rows.append((float(drops[k, 0]), column, size))
+    return [(c, s) for _, c, s in sorted(rows, key=lambda row: -row[0])]
+
+
+def nested(study: Study, noise: Noise, refits: dict[tuple[str, ...], Refit], fits: list[Refit]) -> list[Refit]:
+    """Refit from its best subset any set that came out worse than that subset: its search had not converged."""
+    again = []
+    for fit in fits:
+        subsets = [refits[s] for s in refits if set(s) < set(fit.names)]
+        best = min(subsets, key=lambda r: r.deviance, default=None)
+        if best is not None and fit.deviance > best.deviance + NESTED:
+            again.append((fit.names, best.unit))
+    if not again:
+        return fits
+    redone = {f.names: f for f in study.refit(noise, again)}
+    return [min(f, redone.get(f.names, f), key=lambda r: r.deviance) for f in fits]

@@ -1,0 +1,176 @@
+"""The page of an investigation: noise, disagreement, where, which, how sure, added, smaller, in that order."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tractexp.discrepancy.contract import parameters, recommendation
+from tractexp.discrepancy.investigate import Finding, judge
+from tractexp.report import style
+from tractexp.report.page import Page
+
+KIND = {"none": "good", "named": "good", "tied": "plain", "unexplained": "bad"}
+
+
+def report(folder: Path, finding: Finding, title: str) -> list[Path]:
+    """Write residuals.svg, gap.svg and discrepancy.html into `folder`; returns their paths."""
+    figures = [residuals(folder / "residuals.svg", finding), smaller(folder / "gap.svg", finding, held=False)]
+    if finding.validation is not None:
+        figures.append(smaller(folder / "gap_held_out.svg", finding, held=True))
+    return [*figures, page(folder / "discrepancy.html", finding, figures, title)]
+
+
+def page(path: Path, finding: Finding, figures: list[Path], title: str) -> Path:
+    """Tell the investigation to a reader who was not there."""
+    names = " and ".join(finding.names)
+    made = Page(f"Missing effect: {title}", f"{finding.study.model.title}, {len(finding.study.events)} events fitted")
+    made.verdict(f"{finding.verdict.upper()} {names}".strip(), finding.reason, kind=KIND[finding.verdict])
+    made.heading("1 Noise").text(
+        f"{finding.last.noise.describe()}. It is estimated where nothing happens, from what the fit leaves there, and"
+        " so contains the voltage's noise too. Time skew, measurement window and load drift are free in every fit, each"
+        " held by what is physically likely."
+    )
+    made.heading("2 Is there a disagreement?").text(_gate(finding))
+    made.heading("3 Where")
+    if finding.places:
+        rows = [[p.event, p.channel, f"{p.start:.3f}", f"{p.end:.3f}", f"{p.share:.0%}"] for p in finding.places]
+        made.table(["event", "channel", "from [s]", "to [s]", "share of the excess"], rows)
+    else:
+        made.text("No interval holds more energy than chance leaves there.")
+    made.figure(figures[0], "What the base model leaves; shaded: more than chance, at a family-wise error of "
+                            f"{finding.alpha:.0%}.")  # fmt: skip
+    _which(made, finding)
+    _sure(made, finding)
+    _added(made, finding)
+    made.heading("7 Smaller")
+    made.table(["events", "", "epsilon_p", "epsilon_q", "chi2 per sample", "gap closed"], _gap_rows(finding))
+    for figure in figures[1:]:
+        made.figure(figure, "Before and after, measured less calculated.")
+    made.heading("Next").text(recommendation(finding))
+    return made.write(path)
+
+
+def _gate(finding: Finding) -> str:
+    first = finding.first
+    best = first.scores[0] if first.scores else None
+    critical = first.null.critical_p(finding.alpha)
+    text = f"The structured test of the base fit gives p = {first.p_unrest:.2g}."
+    if best is None:
+        return text
+    return (
+        f"The most helpful single effect, {best.name}, lowers the deviance by {best.drop:.1f} (p = {best.p:.2g}; chance"
+        f" gives less than {critical:.2g} to the best of all candidates in {finding.alpha:.0%} of cases). {text}"
+    )
+
+
+def _which(made: Page, finding: Finding) -> None:
+    made.heading("4 Which")
+    rows = []
+    for j in judge(finding):
+        size = ""
+        if j.score is not None:
+            size = ", ".join(f"{n} {v:.3g} ± {j.score.deviation[n]:.2g}" for n, v in j.score.size.items())
+        rows.append([j.name, j.status, "" if j.score is None else f"{j.score.drop:.1f}", size, j.why])
+    made.table(
+        ["effect", "verdict", "drop of deviance", "one-step size", "why"], rows,
+        "Scores at the chosen model, all nuisances projected out.", words=(1, 3, 4),
+    )  # fmt: skip
+
+
+def _sure(made: Page, finding: Finding) -> None:
+    made.heading("5 How sure")
+    rows = [
+        [" and ".join(r.fit.names) or "the base model", f"{r.fit.deviance:.1f}", f"{r.behind:.1f}", f"{r.distance:.1f}",
+         "rejected" if r.rejected else "adequate" if r.adequate else "not adequate",
+         "" if r.stage is None else f"{r.stage.p_unrest:.2g}"]
+        for r in finding.rivals[:12]
+    ]  # fmt: skip
+    made.table(
+        ["set", "deviance", "behind", "distance of the curves", "verdict", "p of adequacy"], rows,
+        "Every set of this size that was refitted. A set is rejected when, were it true, the best would not fit so"
+        " well.", words=(4,),
+    )  # fmt: skip
+    if len(finding.sets) > 1:
+        made.text("These cannot be told apart on these events: " + "; ".join(" and ".join(s) for s in finding.sets))
+
+
+def _added(made: Page, finding: Finding) -> None:
+    made.heading("6 Added")
+    if not finding.names:
+        made.text("Nothing was added.")
+        return
+    from tractexp.model.model import compose
+
+    base = finding.study.model
+    effects = [finding.catalogue[n].effect for n in finding.names]
+    before, after = base.latex(), compose(base.motor, base.static, [*base.effects, *effects]).latex()
+    made.text("Equations that changed or came in:")
+    old = {line.split("=")[0]: line for line in before}
+    for line in after:
+        if line not in before and "|_0" not in line:
+            was = old.get(line.split("=")[0])
+            if was is not None:
+                made.text("before").equation(was).text("after")
+            made.equation(line)
+    with made.folded("All equations of the extended model"):
+        for line in after:
+            made.equation(line)
+    rows = [[n, f"{v['value']:.5g}", f"{v['standard_error']:.2g}"] for n, v in parameters(finding).items()]
+    made.table(["parameter", "value", "standard error"], rows)
+
+
+def _gap_rows(finding: Finding) -> list[list[str]]:
+    rows = []
+    for label, gap in (("fitted", finding.train), ("held out", finding.validate)):
+        if gap is None:
+            continue
+        for stage, c in (("before", gap.before), ("after", gap.after)):
+            closed = f"{gap.closed:.0%}" if stage == "after" and np.isfinite(gap.closed) else ""
+            rows.append([label, stage, f"{c.epsilon_p:.3%}", f"{c.epsilon_q:.3%}", f"{c.chi2_per_sample:.3f}", closed])
+    return rows
+
+
+def residuals(path: Path, finding: Finding) -> Path:
+    """The base model's residuals of every event, with the intervals that stand out shaded."""
+    study, calculated = finding.study, finding.train.before.calculated
+    return _panels(path, study, [("base model", calculated, None)], finding.places)
+
+
+def smaller(path: Path, finding: Finding, held: bool) -> Path:
+    """Residuals before and after, on the fitted or the held-out events."""
+    study = finding.validation[0] if held else finding.study
+    gap = finding.validate if held else finding.train
+    pairs = [("before", gap.before.calculated, style.MEASURED), ("after", gap.after.calculated, None)]
+    return _panels(path, study, pairs if finding.names else pairs[:1], ())
+
+
+def _panels(path: Path, study: Any, curves: list[tuple[str, np.ndarray, str | None]], places: Any) -> Path:
+    """One column per event (at most four), P above Q."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    events = study.events[:4]
+    with rc_context(style.SETTINGS):
+        figure = Figure(figsize=(max(4.2, 2.9 * len(events)) + 1, 4.4))
+        panels = figure.subplots(2, len(events), sharex="col", sharey="row", squeeze=False)
+        for e, event in enumerate(events):
+            part = study.problem.drive.part(e)
+            for c, (name, color) in enumerate((("P", style.ACTIVE), ("Q", style.REACTIVE))):
+                panel, measured = panels[c, e], getattr(event.record, name)
+                for place in places:
+                    if (place.event, place.channel) == (event.record.name, name):
+                        panel.axvspan(place.start, place.end, color="#F2C14E", alpha=0.35, linewidth=0)
+                for label, made, chosen in curves:
+                    x, y = style.thin(event.record.t, measured - made[c, part])
+                    panel.plot(x, y, color=chosen or color, linewidth=0.8, label=f"{name} {label}")
+                panel.axhline(0.0, color=style.FAINT, linewidth=0.6, zorder=0.5)
+                if e == 0:
+                    panel.set_ylabel(f"residual of {name} [pu]")
+                    panel.legend(loc="best")
+            panels[0, e].set_title(event.record.name)
+            panels[1, e].set_xlabel("t [s]")
+        figure.subplots_adjust(
+            left=0.8 / figure.get_figwidth(), right=0.985, bottom=0.11, top=0.93, hspace=0.1, wspace=0.08
+        )
+        return style.save(figure, path)
