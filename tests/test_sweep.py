@@ -13,7 +13,7 @@ import time
 import pytest
 
 QUICK = ("optimizer.population=20", "budget=200")
-SILENT = (*QUICK, "tracking.enabled=false")
+SILENT = ("budget=200", "tracking.enabled=false")
 HERE = "hydra.sweep.dir=sweep"
 
 needs_dask = pytest.mark.skipif(
@@ -70,10 +70,11 @@ def site(tmp_path_factory):
     return site
 
 
-def tractexp(*arguments, cwd, **environment):
-    """Run `python -m tractexp` in a folder."""
+def tractexp(*arguments, cwd, site=None):
+    """Run `python -m tractexp` in a folder, with the package in `site` installed too."""
     command = [sys.executable, "-m", "tractexp", *arguments]
-    env = os.environ | {"COLUMNS": "200"} | environment
+    paths = [str(site)] * (site is not None) + [p for p in (os.environ.get("PYTHONPATH"),) if p]
+    env = os.environ | {"COLUMNS": "200", "PYTHONPATH": os.pathsep.join(paths)}
     return subprocess.run(command, cwd=cwd, capture_output=True, text=True, env=env)
 
 
@@ -155,7 +156,7 @@ def test_the_same_command_again_runs_nothing_and_more_seeds_run_only_those(logge
     assert len(ask(folder, "select run_uuid from runs")) == 5
 
     shutil.copytree(sweep, tmp_path / "sweep")
-    done = tractexp("-m", *SILENT, "optimizer=ssa,pso", "seed=range(0,3)", HERE, cwd=tmp_path)
+    done = tractexp("-m", *QUICK, "tracking.enabled=false", "optimizer=ssa,pso", "seed=range(0,3)", HERE, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "4 of them are finished and kept" in done.stdout
     ends = statuses(tmp_path / "sweep")
@@ -191,8 +192,8 @@ def test_redo_runs_finished_jobs_again_under_a_new_parent(logged, tmp_path):
 
 
 def test_failing_jobs_are_isolated_listed_and_change_the_exit_code(site, tmp_path):
-    sweep = ("-m", *QUICK, "optimizer=stumbles,pso", "seed=range(0,4)", HERE)
-    done = tractexp(*sweep, cwd=tmp_path, PYTHONPATH=str(site))
+    sweep = ("-m", "budget=200", "optimizer=stumbles,pso", "seed=range(0,4)", HERE)
+    done = tractexp(*sweep, cwd=tmp_path, site=site)
     ends = statuses(tmp_path / "sweep")
     failed = {n for n, end in ends.items() if end["status"] == "failed"}
     from numpy.random import default_rng
@@ -212,7 +213,7 @@ def test_failing_jobs_are_isolated_listed_and_change_the_exit_code(site, tmp_pat
     parent = json.loads((tmp_path / "sweep" / "sweep.json").read_text())["run"]
     assert ask(tmp_path, f"select status from runs where run_uuid = '{parent}'") == [("FAILED",)]
 
-    again = tractexp(*sweep, cwd=tmp_path, PYTHONPATH=str(site))
+    again = tractexp(*sweep, cwd=tmp_path, site=site)
     assert f"{8 - len(failed)} of them are finished and kept" in again.stdout
     assert json.loads((tmp_path / "sweep" / "sweep.json").read_text())["run"] == parent
     assert len(ask(tmp_path, "select run_uuid from runs")) == 1 + 8 - len(failed)
@@ -231,9 +232,7 @@ def test_a_bad_value_fails_its_job_with_the_same_sentence_as_alone(tmp_path):
 @pytest.mark.parametrize("backend", ["loky", pytest.param("dask", marks=needs_dask)])
 def test_the_job_of_a_killed_worker_is_run_again_and_its_neighbors_are_not_blamed(backend, site, tmp_path):
     launcher = ("hydra.launcher.n_jobs=2", f"hydra.launcher.backend={backend}")
-    done = tractexp(
-        "-m", *SILENT, *launcher, "optimizer=dies,pso", "seed=range(0,3)", HERE, cwd=tmp_path, PYTHONPATH=str(site)
-    )
+    done = tractexp("-m", *SILENT, *launcher, "optimizer=dies,pso", "seed=range(0,3)", HERE, cwd=tmp_path, site=site)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "marker").exists()
     assert len(results(tmp_path / "sweep")) == 6
@@ -248,7 +247,7 @@ def test_a_job_that_kills_its_worker_every_time_is_listed_and_the_others_finish(
         "optimizer=kills,pso",
         "seed=range(0,3)",
     )
-    done = tractexp(*sweep, HERE, "optimizer.population=20", cwd=tmp_path, PYTHONPATH=str(site))
+    done = tractexp(*sweep, HERE, cwd=tmp_path, site=site)
     ends = statuses(tmp_path / "sweep")
     assert [ends[n]["status"] for n in range(6)] == ["failed"] * 3 + ["finished"] * 3
     assert "its worker was killed each of the 2 times it was run" in ends[0]["message"]
@@ -262,7 +261,15 @@ def test_results_are_the_same_bits_for_any_number_of_workers_and_backend(logged,
     if importlib.util.find_spec("distributed") is not None:
         launchers.append(("hydra/launcher=dask", "hydra.launcher.n_jobs=2"))
     for k, launcher in enumerate(launchers):
-        command = ("-m", *SILENT, *launcher, "optimizer=ssa,pso", "seed=range(0,2)", f"hydra.sweep.dir=sweep{k}")
+        command = (
+            "-m",
+            *QUICK,
+            "tracking.enabled=false",
+            *launcher,
+            "optimizer=ssa,pso",
+            "seed=range(0,2)",
+            f"hydra.sweep.dir=sweep{k}",
+        )
         done = tractexp(*command, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
         assert results(tmp_path / f"sweep{k}") == results(sweep)
@@ -273,8 +280,8 @@ def test_submitit_runs_a_sweep_isolates_a_failure_and_logs_below_the_parent(site
     launcher = ["hydra/launcher=submitit_local", "hydra.launcher.timeout_min=3"]
     if shutil.which("sinfo") and subprocess.run(["sinfo", "-h"], capture_output=True).stdout:
         launcher = ["hydra/launcher=submitit_slurm", "hydra.launcher.timeout_min=3", "hydra.launcher.cpus_per_task=1"]
-    sweep = ("-m", *QUICK, *launcher, "optimizer=stumbles", "seed=0,1,2", HERE)
-    done = tractexp(*sweep, cwd=tmp_path, PYTHONPATH=str(site))
+    sweep = ("-m", "budget=200", *launcher, "optimizer=stumbles", "seed=0,1,2", HERE)
+    done = tractexp(*sweep, cwd=tmp_path, site=site)
     from numpy.random import default_rng
 
     failed = sum(default_rng(seed).random() < 0.5 for seed in range(3))

@@ -18,6 +18,7 @@ from tractexp.sweep.progress import progress
 from tractexp.sweep.status import FAILED, RUNNING, Status
 
 BARREN = 3  # times a pool may break before any job of it has started
+IDLE = 60  # s after which a worker without work ends, as it must where the parent has been killed
 
 
 @dataclass
@@ -114,7 +115,7 @@ class Cores(Launcher):
             return
         from joblib.externals.loky import get_reusable_executor
 
-        executor = get_reusable_executor(max_workers=n_jobs, timeout=None)
+        executor = get_reusable_executor(max_workers=n_jobs, timeout=IDLE)
         try:
             yield executor
         finally:  # the jobs' ends are on disk: there is nothing to wait for

@@ -6,6 +6,7 @@ import signal
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from hydra._internal.core_plugins.basic_sweeper import BasicSweeper
@@ -21,6 +22,7 @@ from tractexp.sweep.parent import parent_run
 from tractexp.sweep.status import FAILED, FINISHED, RUNNING
 from tractexp.tasks.console import say, table
 
+INTERRUPTED = "interrupted"
 REPEAT = "repeat the command to go on with the jobs that are left"
 
 
@@ -88,10 +90,10 @@ class Grid(BasicSweeper):
             if isinstance(self.launcher, Cores):
                 self.launcher.run(jobs)
             else:
-                batch = [[*job.overrides, f"hydra.sweep.subdir={job.folder.name}"] for job in jobs]
+                batch = [[*job.overrides, *placement(job)] for job in jobs]
                 self.launcher.launch(batch, initial_job_idx=0)  # type: ignore[union-attr]
         except KeyboardInterrupt:
-            problem = "interrupted"
+            problem = INTERRUPTED
             raise KeyboardInterrupt(f"the sweep is interrupted; {REPEAT}") from None
         except UserError:
             raise
@@ -99,7 +101,8 @@ class Grid(BasicSweeper):
             problem = f"the launcher gave up: {str(error).strip().partition(chr(10))[0] or type(error).__name__}"
         finally:
             for job in jobs:
-                settle(job, problem)
+                if problem != INTERRUPTED or job.folder.exists():  # a job not begun has nothing to tell
+                    settle(job, problem)
 
 
 def place(jobs: Sequence[SweepJob], folder: Path) -> list[SweepJob]:
@@ -113,6 +116,12 @@ def place(jobs: Sequence[SweepJob], folder: Path) -> list[SweepJob]:
             known[job.configuration] = folder / str(number)
         placed.append(replace(job, folder=known[job.configuration]))
     return placed
+
+
+def placement(job: SweepJob) -> list[str]:
+    """The overrides by which any launcher of Hydra's puts a job into its folder."""
+    sweep = str(job.folder.parent).replace("\\", "\\\\").replace("'", "\\'")
+    return [f"hydra.sweep.dir='{sweep}'", f"hydra.sweep.subdir={job.folder.name}"]
 
 
 def _numbered(folder: Path) -> list[Path]:
@@ -159,15 +168,16 @@ def conclude(jobs: Sequence[SweepJob]) -> None:
     if found:
         say()
         rows = sorted((sorted(values), name) for name, values in found.items())
-        cells = [[n, str(len(v)), *(f"{x:.4e}" for x in (v[0], v[len(v) // 2], v[-1])), ""] for v, n in rows]
+        cells = [[n, str(len(v)), *(f"{x:.4e}" for x in (v[0], median(v), v[-1])), ""] for v, n in rows]
         table(["optimizer", "jobs", "best objective", "median", "worst", ""], cells)
     failed = [(job, end.message) for job, end in ends if end is not None and end.status == FAILED]
     if not failed:
         return
     common = set.intersection(*(set(job.overrides) for job in jobs)) if len(jobs) > 1 else set()
-    rows = [[job.folder.name, " ".join(o for o in job.overrides if o not in common), why] for job, why in failed]
     say()
-    table(["failed", "job", "why"], [[number, what, why] for number, what, why in rows])
+    say("failed jobs")
+    for job, why in failed:  # not in columns: they would cut the sentences
+        say(f"  {job.folder.name:>4}  {' '.join(o for o in job.overrides if o not in common)}: {why}")
     raise UserError(
         f"{len(failed)} of {len(jobs)} jobs failed, as listed; what they printed is in output.txt of their folders in "
         f"{jobs[0].folder.parent}, an unexpected error in traceback.txt; {REPEAT}"
