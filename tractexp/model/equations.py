@@ -20,12 +20,16 @@ LONG_AGO = -(10**6)  # s: the time at which a load rests before the event
 
 @dataclass
 class State:
-    """A continuous state: d(symbol)/dt = derivative, and its value in the steady state before the event."""
+    """A continuous state: d(symbol)/dt = derivative, and its value in the steady state before the event.
+
+    `balance` is what vanishes in that steady state, where it is not the derivative.
+    """
 
     symbol: Symbol
     latex: str
     derivative: sympy.Expr | None = None
     initial: sympy.Expr | None = None
+    balance: sympy.Expr | None = None
 
 
 @dataclass(frozen=True)
@@ -139,10 +143,16 @@ class Equations:
         self.latex_names[symbol] = latex
         return symbol
 
-    def moves(self, state: Symbol, derivative: sympy.Expr, initial: sympy.Expr) -> None:
-        """Give a state its time derivative and its steady state before the event."""
-        self.states[state].derivative = sympy.sympify(derivative)
-        self.states[state].initial = sympy.sympify(initial)
+    def moves(
+        self, state: Symbol, derivative: sympy.Expr, initial: sympy.Expr, balance: sympy.Expr | None = None
+    ) -> None:
+        """Give a state its time derivative and its steady state before the event.
+
+        `balance` vanishes there where the derivative does not tell it: for a state that stays where it was.
+        """
+        moved = self.states[state]
+        moved.derivative, moved.initial = sympy.sympify(derivative), sympy.sympify(initial)
+        moved.balance = None if balance is None else sympy.sympify(balance)
 
     def memory(self, name: str, latex: str) -> Symbol:
         """A discrete memory (real)."""
@@ -181,42 +191,53 @@ class Equations:
         still = {self.U_rate: sympy.Integer(0), self.t: sympy.Integer(LONG_AGO)}
         return {self.U: self.U0, self.omega_s: self.omega_s0, self.U2: self.U20} | still
 
-    def expand(self, expression: sympy.Expr) -> sympy.Expr:
-        """The expression with every named quantity replaced by what it stands for."""
+    def expand(self, expression: sympy.Expr, named: Callable[[Symbol], bool] = lambda _: True) -> sympy.Expr:
+        """The expression with the quantities that are `named` (by default all) replaced by what they stand for."""
         expression = sympy.sympify(expression)
-        while named := expression.free_symbols & self.definitions.keys():
-            expression = expression.xreplace({s: self.definitions[s] for s in named})
+        while found := {s for s in expression.free_symbols & self.definitions.keys() if named(s)}:
+            expression = expression.xreplace({s: self.definitions[s] for s in found})
         return expression
 
     def real_states(self) -> list[tuple[Symbol, sympy.Expr, sympy.Expr]]:
         """(symbol, derivative, initial) of each real state, phasors split in two, names expanded."""
         rows = []
         for state in self.states.values():
-            derivative, initial = self.expand(state.derivative), self.expand(state.initial)
-            if state.symbol.is_real:
-                rows.append((state.symbol, self.real(derivative), self.real(initial)))
-                continue
-            parts = zip(phasor_parts(state.symbol), self.parts(derivative), self.parts(initial), strict=True)
-            rows.extend(parts)
+            own = (state.symbol,) if state.symbol.is_real else phasor_parts(state.symbol)
+            rows.extend(zip(own, self.parts(state.derivative), self.parts(state.initial), strict=False))
+        return rows
+
+    def real_balances(self) -> list[sympy.Expr]:
+        """What vanishes in the steady state before the event, one for each real state."""
+        rows: list[sympy.Expr] = []
+        for state in self.states.values():
+            balance = self.parts(state.derivative if state.balance is None else state.balance)
+            rows.extend(balance[:1] if state.symbol.is_real else balance)
         return rows
 
     def parts(self, expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
-        """Real and imaginary part, with phasor symbols replaced by their real parts."""
+        """Real and imaginary part in real symbols, names expanded.
+
+        A name that stands for something real is lowered by itself and put in last: products are not expanded
+        across it, so that it stays one common subexpression.
+        """
         split: dict[Symbol, sympy.Expr] = {}
         for state in self.states:
             if not state.is_real:
                 a, b = phasor_parts(state)
                 a0, b0 = phasor_parts(start_symbol(state))
                 split |= {state: a + I * b, start_symbol(state): a0 + I * b0}
-        lowered = expression.xreplace(split)
-        if lowered.is_real:
-            return lowered, sympy.Integer(0)
-        real, imaginary = lowered.as_real_imag()
-        return _shorter(real), _shorter(imaginary)
+        lowered = self.expand(expression, lambda s: not s.is_real).xreplace(split)
+        both = (lowered, sympy.Integer(0)) if lowered.is_real else map(_shorter, lowered.as_real_imag())
+        real, imaginary = (e.xreplace({s: self.real(s) for s in self._names(e)}) for e in both)
+        return real, imaginary
+
+    def _names(self, expression: sympy.Expr) -> set[Symbol]:
+        return expression.free_symbols & self.definitions.keys()
 
     def real(self, expression: sympy.Expr) -> sympy.Expr:
         """The real part of an expression that is meant to be real."""
-        return self.parts(expression)[0]
+        named = self.definitions.get(expression)
+        return self.parts(expression if named is None else named)[0]
 
     def latex(self) -> list[str]:
         """The equations one a line: states, memories, named quantities, power, steady state."""

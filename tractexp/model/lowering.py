@@ -34,7 +34,7 @@ class Lowered:
     memories: tuple[Symbol, ...]
     starts: tuple[Symbol, ...]  # states and memories before the event
     start: Phase  # states and memories before the event, then the slack of each requirement
-    rest: Phase | None  # derivatives before the event, where the start is only a guess to be solved
+    rest: Phase | None  # what vanishes before the event, where the start is only a guess to be solved
     constants: tuple[tuple[Symbol, sympy.Expr], ...]
     derivative: Phase
     renewal: Phase
@@ -101,13 +101,13 @@ def lower(eq: Equations) -> Lowered:
 
     hoist = _Hoister(lane, set(event), set(inputs))
     derivative = _phase(hoist, [d for _, d, _ in rows])
-    renewal = _phase(hoist, [eq.real(eq.expand(m.renewal)) for m in eq.memories.values()])
-    output = _phase(hoist, [eq.real(eq.expand(eq.P)), eq.real(eq.expand(eq.Q))])
+    renewal = _phase(hoist, [eq.real(m.renewal) for m in eq.memories.values()])
+    output = _phase(hoist, [eq.real(eq.P), eq.real(eq.Q)])
     slack = [eq.expand(r.slack) for r in eq.requirements]
-    remembered = [eq.real(eq.expand(m.initial)) for m in eq.memories.values()]
+    remembered = [eq.real(m.initial) for m in eq.memories.values()]
     start = _phase(None, [i for _, _, i in rows] + remembered + slack)
     at_rest = eq.at_rest() | dict(zip((*states, *memories), starts, strict=True))
-    rest = None if eq.settled else _phase(None, [d.xreplace(at_rest) for _, d, _ in rows])
+    rest = None if eq.settled else _phase(None, [b.xreplace(at_rest) for b in eq.real_balances()])
     phases = (derivative, renewal, output)
     used = tuple(s for s in inputs if s == eq.U or any(s in symbols(p) for p in phases))
     lowered = Lowered(

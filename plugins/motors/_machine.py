@@ -1,0 +1,46 @@
+"""What the motors share: parameters by one name and meaning, and the steady state of a single cage, Eq. (3)."""
+
+from tractexp.parameter import Parameter
+
+PAPER = "Wu, Fan, Zou 2022, Energies 15(14) 5034"
+
+T_PRIME = Parameter(0.1, (0.005, 0.5), "s", "transient time constant X'/X T0'", f"{PAPER}, Eq. (1)", "T'")
+X_PRIME = Parameter(0.3, (0.05, 1.5), "pu", "transient reactance on the record's base", f"{PAPER}, Eq. (2)", "X'")
+C = Parameter(0.9, (0.3, 0.99), "1", "(X - X')/X", f"{PAPER}, Eq. (1)")
+M = Parameter(0.005, (0.0005, 0.03), "pu s²/rad", "inertia, H = M omega_s/2", f"{PAPER}, Eq. (1)")
+T_M = Parameter(0.5, (0.05, 1.0), "pu", "load torque, the motor's power before the event", f"{PAPER}, Eq. (1)")
+
+
+def at_rest(eq, T_prime, X_prime, C, T_m):
+    """Internal voltage and speed relative to synchronous before the event, Eq. (3): the stable of two solutions."""
+    from tractexp.model.equations import I
+
+    sine, cosine = _angle(eq, X_prime, C, T_m)
+    return C * eq.U0 / 2 * (1 + cosine - I * sine), -sine / (1 + cosine) / T_prime  # C U0 cos(delta_0) exp(j delta_0)
+
+
+def require(eq, positive, X_prime, C, T_m):
+    """State what the steady state of Eq. (3) needs: a real angle, a C between 0 and 1, the others positive."""
+    sine, _ = _angle(eq, X_prime, C, T_m)
+    eq.require(
+        1 - abs(sine),
+        "no steady state exists before the event: Eq. (3) needs |2 T_m X'/(C U0²)| at most 1 and it is {value:.3g};"
+        " lower T_m or X', or raise C",
+        abs(sine),
+    )
+    require_physical(eq, positive, C)
+
+
+def require_physical(eq, positive, C):
+    """State that C lies between 0 and 1 and that the other parameters are positive."""
+    for symbol in positive:
+        eq.require(symbol, f"{symbol.name} must be positive and is {{value:g}}", symbol)
+    eq.require(C * (1 - C), "C = (X - X')/X must lie between 0 and 1 and is {value:g}", C)
+
+
+def _angle(eq, X_prime, C, T_m):
+    """-sin(2 delta_0) of Eq. (3), and the cosine (0 where there is none)."""
+    from tractexp.model.equations import sympy
+
+    sine = 2 * T_m * X_prime / (C * eq.U0**2)
+    return sine, sympy.sqrt(sympy.Max(0, 1 - sine**2))

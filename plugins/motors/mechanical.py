@@ -1,0 +1,56 @@
+"""First-order induction motor."""
+
+from tractexp.model.parts import Motor
+from tractexp.plugin import plugin
+from tractexp_plugins.motors import _machine
+
+
+@plugin
+class Mechanical(Motor):
+    r"""Induction motor whose only state is its speed; the rotor flux is in equilibrium with voltage and slip.
+
+    State: speed omega [rad/s, relative to synchronous]. The internal voltage E is what Eq. (1) comes to rest at,
+
+        E = j X' C U/(Z' (1 - C - j (omega - omega_s) T') + j X' C),   I = (U - E)/Z',   Z' = j X'
+
+    that is C U/(1 - j (omega - omega_s) T'), the steady-state equivalent circuit at the present slip, and
+
+        M domega/dt = Re(E I*) - T_m,          P_d + j Q_d = U I*
+
+    The active power follows the speed; the reactive power jumps with the voltage, for no flux holds it back. Steady
+    state as in Eq. (3), the same as the third-order motor's. It is the limit of `electromechanical` for a flux
+    that settles much faster than the speed.
+
+    Not to be confused with a constant-slip or constant-torque load: the slip moves. Not to be confused with the
+    first-order *voltage* models of the literature, which keep the flux and drop the speed (see `voltage`).
+
+    Source: Wu, Fan, Zou 2022, Table 1 (mechanical transient model), Eq. (1) with dE/dt = 0 in the frame that
+    turns with the voltage; Kundur 1994, Power System Stability and Control, section 7.2.
+    Departures: the paper names the model and prints no equations for it.
+    """
+
+    T_prime, X_prime, C, M, T_m = _machine.T_PRIME, _machine.X_PRIME, _machine.C, _machine.M, _machine.T_M
+
+    def declare(self, eq):
+        from tractexp.model.equations import I, conjugate, im, re
+
+        T_prime, X_prime, C, M, T_m = eq.declare(self.parameters)
+        omega = eq.state("omega", r"\omega")
+        V = eq.define("motor_voltage", eq.U, "V", phasor=True)
+        Z = eq.define("stator_impedance", I * X_prime, "Z'")
+        coupling = eq.define("coupling", C, "c")
+        time_constant = eq.define("time_constant", T_prime, r"\tau'")
+        source = I * X_prime * coupling
+        slip = eq.define("slip", omega - eq.omega_s, "s")
+        turning = I * slip * time_constant
+        E = eq.define("internal_voltage", source * V / (Z * (1 - coupling - turning) + source), "E")
+        current = eq.define("stator_current", (V - E) / Z, "I")
+        electrical_torque = eq.define("electrical_torque", re(E * conjugate(current)), "T_e")
+        load_torque = eq.define("load_torque", T_m, "T_L")
+        P = eq.define("P_motor", re(V * conjugate(current)), "P_d")  # Eq. (2)
+        Q = eq.define("Q_motor", im(V * conjugate(current)), "Q_d")
+        eq.consume(P, Q)
+
+        _, slower = _machine.at_rest(eq, T_prime, X_prime, C, T_m)
+        eq.moves(omega, (electrical_torque - load_torque) / M, eq.omega_s0 + slower)
+        _machine.require(eq, (T_prime, X_prime, M), X_prime, C, T_m)
