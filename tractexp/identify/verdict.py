@@ -16,6 +16,7 @@ IDENTIFIED, WEAK, UNIDENTIFIED, BOUND = (
 WITHIN = 0.2  # an interval of at most plus and minus this share of the value identifies a parameter
 NEAR_ZERO = 0.1  # of the range: what may be zero is measured against this where its value is smaller
 TRADES = 0.8  # correlation from which two parameters are said to trade against each other
+PARTNERS = 2  # named at most
 EDGE = 1e-3  # of the range: closer than this is at the bound
 
 
@@ -53,8 +54,8 @@ def judge(
         at = [f"{b:g}" for b in (lower[j], upper[j]) if abs(value - b) < EDGE * width[j]]
         if not identifiable[j]:
             verdicts[name] = Verdict(UNIDENTIFIED, _structural(information, unseen, j))
-        elif half[j] >= width[j] / 2:
-            span = f"its 95 % interval spans {2 * half[j]:.2g}, no less than its bounds' {width[j]:.2g}"
+        elif low <= lower[j] and high >= upper[j]:
+            span = f"its 95 % interval holds its whole range {lower[j]:g} .. {upper[j]:g}"
             verdicts[name] = Verdict(UNIDENTIFIED, "; ".join([span, *_trade(information, j, factor)]))
         elif half[j] > WITHIN * size(value, lower[j], upper[j]):
             why = _trade(information, j, factor) or ["the record hardly changes with it"]
@@ -71,13 +72,13 @@ def judge(
 
 
 def _trade(information: Information, j: int, factor: float) -> list[str]:
-    """Against which parameter this one trades, and which combination of the two is known; empty where none is."""
+    """Against which parameters this one trades, and which combination is known; empty where there is none."""
     correlation = np.where(np.arange(len(information.names)) == j, 0.0, information.correlation[j])
-    k = int(np.abs(correlation).argmax())
-    if abs(correlation[k]) < TRADES:
+    partners = [int(k) for k in np.argsort(-np.abs(correlation))[:PARTNERS] if abs(correlation[k]) >= TRADES]
+    if not partners:
         return []
-    number = f"{correlation[k]:.2f}" if abs(correlation[k]) < 0.995 else f"{correlation[k]:.4f}"
-    said = [f"trades against {information.names[k]}, correlation {number}"]
+    named = " and ".join(f"{information.names[k]} (correlation {_number(correlation[k])})" for k in partners)
+    said, k = [f"trades against {named}"], partners[0]
     covariance, values = information.covariance, information.values
     if values[j] > 0 and values[k] > 0:
         exponents = np.zeros(len(values))
@@ -85,6 +86,10 @@ def _trade(information: Information, j: int, factor: float) -> list[str]:
         known = factor * information.relative_error(exponents)
         said.append(f"{combination(information.names, exponents)} is known to ± {100 * known:.2g} %")
     return said
+
+
+def _number(correlation: float) -> str:
+    return f"{correlation:.2f}" if abs(correlation) < 0.995 else f"{correlation:.4f}"
 
 
 def _structural(information: Information, unseen: np.ndarray, j: int) -> str:

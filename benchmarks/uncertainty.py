@@ -1,0 +1,361 @@
+"""Are the intervals and verdicts true? python benchmarks/uncertainty.py [--records 500] [--out FOLDER] [--part NAME]
+
+Records of known truth come from the printed, polar Eqs. (1)-(3) solved by SciPy (`printed`), never from
+`tractexp.model`, and from the flux-state simulator in `independent`, whose truth lies outside the model class.
+Each record is read, searched and judged as `task=identify` does it. Results are kept per record, so that an
+interrupted study goes on where it stopped. Prints the tables of docs/uncertainty.md.
+"""
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import argparse
+import json
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+NAMES = ("T_prime", "X_prime", "C", "M", "T_m", "p_v", "q_v")
+LOW = np.array([0.04, 0.2, 0.7, 0.003, 0.3, 0.8, 2.6])  # truths are drawn between these
+HIGH = np.array([0.15, 0.5, 0.92, 0.010, 0.6, 2.0, 5.0])
+STATIC_Q = (0.2, 0.5)  # pu: reactive power of the static part, without which q_v would mean nothing
+CONDITIONS = {
+    "white 0.2 %": (0.002, 0.0),
+    "white 2 %": (0.02, 0.0),
+    "AR(1) 0.2 %": (0.002, 0.7),
+    "AR(1) 2 %": (0.02, 0.7),
+}
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A dip with linear edges."""
+
+    depth: float
+    duration: float = 0.2
+    step: float = 2e-3
+    length: float = 2.0
+    start: float = 0.3
+    edge: float = 0.03
+
+    def voltage(self) -> tuple[np.ndarray, np.ndarray]:
+        t = np.arange(round(self.length / self.step)) * self.step
+        fall, back = (np.clip((t - s) / self.edge, 0, 1) for s in (self.start, self.start + self.duration))
+        return t, 1 - self.depth * (fall - back)
+
+
+def printed(truth: np.ndarray, t: np.ndarray, U: np.ndarray, Q_s0: float, P0: float = 1.0) -> np.ndarray:
+    """P and Q (2, N) of Eqs. (1)-(7) as printed, E', delta and omega, by SciPy's DOP853; U linear between samples."""
+    from scipy.integrate import solve_ivp
+
+    T_prime, X_prime, C, M, T_m, p_v, q_v = map(float, truth)
+    U0 = float(U[0])
+    delta = 0.5 * np.arcsin(-2 * T_m * X_prime / (C * U0**2))  # Eq. (3)
+    E = C * U0 * np.cos(delta)
+    omega = C * U0 * np.sin(delta) / (T_prime * E)  # relative to synchronous
+
+    def slope(now, y):
+        u = np.interp(now, t, U)
+        E, delta, omega = y
+        return [
+            (-E + C * u * np.cos(delta)) / T_prime,
+            -C * u * np.sin(delta) / (T_prime * E) + omega,
+            (-u * E * np.sin(delta) / X_prime - T_m) / M,
+        ]
+
+    solved = solve_ivp(
+        slope, (t[0], t[-1]), [E, delta, omega], "DOP853", t, rtol=1e-8, atol=1e-10, max_step=t[1] - t[0]
+    )
+    E, delta, _ = solved.y
+    P_d, Q_d = -U * E * np.sin(delta) / X_prime, (U**2 - U * E * np.cos(delta)) / X_prime  # Eq. (2)
+    P_s = (P0 - P_d[0]) * (U / U0) ** p_v  # Eq. (6)
+    Q_s = Q_s0 * (U / U0) ** q_v
+    return np.array([P_d + P_s, Q_d + Q_s])
+
+
+def noise(rng: np.random.Generator, samples: int, deviation: float, correlation: float) -> np.ndarray:
+    """Stationary AR(1) noise (2, samples) of this standard deviation."""
+    from scipy.signal import lfilter
+
+    shocks = rng.standard_normal((2, samples)) * np.sqrt(1 - correlation**2)
+    shocks[:, 0] /= np.sqrt(1 - correlation**2)
+    return deviation * lfilter([1.0], [1.0, -correlation], shocks)
+
+
+def draw(rng: np.random.Generator) -> np.ndarray:
+    """A truth with a steady state well inside Eq. (3), so that the motor is not about to stall."""
+    while True:
+        truth = rng.uniform(LOW, HIGH)
+        if 2 * truth[4] * truth[1] / truth[2] < 0.8:
+            return truth
+
+
+def event(t: np.ndarray, U: np.ndarray, power: np.ndarray, name: str = "synthetic"):
+    """The product's event of a synthetic record."""
+    from tractexp.record import Record, detect
+
+    return detect(Record(name, t, U, power[0], power[1]))
+
+
+def model():
+    from tractexp.model.model import compose
+    from tractexp.plugin import get
+
+    return compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
+
+
+def identified(load, events, seed: int = 0, starts: int = 3, bounds: dict | None = None):
+    """Search and judgement as in `task=identify`: the values of Eq. (8), and the `Uncertainty`."""
+    from tractexp.identify.problem import Problem
+    from tractexp.identify.search import search
+    from tractexp.identify.uncertainty import assess
+    from tractexp.plugin import get
+
+    problem = Problem(load, events, bounds)
+    optimizer = get("optimizer", "multistart_least_squares")(starts=starts)
+    found = search(problem, optimizer, seed)
+    return found, assess(problem, found.values)
+
+
+def bound(load, events, truth: np.ndarray, deviation: float, correlation: float):
+    """Cramér-Rao: the information at the truth under the noise that was really added, P0 and Q0 unknown."""
+    from tractexp.identify.information import Information
+    from tractexp.identify.likelihood import Likelihood
+    from tractexp.identify.noise import Autoregression
+    from tractexp.identify.problem import Problem
+
+    shock = deviation * np.sqrt(1 - correlation**2)
+    true = Autoregression(np.array([[0.0], [correlation]]), np.array([deviation, shock]))
+    problem = Problem(load, events)
+    likelihood = Likelihood.of(problem, [(true, true)] * len(events))
+    unit = likelihood.to_unit(truth)[0]
+    _, J = likelihood.jacobian(unit)
+    d = len(truth)
+    return Information.of(NAMES, truth, problem.upper - problem.lower, J[:, :d], J[:, d:])
+
+
+def coverage_record(seed: int) -> dict:
+    """One truth and one dip under each condition: estimates, errors and intervals."""
+    rng = np.random.default_rng([11, seed])
+    load, truth = model(), draw(rng)
+    t, U = Shape(rng.uniform(0.4, 0.65), rng.uniform(0.12, 0.25)).voltage()
+    clean = printed(truth, t, U, rng.uniform(*STATIC_Q))
+    rows = {}
+    for label, (deviation, correlation) in CONDITIONS.items():
+        events = [event(t, U, clean + noise(rng, len(t), deviation, correlation))]
+        limit = bound(load, events, truth, deviation, correlation).standard_errors
+        found, known = identified(load, events, seed)
+        rows[label] = {
+            "eq8": ((found.values - truth) / limit).tolist(),
+            "likely": ((known.values - truth) / limit).tolist(),
+            "inside": ((known.intervals[:, 0] <= truth) & (truth <= known.intervals[:, 1])).tolist(),
+            "relative": (1.96 * limit / truth).tolist(),
+            "words": [v.word for v in known.verdicts.values()],
+            "notes": len(known.notes),
+        }
+    return rows
+
+
+TYPICAL = np.array([0.08, 0.35, 0.85, 0.006, 0.4, 1.4, 3.6])
+SHALLOW, DEEP = (0.15,), (0.5,)
+IDENTIFIED, WEAK, UNIDENTIFIED, BOUND = (
+    "identified",
+    "weakly identified",
+    "not identifiable from this record",
+    "at its bound",
+)
+
+
+@dataclass(frozen=True)
+class Case:
+    """Records whose verdicts are known by construction, and why."""
+
+    why: str
+    depths: tuple[float, ...]
+    deviation: float
+    expected: dict[str, str]
+    P0: float = 1.0
+    bounds: dict | None = None
+    motor: str = ""
+
+
+CASES = {
+    "one deep dip": Case("noise of 0.2 % on a dip of 50 %", DEEP, 0.002, dict.fromkeys(NAMES, IDENTIFIED)),
+    "one shallow dip": Case(
+        "C trades against q_v and X'",
+        SHALLOW,
+        0.002,
+        {"C": WEAK, **dict.fromkeys(("M", "T_m", "p_v"), IDENTIFIED)},
+    ),
+    "three dips": Case(
+        "the same noise, with dips of 30 % and 50 % beside it",
+        (*SHALLOW, 0.3, 0.5),
+        0.002,
+        dict.fromkeys(NAMES, IDENTIFIED),
+    ),
+    "no static P": Case(
+        "the motor draws all of P, so p_v has no meaning", DEEP, 0.002, {"p_v": UNIDENTIFIED, "M": IDENTIFIED}, P0=0.4
+    ),
+    "bound below the truth": Case("C is 0.85 and its bound 0.75", DEEP, 0.002, {"C": BOUND}, bounds={"C": [0.3, 0.75]}),
+    "T-circuit": Case(
+        "four numbers for three observables", DEEP, 0.002,
+        {**dict.fromkeys(("X_s", "X_m", "X_r", "R_r"), UNIDENTIFIED), **dict.fromkeys(("M", "T_m", "p_v"), IDENTIFIED)},
+        motor="TCircuit",
+    ),
+    "rating": Case(
+        "a rating scales reactance and inertia", DEEP, 0.002,
+        {**dict.fromkeys(("x_prime", "m", "rating"), UNIDENTIFIED), "T_m": IDENTIFIED, "T_prime": IDENTIFIED},
+        motor="Rated",
+    ),
+}  # fmt: skip
+
+
+def verdict_record(seed: int) -> dict:
+    """One record of each case, another truth and noise for each seed: the words that came, and those that should."""
+    import symmetries
+
+    rng = np.random.default_rng([22, seed])
+    truth = TYPICAL * rng.uniform(0.95, 1.05, len(TYPICAL))
+    truth[2] = TYPICAL[2]
+    rows = {}
+    for label, case in CASES.items():
+        load = symmetries.load(getattr(symmetries, case.motor)) if case.motor else model()
+        events = []
+        for k, depth in enumerate(case.depths):
+            t, U = Shape(depth).voltage()
+            own = truth.copy()
+            if case.P0 != 1.0:
+                own[4] = case.P0
+            clean = printed(own, t, U, Q_s0=0.35, P0=case.P0)
+            events.append(event(t, U, clean + noise(rng, len(t), case.deviation, 0.0), f"dip {k + 1}"))
+        _, known = identified(load, events, seed, bounds=case.bounds)
+        said = {name: known.verdicts[name].word for name in case.expected}
+        rows[label] = {"said": said, "right": said == case.expected}
+    return rows
+
+
+def independent_record(seed: int) -> dict:
+    """A record of the flux-state simulator, stator transients and all: the truth is outside the model class."""
+    from independent import Dip, Load, Machine, Recorder, Static, record
+
+    from tractexp.record import Record, detect
+
+    rng = np.random.default_rng([33, seed])
+    machine = Machine(Rs=0.0, Xs=0.16, Xm=2.0, Rr=0.02, Xr=0.20, H=rng.uniform(0.6, 1.2))
+    load = Load(machine, 0.45, rng.uniform(0.6, 0.85), Static(0.64, 0.36, rng.uniform(1, 2), rng.uniform(2.6, 4)))
+    dip = Dip(depth=rng.uniform(0.35, 0.6), duration=0.2, start=0.3, fall=0.05, rise=0.09, sag=0.4, settle=0.2)
+    r = record(load, dip, Recorder(step=0.002, voltage_noise=0.01, current_noise=0.02, bits=14), rng)
+    truth = np.array([load.truth()[name] for name in NAMES])
+    events = [detect(Record("simulated", r["t"], r["U"], r["P"], r["Q"]))]
+    _, known = identified(model(), events, seed)
+    inside = (known.intervals[:, 0] <= truth) & (truth <= known.intervals[:, 1])
+    off = (known.values - truth) / truth
+    return {"inside": inside.tolist(), "off": off.tolist(), "warned": bool(known.notes)}
+
+
+def timing(repeats: int = 9) -> dict:
+    """Seconds for fit, judgement and seven profiles of a record of 1,000 samples, the kernel loaded; medians."""
+    from tractexp.identify.problem import Problem
+    from tractexp.identify.profile import profiles
+    from tractexp.identify.search import search
+    from tractexp.identify.uncertainty import assess
+    from tractexp.plugin import get
+
+    load, (t, U) = model(), Shape(0.5).voltage()
+    clean = printed(TYPICAL, t, U, 0.35)
+    events = [event(t, U, clean + noise(np.random.default_rng(5), len(t), 0.005, 0.7))]
+    rows = []
+    for k in range(repeats + 1):
+        marks = [time.perf_counter()]
+        problem = Problem(load, events)
+        found = search(problem, get("optimizer", "multistart_least_squares")(starts=3), k)
+        marks.append(time.perf_counter())
+        known = assess(problem, found.values)
+        marks.append(time.perf_counter())
+        made = profiles(known)
+        _ = made.verdicts
+        marks.append(time.perf_counter())
+        rows.append(np.diff(marks))
+    parts = np.median(rows[1:], axis=0)
+    return {"fit": parts[0], "judgement": parts[1], "profiles": parts[2], "total": parts.sum(), "samples": len(t)}
+
+
+def study(record: Callable[[int], dict], path: Path, records: int) -> Iterator[dict]:
+    """Results of `records` seeds, those already in the file first; new ones are added to it as they come."""
+    from joblib import Parallel, delayed
+
+    done = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+    yield from (row["result"] for row in done[:records])
+    left = sorted(set(range(records)) - {row["seed"] for row in done})
+    path.parent.mkdir(parents=True, exist_ok=True)
+    made = Parallel(n_jobs=2, return_as="generator")(delayed(record)(seed) for seed in left)
+    with path.open("a") as file:
+        for seed, result in zip(left, made, strict=True):
+            file.write(json.dumps({"seed": seed, "result": result}) + "\n")
+            file.flush()
+            yield result
+
+
+def show_coverage(results: list[dict]) -> None:
+    """Tables of docs/uncertainty.md: coverage and root mean square error, for parameters the truth identifies."""
+    print("\nconditions | verdict at the truth | " + " | ".join(NAMES))
+    for label in CONDITIONS:
+        rows = [r[label] for r in results]
+        take = lambda key, rows=rows: np.array([r[key] for r in rows])  # noqa: E731
+        relative = take("relative")
+        for word, mask in (("identified", relative <= 0.2), ("weak", relative > 0.2)):
+            counts = mask.sum(axis=0)
+            mean = lambda x, mask=mask, counts=counts: np.where(mask, x, 0).sum(axis=0) / np.maximum(counts, 1)  # noqa: E731
+            for what, values in (
+                ("records", counts),
+                ("coverage %", 100 * mean(take("inside"))),
+                ("RMSE / bound, most likely", np.sqrt(mean(take("likely") ** 2))),
+                ("RMSE / bound, Eq. (8)", np.sqrt(mean(take("eq8") ** 2))),
+            ):
+                cells = [f"{v:.3g}" if n >= 25 else "-" for v, n in zip(values, counts, strict=True)]
+                print(f"{label} | {word}: {what} | " + " | ".join(cells))
+        print(f"{label} | warned of a missing effect: {100 * np.mean(take('notes') > 0):.1f} %")
+
+
+def show_verdicts(results: list[dict]) -> None:
+    total = np.array([[r[label]["right"] for label in CASES] for r in results])
+    print(f"\nverdicts right: {100 * total.mean():.1f} % of {total.size}")
+    for label, right in zip(CASES, total.T, strict=True):
+        wrong = [r[label]["said"] for r in results if not r[label]["right"]]
+        print(f"{label} | {100 * right.mean():.1f} % of {len(right)} | {wrong[:2] or ''}")
+
+
+def show_independent(results: list[dict]) -> None:
+    inside, off = (np.array([r[key] for r in results]) for key in ("inside", "off"))
+    print("\nflux-state simulator | " + " | ".join(NAMES))
+    print("coverage % | " + " | ".join(f"{100 * x:.0f}" for x in inside.mean(axis=0)))
+    print("bias % | " + " | ".join(f"{100 * x:+.1f}" for x in off.mean(axis=0)))
+    print(f"warned of a missing effect: {100 * np.mean([r['warned'] for r in results]):.0f} %")
+
+
+STUDIES = {
+    "coverage": (coverage_record, show_coverage, 1),
+    "verdicts": (verdict_record, show_verdicts, len(CASES)),
+    "independent": (independent_record, show_independent, 5),
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--records", type=int, default=500)
+    parser.add_argument("--out", type=Path, default=Path("outputs/benchmarks/uncertainty"), help="kept results")
+    parser.add_argument("--part", choices=[*STUDIES, "timing"], help="one study only")
+    chosen = parser.parse_args()
+    if chosen.part in (None, "timing"):
+        print(" | ".join(f"{key} {value:.3g}" for key, value in timing().items()))
+    for name, (record, show, share) in STUDIES.items():
+        if chosen.part in (None, name):
+            show(list(study(record, chosen.out / f"{name}.jsonl", -(-chosen.records // share))))
+
+
+if __name__ == "__main__":
+    main()
