@@ -1,6 +1,7 @@
 """`hydra/launcher=cores`: the jobs of a sweep on worker processes that start once, here or on a Dask cluster."""
 
 import contextlib
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, as_completed
 from dataclasses import dataclass, replace
@@ -155,13 +156,10 @@ def _dask(n_jobs: int, address: str | None) -> Iterator[Any]:
         raise UserError(
             "hydra.launcher.backend=dask needs Dask, which is not installed: pip install 'tractexp[dask]'"
         ) from None
-    quiet = {
-        "distributed.scheduler.allowed-failures": 0,
-        "distributed.admin.log-format": "",
-        "logging.distributed": "error",
-    }
+    loud = logging.getLogger("distributed")  # its remarks on every worker that comes or goes would tear the bar
+    loud.propagate, loud.handlers = False, [logging.NullHandler()]
     with contextlib.ExitStack() as stack:
-        stack.enter_context(dask.config.set(quiet))
+        stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 0}))  # we count ourselves
         if address is None:
             cluster = LocalCluster(n_workers=n_jobs, threads_per_worker=1, dashboard_address=None, silence_logs=50)
             address = stack.enter_context(cluster).scheduler_address

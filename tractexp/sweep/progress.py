@@ -36,9 +36,12 @@ class Tally:
         return sorted(self.best.items(), key=lambda item: item[1])
 
     @property
-    def left(self) -> float:
-        """Seconds left, by the pace since the first end: before it, the workers were starting."""
-        return (time.perf_counter() - self.first) * (self.total - self.done) / max(self.done - 1, 1)
+    def left(self) -> str:
+        """The time left, by the pace since the first end: before it, the workers were starting."""
+        if self.done < 2:
+            return "time left not known yet"
+        spent = time.perf_counter() - self.first
+        return f"about {spent * (self.total - self.done) / (self.done - 1):.0f} s left"
 
     def line(self) -> str:
         """The state in one line."""
@@ -47,7 +50,7 @@ class Tally:
             parts.append(f"{self.failed} failed")
         if self.best:
             parts.append("best objectives " + ", ".join(f"{n} {f:.4g}" for n, f in self.ranked()[:SHOWN]))
-        return f"  {', '.join(parts)}; about {self.left:.0f} s left"
+        return f"  {', '.join(parts)}; {self.left}"
 
 
 @contextmanager
@@ -95,7 +98,7 @@ def _live(tally: Tally) -> Iterator[Callable[[SweepJob, Status], None]]:
         def note(job: SweepJob, end: Status) -> None:
             tally.add(job, end)
             failed = f"{tally.failed} failed, " if tally.failed else ""
-            bar.update(line, completed=tally.done, note=f"{failed}about {tally.left:.0f} s left;")
+            bar.update(line, completed=tally.done, note=f"{failed}{tally.left};")
             live.update(shown())
 
         yield note
