@@ -14,7 +14,6 @@ from sympy import I, Symbol, conjugate, im, re
 from tractexp.model.drive import EVENT, INPUTS
 from tractexp.parameter import Parameter
 
-
 LONG_AGO = -(10**6)  # s: the time at which a load rests before the event
 
 
@@ -76,6 +75,9 @@ class Equations:
         self.settled = True
         self.parameters: dict[str, Parameter] = {}
         self.definitions: dict[Symbol, sympy.Expr] = {}
+        self.steps: dict[Symbol, sympy.Expr] = {}
+        self.known_before: dict[Symbol, sympy.Expr] = {}
+        self.shown: dict[Symbol, sympy.Expr] = {}
         self.states: dict[Symbol, State] = {}
         self.memories: dict[Symbol, Memory] = {}
         self.requirements: list[Requirement] = []
@@ -99,12 +101,26 @@ class Equations:
             symbols.append(symbol)
         return symbols
 
-    def define(self, name: str, expression: sympy.Expr, latex: str) -> Symbol:
-        """Name a quantity (real or complex), so that later expressions use it and effects can edit it."""
+    def define(self, name: str, expression: sympy.Expr, latex: str, phasor: bool = False) -> Symbol:
+        """Name a quantity (real or complex), so that later expressions use it and effects can edit it.
+
+        `phasor` makes one complex that is real as it stands, so that an effect may turn it.
+        """
         expression = sympy.sympify(expression)
-        symbol = Symbol(name, real=True) if expression.is_real else Symbol(name, complex=True)
+        symbol = Symbol(name, complex=True) if phasor or not _is_real(expression) else _real(name)
         self.latex_names[symbol] = latex
         self.definitions[symbol] = expression
+        return symbol
+
+    def compute(self, name: str, expression: sympy.Expr, before: sympy.Expr) -> Symbol:
+        """A real quantity that is computed once and then referred to, such as a step of an unrolled iteration.
+
+        `before` is its value before the event, where the iteration has converged.
+        """
+        symbol = _real(name)
+        self.steps[symbol] = sympy.sympify(expression)
+        self.known_before[symbol] = self.real(self.before(before))
+        self.latex_names[symbol] = name
         return symbol
 
     def has(self, name: str) -> bool:
@@ -121,12 +137,15 @@ class Equations:
     def _symbols(self) -> list[Symbol]:
         return [*self.definitions, *self.states, *self.memories, *map(_real, self.parameters)]
 
-    def edit(self, name: str, change: Callable[[sympy.Expr], sympy.Expr]) -> None:
+    def edit(self, name: str, change: Callable[[sympy.Expr], sympy.Expr], shown: sympy.Expr | None = None) -> None:
         """Replace the expression behind a named quantity by `change` of it: what a missing effect does.
 
-        The quantity keeps its name, so effects stack in any order. A quantity that was real must stay real.
+        The quantity keeps its name, so effects stack in any order. A quantity that was real must stay real. `shown`
+        is what LaTeX prints where the change is the solution of an equation.
         """
         symbol = self.symbol(name)
+        if shown is not None:
+            self.shown[symbol] = shown
         self.definitions[symbol] = sympy.sympify(change(self.definitions[symbol]))
         self.settled = False
 
@@ -184,12 +203,15 @@ class Equations:
     def before(self, expression: sympy.Expr) -> sympy.Expr:
         """An expression's value in the steady state before the event, as an expression of constants."""
         at_start = {symbol: start_symbol(symbol) for symbol in (*self.states, *self.memories)}
+        for symbol, start in list(at_start.items()):
+            if not symbol.is_real:
+                at_start |= zip(phasor_parts(symbol), phasor_parts(start), strict=True)
         return self.expand(expression).xreplace(self.at_rest() | at_start)
 
     def at_rest(self) -> dict[Symbol, sympy.Expr]:
-        """The inputs' values before the event."""
+        """The values before the event of inputs and computed quantities."""
         still = {self.U_rate: sympy.Integer(0), self.t: sympy.Integer(LONG_AGO)}
-        return {self.U: self.U0, self.omega_s: self.omega_s0, self.U2: self.U20} | still
+        return {self.U: self.U0, self.omega_s: self.omega_s0, self.U2: self.U20} | still | self.known_before
 
     def expand(self, expression: sympy.Expr, named: Callable[[Symbol], bool] = lambda _: True) -> sympy.Expr:
         """The expression with the quantities that are `named` (by default all) replaced by what they stand for."""
@@ -227,7 +249,7 @@ class Equations:
                 a0, b0 = phasor_parts(start_symbol(state))
                 split |= {state: a + I * b, start_symbol(state): a0 + I * b0}
         lowered = self.expand(expression, lambda s: not s.is_real).xreplace(split)
-        both = (lowered, sympy.Integer(0)) if lowered.is_real else map(_shorter, lowered.as_real_imag())
+        both = (lowered, sympy.Integer(0)) if _is_real(lowered) else map(_shorter, lowered.as_real_imag())
         real, imaginary = (e.xreplace({s: self.real(s) for s in self._names(e)}) for e in both)
         return real, imaginary
 
@@ -245,7 +267,7 @@ class Equations:
         tex = lambda e: sympy.latex(e, **show)  # noqa: E731
         lines = [rf"\frac{{d {s.latex}}}{{dt}} = {tex(s.derivative)}" for s in self.states.values()]
         lines += [rf"{m.latex} \leftarrow {tex(m.renewal)}" for m in self.memories.values()]
-        lines += [f"{tex(symbol)} = {tex(expression)}" for symbol, expression in self.definitions.items()]
+        lines += [f"{tex(s)} = {tex(self.shown.get(s, expression))}" for s, expression in self.definitions.items()]
         lines += [f"P = {tex(self.P)}", f"Q = {tex(self.Q)}"]
         starts = {start_symbol(s.symbol): f"{{{s.latex}}}|_0" for s in (*self.states.values(), *self.memories.values())}
         show["symbol_names"] = self.latex_names | starts
@@ -255,6 +277,11 @@ class Equations:
 def _shorter(expression: sympy.Expr) -> sympy.Expr:
     """The expression or its expansion, whichever has fewer operations: products of phasors cancel when expanded."""
     return min(expression, sympy.expand(expression), key=sympy.count_ops)
+
+
+def _is_real(expression: sympy.Expr) -> bool:
+    """Whether an expression is real wherever it is finite."""
+    return bool(expression.is_real) or not (expression.has(I) or any(not s.is_real for s in expression.free_symbols))
 
 
 def _real(name: str) -> Symbol:

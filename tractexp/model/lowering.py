@@ -5,6 +5,7 @@ input only once per sample (a *signal*); the rest is left for the inner loop. A 
 becomes exp(exponent * log(base)), whose logarithm is then a signal.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import sympy
@@ -100,9 +101,10 @@ def lower(eq: Equations) -> Lowered:
     inputs = tuple(map(_symbol, INPUTS))
 
     hoist = _Hoister(lane, set(event), set(inputs))
-    derivative = _phase(hoist, [d for _, d, _ in rows])
-    renewal = _phase(hoist, [eq.real(m.renewal) for m in eq.memories.values()])
-    output = _phase(hoist, [eq.real(eq.P), eq.real(eq.Q)])
+    steps = {symbol: eq.real(e) for symbol, e in eq.steps.items()}
+    derivative = _phase(hoist, [d for _, d, _ in rows], steps)
+    renewal = _phase(hoist, [eq.real(m.renewal) for m in eq.memories.values()], steps)
+    output = _phase(hoist, [eq.real(eq.P), eq.real(eq.Q)], steps)
     slack = [eq.expand(r.slack) for r in eq.requirements]
     remembered = [eq.real(m.initial) for m in eq.memories.values()]
     start = _phase(None, [i for _, _, i in rows] + remembered + slack)
@@ -124,14 +126,40 @@ def symbols(phase: Phase) -> set[Symbol]:
     return set().union(*(e.free_symbols for e in parts))
 
 
-def _phase(hoist: _Hoister | None, expressions: list[sympy.Expr]) -> Phase:
+def _phase(
+    hoist: _Hoister | None, expressions: list[sympy.Expr], steps: Mapping[Symbol, sympy.Expr] | None = None
+) -> Phase:
     signals = ()
+    needed = _needed(expressions, steps or {})
+    targets, expressions = list(needed), [*needed.values(), *expressions]
     if hoist is not None:
         expressions = [hoist(e) for e in expressions]
         used = set().union(*(e.free_symbols for e in expressions))
         signals = tuple((s, e) for e, s in hoist.signals.items() if s in used)
     temporaries, reduced = sympy.cse(expressions, symbols=sympy.numbered_symbols("x", real=True), order="none")
-    return Phase(signals, tuple(temporaries), tuple(reduced))
+    computed = [*temporaries, *zip(targets, reduced, strict=False)]
+    return Phase(signals, _in_order(computed), tuple(reduced[len(targets) :]))
+
+
+def _needed(expressions: list[sympy.Expr], steps: Mapping[Symbol, sympy.Expr]) -> dict[Symbol, sympy.Expr]:
+    """The steps that some expressions need, and those that these need in turn."""
+    needed: set[Symbol] = set()
+    new = set().union(*(e.free_symbols for e in expressions)) & steps.keys()
+    while new:
+        needed |= new
+        new = set().union(*(steps[s].free_symbols for s in new)) & steps.keys() - needed
+    return {symbol: e for symbol, e in steps.items() if symbol in needed}
+
+
+def _in_order(assignments: list[tuple[Symbol, sympy.Expr]]) -> tuple[tuple[Symbol, sympy.Expr], ...]:
+    """Assignments rearranged so that each comes after those it reads."""
+    waiting, ordered = list(assignments), []
+    while waiting:
+        open_symbols = {s for s, _ in waiting}
+        ready = [(s, e) for s, e in waiting if not e.free_symbols & open_symbols]
+        ordered += ready
+        waiting = [(s, e) for s, e in waiting if s not in {r for r, _ in ready}]
+    return tuple(ordered)
 
 
 def _check_closed(lowered: Lowered, lane: set[Symbol]) -> None:

@@ -36,20 +36,25 @@ class Static(Part):
 class Effect(Plugin):
     """Base of the effects a model may lack, named in `model.effects=[...]`: an edit of the equations.
 
-    Every parameter has a `null` at which the edited equations are the unedited ones. `reads` names the recorded
-    channels without which the effect cannot be seen (`f`, `U2`); `relevant` the smallest size of each parameter's
-    departure from its null that matters; `confused_with` the effects that look alike on ordinary dips.
+    The parameters that say how large the effect is have a `null` at which the edited equations are the unedited
+    ones; `relevant` is the smallest departure from it that matters. The others vanish there, and `grid` names the
+    values of each at which to look for the effect. `needs` names the quantities it edits or uses, `reads` the
+    recorded channels without which it cannot be seen (`f`, `U2`), `confused_with` the effects that look alike on
+    ordinary dips.
     """
 
     group: ClassVar[str] = "effect"
     order: ClassVar[int] = 0  # edits of a higher order come later: those that copy what others have edited
+    needs: ClassVar[tuple[str, ...]] = ()
     reads: ClassVar[tuple[str, ...]] = ()
+    grid: ClassVar[dict[str, tuple[float, ...]]] = {}
     relevant: ClassVar[dict[str, float]] = {}
     confused_with: ClassVar[tuple[str, ...]] = ()
 
     def refusal(self, eq: "Equations") -> str | None:
         """Why this effect makes no sense for the equations in `eq`, as a sentence; None where it does."""
-        return None
+        missing = [name for name in self.needs if not eq.has(name)]
+        return f"its equations have no {' and no '.join(missing)}" if missing else None
 
     def edit(self, eq: "Equations") -> None:
         """Edit the declared equations: rename nothing, add what is new, call `eq.edit` on what changes."""
