@@ -12,9 +12,9 @@ class SecondMotorGroup(Effect):
     """Part of the motors has another inertia, so that it slows down and recovers at another pace.
 
     A share g of the motor load is a second machine with the same electrical parameters and load per unit, and
-    inertia r M:
+    inertia r M; every quantity that moves with a motor has a twin marked 2:
 
-        P_d = (1 - g) P_1 + g P_2,        r M domega_2/dt = T_e2 - T_L
+        P_d = (1 - g) P_d1 + g P_d2,        r M domega_2/dt = T_e2 - T_L2
 
     At g = 0 the base model, whatever r.
 
@@ -26,21 +26,35 @@ class SecondMotorGroup(Effect):
     inertia_ratio = Parameter(4.0, (0.1, 12.0), "1", "inertia of the second group over the first's", SOURCE, "r")
 
     order = 1
+    needs = ("omega", "M", "P_motor", "Q_motor")
+    grid = {"inertia_ratio": (0.25, 0.5, 2.0, 4.0, 8.0)}
     relevant = {"group_share": 0.1}
     confused_with = ("speed_dependent_torque", "undervoltage_trip", "exponential_recovery")
 
-    def refusal(self, eq):
-        whole = all(map(eq.has, ("E", "omega", "M", "stator_current", "electrical_torque")))
-        return None if whole else "it has no speed and internal voltage to give a second group"
-
     def edit(self, eq):
+        from tractexp.model.equations import start_symbol
+
         share, ratio = eq.declare(self.parameters)
-        first = {eq.symbol(name): eq.states[eq.symbol(name)] for name in ("E", "omega")}
-        second = {eq.symbol("E"): eq.phasor("E_2", "E_2"), eq.symbol("omega"): eq.state("omega_2", r"\omega_2")}
-        twin = lambda e: eq.expand(e).xreplace(second)  # noqa: E731
-        for symbol, state in first.items():
-            slower = ratio if symbol.name == "omega" else 1
-            eq.moves(second[symbol], twin(state.derivative) / slower, state.initial)
+        moving = _moving(eq)
+        twins = {s: (eq.state if s.is_real else eq.phasor)(f"{s.name}_2", rf"{eq.latex_names[s]}_2") for s in moving}
+        twins |= {start_symbol(s): start_symbol(twin) for s, twin in twins.items()}
+        touched = [s for s in eq.definitions if eq.expand(s).free_symbols & twins.keys()]
+        for symbol in touched:
+            twin = eq.definitions[symbol].xreplace(twins)
+            twins[symbol] = eq.define(f"{symbol.name}_2", twin, rf"{{{eq.latex_names[symbol]}}}_2")
+        for symbol in moving:
+            state, slower = eq.states[symbol], ratio if symbol.name == "omega" else 1
+            eq.moves(twins[symbol], state.derivative.xreplace(twins) / slower, state.initial)
         for name in ("P_motor", "Q_motor"):
-            own = eq.definitions[eq.symbol(name)]
-            eq.edit(name, lambda P, own=own: (1 - share) * P + share * twin(own))
+            second = twins[eq.symbol(name)]
+            eq.edit(name, lambda own, second=second: (1 - share) * own + share * second)
+
+
+def _moving(eq):
+    """The states the motor's power depends on, and those that these depend on in turn."""
+    found, read = set(), {eq.symbol("P_motor"), eq.symbol("Q_motor")}
+    while read:
+        new = set().union(*(eq.expand(e).free_symbols for e in read)) & eq.states.keys() - found
+        found |= new
+        read = {eq.states[s].derivative for s in new}
+    return [s for s in eq.states if s in found]

@@ -1,27 +1,31 @@
 """Undervoltage trip of part of the load, and its reconnection."""
 
+from tractexp_plugins.effects._operators import gate
+
 from tractexp.model.parts import Effect
 from tractexp.parameter import Parameter
 from tractexp.plugin import plugin
 
 SOURCE = "NERC 2016, Dynamic Load Modeling, app. A; WECC composite load model (Ftr1, Vtr1, Ttr1, Vrc1, Trc1)"
+LEVEL, TIME = 0.0025, 0.3  # how sharp the relay is: in voltage over U_0, and in samples
+HYSTERESIS = 0.02  # of U_0: the voltage has recovered when it is this much above the trip level
 
 
 @plugin
 class UndervoltageTrip(Effect):
     """A share F of the load drops out when the voltage stays below U_trip, and returns after it has recovered.
 
-    Timers run on the samples: time below U_trip fills the first, time above U_reconnect the second; both empty at
-    once where their condition ends. Tripped, the load is (1 - F) of what it would be; after the reconnection
-    delay it returns along a ramp.
+    Two timers run on the samples: the first while the voltage is below u_t, the second while it is 2 % above; each
+    is empty again as soon as its condition ends. When the first reaches T_t the share is gone, when the second
+    reaches T_r it is back:
 
-        P = (1 - F g) P,   Q = (1 - F g) Q,   g = 1 while tripped, 0 before the trip
+        P -> (1 - F g) P,   Q -> (1 - F g) Q,   g = 1 while tripped, else 0
 
     At F = 0 the base model, whatever the thresholds.
 
     Source: NERC 2016, Dynamic Load Modeling, app. A; WECC composite load model (one stage).
-    Departures: the threshold is softened over 1 % of voltage so that derivatives exist; the trip level counts from
-    the voltage before the event.
+    Departures: levels count from the voltage before the event; thresholds are softened over 1 % of voltage and one
+    sample so that derivatives exist; the tripped motors come back as if they had run on.
     """
 
     tripped_share = Parameter(0.0, (0.0, 0.9), "1", "share of the load that trips", SOURCE, "F", null=0.0)
@@ -29,19 +33,21 @@ class UndervoltageTrip(Effect):
     trip_delay = Parameter(0.05, (0.0, 0.5), "s", "time below the level before it trips", SOURCE, "T_t")
     reconnect_delay = Parameter(0.5, (0.02, 5.0), "s", "time after recovery before it returns", SOURCE, "T_r")
 
+    order = 3
+    grid = {"trip_level": (0.5, 0.7, 0.8, 0.9), "trip_delay": (0.02, 0.08), "reconnect_delay": (0.2, 1.0)}
     relevant = {"tripped_share": 0.02}
     confused_with = ("exponential_recovery", "second_motor_group", "load_drift")
 
     def edit(self, eq):
-        from tractexp.model.equations import sympy
-
         share, level, delay, back = eq.declare(self.parameters)
-        below = eq.memory("time_below", "t_b")
+        u = eq.U / eq.U0
+        below, above = eq.memory("time_below", "t_b"), eq.memory("time_above", "t_a")
         tripped = eq.memory("tripped", "g")
-        low = 1 / (1 + sympy.exp((eq.U / eq.U0 - level) / 0.0025))  # 1 below the level, 0 above
+        low, high = gate(level - u, LEVEL), gate(u - level - HYSTERESIS, LEVEL)
         eq.renews(below, low * (below + eq.step), 0)
-        fires = 1 / (1 + sympy.exp(-(below - delay) / eq.step))  # within a sample or two of the delay
-        returns = (1 - low) * eq.step / back
-        eq.renews(tripped, tripped + fires * low * (1 - tripped) - tripped * returns, 0)
+        eq.renews(above, high * (above + eq.step), 0)
+        goes = low * gate(below - delay, TIME * eq.step)
+        returns = high * gate(above - back, TIME * eq.step)
+        eq.renews(tripped, tripped + (1 - tripped) * goes - tripped * returns, 0)
         eq.P, eq.Q = eq.P * (1 - share * tripped), eq.Q * (1 - share * tripped)
         eq.settled = False

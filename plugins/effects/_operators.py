@@ -1,0 +1,20 @@
+"""Shapes that several effects share: limits with a rounded corner, so that derivatives exist everywhere."""
+
+
+def smaller(a, b, width):
+    """The smaller of two, rounded where they are closer than `width`; below both, and smooth."""
+    from tractexp.model.equations import sympy
+
+    return (a + b - sympy.sqrt((a - b) ** 2 + width**2)) / 2
+
+
+def larger(a, b, width):
+    """The larger of two, rounded where they are closer than `width`; above both, and smooth."""
+    return -smaller(-a, -b, width)
+
+
+def gate(x, width):
+    """0 well below x = 0, 1 well above: a logistic step."""
+    from tractexp.model.equations import sympy
+
+    return 1 / (1 + sympy.exp(-x / width))

@@ -1,0 +1,39 @@
+"""Saturation of the motor's main flux path."""
+
+from tractexp.model.parts import Effect
+from tractexp.parameter import Parameter
+from tractexp.plugin import plugin
+
+SOURCE = "Milano 2010, ch. 15; PSS/E COMPLOAD and CIM5 (E1, S(E1), E2, S(E2))"
+
+
+@plugin
+class MagneticSaturation(Effect):
+    r"""The magnetizing reactance grows as the flux falls below what it was before the event.
+
+        X - X' -> (X - X')/sigma,   T0' -> T0'/sigma,   sigma = 1 + k_s (|E|^2 - |E_0|^2)
+
+    In the parameters of the model, C = (X - X')/X and T' = X'/X T0', both are divided by n = 1 + (1 - C)(sigma - 1).
+    At k_s = 0 the base model.
+
+    Source: saturation as a factor on the magnetizing reactance, Milano 2010, ch. 15; CIM5 load model.
+    Departures: quadratic in the internal voltage, and counted from its value before the event, so that C and T' are
+    the machine's at that point.
+    """
+
+    saturation = Parameter(0.0, (0.0, 1.0), "1/pu²", "growth of sigma with flux squared", SOURCE, "k_s", null=0.0)
+
+    needs = ("E", "C", "coupling", "time_constant")
+    relevant = {"saturation": 0.2}
+    confused_with = ("feeder_impedance", "speed_dependent_torque")
+
+    def edit(self, eq):
+        from tractexp.model.equations import conjugate, re, start_symbol
+
+        (k_s,) = eq.declare(self.parameters)
+        E = eq.symbol("E")
+        square = lambda x: re(x * conjugate(x))  # noqa: E731
+        rise = eq.define("flux_rise", square(E) - square(start_symbol(E)), r"\Delta E^2")
+        unsaturated = 1 + (1 - eq.symbol("C")) * k_s * rise
+        for name in ("coupling", "time_constant"):
+            eq.edit(name, lambda x: x / unsaturated)

@@ -1,0 +1,31 @@
+"""Shunt capacitor bank."""
+
+from tractexp.model.parts import Effect
+from tractexp.parameter import Parameter
+from tractexp.plugin import plugin
+
+SOURCE = "WECC composite load model (Bss, Bfdr)"
+
+
+@plugin
+class ShuntCapacitor(Effect):
+    """A capacitor bank at the bus, whose reactive power falls with the square of the voltage.
+
+        Q -> Q - b U^2 (omega_s + omega_n)/omega_n
+
+    Q_0 includes the bank, so the static load has b U_0^2 more. At b = 0 the base model. An exponent q_v near 2
+    hides it: without a switching of the bank or a change of frequency it is hardly seen.
+
+    Source: WECC composite load model specification (Bss, Bfdr).
+    Departures: none.
+    """
+
+    capacitor = Parameter(0.0, (0.0, 1.0), "pu", "susceptance on the record's base", SOURCE, "b", null=0.0)
+
+    relevant = {"capacitor": 0.05}
+    confused_with = ("static_var_compensator", "negative_sequence_braking")
+
+    def edit(self, eq):
+        (b,) = eq.declare(self.parameters)
+        eq.consume(0, -b * eq.U**2 * (1 + eq.omega_s / eq.omega_n))
+        eq.settled = False

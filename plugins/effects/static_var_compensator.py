@@ -1,0 +1,40 @@
+"""Static var compensator or STATCOM at the bus."""
+
+from tractexp.model.parts import Effect
+from tractexp.parameter import Parameter
+from tractexp.plugin import plugin
+
+SOURCE = "Kundur 1994, section 11.2; Milano 2010, ch. 19 (SVC and STATCOM)"
+
+
+@plugin
+class StaticVarCompensator(Effect):
+    """A compensator that feeds reactive power into the bus when the voltage is low, up to its rating.
+
+        T_c dx/dt = sat(K (U_0 - U)) - x,   Q -> Q - q_c x,   sat(z) = z/sqrt(1 + z^2)
+
+    A small drop dU brings K q_c dU, a deep one the rating q_c. The set point is the voltage before the event. At
+    q_c = 0 the base model, whatever gain and time constant.
+
+    Source: Kundur 1994, section 11.2; Milano 2010, ch. 19: proportional regulator, one lag, limits.
+    Departures: the limit is rounded, symmetric, and of reactive power (a STATCOM's is of current, an SVC's of
+    susceptance).
+    """
+
+    compensator = Parameter(0.0, (0.0, 1.0), "pu", "rating on the record's base", SOURCE, "q_c", null=0.0)
+    compensator_gain = Parameter(10.0, (1.0, 100.0), "1/pu", "gain per rating, 1/droop", SOURCE, "K")
+    compensator_time = Parameter(0.03, (0.005, 0.3), "s", "time constant", SOURCE, "T_c")
+
+    grid = {"compensator_gain": (2.0, 10.0, 50.0), "compensator_time": (0.01, 0.03, 0.1)}
+    relevant = {"compensator": 0.05}
+    confused_with = ("shunt_capacitor", "time_skew")
+
+    def edit(self, eq):
+        from tractexp.model.equations import sympy
+
+        rating, gain, time = eq.declare(self.parameters)
+        x = eq.state("compensation", "x_c")
+        asked = gain * (eq.U0 - eq.U)
+        eq.moves(x, (asked / sympy.sqrt(1 + asked**2) - x) / time, 0)
+        eq.consume(0, -rating * x)
+        eq.settled = False

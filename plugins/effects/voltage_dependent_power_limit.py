@@ -1,0 +1,39 @@
+"""Traction power limited at low line voltage."""
+
+from tractexp_plugins.effects._operators import larger, smaller
+
+from tractexp.model.parts import Effect
+from tractexp.parameter import Parameter
+from tractexp.plugin import plugin
+
+SOURCE = "EN 50388-1, limitation of current or power at low line voltage"
+WIDTH = 0.02  # of the power: how rounded the corners are
+
+
+@plugin
+class VoltageDependentPowerLimit(Effect):
+    """A share of the static active power is traction that must be reduced when the line voltage is low.
+
+        P_s -> (1 - s) P_s + s P_s0 min(1, max(0, (u - u_off)/(u_full - u_off))),   u = U/U_0
+
+    Full power down to u_full, then linearly down to none at u_off. At s = 0 the base model, whatever the levels.
+
+    Source: EN 50388-1: at 25 kV full power down to a U_n, a = 0.9, none at U_min2 = 17.5 kV.
+    Departures: levels count from the voltage before the event; what the auxiliaries draw at the end belongs to the
+    other share; corners are rounded over 2 % of the power so that derivatives exist.
+    """
+
+    limited_share = Parameter(0.0, (0.0, 1.0), "1", "share in the static active power", SOURCE, "s_l", null=0.0)
+    full_level = Parameter(0.9, (0.75, 1.0), "1", "voltage of full power, over U_0", SOURCE, "u_{full}")
+    off_level = Parameter(0.65, (0.3, 0.74), "1", "voltage of no power, over U_0", SOURCE, "u_{off}")
+
+    needs = ("static_voltage", "P_static")
+    grid = {"full_level": (0.8, 0.9, 0.97), "off_level": (0.4, 0.55, 0.7)}
+    relevant = {"limited_share": 0.1}
+    confused_with = ("constant_power_converter", "undervoltage_trip")
+
+    def edit(self, eq):
+        share, full, off = eq.declare(self.parameters)
+        allowed = lambda u: smaller(1, larger(0, (u - off) / (full - off), WIDTH), WIDTH)  # noqa: E731
+        power = eq.P_s0 * allowed(eq.symbol("static_voltage")) / allowed(1)
+        eq.edit("P_static", lambda P: (1 - share) * P + share * power)
