@@ -102,20 +102,20 @@ class _Contrasts:
         single = {(s,): self._pairs(s) for s in self.switches}
         double = {pair: self._squares(*pair) for pair in combinations(self.switches, 2)}
         company = {(s,): self._ends(s) for s in self.switches}
-        told = [
+        effects, changes, interactions = (
             tuple(self._effect(key, rows) for key, rows in contrasts.items() if rows)
             for contrasts in (single, company, double)
-        ]
+        )
         unknown = tuple(key for key, rows in (single | double).items() if not rows)
-        return Ablation(self.switches, tuple(self.names.values()), *told, unknown)
+        return Ablation(self.switches, tuple(self.names.values()), effects, changes, interactions, unknown)
 
     def _effect(self, switches: tuple[str, ...], contrasts: list[tuple[On, ...]]) -> Effect:
         """Signs alternate as in a factorial design: with - without, or both - first - second + neither."""
-        signs = (1, -1) if len(contrasts[0]) == 2 else (1, -1, -1, 1)
-        logs = np.mean([sum(s * self.logs[on] for s, on in zip(signs, row, strict=True)) for row in contrasts], axis=0)
+        signs = np.array((1.0, -1.0) if len(contrasts[0]) == 2 else (1.0, -1.0, -1.0, 1.0))
+        logs = np.mean([signs @ [self.logs[on] for on in row] for row in contrasts], axis=0)
         low, high = bootstrap(logs)
         names = tuple(tuple(self.names[on] for on in row) for row in contrasts)
-        return Effect(switches, *(float(10.0**x) for x in (logs.mean(), low, high)), names, len(logs))
+        return Effect(switches, 10.0 ** float(logs.mean()), 10.0**low, 10.0**high, names, len(logs))
 
     def _pairs(self, switch: str) -> list[tuple[On, ...]]:
         return self._existing([(on | {switch}, on) for on in self.logs if switch not in on])

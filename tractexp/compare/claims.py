@@ -61,15 +61,15 @@ def of_pair(comparison: Comparison, pair: Pair) -> str:
     """One pair of variants, as it may be quoted."""
     one, two = (comparison.gathered[name] for name in (pair.first, pair.second))
     spent = [Spread.of([run.simulations[-1] for run in v.finished]) for v in (one, two)]
-    first, second = (number(median) if np.isfinite(median) else "no result" for median in pair.medians)
+    first, second = (f"{number(median)} pu²" if np.isfinite(median) else "no result" for median in pair.medians)
     if len({x for s in spent for x in (s.best, s.worst)}) == 1:
         start = f"On {pair.seeds} seeds and {number(spent[0].median)} simulations, "
-        reached = f"{pair.first} reaches a median objective of {first} pu² against {second} pu² for {pair.second}"
+        reached = f"{pair.first} reaches a median objective of {first} against {second} for {pair.second}"
     else:
         start = f"On {pair.seeds} seeds, "
         reached = (
-            f"{pair.first} reaches a median objective of {first} pu² with {number(spent[0].median)} simulations "
-            f"(median) against {second} pu² with {number(spent[1].median)} for {pair.second}"
+            f"{pair.first} reaches a median objective of {first} with {number(spent[0].median)} simulations "
+            f"(median) against {second} with {number(spent[1].median)} for {pair.second}"
         )
     verdict = "is significant" if pair.significant else "is not significant"
     tests = len(comparison.pairs)

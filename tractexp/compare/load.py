@@ -1,7 +1,9 @@
 """Where the runs of a comparison come from: the folders of a sweep, or runs found in MLflow."""
 
 import json
-from collections.abc import Iterable, Mapping
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -49,39 +51,51 @@ def _job(folder: Path) -> Run | None:
     if config["task"]["name"] != TASK:
         return None
     choices = _yaml(folder / ".hydra" / "hydra.yaml")["hydra"]["runtime"]["choices"]
-    told = {
+    told: dict[str, Any] = {
         "optimizer": choices["optimizer"], "data": choices["data"], "seed": int(config["seed"]),
         "config": flat(config), "where": folder.name,
     }  # fmt: skip
     if failure := _failure(folder):
         return Run(**told, failure=failure)
-    result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    with _readable(folder / "result.json") as path:
+        result = json.loads(path.read_text(encoding="utf-8"))
+        told |= {key: float(result[key]) for key in ("objective", "epsilon_p", "epsilon_q")}
+    with _readable(folder / "history.csv") as path:
+        _, simulations, seconds, history = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2).T
+    return Run(**told, simulations=simulations, seconds=seconds, history=history)
+
+
+@contextmanager
+def _readable(path: Path) -> Iterator[Path]:
+    """Turn what goes wrong with a job's file into a sentence."""
     try:
-        columns = np.loadtxt(folder / "history.csv", delimiter=",", skiprows=1, ndmin=2).T
-        _, simulations, seconds, history = columns
-    except (OSError, ValueError) as error:
-        raise UserError(f"the history of a finished run, {folder / 'history.csv'}, cannot be read: {error}") from None
-    figures = {key: float(result[key]) for key in ("objective", "epsilon_p", "epsilon_q")}
-    return Run(**told, **figures, simulations=simulations, seconds=seconds, history=history)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # NumPy's about a file without a row, which raises next
+            yield path
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        reason = str(error).strip().partition("\n")[0] or type(error).__name__
+        raise UserError(f"{path} cannot be read: {reason}; run this job again, or remove its folder") from error
 
 
 def _failure(folder: Path) -> str:
     """Why a job has no result, "" where it has one."""
-    status, path = {}, folder / "status.json"
-    if path.is_file():
-        status = json.loads(path.read_text(encoding="utf-8"))
-        if str(status.get("status")).lower() != FINISHED:
-            return str(status.get("message") or status.get("status"))
+    if (folder / "status.json").is_file():
+        with _readable(folder / "status.json") as path:
+            told = json.loads(path.read_text(encoding="utf-8"))
+            status, message = str(told["status"]), str(told.get("message") or "")
+        if status != FINISHED:
+            return message or f"its status is {status}"
     return "" if (folder / "result.json").is_file() else "it left no result.json: it was ended, or still runs"
 
 
 def _yaml(path: Path) -> Any:
     import yaml
 
-    try:
-        return yaml.load(path.read_text(encoding="utf-8"), getattr(yaml, "CSafeLoader", yaml.SafeLoader))
-    except (OSError, yaml.YAMLError) as error:
-        raise UserError(f"{path} cannot be read: {str(error).splitlines()[0]}") from None
+    with _readable(path):
+        try:
+            return yaml.load(path.read_text(encoding="utf-8"), getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+        except yaml.YAMLError as error:
+            raise ValueError(str(error)) from error
 
 
 def flat(node: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
@@ -108,7 +122,7 @@ def from_logged(logged: Iterable[Any], source: str) -> list[Run]:
 
 
 def _logged(one: Any) -> Run:
-    told = {
+    told: dict[str, Any] = {
         "optimizer": one.tags["optimizer"], "data": one.tags["data"], "seed": int(one.tags["seed"]),
         "config": {key: _value(text) for key, text in one.parameters.items()}, "where": one.name,
     }  # fmt: skip
@@ -117,8 +131,8 @@ def _logged(one: Any) -> Run:
         return Run(**told, failure=f"its status in MLflow is {one.status}")
     simulations, history = curve
     seconds = one.metrics["seconds"] * simulations / simulations[-1]
-    figures = {key: one.metrics[key] for key in ("objective", "epsilon_p", "epsilon_q")}
-    return Run(**told, **figures, simulations=simulations, seconds=seconds, history=history)
+    told |= {key: one.metrics[key] for key in ("objective", "epsilon_p", "epsilon_q")}
+    return Run(**told, simulations=simulations, seconds=seconds, history=history)
 
 
 def _value(text: str) -> Any:

@@ -93,9 +93,8 @@ def gather(runs: Sequence[Run], source: str, data: str | None = None) -> Gathere
             f"the first failed because: {failures[0].failure}"
         )
     unique = {(run.optimizer, _settings(run), run.seed): run for run in runs}
-    notes = (
-        [f"{len(runs) - len(unique)} repeated runs were left out, the newest kept."] if len(unique) < len(runs) else []
-    )
+    left_out = len(runs) - len(unique)
+    notes = [f"Of runs made more than once, the newest count: {left_out} left out."] if left_out else []
     return Gathered(_variants(list(unique.values())), _problem_name(runs[0]), tuple(notes))
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -26,10 +27,10 @@ def size_of(effect: float) -> str:
 
 def holm(p: Sequence[float]) -> np.ndarray:
     """Holm's step-down correction of p-values (m,). Source: Holm 1979."""
-    p = np.asarray(p, dtype=float)
-    order = np.argsort(p, kind="stable")
-    corrected = np.empty(len(p))
-    corrected[order] = np.minimum(np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1)), 1.0)
+    values = np.asarray(p, dtype=float)
+    order = np.argsort(values, kind="stable")
+    corrected = np.empty(len(values))
+    corrected[order] = np.minimum(np.maximum.accumulate(values[order] * np.arange(len(values), 0, -1)), 1.0)
     return corrected
 
 
@@ -45,7 +46,8 @@ def wilcoxon(a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
     if not len(difference):
         return 1.0, 0.0
     ranks = stats.rankdata(np.abs(difference))
-    return float(stats.wilcoxon(difference).pvalue), float(-np.sum(np.sign(difference) * ranks))
+    found: Any = stats.wilcoxon(difference)
+    return float(found.pvalue), float(-np.sum(np.sign(difference) * ranks))
 
 
 def finite(*samples: np.ndarray) -> list[np.ndarray]:

@@ -12,6 +12,7 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from tractexp.errors import UserError, check_choice
 
@@ -156,7 +157,7 @@ def _typeset(latex: str) -> str | None:
     from matplotlib.mathtext import MathTextParser
 
     latex = _displayed(latex)
-    settings = {"svg.fonttype": "path", "mathtext.fontset": "cm", "svg.hashsalt": "tractexp"}
+    settings: Any = {"svg.fonttype": "path", "mathtext.fontset": "cm", "svg.hashsalt": "tractexp"}
     with rc_context(settings):
         font = FontProperties(size=13)
         try:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from tractexp.errors import UserError, check_range
-from tractexp.plugin import discover, plugin
+from tractexp.plugin import discover, get, plugin
 from tractexp.tasks.console import say, table
 from tractexp.tasks.task import Job, Task
 
@@ -82,7 +82,7 @@ def store(job: Job) -> str:
 
 def plain() -> dict[str, str]:
     """For each optimizer the one that it is with all its switches off, "" where there is none."""
-    return {name: cls.plain for name, cls in discover()["optimizer"].items()}
+    return {name: get("optimizer", name).plain for name in discover()["optimizer"]}
 
 
 def report(comparison: Any, source: str) -> None:
@@ -94,16 +94,11 @@ def report(comparison: Any, source: str) -> None:
     say(f"{source}: {comparison.gathered.problem}")
     rows = [
         [
-            s.name,
-            str(s.runs),
-            str(s.failures),
-            number(s.objective.median),
-            number(s.objective.worst),
-            f"{s.at_floor:.0%}",
+            *(s.name, str(s.failures), number(s.objective.median), number(s.objective.worst), f"{s.at_floor:.0%}"),
+            number(s.ert["simulations"][hardest]),
         ]
         for s in comparison.summaries
     ]
-    rows = [[*row, number(s.ert["simulations"][hardest])] for row, s in zip(rows, comparison.summaries, strict=True)]
     table(["variant", "failed", "median", "worst", "at floor", "ERT"], rows)
     say(f"objectives in pu²; at floor: within 1 %; ERT: simulations expected to {target:g} times the floor")
     told = claims.sentences(comparison)

@@ -1,0 +1,455 @@
+"""Comparisons of sweeps whose truth was planted: found where it is, not found where it is not."""
+
+import itertools
+import json
+import os
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_report_page import read
+
+from tractexp.compare import claims, load
+from tractexp.compare.comparison import compare
+from tractexp.compare.runs import Run, gather
+from tractexp.compare.summary import ECDF_TARGETS, band, floor_of, running_time, runtimes, summarize
+from tractexp.errors import UserError
+
+FLOOR = 8.1e-6
+SEEDS = range(30)
+SWITCHES = ("gaussian", "levy", "tent_initialization", "tent_perturbation")
+TARGETS = (10.0, 2.0, 1.01)
+DATA = {"data.name": "csv", "data.train": ["a.csv"]}
+
+
+def a_run(optimizer, seed, objective, settings=None, *, rate=0.05, iterations=100, data=None, name=None, **more):
+    """A search of 50 simulations and 10 ms an iteration, from 0.1 pu² down to `objective`."""
+    steps = np.arange(iterations + 1)
+    config = {"optimizer.name": name or optimizer, "seed": seed, "budget": None} | (data or DATA)
+    config |= {f"optimizer.{key}": value for key, value in (settings or {}).items()}
+    return Run(
+        optimizer, "tibet_50pct", seed, config, f"{optimizer}-{seed}", objective, objective**0.5, 1.3 * objective**0.5,
+        50.0 * (1 + steps), 0.01 * (1 + steps), np.maximum(0.1 * np.exp(-rate * 2 * steps), objective), **more,
+    )  # fmt: skip
+
+
+def a_failure(optimizer, seed, why="it burst"):
+    whole = a_run(optimizer, seed, FLOOR)
+    return Run(whole.optimizer, whole.data, seed, whole.config, whole.where, failure=why)
+
+
+def samples(factors, spread=0.3, seeds=SEEDS):
+    """Runs whose objectives are log-normal about FLOOR times the variant's factor; seeds share nothing."""
+    runs = []
+    for k, (optimizer, factor) in enumerate(factors.items()):
+        rng = np.random.default_rng(k)
+        runs += [a_run(optimizer, s, FLOOR * factor * np.exp(spread * rng.standard_normal())) for s in seeds]
+    return runs
+
+
+def compared(runs, **more):
+    return compare(gather(runs, "the test"), targets=TARGETS, ties=1e-3, **{"floor": FLOOR / 10, **more})
+
+
+def test_a_planted_better_optimizer_is_found():
+    result = compared(samples({"good": 1.0, "bad": 2.0, "worse": 4.0}))
+    assert [s.name for s in result.summaries] == ["good", "bad", "worse"]
+    assert all(pair.significant for pair in result.pairs)
+    assert {(p.first, p.second) for p in result.pairs} == {("good", "bad"), ("good", "worse"), ("bad", "worse")}
+    assert min(p.effect for p in result.pairs) > 0.85
+    assert result.ranks.p < 1e-6
+    assert result.ranks.groups == ()
+    assert claims.headline(result) == (
+        "good has the lowest median objective; it is significantly better than bad and worse."
+    )
+
+
+def test_optimizers_that_do_not_differ_are_not_told_apart():
+    """Over 100 comparisons of five alike, about 5 in 100 find any difference, since the errors are held per family."""
+    found = sum(
+        any(p.significant for p in compared(runs).pairs)
+        for runs in (
+            [
+                a_run(
+                    name, s, FLOOR * np.exp(0.3 * np.random.default_rng([trial, k, s]).standard_normal()), iterations=2
+                )
+                for k, name in enumerate("abcde")
+                for s in range(12)
+            ]
+            for trial in range(100)
+        )
+    )
+    assert found <= 11  # 99 % of binomial(100, 0.05)
+
+
+def test_runs_that_all_reach_the_floor_are_equal_whatever_is_left_of_rounding():
+    runs = [a_run("a", s, FLOOR * (1 + 1e-9 * s)) for s in SEEDS] + [a_run("b", s, FLOOR * (1 + 1e-7)) for s in SEEDS]
+    result = compared(runs, floor=None)
+    (pair,) = result.pairs
+    assert (pair.p, pair.effect, pair.significant) == (1.0, 0.5, False)
+    assert result.floor.value == FLOOR
+    assert "reached by a" in result.floor.source
+    assert "is not significant" in claims.of_pair(result, pair)
+    assert claims.headline(result).startswith("a and b reach the lowest median objective (equal within 0.10% of the")
+
+
+def test_the_order_of_the_runs_does_not_matter(tmp_path):
+    from tractexp.report.comparison import write_json
+
+    runs = [*samples({"good": 1.0, "bad": 2.0, "other": 1.05}), a_failure("bad", 99)]
+    shuffled = [runs[i] for i in np.random.default_rng(0).permutation(len(runs))]
+    texts = [write_json(compared(r), tmp_path / "c.json", "x").read_text() for r in (runs, shuffled)]
+    assert texts[0] == texts[1]
+
+
+def test_a_quotable_sentence_says_what_the_test_said():
+    result = compared(samples({"issa": 1.0, "ssa": 2.0}))
+    (pair,) = result.pairs
+    medians = [f"{np.median([r.objective for r in result.gathered[n].runs]):.3g}" for n in ("issa", "ssa")]
+    assert claims.of_pair(result, pair) == (
+        f"On 30 seeds and 5,050 simulations, issa reaches a median objective of {medians[0]} pu² against {medians[1]} "
+        f"pu² for ssa; the difference is significant (Wilcoxon signed-rank, Holm-corrected over 1 pair, "
+        f"p = {claims.p_value(pair.p)}; Vargha-Delaney A = {pair.effect:.2f})."
+    )
+
+
+def test_a_sentence_does_not_hide_that_one_variant_had_more_simulations():
+    runs = [a_run("issa", s, FLOOR, iterations=200) for s in SEEDS] + [a_run("ssa", s, 2 * FLOOR) for s in SEEDS]
+    result = compared(runs)
+    told = claims.of_pair(result, result.pairs[0])
+    assert "with 10,050 simulations (median)" in told
+    assert "with 5,050 for ssa" in told
+
+
+def test_a_summary_is_that_of_the_numbers():
+    """Objectives 1 to 5 times 1e-5 with the floor at 1e-5: one run of five is within 1 % of it."""
+    runs = [a_run("a", s, (s + 1) * 1e-5) for s in range(5)] + [a_failure("a", 5)]
+    (variant,) = gather(runs, "x").variants
+    told = summarize(variant, floor_of([variant], None), TARGETS)
+    assert (told.runs, told.failures) == (6, 1)
+    assert vars(told.objective) == pytest.approx(
+        {"best": 1e-5, "lower": 2e-5, "median": 3e-5, "upper": 4e-5, "worst": 5e-5}
+    )
+    assert told.at_floor == pytest.approx(1 / 6)
+    assert told.epsilon_p.median == pytest.approx(3e-5**0.5)
+
+
+def test_running_times_are_counted_by_hand():
+    """Reached after 3, 5 and never; the one that never did, and one that burst, spend all 101 x 50 simulations."""
+    history = {0: 3, 1: 5}
+    runs = [
+        replace(a_run("a", s, 1.0), history=np.where(np.arange(101) >= history.get(s, 999), 1.0, 9.0)) for s in range(3)
+    ]
+    (variant,) = gather([*runs, a_failure("a", 3)], "x").variants
+    assert running_time(variant, 2.0, "simulations") == (4 * 50 + 6 * 50 + 5050 + 5050) / 2
+    assert running_time(variant, 2.0, "seconds") == pytest.approx((0.04 + 0.06 + 1.01 + 1.01) / 2)
+    assert running_time(variant, 0.5, "simulations") == np.inf
+    budgeted = replace(a_failure("a", 3), config=a_failure("a", 3).config | {"budget": 700})
+    (variant,) = gather([replace(r, config=r.config | {"budget": 700}) for r in runs] + [budgeted], "x").variants
+    assert running_time(variant, 2.0, "simulations") == (4 * 50 + 6 * 50 + 5050 + 700) / 2
+
+
+def test_runtimes_hold_every_target_of_every_run():
+    (variant,) = gather([a_run("a", s, FLOOR) for s in range(3)] + [a_failure("a", 9)], "x").variants
+    costs = runtimes(variant, floor_of([variant], None))
+    assert costs.shape == (4 * len(ECDF_TARGETS),)
+    assert np.isinf(costs).sum() == len(ECDF_TARGETS)
+    assert (np.diff(costs[np.isfinite(costs)]) >= 0).all()
+
+
+def test_a_band_holds_what_a_short_run_had_reached():
+    runs = [a_run("a", 0, 1e-5, iterations=10), a_run("a", 1, 3e-5, iterations=100, rate=1.0)]
+    (variant,) = gather(runs, "x").variants
+    for by, last in (("iterations", 100), ("simulations", 5050)):
+        told = band(variant, by)
+        assert told.x[-1] == last
+        assert told.median[-1] == pytest.approx((runs[0].history[-1] + 3e-5) / 2)
+        assert (np.diff(told.median) <= 0).all()
+        assert (told.lower <= told.median).all()
+        assert (told.median <= told.upper).all()
+
+
+# The ablation: objectives with known effects of each switch, in powers of ten.
+
+
+def ablation_runs(combinations, interaction=0.0, noise=0.02):
+    """log10 of the objective: levy -0.3, gaussian +0.1, both together `interaction` more; the others nothing."""
+    runs = []
+    for on in combinations:
+        settings = {switch: switch in on for switch in SWITCHES} | {"population": 50, "polish": False}
+        label = "+".join(sorted(on)) or "off"
+        for seed in SEEDS:
+            rng = np.random.default_rng([seed, *(ord(c) for c in label)])
+            shift = -0.3 * ("levy" in on) + 0.1 * ("gaussian" in on) + interaction * ({"levy", "gaussian"} <= set(on))
+            objective = 1e-3 * 10 ** (shift + noise * rng.standard_normal())
+            runs.append(a_run(label, seed, objective, settings, name="issa", iterations=2))
+    return runs
+
+
+def subsets(sizes):
+    return [on for size in sizes for on in itertools.combinations(SWITCHES, size)]
+
+
+def test_a_full_factorial_gives_every_effect_and_interaction():
+    result = compared(ablation_runs(subsets(range(5)), interaction=0.2), floor=1e-9, plain={"issa": "ssa"})
+    found = result.ablation
+    assert found.unknown == ()
+    effects = {e.switches[0]: e for e in found.effects}
+    assert {len(e.contrasts) for e in effects.values()} == {8}
+    assert effects["levy"].factor == pytest.approx(10 ** (-0.3 + 0.1), rel=0.01)
+    assert effects["gaussian"].factor == pytest.approx(10 ** (0.1 + 0.1), rel=0.01)
+    assert effects["levy"].low < effects["levy"].factor < effects["levy"].high < 1
+    assert effects["levy"].shown
+    assert effects["gaussian"].shown
+    interactions = {frozenset(e.switches): e for e in found.interactions}
+    assert len(interactions) == 6
+    assert interactions[frozenset(("levy", "gaussian"))].factor == pytest.approx(10**0.2, rel=0.01)
+    assert sum(e.shown for e in interactions.values()) <= 2  # one is planted; 1 in 20 of the others by chance
+
+
+def test_one_by_one_from_both_ends_gives_effects_and_says_what_it_cannot_give():
+    """The ablation of the paper: all, all but one, none, one; `ssa` stands for none."""
+    runs = ablation_runs(subsets((1, 3, 4)), interaction=0.2)
+    for r in ablation_runs([()]):
+        config = {k: v for k, v in r.config.items() if not k.endswith(SWITCHES)} | {"optimizer.name": "ssa"}
+        runs.append(replace(r, optimizer="ssa", config=config))
+    found = compared(runs, floor=1e-9, plain={"issa": "ssa", "ssa": ""}).ablation
+    assert len(found.variants) == 10
+    assert "ssa" in found.variants
+    levy = next(e for e in found.effects if e.switches == ("levy",))
+    without = "gaussian+tent_initialization+tent_perturbation"
+    assert set(levy.contrasts) == {("levy", "ssa"), ("+".join(SWITCHES), without)}
+    assert levy.factor == pytest.approx(10 ** ((-0.3 + -0.1) / 2), rel=0.01)  # alone -0.3, with gaussian on -0.1
+    company = next(e for e in found.company if e.switches == ("levy",))
+    assert company.factor == pytest.approx(10**0.2, rel=0.02)
+    assert found.interactions == ()
+    assert {frozenset(u) for u in found.unknown} == {frozenset(p) for p in itertools.combinations(SWITCHES, 2)}
+    assert "four that differ in those alone" in claims.of_unknown(found)
+
+
+def test_variants_with_other_settings_stay_out_of_the_ablation():
+    runs = ablation_runs(subsets((3, 4)))
+    other = [
+        replace(r, optimizer="raw", config=r.config | {"optimizer.space": "raw"}) for r in ablation_runs(subsets((4,)))
+    ]
+    found = compared([*runs, *other], floor=1e-9, plain={"issa": "ssa"}).ablation
+    assert "raw" not in found.variants
+    assert compared(samples({"a": 1.0, "b": 2.0}), plain={"a": "", "b": ""}).ablation is None
+
+
+# Gathering.
+
+
+def test_settings_make_variants_and_name_them():
+    runs = [a_run("issa", s, FLOOR, {"population": n, "levy": True}) for s in range(3) for n in (30, 50)]
+    assert [v.name for v in gather(runs, "x").variants] == ["issa population=30", "issa population=50"]
+    assert [v.name for v in gather(runs[::2], "x").variants] == ["issa"]
+
+
+def test_a_repeated_run_counts_once_and_the_newest():
+    runs = [a_run("a", 0, 2e-5), a_run("a", 0, 1e-5), a_run("a", 1, 1e-5)]
+    gathered = gather(runs, "x")
+    assert [r.objective for r in gathered["a"].runs] == [1e-5, 1e-5]
+    assert gathered.notes == ("Of runs made more than once, the newest count: 1 left out.",)
+
+
+def test_failures_count_as_the_worst_and_never_as_missing():
+    runs = [a_run("a", s, FLOOR) for s in SEEDS] + [a_failure("b", s) for s in SEEDS[:20]]
+    runs += [a_run("b", s, FLOOR) for s in SEEDS[20:]]
+    result = compared(runs)
+    (pair,) = result.pairs
+    assert (pair.first, pair.seeds, pair.significant) == ("a", 30, True)
+    assert "against no result for b; the difference is significant" in claims.of_pair(result, pair)
+
+
+def test_a_reference_tests_its_own_pairs_only():
+    runs = samples({"a": 1.0, "b": 1.5, "c": 2.0})
+    assert len(compared(runs).pairs) == 3
+    result = compared(runs, reference="b")
+    assert {frozenset((p.first, p.second)) for p in result.pairs} == {frozenset("ab"), frozenset("bc")}
+    with pytest.raises(UserError, match="there is no variant 'bb' in this comparison; did you mean 'b'"):
+        compared(runs, reference="bb")
+
+
+def test_too_few_seeds_are_said_and_nothing_is_tested():
+    result = compared(samples({"a": 1.0, "b": 5.0, "c": 9.0}, seeds=range(5)))
+    assert result.pairs == ()
+    assert result.ranks is None
+    assert "3 of 3 pairs were not tested, for want of seeds: a and b have 5 in common" in result.notes[0]
+    assert "needs at least 6" in result.notes[0]
+    assert "The variants were not ranked: they have 5 seeds in common" in result.notes[1]
+    assert claims.headline(result) == "No difference between variants was tested."
+
+
+def test_seeds_too_few_for_the_correction_are_said():
+    """15 pairs on 6 seeds: the smallest corrected p is 15 x 2 / 2^6 = 0.47; 10 seeds give 15 x 2 / 2^10 = 0.029."""
+    runs = samples({name: 10.0**k for k, name in enumerate("abcdef")}, seeds=range(6))
+    (note,) = compared(runs).notes
+    assert "With 15 pairs corrected for, fewer than 10 seeds can show no difference" in note
+    assert min(p.corrected for p in compared(runs).pairs) == pytest.approx(15 * 2 / 64)
+    assert compared(samples({name: 10.0**k for k, name in enumerate("abcdef")}, seeds=range(10))).notes == ()
+
+
+def test_one_variant_is_described_and_not_tested():
+    result = compared(samples({"a": 1.0}))
+    assert result.notes == ("There is one variant only, a: nothing to test it against.",)
+
+
+def test_different_problems_are_refused():
+    other = [replace(r, data="tibet_30pct") for r in samples({"b": 1.0})]
+    with pytest.raises(UserError, match=r"different data \(tibet_30pct, tibet_50pct\).*choose one, such as task.data="):
+        gather([*samples({"a": 1.0}), *other], "the sweep x")
+    assert [v.name for v in gather([*samples({"a": 1.0}), *other], "x", "tibet_30pct").variants] == ["b"]
+    with pytest.raises(UserError, match=r"task.data=tibet_3: the sweep x has no run.*did you mean 'tibet_30pct'"):
+        gather(other, "the sweep x", "tibet_3")
+    fixed = [replace(r, config=r.config | {"model.fixed.C": 0.7}) for r in samples({"b": 1.0})]
+    with pytest.raises(UserError, match=r"differ in model.fixed.C \(0.7, null\)"):
+        gather([*samples({"a": 1.0}), *fixed], "x")
+    with pytest.raises(UserError, match=r"none of the 2 runs of x finished.*because: it burst"):
+        gather([a_failure("a", 0), a_failure("a", 1)], "x")
+
+
+# Sweep folders and the command line.
+
+
+def write_sweep(folder: Path, runs) -> Path:
+    for number, run in enumerate(runs):
+        job = folder / str(number)
+        (job / ".hydra").mkdir(parents=True)
+        config = {
+            "task": {"name": "identify"},
+            "seed": run.seed,
+            "budget": None,
+            "data": {"name": "csv", "train": ["a"]},
+        }
+        config |= {"optimizer": {k.removeprefix("optimizer."): v for k, v in run.config.items() if k.startswith("opt")}}
+        choices = {"task": "identify", "optimizer": run.optimizer, "data": run.data}
+        (job / ".hydra" / "config.yaml").write_text(json.dumps(config))
+        (job / ".hydra" / "hydra.yaml").write_text(json.dumps({"hydra": {"runtime": {"choices": choices}}}))
+        if run.failure:
+            (job / "status.json").write_text(json.dumps({"status": "failed", "message": run.failure}))
+            continue
+        figures = {key: getattr(run, key) for key in ("objective", "epsilon_p", "epsilon_q")}
+        (job / "result.json").write_text(json.dumps(figures))
+        rows = zip(run.simulations, run.seconds, run.history, strict=True)
+        lines = [f"{k},{int(n)},{s:.4f},{f!r}" for k, (n, s, f) in enumerate((n, s, float(f)) for n, s, f in rows)]
+        (job / "history.csv").write_text("\n".join(["iteration,simulations,seconds,objective", *lines]))
+    return folder
+
+
+def tractexp(*arguments, cwd, tracking=False):
+    command = [sys.executable, "-m", "tractexp", "task=compare", *arguments]
+    command += [] if tracking else ["tracking.enabled=false"]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, env=os.environ | {"COLUMNS": "140"})
+
+
+def test_a_sweep_is_read_back_as_it_was_run(tmp_path):
+    runs = [*samples({"a": 1.0}, seeds=range(12)), a_failure("b", 3, "no steady state: widen model.bounds")]
+    back = load.from_sweep(write_sweep(tmp_path / "sweep", runs))
+    for run, found in zip(runs, back, strict=True):
+        assert (found.optimizer, found.data, found.seed, found.failure) == (
+            run.optimizer,
+            run.data,
+            run.seed,
+            run.failure,
+        )
+        assert found.objective == run.objective
+        np.testing.assert_array_equal(found.history, run.history)
+        np.testing.assert_array_equal(found.simulations, run.simulations)
+
+
+def test_a_job_without_a_result_did_not_finish(tmp_path):
+    folder = write_sweep(tmp_path, samples({"a": 1.0}, seeds=range(2)))
+    (folder / "0" / "result.json").unlink()
+    assert load.from_sweep(folder)[0].failure == "it left no result.json: it was ended, or still runs"
+    for name, content in (("history.csv", "nonsense"), ("result.json", "{}"), ("result.json", "[")):
+        (folder / "1" / name).write_text(content)
+        with pytest.raises(UserError, match=rf"{name} cannot be read"):
+            load.from_sweep(folder)
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory):
+    """The command on a sweep of four variants, the newest of two."""
+    folder = tmp_path_factory.mktemp("compare")
+    runs = [
+        *samples({"good": 1.0, "bad <b>": 2.0, "alike": 1.0, "worst": 8.0}),
+        a_failure("worst", 77, "it <b>burst</b>"),
+    ]
+    older = write_sweep(folder / "outputs" / "sweeps" / "older", samples({"old": 1.0}, seeds=range(2)))
+    for path in older.iterdir():
+        os.utime(path, (1, 1))
+    write_sweep(folder / "outputs" / "sweeps" / "newer", runs)
+    return folder, tractexp("hydra.run.dir=out", cwd=folder)
+
+
+def test_the_command_compares_the_newest_sweep(swept):
+    folder, done = swept
+    assert (done.returncode, done.stderr) == (0, "")
+    for part in ("outputs/sweeps/newer", "good", "worst", "at floor", "Holm-corrected over 6 pairs", "comparison.html"):
+        assert part in done.stdout, part
+    assert re.search(r"\n worst +1 +6\.\d+e-05 ", done.stdout)  # one failed, median objective
+    beside = folder / "outputs" / "sweeps" / "newer"
+    for name in ("comparison.html", "comparison.json"):
+        assert (folder / "out" / name).read_bytes() == (beside / name).read_bytes()
+
+
+def test_the_page_is_self_contained_and_complete(swept):
+    reader = read(swept[0] / "out" / "comparison.html")
+    assert reader.tags.count("svg") == 5
+    for part in (
+        "How good", "How fast", "Is the difference more than chance?", "To quote", "Failures: 1", "it <b>burst</b>",
+        "bad <b>", "How to read this page", "by iterations", "by simulations", "Runtimes", "critical difference",
+    ):  # fmt: skip
+        assert part in reader.words, part
+
+
+def test_the_json_holds_the_numbers(swept):
+    content = json.loads((swept[0] / "out" / "comparison.json").read_text())
+    assert {v["name"] for v in content["variants"]} == {"good", "bad <b>", "alike", "worst"}
+    pairs = {frozenset((p["first"], p["second"])): p for p in content["pairs"]}
+    assert len(pairs) == 6
+    assert pairs[frozenset(("good", "worst"))]["significant"]
+    assert not pairs[frozenset(("good", "alike"))]["significant"]
+    assert content["failures"] == [{"variant": "worst", "seed": 77, "job": "120", "message": "it <b>burst</b>"}]
+    assert content["ranks"]["seeds"] == 30
+    assert len(content["sentences"]) == 4 + 6
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ((), "there is no sweep under outputs/sweeps to compare; make one, such as tractexp -m"),
+        (("task.sweep=missing",), "task.sweep=missing is not a folder"),
+        (("task.sweep=empty",), "the sweep empty is empty: none of its folders holds a job"),
+        (("task.sweep=mixed",), "runs on different data (tibet_30pct, tibet_50pct)"),
+        (("task.sweep=empty", "task.filter=x"), "task.sweep and task.filter are both given"),
+        (("task.floor=0",), "task.floor=0 must be an objective above 0"),
+        (("task.targets=[0.5]",), "task.targets=0.5 is out of range: it must be at least 1"),
+        (("task.targets=[]",), "task.targets is empty"),
+        (("task.ties=2",), "task.ties=2.0 is out of range"),
+        (("task.flor=1",), "no key 'flor'; did you mean 'floor'?"),
+    ],
+)
+def test_bad_input_is_one_sentence(tmp_path, arguments, sentence):
+    (tmp_path / "empty" / "0").mkdir(parents=True)
+    runs = samples({"a": 1.0}, seeds=range(2))
+    write_sweep(tmp_path / "mixed", [*runs, *(replace(r, data="tibet_30pct") for r in runs)])
+    done = tractexp(*arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith("tractexp: ")
+    assert sentence in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert not (tmp_path / "outputs" / "runs").exists() or not list((tmp_path / "outputs" / "runs").iterdir())
+
+
+def test_two_seeds_are_compared_without_a_test_and_say_so(tmp_path):
+    write_sweep(tmp_path / "few", samples({"a": 1.0, "b": 2.0}, seeds=range(2)))
+    done = tractexp("task.sweep=few", "hydra.run.dir=out", cwd=tmp_path)
+    assert done.returncode == 0
+    assert "a and b have 2 in common, and the Wilcoxon signed-rank test needs at least 6" in done.stdout
+    assert read(tmp_path / "out" / "comparison.html").tags.count("svg") == 4
