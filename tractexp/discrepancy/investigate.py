@@ -104,7 +104,7 @@ def _conclude(
     validate: Sequence[Event], bounds: Mapping, fixed: Mapping, alpha: float, seed: int, tell: Callable[[str], None],
 ) -> Finding:  # fmt: skip
     noise = explanation.stages[-1].noise
-    bare = study.refit(noise, [((), explanation.stages[0].fit.unit)], chain=())[0]
+    bare = study.refit(noise, [((), _unchained(study, explanation.stages[0].fit, ()))], chain=())[0]
     adequate = [s for s in survivors if s.adequate]
     carried, validation, kept = None, None, adequate
     extended_of = lambda r: study.refit(noise, [(r.fit.names, _unchained(study, r.fit, chain))], chain=chain)[0]  # noqa: E731

@@ -44,15 +44,15 @@ class Null:
         return float((1 + np.count_nonzero(self.unrest >= value)) / (1 + len(self.unrest)))
 
 
-def null_of(t: Tangent, noise: Noise, seed: int, draws: int = DRAWS) -> Null:
-    """Draw the null of every statistic at a fit."""
+def null_of(t: Tangent, noise: Noise, seed: int, plain: bool, draws: int = DRAWS) -> Null:
+    """Draw the null of every statistic at a fit; where the case is `plain`, with the noise taken as known."""
     study, drive = t.study, t.study.problem.drive
     rng = np.random.default_rng(seed)
     lengths = np.diff(drive.first)
     made = np.array([np.concatenate([noise.draw(rng, n) for n in lengths], axis=1) for _ in range(draws)])
     made *= study.likelihood.known
     quiet = sum(p.stop - p.start for p in study.quiet)
-    if quiet >= FEW:
+    if plain or quiet >= FEW:
         return _collect([t.whitened(noise, made)], study)
     rest = rich_residuals(t, made)
     return _collect([t.whitened(re_estimated(t, rest[b]), made[b : b + 1]) for b in range(draws)], study)

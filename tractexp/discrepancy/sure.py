@@ -53,10 +53,11 @@ def rivals(study: Study, explanation: Explanation) -> tuple[list[Rival], Noise]:
 
 
 def surviving(study: Study, explanation: Explanation, seed: int, most: int = 6) -> tuple[list[Rival], list[Rival]]:
-    """(survivors with their adequacy tested, all rivals)."""
+    """(survivors with their adequacy tested, all rivals), the best first."""
     everyone, noise = rivals(study, explanation)
     tested = []
     for k, rival in enumerate([r for r in everyone if not r.rejected][:most]):
         at = explanation.stages[-1] if k == 0 else stage(study, rival.fit, noise, seed + 100 + k)
         tested.append(Rival(rival.fit, rival.behind, rival.distance, False, at))
-    return tested, everyone
+    known = {r.fit.names: r for r in tested}
+    return tested, [known.get(r.fit.names, r) for r in everyone]

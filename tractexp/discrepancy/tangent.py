@@ -59,21 +59,22 @@ class Tangent:
 
     def whitened(self, noise: Noise, residuals: np.ndarray | None = None) -> "Projection":
         """Project under this noise; `residuals` (b, 2, N) replace the fit's own (for the bootstrap)."""
-        drive, known = self.study.problem.drive, self.study.likelihood.known
-        white = lambda raw: noise.whiten(raw, drive, known)  # noqa: E731
-        padded = lambda raw: np.concatenate([white(raw), np.zeros((len(raw), len(self.prior)))], axis=1)  # noqa: E731
-        N = np.concatenate([white(self.nuisance), self.prior.T], axis=1)
-        Q, R = np.linalg.qr(N.T)
-        r = padded(self.residual[None] if residuals is None else residuals)
-        if residuals is None:
-            r[0, -len(self.prior) :] = self.prior @ self.estimate if len(self.prior) else 0.0
-        blocks = [padded(c.raw) for c in self.columns]
-        return Projection(self, Q, R, _off(r, Q), r @ Q, [_off(b, Q) for b in blocks], _off(padded(self.cells), Q))
-
-
-def _off(rows: np.ndarray, Q: np.ndarray) -> np.ndarray:
-    """Rows (n, R) with their part in the span of Q (R, k) taken away."""
-    return rows - (rows @ Q) @ Q.T
+        own = residuals is None
+        raw = [self.nuisance, self.residual[None] if own else residuals, *(c.raw for c in self.columns), self.cells]
+        ends = np.cumsum([len(part) for part in raw])
+        white = noise.whiten(np.concatenate(raw), self.study.problem.drive, self.study.likelihood.known)
+        rows = np.concatenate([white, np.zeros((len(white), len(self.prior)))], axis=1)
+        size = white.shape[1]
+        rows[: ends[0], size:] = self.prior.T
+        if own:
+            rows[ends[0], size:] = self.prior @ self.estimate
+        Q, R = np.linalg.qr(rows[: ends[0]].T)
+        rest = rows[ends[0] :]
+        along = rest @ Q
+        rest -= along @ Q.T
+        parts = np.split(rest, ends[1:-1] - ends[0])
+        departure = self.estimate if own else np.zeros_like(self.estimate)
+        return Projection(self, Q, R, parts[0], along[: len(parts[0])], departure, parts[1:-1], parts[-1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +86,7 @@ class Projection:
     R: np.ndarray
     r: np.ndarray  # (b, R)
     along: np.ndarray  # (b, k) the residuals' part along the nuisances
+    departure: np.ndarray  # (k,) where the nuisances stand, off their prior mean
     blocks: list[np.ndarray]  # per column (k, R)
     cells: np.ndarray  # (c, R)
 
@@ -126,7 +128,7 @@ class Projection:
         estimate = -self.along @ inverse.T  # departures of the nuisances, (b, k)
         covariance = inverse @ inverse.T
         for name, members in self.tangent.chain.items():
-            whole = estimate[:, members] + self.tangent.estimate[members] * (len(self.r) == 1)
+            whole = estimate[:, members] + self.departure[members]
             inner = np.linalg.pinv(covariance[np.ix_(members, members)], rcond=1e-12, hermitian=True)
             result[name] = chdtrc(len(members), np.einsum("bi,ij,bj->b", whole, inner, whole))
         return result

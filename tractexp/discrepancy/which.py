@@ -25,6 +25,7 @@ from tractexp.discrepancy.tangent import (
 
 MOST_EFFECTS = 3
 SHORTLIST = 8  # sets of one size that are refitted
+PLAIN = 1e-10  # a score of this p needs no exact threshold
 NESTED = 0.1  # a set may be worse than its own subset by no more than this, or the refit did not converge
 
 
@@ -72,7 +73,9 @@ def stage(study: Study, fit: Refit, noise: Noise, seed: int) -> Stage:
     fit = study.refit(noise, [(fit.names, fit.unit)])[0]
     t = tangent(study, fit)
     projection = t.whitened(noise)
-    return Stage(fit, noise, t, projection, null_of(t, noise, seed), projection.scores())
+    scores = projection.scores()
+    plain = bool(scores) and scores[0].p < PLAIN
+    return Stage(fit, noise, t, projection, null_of(t, noise, seed, plain), scores)
 
 
 def explain(study: Study, alpha: float, seed: int, tell: Callable[[str], None] = lambda line: None) -> Explanation:
