@@ -116,7 +116,8 @@ class Problem:
             for e in (range(1, len(self.events) + 1) if p.name in own else (0,))
         ]
         if not free:
-            raise UserError("model.fixed fixes every parameter; leave at least one free to identify")
+            why = "model.fixed fixes every parameter" if self.fixed else f"a {model.title} has no parameters"
+            raise UserError(f"{why}; leave at least one free to identify")
         self.space = Space.of(tuple(free))
         self.lower, self.upper = self.space.lower, self.space.upper
         self.per_event = tuple(name for name in model.names if name in own)

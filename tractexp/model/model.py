@@ -70,6 +70,8 @@ class Model:
             if why := effect.refusal(eq):
                 raise UserError(f"the effect '{effect.name}' cannot be added to this model: {why}")
             effect.edit(eq)
+        if eq.P == 0 and eq.Q == 0:
+            raise UserError(f"the {self.title} draw no power; choose a model/motor or a model/static other than 'none'")
         eq.close()
         return eq
 

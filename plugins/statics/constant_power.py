@@ -1,0 +1,27 @@
+"""Static load of constant power."""
+
+from tractexp.model.parts import Static
+from tractexp.plugin import plugin
+
+
+@plugin
+class ConstantPower(Static):
+    """Static load that draws the same power at any voltage: nothing about it is identified.
+
+        P_s = P_s0        Q_s = Q_s0
+
+    `exponential` with p_v = q_v = 0, and `zip` without a_Z, a_I, b_Z, b_I. Its current grows as the voltage falls,
+    which no real load sustains in a deep dip; the effects `constant_power_converter` and
+    `voltage_dependent_power_limit` are what to add then.
+
+    Not to be confused with a converter behind a current limit.
+
+    Source: Kundur 1994, Power System Stability and Control, section 7.1.1.
+    Departures: none.
+    """
+
+    def declare(self, eq):
+        eq.define("static_voltage", eq.U / eq.U0, "u")
+        P = eq.define("P_static", eq.P_s0, "P_s")
+        Q = eq.define("Q_static", eq.Q_s0, "Q_s")
+        eq.consume(P, Q)
