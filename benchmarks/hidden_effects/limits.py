@@ -1,0 +1,93 @@
+"""The size at which an effect can just be told from the base model, by the generator's own sensitivities.
+
+Source: Rao's score test with nuisance directions projected out; the non-centrality of an effect of size eta with the
+whitened, projected signature s is eta² |s|². Small effects, Gaussian noise: an approximation for large limits.
+"""
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+from independent import Load
+
+from hidden_effects.effects import CATALOG, MEASUREMENT
+from hidden_effects.generator import Case, Scene, scene
+from hidden_effects.noise import Noise
+
+STEP = 0.05  # of a size or, relative, of a parameter of the load
+WEAK = 1.0  # prior standard deviation of the relative deviation of a parameter
+MACHINE, STATIC = ("Xs", "Xm", "Rr", "Xr", "H"), ("p_v", "q_v")
+
+
+@lru_cache(maxsize=4096)
+def detection_limit(case: Case, seed: int, power: float = 0.9, level: float = 0.05) -> float:
+    """Size of the case's one effect that a test of the whole catalogue finds with probability `power`.
+
+    `level` is the family-wise false alarm over the catalogue (Bonferroni). The parameters of the load, the static
+    load of each event, and skew, window and drift are projected out. Only the level and the color of the noise count,
+    and only P and Q: for effects on the voltage channel this is a rough guide.
+    """
+    from scipy.stats import norm
+
+    needed = (norm.isf(level / (2 * len(CATALOG))) + norm.isf(1 - power)) ** 2
+    return float(np.sqrt(needed) / np.linalg.norm(projected(case, seed)))
+
+
+def projected(case: Case, seed: int) -> np.ndarray:
+    """The whitened signature of size 1 (rows,), what the base model and the nuisances could imitate taken out.
+
+    ValueError unless the case hides exactly one effect.
+    """
+    ((name, _),) = case.hidden
+    base = replace(
+        case, effect=None, size=1.0, nuisances=(), swing=case.needs("swing"), negative=case.needs("negative")
+    )
+    hidden = replace(case, size=STEP, nuisances=())
+    signature = (_rows(scene(hidden, seed), case.noise) - _rows(scene(base, seed), case.noise)) / STEP
+    tangent = _tangent(base, seed, tuple(other for other in MEASUREMENT if other != name))
+    padded = np.concatenate([signature, np.zeros(tangent.shape[1])])
+    anchored = np.vstack([tangent, np.eye(tangent.shape[1]) / WEAK])
+    return padded - anchored @ np.linalg.lstsq(anchored, padded, rcond=None)[0]
+
+
+@lru_cache(maxsize=64)
+def _tangent(base: Case, seed: int, measurement: tuple[str, ...]) -> np.ndarray:
+    """Whitened derivatives (rows, columns) by parameters of the load, levels of the events, and nuisances."""
+    made = scene(base, seed)
+    loads = [replace(made, load=load) for load in _deviations(made.load)]
+    powers = [
+        replace(made, static=(*made.static[:k], S + STEP * part, *made.static[k + 1 :]))
+        for k, S in enumerate(made.static)
+        for part in (S.real, 1j * S.imag)
+    ]
+    nuisances = [scene(replace(base, nuisances=((name, STEP),)), seed) for name in measurement]
+    at_rest, scale = _rows(made, base.noise), _scale(made)
+    columns = [_rows(other, base.noise, scale) - at_rest for other in (*loads, *powers, *nuisances)]
+    return np.stack(columns, axis=1) / STEP
+
+
+def _scale(made: Scene) -> list[float]:
+    """P0 of each event, which the level of the noise refers to."""
+    return [abs(made.power(k).real) for k in range(len(made.dips))]
+
+
+def _rows(made: Scene, noise: Noise, scale: list[float] | None = None) -> np.ndarray:
+    """P and Q of all events end to end (rows,), whitened by the noise; `scale` where that of `made` is not meant."""
+    rows, phi = [], noise.phi
+    for record, P0 in zip(made.records(), scale or _scale(made), strict=True):
+        for channel in ("P", "Q"):
+            y = record[channel] / (noise.level * P0)
+            rows += [y[:1], (y[1:] - phi * y[:-1]) / np.sqrt(1 - phi**2)]
+    return np.concatenate(rows)
+
+
+def _deviations(load: Load) -> list[Load]:
+    """The load with each of its parameters larger by `STEP`, relative."""
+    larger = 1 + STEP
+    machines = [replace(load.machine, **{name: larger * getattr(load.machine, name)}) for name in MACHINE]
+    statics = [replace(load.static, **{name: larger * getattr(load.static, name)}) for name in STATIC]
+    return [
+        *(replace(load, machine=m) for m in machines),
+        replace(load, rating=larger * load.rating),
+        *(replace(load, static=s) for s in statics),
+    ]
