@@ -19,7 +19,7 @@ HERE = "benchmarks/symmetries.py"
 
 
 def third_order(eq, T_prime, X_prime, C, M, T_m):
-    """Eqs. (1)-(3) of the paper in expressions of any parameters; returns P and Q of the motor."""
+    """Eqs. (1)-(3) of the paper in expressions of any parameters; the motor consumes P and Q."""
     from tractexp.model.equations import I, im, re, sympy
 
     U, U0 = eq.U, eq.U0
@@ -31,7 +31,7 @@ def third_order(eq, T_prime, X_prime, C, M, T_m):
     eq.moves(E, (C * U - E) / T_prime + I * (omega - eq.omega_s) * E, C * U0 / 2 * (1 + cosine - I * sine))
     eq.moves(omega, (P - T_m) / M, eq.omega_s0 - sine / (1 + cosine) / T_prime)
     eq.require(1 - sympy.Abs(sine), "no steady state: |2 T_m X'/(C U0²)| is {value:.3g}", sympy.Abs(sine))
-    return P, Q
+    eq.consume(P, Q)
 
 
 class TCircuit(Motor):
@@ -41,29 +41,29 @@ class TCircuit(Motor):
     X_m = Parameter(2.0, (1.0, 5.0), "pu", "magnetizing reactance", HERE)
     X_r = Parameter(0.2, (0.05, 0.5), "pu", "rotor leakage", HERE)
     R_r = Parameter(0.03, (0.005, 0.1), "pu", "rotor resistance", HERE)
-    M = Parameter(0.006, (0.0005, 0.03), "pu s²/rad", "inertia", HERE)
+    M = Parameter(0.006, (0.0005, 0.03), "pu s²/rad", "inertia constant", HERE)
     T_m = Parameter(0.4, (0.05, 1.0), "pu", "load torque", HERE)
 
     def declare(self, eq):
         X_s, X_m, X_r, R_r, M, T_m = eq.declare(self.parameters)
         X, X_prime = X_s + X_m, X_s + X_m * X_r / (X_m + X_r)
         T0_prime = (X_m + X_r) / (OMEGA * R_r)
-        return third_order(eq, X_prime / X * T0_prime, X_prime, (X - X_prime) / X, M, T_m)
+        third_order(eq, X_prime / X * T0_prime, X_prime, (X - X_prime) / X, M, T_m)
 
 
 class Rated(Motor):
     """The motor per unit of a rating that is a parameter of its own: reactances and inertia scale with it."""
 
-    T_prime = Parameter(0.1, (0.01, 0.5), "s", "transient time constant", HERE)
-    x_prime = Parameter(0.2, (0.05, 1.0), "pu of the rating", "transient reactance", HERE)
+    T_prime = Parameter(0.1, (0.02, 0.3), "s", "transient time constant", HERE)
+    x_prime = Parameter(0.2, (0.1, 0.5), "pu of the rating", "transient reactance", HERE)
     C = Parameter(0.85, (0.3, 0.99), "1", "(X - X')/X", HERE)
-    m = Parameter(0.01, (0.001, 0.05), "pu of the rating s²/rad", "inertia", HERE)
+    inertia = Parameter(0.01, (0.004, 0.03), "pu of the rating s²/rad", "inertia constant", HERE)
     T_m = Parameter(0.4, (0.05, 1.0), "pu", "load torque on the record's base", HERE)
-    rating = Parameter(0.6, (0.2, 1.5), "pu", "rating", HERE)
+    rating = Parameter(0.6, (0.4, 1.0), "pu", "rating", HERE)
 
     def declare(self, eq):
-        T_prime, x_prime, C, m, T_m, rating = eq.declare(self.parameters)
-        return third_order(eq, T_prime, x_prime / rating, C, m * rating, T_m)
+        T_prime, x_prime, C, inertia, T_m, rating = eq.declare(self.parameters)
+        third_order(eq, T_prime, x_prime / rating, C, inertia * rating, T_m)
 
 
 @functools.cache

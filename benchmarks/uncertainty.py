@@ -188,19 +188,21 @@ CASES = {
     "one shallow dip": Case(
         "C trades against q_v and X'",
         SHALLOW,
-        0.002,
+        0.005,
         {"C": WEAK, **dict.fromkeys(("M", "T_m", "p_v"), IDENTIFIED)},
     ),
     "three dips": Case(
         "the same noise, with dips of 30 % and 50 % beside it",
         (*SHALLOW, 0.3, 0.5),
-        0.002,
+        0.005,
         dict.fromkeys(NAMES, IDENTIFIED),
     ),
     "no static P": Case(
         "the motor draws all of P, so p_v has no meaning", DEEP, 0.002, {"p_v": UNIDENTIFIED, "M": IDENTIFIED}, P0=0.4
     ),
-    "bound below the truth": Case("C is 0.85 and its bound 0.75", DEEP, 0.002, {"C": BOUND}, bounds={"C": [0.3, 0.75]}),
+    "bound below the truth": Case(
+        "M is 0.006 and its bound 0.005", DEEP, 0.002, {"M": BOUND}, bounds={"M": [0.001, 0.005]}
+    ),
     "T-circuit": Case(
         "four numbers for three observables", DEEP, 0.002,
         {**dict.fromkeys(("X_s", "X_m", "X_r", "R_r"), UNIDENTIFIED), **dict.fromkeys(("M", "T_m", "p_v"), IDENTIFIED)},
@@ -208,7 +210,7 @@ CASES = {
     ),
     "rating": Case(
         "a rating scales reactance and inertia", DEEP, 0.002,
-        {**dict.fromkeys(("x_prime", "m", "rating"), UNIDENTIFIED), "T_m": IDENTIFIED, "T_prime": IDENTIFIED},
+        {**dict.fromkeys(("x_prime", "inertia", "rating"), UNIDENTIFIED), "T_m": IDENTIFIED, "T_prime": IDENTIFIED},
         motor="Rated",
     ),
 }  # fmt: skip

@@ -94,21 +94,22 @@ def _number(correlation: float) -> str:
 
 def _structural(information: Information, unseen: np.ndarray, j: int) -> str:
     """Which changes leave the record unchanged, and which combinations of those parameters it does see."""
-    direction = min(
-        (row for row in unseen if abs(row[j]) > SHARE), key=lambda row: np.count_nonzero(np.abs(row) > SHARE)
-    )
-    members = [k for k in np.flatnonzero(np.abs(direction) > SHARE) if k != j]
-    if not members:
+    with_it = [row for row in unseen if abs(row[j]) > SHARE]
+    direction = min(with_it, key=lambda row: np.count_nonzero(np.abs(row) > SHARE))
+    names, pivot = information.names, int(np.abs(direction).argmax())
+    direction = direction / direction[pivot]
+    members = np.flatnonzero(np.abs(direction) > SHARE)
+    if len(members) == 1:
         return "the record does not change with it at all"
-    moves = ", ".join(f"{information.names[k]} {direction[k] / direction[j]:+.3g} %" for k in members)
-    said = f"a change of {information.names[j]} by +1 % together with {moves} leaves the record unchanged"
+    moves = ", ".join(f"{names[k]} {direction[k]:+.3g} %" for k in members)
+    said = f"{moves}, changed together, leave the record unchanged"
     seen = []
-    for k in members:
-        exponents = np.zeros(len(information.names))
-        exponents[j], exponents[k] = -direction[k] / direction[j], 1.0
-        if np.abs(unseen @ exponents).max() < SHARE * np.abs(exponents).max():
-            seen.append(combination(information.names, exponents))
-    return said + (f"; what it sees is {' and '.join(seen)}" if seen else "")
+    for k in members[members != pivot]:
+        exponents = np.zeros(len(names))
+        exponents[pivot], exponents[k] = -direction[k], 1.0
+        if np.abs(unseen @ exponents).max() < SHARE:
+            seen.append(combination(names, exponents))
+    return said + (f"; what it sees is {', '.join(seen)}" if seen else "")
 
 
 def combination(names: Sequence[str], exponents: np.ndarray) -> str:

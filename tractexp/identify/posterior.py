@@ -1,0 +1,72 @@
+"""A sample of the posterior, to confirm intervals where the likelihood is no parabola. Needs the extra [posterior]."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.identify.uncertainty import LEVEL, Uncertainty
+
+BURN = 0.3  # of the steps are thrown away
+ENOUGH = 50.0  # autocorrelation times that a chain should last (emcee's own advice)
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Draws (n, d) of the free parameters under a flat prior within their bounds."""
+
+    names: tuple[str, ...]
+    draws: np.ndarray
+    steps: int
+    autocorrelation: float  # steps, the largest over the coordinates
+    acceptance: float
+    simulations: int
+
+    @property
+    def intervals(self) -> np.ndarray:
+        """(d, 2) between the outer quantiles."""
+        tails = (1 - LEVEL) / 2
+        return np.quantile(self.draws, [tails, 1 - tails], axis=0).T
+
+    @property
+    def converged(self) -> bool:
+        return self.steps >= ENOUGH * self.autocorrelation
+
+
+def sample(known: Uncertainty, walkers: int, steps: int, seed: int) -> Posterior:
+    """Goodman and Weare's affine-invariant ensemble (emcee), all walkers of a half-step in one simulation call.
+
+    P0 and Q0 of each event are sampled along. Raises `UserError` where emcee is not installed.
+    """
+    try:
+        import emcee
+    except ImportError:
+        raise UserError("task=posterior needs emcee; install it by: pip install 'tractexp[posterior]'") from None
+    likelihood, d = known.likelihood, len(known.unit)
+    if walkers < 2 * d:
+        raise UserError(f"task.walkers={walkers} is too few: {d} coordinates need at least {2 * d}")
+
+    def log_probability(unit: np.ndarray) -> np.ndarray:
+        outside = ((unit < 0) | (unit > 1)).any(axis=1)
+        rows = likelihood.rows(np.clip(unit, 0, 1))
+        value = -0.5 * np.einsum("nr,nr->n", rows, rows)
+        return np.where(outside | ~np.isfinite(value), -np.inf, value)
+
+    rng = np.random.default_rng(seed)
+    start = np.clip(known.unit + _spread(known) * rng.standard_normal((walkers, d)), 1e-6, 1 - 1e-6)
+    start[~np.isfinite(log_probability(start))] = np.clip(known.unit, 1e-6, 1 - 1e-6)
+    start = np.clip(start + 1e-7 * rng.standard_normal(start.shape), 0, 1)
+    sampler = emcee.EnsembleSampler(walkers, d, log_probability, vectorize=True)
+    sampler._random = np.random.RandomState(seed)
+    sampler.run_mcmc(start, steps)
+    kept = sampler.get_chain(discard=int(BURN * steps), flat=True)
+    time = float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))
+    draws = likelihood.values(kept)
+    return Posterior(known.names, draws, steps, time, float(sampler.acceptance_fraction.mean()), walkers * (steps + 2))
+
+
+def _spread(known: Uncertainty) -> np.ndarray:
+    """Standard deviation of the start (D,), in ranges: that of the information matrix, at most a tenth."""
+    wide = known.half / known.factor / (known.upper - known.lower)
+    rest = np.full(len(known.unit) - len(wide), 1e-3)
+    return np.concatenate((np.clip(wide, 1e-6, 0.1), rest))
