@@ -304,3 +304,12 @@ def test_there_is_a_variant_for_each_ablation_and_reading():
     wanted |= {f"{name}_{r}" for name in ("ssa", "issa") for r in readings}
     wanted |= {"issa_by_stage", "issa_printed_levy", "issa_polish"}
     assert wanted <= set(VARIANTS)
+
+
+def test_bias_audit_finds_printed_ssa_drawn_to_zero_and_particle_swarm_not():
+    from bias_audit import LITERAL, error
+
+    for settings, biased in (({"name": "ssa", **LITERAL}, True), ({"name": "pso"}, False)):
+        centered, shifted = (error(settings, "sphere", shift, 5000, 3) for shift in (0.0, 1.0))
+        assert (shifted > 1e20 * centered) == biased
+        assert (0.1 < shifted / centered < 10) == (not biased)  # Kudela 2023: a ratio beyond ten is a bias

@@ -222,7 +222,7 @@ def test_polish_finishes_what_a_search_began_inside_the_budget(space):
     assert polished.objective < 1e-20
     np.testing.assert_allclose(polished.values, TRUTH, rtol=1e-9)
     assert polished.simulations <= 600
-    np.testing.assert_array_equal(polished.history.objective[:8], rough.history.objective[:8])
+    np.testing.assert_array_equal(polished.history.objective[:6], rough.history.objective[:6])  # half of it
 
 
 def test_polish_follows_a_search_that_ends_by_itself():

@@ -14,6 +14,8 @@ EDGE = 1e-9  # SciPy's interior method starts strictly inside the box
 ELITE = 10  # starts of a polish
 APART = 0.3  # between starts: a search that has settled in one valley must not fill the elite with points of it
 
+ROUGH, ROUGH_TRIALS = 1e-2, 30  # relative tolerance and trials of the first descents of a polish
+
 
 def spread(unit: np.ndarray, f: np.ndarray, count: int) -> np.ndarray:
     """Indices of at most `count` points, best first, each further than `APART` from every better one chosen.
@@ -82,19 +84,27 @@ def descend(
     the descent ends when the objective, the step or the gradient is below it, or after `trials` trials. The
     search loop that owns `evaluate` keeps the best; a start that cannot be simulated is left at once.
     """
-    from scipy.optimize import least_squares
+    from scipy.optimize import least_squares  # its annotations know `jac` as a string only
 
     residuals = _Residuals(evaluate, box, 1 / np.sqrt(objective) if objective > 0 else 1.0)
     unit = np.clip(box.to_unit(start), EDGE, 1 - EDGE)
     if np.isfinite(residuals(unit)).all():
         least_squares(
-            residuals, unit, residuals.jacobian, (0.0, 1.0), ftol=tolerance, xtol=tolerance, gtol=tolerance,
+            residuals, unit, residuals.jacobian,  # pyright: ignore[reportArgumentType]
+            (0.0, 1.0), ftol=tolerance, xtol=tolerance, gtol=tolerance,
             max_nfev=trials,
         )  # fmt: skip
 
 
 def polish(evaluate: Evaluate, elite: Elite) -> Iterator[None]:
-    """Descend from each elite point, best first; one iteration each."""
+    """Descend roughly from each elite point, best first, then finish from the best reached; an iteration each.
+
+    The elite must hear of what `evaluate` meets, as it does in the search loop. Finishing every descent would
+    spend half the simulations on the bottoms of wrong valleys.
+    """
     for start, objective in zip(elite.x, elite.f, strict=True):
-        descend(evaluate, elite.box, start, objective)
+        descend(evaluate, elite.box, start, objective, ROUGH, ROUGH_TRIALS)
+        yield
+    if len(elite.f):
+        descend(evaluate, elite.box, elite.x[0], elite.f[0])
         yield

@@ -15,8 +15,8 @@ from tractexp.identify.optimizer import REFUSED, Box, Optimizer
 from tractexp.identify.polish import Elite, polish
 
 UNKNOWN = 1e30  # stands for an objective that is not a finite number: worse than any miss
-POLISH_STEPS = 160  # least-squares steps, of d + 2 simulations, that a budget keeps back for the polish,
-POLISH_SHARE = 1 / 3  # but never more than this share of it
+POLISH_STEPS = 200  # least-squares steps, of d + 2 simulations, that a budget keeps back for the polish,
+POLISH_SHARE = 1 / 2  # but never more than this share of it
 
 
 class Objective(Protocol):
@@ -157,8 +157,7 @@ def _iterations(counter: _Counter, optimizer: Optimizer, rng: np.random.Generato
     if not optimizer.polish:
         yield from optimizer.search(counter, counter.box, rng)
         return
-    limits, elite = counter.limits, Elite(counter.box)
-    counter.elite = elite
+    limits, counter.elite = counter.limits, Elite(counter.box)
     counter.limits = _before_polish(limits, counter.box.dimension)
     try:
         yield from optimizer.search(counter, counter.box, rng)
@@ -166,8 +165,8 @@ def _iterations(counter: _Counter, optimizer: Optimizer, rng: np.random.Generato
         raise
     except _Stop:
         pass  # its share is spent: the polish has the rest
-    counter.limits, counter.elite = limits, None
-    yield from polish(counter, elite)
+    counter.limits = limits
+    yield from polish(counter, counter.elite)
 
 
 def search(
