@@ -19,6 +19,7 @@ from tractexp.model.model import Model, compose
 from tractexp.record import Event
 
 STARTS = 24  # of the base fit
+KEPT = 3  # of them that are refined with the measurement chain free
 PRIOR = 5.0  # smallest relevant sizes: how far the measurement chain is believed to be off, one standard deviation
 
 
@@ -48,7 +49,7 @@ class Study:
         substeps: int | None = None,
     ):
         self.model, self.catalogue, self.events = model, catalogue, tuple(events)
-        base = Problem(model, events, bounds, fixed, substeps)
+        base = self._alone = Problem(model, events, bounds, fixed, substeps)
         union = compose(model.motor, model.static, [*model.effects, *catalogue.effects, Injection()])
         self.problem = Problem(union, events, bounds, fixed, int(base.step.substeps.max()))
         self.likelihood = Likelihood.of(self.problem)
@@ -139,16 +140,26 @@ class Study:
 
     def base_fit(self) -> tuple[Refit, Noise]:
         """The base model with the chain free, and the noise of its residuals in quiet stretches."""
-        from scipy.stats import qmc
-
         noise = self.white()
-        starts = np.tile(self.null, (STARTS + 1, 1))
-        starts[1:, self.base] = qmc.Sobol(len(self.base), scramble=False).random(64)[1 : STARTS + 1]
-        fit = self.refit(noise, [((), start) for start in starts])[0]
+        fit = self.refit(noise, [((), start) for start in self._base_starts()])[0]
         for _ in range(2):
             noise = self.noise(fit.unit)
             fit = self.refit(noise, [((), fit.unit)])[0]
         return fit, noise
+
+    def _base_starts(self) -> list[np.ndarray]:
+        """The best fits of the base model alone, by its own fast kernel, from starts all over its box."""
+        from scipy.stats import qmc
+
+        likelihood = Likelihood.of(self._alone)
+        d = self._alone.space.dimension
+        begin = np.full((STARTS + 1, d + len(self.before)), 0.5)
+        begin[1:, :d] = qmc.Sobol(d, scramble=False).random(64)[1 : STARTS + 1]
+        done = descend(likelihood.rows, begin, tolerance=0.1)
+        starts = np.tile(self.null, (KEPT, 1))
+        best = np.argsort(done.deviance)[:KEPT]
+        starts[:, self.base], starts[:, self.before] = done.unit[best, :d], done.unit[best, d:]
+        return list(starts)
 
     def white(self) -> Noise:
         """White noise of the level before the dips: what is known before the first fit."""
