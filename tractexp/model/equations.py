@@ -112,14 +112,16 @@ class Equations:
         self.definitions[symbol] = expression
         return symbol
 
-    def compute(self, name: str, expression: sympy.Expr, before: sympy.Expr) -> Symbol:
+    def compute(self, name: str, expression: sympy.Expr, before: sympy.Expr | None = None) -> Symbol:
         """A real quantity that is computed once and then referred to, such as a step of an unrolled iteration.
 
-        `before` is its value before the event, where the iteration has converged.
+        `before` is its value before the event, needed where the steady state or the static load's share depends on
+        it: there the iteration has converged.
         """
         symbol = _real(name)
         self.steps[symbol] = sympy.sympify(expression)
-        self.known_before[symbol] = self.real(self.before(before))
+        if before is not None:
+            self.known_before[symbol] = self.real(self.before(before))
         self.latex_names[symbol] = name
         return symbol
 

@@ -1,0 +1,139 @@
+"""Impedance between the recorded bus and the load."""
+
+from tractexp.model.parts import Effect
+from tractexp.parameter import Parameter
+from tractexp.plugin import plugin
+
+SOURCE = "WECC composite load model 2015 (jXxf, Rfdr + jXfdr)"
+ITERATIONS = 2
+STEEPEST = 0.3  # least slope Newton's method may see: near voltage collapse it would step too far
+
+
+@plugin
+class FeederImpedance(Effect):
+    r"""Motor and static load lie behind a feeder, whose drop they see and whose loss the bus feeds.
+
+        V = U - Z_f I,   I = I_d + I_s,   Z_f = R_f + j X_f,   P + j Q -> P + j Q + Z_f |I|^2
+
+    The motor's current is I_d = a + b V, the static load's I_s = conj(P_s + j Q_s)/conj(V) depends on v = |V| by an
+    admittance Y(v) alone, so
+
+        V = B/(1 + Z_f (b + Y(v))),   B = U - Z_f a
+
+    leaves one real equation, v |1 + Z_f (b + Y(v))| = |B|. It is solved for ln v by two steps of Newton's method,
+    from the v that the admittance before the event would give. At R_f = X_f = 0 the base model. Other parts, such as
+    a capacitor, stay at the recorded bus.
+
+    Source: WECC composite load model specification 2015 (feeder and transformer).
+    Departures: R_f and X_f are one impedance from bus to load; where a load has no solution (voltage collapse) the
+    last iterate stands.
+    """
+
+    R_f = Parameter(0.0, (-0.02, 0.1), "pu", "feeder resistance on the record's base", SOURCE, null=0.0)
+    X_f = Parameter(0.0, (-0.05, 0.2), "pu", "feeder reactance on the record's base", SOURCE, null=0.0)
+
+    order = 2
+    needs = ("static_voltage", "P_static", "Q_static")
+    relevant = {"R_f": 0.01, "X_f": 0.02}
+    confused_with = ("stator_resistance", "dc_link_lag", "magnetic_saturation", "speed_dependent_torque")
+
+    def refusal(self, eq):
+        if (why := super().refusal(eq)) or not eq.has("P_motor"):
+            return why
+        if not eq.has("motor_voltage") or eq.symbol("motor_voltage").is_real:
+            return "its motor's voltage is no phasor (a quantity motor_voltage) that a feeder could turn"
+        return None if _affine(eq) else "its motor's current is not a + b V in the voltage V"
+
+    def edit(self, eq):
+        from tractexp.model.equations import I, conjugate, im, re, start_symbol, sympy
+
+        R_f, X_f = eq.declare(self.parameters)
+        Z = R_f + I * X_f
+        loads = [eq.symbol(n) for n in ("P_motor", "P_static", "Q_motor", "Q_static") if eq.has(n)]
+        at_bus = [eq.before(power.xreplace(dict.fromkeys(loads, sympy.Integer(0)))) for power in (eq.P, eq.Q)]
+        I_0 = (eq.P0 - at_bus[0] - I * (eq.Q0 - at_bus[1])) / eq.U0
+        a, b = (_computed(eq, f"motor_{k}", part, part) for k, part in zip("ab", _motor_current(eq), strict=True))
+        B = _computed(eq, "feeder_source", eq.U - Z * a, eq.U - Z * a)
+        x, Y = _solve(eq, Z, b, B, eq.U0 - Z * I_0)
+        V = _computed(eq, "load_voltage", B / (1 + Z * (b + Y)), eq.U0 - Z * I_0)
+
+        name = eq.symbol("motor_voltage") if eq.has("motor_voltage") else eq.define("load_voltage", V, "V")
+        drawn = sum(s * (1 if s.name.startswith("P") else I) for s in loads)
+        current = eq.define("feeder_current", _computed(eq, "feeder_current", a + (b + Y) * V, I_0), "I_f")
+        eq.shown[current] = conjugate(drawn / name)
+        eq.edit(name.name, lambda _: V, shown=eq.U - Z * current)
+        eq.edit("static_voltage", lambda _: sympy.exp(x), shown=sympy.Abs(name) / sympy.Abs(start_symbol(name)))
+        square = re(current) ** 2 + im(current) ** 2
+        eq.consume(R_f * square, X_f * square)
+
+
+def _solve(eq, Z, b, B, V_0):
+    """ln(v/v_0) by Newton's method, and the static load's admittance there."""
+    from tractexp.model.equations import conjugate, re, sympy
+
+    v_0 = eq.compute("load_voltage_0", *[sympy.sqrt(_square(eq, V_0))] * 2)
+    square = _square(eq, B)
+    x = eq.compute("feeder_x0", sympy.log(square / eq.before(square)) / 2, 0)
+    for k in range(ITERATIONS):
+        v_squared = eq.compute(f"{x}_v_squared", (v_0 * sympy.exp(x)) ** 2)
+        Y, slope = _static_admittance(eq, x, v_squared)
+        W = 1 + Z * (b + Y)
+        size = eq.compute(f"{x}_size", _square(eq, W))
+        excess = eq.compute(f"{x}_excess", v_squared * size / square - 1)
+        steepness = 1 + eq.real(re(conjugate(W) * Z * slope)) / size
+        step = excess / (2 + excess) / sympy.Max(STEEPEST, steepness)  # ln(1 + excess) ~ 2 excess/(2 + excess)
+        x = eq.compute(f"feeder_x{k + 1}", x - step, 0)
+    return x, _static_admittance(eq, x, (v_0 * sympy.exp(x)) ** 2)[0]
+
+
+def _static_admittance(eq, x, v_squared):
+    """Y = conj(P_s + j Q_s)/v^2 at x = ln(v/v_0), and dY/dx."""
+    from tractexp.model.equations import I, sympy
+
+    u = eq.symbol("static_voltage")
+    Y, slope = [], []
+    for name in ("P_static", "Q_static"):
+        drawn = eq.expand(eq.symbol(name), lambda s: s != u).xreplace({u: sympy.exp(x)})
+        Y.append(eq.compute(f"{x}_{name}", drawn / v_squared))
+        slope.append(eq.compute(f"{x}_{name}_slope", (sympy.diff(drawn, x) - 2 * drawn) / v_squared))
+    return Y[0] - I * Y[1], slope[0] - I * slope[1]
+
+
+def _motor_current(eq):
+    """a and b of the motor's current a + b V, from its power at V = 1 and V = -1."""
+    if not eq.has("P_motor"):
+        return 0, 0
+    plus, minus = (_motor_current_at(eq, V) for V in (1, -1))
+    return (plus + minus) / 2, (plus - minus) / 2
+
+
+def _motor_current_at(eq, V):
+    from tractexp.model.equations import I, conjugate, sympy
+
+    name = eq.symbol("motor_voltage")
+    P, Q = (eq.expand(eq.symbol(n), lambda s: s != name) for n in ("P_motor", "Q_motor"))
+    return (P - I * Q).xreplace({name: sympy.sympify(V)}) / conjugate(sympy.sympify(V))
+
+
+def _affine(eq):
+    """Whether the motor's current really is a + b V: tried at V = 2j with every other symbol at some number."""
+    from tractexp.model.equations import I
+
+    a, b = _motor_current(eq)
+    off = sum(part**2 for part in eq.parts(_motor_current_at(eq, 2 * I) - a - 2 * I * b))
+    known = {s: 0.3 + 0.01 * k for k, s in enumerate(sorted(off.free_symbols, key=str))}
+    return abs(off.subs(known)) < 1e-18
+
+
+def _computed(eq, name, value, before):
+    """A complex quantity computed once, from its two parts."""
+    from tractexp.model.equations import I
+
+    pairs = zip("dq", eq.parts(value), eq.parts(eq.before(before)), strict=True)
+    d, q = (eq.compute(f"{name}_{axis}", now, then) for axis, now, then in pairs)
+    return d + I * q
+
+
+def _square(eq, z):
+    """|z|^2."""
+    return sum(part**2 for part in eq.parts(z))
