@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from tractexp.tasks.task import Job, Task
 
 if TYPE_CHECKING:
     from tractexp.identify.problem import Problem
+    from tractexp.identify.result import Fit, Result
     from tractexp.identify.search import Found
     from tractexp.identify.uncertainty import Together, Uncertainty
 
@@ -27,23 +28,10 @@ class Identify(Task):
     predictor: bool | None = None  # log the model for mlflow.pyfunc; null: in single runs, not in sweeps
 
     def run(self, job: Job) -> None:
-        from tractexp.identify.result import conclude, write_history
-        from tractexp.identify.uncertainty import assess, compare_events
+        from tractexp.identify.result import write_history
+        from tractexp.identify.uncertainty import compare_events
 
-        config = job.config
-        events = job.events()
-        node = config["model"]
-        problem = job.problem(events.train)
-        optimizer = job.optimizer
-        announce(job, events, problem)
-
-        limits = Limits(config["budget"], config["time_limit"], config["target"])
-        with searching(getattr(optimizer, "iterations", None), limits.simulations) as progress:
-            found = search(problem, optimizer, job.seed, limits, progress)
-        settings = {part: node[part] for part in ("motor", "static", "effects")}
-        result, fits = conclude(problem, found, events.validate, job.seed, settings, job.choices["optimizer"])
-
-        known = assess(problem, found.values, robust=not problem.loss.quadratic)
+        problem, found, result, fits, known = identified(job)
         together = compare_events(known) if len(problem.events) > 1 else None
         result = replace(result, **known.fields(together, astray(problem, found, known)))
 
@@ -57,6 +45,33 @@ class Identify(Task):
         for path in paths:
             say(f"  {path}")
         track(job, found, result, paths, _wanted(self.predictor, job))
+
+
+class Identified(NamedTuple):
+    """What a search found and how sure it is: where every task begins that looks closer."""
+
+    problem: "Problem"
+    found: "Found"
+    result: "Result"
+    fits: "list[Fit]"
+    known: "Uncertainty"
+
+
+def identified(job: Job) -> Identified:
+    """Read the records, search, judge the outcome; says what is read and how far the search is."""
+    from tractexp.identify.result import conclude
+    from tractexp.identify.uncertainty import assess
+
+    config, events, optimizer = job.config, job.events(), job.optimizer
+    problem = job.problem(events.train)
+    announce(job, events, problem)
+    limits = Limits(config["budget"], config["time_limit"], config["target"])
+    with searching(getattr(optimizer, "iterations", None), limits.simulations) as progress:
+        found = search(problem, optimizer, job.seed, limits, progress)
+    settings = {part: config["model"][part] for part in ("motor", "static", "effects")}
+    result, fits = conclude(problem, found, events.validate, job.seed, settings, job.choices["optimizer"])
+    known = assess(problem, found.values, robust=not problem.loss.quadratic)
+    return Identified(problem, found, replace(result, **known.fields()), fits, known)
 
 
 def _wanted(setting: bool | None, job: Job) -> bool:

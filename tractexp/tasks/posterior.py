@@ -2,16 +2,14 @@
 
 import json
 import time
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from tractexp.errors import check_range
-from tractexp.identify.search import Limits, search
 from tractexp.plugin import plugin
-from tractexp.tasks.console import say, searching, table
-from tractexp.tasks.identify import announce, report, track
+from tractexp.tasks.console import say, table
+from tractexp.tasks.identify import identified, report, track
 from tractexp.tasks.task import Job, Task
 
 
@@ -28,20 +26,9 @@ class Posterior(Task):
 
     def run(self, job: Job) -> None:
         from tractexp.identify.posterior import sample
-        from tractexp.identify.result import conclude, write_history
-        from tractexp.identify.uncertainty import assess
+        from tractexp.identify.result import write_history
 
-        config, events = job.config, job.events()
-        problem = job.problem(events.train)
-        announce(job, events, problem)
-        limits = Limits(config["budget"], config["time_limit"], config["target"])
-        with searching(getattr(job.optimizer, "iterations", None), limits.simulations) as progress:
-            found = search(problem, job.optimizer, job.seed, limits, progress)
-        settings = {part: config["model"][part] for part in ("motor", "static", "effects")}
-        result, _ = conclude(problem, found, events.validate, job.seed, settings, job.choices["optimizer"])
-        known = assess(problem, found.values, robust=not problem.loss.quadratic)
-        result = replace(result, **known.fields())
-
+        problem, found, result, _, known = identified(job)
         started = time.perf_counter()
         drawn = sample(known, self.walkers, self.steps, job.seed)
         seconds = time.perf_counter() - started

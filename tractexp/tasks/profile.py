@@ -6,10 +6,9 @@ from dataclasses import replace
 from typing import Any
 
 from tractexp.errors import check_range
-from tractexp.identify.search import Limits, search
 from tractexp.plugin import plugin
-from tractexp.tasks.console import say, searching, table
-from tractexp.tasks.identify import announce, report, track
+from tractexp.tasks.console import say, table
+from tractexp.tasks.identify import identified, report, track
 from tractexp.tasks.task import Job, Task
 
 
@@ -24,26 +23,16 @@ class Profile(Task):
 
     def run(self, job: Job) -> None:
         from tractexp.identify.profile import profiles
-        from tractexp.identify.result import conclude, write_history
-        from tractexp.identify.uncertainty import assess
+        from tractexp.identify.result import write_history
         from tractexp.report import uncertainty
 
-        config, events = job.config, job.events()
-        problem = job.problem(events.train)
-        announce(job, events, problem)
-        limits = Limits(config["budget"], config["time_limit"], config["target"])
-        with searching(getattr(job.optimizer, "iterations", None), limits.simulations) as progress:
-            found = search(problem, job.optimizer, job.seed, limits, progress)
-        settings = {part: config["model"][part] for part in ("motor", "static", "effects")}
-        result, _ = conclude(problem, found, events.validate, job.seed, settings, job.choices["optimizer"])
-
+        problem, found, result, _, known = identified(job)
         started = time.perf_counter()
-        made = profiles(assess(problem, found.values, robust=not problem.loss.quadratic), self.points)
+        made = profiles(known, self.points)
         seconds = time.perf_counter() - started
-        known = made.known
         verdicts = {name: str(verdict) for name, verdict in made.verdicts.items()}
         intervals = {p.name: list(p.interval) for p in made.profiles}
-        fields = known.fields(notes=made.notes) | {"verdicts": verdicts, "intervals": intervals}
+        fields = made.known.fields(notes=made.notes) | {"verdicts": verdicts, "intervals": intervals}
         result = replace(result, **fields)
 
         report(problem, result)
