@@ -22,8 +22,9 @@ class DoubleCage(Motor):
 
     X = X'/(1 - C), T_0' = T'/(1 - C) as everywhere here, and T'' = X''/X' T_0'' in the same manner. D is the kernel's
     state: the textbook's line for dE''/dt is the sum of the two. At X'' = X' the second cage is open, D = 0, and the
-    model is `electromechanical`. The steady state is a quartic in the slip and is solved by Newton's method, from
-    that of both cages in parallel at a small slip.
+    model is `electromechanical`. The steady state is a quartic in the slip and is solved by Newton's method from below:
+    from slips that are raised until the torque, which grows less than in proportion, is nearly T_m. A load beyond the
+    first cage's peak torque, which only a crawling motor carries on its second cage, may be refused.
 
     Not to be confused with `stator_flux`, the "fifth order" of machine textbooks, which has one cage and stator
     transients; nor with `second_motor_group`, which is two machines with a speed each.
@@ -53,14 +54,30 @@ class DoubleCage(Motor):
         Q = eq.define("Q_motor", im(V * conjugate(current)), "Q_d")
         eq.consume(P, Q)
 
-        share = X_second * (X_prime - X_second) / X_prime / T_second  # (X' - X'')/T_0''
-        both = T_prime + share / X_prime * (T_prime / C) ** 2 * 0  # placeholder
-        E_0, slower = _machine.at_rest(eq, both, X_prime, C, T_m)
+        open_second = T_second * X_prime / X_second  # T_0''
+        E_0, D_0, slip = self._guess(eq, T_prime, X_prime, C, T_m, open_second, X_second)
         flux = (I * X_prime * coupling * current - (1 - coupling) * E) / time_constant
-        second = (I * (X_prime - X_second) * current - D) * X_second / (X_prime * T_second)
+        second = (I * (X_prime - X_second) * current - D) / open_second
         eq.moves(E, flux + I * (omega - eq.omega_s) * E, E_0)
-        eq.moves(D, second + I * (omega - eq.omega_s) * D, 0)
-        eq.moves(omega, (electrical_torque - load_torque) / M, eq.omega_s0 + slower)
+        eq.moves(D, second + I * (omega - eq.omega_s) * D, D_0)
+        eq.moves(omega, (electrical_torque - load_torque) / M, eq.omega_s0 - slip)
         eq.settled = False
         _machine.require_physical(eq, (T_prime, X_prime, M, T_second, X_second), C)
         eq.require(X_prime - X_second, "X'' must be at most X', of which it exceeds {value:g} pu", X_second - X_prime)
+
+    @staticmethod
+    def _guess(eq, T_prime, X_prime, C, T_m, open_second, X_second):
+        """Voltages and slip [rad/s] near the steady state: what both cages carry at a slip just below it."""
+        from tractexp.model.equations import I
+
+        first, second = X_prime * C, X_prime - X_second  # X - X' over X/X', and X' - X''
+        slip = T_m * X_prime**2 / eq.U0**2 / (first * T_prime + second * open_second * (1 - C) ** 2)
+        for k in range(4):
+            n_1, n_2 = (1 - C) ** 2 + (slip * T_prime) ** 2, 1 + (slip * open_second) ** 2
+            R = eq.define(f"R_{k}", slip * (first * T_prime / n_1 + second * open_second / n_2), f"R_{k}")
+            X = eq.define(f"X_{k}", X_second + first * (1 - C) / n_1 + second / n_2, f"X_{k}")
+            if k < 3:
+                slip = eq.define(f"slip_{k}", slip * T_m * (R**2 + X**2) / (eq.U0**2 * R), f"s_{k}")
+        current = eq.U0 * (R - I * X) / (R**2 + X**2)
+        E_0 = I * first * current * (1 - C - I * slip * T_prime) / n_1
+        return E_0, I * second * current * (1 - I * slip * open_second) / n_2, slip
