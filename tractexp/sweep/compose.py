@@ -9,7 +9,7 @@ import functools
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from omegaconf import DictConfig, OmegaConf
+from omegaconf import DictConfig, OmegaConf, open_dict, read_write
 
 
 class Composer:
@@ -47,6 +47,8 @@ class Composer:
 
         whole = self.loader.load_sweep_config(self.master, list(overrides))
         HydraConfig.instance().set_config(whole)  # what ${hydra:...} refers to
-        task = OmegaConf.masked_copy(whole, [key for key in whole if key != "hydra"])
-        OmegaConf.set_struct(task, True)
-        return task, dict(whole.hydra.runtime.choices)
+        choices = dict(whole.hydra.runtime.choices)
+        task = copy.deepcopy(whole)
+        with read_write(task), open_dict(task):
+            del task["hydra"]
+        return task, choices

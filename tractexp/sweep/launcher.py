@@ -119,8 +119,12 @@ class Cores(Launcher):
         executor = get_reusable_executor(max_workers=n_jobs, timeout=IDLE)
         try:
             yield executor
-        finally:  # the jobs' ends are on disk: there is nothing to wait for
-            executor.shutdown(wait=True, kill_workers=True)
+        except BaseException:  # loky's own way to kill them fails in a thread where jobs are still queued
+            for process in list(executor._processes.values()):
+                process.terminate()
+            executor.shutdown(wait=True)
+            raise
+        executor.shutdown(wait=True, kill_workers=True)  # the jobs' ends are on disk: there is nothing to wait for
 
 
 def _collect(executor: Any, jobs: Sequence[SweepJob], note: Callable[[Status, SweepJob], None]) -> bool:
