@@ -1,5 +1,6 @@
 """The identification problem: free parameters of a model against recorded events, Eq. (8)."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -56,6 +57,17 @@ def _known(name: str, known: Mapping[str, object], where: str) -> None:
         raise UserError(f"{where}.{name}: this model has no parameter '{name}'{among(name, known, 'Parameters')}")
 
 
+def _check_channels(model: Model, events: Sequence[Event]) -> None:
+    """Raise `UserError` where an effect reads a channel that an event does not have."""
+    for effect, event in itertools.product(model.effects, events):
+        for channel in effect.reads:
+            if channel not in event.record.channels:
+                raise UserError(
+                    f"the effect '{effect.name}' reads {channel}, which {event.record.where} does not have; record"
+                    f" {channel}, or leave the effect out of model.effects"
+                )
+
+
 @dataclass(frozen=True)
 class Step:
     """Runge-Kutta steps per sample, one number per event, and the error they leave [pu] (nan where given by hand)."""
@@ -100,6 +112,7 @@ class Problem:
         `T_m[1]`, `T_m[2]`, ... `loss` None means least squares.
         """
         self.model, self.events = model, tuple(events)
+        _check_channels(model, self.events)
         self.parameters = narrowed(model.parameters, bounds or {})
         self.fixed = {name: float(value) for name, value in (fixed or {}).items()}
         for name in self.fixed:

@@ -265,14 +265,18 @@ class Equations:
 
     def latex(self) -> list[str]:
         """The equations one a line: states, memories, named quantities, power, steady state."""
-        show = {"symbol_names": self.latex_names, "imaginary_unit": "j", "mul_symbol": r" \, "}
-        tex = lambda e: sympy.latex(e, **show)  # noqa: E731
+        starts = {start_symbol(s): f"{{{self.latex_names[s]}}}|_0" for s in (*self.states, *self.memories)}
+        names = self.latex_names | starts
+        for s in self.states:
+            halves = phasor_parts(start_symbol(s))
+            names |= zip(
+                halves, (rf"\operatorname{{{part}}} {starts[start_symbol(s)]}" for part in ("Re", "Im")), strict=True
+            )
+        tex = lambda e: sympy.latex(e, symbol_names=names, imaginary_unit="j", mul_symbol=r" \, ")  # noqa: E731
         lines = [rf"\frac{{d {s.latex}}}{{dt}} = {tex(s.derivative)}" for s in self.states.values()]
         lines += [rf"{m.latex} \leftarrow {tex(m.renewal)}" for m in self.memories.values()]
         lines += [f"{tex(s)} = {tex(self.shown.get(s, expression))}" for s, expression in self.definitions.items()]
         lines += [f"P = {tex(self.P)}", f"Q = {tex(self.Q)}"]
-        starts = {start_symbol(s.symbol): f"{{{s.latex}}}|_0" for s in (*self.states.values(), *self.memories.values())}
-        show["symbol_names"] = self.latex_names | starts
         return lines + [f"{starts[start_symbol(s.symbol)]} = {tex(s.initial)}" for s in self.states.values()]
 
 
