@@ -62,6 +62,7 @@ class FeederImpedance(Effect):
         current = eq.define("feeder_current", _computed(eq, "feeder_current", a + (b + Y) * V, I_0), "I_f")
         eq.shown[current] = conjugate(drawn / name)
         eq.edit(name.name, lambda _: V, shown=eq.U - Z * current)
+        eq.latex_names[start_symbol(name)] = "V_0"
         eq.edit("static_voltage", lambda _: sympy.exp(x), shown=sympy.Abs(name) / sympy.Abs(start_symbol(name)))
         square = re(current) ** 2 + im(current) ** 2
         eq.consume(R_f * square, X_f * square)

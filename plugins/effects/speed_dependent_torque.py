@@ -21,7 +21,7 @@ class SpeedDependentTorque(Effect):
 
     quadratic_share = Parameter(0.0, (0.0, 1.0), "1", "share of the torque that is quadratic", SOURCE, "k", null=0.0)
 
-    needs = ("omega", "load_torque")
+    needs = ("omega", "M", "load_torque")  # a speed that never moves needs no torque
     relevant = {"quadratic_share": 0.25}
     confused_with = ("feeder_impedance", "second_motor_group", "magnetic_saturation")
 

@@ -43,11 +43,12 @@ class UndervoltageTrip(Effect):
         u = eq.U / eq.U0
         below, above = eq.memory("time_below", "t_b"), eq.memory("time_above", "t_a")
         tripped = eq.memory("tripped", "g")
-        low, high = gate(level - u, LEVEL), gate(u - level - HYSTERESIS, LEVEL)
+        low = eq.define("voltage_low", gate(level - u, LEVEL), r"\ell")
+        high = eq.define("voltage_back", gate(u - level - HYSTERESIS, LEVEL), "h")
+        goes = eq.define("relay_goes", low * gate(below - delay, TIME * eq.step), "g_+")
+        returns = eq.define("relay_returns", high * gate(above - back, TIME * eq.step), "g_-")
         eq.renews(below, low * (below + eq.step), 0)
         eq.renews(above, high * (above + eq.step), 0)
-        goes = low * gate(below - delay, TIME * eq.step)
-        returns = high * gate(above - back, TIME * eq.step)
         eq.renews(tripped, tripped + (1 - tripped) * goes - tripped * returns, 0)
         eq.P, eq.Q = eq.P * (1 - share * tripped), eq.Q * (1 - share * tripped)
         eq.settled = False
