@@ -8,6 +8,7 @@ import sys
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.interpolate import Akima1DInterpolator
 
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
@@ -47,16 +48,18 @@ def polar_right_hand_side(t, y, U, omega_s, p):
 
 
 def reference(excitation, values, rtol=1e-12):
-    """P and Q by DOP853 on the printed polar equations, restarted at each sample (the input has kinks there)."""
+    """P and Q by DOP853 on the printed polar equations, restarted at each sample; the voltage by SciPy's makima."""
     *p, p_v, q_v = values
     T_prime, X_prime, C, _, T_m = p
     U, U0, h = excitation.U, excitation.U0, excitation.step
     delta = 0.5 * np.arcsin(-2 * T_m * X_prime / (C * U0**2))  # Eq. (3)
     state = [C * U0 * np.cos(delta), delta, np.sin(delta) * C * U0 / (T_prime * C * U0 * np.cos(delta))]
     states = [state]
-    for a, b in itertools.pairwise(U):
-        f = lambda t, y, a=a, b=b: polar_right_hand_side(t, y, a + (b - a) * t / h, 0.0, p)  # noqa: E731
-        state = solve_ivp(f, (0, h), state, method="DOP853", rtol=rtol, atol=1e-13).y[:, -1]
+    t = np.arange(len(U)) * h
+    voltage = Akima1DInterpolator(t, U, method="makima")
+    for a, b in itertools.pairwise(t):
+        f = lambda t, y: polar_right_hand_side(t, y, voltage(t), 0.0, p)  # noqa: E731
+        state = solve_ivp(f, (a, b), state, method="DOP853", rtol=rtol, atol=1e-13).y[:, -1]
         states.append(state)
     E, delta, _ = np.array(states).T
     P_d, Q_d = -U * E * np.sin(delta) / X_prime, U * (U - E * np.cos(delta)) / X_prime  # Eq. (2)

@@ -12,7 +12,7 @@ from tractexp.discrepancy.noise import Noise
 from tractexp.discrepancy.tangent import Projection, Tangent, re_estimated, rich_residuals, windows
 
 DRAWS = 199
-FEW = 1500  # quiet samples below which the noise estimate is itself uncertain
+FEW = 600  # quiet samples below which the noise estimate is itself uncertain
 SMALLEST_P = 1e-300
 
 

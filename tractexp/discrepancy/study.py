@@ -149,12 +149,10 @@ class Study:
 
     def _base_starts(self) -> list[np.ndarray]:
         """The best fits of the base model alone, by its own fast kernel, from starts all over its box."""
-        from scipy.stats import qmc
-
         likelihood = Likelihood.of(self._alone)
         d = self._alone.space.dimension
         begin = np.full((STARTS + 1, d + len(self.before)), 0.5)
-        begin[1:, :d] = qmc.Sobol(d, scramble=False).random(64)[1 : STARTS + 1]
+        begin[1:, :d] = np.random.default_rng(0).random((STARTS, d))
         done = descend(likelihood.rows, begin, tolerance=0.1)
         starts = np.tile(self.null, (KEPT, 1))
         best = np.argsort(done.deviance)[:KEPT]

@@ -65,6 +65,20 @@ def _log(x):
     p = p * t + 0.3333333333333333
     p = p * t + 1.0
     return k * 0.6931471805599453 + 2.0 * s * p + (x - x)
+
+
+@inlined
+def _cubic(a, b, da, db, x):
+    """Value at x in [0, 1] of the cubic with these end values and slopes."""
+    rise = b - a
+    return a + x * (da + x * (3.0 * rise - 2.0 * da - db + x * (da + db - 2.0 * rise)))
+
+
+@inlined
+def _slope(a, b, da, db, x):
+    """Slope of that cubic."""
+    rise = b - a
+    return da + x * (2.0 * (3.0 * rise - 2.0 * da - db) + 3.0 * x * (da + db - 2.0 * rise))
 '''
 
 RUN = '''
@@ -263,7 +277,7 @@ def _sample(lowered: Lowered, at: _Rows) -> list[str]:
 
 
 def _advance(lowered: Lowered, at: _Rows) -> list[str]:
-    """Classical Runge-Kutta, order 4 (Eq. (4) with its stage steps corrected), inputs linear between samples."""
+    """Classical Runge-Kutta, order 4 (Eq. (4) with its stage steps corrected), the voltage smooth between samples."""
     if not lowered.states:
         return ["pass"]
     inner = []
@@ -281,12 +295,14 @@ def _advance(lowered: Lowered, at: _Rows) -> list[str]:
 
 
 def _between(symbol: sympy.Symbol, point: str, fraction: str) -> str:
-    """An input between samples i and i + 1: linear, but its slope is the same all the way."""
-    k = _row(symbol)
-    if symbol.name == "U_rate":
-        return f"{symbol}{point} = inputs[{k}, i + 1]"
-    rise = f"(inputs[{k}, i + 1] - inputs[{k}, i])"
-    return f"{symbol}{point} = inputs[{k}, i] + {rise} * ({fraction} / substeps[e])"
+    """An input between samples i and i + 1: the voltage on the cubic its slopes define, all else on a straight line."""
+    k, place = _row(symbol), f"{fraction} / substeps[e]"
+    if symbol.name in ("U", "U_rate"):
+        rate = INPUTS.index("U_rate")
+        ends = f"inputs[0, i], inputs[0, i + 1], step * inputs[{rate}, i], step * inputs[{rate}, i + 1]"
+        scale = "" if symbol.name == "U" else " / step"
+        return f"{symbol}{point} = _{'cubic' if symbol.name == 'U' else 'slope'}({ends}, {place}){scale}"
+    return f"{symbol}{point} = inputs[{k}, i] + (inputs[{k}, i + 1] - inputs[{k}, i]) * ({place})"
 
 
 def _stage(lowered: Lowered, at: _Rows, slope: str, point: str, ahead: tuple[str, str] | None) -> str:
