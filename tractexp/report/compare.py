@@ -48,7 +48,11 @@ def _seen(b: Band) -> float:
 
 def ecdf(path: Path, variants: Sequence[Variant], floor: Floor) -> Path:
     """The share of all targets that all runs of a variant have reached, by simulations."""
-    costs = [runtimes(variant, floor) for variant in variants]
+    return runtime_curves(path, [v.name for v in variants], [runtimes(v, floor) for v in variants], "simulations")
+
+
+def runtime_curves(path: Path, names: Sequence[str], costs: Sequence[np.ndarray], label: str) -> Path:
+    """The ECDF of runtimes, sorted, inf where a target was not reached; `label` says what they are counted in."""
     reached = np.concatenate([cost[np.isfinite(cost)] for cost in costs])
     first, last = (reached.min(), reached.max()) if len(reached) else (1.0, 10.0)
 
@@ -62,7 +66,7 @@ def ecdf(path: Path, variants: Sequence[Variant], floor: Floor) -> Path:
         style.logarithmic(panel, "x", first, last)
         panel.set_ylim(0, 1.02)
 
-    return _panels(path, [v.name for v in variants], draw, finish, ("simulations", "share of targets reached"))
+    return _panels(path, names, draw, finish, (label, "share of targets reached"))
 
 
 def targets_told() -> str:

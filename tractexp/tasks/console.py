@@ -3,7 +3,7 @@
 import functools
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -43,6 +43,31 @@ def searching(iterations: int | None, budget: int | None) -> Iterator[Any]:
             yield callback
     else:
         yield _Lines(iterations, budget)
+
+
+@contextmanager
+def counting(what: str, total: int) -> Iterator[Callable[[], None]]:
+    """Yield what is to be called at the end of each of `total` parts: a bar on a terminal, a line now and then."""
+    if console().is_terminal:
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        columns = [TextColumn(f"  {what}"), BarColumn(bar_width=30), MofNCompleteColumn(), TimeRemainingColumn()]
+        with Progress(*columns, console=console(), transient=True) as bar:
+            line = bar.add_task("", total=total)
+            yield lambda: bar.advance(line)
+        return
+    started, due, done = time.perf_counter(), FIRST_LINE, 0
+
+    def count() -> None:
+        nonlocal due, done
+        done += 1
+        spent = time.perf_counter() - started
+        if spent >= due and done < total:
+            due = spent + NEXT_LINES
+            say(f"  {done} of {total} {what}, about {spent * (total - done) / done:.0f} s left")
+            sys.stdout.flush()
+
+    yield count
 
 
 def share(iteration: int, simulations: int, iterations: int | None, budget: int | None) -> float | None:

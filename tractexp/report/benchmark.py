@@ -1,0 +1,175 @@
+"""A benchmark as one self-contained page for people, its figures, and one JSON file for machines."""
+
+import json
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from tractexp.compare.bbob import Benchmark
+from tractexp.errors import UserError
+from tractexp.report.compare import runtime_curves
+from tractexp.report.page import Page
+
+
+def scale(benchmark: Benchmark) -> str:
+    """What was run, in words."""
+    plan = benchmark.plan
+    functions, dimensions = len(plan.functions), " and ".join(map(str, plan.dimensions))
+    return (
+        f"{functions} BBOB function{'s' * (functions > 1)} in dimension {dimensions},"
+        f" {len(plan.instances)} instance{'s' * (len(plan.instances) > 1)} each,"
+        f" {plan.multiplier:,} evaluations per dimension and run"
+    )
+
+
+def sentences(benchmark: Benchmark) -> list[str]:
+    """One sentence to quote for each dimension, the best optimizer first."""
+    told = []
+    plan = benchmark.plan
+    for d in plan.dimensions:
+        shares = {name: benchmark.share(name, d, plan.functions) for name in benchmark.optimizers}
+        ranked = sorted(shares, key=lambda name: -shares[name])
+        parts = [
+            f"{name} met {shares[name]:.0%} of the targets and solved {benchmark.solved(name, d)} functions"
+            for name in ranked
+        ]
+        told.append(
+            f"On {len(plan.functions)} BBOB functions in dimension {d}, {len(plan.instances)} runs of"
+            f" {plan.multiplier * d:,} evaluations on each, {'; '.join(parts)}."
+        )
+    return told
+
+
+def shares(benchmark: Benchmark, dimension: int) -> tuple[list[str], list[list[str]]]:
+    """Columns and rows: the share of targets met, in all and by group of functions, and the functions solved."""
+    groups = benchmark.groups()
+    functions = benchmark.plan.functions
+    rows = []
+    for name in benchmark.optimizers:
+        parts = [benchmark.share(name, dimension, chosen) for chosen in (functions, *groups.values())]
+        solved = f"{benchmark.solved(name, dimension)} of {len(functions)}"
+        rows.append([name, *(f"{part:.0%}" for part in parts), solved])
+    return ["optimizer", "all", *groups, "solved"], rows
+
+
+def running_times(benchmark: Benchmark, dimension: int, target: int) -> list[list[str]]:
+    """One row for each function: ERT in evaluations and the runs that met the target, for each optimizer."""
+    count = len(benchmark.plan.instances)
+
+    def cell(optimizer: str, function: int) -> str:
+        time, met = benchmark.ert(optimizer, dimension, function, target)
+        return f"{time:,.0f} ({met}/{count})" if met else "–"
+
+    return [
+        [f"f{f} {benchmark.titles[f]}", *(cell(name, f) for name in benchmark.optimizers)]
+        for f in benchmark.plan.functions
+    ]
+
+
+def draw(benchmark: Benchmark, folder: Path) -> dict[tuple[int, str], Path]:
+    """The ECDF over all functions and over each group, {(dimension, group or "all"): path}."""
+    groups = benchmark.groups()
+    chosen: Mapping[str, Iterable[int]] = {"all": benchmark.plan.functions} | (groups if len(groups) > 1 else {})
+    drawn = {}
+    for d in benchmark.plan.dimensions:
+        for group, functions in chosen.items():
+            hits = [benchmark.hits(name, d, functions) for name in benchmark.optimizers]
+            path = folder / f"ecdf_{d}d_{group.replace(' ', '_')}.svg"
+            drawn[d, group] = runtime_curves(path, benchmark.optimizers, hits, "evaluations")
+    return drawn
+
+
+def write_page(benchmark: Benchmark, figures: Mapping[tuple[int, str], Path], path: Path) -> Path:
+    """Write `benchmark.html`."""
+    plan = benchmark.plan
+    page = Page(f"Benchmark of {benchmark.optimizers[0]} on BBOB", f"{scale(benchmark)}; seed {plan.seed}.")
+    page.verdict(*sentences(benchmark))
+    hardest = len(plan.targets) - 1
+    for d in plan.dimensions:
+        page.heading(f"Dimension {d}")
+        columns, rows = shares(benchmark, d)
+        page.table(
+            columns,
+            rows,
+            f"Share of the {len(plan.targets)} targets, {plan.targets[0]:g} to {plan.targets[-1]:g} from the optimum,"
+            " met by all runs. Solved: functions on which every run met the last one.",
+        )
+        page.figure(figures[d, "all"], "Runtimes: the share of all targets met by all runs, by evaluations.")
+        with page.folded("the same by group of functions"):
+            for group in benchmark.groups():
+                if (d, group) in figures:
+                    chosen = ", ".join(f"f{f}" for f in benchmark.groups()[group])
+                    page.figure(figures[d, group], f"{group.capitalize()}: {chosen}.")
+        page.heading(f"Expected running times in dimension {d}", 3)
+        page.table(["function", *benchmark.optimizers], running_times(benchmark, d, hardest), _caption(plan, hardest))
+        with page.folded("to the other targets"):
+            for target in range(hardest):
+                page.table(
+                    ["function", *benchmark.optimizers], running_times(benchmark, d, target), _caption(plan, target)
+                )
+    return _reading(page).write(path)
+
+
+def _caption(plan: Any, target: int) -> str:
+    return f"ERT to {plan.targets[target]:g} from the optimum, in evaluations (runs that met it)."
+
+
+def _reading(page: Page) -> Page:
+    return page.heading("How to read this page").items(
+        [
+            "ERT, the expected running time, is what all runs spent until they met the target, those that did not all"
+            " they had, per run that did; a dash where none did (Hansen et al. 2021, COCO).",
+            "A search that ends by itself is started again from new random numbers until the budget is spent. All"
+            " optimizers have the same seeds.",
+            "Each optimizer has its own settings, tuned for nothing here. An evaluation counts when it is made, not at"
+            " the end of its iteration.",
+            "The functions are those of Hansen, Finck, Ros and Auger 2009 in the package ioh, searched on the box"
+            " [-5, 5], from which no point is let out.",
+        ]
+    )
+
+
+def write_json(benchmark: Benchmark, settings: Mapping[str, Any], path: Path) -> Path:
+    """Write `benchmark.json`: the plan, each optimizer's settings, every run; the same for the same seed.
+
+    Evaluations to a target that was not met, and running times to one that no run met, are null.
+    """
+    plan = benchmark.plan
+    times = [
+        {
+            "optimizer": name,
+            "dimension": d,
+            "function": f,
+            "ert": [_finite(benchmark.ert(name, d, f, k)[0]) for k in range(len(plan.targets))],
+        }
+        for name in benchmark.optimizers for d in plan.dimensions for f in plan.functions
+    ]  # fmt: skip
+    summary = [
+        {
+            "optimizer": name,
+            "dimension": d,
+            "share": benchmark.share(name, d, plan.functions),
+            "groups": {group: benchmark.share(name, d, chosen) for group, chosen in benchmark.groups().items()},
+            "solved": benchmark.solved(name, d),
+        }
+        for name in benchmark.optimizers for d in plan.dimensions
+    ]  # fmt: skip
+    content = {
+        **asdict(plan),
+        "optimizers": settings,
+        "summary": summary,
+        "running_times": times,
+        "runs": [asdict(run) | {"hits": [_finite(n) for n in run.hits]} for run in benchmark.runs],
+        "sentences": sentences(benchmark),
+    }
+    try:
+        path.write_text(json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"{path} cannot be written: {error.strerror}") from error
+    return path
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,148 @@
+"""Optimizers on functions that nobody here wrote."""
+
+import dataclasses
+from collections.abc import Iterable, Iterator
+from dataclasses import field
+from pathlib import Path
+from typing import Any
+
+from tractexp.errors import UserError, check_range
+from tractexp.plugin import build, get, plugin
+from tractexp.tasks.console import counting, say, table
+from tractexp.tasks.task import Job, Task
+
+NOT_READ = {"budget": "task.multiplier", "target": "task.targets", "time_limit": "task.multiplier"}
+
+
+@plugin
+class Benchmark(Task):
+    """Run the optimizer and those it is set against on BBOB: ERT and ECDF tables, figures, one page, JSON."""
+
+    functions: list[int] = field(default_factory=lambda: list(range(1, 25)))
+    instances: list[int] = field(default_factory=lambda: [1, 2, 3])
+    dimensions: list[int] = field(default_factory=lambda: [5])
+    multiplier: int = 3000  # evaluations per dimension in each run
+    targets: list[float] = field(default_factory=lambda: [10.0**k for k in range(2, -9, -1)])  # f - f_opt
+    against: list[str] = field(default_factory=lambda: ["cmaes", "differential_evolution"])
+    cores: int | None = None  # processes; null: all cores, one for a job of a sweep
+
+    def check(self) -> None:
+        for key, low, high in (("functions", 1, 24), ("instances", 1, 10_000), ("dimensions", 2, 100)):
+            values = getattr(self, key)
+            distinct(f"task.{key}", values)
+            for value in values:
+                check_range(f"task.{key}", value, low, high)
+        check_range("task.multiplier", self.multiplier, 1)
+        distinct("task.targets", self.targets)
+        for target in self.targets:
+            check_range("task.targets", target, 1e-12, 1e12)
+        if self.against:
+            distinct("task.against", self.against)
+        for name in self.against:
+            get("optimizer", name)
+        if self.cores is not None:
+            check_range("task.cores", self.cores, 1)
+
+    def run(self, job: Job) -> None:
+        from tractexp.compare.bbob import Plan, package, perform
+        from tractexp.report import benchmark as report
+
+        refuse_unread(job)
+        package()
+        targets = tuple(sorted(self.targets, reverse=True))
+        plan = Plan(
+            tuple(self.functions), tuple(self.dimensions), tuple(self.instances), self.multiplier, targets, job.seed
+        )
+        optimizers = self.optimizers(job)
+        cores = self.cores or (1 if job.in_sweep else None)
+        made = perform(optimizers, plan, cores, progress)
+        show(made)
+        settings = {name: {"name": it.name, **dataclasses.asdict(it)} for name, it in optimizers.items()}
+        figures = report.draw(made, job.folder)
+        paths = [
+            report.write_page(made, figures, job.folder / "benchmark.html"),
+            report.write_json(made, settings, job.folder / "benchmark.json"),
+            *figures.values(),
+        ]
+        for path in paths[:2]:
+            say(f"  {path}")
+        track(job, made, paths)
+
+    def optimizers(self, job: Job) -> dict[str, Any]:
+        """The optimizer of the job, and those it is set against as they are by default, by name."""
+        chosen = job.choices["optimizer"]
+        made = {chosen: job.optimizer}
+        for name in self.against:
+            default = build("optimizer", {"name": name})
+            if default != job.optimizer:
+                made[f"{name} by default" if name == chosen else name] = default
+        for name, it in made.items():
+            if it.polish:
+                raise UserError(
+                    f"optimizer {name} polishes by least squares, which need residuals that a BBOB function does not"
+                    " have; set optimizer.polish=false"
+                )
+        return made
+
+
+def distinct(where: str, values: list[Any]) -> None:
+    """Raise `UserError` for an empty list or one that names something twice."""
+    if not values:
+        raise UserError(f"{where} is empty; give at least one")
+    for value in values:
+        if values.count(value) > 1:
+            raise UserError(f"{where} names {value} twice; name each once")
+
+
+def refuse_unread(job: Job) -> None:
+    """Raise `UserError` for a limit of the search that this task would silently ignore."""
+    for key, instead in NOT_READ.items():
+        if job.config[key] is not None:
+            raise UserError(f"{key}={job.config[key]:g} is not read by task=benchmark; set {instead} instead")
+
+
+def progress(runs: Iterable[Any], total: int) -> Iterator[Any]:
+    """Pass the runs on as they end, and say how many have."""
+    with counting("runs", total) as count:
+        for run in runs:
+            count()
+            yield run
+
+
+def show(made: Any) -> None:
+    """Print the shares and the sentences."""
+    from tractexp.report import benchmark as report
+
+    say(report.scale(made))
+    for dimension in made.plan.dimensions:
+        columns, rows = report.shares(made, dimension)
+        table(columns, rows, f"dimension {dimension}: share of targets met, functions solved")
+    for sentence in report.sentences(made):
+        say(f"- {sentence}")
+    say()
+
+
+def track(job: Job, made: Any, paths: list[Path]) -> None:
+    """Log a run whose experiment is named after the benchmark: it has no data of the user's."""
+    node = job.config["tracking"]
+    if not node["enabled"]:
+        return
+    from tractexp import tracking
+
+    experiment = node["experiment"] or "benchmark bbob"
+    metrics = {
+        f"share_{name.replace(' ', '_')}_{d}d": made.share(name, d, made.plan.functions)
+        for name in made.optimizers for d in made.plan.dimensions
+    }  # fmt: skip
+    optimizer = job.choices["optimizer"]
+    run = tracking.Run(
+        experiment=experiment,
+        name=f"{optimizer} on BBOB",
+        parameters=tracking.flatten({key: job.config[key] for key in ("task", "optimizer", "seed")}),
+        metrics=metrics,
+        tags={"task": "benchmark", "optimizer": optimizer, "seed": str(job.seed), "git_commit": tracking.git_commit()},
+        artifacts=paths,
+        parent=job.sweep,
+    )
+    tracking.log(run, node["uri"] or tracking.default_uri(Path.cwd()))
+    say(f"logged in experiment '{experiment}'; to see it: tractexp ui")
