@@ -263,3 +263,19 @@ def test_a_kernel_is_shared_by_processes_that_start_together(tmp_path):
     assert len(files) == 1
     assert len(list(tmp_path.glob("*.py"))) == 1
     assert not list(tmp_path.glob("*.part"))
+
+
+def test_a_generated_source_is_remembered_until_code_or_settings_change(tmp_path, monkeypatch):
+    from tractexp.model import kernel
+
+    monkeypatch.setenv("TRACTEXP_CACHE_DIR", str(tmp_path))
+    motor, static = get("model/motor", "electromechanical")(), get("model/static", "exponential")()
+    made = []
+
+    def generate():
+        made.append(1)
+        return f"source {len(made)}"
+
+    assert kernel.remembered((motor, static), generate) == "source 1"
+    assert kernel.remembered((motor, static), generate) == "source 1"
+    assert kernel.remembered((static, motor), generate) == "source 2"

@@ -15,6 +15,10 @@ class Injection(Effect):
     """Adds push_k to the k-th balance between `window_on` and `window_off` [s since the first sample]."""
 
     name = "injection"
+
+    def __repr__(self) -> str:
+        return "Injection()"
+
     order = 2
     parameters = (
         *(

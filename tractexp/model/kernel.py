@@ -2,10 +2,12 @@
 
 import functools
 import hashlib
+import importlib.metadata
 import importlib.util
 import os
 import sys
 import tempfile
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import ModuleType
 
@@ -25,6 +27,26 @@ def cache_folder() -> Path:
         if os.access(folder, os.W_OK):
             return folder
     raise OSError(f"no kernel cache can be written; tried {', '.join(map(str, candidates))}; set TRACTEXP_CACHE_DIR")
+
+
+def remembered(parts: Iterable[object], generate: Callable[[], str]) -> str:
+    """The source generated for these parts, from the cache where their code and settings are unchanged.
+
+    Deriving a large model takes seconds, reading it back milliseconds. What a source depends on is the settings of
+    its parts (their `repr`), every file beside their plugins, this package's own code, and SymPy's version.
+    """
+    parts = tuple(parts)
+    folders = {Path(sys.modules[type(part).__module__].__file__ or "").parent for part in parts}
+    digest = hashlib.sha256(f"{importlib.metadata.version('sympy')} {parts!r}".encode())
+    for folder in sorted({Path(__file__).parent, *folders}):
+        for file in sorted(folder.glob("*.py")):
+            digest.update(file.read_bytes())
+    path = cache_folder() / f"source_{digest.hexdigest()[:20]}.txt"
+    if path.exists():
+        return path.read_text()
+    text = generate()
+    _write(path, text)
+    return text
 
 
 @functools.cache

@@ -78,6 +78,11 @@ class Model:
     @functools.cached_property
     def source(self) -> str:
         """Source text of the kernel."""
+        from tractexp.model.kernel import remembered
+
+        return remembered((self.motor, self.static, *self.effects), self._generated)
+
+    def _generated(self) -> str:
         from tractexp.model.codegen import source
         from tractexp.model.lowering import lower
 
