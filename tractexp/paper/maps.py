@@ -1,0 +1,83 @@
+"""Chaotic maps and Lévy flights: what Figures 3 and 4 show, and how even a flock they scatter.
+
+Tent orbits and flights are taken from the optimizer itself, so that what is measured is what searches.
+"""
+
+import warnings
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from tractexp.identify.optimizer import Box
+from tractexp.plugin import build
+
+DRAWS = 200  # flocks of each kind whose discrepancy is taken
+STEPS = 200_000  # Lévy steps whose tail is measured
+TAIL = 0.005  # share of the steps that count as the tail
+
+
+def issa(**settings: Any) -> Any:
+    """The improved sparrow search with these settings."""
+    return build("optimizer", {"name": "issa", **settings})
+
+
+def unit_cube(d: int) -> Box:
+    return Box(np.zeros(d), np.ones(d))
+
+
+def tent_orbit(alpha: float, n: int, d: int, rng: np.random.Generator) -> np.ndarray:
+    """(n, d) iterates of the tent map, Eq. (14), one orbit in each column."""
+    return issa(tent_alpha=alpha, population=n).initial(unit_cube(d), rng)
+
+
+def logistic_orbit(n: int, d: int, rng: np.random.Generator) -> np.ndarray:
+    """(n, d) iterates of the logistic map z -> 4 z (1 - z), one orbit in each column."""
+    orbit = [rng.random(d)]
+    for _ in range(n - 1):
+        orbit.append(4 * orbit[-1] * (1 - orbit[-1]))
+    return np.array(orbit)
+
+
+def sobol(n: int, d: int, rng: np.random.Generator) -> np.ndarray:
+    """(n, d) scrambled Sobol points."""
+    from scipy.stats import qmc
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of balance lost where n is no power of two
+        return qmc.Sobol(d, rng=rng).random(n)
+
+
+def flocks(n: int, d: int, alphas: tuple[float, ...]) -> dict[str, Callable[[np.random.Generator], np.ndarray]]:
+    """The ways to scatter n sparrows over d coordinates, by name."""
+    made = {f"tent, alpha = {a:g}": lambda rng, a=a: tent_orbit(a, n, d, rng) for a in alphas}
+    return made | {
+        "logistic": lambda rng: logistic_orbit(n, d, rng),
+        "uniform": lambda rng: rng.random((n, d)),
+        "Sobol": lambda rng: sobol(n, d, rng),
+    }
+
+
+def discrepancies(
+    n: int, d: int, alphas: tuple[float, ...], draws: int = DRAWS, seed: int = 0
+) -> Mapping[str, np.ndarray]:
+    """Centered discrepancy of each way to scatter, (draws,) each: the lower, the more even. Source: Hickernell 1998."""
+    from scipy.stats import qmc
+
+    rng = np.random.default_rng(seed)
+    return {
+        name: np.array([qmc.discrepancy(np.clip(draw(rng), 0, 1)) for _ in range(draws)])
+        for name, draw in flocks(n, d, alphas).items()
+    }
+
+
+def flights(formula: str, n: int, d: int, seed: int = 0) -> np.ndarray:
+    """(n, d) Lévy steps of Eq. (15), "mantegna" or as "printed"."""
+    return issa(levy_formula=formula).flight((n, d), np.random.default_rng(seed))
+
+
+def tail_exponent(steps: np.ndarray, share: float = TAIL) -> float:
+    """a in P(|s| > x) ~ x^-a, from the largest `share` of the steps (n,). Source: Hill 1975."""
+    size = np.sort(np.abs(steps.ravel()))
+    k = max(2, round(share * len(size)))
+    return float(1 / np.mean(np.log(size[-k:] / size[-k - 1])))

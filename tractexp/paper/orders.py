@@ -1,0 +1,84 @@
+"""Table 1 in measured numbers: one load, three orders of its motor, the same records."""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tractexp.identify.problem import Problem
+from tractexp.identify.result import Fit, parts, respond
+from tractexp.identify.search import search
+from tractexp.identify.uncertainty import Uncertainty, assess
+from tractexp.identify.verdict import IDENTIFIED
+from tractexp.model.model import compose
+from tractexp.plugin import build
+from tractexp.record import Event
+
+CANDIDATES = 2048  # simulated together when the time is taken
+REPEATS = 9  # of which the fastest counts
+
+
+@dataclass(frozen=True, eq=False)
+class Order:
+    """One motor fitted to the records. `fits` are those of the fitted events, then of the held-out ones."""
+
+    motor: str
+    values: dict[str, float]
+    objective: float
+    fits: tuple[Fit, ...]
+    known: Uncertainty
+    nanoseconds: float  # per simulated sample and candidate
+    substeps: int
+
+    @property
+    def free(self) -> int:
+        return len(self.known.names)
+
+    @property
+    def finite(self) -> int:
+        """Parameters whose 95 % interval is finite and within the bounds."""
+        low, high = self.known.values - self.known.half, self.known.values + self.known.half
+        return int(np.count_nonzero((low > self.known.lower) & (high < self.known.upper)))
+
+    @property
+    def identified(self) -> int:
+        return sum(verdict.word == IDENTIFIED for verdict in self.known.verdicts.values())
+
+    @property
+    def condition(self) -> float:
+        """Of the information matrix, parameters in units of their ranges."""
+        return float(np.linalg.cond(self.known.information.J) ** 2)
+
+    def spread(self, role: str) -> tuple[float, float]:
+        """Root mean square over the events of a role of epsilon_p and of epsilon_q, fractions."""
+        errors = np.array([(f.epsilon_p, f.epsilon_q) for f in self.fits if f.role == role])
+        P, Q = np.sqrt(np.mean(errors**2, axis=0)) if len(errors) else (np.nan, np.nan)
+        return float(P), float(Q)
+
+
+def fit(node: Mapping[str, Any], motor: str, train: Sequence[Event], held_out: Sequence[Event], seed: int) -> Order:
+    """Fit a model configuration with its motor replaced, by least squares from many starts."""
+    model = compose(*parts({**node, "motor": {"name": motor}}))
+    bounds, fixed = ({n: v for n, v in node[key].items() if n in model.names} for key in ("bounds", "fixed"))
+    problem = Problem(model, train, bounds, fixed, node["substeps"])
+    found = search(problem, build("optimizer", {"name": "multistart_least_squares"}), seed)
+    values = problem.full(found.values)[0]
+    fits = [respond(model, values, event, "train") for event in train]
+    fits += [respond(model, values, event, "validate") for event in held_out]
+    substeps = int(problem.step.substeps.max())
+    known = dict(zip(model.names, values.tolist(), strict=True))
+    return Order(motor, known, found.objective, tuple(fits), assess(problem, found.values), duration(problem), substeps)
+
+
+def duration(problem: Problem) -> float:
+    """Nanoseconds per sample of one candidate's simulation, objective included: the fastest of some repeats."""
+    rng = np.random.default_rng(0)
+    values = problem.space.from_unit(rng.random((CANDIDATES, problem.space.dimension)))
+    spent = []
+    for _ in range(REPEATS):
+        started = time.perf_counter()
+        problem.objective(values)
+        spent.append(time.perf_counter() - started)
+    return 1e9 * min(spent) / CANDIDATES / problem.drive.samples

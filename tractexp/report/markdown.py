@@ -1,0 +1,76 @@
+"""A page as Markdown: the same calls as `Page`, so that one description makes both."""
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from tractexp.errors import UserError
+
+
+class Markdown:
+    """Collects the parts of a page in order. `figures` is the folder its figures are linked in, "" beside it."""
+
+    def __init__(self, title: str, lead: str = "", figures: str = ""):
+        self.figures = figures
+        self._parts = [f"# {title}"] + [lead] * bool(lead)
+
+    def heading(self, text: str, level: int = 2) -> "Markdown":
+        return self._add(f"{'#' * level} {text}")
+
+    def text(self, *paragraphs: str) -> "Markdown":
+        return self._add(*map(_escaped, paragraphs))
+
+    def verdict(self, *paragraphs: str, kind: str = "plain") -> "Markdown":
+        return self._add("\n>\n".join(f"> {_escaped(text)}" for text in paragraphs))
+
+    def items(self, texts: Sequence[str]) -> "Markdown":
+        return self._add("\n".join(f"- {_escaped(text)}" for text in texts))
+
+    def table(
+        self, columns: Sequence[str], rows: Sequence[Sequence[str]], caption: str = "", words: Sequence[int] = ()
+    ) -> "Markdown":
+        """The first column and those counted in `words` are to the left."""
+        marks = ["---" if i == 0 or i in words else "---:" for i in range(len(columns))]
+        lines = [columns, marks, *rows]
+        told = "\n".join(f"| {' | '.join(_escaped(str(cell)) for cell in line)} |" for line in lines)
+        return self._add(told, *([_escaped(caption)] if caption else []))
+
+    def figure(self, path: Path, caption: str = "") -> "Markdown":
+        """A link to an SVG file of this name in the folder of figures."""
+        return self._add(f"![{_escaped(caption or path.stem)}]({self.figures}{path.name})")
+
+    def write(self, path: Path) -> Path:
+        """Write the page in one move. Raises `UserError` where that is impossible."""
+        path = Path(path)
+        part = path.with_name(f"{path.name}.{os.getpid()}.part")
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            part.write_text("\n\n".join(self._parts) + "\n", encoding="utf-8")
+            return part.replace(path)
+        except OSError as error:
+            raise UserError(f"the page {path} cannot be written: {error.strerror}") from error
+
+    def _add(self, *parts: str) -> "Markdown":
+        self._parts += parts
+        return self
+
+
+def _escaped(text: str) -> str:
+    """Text with the signs that Markdown would read as markup escaped."""
+    return text if set(text) <= set("-:") else "".join(f"\\{c}" if c in "|*_<>[]" else c for c in text)
+
+
+class Together:
+    """Pages that are written as one: every call goes to each."""
+
+    def __init__(self, *pages: Any):
+        self.pages = pages
+
+    def __getattr__(self, name: str) -> Callable[..., "Together"]:
+        def each(*args: Any, **kwargs: Any) -> "Together":
+            for page in self.pages:
+                getattr(page, name)(*args, **kwargs)
+            return self
+
+        return each
