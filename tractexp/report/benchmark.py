@@ -32,12 +32,13 @@ def sentences(benchmark: Benchmark) -> list[str]:
         shares = {name: benchmark.share(name, d, plan.functions) for name in benchmark.optimizers}
         ranked = sorted(shares, key=lambda name: -shares[name])
         parts = [
-            f"{name} met {shares[name]:.0%} of the targets and solved {benchmark.solved(name, d)} functions"
+            f"{name} met {shares[name]:.0%} of the targets and solved {benchmark.solved(name, d)} of"
+            f" {len(plan.functions)} functions"
             for name in ranked
         ]
         told.append(
-            f"On {len(plan.functions)} BBOB functions in dimension {d}, {len(plan.instances)} runs of"
-            f" {plan.multiplier * d:,} evaluations on each, {'; '.join(parts)}."
+            f"On BBOB in dimension {d}, {len(plan.instances)} runs of {plan.multiplier * d:,} evaluations on each"
+            f" function, {'; '.join(parts)}."
         )
     return told
 
