@@ -5,6 +5,7 @@ profiles advance in lockstep, two lanes (down and up) for each parameter, so tha
 step of every one of them.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -12,7 +13,7 @@ import numpy as np
 
 from tractexp.identify.descent import descend
 from tractexp.identify.uncertainty import LEVEL, Uncertainty, conclude
-from tractexp.identify.verdict import UNIDENTIFIED, WEAK, Verdict
+from tractexp.identify.verdict import BOUND, IDENTIFIED, UNIDENTIFIED, WEAK, WITHIN, Verdict, size
 
 BEYOND = 1.6  # of the threshold: a lane ends when its deviance has risen so far
 STEP = 0.5  # standard errors between the first points of a lane
@@ -21,6 +22,7 @@ AIM = 0.8  # rise of the root of the deviance that a step aims at
 BETTER = 0.05  # fall of the deviance that makes a point a better optimum
 RISE = 0.5  # of the deviance between two minima, for them to count as two
 RESTARTS = 5
+DOUBTFUL = 0.05  # of the value: wider half intervals are checked by a profile
 
 
 class End(StrEnum):
@@ -74,18 +76,48 @@ class Profiles:
     @property
     def verdicts(self) -> dict[str, Verdict]:
         """The verdicts of the information matrix, corrected by what the profiles show."""
-        return {p.name: revised(self.known.verdicts[p.name], p) for p in self.profiles}
+        known = self.known
+        bounds = dict(zip(known.names, zip(known.lower, known.upper, strict=True), strict=True))
+        return known.verdicts | {p.name: revised(known.verdicts[p.name], p, *bounds[p.name]) for p in self.profiles}
 
 
-def revised(verdict: Verdict, profile: Profile) -> Verdict:
-    """A verdict in the light of a profile: a side that never closes is not an interval, two minima are not one."""
-    low, high = profile.interval
-    detail = f"{verdict.detail}; profile {low:.4g} .. {high:.4g}"
-    if not profile.verdict:
-        return replace(verdict, detail=detail)
-    both = all(end is not End.CLOSED for end in profile.ends)
-    word = UNIDENTIFIED if both or verdict.word == UNIDENTIFIED else WEAK
-    return Verdict(word, f"{detail}, {profile.verdict}")
+def revised(verdict: Verdict, profile: Profile, low: float, high: float) -> Verdict:
+    """A verdict in the light of a profile: its width decides; an open side or a second minimum is a weakness."""
+    a, b = profile.interval
+    detail = "; ".join([f"profile {a:.4g} .. {b:.4g}", *([profile.verdict] if profile.verdict else [])])
+    if verdict.word == UNIDENTIFIED and "leave the record unchanged" in verdict.detail:
+        return verdict
+    value = (a + b) / 2
+    opened = [end is not End.CLOSED for end in profile.ends]
+    if all(opened):
+        word = UNIDENTIFIED
+    elif verdict.word == BOUND:
+        word = BOUND
+    elif any(opened) or profile.minima or (b - a) / 2 > WITHIN * size(value, low, high):
+        word = WEAK
+    else:
+        word = IDENTIFIED
+    return Verdict(word, f"{verdict.detail}; {detail}")
+
+
+def checked(known: Uncertainty) -> Uncertainty:
+    """The judgement with profiles in place of curvature wherever the curvature may mislead.
+
+    That is for intervals wider than `DOUBTFUL` of the value; a narrow one is a parabola anyway. Parameters that
+    are not identifiable by structure have no profile.
+    """
+    bounds = zip(known.lower, known.upper, strict=True)
+    sizes = np.array([size(v, *pair) for v, pair in zip(known.values, bounds, strict=True)])
+    doubtful = known.information.identifiable & (known.half > DOUBTFUL * sizes)
+    if not doubtful.any():
+        return known
+    made = profiles(known, names=[n for n, d in zip(known.names, doubtful, strict=True) if d])
+    return replace(
+        made.known,
+        verdicts=made.verdicts,
+        profiled={p.name: p.interval for p in made.profiles},
+        notes=[*made.known.notes, *made.notes],
+    )
 
 
 def threshold(level: float = LEVEL) -> float:
@@ -95,14 +127,14 @@ def threshold(level: float = LEVEL) -> float:
     return float(chdtri(1, 1 - level))
 
 
-def profiles(known: Uncertainty, points: int = 24) -> Profiles:
-    """Profiles of every free parameter around `known`, of at most `points` points a side.
+def profiles(known: Uncertainty, points: int = 24, names: Sequence[str] | None = None) -> Profiles:
+    """Profiles of every free parameter (or of `names`) around `known`, of at most `points` points a side.
 
     Where a point fits better than the optimum did, everything starts again from there.
     """
     simulations, limit = 0, threshold()
     for restarts in range(RESTARTS + 1):
-        lanes = _Lanes(known, limit)
+        lanes = _Lanes(known, limit, names or known.names)
         for _ in range(points):
             if not lanes.advance():
                 break
@@ -114,22 +146,22 @@ def profiles(known: Uncertainty, points: int = 24) -> Profiles:
         found = descend(known.likelihood.rows, lanes.better[None])
         simulations += found.simulations
         known = conclude(known.likelihood, found.unit[0], known.notes)
-    made = tuple(lanes.profile(j) for j in range(len(known.names)))
+    made = tuple(lanes.profile(k) for k in range(len(names or known.names)))
     return Profiles(known, made, limit, simulations, restarts)
 
 
 class _Lanes:
-    """The state of all lanes: lane 2 j goes down, lane 2 j + 1 up from the optimum of parameter j."""
+    """The state of all lanes: lane 2 k goes down, lane 2 k + 1 up from the optimum of the k-th parameter profiled."""
 
-    def __init__(self, known: Uncertainty, limit: float):
+    def __init__(self, known: Uncertainty, limit: float, names: Sequence[str]):
         self.known, self.limit = known, limit
-        d = len(known.names)
-        self.column = np.repeat(np.arange(d), 2)
+        d = len(names)
+        self.column = np.repeat([known.names.index(name) for name in names], 2)
         self.sign = np.tile([-1.0, 1.0], d)
         self.unit = np.tile(known.unit, (2 * d, 1))
         self.slope = np.zeros_like(self.unit)  # how the others move with the profiled one
         errors = known.half / known.factor / (known.upper - known.lower)
-        self.step = np.repeat(np.clip(STEP * errors, SMALLEST_STEP, LARGEST_STEP), 2)
+        self.step = np.clip(STEP * errors, SMALLEST_STEP, LARGEST_STEP)[self.column]
         self.rise = np.zeros(2 * d)
         self.open = np.ones(2 * d, dtype=bool)
         self.path: list[list[tuple[float, float]]] = [[] for _ in range(2 * d)]
@@ -175,11 +207,12 @@ class _Lanes:
         factor = np.clip(np.where(np.isfinite(gained), AIM / gained, 1 / 3), 1 / 3, 3.0)
         self.step[lanes] = np.clip(np.abs(moved) * factor, SMALLEST_STEP, LARGEST_STEP)
 
-    def profile(self, j: int) -> Profile:
-        """The profile of parameter j, from its two lanes."""
+    def profile(self, k: int) -> Profile:
+        """The profile of the k-th parameter, from its two lanes."""
         sides, ends, limits = [], [], []
+        j = int(self.column[2 * k])
         optimum = (float(self.known.unit[j]), 0.0)
-        for lane in (2 * j, 2 * j + 1):
+        for lane in (2 * k, 2 * k + 1):
             path = np.array([optimum, *self.path[lane]])
             limit, end = self._crossing(path, lane)
             sides.append(path)

@@ -4,8 +4,8 @@ The search minimizes Eq. (8). From where it ended, damped least squares climb to
 (`likelihood`), whose noise is estimated on the way; its curvature there gives everything else.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -40,6 +40,7 @@ class Uncertainty:
     tests: list[dict[str, Any]]
     noise: list[dict[str, Any]]
     notes: list[str]
+    profiled: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # intervals that replace the curvature's
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -52,8 +53,10 @@ class Uncertainty:
 
     @property
     def intervals(self) -> np.ndarray:
-        """(d, 2), 95 %, inside the bounds."""
+        """(d, 2), 95 %, inside the bounds: by profile where there is one, else by the curvature."""
         ends = self.values[:, None] + self.half[:, None] * [-1.0, 1.0]
+        for name, interval in self.profiled.items():
+            ends[self.names.index(name)] = interval
         return np.clip(ends, self.lower[:, None], self.upper[:, None])
 
     def fields(self, together: "Together | None" = None, notes: Sequence[str] = ()) -> dict[str, Any]:
@@ -69,6 +72,7 @@ class Uncertainty:
                 "level": LEVEL,
                 "most_likely": dict(zip(self.names, self.values.tolist(), strict=True)),
                 "correlation": self.information.correlation.tolist(),
+                "profiled": list(self.profiled),
                 "noise": self.noise,
                 "tests": self.tests,
                 "notes": [*self.notes, *(together.notes if together else []), *notes],
@@ -84,12 +88,14 @@ def assess(problem: Problem, values: np.ndarray, robust: bool = False) -> Uncert
     `robust` leaves samples out that lie more than `OUTLIER` standard deviations off the fit, as a robust loss does.
     """
     likelihood = Likelihood.of(problem)
-    unit = valleys(likelihood, descend(likelihood.rows, likelihood.to_unit(values)).unit[0])[None]
+    unit = likelihood.to_unit(values)
+    if robust:
+        likelihood = cleaned(likelihood, unit)
+    unit = valleys(likelihood, descend(likelihood.rows, unit).unit[0])[None]
     for _ in range(2):
-        residuals = likelihood.residuals(unit)[0]
         if robust:
-            likelihood = replace(likelihood, known=inliers(likelihood, residuals))
-        likelihood = replace(likelihood, noise=noise_of(likelihood, residuals))
+            likelihood = cleaned(likelihood, unit)
+        likelihood = replace(likelihood, noise=noise_of(likelihood, likelihood.residuals(unit)[0]))
         unit = descend(likelihood.rows, unit).unit
     likelihood, notes = widened(likelihood, likelihood.residuals(unit)[0])
     found = descend(likelihood.rows, unit)
@@ -141,17 +147,18 @@ def conclude(likelihood: Likelihood, unit: np.ndarray, notes: Sequence[str] = ()
     )
 
 
-def inliers(likelihood: Likelihood, residuals: np.ndarray) -> np.ndarray:
-    """(2, N) samples within `OUTLIER` robust standard deviations of the fit, per event and channel."""
+def cleaned(likelihood: Likelihood, unit: np.ndarray) -> Likelihood:
+    """The likelihood without the samples beyond `OUTLIER` robust standard deviations of the fit at `unit` (1, D)."""
     drive = likelihood.problem.drive
     known = drive.weights > 0
+    residuals = np.abs(replace(likelihood, known=known).residuals(unit)[0])
     for e in range(drive.events):
         for c in range(2):
             part = drive.part(e)
-            seen = residuals[c, part][likelihood.known[c, part]]
-            spread = 1.4826 * float(np.median(np.abs(seen))) if len(seen) else 0.0
-            known[c, part] &= np.abs(residuals[c, part]) <= max(OUTLIER * spread, 1e-12)
-    return known
+            seen = residuals[c, part][known[c, part]]
+            if len(seen):
+                known[c, part] &= residuals[c, part] <= max(OUTLIER * 1.4826 * float(np.median(seen)), 1e-12)
+    return replace(likelihood, known=known)
 
 
 def noise_of(likelihood: Likelihood, residuals: np.ndarray) -> list[Any]:

@@ -59,6 +59,7 @@ class Identified(NamedTuple):
 
 def identified(job: Job) -> Identified:
     """Read the records, search, judge the outcome; says what is read and how far the search is."""
+    from tractexp.identify.profile import checked
     from tractexp.identify.result import conclude
     from tractexp.identify.uncertainty import assess
 
@@ -70,7 +71,7 @@ def identified(job: Job) -> Identified:
         found = search(problem, optimizer, job.seed, limits, progress)
     settings = {part: config["model"][part] for part in ("motor", "static", "effects")}
     result, fits = conclude(problem, found, events.validate, job.seed, settings, job.choices["optimizer"])
-    known = assess(problem, found.values, robust=not problem.loss.quadratic)
+    known = checked(assess(problem, found.values, robust=not problem.loss.quadratic))
     return Identified(problem, found, replace(result, **known.fields()), fits, known)
 
 

@@ -50,9 +50,8 @@ class Profile(Task):
 def show(made: Any, seconds: float) -> None:
     """Print both intervals of each parameter and the verdict that the profile leaves."""
     rows = []
-    for profile, (low, high) in zip(made.profiles, made.known.intervals, strict=True):
-        a, b = profile.interval
-        value = made.known.values[made.known.names.index(profile.name)]
+    for profile, value, half in zip(made.profiles, made.known.values, made.known.half, strict=True):
+        (a, b), low, high = profile.interval, value - half, value + half
         rows.append([profile.name, f"{value:.4g}", f"{low:.4g} .. {high:.4g}", f"{a:.4g} .. {b:.4g}"])
     table(["parameter", "most likely", "by curvature", "by profile"], rows)
     for name, verdict in made.verdicts.items():

@@ -1,0 +1,126 @@
+"""Plans: a forecast is what the record then gives, deeper tells more, and the best events are the best."""
+
+import itertools
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import uncertainty as study
+
+from tractexp.errors import UserError
+from tractexp.identify.plan import Shape, best_events, combined, depth_needed, each, forecast, guess, over_depth
+from tractexp.identify.problem import Problem
+from tractexp.identify.uncertainty import assess
+
+SHAPE = Shape(depth=0.4, duration=0.2, rate=500.0, noise_P=0.004, noise_Q=0.004, P0=1.0, Q0=1.0)
+
+
+def recorded(depth, deviation=0.004, seed=5, name="dip"):
+    t, U = study.Shape(depth).voltage()
+    clean = study.printed(study.TYPICAL, t, U, 0.35)
+    return study.event(t, U, clean + study.noise(np.random.default_rng(seed), len(t), deviation, 0.0), name)
+
+
+@pytest.fixture(scope="module")
+def problem():
+    return Problem(study.model(), [recorded(0.4)])
+
+
+def test_the_forecast_is_what_the_record_then_gives(problem):
+    known = assess(problem, study.TYPICAL)
+    event = problem.events[0]
+    shape = replace(Shape.of(event), duration=0.2, noise_P=0.004, noise_Q=0.004, memory=0.0)
+    planned = forecast(problem, study.TYPICAL, shape)
+    # The plan's trapezoid has edges of 20 ms, the record's of 30 ms; q_v and C are at other estimates.
+    np.testing.assert_allclose(planned.half[[0, 3, 4, 5]], known.half[[0, 3, 4, 5]], rtol=0.25)
+
+
+def test_deeper_longer_faster_and_quieter_tell_more(problem):
+    def half(**changes):
+        return forecast(problem, study.TYPICAL, replace(SHAPE, **changes)).half
+
+    assert (half(depth=0.5) < half(depth=0.2)).all()
+    assert (half(rate=1000.0) < half(rate=250.0)).all()
+    np.testing.assert_allclose(half(noise_P=0.008, noise_Q=0.008), 2 * half(), rtol=1e-6)
+    assert (half(memory=0.01)[[0, 3, 4, 5]] > half()[[0, 3, 4, 5]]).all()
+
+
+def test_the_depth_needed_gives_just_the_precision_asked_for(problem):
+    needed = depth_needed(over_depth(problem, study.TYPICAL, SHAPE), "H", 0.01)
+    at = forecast(problem, study.TYPICAL, replace(SHAPE, depth=needed.depth))
+    assert at.relative[study.NAMES.index("M")] == pytest.approx(0.01, rel=0.03)
+    assert str(needed) == f"a dip of {100 * needed.depth:.0f} % gives H within 1 %"
+
+
+def test_what_no_dip_can_give_is_said_with_the_best_there_is(problem):
+    forecasts = over_depth(problem, study.TYPICAL, replace(SHAPE, noise_P=0.05, noise_Q=0.05))
+    needed = depth_needed(forecasts, "q_v", 0.01)
+    assert needed.depth is None
+    assert "no dip of this kind gives q_v within 1 %: the best, of" in str(needed)
+
+
+def test_the_best_two_events_are_those_of_all_pairs():
+    depths = (0.1, 0.5, 0.25, 0.6)
+    archive = Problem(study.model(), [recorded(d, seed=k, name=f"{d:g}") for k, d in enumerate(depths)])
+    chosen = best_events(archive, study.TYPICAL, least=0.0, most=2)
+    informations = each(archive, study.TYPICAL)
+    volumes = {pair: combined([informations[e] for e in pair]).logdet() for pair in itertools.combinations(range(4), 2)}
+    assert {c.event for c in chosen} == set(max(volumes, key=volumes.get))
+    assert best_events(archive, study.TYPICAL, least=0.0)[-1].name == "0.1"
+    everything = best_events(archive, study.TYPICAL, least=0.0)
+    assert len(everything) == 4
+    assert all(a.gain >= b.gain for a, b in itertools.pairwise(everything))
+    stopped = best_events(archive, study.TYPICAL, least=everything[2].gain + 1e-6)
+    assert [c.event for c in stopped] == [c.event for c in everything[:2]]
+
+
+def test_a_guess_needs_no_search(problem):
+    np.testing.assert_allclose(guess(problem)[[0, 3, 4, 5]], study.TYPICAL[[0, 3, 4, 5]], rtol=0.05)
+
+
+def test_shapes_that_cannot_be_recorded_are_refused():
+    for changes, sentence in (
+        ({"depth": 0.99}, "task.depth=0.99 is out of range: it must be at least 0.03 and at most 0.95"),
+        ({"rate": 1.0}, "task.duration=0.2 is out of range"),
+        ({"noise_P": 0.0}, "the records show no noise before the dip.*give it as task.noise"),
+        ({"noise_P": float("nan")}, "the records show no noise before the dip"),
+    ):
+        with pytest.raises(UserError, match=sentence):
+            replace(SHAPE, **changes).check()
+
+
+def tractexp(*arguments, cwd):
+    command = [sys.executable, "-m", "tractexp", "tracking.enabled=false", *arguments]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, env=os.environ | {"COLUMNS": "160"})
+
+
+def test_the_plan_task_answers_with_a_number_and_a_figure(tmp_path):
+    done = tractexp("task=plan", "task.parameter=M", "task.within=0.05", "hydra.run.dir=run", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    content = json.loads((tmp_path / "run" / "plan.json").read_text())
+    assert 0.05 < content["depth_needed"] < 0.5
+    assert f"how deep? {content['answer']}" in done.stdout
+    assert (tmp_path / "run" / "plan.svg").stat().st_size > 1000
+    assert set(content["half_intervals"]) == {
+        "depth", "duration [s]", "samples per second", "noise, of P before the dip",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["task.parameter=X_prim"], "task.parameter=X_prim is not a free parameter; did you mean 'X_prime'?"),
+        (["task.depth=0.99"], "task.depth=0.99 is out of range"),
+        (["task.within=0"], "task.within=0.0 is out of range"),
+        (["task.values=nowhere.json"], "there is no result file nowhere.json"),
+    ],
+)
+def test_the_plan_task_refuses_bad_input_in_one_sentence(arguments, sentence, tmp_path):
+    done = tractexp("task=plan", *arguments, "hydra.run.dir=run", cwd=tmp_path)
+    assert done.returncode != 0
+    assert sentence in done.stderr
+    assert done.stderr.count("\n") == 1, done.stderr

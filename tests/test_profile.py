@@ -1,0 +1,118 @@
+"""Profiles: a parabola where theory says so, open sides, two minima, better optima, and the posterior beside them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import uncertainty as study
+
+from tractexp.errors import UserError
+from tractexp.identify.problem import Problem
+from tractexp.identify.profile import End, Profile, checked, profiles, revised, threshold
+from tractexp.identify.uncertainty import assess, conclude
+from tractexp.identify.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, Verdict
+
+
+def events(depths, deviation, seed=1, Q_s0=0.35):
+    rng, made = np.random.default_rng(seed), []
+    for depth in depths:
+        t, U = study.Shape(depth).voltage()
+        clean = study.printed(study.TYPICAL, t, U, Q_s0)
+        made.append(study.event(t, U, clean + study.noise(rng, len(t), deviation, 0.0)))
+    return made
+
+
+@pytest.fixture(scope="module")
+def quiet():
+    return assess(Problem(study.model(), events((0.5,), 0.001)), study.TYPICAL)
+
+
+def test_the_threshold_is_chi_squared_of_one_degree():
+    assert threshold() == pytest.approx(1.959963985**2, rel=1e-6)
+
+
+def test_with_little_noise_a_profile_is_the_parabola_of_the_information_matrix(quiet):
+    found = profiles(quiet)
+    assert found.restarts == 0
+    for profile, value, half in zip(found.profiles, quiet.values, quiet.half, strict=True):
+        np.testing.assert_allclose(
+            profile.interval, (value - half, value + half), atol=0.06 * half, err_msg=profile.name
+        )
+        assert profile.ends == (End.CLOSED, End.CLOSED)
+        assert profile.minima == ()
+        parabola = found.threshold * ((profile.values - value) / half) ** 2
+        np.testing.assert_allclose(profile.deviance, parabola, atol=0.25 + 0.1 * parabola.max())
+    assert {v.word for v in found.verdicts.values()} == {IDENTIFIED}
+
+
+def test_a_point_of_a_profile_is_the_constrained_optimum(quiet):
+    """The deviance with M held, by SciPy on the same whitened residuals."""
+    from scipy.optimize import least_squares
+
+    found = profiles(quiet, names=["M"])
+    (profile,) = found.profiles
+    j, likelihood = quiet.names.index("M"), quiet.likelihood
+    held = (profile.values[-1] - quiet.lower[j]) / (quiet.upper[j] - quiet.lower[j])
+
+    def rows(x):
+        return likelihood.rows(np.insert(x, j, held)[None])[0]
+
+    solved = least_squares(rows, np.delete(quiet.unit, j), x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12)
+    assert profile.deviance[-1] == pytest.approx(2 * solved.cost - quiet.deviance, abs=0.02)
+
+
+def test_a_shallow_dip_leaves_c_open_upwards_and_the_verdict_says_so():
+    known = assess(Problem(study.model(), events((0.15,), 0.01)), study.TYPICAL)
+    made = {p.name: p for p in profiles(known).profiles}
+    assert made["C"].ends == (End.CLOSED, End.BOUND)
+    assert made["C"].interval[1] == pytest.approx(0.99)
+    judged = checked(known)
+    assert judged.verdicts["C"].word == WEAK
+    assert "open upwards" in judged.verdicts["C"].detail
+    assert judged.profiled["C"] == pytest.approx(made["C"].interval, rel=1e-3)
+    assert set(judged.profiled) >= {"C", "X_prime", "q_v"}
+    assert "T_m" not in judged.profiled  # narrow: a parabola anyway
+    assert judged.verdicts["T_m"].word == IDENTIFIED
+
+
+def test_a_better_optimum_restarts_the_profiles_and_is_said(quiet):
+    """Started from a point off the optimum, as a search may leave it."""
+    off = quiet.unit.copy()
+    off[quiet.names.index("M")] += 3 * quiet.half[3] / (quiet.upper[3] - quiet.lower[3])
+    found = profiles(conclude(quiet.likelihood, off))
+    assert found.restarts >= 1
+    assert "a better optimum turned up along a profile" in found.notes[0]
+    np.testing.assert_allclose(found.known.values, quiet.values, atol=0.1 * quiet.half.min())
+    assert found.known.deviance == pytest.approx(quiet.deviance, abs=0.05)
+
+
+def test_two_minima_and_open_sides_change_the_verdict():
+    good = Verdict(IDENTIFIED, "± 3 %")
+    base = Profile("C", np.array([0.4, 0.5, 0.6]), np.array([5.0, 0, 5.0]), (0.48, 0.52), (End.CLOSED, End.CLOSED), ())
+    assert revised(good, base, 0, 1).word == IDENTIFIED
+    twice = revised(good, replace(base, minima=(0.58,)), 0, 1)
+    assert (twice.word, "two minima, another at 0.58" in twice.detail) == (WEAK, True)
+    upwards = revised(good, replace(base, ends=(End.CLOSED, End.BOUND)), 0, 1)
+    assert (upwards.word, "open upwards" in upwards.detail) == (WEAK, True)
+    assert revised(good, replace(base, ends=(End.BOUND, End.BOUND)), 0, 1).word == UNIDENTIFIED
+    assert revised(good, replace(base, interval=(0.3, 0.7)), 0, 1).word == WEAK
+
+
+def test_the_posterior_confirms_the_intervals(quiet):
+    pytest.importorskip("emcee", reason="the optional extra [posterior] is not installed")
+    from tractexp.identify.posterior import sample
+
+    drawn = sample(quiet, walkers=40, steps=600, seed=1)
+    again = sample(quiet, walkers=40, steps=600, seed=1)
+    np.testing.assert_array_equal(drawn.draws, again.draws)
+    for (low, high), value, half in zip(drawn.intervals, quiet.values, quiet.half, strict=True):
+        assert (high - low) / 2 == pytest.approx(half, rel=0.3)
+        assert (high + low) / 2 == pytest.approx(value, abs=0.3 * half)
+
+
+def test_too_few_walkers_are_refused(quiet):
+    pytest.importorskip("emcee", reason="the optional extra [posterior] is not installed")
+    from tractexp.identify.posterior import sample
+
+    with pytest.raises(UserError, match=r"task.walkers=10 is too few: 9 coordinates need at least 18"):
+        sample(quiet, walkers=10, steps=100, seed=0)
