@@ -138,7 +138,7 @@ def figure9(study: Study) -> list[Claim]:
             measured = f"expected {cost} to {targets} times the floor: {told}"
             claims.append(Claim("figure9", text, measured, CONFIRMED if wins else REFUTED))
     ends = {n: study.found_floor(study.objectives(n, "iterations")) for n in printed.COMPARED}
-    after = {n: study.found_floor(d) for n, d in study.descended.items()}
+    after = {n: study.found_floor(d.deviance) for n, d in study.descents.items()}
     told = "; ".join(f"{n} {after[n]:.0%} (at its floor {ends[n]:.0%})" for n in ends)
     holds = after["issa"] > max(0.5, after["ssa"], after["pso"])
     text = "SSA and PSO are caught in local optima, ISSA jumps out of them"

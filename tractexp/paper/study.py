@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from tractexp.record import Event
 ALPHAS = (0.1, 0.3, 0.5, 0.7, 0.9)  # of the tent map
 TARGETS = (10.0, 2.0)  # of running times, times the floor
 AT_FLOOR = 1.1  # a search within so many times the floor has found it
+SAME_VALLEY = 1.02  # descents that end within so many times of each other are in one valley
 DESCENT = 1e-3  # of the floor: a descent's step that gains less ends it
 
 
@@ -120,10 +121,10 @@ class Study:
         return expected_running_time(np.array(spent), np.array(reached))
 
     @functools.cached_property
-    def descended(self) -> dict[str, np.ndarray]:
-        """{optimizer: (seeds,) objectives} that least squares reach from where the searches ended.
+    def descents(self) -> dict[str, Any]:
+        """{optimizer: the `Descent` by least squares from where each seed's search ended}; squares are objectives.
 
-        Where that is the floor, the search was not caught in a local optimum: it was not done.
+        Where that reaches the floor, the search was not caught in a local optimum: it was not done.
         """
         from tractexp.identify.descent import descend
 
@@ -132,13 +133,23 @@ class Study:
         def rows(unit: np.ndarray, lanes: np.ndarray) -> np.ndarray:
             return scale * self.problem.residuals(space.from_unit(unit))
 
-        return {
-            name: descend(
-                rows, np.array([space.to_unit(f.values) for f in found]), iterations=200, tolerance=1e-3
-            ).deviance
-            / scale**2
-            for name, found in self.compared.items()
-        }
+        made = {}
+        for name, found in self.compared.items():
+            ends = descend(rows, np.array([space.to_unit(f.values) for f in found]), iterations=200, tolerance=1e-3)
+            made[name] = replace(ends, deviance=ends.deviance / scale**2)
+        return made
+
+    def valleys(self) -> list[tuple[float, int, np.ndarray]]:
+        """Where the descents of all optimizers end: objective, how many, and the values (free,), the lowest first."""
+        objectives = np.concatenate([d.deviance for d in self.descents.values()])
+        units = np.concatenate([d.unit for d in self.descents.values()])
+        left, found = np.argsort(objectives), []
+        while len(left):
+            same = objectives[left] <= SAME_VALLEY * objectives[left[0]]
+            values = self.problem.space.from_unit(units[left[0]])
+            found.append((float(objectives[left[0]]), int(np.count_nonzero(same)), values))
+            left = left[~same]
+        return found
 
     def found_floor(self, objectives: np.ndarray) -> float:
         """The share of objectives (n,) at the floor."""

@@ -95,16 +95,15 @@ def table1(sheet: Any, study: Study, draw: Draw) -> None:
     )
     rows = []
     for motor, order in study.orders.items():
-        (P, Q), (P2, Q2) = order.spread("train"), order.spread("validate")
-        held = [_percent(P2), _percent(Q2)] if study.held_out else ["-", "-"]
+        fitted, held = (", ".join(map(_percent, order.spread(role))) for role in ("train", "validate"))
         cost = f"{order.nanoseconds * study.problem.drive.samples / 1000:.3g}"
         rows.append([
-            motor, ", ".join(printed.TABLE_1[motor]), _percent(P), _percent(Q), *held, f"{order.condition:.1e}",
+            motor, ", ".join(printed.TABLE_1[motor]), fitted, held if study.held_out else "-", f"{order.condition:.1e}",
             f"{order.finite} of {order.free}", f"{order.identified} of {order.free}", cost, str(order.substeps),
         ])  # fmt: skip
     sheet.table(
-        ["motor", "the paper: P, Q, stability, identifiability, size", "epsilon_p", "epsilon_q", "held out: epsilon_p",
-         "epsilon_q", "condition", "finite intervals", "identified", "µs per simulation", "steps per sample"],
+        ["motor", "the paper: P, Q, stability, identifiability, size", "epsilon_p, epsilon_q", "held out", "condition",
+         "finite intervals", "identified", "µs per simulation", "steps per sample"],
         rows,
         "Condition: of the information matrix, parameters in units of their ranges. Finite intervals: 95 %, inside the"
         " bounds. Identified: within ± 20 %. A simulation is one candidate over the fitted record, among many at once.",
@@ -273,7 +272,9 @@ def figure9(sheet: Any, study: Study, draw: Draw) -> None:
     rows = []
     for name in printed.COMPARED:
         times = [number(study.running_time(name, t, c)) for c in ("iterations", "simulations") for t in TARGETS]
-        shares = [f"{study.found_floor(o):.0%}" for o in (study.objectives(name, "iterations"), study.descended[name])]
+        shares = [
+            f"{study.found_floor(o):.0%}" for o in (study.objectives(name, "iterations"), study.descents[name].deviance)
+        ]
         rows.append([LABELS[name], *times, *shares])
     sheet.table(
         ["", *(f"{c} to {t:g} × floor" for c in ("iterations", "simulations") for t in TARGETS), "at the floor",
@@ -282,6 +283,11 @@ def figure9(sheet: Any, study: Study, draw: Draw) -> None:
         " squares from where the search ended reach the floor, so that it lacked precision only; the others ended in a"
         " local optimum.",
     )  # fmt: skip
+    names = study.problem.space.names
+    valleys = [[number(f), str(n), *map(number, values)] for f, n, values in study.valleys()]
+    sheet.table(
+        ["valley: objective", "searches", *names], valleys, "Where least squares lead the searches of all three."
+    )
 
 
 def _variants(study: Study) -> list[Variant]:

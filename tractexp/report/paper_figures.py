@@ -35,9 +35,9 @@ def maps(path: Path, orbits: Mapping[str, np.ndarray], spread: Mapping[str, np.n
         )  # fmt: skip
         panel.set_yticks(range(1, len(spread) + 1), list(spread))
         panel.invert_yaxis()
-        everything = np.concatenate(list(spread.values()))
-        style.logarithmic(panel, "x", everything.min(), everything.max())
-        panel.set_xlabel("centered discrepancy (lower is more even)")
+        middle = [np.quantile(values, (0.05, 0.95)) for values in spread.values()]
+        style.logarithmic(panel, "x", np.min(middle), np.max(middle))
+        panel.set_xlabel("centered discrepancy")
         panel.set_title(caption, loc="left", pad=2)
         return style.save(figure, path)
 

@@ -6,21 +6,20 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import field, replace
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
 from tractexp.errors import UserError, check_choice, check_range
 from tractexp.plugin import plugin
 from tractexp.tasks.console import NEXT_LINES, say
+from tractexp.tasks.generalise import with_siblings
 from tractexp.tasks.task import Job, Task
 
 PARTS = (
     "table1", "table2", "table3", "table4", "table5", "figure3", "figure4", "figure6", "figure8", "figure9", "figure10",
     "figure11", "equations",
 )  # fmt: skip
-SHIPPED = "tibet_50pct"
-SIBLINGS = ("pkg://tractexp.data/tibet_30pct.csv", "pkg://tractexp.data/tibet_65pct.csv")
 
 
 @plugin
@@ -91,15 +90,6 @@ def study(job: Job, seeds: int, workers: int | None) -> Any:
 def problem(config: Mapping[str, Any], events: Any) -> Any:
     """The identification problem of these events, composed anew: compiled code does not travel to a worker."""
     return Job(config, {}, Path()).problem(events)
-
-
-def with_siblings(job: Job) -> Job:
-    """The job with the milder and the deeper shipped dip held out, where it fits the shipped one and names none."""
-    data: Mapping[str, Any] = job.config["data"]
-    if job.choices["data"] != SHIPPED or data.get("validate"):
-        return job
-    held = [path for path in SIBLINGS if path not in data["train"]]
-    return replace(job, config={**job.config, "data": {**data, "validate": held}})
 
 
 def need_held_out(made: Any, parts: list[str]) -> None:

@@ -1,0 +1,372 @@
+"""The paper's experiments: numbers by hand, planted verdicts, every experiment and part, refusals."""
+
+import json
+import os
+import subprocess
+import sys
+from itertools import product
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tractexp.errors import UserError
+from tractexp.paper import claims, equations, maps, printed, searches
+from tractexp.paper.study import Study
+from tractexp.report.markdown import Markdown
+from tractexp.tasks.paper import PARTS
+
+QUICK = ("task=paper", "task.seeds=1", "task.workers=1", "budget=300", "tracking.enabled=false")
+EXPERIMENTS = [
+    "table1", "table2", "table4", "table5", "figure3", "figure4", "figure6", "figure8", "figure9", "figure10",
+    "figure11",
+]  # fmt: skip
+
+
+def tractexp(*arguments, cwd):
+    command = [sys.executable, "-m", "tractexp", *arguments]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, env=os.environ | {"COLUMNS": "140"})
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    """All parts with one seed and few simulations: (folder, what was printed)."""
+    folder = tmp_path_factory.mktemp("paper")
+    done = tractexp(*QUICK, "hydra.run.dir=run", "task.docs=docs/paper.md", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return folder, done.stdout
+
+
+@pytest.fixture(scope="module")
+def generalised(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("generalise")
+    done = tractexp(
+        "task=generalise", "task.optimizers=[pso]", "budget=400", "tracking.enabled=false", "hydra.run.dir=run",
+        cwd=folder,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return folder, done.stdout
+
+
+# What the paper prints
+
+
+@pytest.mark.parametrize(("name", "sine"), [("issa", 4.29), ("ssa", 6.00), ("pso", 2.97)])
+def test_no_column_of_table_3_has_a_steady_state(name, sine):
+    assert equations.steady_state_sine(printed.TABLE_3[name]) == pytest.approx(sine, abs=0.005)
+
+
+def test_the_columns_of_table_3_cannot_fit_one_record_however_they_were_rounded():
+    """Two columns give mean P² and mean Q² by Eqs. (8) and (20); the second is negative in every corner of rounding."""
+    half_P, half_Q, half_E = (5e-6, 5e-7), (5e-6, 5e-6), (5e-7, 5e-7)
+    for signs in product((-1, 1), repeat=6):
+        P = [printed.EPSILON_P[n] + s * h for n, s, h in zip(("issa", "ssa"), signs[:2], half_P, strict=True)]
+        Q = [printed.EPSILON_Q[n] + s * h for n, s, h in zip(("issa", "ssa"), signs[2:4], half_Q, strict=True)]
+        E = [printed.OBJECTIVE[n] + s * h for n, s, h in zip(("issa", "ssa"), signs[4:], half_E, strict=True)]
+        determinant = P[0] ** 2 * Q[1] ** 2 - P[1] ** 2 * Q[0] ** 2
+        assert (P[0] ** 2 * E[1] - P[1] ** 2 * E[0]) / determinant < -1
+    found = equations.consistency()
+    assert found.pairs["issa and ssa"][1] == pytest.approx(-1.319, abs=0.001)
+    assert min(found.best) >= 0
+    assert max(map(abs, found.misses.values())) > 0.05
+
+
+def test_a_consistent_table_is_found_consistent(monkeypatch):
+    """Objectives made of mean P² = 0.6 and mean Q² = 0.3 give these back, with no miss."""
+    made = {n: printed.EPSILON_P[n] ** 2 * 0.6 + printed.EPSILON_Q[n] ** 2 * 0.3 for n in printed.COMPARED}
+    monkeypatch.setattr(printed, "OBJECTIVE", made)
+    found = equations.consistency()
+    assert found.best == pytest.approx((0.6, 0.3))
+    assert max(map(abs, found.misses.values())) < 1e-12
+
+
+def test_eq_4_as_printed_is_of_first_order():
+    """y' = y by hand: 1 + h + 5/18 h² + h³/27 + h⁴/216 as printed, where the exponential series begins h²/2."""
+    h, one = 0.5, np.ones(1)
+    wrong = 1 + h + 5 / 18 * h**2 + h**3 / 27 + h**4 / 216
+    right = 1 + h + h**2 / 2 + h**3 / 6 + h**4 / 24
+    assert equations.as_printed(lambda y: y, one, h)[0] == pytest.approx(wrong, rel=1e-14)
+    assert equations.classical(lambda y: y, one, h)[0] == pytest.approx(right, rel=1e-14)
+    assert equations.order(equations.as_printed) == pytest.approx(1, abs=0.05)
+    assert equations.order(equations.classical) == pytest.approx(4, abs=0.05)
+
+
+def test_sparrow_search_as_printed_is_drawn_to_zero_and_particle_swarm_is_not():
+    found = equations.bias(budget=2000, seeds=3)
+    for name in ("ssa", "issa"):
+        near, far = found[name]
+        assert far > 1e3 * near
+    near, far = found["pso"]
+    assert 0.05 < far / near < 20
+
+
+# Maps and flights
+
+
+def test_a_tent_orbit_follows_eq_14():
+    """By hand with alpha = 0.3: 0.15 -> 0.5 -> 0.5/0.7 = 0.714 -> 0.286/0.7 = 0.408; and each point of an orbit."""
+    z = 0.15
+    for expected in (0.5, 5 / 7, (2 / 7) / 0.7):
+        z = z / 0.3 if z < 0.3 else (1 - z) / 0.7
+        assert z == pytest.approx(expected)
+    orbit = maps.tent_orbit(0.3, 100, 2, np.random.default_rng(1))
+    before, after = orbit[:-1], orbit[1:]
+    assert after == pytest.approx(np.where(before < 0.3, before / 0.3, (1 - before) / 0.7))
+
+
+def test_a_logistic_orbit_follows_its_map():
+    orbit = maps.logistic_orbit(50, 3, np.random.default_rng(1))
+    assert orbit.shape == (50, 3)
+    assert orbit[1:] == pytest.approx(4 * orbit[:-1] * (1 - orbit[:-1]))
+
+
+def test_discrepancy_ranks_what_is_known_to_be_even():
+    """Sobol points are more even than random ones, and these than the logistic map, which crowds at the walls."""
+    found = {k: np.median(v) for k, v in maps.discrepancies(64, 2, (0.3, 0.9), draws=40).items()}
+    assert found["Sobol"] < 0.5 * found["uniform"] < found["uniform"] < 0.5 * found["logistic"]
+    assert found["tent, alpha = 0.3"] < found["tent, alpha = 0.9"]
+
+
+def test_the_tail_exponent_of_known_tails_is_found():
+    u = np.random.default_rng(0).random(200_000)
+    for a in (0.7, 1.5, 3.0):
+        assert maps.tail_exponent(u ** (-1 / a)) == pytest.approx(a, rel=0.05)
+
+
+def test_mantegnas_steps_have_exponent_three_halves_and_the_printed_ones_two_thirds():
+    """|nu|^-(1/beta) for a normal nu exceeds x with probability ~ x^-beta, |nu|^-beta with x^-(1/beta)."""
+    assert maps.tail_exponent(maps.flights("mantegna", 200_000, 1)) == pytest.approx(1.5, abs=0.15)
+    assert maps.tail_exponent(maps.flights("printed", 200_000, 1)) == pytest.approx(2 / 3, abs=0.07)
+
+
+# Eq. (21)
+
+
+def test_eq_21_by_hand():
+    """|1 - 1.5| = 0.5 and |2 - 1| = 1 have mean 0.75; the gap does not count."""
+    assert searches.mean_residual(np.array([1.0, 2.0, np.nan]), np.array([1.5, 1.0, 3.0])) == pytest.approx(0.75)
+
+
+def test_a_milder_dip_is_interpolated_and_a_deeper_one_extrapolated():
+    event = lambda depth: SimpleNamespace(depth=depth)  # noqa: E731
+    kinds = searches.by_depth([event(0.3), event(0.5), event(0.65)], [event(0.4), event(0.5)])
+    assert kinds == ["interpolation", "interpolation", "extrapolation"]
+
+
+def test_generalise_writes_eq_21_of_the_model_it_identified(generalised):
+    """Recomputed from Eqs. (1)-(3) and (6)-(7) in polar form by SciPy, which share no code with the kernels."""
+    from scipy.integrate import solve_ivp
+    from scipy.interpolate import Akima1DInterpolator
+
+    from tractexp.plugin import build
+    from tractexp.record import detect
+
+    content = json.loads((generalised[0] / "run" / "generalise.json").read_text())
+    row = next(r for r in content["residuals"] if r["optimizer"] == "pso" and r["kind"] == "extrapolation")
+    p = next(i for i in content["identified"] if i["optimizer"] == "pso")["parameters"]
+    event = detect(build("data", {"name": "csv", "train": ["pkg://tractexp.data/tibet_65pct.csv"]}).read().train[0])
+    record, U0 = event.record, event.U0
+    delta = 0.5 * np.arcsin(-2 * p["T_m"] * p["X_prime"] / (p["C"] * U0**2))
+    E = p["C"] * U0 * np.cos(delta)
+    Q_d0 = U0 * (U0 - E * np.cos(delta)) / p["X_prime"]
+    voltage = Akima1DInterpolator(record.t, record.U)
+
+    def slopes(t, y):
+        E, delta, omega = y
+        U = float(voltage(np.clip(t, record.t[0], record.t[-1])))
+        return [
+            (-E + p["C"] * U * np.cos(delta)) / p["T_prime"],
+            -p["C"] * U * np.sin(delta) / (p["T_prime"] * E) + omega,
+            (-U * E * np.sin(delta) / p["X_prime"] - p["T_m"]) / p["M"],
+        ]
+
+    start = [E, delta, np.tan(delta) / p["T_prime"]]
+    solved = solve_ivp(slopes, record.t[[0, -1]], start, t_eval=record.t, rtol=1e-8, atol=1e-10, max_step=0.002).y
+    U = record.U
+    P = (event.P0 - p["T_m"]) * (U / U0) ** p["p_v"] - U * solved[0] * np.sin(solved[1]) / p["X_prime"]
+    Q = (event.Q0 - Q_d0) * (U / U0) ** p["q_v"] + U * (U - solved[0] * np.cos(solved[1])) / p["X_prime"]
+    assert row["residual_P"] == pytest.approx(np.mean(np.abs(record.P - P)), rel=1e-3)
+    assert row["residual_Q"] == pytest.approx(np.mean(np.abs(record.Q - Q)), rel=1e-3)
+
+
+def test_generalise_compares_the_chosen_optimizer_too_and_says_that_the_data_are_synthetic(generalised):
+    folder, printed_ = generalised
+    content = json.loads((folder / "run" / "generalise.json").read_text())
+    assert {(r["optimizer"], r["kind"]) for r in content["residuals"]} == {
+        (n, k) for n in ("pso", "issa") for k in ("interpolation", "extrapolation")
+    }
+    assert all(i["simulations"] == 400 for i in content["identified"])
+    assert "synthetic stand-in" in printed_
+    for name in ("pso_interpolation", "pso_extrapolation", "issa_interpolation", "issa_extrapolation"):
+        assert "synthetic stand-in" in (folder / "run" / f"{name}.svg").read_text()
+
+
+# Searches and verdicts
+
+
+def test_the_best_objective_at_a_count_is_that_of_the_last_whole_iteration():
+    history = SimpleNamespace(simulations=np.array([50, 150, 250]), objective=np.array([3.0, 2.0, 1.0]))
+    found = SimpleNamespace(history=history)
+    assert [searches.best_at(found, n) for n in (10, 50, 149, 150, 1000)] == [3.0, 3.0, 3.0, 2.0, 1.0]
+
+
+def test_workers_change_no_result():
+    made = [
+        searches.run(_recipe, {"pso": {"name": "pso"}, "ssa": {"name": "ssa"}}, 6, searches.Limits(150), workers)
+        for workers in (1, 2)
+    ]
+    for name in ("pso", "ssa"):
+        a, b = ([f.objective for f in m[name]] for m in made)
+        assert a == b
+        assert len(set(a)) == 6
+
+
+def _recipe():
+    from tractexp.identify.problem import Problem
+    from tractexp.identify.result import parts
+    from tractexp.model.model import compose
+    from tractexp.plugin import build
+    from tractexp.record import detect
+
+    node = {"motor": {"name": "electromechanical"}, "static": {"name": "exponential"}}
+    records = build("data", {"name": "csv", "train": ["pkg://tractexp.data/tibet_50pct.csv"]}).read()
+    return Problem(compose(*parts(node)), [detect(r) for r in records.train])
+
+
+def planted(seeds, levels):
+    """A study whose searches fell in ten iterations to their level, plus a little that differs by seed."""
+    found = {}
+    for name, level in levels.items():
+        found[name] = []
+        for seed in range(seeds):
+            objective = level * (1 + 0.01 * np.sin(seed)) * np.geomspace(100, 1, 10)
+            history = SimpleNamespace(simulations=50 * np.arange(1, 11), objective=objective)
+            found[name].append(SimpleNamespace(history=history, objective=objective[-1], simulations=500, seconds=1.0))
+    study = Study(_recipe, {}, (), (), seeds)
+    vars(study)["compared"] = found
+    vars(study)["reference"] = SimpleNamespace(objective=min(levels.values()), simulations=100)
+    return study
+
+
+def test_planted_rankings_are_judged_as_they_are():
+    study = planted(10, {"issa": 1.0, "ssa": 2.0, "pso": 0.5})
+    assert claims.better(study, "issa", "ssa", "iterations")[0] == claims.CONFIRMED
+    assert claims.better(study, "issa", "pso", "iterations")[0] == claims.REFUTED
+    assert claims.better(study, "ssa", "pso", "simulations")[0] == claims.REFUTED
+
+
+def test_equal_optimizers_confirm_nothing_and_few_seeds_settle_nothing():
+    assert claims.better(planted(10, {"issa": 1.0, "ssa": 1.0, "pso": 1.0}), "issa", "ssa", "iterations")[0] == (
+        claims.REFUTED
+    )
+    assert (
+        claims.better(planted(5, {"issa": 1.0, "ssa": 2.0, "pso": 3.0}), "issa", "ssa", "iterations")[0] == claims.OPEN
+    )
+
+
+def test_running_times_are_those_of_the_planted_histories():
+    """100, 60, 36, 22, 13, 7.7, ... times the level: below ten times it after 5 iterations, 300 simulations."""
+    study = planted(1, {"issa": 1.0, "ssa": 4.0, "pso": 1.0})
+    assert study.running_time("issa", 10.0, "iterations") == 5
+    assert study.running_time("issa", 10.0, "simulations") == 300
+    assert study.running_time("ssa", 2.0, "iterations") == np.inf
+
+
+# The page
+
+
+@pytest.mark.parametrize("name", EXPERIMENTS)
+def test_every_experiment_composes_to_its_part(name):
+    from hydra import compose, initialize_config_dir
+
+    from tractexp.__main__ import CONF
+    from tractexp.config import register
+
+    register()
+    with initialize_config_dir(str(CONF), version_base="1.3"):
+        config = compose("config", overrides=[f"experiment={name}"])
+    assert config.task.name == "paper"
+    assert config.task.parts == [name]
+    assert name in PARTS
+
+
+def test_the_page_has_every_table_and_figure_and_a_verdict_for_each_claim(page):
+    folder, told = page
+    html = (folder / "run" / "paper.html").read_text()
+    text = (folder / "run" / "paper.md").read_text()
+    for part in PARTS[:-1]:
+        kind = part.rstrip("0123456789")
+        heading = f"{kind.capitalize()} {part[len(kind) :]}: "
+        assert f"<h2>{heading}" in html, heading
+        assert f"## {heading}" in text, heading
+    assert "What the printed equations and values cannot be" in html
+    rows = html.split("<h2>The claims</h2>")[1].split("</tbody>")[0].count("<tr>") - 1
+    verdicts = [line for line in told.splitlines() if line.startswith(("  confirmed: ", "  not ", "  cannot "))]
+    assert rows == len(verdicts) >= 30
+    for verdict in (claims.CONFIRMED, claims.REFUTED, claims.IMPOSSIBLE):
+        assert f">{verdict}</td>" in html
+    assert html.count("<svg") == 9
+    for shown in (html, text):
+        assert "synthetic stand-in" in shown
+        assert "so no value can equal" in shown
+        assert "is not the paper" in shown or "so these are not the paper's 300" in shown.replace("&#x27;", "'")
+
+
+def test_the_page_holds_the_papers_values_beside_ours(page):
+    html = (page[0] / "run" / "paper.html").read_text()
+    for column in printed.TABLE_3.values():
+        for value in column:
+            assert f"<td>{value:g}</td>" in html
+    for table in (printed.INTERPOLATION, printed.EXTRAPOLATION):
+        for pair in table.values():
+            assert all(f"<td>{value:g}</td>" in html for value in pair)
+
+
+def test_the_markdown_is_copied_with_figures_that_are_there(page):
+    folder, _ = page
+    text = (folder / "docs" / "paper.md").read_text()
+    links = [part.split(")")[0] for part in text.split("](")[1:]]
+    assert len(links) == 9
+    assert all((folder / "docs" / link).is_file() for link in links)
+
+
+def test_markdown_escapes_what_would_be_markup():
+    made = Markdown("t").table(["a", "b"], [["x|y", "_z_"]])
+    assert made._parts[-1] == "| a | b |\n| --- | ---: |\n| x\\|y | \\_z\\_ |"
+
+
+# Refusals
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["task=paper", "task.parts=[table6]"], "task.parts=table6 is not one of table1"),
+        (["task=paper", "task.seeds=0"], "task.seeds=0 is out of range: it must be at least 1"),
+        (["task=paper", "task.workers=0"], "task.workers=0 is out of range: it must be at least 1"),
+        (["task=paper", "data=tibet_30pct"], "no held-out event for the interpolation"),
+        (["experiment=table5", "data=tibet_65pct"], "no held-out event for the extrapolation"),
+        (["task=generalise", "data=tibet_30pct"], "task=generalise needs dips that are not fitted"),
+        (["task=generalise", "task.optimizers=[isa]"], "there is no optimizer 'isa'; did you mean 'issa'?"),
+        (["task=generalise", "task.seeds=0"], "task.seeds=0 is out of range: it must be at least 1"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_in_a_sentence(arguments, sentence, tmp_path):
+    done = tractexp(*arguments, "tracking.enabled=false", cwd=tmp_path)
+    assert done.returncode == 2
+    assert sentence in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not [p for p in tmp_path.rglob("*") if p.is_file()]
+
+
+def test_a_table_that_needs_no_held_out_dip_is_made_without_one(tmp_path):
+    done = tractexp(
+        "experiment=figure6", "data=tibet_30pct", "hydra.run.dir=run", "tracking.enabled=false", cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    assert "<h2>Figure 6: the record</h2>" in (tmp_path / "run" / "paper.html").read_text()
+
+
+def test_a_study_without_the_dip_it_needs_says_which():
+    with pytest.raises(UserError, match="a dip deeper than the fitted one is needed"):
+        Study(_recipe, {}, (SimpleNamespace(depth=0.5),), (SimpleNamespace(depth=0.3),), 1).held("extrapolation")
