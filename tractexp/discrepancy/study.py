@@ -19,6 +19,7 @@ from tractexp.model.model import Model, compose
 from tractexp.record import Event
 
 STARTS = 24  # of the base fit
+ROUGH, EXACT = (12, 0.1), (40, 1e-3)  # iterations and tolerance of the deviance
 KEPT = 3  # of them that are refined with the measurement chain free
 PRIOR = 5.0  # smallest relevant sizes: how far the measurement chain is believed to be off, one standard deviation
 
@@ -107,11 +108,16 @@ class Study:
         return np.concatenate([white, *(p[:, None] for p in prior)], axis=1)
 
     def refit(
-        self, noise: Noise, wanted: Sequence[tuple[Sequence[str], np.ndarray]], chain: Sequence[str] | None = None
+        self,
+        noise: Noise,
+        wanted: Sequence[tuple[Sequence[str], np.ndarray]],
+        chain: Sequence[str] | None = None,
+        rough: bool = False,
     ) -> list[Refit]:
         """Fit sets of effects (names, start (D,)) side by side, with the named part of the chain free (all of it).
 
-        Of several starts of one set the best is returned; the result is in order of deviance.
+        Of several starts of one set the best is returned; the result is in order of deviance. A `rough` refit is good
+        enough to rank sets that are far apart.
         """
         free_chain = self.catalogue.chain if chain is None else tuple(chain)
         always = [*self.base, *self.before, *self.parameters(free_chain)]
@@ -129,7 +135,7 @@ class Study:
             return self.rows(whole[:, :-1], noise, prior)
 
         begin = np.take_along_axis(starts, table, axis=1)
-        done = descend(rows, begin, table == self.dimension, tolerance=1e-3)
+        done = descend(rows, begin, table == self.dimension, *(ROUGH if rough else EXACT))
         np.put_along_axis(starts, table, done.unit, axis=1)
         best: dict[tuple[str, ...], Refit] = {}
         for lane, (names, _) in enumerate(wanted):

@@ -24,7 +24,8 @@ from tractexp.discrepancy.tangent import (
 )
 
 MOST_EFFECTS = 3
-SHORTLIST = 8  # sets of one size that are refitted
+SHORTLIST = 6  # sets of one size that are refitted
+CLOSE = 12.0  # of the deviance: a rough refit this near the best is made exact
 PLAIN = 1e-10  # a score of this p needs no exact threshold
 NESTED = 0.1  # a set may be worse than its own subset by no more than this, or the refit did not converge
 
@@ -88,7 +89,10 @@ def explain(study: Study, alpha: float, seed: int, tell: Callable[[str], None] =
         wanted = shortlist(stages, size, study)
         tell(f"refitting {len(wanted)} {'effect' if size == 1 else f'sets of {size}'}{'s' * (size == 1)}")
         noise = stages[-1].noise
-        fits = study.refit(noise, [s for names in wanted for s in starts(study, stages, refits, names)])
+        fits = study.refit(noise, [s for n in wanted for s in starts(study, stages, refits, n)], rough=True)
+        near = [f for f in fits if f.deviance < fits[0].deviance + CLOSE]
+        exact = {f.names: f for f in study.refit(noise, [(f.names, f.unit) for f in near])}
+        fits = [exact.get(f.names, f) for f in fits]
         refits |= {f.names: f for f in fits}
         fits = nested(study, noise, refits, fits)
         refits |= {f.names: f for f in fits}
@@ -114,7 +118,7 @@ def shortlist(stages: Sequence[Stage], size: int, study: Study) -> list[tuple[st
             drop = side @ np.linalg.pinv(block @ block.T, rcond=1e-9, hermitian=True) @ side
             value = base.fit.deviance - float(drop)
             sets[subset] = min(sets.get(subset, np.inf), value)
-    return sorted(sets, key=lambda s: (sets[s], s))[: SHORTLIST if size == 1 else 2 * SHORTLIST]
+    return sorted(sets, key=lambda s: (sets[s], s))[:SHORTLIST]
 
 
 def _column(base: Stage, score: Score) -> np.ndarray:
