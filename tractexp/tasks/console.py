@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+LOG_WIDTH = 120  # characters a table may take in a log file
 FIRST_LINE, NEXT_LINES = 2.0, 10.0  # s: a log file gets a progress line after so long, then every so often
 
 
@@ -14,7 +15,8 @@ FIRST_LINE, NEXT_LINES = 2.0, 10.0  # s: a log file gets a progress line after s
 def console() -> Any:
     from rich.console import Console
 
-    return Console(highlight=False, soft_wrap=True)
+    made = Console(highlight=False, soft_wrap=True)
+    return made if made.is_terminal else Console(highlight=False, soft_wrap=True, width=LOG_WIDTH)
 
 
 def say(text: str = "") -> None:
@@ -29,7 +31,7 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[str]], title: str = ""
 
     made = Table(*[], title=title or None, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     for i, column in enumerate(columns):
-        made.add_column(column, justify="left" if i in (0, len(columns) - 1) else "right", no_wrap=True)
+        made.add_column(column, justify="left" if i in (0, len(columns) - 1) else "right", no_wrap=i < len(columns) - 1)
     for row in rows:
         made.add_row(*row)
     console().print(made, markup=False)

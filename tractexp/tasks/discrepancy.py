@@ -28,6 +28,7 @@ class Discrepancy(Task):
 
         events, node = job.events(), job.config["model"]
         read(events)
+        job.prepare_log()
         finding = investigate(
             job.model, events.train, events.validate, node["bounds"], node["fixed"],
             only=self.effects, alpha=self.false_alarms, seed=job.seed, tell=lambda line: say(f"  {line}"),

@@ -66,6 +66,7 @@ def identified(job: Job) -> Identified:
     config, events, optimizer = job.config, job.events(), job.optimizer
     problem = job.problem(events.train)
     announce(job, events, problem)
+    job.prepare_log()
     limits = Limits(config["budget"], config["time_limit"], config["target"])
     with searching(getattr(optimizer, "iterations", None), limits.simulations) as progress:
         found = search(problem, optimizer, job.seed, limits, progress)

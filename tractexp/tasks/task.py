@@ -65,6 +65,26 @@ class Job:
         """The MLflow experiment: named by the configuration, or after task and data."""
         return self.config["tracking"]["experiment"] or f"{self.choices['task']} {self.choices['data']}"
 
+    @property
+    def _store(self) -> str:
+        from tractexp import tracking
+
+        return self.config["tracking"]["uri"] or tracking.default_uri(Path.cwd())
+
+    @functools.cached_property
+    def _logger(self) -> Any:
+        from tractexp.tracking.process import Logger
+
+        return Logger(self._store)
+
+    def prepare_log(self) -> None:
+        """Get MLflow ready beside the computation, in a process of its own; call it once the input is found right.
+
+        A job of a sweep leaves it: its worker has MLflow at hand, and the cores are busy.
+        """
+        if self.config["tracking"]["enabled"] and not self.in_sweep:
+            _ = self._logger
+
     def log(self, name: str, values: Mapping[str, float], **content: Any) -> None:
         """Log this job in MLflow with its configuration and tags, and say how to look at it.
 
@@ -85,7 +105,9 @@ class Job:
             parent=self.sweep,
             **content,
         )
-        uri = node["uri"] or tracking.default_uri(Path.cwd())
-        tracking.log(run, uri)
+        if "_logger" in self.__dict__:
+            self._logger.log(run)
+        else:
+            tracking.log(run, self._store)
         chosen = f" --uri {node['uri']}" if node["uri"] else ""
         say(f"logged in experiment '{self.experiment}'; to see it: tractexp ui{chosen}")
