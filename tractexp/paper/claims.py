@@ -190,7 +190,7 @@ def figure3(study: Study) -> list[Claim]:
         Claim("figure3", "with alpha = 0.3 it is relatively uniform",
               f"lowest of the alphas tried: {best.partition(', ')[2]} with {number(tent[best])}; 0.3 has"
               f" {number(tent[own])}", CONFIRMED if tent[own] < DIFFERENT * tent[best] else REFUTED),
-        Claim("figure3", "a tent map spreads the flock well (so it is used to initialize)",
+        Claim("figure3", "initializing by the tent map makes the flock more even",
               f"{far:.2f} times the discrepancy of plain random numbers, {middle[own] / middle['Sobol']:.1f} times"
               " that of Sobol points", CONFIRMED if far < 1 / DIFFERENT else REFUTED),
     ]  # fmt: skip

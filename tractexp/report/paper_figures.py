@@ -15,6 +15,7 @@ def maps(path: Path, orbits: Mapping[str, np.ndarray], spread: Mapping[str, np.n
     """Figure 3: orbits {label: (n,)} in [0, 1], and the discrepancies {way: (draws,)} of flocks as box plots."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
+    from matplotlib.ticker import LogLocator
 
     with rc_context(style.SETTINGS):
         figure = Figure(figsize=(8.0, 0.9 + 1.05 * len(orbits)), layout="constrained")
@@ -37,6 +38,7 @@ def maps(path: Path, orbits: Mapping[str, np.ndarray], spread: Mapping[str, np.n
         panel.invert_yaxis()
         middle = [np.quantile(values, (0.05, 0.95)) for values in spread.values()]
         style.logarithmic(panel, "x", np.min(middle), np.max(middle))
+        panel.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         panel.set_xlabel("centered discrepancy")
         panel.set_title(caption, loc="left", pad=2)
         return style.save(figure, path)

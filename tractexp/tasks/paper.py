@@ -1,7 +1,7 @@
 """The paper's tables and figures, done again: one page, one verdict for each claim."""
 
 import functools
-import shutil
+import re
 import sys
 import time
 from collections import Counter
@@ -29,7 +29,7 @@ class Paper(Task):
     parts: list[str] = field(default_factory=list)  # such as [table1,figure9]; empty: all
     seeds: int = 30
     workers: int | None = None  # processes that search; null: one for each core
-    docs: str | None = None  # copy paper.md to this file, and the figures into images/paper beside it
+    docs: str | None = None  # write paper.md to this file too, without its figures
 
     def check(self) -> None:
         for part in self.parts:
@@ -117,17 +117,13 @@ class Counting:
 
 
 def publish(paths: list[Path], docs: Path) -> Path:
-    """Copy the Markdown page to `docs` and its figures beside it."""
-    folder = docs.parent / "images" / "paper"
+    """Write the Markdown page to `docs` without its figures, which are named where they stand in the run's page."""
+    text = next(path for path in paths if path.suffix == ".md").read_text(encoding="utf-8")
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for path in paths:
-            if path.suffix == ".svg":
-                shutil.copyfile(path, folder / path.name)
-        text = next(path for path in paths if path.suffix == ".md").read_text(encoding="utf-8")
-        docs.write_text(text.replace("](figure", "](images/paper/figure"), encoding="utf-8")
+        docs.parent.mkdir(parents=True, exist_ok=True)
+        docs.write_text(re.sub(r"!\[(.*?)\]\((.*?)\)", r"*\2 of the run's folder: \1*", text), encoding="utf-8")
     except OSError as error:
-        raise UserError(f"task.docs={docs}: the page cannot be copied there: {error.strerror}") from error
+        raise UserError(f"task.docs={docs}: the page cannot be written there: {error.strerror}") from error
     return docs
 
 
