@@ -149,6 +149,9 @@ class Model:
 
     def refusal(self, values: np.ndarray, drive: Drive, event: int = 0) -> str | None:
         """Why these values (d,) have no steady state before an event, as a sentence; None where they have one."""
+        _, miss = self._run(drive, self._candidates(drive, values), 1, np.empty((0, 0, 0)))
+        if miss[event, 0] == 0:
+            return None  # the kernel found one; the sentence takes the symbols, which take a second to load
         eq = self.equations
         known = dict(zip(self.names, map(float, values), strict=True))
         known |= dict(zip((*EVENT, "P0", "Q0"), (*drive.event[event], *drive.before[event]), strict=True))
@@ -158,7 +161,30 @@ class Model:
             return complex(whole.subs({s: known[s.name] for s in whole.free_symbols})).real
 
         missed = [r.sentence.format(value=number(r.shown)) for r in eq.requirements if not number(r.slack) >= 0]
-        return "; ".join(missed) or None
+        return "; ".join(missed) or "no steady state was found before the event; its equations have no solution there"
+
+    def at_rest(self, values: np.ndarray, drive: Drive, event: int = 0) -> dict[str, float]:
+        """The kernel's steady state of values (d,) before an event: parameters, states (`NAME_before`), quantities.
+
+        Valid where `refusal` has nothing to say; quantities that are phasors are left out.
+        """
+        from tractexp.model.equations import phasor_parts, start_symbol
+
+        eq = self.equations
+        given = [*map(float, (*values, *drive.before[event], *drive.event[event]))]
+        known = dict(zip((*self.names, "P0", "Q0", *EVENT), given, strict=True))
+        *starts, _ = self.kernel._start(*given)
+        if hasattr(self.kernel, "_settle"):
+            *solved, _ = self.kernel._settle(*given, *starts)
+            starts[: len(solved)] = solved
+        symbols = [start_symbol(s) for s in (*eq.states, *eq.memories)]
+        names = [p.name for s in symbols for p in ((s,) if s.is_real else phasor_parts(s))]
+        known |= dict(zip(names, map(float, starts), strict=True))
+        for symbol in eq.definitions:
+            value, imaginary = eq.parts(eq.before(symbol))
+            if imaginary == 0:
+                known[symbol.name] = float(value.subs({s: known[s.name] for s in value.free_symbols}))
+        return known
 
     def latex(self) -> list[str]:
         """The model's equations, one a line."""
