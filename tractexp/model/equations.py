@@ -251,7 +251,10 @@ class Equations:
                 a0, b0 = phasor_parts(start_symbol(state))
                 split |= {state: a + I * b, start_symbol(state): a0 + I * b0}
         lowered = self.expand(expression, lambda s: not s.is_real).xreplace(split)
-        both = (lowered, sympy.Integer(0)) if _is_real(lowered) else map(_shorter, lowered.as_real_imag())
+        if _is_real(lowered):
+            both = (lowered if lowered.is_real else _shorter(lowered), sympy.Integer(0))
+        else:
+            both = map(_shorter, lowered.as_real_imag())
         real, imaginary = (e.xreplace({s: self.real(s) for s in self._names(e)}) for e in both)
         return real, imaginary
 
