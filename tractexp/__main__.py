@@ -71,7 +71,7 @@ def _run() -> int:
 
 def opened(argument: str) -> str:
     """Let `model.bounds.C=[0.5,0.9]` add the entry it names: Hydra would ask for a plus sign."""
-    return f"++{argument}" if argument.startswith(("model.bounds.", "model.fixed.")) else argument
+    return f"++{argument}" if argument.startswith(("model.bounds.", "model.fixed.", "task.values")) else argument
 
 
 if __name__ == "__main__":

@@ -63,6 +63,25 @@ def fit(
         return style.save(figure, path)
 
 
+def response(
+    path: Path, t: np.ndarray, U: np.ndarray, calculated: Power, *, title: str, notes: Sequence[str] = ()
+) -> Path:
+    """Draw voltage and the calculated P and Q over time [s], in pu, shape (N,), where nothing was measured."""
+    _check_lengths(path, t=t, U=U, P=calculated[0], Q=calculated[1])
+    from matplotlib import rc_context
+
+    with rc_context(style.SETTINGS):
+        figure, top = _page(8.0, 5.2, title, notes)
+        panels = figure.subplots(3, 1, sharex=True, height_ratios=(1.0, 1.5, 1.5))
+        figure.subplots_adjust(left=0.1, right=0.975, bottom=0.09, top=top, hspace=0.13)
+        colors = (style.VOLTAGE, style.ACTIVE, style.REACTIVE)
+        for panel, name, color, values in zip(panels, "UPQ", colors, (U, *calculated), strict=True):
+            panel.plot(*style.thin(t, values), color=color)
+            _label_axis(panel, f"{name} [pu]", -0.085)
+        panels[2].set_xlabel("t [s]")
+        return style.save(figure, path)
+
+
 def fitness(
     path: Path, by_iteration: Curves, by_simulations: Curves, *, title: str = "", notes: Sequence[str] = ()
 ) -> Path:

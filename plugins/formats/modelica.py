@@ -1,0 +1,116 @@
+"""Modelica model, self-contained."""
+
+import re
+
+from tractexp.errors import UserError
+from tractexp.export.format import Format
+from tractexp.plugin import plugin
+
+
+@plugin
+class Modelica(Format):
+    """A Modelica model with inputs U [pu] and omega_s [rad/s] and outputs P, Q [pu], written from the equations.
+
+    Every continuous state, parameter and equation of the identified model, effects included, appears under its own
+    name; a phasor as its real and imaginary part. States start at the steady state before the event and the model needs
+    no library. Connect the inputs to the magnitude and speed of a terminal's voltage phasor.
+
+    Not to be confused with a component of a power system library: it has no electrical connector.
+
+    Source: Modelica Language Specification 3.6, chapters 4 (models), 8 (equations) and 3 (operators).
+    Departures: none. Models with discrete memories, and effects of the measurement chain, are refused.
+    """
+
+    suffix = ".mo"
+
+    def text(self, load):
+        eq, known = load.model.equations, load.before
+        if eq.memories or load.model.chain:
+            which = next(m.name for m in (*eq.memories, *load.model.chain))
+            raise UserError(
+                f"format 'modelica' cannot represent '{which}', which acts on samples;"
+                " export the model without the effect it belongs to"
+            )
+        rows = _equations(eq)
+        lines = [f"model TractionLoad {_quoted(f'{load.model.title}, per unit of the record')}"]
+        for p in load.model.parameters:
+            lines.append(f"  parameter Real {p.name} = {load.values[p.name]!r} {_quoted(f'{p.about} [{p.unit}]')};")
+        for name, about in BEFORE.items():
+            if any(_reads(right, name) for _, right in rows) or name in ("U0", "omega_s0"):
+                lines.append(f"  parameter Real {name} = {known[name]!r} {_quoted(about)};")
+        lines += [f"  input Real U(start = U0) {_quoted('voltage [pu]')};"]
+        lines += [f"  input Real omega_s(start = omega_s0) {_quoted('synchronous speed less nominal [rad/s]')};"]
+        if any(_reads(right, "U2") for _, right in rows):
+            lines.append(f"  input Real U2 {_quoted('negative-sequence voltage [pu]')};")
+        lines += [f"  output Real {power} {_quoted('consumed [pu]')};" for power in "PQ"]
+        for symbol, start in _starts(eq):
+            lines.append(f"  Real {symbol}(start = {known[start]!r}, fixed = true);")
+        lines += [f"  Real {symbol};" for symbol in eq.steps]
+        lines += ["equation", *(f"  {left} = {right};" for left, right in rows), "end TractionLoad;"]
+        return "\n".join(lines) + "\n"
+
+
+BEFORE = {
+    "U0": "voltage before the event [pu]",
+    "omega_s0": "synchronous speed before the event, less nominal [rad/s]",
+    "omega_n": "nominal synchronous speed [rad/s]",
+    "P_s0": "active power of the static load before the event [pu]",
+    "Q_s0": "reactive power of the static load before the event [pu]",
+    "P0": "active power before the event [pu]",
+    "Q0": "reactive power before the event [pu]",
+    "U20": "negative-sequence voltage before the event [pu]",
+}
+
+
+def _equations(eq):
+    """(left, right) of each equation, as Modelica text; what the static load draws before the event is one name."""
+    from tractexp.model.equations import Symbol
+
+    kept = {eq.P_s0: Symbol("P_left", real=True), eq.Q_s0: Symbol("Q_left", real=True)}
+    named = {symbol: Symbol(name, real=True) for symbol, name in zip(kept.values(), ("P_s0", "Q_s0"), strict=True)}
+    at = {eq.U_rate: Symbol("der(U)", real=True), eq.t: Symbol("time", real=True)}
+    show = lambda e: _modelica(eq.real(eq.expand(e, lambda s: s not in kept).xreplace(kept)).xreplace(named | at))  # noqa: E731
+    rows = [(f"der({symbol})", _modelica(d.xreplace(at))) for symbol, d, _ in eq.real_states()]
+    rows += [(symbol.name, show(e)) for symbol, e in eq.steps.items()]
+    return [*rows, ("P", show(eq.P)), ("Q", show(eq.Q))]
+
+
+def _starts(eq):
+    """Each real state and the name of its value before the event."""
+    from tractexp.model.equations import phasor_parts, start_symbol
+
+    for state in eq.states:
+        if state.is_real:
+            yield state, start_symbol(state).name
+        else:
+            yield from zip(phasor_parts(state), (p.name for p in phasor_parts(start_symbol(state))), strict=True)
+
+
+def _modelica(expression):
+    """An expression in Modelica's operators and functions."""
+    from sympy import Float, Rational
+    from sympy.printing.str import StrPrinter
+
+    class Printer(StrPrinter):
+        def _print_Pow(self, e, rational=False):
+            if e.exp == Rational(1, 2):
+                return f"sqrt({self._print(e.base)})"
+            base, power = (self.parenthesize(x, 80) for x in (e.base, e.exp))
+            return f"{base}^{power}" if not e.exp.is_negative else f"{base}^({self._print(e.exp)})"
+
+        def _print_Float(self, e):
+            return repr(float(e))
+
+    names = {"Max(": "max(", "Min(": "min(", "Abs(": "abs("}
+    text = Printer({"full_prec": False}).doprint(expression.evalf() if isinstance(expression, Float) else expression)
+    for python, modelica in names.items():
+        text = text.replace(python, modelica)
+    return text
+
+
+def _reads(text, name):
+    return re.search(rf"\b{name}\b", text) is not None
+
+
+def _quoted(text):
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'

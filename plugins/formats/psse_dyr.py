@@ -1,0 +1,67 @@
+"""PSS/E dynamics data: CIM5BL and IEELBL."""
+
+from tractexp.export.format import Format
+from tractexp.plugin import plugin
+
+
+@plugin
+class PsseDyr(Format):
+    """Records of a PSS/E .dyr file: the motor as CIM5BL on load 'M' of the bus, the static load as IEELBL on load 'S'.
+
+    CIM5BL: bus, model, load, IT, RA, XA, XM, R1, X1, R2, X2, E1, S(E1), E2, S(E2), MBASE, PMULT, H, VI, TI, TB, D,
+    TNOM. Type 1, no saturation, constant torque (D = 0), no undervoltage trip (VI = 0); MBASE is the record's base.
+    R2 = X2 = 0 is a single cage. IEELBL: three terms a V^n each for P and for Q, then the frequency coefficients, then
+    the exponents, n1..n6; coefficients are divided by U_0^n, because V is the bus voltage and not U/U_0.
+
+    Not to be confused with the power flow data: the two loads and their MW and Mvar must be in the .raw file.
+
+    Source: PowerWorld Simulator help, CIM5 (parameters, MBASE, types); STEPS and uqgrid, which read .dyr files, for the
+    order of CIM5BL's and IEELBL's constants and for T0' and X' from them.
+    Departures: none.
+    """
+
+    suffix = ".dyr"
+    motors = ("electromechanical", "double_cage", "none")
+    statics = ("exponential", "zip", "constant_impedance", "constant_power", "none")
+    effects = ("stator_resistance",)
+
+    def text(self, load):
+        records = []
+        if "P_motor" in load.before:
+            c = load.circuit
+            cages = (c.R_1, c.X_1, c.R_2 or 0.0, c.X_2 or 0.0)
+            saturation, trip = (0.0, 0.0, 0.0, 0.0), (0.0, 9999.0, 0.0)
+            rating = (load.power, 1.0, load.inertia)
+            records.append(
+                _record(load.bus, "CIM5BL", "M", 1, c.R_s, c.X_s, c.X_m, *cages, *saturation, *rating, *trip, 0.0, 0.0)
+            )
+        if "P_static" in load.before:
+            terms = self._terms(load)
+            coefficients = [a / load.before["U0"] ** n for side in terms for a, n in side]
+            exponents = [n for side in terms for _, n in side]
+            records.append(_record(load.bus, "IEELBL", "S", *coefficients, 0.0, 0.0, *exponents))
+        return "".join(records)
+
+    def notes(self, load):
+        lines = []
+        for identifier, part in (("M", "motor"), ("S", "static")):
+            if f"P_{part}" in load.before:
+                P, Q = (load.power * load.before[f"{power}_{part}"] for power in "PQ")
+                lines.append(f"load '{identifier}' of bus {load.bus} in the power flow: {P:.6g} MW, {Q:.6g} Mvar")
+        return lines
+
+    def _terms(self, load):
+        """Three (coefficient, exponent) for P, then for Q, in powers of U/U_0."""
+        value, static = load.values.get, load.result.model["static"]["name"]
+        if static == "zip":
+            shares = [(value(f"{x}_Z"), value(f"{x}_I")) for x in "ab"]
+            return [((Z, 2.0), (current, 1.0), (1 - Z - current, 0.0)) for Z, current in shares]
+        fixed = {"constant_impedance": (2.0, 2.0), "constant_power": (0.0, 0.0)}.get(static)
+        return [((1.0, n), (0.0, 0.0), (0.0, 0.0)) for n in fixed or (value("p_v"), value("q_v"))]
+
+
+def _record(bus, model, load, *constants):
+    """One record, its constants in lines of five."""
+    texts = [f"{c:d}" if isinstance(c, int) else f"{c:.8g}" for c in constants]
+    rows = [", ".join(texts[k : k + 5]) for k in range(0, len(texts), 5)]
+    return f"{bus}, '{model}', '{load}', " + ",\n    ".join(rows) + " /\n"

@@ -1,0 +1,86 @@
+"""The T-circuit of a motor from what an identification finds, and back.
+
+Records determine X, X', T0' (and X'', T0'' of a second cage), one number fewer than the circuit has elements. The
+convention that closes the gap, with R_s = 0 unless identified: stator and rotor leakage are equal, X_s = X_1, so that
+X_m = X sqrt(C) and X_s = X (1 - sqrt(C)). Where a second cage leaves no room for that, X'' <= X_s, the stator takes
+half of X''. Any other split gives the same P and Q.
+
+Source: Wu, Fan, Zou 2022, below Eq. (2) for X, X', T0'; Milano 2010, ch. 15 for X'', T0''.
+"""
+
+from dataclasses import dataclass
+from math import sqrt
+
+
+@dataclass(frozen=True)
+class Circuit:
+    """Elements [pu of the record's base] at the nominal speed omega_n [rad/s]; `R_2`, `X_2` are None in one cage."""
+
+    omega_n: float
+    R_s: float
+    X_s: float
+    X_m: float
+    R_1: float
+    X_1: float
+    R_2: float | None = None
+    X_2: float | None = None
+
+    @classmethod
+    def single(cls, T_prime: float, X_prime: float, C: float, omega_n: float, R_s: float = 0.0) -> "Circuit":
+        """One cage, from T' [s], X' and C = (X - X')/X."""
+        X = X_prime / (1 - C)
+        X_s = X * (1 - sqrt(C))
+        return cls(omega_n, R_s, X_s, X - X_s, X * (1 - C) / (omega_n * T_prime), X_s)
+
+    @classmethod
+    def double(
+        cls,
+        T_prime: float,
+        X_prime: float,
+        C: float,
+        T_second: float,
+        X_second: float,
+        omega_n: float,
+        R_s: float = 0.0,
+    ) -> "Circuit":
+        """Two cages in parallel, from those and T'' [s], X'' < X'."""
+        X = X_prime / (1 - C)
+        equal = X * (1 - sqrt(C))
+        X_s = equal if equal < X_second else X_second / 2
+        X_m, behind = X - X_s, X_prime - X_s
+        X_1 = behind * X_m / (X_m - behind)
+        X_2 = 1 / (1 / (X_second - X_s) - 1 / behind)
+        R_1 = (X_1 + X_m) * (1 - C) / (omega_n * T_prime)
+        R_2 = (X_2 + behind) * X_second / (X_prime * omega_n * T_second)
+        return cls(omega_n, R_s, X_s, X_m, R_1, X_1, R_2, X_2)
+
+    @property
+    def X(self) -> float:
+        """Open-circuit reactance."""
+        return self.X_s + self.X_m
+
+    @property
+    def X_prime(self) -> float:
+        """Transient reactance."""
+        return self.X_s + _parallel(self.X_m, self.X_1)
+
+    @property
+    def X_second(self) -> float:
+        """Subtransient reactance of two cages; of one, the transient reactance."""
+        return self.X_prime if self.X_2 is None else self.X_s + _parallel(_parallel(self.X_m, self.X_1), self.X_2)
+
+    @property
+    def T0_prime(self) -> float:
+        """Open-circuit time constant of the first cage [s]."""
+        return (self.X_1 + self.X_m) / (self.omega_n * self.R_1)
+
+    @property
+    def T0_second(self) -> float:
+        """Open-circuit time constant of the second cage [s]; 0 where there is none."""
+        if self.X_2 is None or self.R_2 is None:
+            return 0.0
+        return (self.X_2 + _parallel(self.X_m, self.X_1)) / (self.omega_n * self.R_2)
+
+
+def _parallel(a: float, b: float) -> float:
+    return a * b / (a + b)

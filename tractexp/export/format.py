@@ -1,0 +1,93 @@
+"""What an export is: an identified load, and the formats that write it for other simulators."""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.export.circuit import Circuit
+from tractexp.identify.result import Result, parts
+from tractexp.model.drive import Drive, Excitation
+from tractexp.model.model import Model, compose
+from tractexp.plugin import Plugin
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """An identified load on a bus, and the base its per-unit values stand for."""
+
+    result: Result
+    bus: int = 1
+    power: float = 100.0  # MVA
+    voltage: float = 110.0  # kV
+
+    @cached_property
+    def model(self) -> Model:
+        return compose(*parts(self.result.model))
+
+    @property
+    def values(self) -> dict[str, float]:
+        return self.result.parameters
+
+    @property
+    def omega_n(self) -> float:
+        """Nominal synchronous speed [rad/s]."""
+        return 2 * np.pi * self.result.before["frequency"]
+
+    @property
+    def inertia(self) -> float:
+        """H [s] on the record's base, M = 2 H/omega_n."""
+        return self.values["M"] * self.omega_n / 2
+
+    @cached_property
+    def before(self) -> dict[str, float]:
+        """States and named quantities before the event. Raises `UserError` where there is no steady state."""
+        kept, flat = self.result.before, np.full(2, self.result.before["U0"])
+        event = Excitation(1e-3, flat, flat, flat, kept["U0"], kept["P0"], kept["Q0"], omega_n=self.omega_n)
+        drive, values = Drive.of([event]), np.array([self.values[name] for name in self.model.names])
+        if refusal := self.model.refusal(values, drive):
+            raise UserError(f"these parameters cannot be exported: {refusal}")
+        return self.model.at_rest(values, drive)
+
+    @property
+    def circuit(self) -> Circuit:
+        """The motor's T-circuit: of two cages where a second one was identified."""
+        names = ("T_prime", "X_prime", "C", "T_second", "X_second")
+        found = {name: self.values[name] for name in names if name in self.values}
+        build = Circuit.double if "T_second" in found else Circuit.single
+        return build(**found, omega_n=self.omega_n, R_s=self.values.get("R_s", 0.0))
+
+
+class Format(Plugin):
+    """Base of the export formats, chosen by `task.format=NAME`."""
+
+    group: ClassVar[str] = "format"
+    suffix: ClassVar[str]  # of the file
+    motors: ClassVar[Collection[str] | None] = None  # names it can represent; None: any
+    statics: ClassVar[Collection[str] | None] = None
+    effects: ClassVar[Collection[str] | None] = None
+
+    def text(self, load: Identified) -> str:
+        """The file's content. `check_parts` has passed; raises `UserError` for values it cannot represent."""
+        raise NotImplementedError
+
+    def notes(self, load: Identified) -> list[str]:
+        """What a user must know to use the file, one sentence each."""
+        return []
+
+    def check_parts(self, load: Identified) -> None:
+        """Raise `UserError` for a part of the model that this format cannot represent."""
+        model = load.result.model
+        chosen = [
+            ("motor", [model["motor"]["name"]], self.motors),
+            ("static load", [model["static"]["name"]], self.statics),
+        ]
+        chosen.append(("effect", model.get("effects", ()), self.effects))
+        for kind, names, can in chosen:
+            for name in names:
+                if can is not None and name not in can:
+                    offer = f"it can represent {', '.join(sorted(can))}" if can else "it can represent none"
+                    raise UserError(f"format '{self.name}' cannot represent the {kind} '{name}'; {offer}")
