@@ -1,0 +1,191 @@
+"""The investigation: what is planted is named, what is not there is not, and the linear algebra behind it is right.
+
+Records come from the independent generator of `benchmarks/hidden_effects`; only a few effects are tested against each
+other here, so that the tests stay short. The study over the whole catalogue is `benchmarks/hidden_effects/study.py`.
+"""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hidden_effects import Case, Noise, make, write
+from scipy.special import chdtrc
+from test_cli import tractexp
+
+from tractexp.discrepancy.catalogue import catalogue
+from tractexp.discrepancy.contract import contract, write_model
+from tractexp.discrepancy.investigate import check_events, investigate, judge
+from tractexp.discrepancy.noise import Noise as PowerNoise
+from tractexp.discrepancy.noise import estimate
+from tractexp.discrepancy.study import Study
+from tractexp.discrepancy.tangent import _signed_drop, tangent
+from tractexp.errors import UserError
+from tractexp.identify.noise import Autoregression, white_noise
+from tractexp.model.model import compose
+from tractexp.plugin import get
+from tractexp.record import Record, detect
+
+FEW = ("stator_resistance", "speed_dependent_torque", "exponential_recovery")
+QUIET = Noise(0.002)
+
+
+def base():
+    return compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
+
+
+def events(effect=None, size=1.0, seed=3, count=2, noise=QUIET):
+    records = make(Case(effect, size, events=count, noise=noise), seed)
+    return [detect(Record(f"event{k + 1}", **r, source=f"made {k + 1}").check()) for k, r in enumerate(records)]
+
+
+@pytest.fixture(scope="module")
+def planted():
+    made = events("stator_resistance", size=2.0, count=3)
+    return investigate(base(), made[:2], made[2:], {}, {}, only=FEW)
+
+
+@pytest.fixture(scope="module")
+def silent():
+    return investigate(base(), events(), (), {}, {}, only=FEW)
+
+
+def test_names_the_effect_that_was_planted(planted):
+    assert planted.verdict == "named"
+    assert planted.names == ("stator_resistance",)
+    assert planted.first.p_unrest < 0.01
+
+
+def test_stays_silent_when_nothing_is_missing(silent):
+    assert silent.verdict == "none"
+    assert silent.names == ()
+    assert silent.places == []
+    assert silent.train.after.chi2_per_sample == pytest.approx(1.0, abs=0.1)
+
+
+def test_the_gap_shrinks_on_fitted_and_on_held_out_events(planted):
+    for gap in (planted.train, planted.validate):
+        assert gap.after.epsilon_p < gap.before.epsilon_p
+        assert gap.after.chi2_per_sample < gap.before.chi2_per_sample
+        assert gap.closed > 0.9
+        assert gap.gain > 0
+    assert planted.train.after.chi2_per_sample == pytest.approx(1.0, abs=0.1)
+
+
+def test_the_place_found_is_the_dip_and_what_follows(planted):
+    event = planted.study.events[0]
+    assert planted.places
+    assert all(p.end > event.t_start - 0.05 for p in planted.places)
+    assert sum(p.share for p in planted.places) > 0.5
+
+
+def test_every_effect_is_judged_and_what_cannot_be_seen_is_said(planted):
+    judged = {j.name: j for j in judge(planted)}
+    assert judged["stator_resistance"].status == "relevant"
+    assert {"time_skew", "measurement_window", "load_drift"} <= judged.keys()
+    silent_channels = catalogue(base().motor, base().static, (), planted.study.events).untestable
+    assert "not recorded" in silent_channels["frequency_dependence"]
+    assert "U2" in silent_channels["negative_sequence_braking"]
+
+
+def test_the_contract_holds_what_machines_read(planted, tmp_path):
+    made = json.loads(json.dumps(contract(planted), default=str))
+    assert made["verdict"] == "named"
+    assert made["effects"] == ["stator_resistance"]
+    assert made["name_sets"] == [["stator_resistance"]]
+    assert {"event", "channel", "start", "end", "share"} == made["where"][0].keys()
+    for role in ("train", "validate"):
+        assert {"epsilon_p", "epsilon_q", "chi2_per_sample"} == made["gap"][role]["before"].keys()
+    candidate = next(c for c in made["candidates"] if c["effects"] == ["stator_resistance"])
+    assert {"status", "likelihood_ratio", "parameters"} <= candidate.keys()
+    node = {"motor": {"name": "electromechanical"}, "static": {"name": "exponential"}, "bounds": {}, "fixed": {}}
+    path = write_model(planted, node, tmp_path / "model" / "extended.yaml")
+    assert "effects:\n- stator_resistance" in path.read_text()
+
+
+def test_a_score_is_the_drop_of_the_refitted_linear_problem():
+    """(s'r)^2/s's equals the difference of two least-squares fits, with and without the column."""
+    rng = np.random.default_rng(5)
+    N, s, r = rng.normal(size=(200, 6)), rng.normal(size=200), rng.normal(size=200)
+    Q, _ = np.linalg.qr(N)
+    off = lambda y: y - Q @ (Q.T @ y)  # noqa: E731
+    drop, p = _signed_drop(off(s)[None], off(r)[None], np.array([0]))
+    without = np.linalg.lstsq(N, r, rcond=None)[1][0]
+    both = np.linalg.lstsq(np.column_stack([N, s]), r, rcond=None)[1][0]
+    assert drop[0] == pytest.approx(without - both, rel=1e-9)
+    assert p[0] == pytest.approx(chdtrc(1, without - both), rel=1e-9)
+
+
+def test_a_size_that_may_only_grow_has_half_of_its_chi_square():
+    rng = np.random.default_rng(6)
+    s, r = rng.normal(size=100), rng.normal(size=(4000, 100))
+    drops, p = _signed_drop(s[None], r, np.array([1]))
+    assert np.mean(drops == 0) == pytest.approx(0.5, abs=0.03)
+    assert np.mean(p < 0.05) == pytest.approx(0.05, abs=0.01)
+
+
+def test_noise_that_is_drawn_is_noise_that_is_found():
+    """Correlated channels, one of them colored: mix, level and color come back from a long stretch."""
+    mix = np.linalg.inv(np.array([[0.004, 0.0], [0.002, 0.003]]))
+    color = Autoregression(np.array([[0.0], [0.8]]), np.array([1.0, 0.6]))
+    noise = PowerNoise(mix, (color, white_noise(1.0)))
+    drawn = noise.draw(np.random.default_rng(7), 40000)
+    found = estimate(drawn, np.ones(drawn.shape, dtype=bool), [slice(0, 40000)])
+    covariance = np.linalg.inv(mix) @ np.linalg.inv(mix).T
+    assert np.cov(drawn) == pytest.approx(covariance, rel=0.1)
+    assert found.channels[0].coefficients[-1, 0] == pytest.approx(0.8, abs=0.03)
+
+
+def test_candidates_at_their_null_leave_the_base_model(silent):
+    """The union of all candidates, every one at its null, gives the base model's residuals."""
+    made = events()
+    whole = catalogue(base().motor, base().static, (), made, FEW)
+    study = Study(base(), whole, made, {}, {})
+    alone = study._alone
+    values = alone.space.from_unit(study.null[study.base])
+    response = alone.model.simulate(alone.drive, alone.full(values), study.problem.step.substeps)
+    rows = study.residuals(study.null[None])[0]
+    assert rows[0] == pytest.approx(response.P[0] - alone.drive.measured[0], abs=1e-10)
+
+
+def test_nuisance_columns_are_orthogonal_to_the_projected_residual(silent):
+    projection = tangent(silent.study, silent.first.fit).whitened(silent.first.noise)
+    assert np.abs(projection.r @ projection.Q).max() < 1e-8
+    for block in projection.blocks:
+        assert np.abs(block @ projection.Q).max() < 1e-6 * max(np.abs(block).max(), 1.0)
+
+
+def test_events_that_do_not_belong_together_are_refused():
+    one, two = events()
+    with pytest.raises(UserError, match=r"made 1 is both in data\.train and in data\.validate"):
+        check_events([one, two], [one])
+    with_f = detect(
+        Record("f", one.record.t, one.record.U, one.record.P, one.record.Q, f=np.full(len(one.record.t), 50.0))
+    )
+    with pytest.raises(UserError, match="has the channel f and made 1 has not"):
+        check_events([one, with_f], [])
+
+
+def test_an_effect_that_does_not_exist_is_refused_with_the_nearest_name():
+    with pytest.raises(UserError, match=r"'stator_resistence', which is no effect; did you mean 'stator_resistance'\?"):
+        investigate(base(), events(), (), {}, {}, only=("stator_resistence",))
+
+
+def test_the_command_tells_the_story_and_its_extended_model_runs_at_once(tmp_path):
+    case = Case("stator_resistance", 2.0, events=2, noise=QUIET)
+    write(case, 3, tmp_path)
+    only = "task.effects=[stator_resistance,speed_dependent_torque]"
+    data = ["data=csv", "data.train=[event1.csv]", "data.validate=[event2.csv]", "tracking.enabled=false"]
+    done = tractexp("task=discrepancy", only, *data, "hydra.run.dir=run", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    for part in ("noise:", "verdict: NAMED stator_resistance", "where:", "held out", "discrepancy.html"):
+        assert part in done.stdout, part
+    made = json.loads((tmp_path / "run" / "discrepancy.json").read_text())
+    assert made["effects"] == ["stator_resistance"]
+    page = (tmp_path / "run" / "discrepancy.html").read_text()
+    for heading in ("1 Noise", "2 Is there", "3 Where", "4 Which", "5 How sure", "6 Added", "7 Smaller"):
+        assert heading in page
+    quick = ["optimizer=multistart_least_squares", "optimizer.starts=2", "hydra.run.dir=again"]
+    done = tractexp("--config-dir", str(Path("run") / "conf"), "model=extended", *data, *quick, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "R_s" in json.loads((tmp_path / "again" / "result.json").read_text())["parameters"]
