@@ -10,6 +10,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+
 from independent import Dip, Load, Machine, Recorder, Static, record
 
 MADE_BY = "benchmarks/make_tibet.py"

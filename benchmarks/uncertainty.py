@@ -33,25 +33,28 @@ CONDITIONS = {
 
 @dataclass(frozen=True)
 class Shape:
-    """A dip with linear edges."""
+    """A dip whose edges are raised cosines, so that samples of it say what lies between them."""
 
     depth: float
     duration: float = 0.2
     step: float = 2e-3
     length: float = 2.0
     start: float = 0.3
-    edge: float = 0.03
+    edge: float = 0.05
 
     def voltage(self) -> tuple[np.ndarray, np.ndarray]:
         t = np.arange(round(self.length / self.step)) * self.step
-        fall, back = (np.clip((t - s) / self.edge, 0, 1) for s in (self.start, self.start + self.duration))
+        ramps = (np.clip((t - s) / self.edge, 0, 1) for s in (self.start, self.start + self.duration))
+        fall, back = (0.5 - 0.5 * np.cos(np.pi * ramp) for ramp in ramps)
         return t, 1 - self.depth * (fall - back)
 
 
 def printed(truth: np.ndarray, t: np.ndarray, U: np.ndarray, Q_s0: float, P0: float = 1.0) -> np.ndarray:
-    """P and Q (2, N) of Eqs. (1)-(7) as printed, E', delta and omega, by SciPy's DOP853; U linear between samples."""
+    """P and Q (2, N) of Eqs. (1)-(7) as printed, E', delta and omega, by SciPy's DOP853; U by a cubic spline."""
     from scipy.integrate import solve_ivp
+    from scipy.interpolate import CubicSpline
 
+    voltage = CubicSpline(t, U)
     T_prime, X_prime, C, M, T_m, p_v, q_v = map(float, truth)
     U0 = float(U[0])
     delta = 0.5 * np.arcsin(-2 * T_m * X_prime / (C * U0**2))  # Eq. (3)
@@ -59,7 +62,7 @@ def printed(truth: np.ndarray, t: np.ndarray, U: np.ndarray, Q_s0: float, P0: fl
     omega = C * U0 * np.sin(delta) / (T_prime * E)  # relative to synchronous
 
     def slope(now, y):
-        u = np.interp(now, t, U)
+        u = float(voltage(now))
         E, delta, omega = y
         return [
             (-E + C * u * np.cos(delta)) / T_prime,
@@ -67,9 +70,8 @@ def printed(truth: np.ndarray, t: np.ndarray, U: np.ndarray, Q_s0: float, P0: fl
             (-u * E * np.sin(delta) / X_prime - T_m) / M,
         ]
 
-    solved = solve_ivp(
-        slope, (t[0], t[-1]), [E, delta, omega], "DOP853", t, rtol=1e-8, atol=1e-10, max_step=t[1] - t[0]
-    )
+    begin = [E, delta, omega]
+    solved = solve_ivp(slope, (t[0], t[-1]), begin, "DOP853", t, rtol=1e-9, atol=1e-11, max_step=0.005)
     E, delta, _ = solved.y
     P_d, Q_d = -U * E * np.sin(delta) / X_prime, (U**2 - U * E * np.cos(delta)) / X_prime  # Eq. (2)
     P_s = (P0 - P_d[0]) * (U / U0) ** p_v  # Eq. (6)
@@ -245,7 +247,6 @@ def verdict_record(seed: int) -> dict:
 def independent_record(seed: int) -> dict:
     """A record of the flux-state simulator, stator transients and all: the truth is outside the model class."""
     from independent import Dip, Load, Machine, Recorder, Static, record
-
     from tractexp.record import Record, detect
 
     rng = np.random.default_rng([33, seed])

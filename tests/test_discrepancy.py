@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hidden_effects import Case, Noise, make, write
 from scipy.special import chdtrc
 from test_cli import tractexp
 
+from hidden_effects import Case, Noise, make, write
 from tractexp.discrepancy.catalogue import catalogue
 from tractexp.discrepancy.contract import contract, write_model
 from tractexp.discrepancy.investigate import check_events, investigate, judge

@@ -8,6 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import quad, solve_ivp
+from scipy.signal import find_peaks
+
 from hidden_effects import (
     CATALOG,
     EFFECTS,
@@ -32,8 +35,6 @@ from hidden_effects.site import Response
 from hidden_effects.supply import Moment, Relay, Supply
 from independent import Dip, Load, Machine, Static, simulate
 from independent.source import OMEGA
-from scipy.integrate import quad, solve_ivp
-from scipy.signal import find_peaks
 
 PACKAGE = Path(__file__).parents[1] / "benchmarks" / "hidden_effects"
 LOAD = Load(

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp, trapezoid
+
 from independent import Dip, Load, Machine, Recorder, Stall, Static, Waveforms, record, simulate
 from independent.recorder import PHASES
 from independent.source import NOMINAL_FREQUENCY, OMEGA
-from scipy.integrate import solve_ivp, trapezoid
 
 PACKAGE = Path(__file__).parents[1] / "benchmarks" / "independent"
 MACHINE = Machine(Rs=0.03, Xs=0.10, Xm=3.2, Rr=0.018, Xr=0.18, H=0.7)

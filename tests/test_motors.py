@@ -5,10 +5,11 @@ import itertools
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.interpolate import Akima1DInterpolator
+
 from independent import Machine
 from independent.source import OMEGA
-from scipy.integrate import solve_ivp
-
 from tractexp.errors import UserError
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
@@ -87,23 +88,28 @@ def functions(of, *names):
 
 
 def play(of, excitation, parameters, names=("P_motor", "Q_motor"), rtol=1e-11):
-    """States and named quantities at the samples by DOP853 on the declared equations, restarted at each sample."""
+    """States and named quantities at the samples by DOP853 on the declared equations, restarted at each sample.
+
+    Between samples the voltage is SciPy's makima, the speed a straight line.
+    """
     states, compute = functions(of, *names)
     start = at_rest(of, excitation, parameters)
     fixed = known(of, excitation, parameters)
-    speed = np.zeros(len(excitation.U)) if excitation.omega_s is None else excitation.omega_s
-    inputs = np.stack([excitation.U, speed])
+    t = np.arange(len(excitation.U)) * excitation.step
+    voltage = Akima1DInterpolator(t, excitation.U, method="makima")
+    speed = np.zeros(len(t)) if excitation.omega_s is None else excitation.omega_s
+
+    def evaluate(at, x):
+        inputs = {"U": float(voltage(at)), "omega_s": np.interp(at, t, speed)}
+        return compute(fixed | inputs | dict(zip(states, x, strict=True)))
+
     x = np.array([start[s] for s in states])
-    rows, quantities = [], []
-
-    def evaluate(x, u):
-        return compute(fixed | dict(zip(states, x, strict=True)) | {"U": u[0], "omega_s": u[1]})
-
-    for a, b in itertools.pairwise([*inputs.T, inputs[:, -1]]):
+    rows, quantities = [x], [evaluate(t[0], x)[1]]
+    for a, b in itertools.pairwise(t):
+        f = lambda at, x: evaluate(at, x)[0]  # noqa: E731
+        x = solve_ivp(f, (a, b), x, method="DOP853", rtol=rtol, atol=1e-12).y[:, -1]
         rows.append(x)
-        quantities.append(evaluate(x, a)[1])
-        f = lambda t, x, a=a, b=b: evaluate(x, a + (b - a) * t / excitation.step)[0]  # noqa: E731
-        x = solve_ivp(f, (0, excitation.step), x, method="DOP853", rtol=rtol, atol=1e-12).y[:, -1]
+        quantities.append(evaluate(b, x)[1])
     return np.array(rows).T, np.array(quantities).T
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import tractexp_plugins.optimizers as folder
 
+import tractexp_plugins.optimizers as folder
 from tractexp.errors import UserError
 from tractexp.identify.optimizer import REFUSED, Box
 from tractexp.identify.search import Limits, search

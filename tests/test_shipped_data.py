@@ -6,6 +6,7 @@ from pathlib import Path
 import make_tibet
 import numpy as np
 import pytest
+
 from independent.source import OMEGA
 
 DATA = Path(__file__).parents[1] / "tractexp" / "data"

@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from tractexp_plugins.optimizers import _sparrow as sparrow
-from tractexp_plugins.optimizers import issa
 
 from tractexp.identify.optimizer import Box
 from tractexp.identify.search import search
 from tractexp.plugin import build
+from tractexp_plugins.optimizers import _sparrow as sparrow
+from tractexp_plugins.optimizers import issa
 
 N, D = 5, 2
 X = np.array([[0.2, 0.7], [0.4, 0.1], [0.9, 0.5], [0.3, 0.3], [0.8, 0.6]])

@@ -137,12 +137,8 @@ def test_jacobian_agrees_with_the_printed_equations(model):
         for sign in (1, -1):
             moved = study.TYPICAL.copy()
             moved[j] += sign * h
-            motor = study.printed(moved, t, U, 0.0, P0=0.0)
-            Q_d0 = study.printed(moved, t, U, 0.0)[1][0]
-            P_d0 = moved[4]
-            static_P = (events[0].P0 - P_d0) * U ** moved[5]
-            motor_P = motor[0] + P_d0 * U ** moved[5]
-            sides.append(np.concatenate((motor_P + static_P, motor[1] + (events[0].Q0 - Q_d0) * U ** moved[6])))
+            P, Q = study.printed(moved, t, U, 0.0, P0=events[0].P0)
+            sides.append(np.concatenate((P, Q + (events[0].Q0 - Q[0]) * U ** moved[6])))
         expected = (sides[0] - sides[1]) / (2 * h) * (problem.upper - problem.lower)[j]
         np.testing.assert_allclose(J[:, j], expected, atol=1e-4 * np.abs(expected).max(), err_msg=name)
 

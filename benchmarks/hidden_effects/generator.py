@@ -8,7 +8,6 @@ from typing import Any
 from zlib import crc32
 
 import numpy as np
-from independent import Dip, Load, Machine, Static
 
 from hidden_effects import devices
 from hidden_effects.effects import CATALOG, NUISANCES
@@ -18,6 +17,7 @@ from hidden_effects.noise import Noise
 from hidden_effects.outside import OUTSIDE
 from hidden_effects.recorder import Recorder
 from hidden_effects.site import Response, Site
+from independent import Dip, Load, Machine, Static
 
 EFFECTS: dict[str, type[Hidden]] = CATALOG | OUTSIDE | NUISANCES
 SLOWEST = 0.75  # pu: a base case whose motors get slower than this is drawn anew

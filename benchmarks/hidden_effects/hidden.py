@@ -5,11 +5,11 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
-from independent.source import Dip
 
 from hidden_effects.devices import Device
 from hidden_effects.motor import Motor
 from hidden_effects.site import Site
+from independent.source import Dip
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from independent import Load
 
 from hidden_effects.effects import CATALOG, MEASUREMENT
 from hidden_effects.generator import Case, Scene, scene
 from hidden_effects.noise import Noise
+from independent import Load
 
 STEP = 0.05  # of a size or, relative, of a parameter of the load
 WEAK = 1.0  # prior standard deviation of the relative deviation of a parameter

@@ -8,10 +8,10 @@ with the bus voltage.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from independent.machine import Machine
-from independent.source import OMEGA
 
 from hidden_effects.supply import Moment
+from independent.machine import Machine
+from independent.source import OMEGA
 
 
 @dataclass(frozen=True)

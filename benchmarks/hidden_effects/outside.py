@@ -4,12 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from independent.source import Dip
 
 from hidden_effects.devices import Arc, Ring, Ripple, Slope, Switched
 from hidden_effects.hidden import Hidden, beside, motors, split
 from hidden_effects.site import Site
 from hidden_effects.supply import Profile
+from independent.source import Dip
 
 
 def after(site: Site, delay: float) -> float:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+
 from independent.source import OMEGA, Dip
 
 FINE = 0.001  # s, grid on which windows are averaged

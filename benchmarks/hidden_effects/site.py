@@ -4,12 +4,12 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
-from independent.source import Dip
 
 from hidden_effects.devices import Device, Static
 from hidden_effects.motor import Motor
 from hidden_effects.recorder import Recorder
 from hidden_effects.supply import Moment, Profile, Supply
+from independent.source import Dip
 
 MARGIN = 0.15  # s simulated before and after the record, for the recorder's windows
 

@@ -6,6 +6,7 @@ from math import cos, exp, pi, sin
 from typing import NamedTuple
 
 import numpy as np
+
 from independent.source import NOMINAL_FREQUENCY, Dip
 
 JUMP = 1e-4  # s: how long a contactor, a tap changer or a step takes

@@ -1,10 +1,9 @@
 """Converters that hold their power."""
 
-from tractexp_plugins.effects._operators import smaller
-
 from tractexp.model.parts import Effect
 from tractexp.parameter import Parameter
 from tractexp.plugin import plugin
+from tractexp_plugins.effects._operators import smaller
 
 SOURCE = "WECC composite load model (power electronic load); RAMSES vfd_load"
 WIDTH = 0.02  # of the power: how rounded the corner at the limit is

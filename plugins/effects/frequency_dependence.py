@@ -28,6 +28,10 @@ class FrequencyDependence(Effect):
     relevant = {"k_pf": 1.0, "k_qf": 1.0}
     confused_with = ("load_drift",)
 
+    def refusal(self, eq):
+        twice = eq.has("static_frequency")
+        return "its static load depends on the frequency already" if twice else super().refusal(eq)
+
     def edit(self, eq):
         factors = eq.declare(self.parameters)
         deviation = (eq.omega_s - eq.omega_s0) / eq.omega_n

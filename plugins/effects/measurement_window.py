@@ -13,9 +13,8 @@ class MeasurementWindow(Measurement):
 
         P_recorded(t) = 1/W integral of P over t - W/2 ... t + W/2
 
-    P is linear between samples, as the recorded voltage that drives it is; before the first sample and after the
-    last it is what it is there. At W = 0 the base model. A window that ends at its time is this one and a
-    `time_skew` of W/2.
+    P is linear between samples; before the first and after the last it is what it is there. At W = 0 the base model.
+    A window that ends at its time is this one and a `time_skew` of W/2.
 
     Source: IEC/IEEE 60255-118-1, phasors by a one-cycle discrete Fourier transform (a boxcar on the power).
     Departures: the window acts on power, though the recorder's acts on voltage and current.

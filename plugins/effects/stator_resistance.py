@@ -21,11 +21,9 @@ class StatorResistance(Effect):
 
     R_s = Parameter(0.0, (-0.02, 0.2), "pu", "stator resistance on the record's base", SOURCE, null=0.0)
 
+    needs = ("stator_impedance",)
     relevant = {"R_s": 0.01}
     confused_with = ("feeder_impedance", "dc_link_lag", "time_skew")
-
-    def refusal(self, eq):
-        return None if eq.has("stator_impedance") else "it has no stator impedance to add a resistance to"
 
     def edit(self, eq):
         (R_s,) = eq.declare(self.parameters)

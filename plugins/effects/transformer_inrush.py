@@ -17,7 +17,7 @@ class TransformerInrush(Effect):
         dx/dt = max(0, u - y - 0.02)/T_c - x/T_i,   T_c dy/dt = u - y,   u = U/U_0,   T_c = 20 ms
         Q -> Q + q_i x,   P -> P + 0.1 q_i x
 
-    After a step up of the voltage by du, x is close to du and decays with T_i. At q_i = 0 the base model.
+    After a step up of the voltage by du, x is a little less than du and decays with T_i. At q_i = 0 the base model.
 
     Source: Blume et al. 1951: the offset decays with the circuit's L/R, a tenth to about a second.
     Departures: the current's dependence on the instant of recovery and its harmonics are left out; linear in the

@@ -1,10 +1,9 @@
 """Undervoltage trip of part of the load, and its reconnection."""
 
-from tractexp_plugins.effects._operators import gate
-
 from tractexp.model.parts import Effect
 from tractexp.parameter import Parameter
 from tractexp.plugin import plugin
+from tractexp_plugins.effects._operators import gate
 
 SOURCE = "NERC 2016, Dynamic Load Modeling, app. A; WECC composite load model (Ftr1, Vtr1, Ttr1, Vrc1, Trc1)"
 LEVEL, TIME = 0.0025, 0.3  # how sharp the relay is: in voltage over U_0, and in samples

@@ -1,10 +1,9 @@
 """Traction power limited at low line voltage."""
 
-from tractexp_plugins.effects._operators import larger, smaller
-
 from tractexp.model.parts import Effect
 from tractexp.parameter import Parameter
 from tractexp.plugin import plugin
+from tractexp_plugins.effects._operators import larger, smaller
 
 SOURCE = "EN 50388-1, limitation of current or power at low line voltage"
 WIDTH = 0.02  # of the power: how rounded the corners are

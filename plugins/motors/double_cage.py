@@ -1,10 +1,9 @@
 """Fifth-order induction motor: two rotor cages, no stator transients."""
 
-from tractexp_plugins.motors import _machine
-
 from tractexp.model.parts import Motor
 from tractexp.parameter import Parameter
 from tractexp.plugin import plugin
+from tractexp_plugins.motors import _machine
 
 SOURCE = "Milano 2010, Power System Modelling and Scripting, ch. 15"
 

@@ -1,9 +1,8 @@
 """Third-order induction motor."""
 
-from tractexp_plugins.motors import _machine
-
 from tractexp.model.parts import Motor
 from tractexp.plugin import plugin
+from tractexp_plugins.motors import _machine
 
 
 @plugin

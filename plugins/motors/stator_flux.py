@@ -1,10 +1,9 @@
 """Fifth-order induction motor: single cage with stator transients."""
 
-from tractexp_plugins.motors import _machine
-
 from tractexp.model.parts import Motor
 from tractexp.parameter import Parameter
 from tractexp.plugin import plugin
+from tractexp_plugins.motors import _machine
 
 SOURCE = "Krause, Wasynczuk, Sudhoff 2002, ch. 4"
 

@@ -5,11 +5,11 @@ from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
-from tractexp_plugins.optimizers._sparrow import Flock, Sparrow
 
 from tractexp.errors import check_choice, check_range
 from tractexp.identify.optimizer import Box
 from tractexp.plugin import plugin
+from tractexp_plugins.optimizers._sparrow import Flock, Sparrow
 
 LEVY_BETA = 1.5  # beta of Eq. (15)
 

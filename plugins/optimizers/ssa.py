@@ -1,8 +1,7 @@
 """The traditional sparrow search algorithm."""
 
-from tractexp_plugins.optimizers._sparrow import Sparrow
-
 from tractexp.plugin import plugin
+from tractexp_plugins.optimizers._sparrow import Sparrow
 
 
 @plugin

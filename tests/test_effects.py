@@ -1,0 +1,495 @@
+"""Every registered effect: what all must satisfy, and for each what physics says it does."""
+
+import functools
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.interpolate import Akima1DInterpolator
+from scipy.optimize import fsolve
+
+from tractexp.errors import UserError
+from tractexp.identify.problem import Problem
+from tractexp.model.drive import Drive, Excitation
+from tractexp.model.model import compose
+from tractexp.model.parts import Measurement
+from tractexp.plugin import discover, get
+from tractexp.record import Record, detect
+
+TRUTH = np.array([0.12, 0.25, 0.9, 0.006, 0.55, 1.4, 3.0])  # T', X', C, M, T_m, p_v, q_v
+T_PRIME, X_PRIME, C, M, T_M, P_V, Q_V = TRUTH
+P0, Q0, OMEGA_N = 1.0, 0.6, 100 * np.pi
+NAMES = sorted(discover()["effect"])
+CHANNELS = {"f", "U2"}
+
+
+def effect(name):
+    return get("effect", name)()
+
+
+@functools.cache
+def model(*names, motor="electromechanical"):
+    return compose(get("model/motor", motor)(), get("model/static", "exponential")(), [effect(n) for n in names])
+
+
+def dip(depth=0.5, step=1e-3, length=0.8, start=0.1, duration=0.15, U0=1.0, sag=-0.5):
+    """A dip with 20 ms edges, during which the frequency [Hz] sags and the voltage is unbalanced."""
+    t = np.arange(round(length / step) + 1) * step
+    shape = np.clip((t - start) / 0.02, 0, 1) - np.clip((t - start - duration) / 0.02, 0, 1)
+    return event(U0 * (1 - depth * shape), step, 2 * np.pi * sag * shape, 0.02 + 0.3 * depth * shape)
+
+
+def event(U, step=1e-3, omega_s=None, U2=None):
+    """An excitation from its first sample, with the P0 and Q0 of all tests."""
+    n = len(U)
+    start = (0.0, 0.0) if omega_s is None else (omega_s[0], U2[0])
+    return Excitation(
+        step, U, np.full(n, P0), np.full(n, Q0), U[0], P0, Q0, omega_s, start[0], U2=np.zeros(n) if U2 is None else U2,
+        U20=start[1],
+    )  # fmt: skip
+
+
+def values(name, size=None, **chosen):
+    """TRUTH and the effect's parameters: null (or `size`) for those with a null, default for the others."""
+    own = [p.default if p.null is None else (p.null if size is None else size(p)) for p in effect(name).parameters]
+    own = [chosen.pop(p.name, v) for p, v in zip(effect(name).parameters, own, strict=True)]
+    assert not chosen
+    return np.r_[TRUTH, own]
+
+
+def run(name, excitation, chosen, substeps=4):
+    """P and Q (N,) with one effect."""
+    response = model(name).simulate(Drive.of([excitation]), chosen, substeps)
+    assert (response.miss == 0).all()
+    return response.P[0], response.Q[0]
+
+
+def base(excitation, substeps=4, truth=TRUTH):
+    response = model().simulate(Drive.of([excitation]), truth, substeps)
+    return response.P[0], response.Q[0]
+
+
+def static(excitation):
+    """P_s and Q_s of the base model: what the motor leaves, Eq. (6). Its Q before the event from Eq. (3)."""
+    sine = 2 * T_M * X_PRIME / C
+    Q_d = (1 - C / 2 * (1 + np.sqrt(1 - sine**2))) / X_PRIME
+    return (P0 - T_M) * excitation.U**P_V, (Q0 - Q_d) * excitation.U**Q_V
+
+
+def halfway(p):
+    """A size well away from the null and inside the bounds."""
+    return (p.null + max(p.bounds, key=lambda b: abs(b - p.null))) / 2
+
+
+def sizes(name):
+    return [p for p in effect(name).parameters if p.null is not None]
+
+
+SIZES = [(name, p.name) for name in NAMES for p in sizes(name)]
+
+
+# what every effect must satisfy
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_at_its_null_it_is_the_base_model(name):
+    drive = Drive.of([dip(d) for d in (0.3, 0.5, 0.65)])
+    with_it, without = model(name).simulate(drive, values(name)), model().simulate(drive, TRUTH)
+    assert np.abs(with_it.P - without.P).max() < 1e-12
+    assert np.abs(with_it.Q - without.Q).max() < 1e-12
+
+
+@pytest.mark.parametrize("name", [n for n in NAMES if n != "load_drift"])
+def test_flat_input_stays_flat_with_the_effect_on(name):
+    n = 400
+    flat = event(np.full(n, 0.97), omega_s=np.full(n, -1.5), U2=np.full(n, 0.03))
+    P, Q = run(name, flat, values(name, halfway))
+    assert np.abs(P - P0).max() < 1e-9
+    assert np.abs(Q - Q0).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_is_finite_in_every_corner_of_its_bounds(name):
+    corners = np.array(list(itertools.product(*(p.bounds for p in effect(name).parameters))))
+    drive = Drive.of([dip(d) for d in (0.3, 0.5, 0.65)])
+    response = model(name).simulate(drive, np.c_[np.tile(TRUTH, (len(corners), 1)), corners], 16)
+    assert (response.miss == 0).all()
+    assert np.isfinite(response.P).all()
+    assert np.isfinite(response.Q).all()
+    assert np.abs([response.P, response.Q]).max() < 30
+
+
+@pytest.mark.parametrize(("name", "parameter"), SIZES)
+def test_it_has_a_derivative_at_its_null_that_a_dip_shows(name, parameter):
+    own = next(p for p in sizes(name) if p.name == parameter)
+    low, high = own.bounds
+    slopes = []
+    for h in (1e-4 * (high - low), 2e-4 * (high - low)):
+        ends = (own.null - h if own.null - h >= low else own.null, own.null + h)
+        chosen = np.array([values(name, **{parameter: end}) for end in ends])
+        response = model(name).simulate(Drive.of([dip(0.6)]), chosen, 4)
+        slopes.append(np.diff([response.P, response.Q], axis=1) / (ends[1] - ends[0]))
+    largest = np.abs(slopes[0]).max()
+    assert largest * effect(name).relevant[parameter] > 1e-5
+    assert np.abs(slopes[1] - slopes[0]).max() < 0.03 * largest
+
+
+def test_all_stack_and_at_their_nulls_are_the_base_model():
+    union = model(*NAMES)
+    null = np.r_[TRUTH, [p.default if p.null is None else p.null for p in union.parameters[len(TRUTH) :]]]
+    drive = Drive.of([dip(0.5)])
+    together, alone = union.simulate(drive, null), model().simulate(drive, TRUTH)
+    assert np.abs(together.P - alone.P).max() < 1e-12
+    assert np.abs(together.Q - alone.Q).max() < 1e-12
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_they_stack_in_any_order(seed):
+    names = ["stator_resistance", "second_motor_group", "magnetic_saturation", "undervoltage_trip", "shunt_capacitor",
+             "exponential_recovery", "constant_power_converter", "time_skew", "measurement_window"]  # fmt: skip
+    one, other = model(*names), model(*np.random.default_rng(seed).permutation(names))
+    chosen = np.r_[TRUTH, [p.default if p.null is None else 0.3 * halfway(p) for p in one.parameters[len(TRUTH) :]]]
+    drive = Drive.of([dip(0.5)])
+    first, second = one.simulate(drive, chosen), other.simulate(drive, chosen)
+    assert one.names == other.names
+    assert np.array_equal(first.P, second.P)
+    assert np.abs(first.P - model().simulate(drive, TRUTH).P).max() > 0.01
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_its_declaration_is_complete(name):
+    one, parameters = effect(name), {p.name: p for p in effect(name).parameters}
+    assert sizes(name), "an effect needs a size that vanishes"
+    assert all(p.bounds[0] <= p.null <= p.bounds[1] and p.default == p.null for p in sizes(name))
+    assert set(one.relevant) == {p.name for p in sizes(name)}
+    assert all(parameters[k].bounds[0] <= v <= parameters[k].bounds[1] for k, vs in one.grid.items() for v in vs)
+    assert all(parameters[k].null is None for k in one.grid)
+    assert set(one.reads) <= CHANNELS
+    assert one.confused_with
+    assert set(one.confused_with) <= set(NAMES) - {name}
+    if not isinstance(one, Measurement):
+        text = " ".join(model(name).latex())
+        assert all(p.symbol in text for p in parameters.values())
+
+
+def test_no_two_effects_share_a_parameter():
+    names = [p.name for n in NAMES for p in effect(n).parameters]
+    assert len(names) == len(set(names))
+
+
+def test_the_documentation_lists_every_effect_and_parameter():
+    text = (Path(__file__).parents[1] / "docs" / "effects.md").read_text()
+    for name in NAMES:
+        assert f"`{name}`" in text
+        assert all(f"`{p.name}`" in text for p in effect(name).parameters)
+
+
+# which models take them
+
+
+REFUSED = {
+    "none": {"stator_resistance", "speed_dependent_torque", "magnetic_saturation", "second_motor_group",
+             "negative_sequence_braking"},
+    "mechanical": {"magnetic_saturation"},
+    "voltage": {"speed_dependent_torque", "second_motor_group"},
+    "electromechanical": set(),
+    "double_cage": set(),
+    "stator_flux": {"stator_resistance", "negative_sequence_braking"},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("motor", REFUSED)
+def test_each_motor_takes_the_effects_that_make_sense_for_it(motor):
+    equations = model(motor=motor).equations
+    reasons = {name: effect(name).refusal(equations) for name in NAMES}
+    assert {name for name, why in reasons.items() if why} == REFUSED[motor]
+    assert all(why.startswith("its equations have no ") for why in reasons.values() if why)
+
+
+def test_a_static_load_with_a_frequency_exponent_needs_no_other():
+    static = get("model/static", "exponential_frequency")()
+    equations = compose(get("model/motor", "none")(), static).equations
+    assert effect("frequency_dependence").refusal(equations) == "its static load depends on the frequency already"
+
+
+def test_a_refusal_names_effect_and_reason():
+    with pytest.raises(UserError, match=r"'stator_resistance' cannot be added to this model: .* no stator_impedance"):
+        _ = model("stator_resistance", motor="none").equations
+
+
+def test_a_channel_that_is_not_recorded_is_named():
+    t = np.arange(600) * 2e-3
+    U = np.where((t > 0.4) & (t < 0.55), 0.6, 1.0)
+    recorded = detect(Record("plain", t, U, U**1.5, 0.5 * U**2))
+    with pytest.raises(UserError, match=r"'negative_sequence_braking' reads U2, which plain does not have"):
+        Problem(model("negative_sequence_braking"), [recorded])
+
+
+@pytest.mark.parametrize("motor", ["none", "mechanical"])
+def test_a_feeder_fits_before_other_motors(motor):
+    whole, bare = model("feeder_impedance", motor=motor), model(motor=motor)
+    truth = [dict(zip(model().names, TRUTH, strict=True))[n] for n in bare.names]
+    drive = Drive.of([dip(0.4)])
+    on, off = (whole.simulate(drive, [*truth, *Z]) for Z in ((0.02, 0.06), (0, 0)))
+    without = bare.simulate(drive, truth)
+    assert np.abs(off.P - without.P).max() < 1e-12
+    assert on.P[0, 0] == pytest.approx(P0, abs=1e-9)
+    assert np.abs(on.P - off.P).max() > 0.003
+
+
+# what physics says of each
+
+
+def reference(excitation, R_s=0.0, k_s=0.0, share=0.0, Z=0.0):
+    """P and Q of motor and static load behind Z, DOP853 from sample to sample; the network iterated to rest.
+
+    Written with X - X' = C X'/(1 - C) and T0' = T' X/X', not with the symbols of the plugins.
+    """
+    X = X_PRIME / (1 - C)
+    D, T0 = X - X_PRIME, T_PRIME * X / X_PRIME
+    Z_s, U0 = R_s + 1j * X_PRIME, excitation.U0
+    V_0 = U0 - Z * np.conj((P0 + 1j * Q0) / U0)
+
+    def derivative(E, w, V, E_0, w_0):
+        current, sigma = (V - E) / Z_s, 1 + k_s * (abs(E) ** 2 - abs(E_0) ** 2)
+        torque = T_M * (1 - share + share * ((w + OMEGA_N) / (w_0 + OMEGA_N)) ** 2)
+        return (1j * D / sigma * current - E) / (T0 / sigma) + 1j * w * E, ((E * np.conj(current)).real - torque) / M
+
+    def residual(y):
+        dE, dw = derivative(y[0] + 1j * y[1], y[2], V_0, y[0] + 1j * y[1], y[2])
+        return [dE.real, dE.imag, dw * M]
+
+    start = fsolve(residual, [0.85 * U0, -0.2, -2.0], xtol=1e-13)
+    E_0, w_0 = start[0] + 1j * start[1], start[2]
+    S_d = V_0 * np.conj((V_0 - E_0) / Z_s)
+    S_s0 = V_0 * np.conj((P0 - 1j * Q0) / U0) - S_d
+
+    def voltage(E, U):
+        V = V_0 * U / U0
+        for _ in range(200):
+            u = abs(V) / abs(V_0)
+            S_s = S_s0.real * u**P_V + 1j * S_s0.imag * u**Q_V
+            old, V = V, (U + Z * E / Z_s - Z * np.conj(S_s / V)) / (1 + Z / Z_s)
+            if abs(V - old) < 1e-14:
+                break
+        return V
+
+    t, y, out = np.arange(len(excitation.U)) * excitation.step, start, []
+    recorded = Akima1DInterpolator(t, excitation.U, method="makima")
+    for i, a in enumerate(excitation.U):
+        E, V = y[0] + 1j * y[1], voltage(y[0] + 1j * y[1], a)
+        u = abs(V) / abs(V_0)
+        current = (V - E) / Z_s + np.conj((S_s0.real * u**P_V + 1j * S_s0.imag * u**Q_V) / V)
+        out.append(a * np.conj(current))
+        if i + 1 == len(excitation.U):
+            break
+
+        def slope(s, y):
+            E = y[0] + 1j * y[1]
+            dE, dw = derivative(E, y[2], voltage(E, recorded(s)), E_0, w_0)
+            return [dE.real, dE.imag, dw]
+
+        y = solve_ivp(slope, t[i : i + 2], y, method="DOP853", rtol=1e-9, atol=1e-11).y[:, -1]
+    out = np.array(out)
+    return out.real, out.imag
+
+
+@pytest.mark.parametrize(
+    ("name", "chosen", "known"),
+    [
+        ("stator_resistance", {"R_s": 0.04}, {"R_s": 0.04}),
+        ("magnetic_saturation", {"saturation": 0.5}, {"k_s": 0.5}),
+        ("speed_dependent_torque", {"quadratic_share": 0.8}, {"share": 0.8}),
+        ("feeder_impedance", {"R_f": 0.03, "X_f": 0.1}, {"Z": 0.03 + 0.1j}),
+    ],
+)
+def test_motor_effects_agree_with_equations_written_apart(name, chosen, known):
+    """Copper loss at rest is in it: the static share is P0 less air-gap power less R_s |I|^2."""
+    excitation = dip(0.5, step=2e-3, length=0.5, sag=0.0)
+    P, Q = run(name, excitation, values(name, **chosen), 8)
+    P_known, Q_known = reference(excitation, **known)
+    assert np.abs(P - P_known).max() < 1e-7
+    assert np.abs(Q - Q_known).max() < 1e-7
+    assert np.abs(P - base(excitation)[0]).max() > 0.01
+
+
+def test_a_second_group_is_two_loads_side_by_side():
+    g, r = 0.3, 5.0
+    slow = TRUTH * np.where(np.arange(7) == 3, r, 1)
+    P, Q = run("second_motor_group", dip(), values("second_motor_group", group_share=g, inertia_ratio=r))
+    first, second = base(dip()), base(dip(), truth=slow)
+    assert pytest.approx((1 - g) * first[0] + g * second[0], abs=1e-11) == P
+    assert pytest.approx((1 - g) * first[1] + g * second[1], abs=1e-11) == Q
+
+
+def test_frequency_changes_the_static_load_only():
+    excitation = dip(sag=-0.8)
+    P, Q = run("frequency_dependence", excitation, values("frequency_dependence", k_pf=1.5, k_qf=-2.0))
+    P_s, Q_s = static(excitation)
+    deviation = excitation.omega_s / OMEGA_N
+    assert pytest.approx(1.5 * deviation * P_s, abs=1e-11) == P - base(excitation)[0]
+    assert pytest.approx(-2.0 * deviation * Q_s, abs=1e-11) == Q - base(excitation)[1]
+
+
+def solved(excitation, slope, start):
+    """States driven by u = U/U0, as smooth between samples as the model has it: DOP853."""
+    t = np.arange(len(excitation.U)) * excitation.step
+    U = Akima1DInterpolator(t, excitation.U, method="makima")
+    f = lambda s, y: slope(U(s) / excitation.U0, y)  # noqa: E731
+    return solve_ivp(f, (0, t[-1]), start, "DOP853", t, rtol=1e-11, atol=1e-13, max_step=excitation.step).y
+
+
+def test_recovery_is_the_lag_of_karlsson_and_hill():
+    excitation, D, T_r = dip(), -0.8, 0.2
+    P, Q = run("exponential_recovery", excitation, values("exponential_recovery", recovery_P=D, recovery_time=T_r))
+    share = P0 - T_M
+    (x,) = solved(excitation, lambda u, x: (share * (u ** (P_V + D) - u**P_V) - x) / T_r, [0.0])
+    assert pytest.approx(x, abs=1e-9) == P - base(excitation)[0]
+    assert pytest.approx(base(excitation)[1], abs=1e-12) == Q
+    assert x.max() > 0.02
+
+
+def test_oscillation_is_a_damped_mode_rung_by_the_voltage():
+    excitation, f, zeta, phi = dip(), 4.0, 0.05, 0.7
+    chosen = values("low_frequency_oscillation", oscillation_P=0.1, oscillation_Q=-0.2, mode_frequency=f,
+                    mode_damping=zeta, mode_phase=phi)  # fmt: skip
+    P, Q = run("low_frequency_oscillation", excitation, chosen)
+    w = 2 * np.pi * f  # second-order form: x'' + 2 zeta w x' + w^2 x = w^2 (u - 1)
+    x, v = solved(excitation, lambda u, y: [y[1], w**2 * (u - 1 - y[0]) - 2 * zeta * w * y[1]], [0.0, 0.0])
+    u = excitation.U / excitation.U0
+    z = np.cos(phi) * v / w + np.sin(phi) * (u - 1 - x - 2 * zeta * v / w)
+    assert pytest.approx(0.1 * z, abs=1e-8) == P - base(excitation)[0]
+    assert pytest.approx(-0.2 * z, abs=1e-8) == Q - base(excitation)[1]
+
+
+def test_a_trip_takes_its_share_after_the_delay_and_gives_it_back():
+    excitation = dip(0.5, length=1.0)  # below 0.7 from 112 ms to 258 ms, back above 0.72 from 259 ms
+    chosen = values("undervoltage_trip", tripped_share=0.3, trip_level=0.7, trip_delay=0.05, reconnect_delay=0.3)
+    P, Q = run("undervoltage_trip", excitation, chosen)
+    for got, whole in zip((P, Q), base(excitation), strict=True):
+        ratio = got / whole
+        assert pytest.approx(1.0, abs=1e-3) == ratio[:158]
+        assert pytest.approx(0.7, abs=1e-3) == ratio[168:554]
+        assert pytest.approx(1.0, abs=1e-3) == ratio[565:]
+
+
+def test_a_short_dip_does_not_trip():
+    excitation = dip(0.5, duration=0.04)
+    chosen = values("undervoltage_trip", tripped_share=0.3, trip_level=0.7, trip_delay=0.1)
+    assert np.abs(run("undervoltage_trip", excitation, chosen)[0] - base(excitation)[0]).max() < 1e-6
+
+
+def slow(name, low, **chosen):
+    """What an effect adds to P at the bottom of a dip to `low`."""
+    excitation = dip(1 - low)
+    return (run(name, excitation, values(name, **chosen))[0] - base(excitation)[0])[200]
+
+
+@pytest.mark.parametrize(("low", "held"), [(0.9, 1.0), (0.6, 0.75), (0.4, 0.5)])
+def test_a_converter_holds_its_power_down_to_its_limit(low, held):
+    added = slow("constant_power_converter", low, converter_share=0.4, current_limit=0.8)
+    assert added == pytest.approx(0.4 * (P0 - T_M) * (held - low**P_V), abs=0.002)
+
+
+@pytest.mark.parametrize(("low", "allowed"), [(0.95, 1.0), (0.85, 0.8), (0.75, 0.4), (0.5, 0.0)])
+def test_traction_power_is_limited_linearly(low, allowed):
+    added = slow("voltage_dependent_power_limit", low, limited_share=0.4, full_level=0.9, off_level=0.65)
+    assert added == pytest.approx(0.4 * (P0 - T_M) * (allowed - low**P_V), abs=0.002)
+
+
+def test_a_dc_link_lets_its_share_fall_late():
+    excitation, s, T = dip(), 0.5, 0.04
+    P, _ = run("dc_link_lag", excitation, values("dc_link_lag", lag_share=s, lag_time=T))
+    share = P0 - T_M
+    (late,) = solved(excitation, lambda u, y: (share * u**P_V - y) / T, [share])
+    assert pytest.approx(s * (late - static(excitation)[0]), abs=1e-9) == P - base(excitation)[0]
+
+
+def test_a_capacitor_gives_reactive_power_with_the_square_of_voltage():
+    excitation, b = dip(sag=0.0), 0.2
+    P, Q = run("shunt_capacitor", excitation, values("shunt_capacitor", capacitor=b))
+    assert pytest.approx(b * (excitation.U**Q_V - excitation.U**2), abs=1e-11) == Q - base(excitation)[1]
+    assert pytest.approx(base(excitation)[0], abs=1e-12) == P
+
+
+def test_negative_sequence_brakes_by_the_rotor_loss():
+    """U2 jumps while U holds: at once Z_2's power; at rest both rotor losses, for T_L has not changed."""
+    n, U2 = 3000, 0.3
+    excitation = event(np.ones(n), omega_s=np.zeros(n), U2=np.where(np.arange(n) < 10, 0.0, U2))
+    rotor = C * X_PRIME / (OMEGA_N * T_PRIME)
+    square = (rotor / 2) ** 2 + X_PRIME**2
+    P, Q = run("negative_sequence_braking", excitation, values("negative_sequence_braking", negative_sequence=1.0))
+    assert P[10] - P0 == pytest.approx(U2**2 * rotor / 2 / square, rel=0.02)
+    assert Q[10] - Q0 == pytest.approx(U2**2 * X_PRIME / square, rel=0.02)
+    assert P[-1] - P0 == pytest.approx(U2**2 * rotor / square, rel=1e-6)
+
+
+def test_inrush_follows_a_rise_and_decays():
+    t = np.arange(1500) * 1e-3
+    up = event(np.where(t < 0.5, 0.6, 0.95), 1e-3)
+    P, Q = run("transformer_inrush", up, values("transformer_inrush", inrush=0.5, inrush_time=0.3))
+    extra = Q - base(up)[1]
+    rise = 0.35 / 0.6
+    assert np.abs(extra[:500]).max() < 1e-12
+    assert 0.35 * rise < extra.max() < 0.5 * rise
+    assert extra[1300] / extra[1000] == pytest.approx(np.exp(-1.0), rel=1e-3)
+    assert pytest.approx(0.1 * extra, abs=1e-12) == P - base(up)[0]
+    down = event(np.where(t < 0.5, 0.95, 0.6), 1e-3)
+    falling = run("transformer_inrush", down, values("transformer_inrush", inrush=0.5))[1] - base(down)[1]
+    assert np.abs(falling).max() < 1e-12
+
+
+@pytest.mark.parametrize(("drop", "given"), [(0.004, 0.04 / np.sqrt(1 + 0.04**2)), (0.5, 5 / np.sqrt(26))])
+def test_a_compensator_settles_at_its_gain_or_its_limit(drop, given):
+    t = np.arange(1200) * 1e-3
+    excitation = event(np.where(t < 0.1, 1.0, 1 - drop))
+    chosen = values("static_var_compensator", compensator=0.3, compensator_gain=10.0, compensator_time=0.05)
+    extra = run("static_var_compensator", excitation, chosen)[1] - base(excitation)[1]
+    assert extra[-1] == pytest.approx(-0.3 * given, rel=1e-6)
+    later = extra[101:151]  # one time constant on
+    assert later[-1] == pytest.approx(extra[-1] * (1 - np.exp(-1)), rel=0.02)
+
+
+def test_skew_is_a_shift():
+    P, Q = base(dip())
+    for lag in (3, -2):
+        late = run("time_skew", dip(), values("time_skew", skew=lag * 1e-3))
+        for got, whole in zip(late, (P, Q), strict=True):
+            assert pytest.approx(np.roll(whole, lag)[5:-5], abs=1e-9) == got[5:-5]
+    half = run("time_skew", dip(), values("time_skew", skew=0.5e-3))[0]
+    assert pytest.approx(((9 * (P[1:-2] + P[2:-1]) - P[:-3] - P[3:]) / 16), abs=1e-12) == half[2:-1]
+
+
+@pytest.mark.parametrize("samples", [2, 10, 40])
+def test_a_window_is_a_convolution(samples):
+    P, _ = base(dip())
+    seen, _ = run("measurement_window", dip(), values("measurement_window", window=samples * 1e-3))
+    weights = np.ones(samples + 1) / samples
+    weights[[0, -1]] /= 2
+    inner = slice(samples, -samples)
+    assert pytest.approx(np.convolve(P, weights, "same")[inner], abs=1e-12) == seen[inner]
+
+
+def test_a_window_shorter_than_a_step_is_the_mean_of_straight_lines():
+    P, _ = base(dip())
+    seen, _ = run("measurement_window", dip(), values("measurement_window", window=0.6e-3))
+    assert pytest.approx(P[1:-1] + 0.6 / 8 * np.diff(P, 2), abs=1e-12) == seen[1:-1]
+
+
+def test_drift_is_a_slope():
+    excitation = dip()
+    P, Q = run("load_drift", excitation, values("load_drift", drift_P=0.02, drift_Q=-0.01))
+    t = np.arange(len(P)) * 1e-3
+    assert pytest.approx(1 + 0.02 * t, abs=1e-12) == P / base(excitation)[0]
+    assert pytest.approx(1 - 0.01 * t, abs=1e-12) == Q / base(excitation)[1]
+
+
+def test_measurement_effects_see_each_event_by_itself():
+    """The first event's end does not leak into the second's beginning."""
+    for name in ("time_skew", "measurement_window", "load_drift"):
+        on = values(name, halfway)
+        together = model(name).simulate(Drive.of([dip(0.3), dip(0.6)]), on)
+        alone = model(name).simulate(Drive.of([dip(0.6)]), on)
+        assert np.array_equal(together.P[:, -alone.P.shape[1] :], alone.P)
