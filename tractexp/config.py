@@ -1,11 +1,8 @@
-"""The configuration's schema, and the door through which plugins enter Hydra's groups."""
+"""The door through which plugins and schemas enter Hydra's groups."""
 
-import dataclasses
 import hashlib
 import importlib
 import sys
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 from types import ModuleType
 from typing import Any
 
@@ -15,57 +12,7 @@ from hydra.plugins.search_path_plugin import SearchPathPlugin
 from omegaconf import OmegaConf
 
 from tractexp import plugin
-from tractexp.errors import UserError, among, check_range
-
-
-@dataclass
-class ModelConfig:
-    """The parts of a load model, and what is known of its parameters beforehand."""
-
-    motor: Any = None
-    static: Any = None
-    effects: list[str] = field(default_factory=list)  # names of effects added to the equations
-    bounds: dict[str, list[float]] = field(default_factory=dict)  # {name: [lower, upper]}
-    fixed: dict[str, float] = field(default_factory=dict)  # {name: value}
-    substeps: int | None = None  # Runge-Kutta steps per sample; null: as many as needed
-    per_event: list[str] = field(default_factory=list)  # parameters with a value of their own in each event
-
-
-@dataclass
-class TrackingConfig:
-    """Where runs are logged."""
-
-    enabled: bool = True
-    uri: str | None = None  # null: SQLite in outputs/ of the current folder
-    experiment: str | None = None  # null: named after task and data
-
-
-@dataclass
-class Config:
-    """One run. The groups hold the chosen plugins' settings."""
-
-    task: Any = None
-    model: ModelConfig = field(default_factory=ModelConfig)
-    optimizer: Any = None
-    data: Any = None
-    objective: Any = None
-    seed: int = 0
-    budget: int | None = None  # simulations; null: the optimizer's own end
-    time_limit: float | None = None  # s
-    target: float | None = None  # objective at which the search may stop
-    tracking: TrackingConfig = field(default_factory=TrackingConfig)
-
-
-def check(config: Mapping[str, Any]) -> None:
-    """Raise `UserError` for a key nobody reads (as `+sede=3` makes one) or a value out of range."""
-    for where, part, kind in (("", config, Config), ("model.", config["model"], ModelConfig)):
-        known = [item.name for item in dataclasses.fields(kind)]
-        for key in part:
-            if key not in known:
-                raise UserError(f"{where}{key}: there is no such key{among(key, known, 'Keys')}")
-    for key, least in {"seed": 0, "budget": 1, "time_limit": 0, "target": 0}.items():
-        if config[key] is not None:
-            check_range(key, config[key], least)
+from tractexp.schema import Config
 
 
 class PluginSearchPath(SearchPathPlugin):

@@ -27,7 +27,7 @@ def run(config: Any) -> None:
 
 def perform(job: Job) -> None:
     """Check a job's configuration and run its task: the same for a single job and for one of a sweep."""
-    from tractexp.config import check
+    from tractexp.schema import check
 
     check(job.config)
     build("task", job.config["task"]).run(job)
