@@ -264,6 +264,14 @@ def test_equal_optimizers_confirm_nothing_and_few_seeds_settle_nothing():
     )
 
 
+def test_pairs_are_won_only_beyond_chance():
+    """Ten seeds of ten lower win; five of ten do not; and the second of a pair never wins."""
+    low, high, mixed = ([SimpleNamespace(objective=x + 0.01 * k) for k in range(10)] for x in (1.0, 2.0, 1.0))
+    for k, f in enumerate(mixed):
+        f.objective += 0.5 if k % 2 else -0.5
+    assert claims.ends_lower([(low, high), (high, low), (low, mixed), (low, low)]) == [True, False, False, False]
+
+
 def test_running_times_are_those_of_the_planted_histories():
     """100, 60, 36, 22, 13, 7.7, ... times the level: below ten times it after 5 iterations, 300 simulations."""
     study = planted(1, {"issa": 1.0, "ssa": 4.0, "pso": 1.0})

@@ -16,8 +16,8 @@ from tractexp.model.model import compose
 from tractexp.plugin import build
 from tractexp.record import Event
 
-CANDIDATES = 2048  # simulated together when the time is taken
-REPEATS = 9  # of which the fastest counts
+CANDIDATES = 256  # simulated together when the time is taken: some milliseconds, less than a turn of a busy core
+REPEATS = 60  # of which the fastest counts
 
 
 @dataclass(frozen=True, eq=False)
