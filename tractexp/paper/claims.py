@@ -28,10 +28,12 @@ class Claim:
 
 
 def number(value: float) -> str:
-    """Three digits, or a word where there is no number."""
+    """Three digits, all of a large number's, or a word where there is none."""
     if not np.isfinite(value):
         return "never"
-    return f"{value:.3g}" if 1e-3 <= abs(value) < 1e5 or value == 0 else f"{value:.2e}"
+    if abs(value) >= 1000:
+        return f"{value:,.0f}"
+    return f"{value:.3g}" if abs(value) >= 1e-3 or value == 0 else f"{value:.2e}"
 
 
 def percent(value: float) -> str:
@@ -110,7 +112,7 @@ def table3(study: Study) -> list[Claim]:
             claims.append(Claim("table3", f"{said}, after {at}", told, verdict))
     P, Q = ({n: np.median([getattr(s[0], e) for s in f]) for n, f in study.fitted.items()}
             for e in ("epsilon_p", "epsilon_q"))  # fmt: skip
-    said = "; ".join(f"{n} {percent(P[n])}, {percent(Q[n])}" for n in P)
+    said = "; ".join(f"{n.upper()} {percent(P[n])}, {percent(Q[n])}" for n in P)
     claims.append(
         Claim("table3", "Q is described more accurately than P", f"median epsilon_p, epsilon_q: {said}",
               CONFIRMED if all(Q[n] < P[n] for n in P) else REFUTED)
@@ -120,7 +122,7 @@ def table3(study: Study) -> list[Claim]:
     claims.append(
         Claim("table3", "the three columns are fits to one record",
               f"errors and objective of a column give mean P² and Q²; ISSA's and SSA's give a mean Q² of"
-              f" {gap.pairs['issa and ssa'][1]:.2f}, and the best common pair misses the objective of {worst} by"
+              f" {gap.pairs['issa and ssa'][1]:.2f}, and the best common pair misses the objective of {worst.upper()} by"
               f" {100 * abs(gap.misses[worst]):.0f} %", IMPOSSIBLE)
     )  # fmt: skip
     return claims
@@ -133,14 +135,14 @@ def figure9(study: Study) -> list[Claim]:
         for cost in ("iterations", "simulations"):
             times = {n: [study.running_time(n, t, cost) for t in TARGETS] for n in (first, second)}
             wins = all(a < b for a, b in zip(times[first], times[second], strict=True))
-            told = "; ".join(f"{n} {', '.join(map(number, t))}" for n, t in times.items())
+            told = "; ".join(f"{n.upper()} {', '.join(map(number, t))}" for n, t in times.items())
             text = f"{first.upper()} converges faster than {second.upper()}, by {cost}"
             targets = " and ".join(f"{t:g}" for t in TARGETS)
             measured = f"expected {cost} to {targets} times the floor: {told}"
             claims.append(Claim("figure9", text, measured, CONFIRMED if wins else REFUTED))
     ends = {n: study.found_floor(study.objectives(n, "iterations")) for n in printed.COMPARED}
     after = {n: study.found_floor(d.deviance) for n, d in study.descents.items()}
-    told = "; ".join(f"{n} {after[n]:.0%} (at its floor {ends[n]:.0%})" for n in ends)
+    told = "; ".join(f"{n.upper()} {after[n]:.0%} (at its floor {ends[n]:.0%})" for n in ends)
     holds = after["issa"] > max(0.5, after["ssa"], after["pso"])
     text = "SSA and PSO are caught in local optima, ISSA jumps out of them"
     measured = f"searches that end in the valley of the lowest objective: {told}"
@@ -161,7 +163,7 @@ def generalized(part: str, kind: str, table: dict[str, tuple[float, float]]) -> 
         own = [min(table, key=lambda n, c=c: table[n][c]) for c in (0, 1)]
         errors = [getattr(fits[e], name) for fits in study.fitted["issa"] for e in study.held(kind)
                   for name in ("epsilon_p", "epsilon_q")]  # fmt: skip
-        told = "; ".join(f"{n} {number(r[0])}, {number(r[1])}" for n, r in residuals.items())
+        told = "; ".join(f"{n.upper()} {number(r[0])}, {number(r[1])}" for n, r in residuals.items())
         both = lowest == ["issa", "issa"]
         return [
             Claim(part, f"ISSA's model has good {kind} ability",

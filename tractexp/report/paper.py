@@ -244,7 +244,7 @@ def figure6(sheet: Any, study: Study, draw: Draw) -> None:
     sheet.heading("Figure 6: the record")
     curves = {"U": record.U, "P": record.P, "Q": record.Q}
     drawn = paper_figures.record(draw("figure6"), record.t, curves, title=f"{record.name}, {100 * event.depth:.0f} %")
-    sheet.figure(drawn, f"{record.name}. {'; '.join(record.notes)}")
+    sheet.figure(drawn, ": ".join([record.name, *record.notes]))
 
 
 def _fit(draw: Draw, name: str, fit: Any, role: str) -> Path:
@@ -345,7 +345,10 @@ def _impossible(study: Study) -> list[str]:
     orders = [equations.order(step) for step in (equations.as_printed, equations.classical)]
     slopes = {formula: maps.tail_exponent(steps) for formula, steps in study.tails.items()}
     spent = {n: float(np.median([f.simulations for f in found])) for n, found in study.compared.items()}
-    pairs = "; ".join(f"{pair}: {P:.2f}, {Q:.2f}" for pair, (P, Q) in gap.pairs.items())
+    pairs = "; ".join(
+        f"{' and '.join(LABELS[n] for n in pair.split(' and '))}: {P:.2f}, {Q:.2f}"
+        for pair, (P, Q) in gap.pairs.items()
+    )
     misses = ", ".join(f"{LABELS[n]} {100 * m:+.0f} %" for n, m in gap.misses.items())
     return [
         "Eq. (3) takes the arcsine of 2 T_m X'/(C U0²). With U0 = 1 that is, in absolute value, "
