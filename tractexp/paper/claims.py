@@ -121,8 +121,8 @@ def table3(study: Study) -> list[Claim]:
     worst = max(gap.misses, key=lambda n: abs(gap.misses[n]))
     claims.append(
         Claim("table3", "the three columns are fits to one record",
-              f"errors and objective of a column give mean P² and Q²; ISSA's and SSA's give a mean Q² of"
-              f" {gap.pairs['issa and ssa'][1]:.2f}, and the best common pair misses the objective of {worst.upper()} by"
+              "errors and objective of a column give mean P² and Q²; ISSA's and SSA's give a mean Q² of"
+              f" {gap.pairs['issa and ssa'][1]:.2f}, and the best common pair misses {worst.upper()}'s objective by"
               f" {100 * abs(gap.misses[worst]):.0f} %", IMPOSSIBLE)
     )  # fmt: skip
     return claims
