@@ -14,6 +14,7 @@ from sympy import I, Symbol, conjugate, im, re
 from tractexp.model.drive import EVENT, INPUTS
 from tractexp.parameter import Parameter
 
+LONG = 300  # nodes of an expression
 LONG_AGO = -(10**6)  # s: the time at which a load rests before the event
 
 
@@ -284,7 +285,12 @@ class Equations:
 
 
 def _shorter(expression: sympy.Expr) -> sympy.Expr:
-    """The expression or its expansion, whichever has fewer operations: products of phasors cancel when expanded."""
+    """The expression or its expansion, whichever has fewer operations: products of phasors cancel when expanded.
+
+    Long ones stay as they are: they gain nothing, and expanding them takes seconds.
+    """
+    if sum(1 for _ in sympy.preorder_traversal(expression)) > LONG:
+        return expression
     return min(expression, sympy.expand(expression), key=sympy.count_ops)
 
 
