@@ -16,6 +16,7 @@ from tractexp.identify.uncertainty import LEVEL, Uncertainty, conclude
 from tractexp.identify.verdict import BOUND, IDENTIFIED, UNIDENTIFIED, WEAK, WITHIN, Verdict, size
 
 BEYOND = 1.6  # of the threshold: a lane ends when its deviance has risen so far
+OVERSHOOT = 3.0  # of the threshold: a step that rises so far at once is taken back
 STEP = 0.5  # standard errors between the first points of a lane
 SMALLEST_STEP, LARGEST_STEP = 1e-5, 0.08  # of the range
 AIM = 0.8  # rise of the root of the deviance that a step aims at
@@ -185,6 +186,11 @@ class _Lanes:
         self.simulations += found.simulations
         rise = found.deviance - self.known.deviance
         moved = target - here
+        if (over := self._overshoots(rise, lanes) & (np.abs(moved) > 2 * SMALLEST_STEP)).any():
+            self.step[lanes[over]] = np.abs(moved[over]) / 3
+            fine = ~over
+            lanes, rise, moved, target = lanes[fine], rise[fine], moved[fine], target[fine]
+            found = replace(found, unit=found.unit[fine], deviance=found.deviance[fine])
         with np.errstate(divide="ignore", invalid="ignore"):
             slope = (found.unit - self.unit[lanes]) / moved[:, None]
         self.slope[lanes] = np.where(np.isfinite(slope), slope, 0.0)
@@ -196,9 +202,13 @@ class _Lanes:
                 self.path[lane].append((value, height))
         ended = (rise > BEYOND * self.limit) | (target <= 0) | (target >= 1) | ~np.isfinite(rise)
         self.open[lanes[ended]] = False
-        if rise.min() < -BETTER:
+        if rise.min(initial=0.0) < -BETTER:
             self.better = found.unit[rise.argmin()]
         return True
+
+    def _overshoots(self, rise: np.ndarray, lanes: np.ndarray) -> np.ndarray:
+        """Lanes whose step went from below the threshold to far above it, or where nothing can be simulated."""
+        return ~(rise <= OVERSHOOT * self.limit) & (self.rise[lanes] < self.limit)
 
     def _adapt(self, lanes: np.ndarray, rise: np.ndarray, moved: np.ndarray) -> None:
         """Steps that raise the root of the deviance by about `AIM`, at most thrice or a third of the last."""

@@ -117,7 +117,7 @@ def plan(path: Path, scans: Mapping[str, tuple[Sequence[float], Sequence[Forecas
                 panel.plot(x, relative[:, j], **line, label=name)
             panel.axhline(100 * within, color=style.FAINT, linewidth=0.7, linestyle="-.")
             panel.set(xlabel=label, yscale="log")
-            if max(x) > 20 * min(x):
+            if max(x) >= 19 * min(x) and min(x) > 0.0:
                 panel.set_xscale("log")
         panels[0].set_ylabel("95 % interval, ± % of the value")
         panels[2].set_ylabel("95 % interval, ± % of the value")
