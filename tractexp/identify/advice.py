@@ -10,6 +10,8 @@ from tractexp.identify.plan import Shape, depth_needed, over_depth
 from tractexp.identify.uncertainty import Uncertainty
 from tractexp.identify.verdict import BOUND, UNIDENTIFIED, WEAK, WITHIN
 
+TIGHTEST = 0.02  # of the value: no dip is asked to do better
+
 
 def advise(known: Uncertainty, odd: Sequence[str] = ()) -> list[str]:
     """Sentences, the most pressing first. `odd` events do not fit with the rest."""
@@ -46,7 +48,8 @@ def _deeper(known: Uncertainty) -> list[str]:
     forecasts = over_depth(problem, known.values, shape, known.information, [known.likelihood.noise[deepest]])
     said = []
     for name in poor:
-        needed = depth_needed(forecasts, name, WITHIN)
+        goal = _goal(known, known.names.index(name))
+        needed = depth_needed(forecasts, name, goal)
         if needed.depth is None:
             longer = replace(shape, depth=float(needed.depths[np.argmin(needed.relative)]))
             said.append(
@@ -57,6 +60,13 @@ def _deeper(known: Uncertainty) -> list[str]:
         else:
             said.append(
                 f"for {name}: record another dip of {100 * needed.depth:.0f} % or more for"
-                f" {1000 * shape.duration:.0f} ms, fitted together with this one: ± {100 * WITHIN:.0f} %"
+                f" {1000 * shape.duration:.0f} ms, fitted together with this one: ± {100 * goal:.2g} %"
             )
     return said
+
+
+def _goal(known: Uncertainty, j: int) -> float:
+    """Half an interval, as a share of the value, that is narrow enough and keeps off the bounds."""
+    value = known.values[j]
+    room = min(value - known.lower[j], known.upper[j] - value)
+    return max(min(WITHIN, room / max(abs(value), 1e-12)), TIGHTEST)
