@@ -35,7 +35,7 @@ def run(
         (label, range(first, min(first + CHUNK, seeds))) for label in variants for first in range(0, seeds, CHUNK)
     ]
     found: dict[str, list[Found]] = {label: [] for label in variants}
-    parallel = Parallel(n_jobs=min(workers or cpu_count(), len(chunks)), return_as="generator")
+    parallel: Any = Parallel(n_jobs=min(workers or cpu_count(), len(chunks)), return_as="generator")
     jobs = (delayed(_chunk)(recipe, dict(variants[label]), part, limits or Limits()) for label, part in chunks)
     done = 0
     for (label, part), outcome in zip(chunks, parallel(jobs), strict=True):

@@ -67,6 +67,7 @@ def _top(sheet: Any, study: Study, judged: Sequence[Claim]) -> None:
     sheet.table(
         ["where", "the paper's claim", "verdict", "measured"],
         [[_place(c.part), c.text, c.verdict, c.measured] for c in judged],
+        "Where the paper does not say it in so many words, a claim is what its argument needs.",
         words=(1, 2, 3),
     )
 
@@ -81,7 +82,7 @@ def _percent(value: float) -> str:
     return f"{100 * value:.3g} %"
 
 
-def _middle(values: Sequence[float]) -> str:
+def _middle(values: Sequence[float] | np.ndarray) -> str:
     """The median and, in brackets, lowest and highest."""
     low, middle, high = np.quantile(values, (0, 0.5, 1))
     return f"{number(middle)} ({number(low)} .. {number(high)})"

@@ -26,8 +26,9 @@ def maps(path: Path, orbits: Mapping[str, np.ndarray], spread: Mapping[str, np.n
             panel.plot(np.arange(len(shown)), shown, color=style.PALETTE[k], linewidth=0.6, marker=".", markersize=3)
             panel.set(ylim=(-0.03, 1.03), ylabel="z")
             panel.set_title(label, loc="left", pad=2)
-            panel.tick_params(labelbottom=k == len(orbits) - 1)
-        panel.set_xlabel("iteration")
+            last = k == len(orbits) - 1
+            panel.tick_params(labelbottom=last)
+            panel.set_xlabel("iteration" if last else "")
         panel = figure.add_subplot(grid[:, 1])
         ink = {"color": style.PALETTE[0], "linewidth": 1.0}
         panel.boxplot(
