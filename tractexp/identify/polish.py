@@ -3,7 +3,7 @@
 A step costs d + 1 simulations: one trial, and a Jacobian whose d forward differences are one batch.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -11,10 +11,10 @@ from tractexp.identify.optimizer import REFUSED, Box, Evaluate
 
 DIFFERENCE = 1e-6  # of the box's width; rounding (3e-13 relative) and curvature both stay below 1e-6 of a column
 EDGE = 1e-9  # SciPy's interior method starts strictly inside the box
-ELITE = 10  # starts of a polish
+ELITE = 30  # starts of a polish: the valley sought may rank twentieth where the motor stalls
 APART = 0.3  # between starts: a search that has settled in one valley must not fill the elite with points of it
 
-ROUGH, ROUGH_TRIALS = 1e-2, 30  # relative tolerance and trials of the first descents of a polish
+ROUGH, ROUGH_TRIALS = 1e-2, 12  # relative tolerance and trials of a descent that has yet to prove itself
 
 
 def spread(unit: np.ndarray, f: np.ndarray, count: int) -> np.ndarray:
@@ -77,34 +77,47 @@ class _Residuals:
 
 def descend(
     evaluate: Evaluate, box: Box, start: np.ndarray, objective: float, tolerance: float = 1e-8, trials: int = 100
-) -> None:
+) -> tuple[np.ndarray, float]:
     """Bounded least squares (SciPy's trust region reflective) from `start` (d,), whose objective is known.
 
     Works in the unit cube and on residuals scaled to a sum of squares of one, so that `tolerance` is relative:
-    the descent ends when the objective, the step or the gradient is below it, or after `trials` trials. The
-    search loop that owns `evaluate` keeps the best; a start that cannot be simulated is left at once.
+    the descent ends when the objective, the step or the gradient is below it, or after `trials` trials. Returns
+    the point (d,) it ended at and its objective; a start that cannot be simulated is left at once.
     """
     from scipy.optimize import least_squares  # its annotations know `jac` as a string only
 
     residuals = _Residuals(evaluate, box, 1 / np.sqrt(objective) if objective > 0 else 1.0)
     unit = np.clip(box.to_unit(start), EDGE, 1 - EDGE)
-    if np.isfinite(residuals(unit)).all():
-        least_squares(
-            residuals, unit, residuals.jacobian,  # pyright: ignore[reportArgumentType]
-            (0.0, 1.0), ftol=tolerance, xtol=tolerance, gtol=tolerance,
-            max_nfev=trials,
-        )  # fmt: skip
+    if not np.isfinite(residuals(unit)).all():
+        return start, objective
+    found = least_squares(
+        residuals, unit, residuals.jacobian,  # pyright: ignore[reportArgumentType]
+        (0.0, 1.0), ftol=tolerance, xtol=tolerance, gtol=tolerance, max_nfev=trials,
+    )  # fmt: skip
+    return box.from_unit(found.x), float(2 * found.cost / residuals.scale**2)
+
+
+def race(
+    evaluate: Evaluate, box: Box, starts: Iterable[tuple[np.ndarray, float]], tolerance: float = 1e-8, trials: int = 100
+) -> Iterator[None]:
+    """Descend briefly from each start (point, objective), and to the end from each that comes out lowest so far.
+
+    In the right valley a descent is soon below the bottoms of the wrong ones, which take most of the simulations where
+    every descent is finished. What was left is finished at last, lowest first. An iteration is one descent.
+    """
+    left, best = [], np.inf
+    for start, objective in starts:
+        x, f = descend(evaluate, box, start, objective, ROUGH, ROUGH_TRIALS)
+        if f < best:
+            best = descend(evaluate, box, x, f, tolerance, trials)[1]
+        else:
+            left.append((x, f))
+        yield
+    for x, f in sorted(left, key=lambda end: end[1]):
+        descend(evaluate, box, x, f, tolerance, trials)
+        yield
 
 
 def polish(evaluate: Evaluate, elite: Elite) -> Iterator[None]:
-    """Descend roughly from each elite point, best first, then finish from the best reached; an iteration each.
-
-    The elite must hear of what `evaluate` meets, as it does in the search loop. Finishing every descent would
-    spend half the simulations on the bottoms of wrong valleys.
-    """
-    for start, objective in zip(elite.x, elite.f, strict=True):
-        descend(evaluate, elite.box, start, objective, ROUGH, ROUGH_TRIALS)
-        yield
-    if len(elite.f):
-        descend(evaluate, elite.box, elite.x[0], elite.f[0])
-        yield
+    """Race from the elite points, best first."""
+    yield from race(evaluate, elite.box, list(zip(elite.x, elite.f, strict=True)))

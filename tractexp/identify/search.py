@@ -15,8 +15,8 @@ from tractexp.identify.optimizer import REFUSED, Box, Optimizer
 from tractexp.identify.polish import Elite, polish
 
 UNKNOWN = 1e30  # stands for an objective that is not a finite number: worse than any miss
-POLISH_STEPS = 200  # least-squares steps, of d + 2 simulations, that a budget keeps back for the polish,
-POLISH_SHARE = 1 / 2  # but never more than this share of it
+POLISH_STEPS = 450  # least-squares steps, of d + 2 simulations, that a budget keeps back for the polish,
+POLISH_SHARE = 2 / 3  # but never more than this share of it
 
 
 class Objective(Protocol):
