@@ -173,13 +173,13 @@ class Model:
         eq = self.equations
         given = [*map(float, (*values, *drive.before[event], *drive.event[event]))]
         known = dict(zip((*self.names, "P0", "Q0", *EVENT), given, strict=True))
-        *starts, _ = self.kernel._start(*given)
+        *starts, _ = np.atleast_1d(self.kernel._start(*given)).tolist()
         if hasattr(self.kernel, "_settle"):
             *solved, _ = self.kernel._settle(*given, *starts)
             starts[: len(solved)] = solved
         symbols = [start_symbol(s) for s in (*eq.states, *eq.memories)]
         names = [p.name for s in symbols for p in ((s,) if s.is_real else phasor_parts(s))]
-        known |= dict(zip(names, map(float, starts), strict=True))
+        known |= dict(zip(names, starts, strict=True))
         for symbol in eq.definitions:
             value, imaginary = eq.parts(eq.before(symbol))
             if imaginary == 0:
