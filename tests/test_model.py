@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import Akima1DInterpolator
 
+from tractexp.errors import UserError
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
 from tractexp.plugin import get
@@ -279,3 +280,18 @@ def test_a_generated_source_is_remembered_until_code_or_settings_change(tmp_path
     assert kernel.remembered((motor, static), generate) == "source 1"
     assert kernel.remembered((motor, static), generate) == "source 1"
     assert kernel.remembered((static, motor), generate) == "source 2"
+
+
+@pytest.mark.parametrize("name", ["m", "c1", "lambda", "k1_E", "two words"])
+def test_a_name_the_kernel_uses_itself_is_refused(name):
+    """A parameter called m once overwrote the kernel's own m and gave nan without a word."""
+    from tractexp.model.equations import Equations
+    from tractexp.model.lowering import lower
+    from tractexp.parameter import Parameter
+
+    eq = Equations()
+    (symbol,) = eq.declare([Parameter(1.0, (0.0, 2.0), "1", "about", "source", name=name)])
+    eq.consume(symbol * eq.U, eq.Q_s0)
+    eq.close()
+    with pytest.raises(UserError, match=f"called '{name}'"):
+        lower(eq)

@@ -5,12 +5,15 @@ input only once per sample (a *signal*); the rest is left for the inner loop. A 
 becomes exp(exponent * log(base)), whose logarithm is then a signal.
 """
 
-from collections.abc import Mapping
+import keyword
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import sympy
 from sympy import Symbol
 
+from tractexp.errors import UserError
 from tractexp.model.drive import EVENT, INPUTS
 from tractexp.model.equations import Equations, phasor_parts, start_symbol
 
@@ -93,6 +96,7 @@ class _Hoister:
 def lower(eq: Equations) -> Lowered:
     """Lower a complete declaration. Raises ValueError where a symbol is used that nothing declares."""
     rows = eq.real_states()
+    _check_names([*eq.parameters, *(s.name for s in (*eq.states, *eq.memories, *eq.steps))])
     states, memories = tuple(symbol for symbol, _, _ in rows), tuple(eq.memories)
     starts = tuple(p for s in (*eq.states, *eq.memories) for p in _real_parts(start_symbol(s)))
     parameters = tuple(map(_symbol, eq.parameters))
@@ -160,6 +164,26 @@ def _in_order(assignments: list[tuple[Symbol, sympy.Expr]]) -> tuple[tuple[Symbo
         ordered += ready
         waiting = [(s, e) for s, e in waiting if s not in {r for r, _ in ready}]
     return tuple(ordered)
+
+
+# Names the generated kernel uses itself: its own variables, and the patterns of constants, signals and stages.
+TAKEN = frozenset(
+    """
+    n e h k l m i j p q P Q W x f g d r c J w_p w_q math np njit candidates event first inputs measured weights
+    substeps sums miss outputs store signals block reachable unsettled moved factor shorter off settled keep
+    """.split()  # noqa: SIM905
+)
+PATTERN = re.compile(r"[csx]\d+|k[1-4]_.*|_.*")
+
+
+def _check_names(names: Iterable[str]) -> None:
+    """Raise `UserError` for a name that the kernel could not tell from its own."""
+    for name in names:
+        if name in TAKEN or PATTERN.fullmatch(name) or not name.isidentifier() or keyword.iskeyword(name):
+            raise UserError(
+                f"a model cannot have a parameter, state or memory called '{name}': the kernel uses that name itself,"
+                " or it is no Python name; choose a longer one"
+            )
 
 
 def _check_closed(lowered: Lowered, lane: set[Symbol]) -> None:
