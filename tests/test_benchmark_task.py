@@ -195,7 +195,7 @@ TINY = ("task=benchmark", "task.functions=[1,15]", "task.dimensions=[2]", "task.
 def test_the_task_runs_from_the_command_line(ioh, tmp_path):
     done = tractexp(*TINY, "optimizer=issa_no_levy", "task.against=[pso]", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    for part in ("issa_no_levy", "pso", "separable", "many valleys", "of 2", "benchmark.html", "benchmark.json"):
+    for part in ("issa_no_levy", "pso", " f1 ", " f15 ", "of 2", "benchmark.html", "benchmark.json"):
         assert part in done.stdout, part
     content = json.loads((tmp_path / "run" / "benchmark.json").read_text())
     assert content["optimizers"]["issa_no_levy"]["levy"] is False

@@ -115,11 +115,18 @@ def show(made: Any) -> None:
 
     say(report.scale(made))
     for dimension in made.plan.dimensions:
-        columns, rows = report.shares(made, dimension)
+        _, rows = report.shares(made, dimension)
+        columns = ["optimizer", "all", *(span(group) for group in made.groups().values()), "solved"]
         table(columns, rows, f"dimension {dimension}: share of targets met, functions solved")
     for sentence in report.sentences(made):
         say(f"- {sentence}")
     say()
+
+
+def span(functions: list[int]) -> str:
+    """The functions of a group in short: f1-5."""
+    first, last = min(functions), max(functions)
+    return f"f{first}" if first == last else f"f{first}-{last}"
 
 
 def track(job: Job, made: Any, paths: list[Path]) -> None:
