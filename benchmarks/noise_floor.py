@@ -1,4 +1,4 @@
-"""Do the recommended optimizers reach the noise floor? python benchmarks/noise_floor.py [--seeds 30] [--first 0] [--json]
+"""Do the recommended optimizers reach the noise floor? python benchmarks/noise_floor.py [--seeds 30] [--json]
 
 Six records: the shipped `tibet_50pct` and five from the simulator in `independent`, which shares no equation with the
 model fitted to them; in one of them the dip is deep and the motor stalls. The lowest objective known is that of a long
@@ -146,10 +146,11 @@ def judge(case: str, seeds: range) -> list[Row]:
     rows = []
     for name, group in tried.items():
         spent = np.array([run.reached((1 + NEAR) * floor) for run in group])
+        missed = [seed for seed, n in zip(seeds, spent, strict=True) if np.isinf(n)]
         rows.append(
             Row(
-                case, name, floor, int(np.isfinite(spent).sum()), len(seeds), _known(np.median(spent)), _known(spent.max()),
-                max(run.best for run in group) / floor - 1, np.array(seeds)[np.isinf(spent)].tolist(), TRIED[name][2],
+                case, name, floor, len(seeds) - len(missed), len(seeds), _known(np.median(spent)), _known(spent.max()),
+                max(run.best for run in group) / floor - 1, missed, TRIED[name][2],
             )
         )  # fmt: skip
     return rows
