@@ -115,7 +115,7 @@ def play(of, excitation, parameters, names=("P_motor", "Q_motor"), rtol=1e-11):
 
 @pytest.mark.parametrize("motor", MOTORS)
 def test_the_kernel_agrees_with_dop853(motor):
-    of, excitation = model(motor, "none"), dip(length=0.5, swing=2.0)
+    of, excitation = model(motor, "none"), dip(length=0.4, swing=2.0)
     response = of.simulate(Drive.of([excitation]), values(of), 16)
     _, (P, Q) = play(of, excitation, values(of))
     assert np.abs(response.P[0] - P).max() < 1e-8
@@ -166,7 +166,7 @@ def test_input_power_is_losses_and_shaft_power_and_what_is_stored(motor):
     the rate x Re(i' i*)/omega_n; without stator transients the stator does not see the voltage i' induces, and only
     the rotor's share of that rate, x Re(i' i_r*)/omega_n, is left. `stator_flux` also stores X' |I|^2/(2 omega_n).
     """
-    of, excitation = model(motor, "none"), dip(length=0.5)
+    of, excitation = model(motor, "none"), dip(length=0.4)
     p = dict(zip(of.names, values(of), strict=True))
     rows, (P, torque) = play(of, excitation, values(of), ("P_motor", "electrical_torque"))
     names, compute = functions(of)
