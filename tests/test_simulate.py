@@ -63,13 +63,14 @@ def test_a_given_dip_is_played_as_described(saved, tmp_path):
 
 
 def test_the_dip_is_the_prediction_of_the_same_result(saved, tmp_path):
-    done = tractexp("task=simulate", f"task.parameters={saved}", "task.depth=0.4", "hydra.run.dir=run", cwd=tmp_path)
+    """With a sudden fall: a prediction takes U_0 from the samples before the dip, none of which has begun to fall."""
+    done = tractexp("task=simulate", f"task.parameters={saved}", "task.depth=0.4", "task.fall=0", "hydra.run.dir=run",
+                    cwd=tmp_path)  # fmt: skip
     assert done.returncode == 0, done.stderr
     rows = read(tmp_path / "run" / "response.csv")
     P, Q = load(saved).predict(rows["t"], rows["U"])
-    # a prediction takes U_0 from the samples before the dip, the last of which have begun to fall by 1e-4
-    assert rows["P"] == pytest.approx(P, abs=2e-5)
-    assert rows["Q"] == pytest.approx(Q, abs=2e-5)
+    assert rows["P"] == pytest.approx(P, abs=1e-6)
+    assert rows["Q"] == pytest.approx(Q, abs=1e-6)
 
 
 def test_recorded_events_are_played_and_judged(saved, tmp_path):
