@@ -24,6 +24,11 @@ def main() -> int:
             from tractexp.tasks.ui import ui
 
             return ui(sys.argv[2:])
+        if {"--help", "-h"} & set(sys.argv[1:]):
+            from tractexp.usage import usage
+
+            print(usage(CONF))
+            return 0
         return _run()
     except UserError as error:
         if traceback:

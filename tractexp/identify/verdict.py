@@ -96,7 +96,7 @@ def _structural(information: Information, unseen: np.ndarray, j: int) -> str:
     """Which changes leave the record unchanged, and which combinations of those parameters it does see."""
     with_it = [row for row in unseen if abs(row[j]) > SHARE]
     direction = min(with_it, key=lambda row: np.count_nonzero(np.abs(row) > SHARE))
-    names, pivot = information.names, int(np.abs(direction).argmax())
+    names, pivot = information.names, j  # told from the parameter in question
     direction = direction / direction[pivot]
     members = np.flatnonzero(np.abs(direction) > SHARE)
     if len(members) == 1:

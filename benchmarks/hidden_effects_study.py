@@ -1,6 +1,6 @@
 """Run the suites through the product and count: false alarms, names found, abstentions, gaps closed.
 
-    python -m hidden_effects.study --suite nulls --count 100        (from the folder benchmarks)
+    python hidden_effects_study.py --suite nulls --count 100        (from the folder benchmarks)
 
 Each trial is made by the independent generator, investigated by `tractexp.discrepancy`, and also ranked by AIC, BIC
 and RMSE on the same refits. Rows are appended to a JSON-lines file, so that a study can be stopped and taken up.
