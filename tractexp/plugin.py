@@ -31,6 +31,7 @@ class Plugin:
     group: ClassVar[str]
     name: ClassVar[str]
     parameters: ClassVar[tuple[Parameter, ...]] = ()
+    chosen: ClassVar[bool] = True  # by a Hydra group; False: by names within a setting
     sourced: ClassVar[bool] = True  # the docstring must say where the equations come from
 
     def check(self) -> None:

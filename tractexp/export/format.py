@@ -65,6 +65,7 @@ class Format(Plugin):
     """Base of the export formats, chosen by `task.format=NAME`."""
 
     group: ClassVar[str] = "format"
+    chosen: ClassVar[bool] = False
     suffix: ClassVar[str]  # of the file
     motors: ClassVar[Collection[str] | None] = None  # names it can represent; None: any
     statics: ClassVar[Collection[str] | None] = None

@@ -44,6 +44,7 @@ class Effect(Plugin):
     """
 
     group: ClassVar[str] = "effect"
+    chosen: ClassVar[bool] = False
     order: ClassVar[int] = 0  # edits of a higher order come later: those that copy what others have edited
     needs: ClassVar[tuple[str, ...]] = ()
     reads: ClassVar[tuple[str, ...]] = ()
