@@ -72,7 +72,9 @@ def identified(job: Job) -> Identified:
         found = search(problem, optimizer, job.seed, limits, progress)
     settings = {part: config["model"][part] for part in ("motor", "static", "effects")}
     result, fits = conclude(problem, found, events.validate, job.seed, settings, job.choices["optimizer"])
-    known = checked(assess(problem, found.values, robust=not problem.loss.quadratic))
+    known = assess(problem, found.values, robust=not problem.loss.quadratic)
+    if not job.in_sweep:  # of many jobs nobody reads each profile; task=profile makes them for the one that matters
+        known = checked(known)
     return Identified(problem, found, replace(result, **known.fields()), fits, known)
 
 
