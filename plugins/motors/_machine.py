@@ -11,6 +11,32 @@ M = Parameter(0.005, (0.0005, 0.03), "pu s²/rad", "inertia, H = M omega_s/2", f
 T_M = Parameter(0.5, (0.05, 1.0), "pu", "load torque, the motor's power before the event", f"{PAPER}, Eq. (1)")
 
 
+def single_cage(eq, T_prime, X_prime, C, T_m):
+    """Declare what the motors with rotor flux and without stator transients share, Eqs. (1)-(2) but for the speed.
+
+    Returns the speed's symbol, its value relative to synchronous before the event, and the electrical and the load
+    torque.
+    """
+    from tractexp.model.equations import I, conjugate, im, re
+
+    E, omega = eq.phasor("E", "E"), eq.state("omega", r"\omega")
+    V = eq.define("motor_voltage", eq.U, "V", phasor=True)
+    Z = eq.define("stator_impedance", I * X_prime, "Z'")
+    current = eq.define("stator_current", (V - E) / Z, "I")
+    coupling = eq.define("coupling", C, "c")
+    time_constant = eq.define("time_constant", T_prime, r"\tau'")
+    electrical_torque = eq.define("electrical_torque", re(E * conjugate(current)), "T_e")
+    load_torque = eq.define("load_torque", T_m, "T_L")
+    P = eq.define("P_motor", re(V * conjugate(current)), "P_d")  # Eq. (2)
+    Q = eq.define("Q_motor", im(V * conjugate(current)), "Q_d")
+    eq.consume(P, Q)
+
+    E_0, slower = at_rest(eq, T_prime, X_prime, C, T_m)
+    flux = (I * X_prime * coupling * current - (1 - coupling) * E) / time_constant
+    eq.moves(E, flux + I * (omega - eq.omega_s) * E, E_0)  # Eq. (1)
+    return omega, slower, electrical_torque, load_torque
+
+
 def at_rest(eq, T_prime, X_prime, C, T_m):
     """Internal voltage and speed relative to synchronous before the event, Eq. (3): the stable of two solutions."""
     from tractexp.model.equations import I

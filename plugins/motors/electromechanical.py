@@ -33,23 +33,7 @@ class Electromechanical(Motor):
     T_prime, X_prime, C, M, T_m = _machine.T_PRIME, _machine.X_PRIME, _machine.C, _machine.M, _machine.T_M
 
     def declare(self, eq):
-        from tractexp.model.equations import I, conjugate, im, re
-
         T_prime, X_prime, C, M, T_m = eq.declare(self.parameters)
-        E, omega = eq.phasor("E", "E"), eq.state("omega", r"\omega")
-        V = eq.define("motor_voltage", eq.U, "V", phasor=True)
-        Z = eq.define("stator_impedance", I * X_prime, "Z'")
-        current = eq.define("stator_current", (V - E) / Z, "I")
-        coupling = eq.define("coupling", C, "c")
-        time_constant = eq.define("time_constant", T_prime, r"\tau'")
-        electrical_torque = eq.define("electrical_torque", re(E * conjugate(current)), "T_e")
-        load_torque = eq.define("load_torque", T_m, "T_L")
-        P = eq.define("P_motor", re(V * conjugate(current)), "P_d")  # Eq. (2)
-        Q = eq.define("Q_motor", im(V * conjugate(current)), "Q_d")
-        eq.consume(P, Q)
-
-        E_0, slower = _machine.at_rest(eq, T_prime, X_prime, C, T_m)
-        flux = (I * X_prime * coupling * current - (1 - coupling) * E) / time_constant
-        eq.moves(E, flux + I * (omega - eq.omega_s) * E, E_0)  # Eq. (1)
-        eq.moves(omega, (electrical_torque - load_torque) / M, eq.omega_s0 + slower)
+        omega, slower, electrical_torque, load_torque = _machine.single_cage(eq, T_prime, X_prime, C, T_m)
+        eq.moves(omega, (electrical_torque - load_torque) / M, eq.omega_s0 + slower)  # Eq. (1)
         _machine.require(eq, (T_prime, X_prime, M), X_prime, C, T_m)
