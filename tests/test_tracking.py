@@ -253,6 +253,27 @@ def test_a_store_that_cannot_be_used_is_named_with_the_reason(tmp_path, empty_st
         tracking.prepare("foo://x")
 
 
+def test_a_relative_address_counts_from_the_folder_where_the_command_runs(tmp_path, empty_store):
+    (tmp_path / "x.db").write_bytes(empty_store.read_bytes())
+    values = "T_prime: 0.05, X_prime: 0.2, C: 0.9, M: 0.01, T_m: 0.5, p_v: 1.5, q_v: 2.5"
+    command = [sys.executable, "-m", "tractexp", "task=simulate", f"task.values={{{values}}}", "task.depth=0.4"]
+    done = subprocess.run([*command, "tracking.uri=sqlite:///x.db"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "to see it: tractexp ui --uri sqlite:///x.db" in done.stdout
+    reader = client(f"sqlite:///{tmp_path / 'x.db'}")
+    (logged,) = reader.search_runs([e.experiment_id for e in reader.search_experiments()])
+    assert logged.info.artifact_uri.startswith((tmp_path / "mlartifacts").as_uri())
+    assert {path.name for path in (tmp_path / "mlartifacts").rglob("response.*")} == {"response.csv", "response.svg"}
+
+
+def test_addresses_are_absolute_and_the_default_is_below_outputs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert tracking.address("sqlite:///runs/x.db") == f"sqlite:///{tmp_path.as_posix()}/runs/x.db"
+    assert tracking.address(None) == tracking.default_uri(tmp_path)
+    for given in (tracking.default_uri(tmp_path), "http://host:5000"):
+        assert tracking.address(given) == given
+
+
 def test_a_server_that_does_not_answer_is_reported_at_once():
     with socket.socket() as taken:  # bound but not listening: connections are refused
         taken.bind(("127.0.0.1", 0))

@@ -33,7 +33,7 @@ def parent_run(folder: Path, jobs: list[Any], overrides: list[str], afresh: bool
         return
     from tractexp import tracking
 
-    uri = node["uri"] or tracking.default_uri(Path.cwd())
+    uri = tracking.address(node["uri"])
     run_id = parent_of(folder)
     if afresh or run_id is None or not tracking.reopen_parent(run_id, uri):
         run_id = tracking.start_parent(_described(folder, jobs, overrides), uri)

@@ -151,5 +151,5 @@ def track(job: Job, made: Any, paths: list[Path]) -> None:
         artifacts=paths,
         parent=job.sweep,
     )
-    tracking.log(run, node["uri"] or tracking.default_uri(Path.cwd()))
+    tracking.log(run, tracking.address(node["uri"]))
     say(f"logged in experiment '{experiment}'; to see it: tractexp ui")

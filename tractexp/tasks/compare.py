@@ -77,7 +77,7 @@ def store(job: Job) -> str:
     """The address of the MLflow store."""
     from tractexp import tracking
 
-    return job.config["tracking"]["uri"] or tracking.default_uri(Path.cwd())
+    return tracking.address(job.config["tracking"]["uri"])
 
 
 def plain() -> dict[str, str]:

@@ -69,7 +69,7 @@ class Job:
     def _store(self) -> str:
         from tractexp import tracking
 
-        return self.config["tracking"]["uri"] or tracking.default_uri(Path.cwd())
+        return tracking.address(self.config["tracking"]["uri"])
 
     @functools.cached_property
     def _logger(self) -> Any:

@@ -1,7 +1,6 @@
 """`tractexp ui`: the MLflow UI, on this computer only."""
 
 import argparse
-from pathlib import Path
 
 from tractexp.errors import UserError
 
@@ -19,7 +18,7 @@ def ui(arguments: list[str]) -> int:
     from tractexp import tracking
     from tractexp.tracking.ui import check_servable, serve
 
-    uri = chosen.uri or tracking.default_uri(Path.cwd())
+    uri = tracking.address(chosen.uri)
     check_servable(uri, port=chosen.port)
     return serve(uri, port=chosen.port, page=_page(uri), open_browser=chosen.open)
 

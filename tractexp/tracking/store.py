@@ -23,6 +23,14 @@ def default_uri(folder: Path) -> str:
     return f"sqlite:///{(Path(folder).absolute() / 'outputs' / 'mlflow.db').as_posix()}"
 
 
+def address(chosen: str | None) -> str:
+    """The store that was chosen, or the default one; both from the current folder, as an absolute address."""
+    if not chosen:
+        return default_uri(Path.cwd())
+    database = database_of(chosen)
+    return f"sqlite:///{database.as_posix()}" if database else chosen
+
+
 def prepare(uri: str) -> None:
     """Create the store at `uri` if it is not there yet; any number of processes may do so at the same moment.
 
@@ -32,8 +40,8 @@ def prepare(uri: str) -> None:
 
 
 def database_of(uri: str) -> Path | None:
-    """The file behind an SQLite address, None for any other store."""
-    return Path(uri.removeprefix("sqlite:///")) if uri.startswith("sqlite:///") else None
+    """The file behind an SQLite address, None for any other store; a relative one counts from the current folder."""
+    return Path(uri.removeprefix("sqlite:///")).absolute() if uri.startswith("sqlite:///") else None
 
 
 @functools.cache
