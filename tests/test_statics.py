@@ -10,7 +10,7 @@ from tractexp.identify.problem import Problem
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
 from tractexp.plugin import build, get
-from tractexp.record import detect
+from tractexp.record import Record, detect
 
 
 @functools.cache
@@ -57,6 +57,18 @@ def test_without_a_recorded_frequency_its_exponents_change_nothing():
     response = alone("exponential_frequency").simulate(drive, [[1.3, 2.6, 1.7, -2.2], [1.3, 2.6, 0.0, 3.0]])
     assert np.array_equal(response.P[0], response.P[1])
     assert np.array_equal(response.Q[0], response.Q[1])
+
+
+def test_its_identification_from_a_record_without_frequency_is_refused():
+    t = np.arange(600) * 2e-3
+    U = np.where((t > 0.4) & (t < 0.55), 0.6, 1.0)
+    recorded = detect(Record("plain", t, U, U**1.5, 0.5 * U**2))
+    sentence = (
+        "the model/static 'exponential_frequency' reads f, which plain does not have; record f, or choose another"
+        " model/static"
+    )
+    with pytest.raises(UserError, match=f"^{sentence}$"):
+        Problem(alone("exponential_frequency"), [recorded])
 
 
 def test_zip_and_exponential_agree_at_the_voltage_before_the_event_in_value_and_slope():

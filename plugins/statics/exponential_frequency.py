@@ -14,7 +14,7 @@ class ExponentialFrequency(Static):
         P_s = P_s0 (U/U_0)^p_v (f/f_0)^p_f        Q_s = Q_s0 (U/U_0)^q_v (f/f_0)^q_f
 
     with f/f_0 = (omega_n + omega_s)/(omega_n + omega_s0), the recorded frequency over that before the event. Where
-    no frequency is recorded the ratio is 1, p_f and q_f have no effect and cannot be identified.
+    no frequency is given the ratio is 1: p_f and q_f then have no effect, and an identification is refused.
 
     Not to be confused with the effect `frequency_dependence`, which adds a term linear in frequency to whatever
     static load there is; the two agree to first order, and together would count the same thing twice.
@@ -27,6 +27,8 @@ class ExponentialFrequency(Static):
     q_v = Parameter(2.5, (0.0, 8.0), "1", "voltage exponent of reactive power", SOURCE)
     p_f = Parameter(1.0, (-2.0, 4.0), "1", "frequency exponent of active power", SOURCE)
     q_f = Parameter(-1.0, (-4.0, 4.0), "1", "frequency exponent of reactive power", SOURCE)
+
+    reads = ("f",)
 
     def declare(self, eq):
         p_v, q_v, p_f, q_f = eq.declare(self.parameters)

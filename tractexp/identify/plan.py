@@ -119,8 +119,14 @@ def forecast(
 ) -> Forecast:
     """The intervals that `shape` would give at free `values` (d,), added to what is `known` already.
 
-    `noise` replaces the shape's. Raises `UserError` where the values have no steady state.
+    `noise` replaces the shape's. Raises `UserError` where the values have no steady state, and for a model that
+    reads more than a planned dip has.
     """
+    if reads := problem.model.reads:
+        told = ", ".join(f"{part.group} '{part.name}' reads {channel}" for channel, part in reads.items())
+        raise UserError(
+            f"a planned dip is a voltage alone, but of this model the {told}: nothing can be planned with it"
+        )
     planned = like(problem, [shape.event()])
     informations = each(planned, values, noise or [shape.noise])
     total = combined([*([known] if known else []), *informations])

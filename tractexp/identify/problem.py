@@ -11,6 +11,7 @@ from tractexp.identify.loss import Loss
 from tractexp.identify.search import REFUSED
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import MOST_SUBSTEPS, Model
+from tractexp.model.parts import Effect
 from tractexp.parameter import Parameter, Space
 from tractexp.record import Event
 
@@ -58,14 +59,17 @@ def _known(name: str, known: Mapping[str, object], where: str) -> None:
 
 
 def _check_channels(model: Model, events: Sequence[Event]) -> None:
-    """Raise `UserError` where an effect reads a channel that an event does not have."""
-    for effect, event in itertools.product(model.effects, events):
-        for channel in effect.reads:
-            if channel not in event.record.channels:
-                raise UserError(
-                    f"the effect '{effect.name}' reads {channel}, which {event.record.where} does not have; record"
-                    f" {channel}, or leave the effect out of model.effects"
-                )
+    """Raise `UserError` where a part of the model reads a channel that an event does not have."""
+    for (channel, part), event in itertools.product(model.reads.items(), events):
+        if channel in event.record.channels:
+            continue
+        if isinstance(part, Effect):
+            what, mend = f"effect '{part.name}'", "leave the effect out of model.effects"
+        else:
+            what, mend = f"{part.group} '{part.name}'", f"choose another {part.group}"
+        raise UserError(
+            f"the {what} reads {channel}, which {event.record.where} does not have; record {channel}, or {mend}"
+        )
 
 
 @dataclass(frozen=True)

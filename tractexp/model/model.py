@@ -58,6 +58,11 @@ class Model:
     def names(self) -> tuple[str, ...]:
         return tuple(p.name for p in self.parameters)
 
+    @property
+    def reads(self) -> dict[str, Motor | Static | Effect]:
+        """The recorded channels without which this model cannot be identified, each with a part that reads it."""
+        return {channel: part for part in (self.motor, self.static, *self.effects) for channel in part.reads}
+
     @functools.cached_property
     def equations(self) -> Any:
         """The declaration all parts wrote into (an `Equations`). Raises `UserError` for parts that do not fit."""

@@ -12,7 +12,12 @@ if TYPE_CHECKING:
 
 
 class Part(Plugin):
-    """A part of a load that draws power of its own."""
+    """A part of a load that draws power of its own.
+
+    `reads` names the recorded channels (`f`, `U2`) without which its parameters cannot be identified.
+    """
+
+    reads: ClassVar[tuple[str, ...]] = ()
 
     def declare(self, eq: "Equations") -> None:
         """Declare parameters, states and named quantities in `eq`, and what the part draws (`eq.consume`)."""
