@@ -3,6 +3,7 @@
 import itertools
 import json
 import os
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -12,9 +13,14 @@ import pytest
 import uncertainty as study
 
 from tractexp.errors import UserError
+from tractexp.identify.advice import advise
 from tractexp.identify.plan import Shape, best_events, combined, depth_needed, each, forecast, guess, over_depth
 from tractexp.identify.problem import Problem
+from tractexp.identify.profile import checked
 from tractexp.identify.uncertainty import assess
+from tractexp.identify.verdict import IDENTIFIED, UNIDENTIFIED, WEAK
+from tractexp.model.model import compose
+from tractexp.plugin import get
 
 SHAPE = Shape(depth=0.4, duration=0.2, rate=500.0, noise_P=0.004, noise_Q=0.004, P0=1.0, Q0=1.0)
 
@@ -80,6 +86,46 @@ def test_the_best_two_events_are_those_of_all_pairs():
 
 def test_a_guess_needs_no_search(problem):
     np.testing.assert_allclose(guess(problem)[[0, 3, 4, 5]], study.TYPICAL[[0, 3, 4, 5]], rtol=0.05)
+
+
+def test_a_further_dip_as_advised_identifies_and_a_repetition_does_not():
+    """C is ± 9 % by curvature and weak only because its profile runs into the bound."""
+    one = recorded(0.2, 0.006, seed=1, name="one")
+
+    def judged(*others):
+        events = [recorded(depth, 0.006, seed, name="other") for depth, seed in others]
+        return checked(assess(Problem(study.model(), [one, *events]), study.TYPICAL))
+
+    known = judged()
+    (said,) = [sentence for sentence in advise(known) if sentence.startswith("for C:")]
+    assert 0.08 < known.half[2] / known.values[2] < 0.1
+    assert known.profiled["C"][1] == 0.99
+    span = r"(\S+) to (\S+) %"
+    low, high, _, _, goal = re.search(rf"dip of {span} or {span} for 234 ms.* ± (\S+) % or better", said).groups()
+    assert float(low) <= 10 <= float(high) < 20  # as deep as the one recorded is not among them
+    assert "its interval now reaches its bound 0.99, and if it does so then, ask whether model.bounds.C" in said
+    advised, repeated = judged((0.1, 11)), judged((0.2, 12))
+    assert advised.verdicts["C"].word == IDENTIFIED
+    assert advised.half[2] / advised.values[2] < 1.1 * float(goal) / 100
+    assert repeated.verdicts["C"].word == WEAK
+
+
+def test_advice_for_a_model_that_no_planned_dip_can_hold_has_no_figures():
+    """Such a model reads more than the voltage, so that nothing can be forecast; what is open must be said still."""
+    static, f = get("model/static", "exponential_frequency")(), np.full(1000, 50.0)
+    event = recorded(0.2, 0.015)
+    event = replace(event, record=replace(event.record, f=f + 0.2 * (event.record.t > 0.3)))
+    problem = Problem(compose(get("model/motor", "electromechanical")(), static), [event])
+    known = assess(problem, np.array([*study.TYPICAL, 0.0, 0.0]))
+    said = advise(known)[-1]
+    poor = [name for name, verdict in known.verdicts.items() if verdict.word in (WEAK, UNIDENTIFIED)]
+    assert "q_f" in poor
+    assert said.startswith(f"for {', '.join(poor)}: record a dip of another depth and fit it together")
+    sentence = (
+        "a voltage alone, but of this model the model/static 'exponential_frequency' reads f: nothing can be planned"
+    )
+    with pytest.raises(UserError, match=sentence):
+        forecast(problem, known.values, SHAPE)
 
 
 def test_shapes_that_cannot_be_recorded_are_refused():

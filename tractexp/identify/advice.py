@@ -1,16 +1,14 @@
 """What to do next, computed from what an identification leaves open."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
+from tractexp.errors import UserError
 from tractexp.identify.information import SHARE
-from tractexp.identify.plan import Shape, depth_needed, over_depth
+from tractexp.identify.plan import Forecast, Shape, over_depth
 from tractexp.identify.uncertainty import Uncertainty
-from tractexp.identify.verdict import BOUND, UNIDENTIFIED, WEAK, WITHIN
-
-TIGHTEST = 0.02  # of the value: no dip is asked to do better
+from tractexp.identify.verdict import BOUND, EDGE, UNIDENTIFIED, WEAK, WITHIN, shown, size
 
 
 def advise(known: Uncertainty, odd: Sequence[str] = ()) -> list[str]:
@@ -41,32 +39,62 @@ def _deeper(known: Uncertainty) -> list[str]:
         if fine and known.verdicts[name].word in (WEAK, UNIDENTIFIED)
     ]
     problem = known.likelihood.problem
-    if not poor or problem.per_event or not identifiable.all():
+    if not poor or not identifiable.all():
         return []
     deepest = int(np.argmax([e.depth for e in problem.events]))
-    shape = Shape.of(problem.events[deepest])
-    forecasts = over_depth(problem, known.values, shape, known.information, [known.likelihood.noise[deepest]])
-    said = []
-    for name in poor:
-        goal = _goal(known, known.names.index(name))
-        needed = depth_needed(forecasts, name, goal)
-        if needed.depth is None:
-            longer = replace(shape, depth=float(needed.depths[np.argmin(needed.relative)]))
-            said.append(
-                f"for {name}: no single further dip of {1000 * shape.duration:.0f} ms will do; the best, of"
-                f" {100 * longer.depth:.0f} %, would give ± {100 * needed.relative.min():.2g} %; record several, or fix"
-                " what it trades against by model.fixed"
-            )
-        else:
-            said.append(
-                f"for {name}: record another dip of {100 * needed.depth:.0f} % or more for"
-                f" {1000 * shape.duration:.0f} ms, fitted together with this one: ± {100 * goal:.2g} %"
-            )
-    return said
+    shape, noise = Shape.of(problem.events[deepest]), [known.likelihood.noise[deepest]]
+    without_figures = (
+        f"for {', '.join(poor)}: record a dip of another depth and fit it together, or fix what stays open by model.fixed"
+    )
+    if problem.per_event:
+        return [without_figures]
+    try:
+        forecasts = over_depth(problem, known.values, shape, known.information, noise)
+    except UserError:  # this model or these values cannot be planned with
+        return [without_figures]
+    others = "these" if len(problem.events) > 1 else "this one"
+    together = f"for {1000 * shape.duration:.0f} ms, fitted together with {others},"
+    return [_further(known, known.names.index(name), forecasts, together) for name in poor]
 
 
-def _goal(known: Uncertainty, j: int) -> float:
-    """Half an interval, as a share of the value, that is narrow enough and keeps off the bounds."""
-    value = known.values[j]
-    room = min(value - known.lower[j], known.upper[j] - value)
-    return max(min(WITHIN, room / max(abs(value), 1e-12)), TIGHTEST)
+def _further(known: Uncertainty, j: int, forecasts: Sequence[Forecast], together: str) -> str:
+    """The depths of a further dip with which the interval of parameter `j` is narrow enough, in a sentence.
+
+    They need not be all beyond one: a dip as deep as those recorded repeats them, a shallower one may tell more.
+    """
+    name, low, high = known.names[j], known.lower[j], known.upper[j]
+    goal, bounds = _goal(known, j)
+    half = np.array([f.half[j] for f in forecasts])
+    told = lambda x: shown(known.values[j], x, low, high)  # noqa: E731
+    reached = f"; its interval now reaches its bound {' and '.join(f'{b:g}' for b in bounds)}, " if bounds else ""
+    if (half <= goal).any():
+        depths = _spans(np.array([f.shape.depth for f in forecasts]), half <= goal)
+        still = f"{reached}and if it does so then, ask whether model.bounds.{name} is right" if reached else ""
+        return f"for {name}: a further dip of {depths} {together} would give {told(goal)} or better{still}"
+    best = int(half.argmin())
+    leaves = f"would give {told(half[best])}" if half[best] < (high - low) / 2 else "would leave it open too"
+    bound = f"{reached}so ask whether model.bounds.{name} is right" if reached else ""
+    return (
+        f"for {name}: no single further dip {together} will do; the best, of {100 * forecasts[best].shape.depth:.3g} %,"
+        f" {leaves}; record several, or fix it or what it trades against by model.fixed{bound}"
+    )
+
+
+def _goal(known: Uncertainty, j: int) -> tuple[float, list[float]]:
+    """Half an interval that is narrow enough, and the bounds that the present one reaches.
+
+    Where it reaches one, half of what is inside the bounds is asked for. Where curvature calls it narrow enough
+    already, it is the profile that does not, and half of what curvature says is asked for.
+    """
+    low, high = known.lower[j], known.upper[j]
+    (a, b), enough = known.intervals[j], WITHIN * size(known.values[j], low, high)
+    bounds = [bound for end, bound in ((a, low), (b, high)) if abs(end - bound) < EDGE * (high - low)]
+    asked = [enough, *([(b - a) / 4] if bounds else []), *([known.half[j] / 2] if known.half[j] <= enough else [])]
+    return min(asked), bounds
+
+
+def _spans(depths: np.ndarray, enough: np.ndarray) -> str:
+    """The depths (n,) that are `enough`, as text: '5 to 15 % or 27.5 to 95 %'."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], enough, [False])).astype(int)))
+    spans = [(100 * depths[a], 100 * depths[b - 1]) for a, b in edges.reshape(-1, 2)]
+    return " or ".join(f"{a:.3g} to {b:.3g} %" if b > a else f"{a:.3g} %" for a, b in spans)
