@@ -43,8 +43,9 @@ def _deeper(known: Uncertainty) -> list[str]:
         return []
     deepest = int(np.argmax([e.depth for e in problem.events]))
     shape, noise = Shape.of(problem.events[deepest]), [known.likelihood.noise[deepest]]
+    named = ", ".join(poor)
     without_figures = (
-        f"for {', '.join(poor)}: record a dip of another depth and fit it together, or fix what stays open by model.fixed"
+        f"for {named}: record a dip of another depth and fit it together, or fix what stays open by model.fixed"
     )
     if problem.per_event:
         return [without_figures]
