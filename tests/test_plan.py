@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import uncertainty as study
+from test_report_page import read
 
 from tractexp.errors import UserError
 from tractexp.identify.advice import advise
@@ -151,9 +152,40 @@ def test_the_plan_task_answers_with_a_number_and_a_figure(tmp_path):
     assert 0.05 < content["depth_needed"] < 0.5
     assert f"how deep? {content['answer']}" in done.stdout
     assert (tmp_path / "run" / "plan.svg").stat().st_size > 1000
-    assert set(content["half_intervals"]) == {
-        "depth", "duration [s]", "samples per second", "noise, of P before the dip",
-    }  # fmt: skip
+    scans = {"depth", "duration [s]", "samples per second", "noise, of P before the dip"}
+    assert set(content["half_intervals"]) == scans
+    page = read(tmp_path / "run" / "plan.html")
+    assert page.tags.count("svg") == 1
+    assert page.tags.count("table") == 1 + len(scans)
+    answer = f"{content['answer'][0].upper()}{content['answer'][1:]}."
+    for part in (
+        answer,
+        "How deep must a dip be for M to be known within ± 5 %?",
+        "a quick fit to tibet_50pct",
+        *scans,
+    ):
+        assert part in page.words
+    assert "1000" in page.words  # the highest rate, in full
+
+
+def test_the_page_of_a_plan_ranks_the_archive(tmp_path):
+    shipped = ",".join(f"pkg://tractexp.data/tibet_{depth}pct.csv" for depth in (30, 50, 65))
+    arguments = ("data=csv", f"data.train=[{shipped}]", "task.within=1e-4", "task.least=0.3", "model.fixed.q_v=3")
+    done = tractexp("task=plan", "task.values=default", *arguments, "hydra.run.dir=run", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    content, page = json.loads((tmp_path / "run" / "plan.json").read_text()), read(tmp_path / "run" / "plan.html")
+    assert content["depth_needed"] is None
+    assert 0 < len(content["best_events"]) < 3
+    assert page.tags.count("table") == 6
+    for part in (
+        "No dip of this kind gives H within 0.01 %",
+        "since H = M omega_s / 2",
+        "the model's default values",
+        "fixed",
+        "the next would narrow them by less than 30%.",
+        *(event["name"] for event in content["best_events"]),
+    ):
+        assert part in page.words
 
 
 @pytest.mark.parametrize(

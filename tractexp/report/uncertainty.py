@@ -117,8 +117,10 @@ def plan(path: Path, scans: Mapping[str, tuple[Sequence[float], Sequence[Forecas
                 panel.plot(x, relative[:, j], **line, label=name)
             panel.axhline(100 * within, color=style.FAINT, linewidth=0.7, linestyle="-.")
             panel.set(xlabel=label, yscale="log")
-            if max(x) >= 19 * min(x) and min(x) > 0.0:
+            if max(x) > 19.5 * min(x) > 0:  # few points, each tried: they are the ticks
                 panel.set_xscale("log")
+                panel.set_xticks(x, [f"{at:.4g}" for at in x])
+                panel.minorticks_off()
         panels[0].set_ylabel("95 % interval, ± % of the value")
         panels[2].set_ylabel("95 % interval, ± % of the value")
         panels[0].legend(ncols=2, fontsize=7.5)

@@ -1,9 +1,10 @@
 """Before the recording: which dips tell what, how deep one must be, and which events of an archive to fit."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,16 +13,20 @@ from tractexp.plugin import plugin
 from tractexp.tasks.console import say, table
 from tractexp.tasks.task import Job, Task
 
+if TYPE_CHECKING:
+    from tractexp.report.plan import Planned
+
 DURATIONS = (0.06, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8)  # s
 RATES = (25.0, 50.0, 100.0, 200.0, 500.0, 1000.0)  # Hz
 NOISES = (0.001, 0.002, 0.005, 0.01, 0.02)  # of P before the event
 DEPTH, DURATION, RATE, NOISE = "depth", "duration [s]", "samples per second", "noise, of P before the dip"
 FIT, DEFAULT = "fit", "default"
+ORIGINS = {FIT: "the values of a quick fit to {name}", DEFAULT: "the model's default values"}
 
 
 @plugin
 class Plan(Task):
-    """Forecast the intervals that a recording would give, without fitting it: plan.json and plan.svg.
+    """Forecast the intervals that a recording would give, without fitting it: plan.html, plan.json, plan.svg.
 
     The dip is that of the deepest record in `data`, or as set here. The parameters are guessed by a quick fit to
     that record, or are the model's defaults, or those of an earlier result.json.
@@ -46,8 +51,23 @@ class Plan(Task):
             check_range("task.noise", self.noise, 1e-9, 1.0)
 
     def run(self, job: Job) -> None:
+        planned = self.planned(job)
+        tell(planned)
+        paths = written(job.folder, planned)
+        for path in paths:
+            say(f"  {path}")
+        needed = planned.needed
+        job.log(
+            name=f"plan for {self.parameter}",
+            values=dict(zip(planned.problem.space.names, planned.values.tolist(), strict=True)),
+            metrics={} if needed.depth is None else {"depth_needed": needed.depth},
+            artifacts=[*paths, job.folder / ".hydra"],
+        )
+
+    def planned(self, job: Job) -> "Planned":
+        """Everything forecast: how deep, over what, and the best events."""
         from tractexp.identify.plan import best_events, column, depth_needed
-        from tractexp.report import uncertainty
+        from tractexp.report.plan import Planned
 
         recorded = job.events().train
         problem = job.problem(recorded)
@@ -58,32 +78,17 @@ class Plan(Task):
         shape = self.shape(deepest)
         shape.check()
         values = self.guess(job, deepest)
-        say(describe(shape))
-        say(f"parameters ({self.values}): {', '.join(named(problem.space.names, values))}")
-
         scans = self.scans(problem, values, shape)
-        by_depth = scans[DEPTH][1]
-        needed = depth_needed(by_depth, self.parameter, self.within)
-        show(scans)
-        say(f"how deep? {needed}")
-        chosen = best_events(problem, values, self.least, self.events) if len(recorded) > 1 else []
-        for k, choice in enumerate(chosen, start=1):
-            say(
-                f"event {k} of the best: {choice.name}"
-                + (f", intervals narrower by {choice.gain:.0%}" if k > 1 else "")
-            )
-        if chosen and len(chosen) < len(recorded) and self.events is None:
-            say(f"the next would narrow them by less than {self.least:.0%}")
-        path = job.folder / "plan.json"
-        path.write_text(json.dumps(content(needed, scans, chosen, values), indent=2) + "\n", encoding="utf-8")
-        figure = uncertainty.plan(job.folder / "plan.svg", scans, self.within)
-        for made in (path, figure):
-            say(f"  {made}")
-        job.log(
-            name=f"plan for {self.parameter}",
-            values=dict(zip(problem.space.names, values.tolist(), strict=True)),
-            metrics={} if needed.depth is None else {"depth_needed": needed.depth},
-            artifacts=[path, figure, job.folder / ".hydra"],
+        return Planned(
+            problem=problem,
+            values=values,
+            origin=ORIGINS.get(self.values, "the values of {path}").format(name=deepest.record.name, path=self.values),
+            dip=describe(shape),
+            needed=depth_needed(scans[DEPTH][1], self.parameter, self.within),
+            scans=scans,
+            chosen=best_events(problem, values, self.least, self.events) if len(recorded) > 1 else [],
+            least=self.least,
+            most=self.events,
         )
 
     def shape(self, event: Any) -> Any:
@@ -133,8 +138,30 @@ class Plan(Task):
         }
 
 
-def named(names: tuple[str, ...], values: np.ndarray) -> list[str]:
-    return [f"{name} {value:.4g}" for name, value in zip(names, values, strict=True)]
+def tell(planned: "Planned") -> None:
+    """Print the plan, its answer and the best events."""
+    from tractexp.report.plan import rest
+
+    values = zip(planned.problem.space.names, planned.values, strict=True)
+    say(planned.dip)
+    say(f"parameters, {planned.origin}: {', '.join(f'{name} {value:.4g}' for name, value in values)}")
+    show(planned.scans)
+    say(f"how deep? {planned.needed}")
+    for k, choice in enumerate(planned.chosen, start=1):
+        narrower = f", intervals narrower by {choice.gain:.0%}" if k > 1 else ""
+        say(f"event {k} of the best: {choice.name}{narrower}")
+    if left_out := rest(planned):
+        say(left_out)
+
+
+def written(folder: Path, planned: "Planned") -> list[Path]:
+    """Write plan.json, plan.svg and plan.html."""
+    from tractexp.report import plan, uncertainty
+
+    path = folder / "plan.json"
+    path.write_text(json.dumps(content(planned), indent=2) + "\n", encoding="utf-8")
+    figure = uncertainty.plan(folder / "plan.svg", planned.scans, planned.needed.within)
+    return [path, figure, plan.page(folder / "plan.html", planned, figure)]
 
 
 def describe(shape: Any) -> str:
@@ -144,11 +171,13 @@ def describe(shape: Any) -> str:
     return f"planned: {dip}, noise {P} in P and {Q} in Q, of P, {memory}"
 
 
-def show(scans: dict[str, Any]) -> None:
+def show(scans: Mapping[str, Any]) -> None:
     """Print half intervals in percent of the value for some points of each scan."""
+    from tractexp.report.plan import percent
+
     for label, (grid, forecasts) in scans.items():
         picked = range(0, len(grid), max(1, len(grid) // 6))
-        rows = [[f"{grid[k]:.3g}", *(percent(r) for r in forecasts[k].relative)] for k in picked]
+        rows = [[f"{grid[k]:.4g}", *(percent(r) for r in forecasts[k].relative)] for k in picked]
         table(
             [label.partition(",")[0].partition(" ")[0], *forecasts[0].names],
             rows,
@@ -156,29 +185,23 @@ def show(scans: dict[str, Any]) -> None:
         )
 
 
-def percent(relative: float) -> str:
-    if relative >= 10:
-        return "-"
-    return f"{100 * relative:.0f}" if relative >= 0.0995 else f"{100 * relative:.2g}"
-
-
-def content(needed: Any, scans: dict[str, Any], chosen: list[Any], values: np.ndarray) -> dict[str, Any]:
+def content(planned: "Planned") -> dict[str, Any]:
     """What `plan.json` holds; half intervals are shares of the value, null where there is none."""
     finite = lambda x: float(x) if np.isfinite(x) else None  # noqa: E731
-    names = scans[DEPTH][1][0].names
+    names = planned.problem.space.names
     return {
-        "answer": str(needed),
-        "depth_needed": needed.depth,
-        "parameters": dict(zip(names, values.tolist(), strict=True)),
+        "answer": str(planned.needed),
+        "depth_needed": planned.needed.depth,
+        "parameters": dict(zip(names, planned.values.tolist(), strict=True)),
         "half_intervals": {
             label: [
                 {"at": float(x), **{n: finite(r) for n, r in zip(names, f.relative, strict=True)}}
                 for x, f in zip(grid, forecasts, strict=True)
             ]
-            for label, (grid, forecasts) in scans.items()
+            for label, (grid, forecasts) in planned.scans.items()
         },
         "best_events": [
             {"name": c.name, "gain": c.gain, "half": {n: finite(h) for n, h in zip(names, c.half, strict=True)}}
-            for c in chosen
+            for c in planned.chosen
         ],
     }
