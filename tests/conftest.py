@@ -4,6 +4,8 @@ from pathlib import Path
 
 import pytest
 
+import tractexp  # noqa: F401  before NumPy: it keeps BLAS to one thread, as every command does
+
 
 @pytest.fixture
 def shared_data() -> Path:

@@ -123,25 +123,29 @@ def test_the_logged_model_predicts_in_a_clean_process(main_job):
     assert dipped < 0.8
 
 
-def test_the_same_seed_gives_the_same_bits_and_another_seed_does_not(tmp_path):
-    values = []
-    for k, seed in enumerate((3, 3, 4)):
-        done = tractexp(*QUICK, f"seed={seed}", f"hydra.run.dir=run{k}", cwd=tmp_path)
-        assert done.returncode == 0, done.stderr
-        values.append(json.loads((tmp_path / f"run{k}" / "result.json").read_text())["parameters"])
-    assert values[0] == values[1] != values[2]
+def run_quickly(folder, *arguments):
+    """result.json of a short run."""
+    done = tractexp(*QUICK, *arguments, "hydra.run.dir=run", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return json.loads((folder / "run" / "result.json").read_text())
 
 
-def test_a_held_out_event_is_judged_but_not_fitted(tmp_path):
-    held = "data.validate=[pkg://tractexp.data/tibet_30pct.csv]"
-    for folder, extra in (("alone", ()), ("both", (held,))):
-        done = tractexp(*QUICK, *extra, f"hydra.run.dir={folder}", cwd=tmp_path)
-        assert done.returncode == 0, done.stderr
-    alone, both = (json.loads((tmp_path / f / "result.json").read_text()) for f in ("alone", "both"))
-    assert alone["parameters"] == both["parameters"]
+@pytest.fixture(scope="module")
+def quick(tmp_path_factory):
+    return run_quickly(tmp_path_factory.mktemp("quick"), "seed=3")
+
+
+def test_the_same_seed_gives_the_same_bits_and_another_seed_does_not(quick, tmp_path):
+    again, other = (run_quickly(tmp_path, f"seed={seed}") for seed in (3, 4))
+    assert quick["parameters"] == again["parameters"] != other["parameters"]
+
+
+def test_a_held_out_event_is_judged_but_not_fitted(quick, tmp_path):
+    both = run_quickly(tmp_path, "seed=3", "data.validate=[pkg://tractexp.data/tibet_30pct.csv]")
+    assert quick["parameters"] == both["parameters"]
     assert [e["role"] for e in both["events"]] == ["train", "validate"]
-    assert both["epsilon_p"] == alone["epsilon_p"] != both["events"][1]["epsilon_p"]
-    assert (tmp_path / "both" / "fit_2.svg").exists()
+    assert both["epsilon_p"] == quick["epsilon_p"] != both["events"][1]["epsilon_p"]
+    assert (tmp_path / "run" / "fit_2.svg").exists()
 
 
 def test_bounds_and_fixed_values_are_kept_and_a_value_at_its_bound_is_marked(tmp_path):
@@ -161,13 +165,6 @@ def test_a_budget_is_spent_to_the_last_simulation(tmp_path):
     result = json.loads((tmp_path / "run" / "result.json").read_text())
     assert result["simulations"] == 333
     assert result["status"] == "stopped at the budget of 333 simulations"
-
-
-def test_a_sweep_runs_each_combination(tmp_path):
-    done = tractexp("-m", *QUICK, "optimizer=ssa,pso", "seed=range(0,2)", "hydra.sweep.dir=sweep", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    results = [json.loads(p.read_text()) for p in sorted(tmp_path.glob("sweep/*/result.json"))]
-    assert sorted((r["optimizer"], r["seed"]) for r in results) == [("pso", 0), ("pso", 1), ("ssa", 0), ("ssa", 1)]
 
 
 @pytest.mark.parametrize(

@@ -192,8 +192,8 @@ def test_the_page_opened_shows_the_comparison(filled, tmp_path):
             f"--user-data-dir={tmp_path / 'profile'}", "--virtual-time-budget=300000", "--window-size=1900,1100",
         ]  # fmt: skip
         SCREENSHOT.parent.mkdir(exist_ok=True)
-        subprocess.run([*arguments, f"--screenshot={SCREENSHOT}", page], capture_output=True, timeout=240, check=True)
-        seen = subprocess.run([*arguments, "--dump-dom", page], capture_output=True, text=True, timeout=240, check=True)
+        command = [*arguments, "--dump-dom", f"--screenshot={SCREENSHOT}", page]
+        seen = subprocess.run(command, capture_output=True, text=True, timeout=240, check=True)
     finally:
         server.send_signal(signal.SIGTERM)
         server.wait(30)

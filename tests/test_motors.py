@@ -50,22 +50,35 @@ def known(of, excitation, parameters, **inputs):
     return dict(zip(of.names, parameters, strict=True)) | before | inputs
 
 
+@functools.cache
+def compiled(*expressions):
+    """SymPy expressions as one function of numbers by name; what they share is computed once."""
+    import sympy
+
+    symbols = sorted(set().union(*(e.free_symbols for e in expressions)), key=str)
+    compute = sympy.lambdify(symbols, expressions, cse=True)
+    return lambda numbers: compute(*(numbers[s.name] for s in symbols))
+
+
 def number(expression, numbers):
     """A SymPy expression as a complex number; its symbols are taken by name."""
-    return complex(expression.subs({s: numbers[s.name] for s in expression.free_symbols}))
+    return complex(compiled(expression)(numbers)[0])
+
+
+@functools.cache
+def real_states(of):
+    return of.equations.real_states()
 
 
 def at_rest(of, excitation, parameters):
     """The kernel's own steady state, by name: from the declaration where it is exact, by SciPy from it otherwise."""
     from scipy.optimize import root
 
-    eq = of.equations
-    rows = eq.real_states()
     numbers = known(of, excitation, parameters, U=excitation.U0, omega_s=excitation.omega_s0)
-    start = {s.name: number(eq.real(i), numbers).real for s, _, i in rows}
-    if eq.settled:
+    start = {s.name: number(i, numbers).real for s, _, i in real_states(of)}
+    if of.equations.settled:
         return start
-    balances = eq.real_balances()
+    balances = of.equations.real_balances()
     found = root(
         lambda x: [number(b, numbers | dict(zip(start, x, strict=True))).real for b in balances],
         list(start.values()),
@@ -77,14 +90,15 @@ def at_rest(of, excitation, parameters):
 
 def functions(of, *names):
     """Real right-hand side, and the real named quantities `names`, as one function of numbers by name."""
-    import sympy
+    eq, rows = of.equations, real_states(of)
+    states = [s.name for s, _, _ in rows]
+    compute = compiled(*(d for _, d, _ in rows), *(eq.real(eq.symbol(name)) for name in names))
 
-    eq = of.equations
-    states = [s for s, _, _ in eq.real_states()]
-    wanted = [d for _, d, _ in eq.real_states()], [eq.real(eq.symbol(name)) for name in names]
-    symbols = sorted(set().union(*(e.free_symbols for e in (*wanted[0], *wanted[1]))) | set(states), key=str)
-    compute = sympy.lambdify(symbols, wanted)
-    return [s.name for s in states], lambda numbers: compute(*(numbers[s.name] for s in symbols))
+    def both(numbers):
+        found = compute(numbers)
+        return found[: len(states)], found[len(states) :]
+
+    return states, both
 
 
 def play(of, excitation, parameters, names=("P_motor", "Q_motor"), rtol=1e-11):

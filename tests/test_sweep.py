@@ -13,6 +13,7 @@ import time
 import pytest
 
 QUICK = ("optimizer.population=20", "budget=200")
+TWO = "hydra.launcher.n_jobs=2"
 SILENT = ("budget=200", "tracking.enabled=false")
 HERE = "hydra.sweep.dir=sweep"
 
@@ -102,9 +103,9 @@ def ask(folder, text):
 
 @pytest.fixture(scope="module")
 def logged(tmp_path_factory):
-    """A sweep of four jobs, logged, run once."""
+    """A sweep of four jobs on two workers, logged, run once."""
     folder = tmp_path_factory.mktemp("logged")
-    done = tractexp("-m", *QUICK, "optimizer=ssa,pso", "seed=range(0,2)", cwd=folder)
+    done = tractexp("-m", *QUICK, TWO, "optimizer=ssa,pso", "seed=range(0,2)", cwd=folder)
     assert done.returncode == 0, done.stderr
     (sweep,) = (folder / "outputs" / "sweeps").iterdir()
     return folder, sweep, done
@@ -231,7 +232,7 @@ def test_a_bad_value_fails_its_job_with_the_same_sentence_as_alone(tmp_path):
 
 @pytest.mark.parametrize("backend", ["loky", pytest.param("dask", marks=needs_dask)])
 def test_the_job_of_a_killed_worker_is_run_again_and_its_neighbors_are_not_blamed(backend, site, tmp_path):
-    launcher = ("hydra.launcher.n_jobs=2", f"hydra.launcher.backend={backend}")
+    launcher = (TWO, f"hydra.launcher.backend={backend}")
     done = tractexp("-m", *SILENT, *launcher, "optimizer=dies,pso", "seed=range(0,3)", HERE, cwd=tmp_path, site=site)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "marker").exists()
@@ -242,7 +243,7 @@ def test_a_job_that_kills_its_worker_every_time_is_listed_and_the_others_finish(
     sweep = (
         "-m",
         *SILENT,
-        "hydra.launcher.n_jobs=2",
+        TWO,
         "hydra.launcher.tries=2",
         "optimizer=kills,pso",
         "seed=range(0,3)",
@@ -257,9 +258,9 @@ def test_a_job_that_kills_its_worker_every_time_is_listed_and_the_others_finish(
 
 def test_results_are_the_same_bits_for_any_number_of_workers_and_backend(logged, tmp_path):
     _, sweep, _ = logged
-    launchers = [("hydra.launcher.n_jobs=1",), ("hydra.launcher.n_jobs=2",), ("hydra/launcher=basic",)]
+    launchers = [("hydra.launcher.n_jobs=1",), ("hydra/launcher=basic",)]  # two workers of joblib ran `logged`
     if importlib.util.find_spec("distributed") is not None:
-        launchers.append(("hydra/launcher=dask", "hydra.launcher.n_jobs=2"))
+        launchers.append(("hydra/launcher=dask", TWO))
     for k, launcher in enumerate(launchers):
         command = (
             "-m",
