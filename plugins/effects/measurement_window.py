@@ -26,24 +26,10 @@ class MeasurementWindow(Measurement):
     confused_with = ("time_skew", "stator_resistance")
 
     def observe(self, power, drive, values):
-        out = power.copy()
+        from tractexp_plugins.effects._recorder import averaged
+
+        out = np.empty_like(power)
         for e in range(drive.events):
-            part, half = drive.part(e), values["window"][e] / drive.event[e, -1] / 2  # samples
-            wide = np.flatnonzero(half)
-            forward, half = power[:, wide, part], half[wide]
-            backward = _ahead(forward[..., ::-1], half)[..., ::-1]
-            out[:, wide, part] = (_ahead(forward, half) + backward) / (2 * half[:, None])
+            part = drive.part(e)
+            averaged(power[:, :, part], values["window"][e] / drive.event[e, -1], out[:, :, part])
         return out
-
-
-def _ahead(y, half):
-    """Integral of y (2, n, N), linear between samples, over the next `half` (n,) samples from each."""
-    whole = np.floor(half).astype(int)
-    r, N = (half - whole)[:, None], y.shape[2]
-    sums = np.zeros_like(y)
-    np.cumsum((y[..., 1:] + y[..., :-1]) / 2, axis=2, out=sums[..., 1:])
-    at = np.arange(N) + whole[:, None]
-    inside, beyond = np.minimum(at, N - 1)[None], np.maximum(at - (N - 1), 0)
-    read = lambda values, where: np.take_along_axis(values, where, 2)  # noqa: E731
-    here, there = read(y, inside), read(y, np.minimum(inside + 1, N - 1))
-    return read(sums, inside) - sums + beyond * y[..., -1:] + r * here + r**2 / 2 * (there - here)

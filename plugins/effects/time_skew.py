@@ -27,19 +27,10 @@ class TimeSkew(Measurement):
     confused_with = ("stator_resistance", "dc_link_lag", "measurement_window")
 
     def observe(self, power, drive, values):
-        out = power.copy()
+        from tractexp_plugins.effects._recorder import earlier
+
+        out = np.empty_like(power)
         for e in range(drive.events):
-            part, lag = drive.part(e), values["skew"][e] / drive.event[e, -1]  # samples
-            late = np.flatnonzero(lag)
-            out[:, late, part] = _earlier(power[:, late, part], lag[late])
+            part = drive.part(e)
+            earlier(power[:, :, part], values["skew"][e] / drive.event[e, -1], out[:, :, part])
         return out
-
-
-def _earlier(y, lag):
-    """y (2, n, N) read `lag` (n,) samples earlier."""
-    whole = np.floor(lag).astype(int)
-    r = (lag - whole)[:, None]
-    at = np.arange(y.shape[2]) - whole[:, None]
-    weights = (r**2 * (r - 1), r * (1 + r * (4 - 3 * r)), 2 + r**2 * (3 * r - 5), -r * (1 - r) ** 2)
-    read = lambda back: np.take_along_axis(y, np.clip(at - back, 0, y.shape[2] - 1)[None], 2)  # noqa: E731
-    return sum(weight / 2 * read(back) for weight, back in zip(weights, (2, 1, 0, -1), strict=True))
