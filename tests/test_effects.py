@@ -356,23 +356,34 @@ def test_oscillation_is_a_damped_mode_rung_by_the_voltage():
     chosen = values("low_frequency_oscillation", oscillation_P=0.1, oscillation_Q=-0.2, mode_frequency=f,
                     mode_damping=zeta, mode_phase=phi)  # fmt: skip
     P, Q = run("low_frequency_oscillation", excitation, chosen)
-    w = 2 * np.pi * f  # second-order form: x'' + 2 zeta w x' + w^2 x = w^2 (u - 1)
-    x, v = solved(excitation, lambda u, y: [y[1], w**2 * (u - 1 - y[0]) - 2 * zeta * w * y[1]], [0.0, 0.0])
+    w = 2 * np.pi * f  # second-order form: x'' + 2 zeta w u x' + w^2 u x = w^2 (u - 1)
+    x, v = solved(excitation, lambda u, y: [y[1], w**2 * (u - 1 - u * y[0]) - 2 * zeta * w * u * y[1]], [0.0, 0.0])
     u = excitation.U / excitation.U0
-    z = np.cos(phi) * v / w + np.sin(phi) * (u - 1 - x - 2 * zeta * v / w)
+    z = np.cos(phi) * v / w + np.sin(phi) * (u - 1 - u * x - 2 * zeta * u * v / w)
     assert pytest.approx(0.1 * z, abs=1e-8) == P - base(excitation)[0]
     assert pytest.approx(-0.2 * z, abs=1e-8) == Q - base(excitation)[1]
 
 
 def test_a_trip_takes_its_share_after_the_delay_and_gives_it_back():
     excitation = dip(0.5, length=1.0)  # below 0.7 from 112 ms to 258 ms, back above 0.72 from 259 ms
-    chosen = values("undervoltage_trip", tripped_share=0.3, trip_level=0.7, trip_delay=0.05, reconnect_delay=0.3)
+    chosen = values("undervoltage_trip", tripped_share=0.3, trip_level=0.7, trip_delay=0.05, reconnect_delay=0.3,
+                    reconnect_margin=0.02, reconnect_ramp=0.0)  # fmt: skip
     P, Q = run("undervoltage_trip", excitation, chosen)
     for got, whole in zip((P, Q), base(excitation), strict=True):
         ratio = got / whole
         assert pytest.approx(1.0, abs=1e-3) == ratio[:158]
         assert pytest.approx(0.7, abs=1e-3) == ratio[168:554]
         assert pytest.approx(1.0, abs=1e-3) == ratio[565:]
+
+
+def test_what_tripped_comes_back_along_a_ramp_once_the_voltage_is_well_above_the_level():
+    excitation = dip(0.5, length=1.2)  # back above 0.7 + 0.2 at 266 ms
+    chosen = values("undervoltage_trip", tripped_share=0.3, trip_level=0.7, trip_delay=0.05, reconnect_delay=0.3,
+                    reconnect_margin=0.2, reconnect_ramp=0.2)  # fmt: skip
+    ratio = run("undervoltage_trip", excitation, chosen)[0] / base(excitation)[0]
+    assert pytest.approx(0.7, abs=1e-3) == ratio[168:562]
+    assert pytest.approx(0.7 + 0.3 * (np.arange(600, 740) - 566) / 201, abs=0.005) == ratio[600:740]
+    assert pytest.approx(1.0, abs=1e-3) == ratio[780:]
 
 
 def test_a_short_dip_does_not_trip():
@@ -393,6 +404,21 @@ def test_a_converter_holds_its_power_down_to_its_limit(low, held):
     assert added == pytest.approx(0.4 * (P0 - T_M) * (held - low**P_V), abs=0.002)
 
 
+@pytest.mark.parametrize(
+    ("name", "size", "level", "delay"),
+    [("constant_power_converter", "converter_share", {"current_limit": 0.3}, "control_delay"),
+     ("voltage_dependent_power_limit", "limited_share", {"full_level": 0.75, "off_level": 0.3}, "limit_delay")],
+)  # fmt: skip
+def test_power_slips_while_a_control_sees_the_voltage_late(name, size, level, delay):
+    """On a ramp the current fits the voltage of T_c ago: power is off by T_c du/dt/u, and by nothing at rest."""
+    t = np.arange(400) * 1e-3
+    ramp = event(1 - np.clip(t - 0.1, 0, 0.2))  # 1 pu/s down to 0.8
+    late, prompt = (run(name, ramp, values(name, **{size: 0.4, delay: T}, **level))[0] for T in (0.008, 0.0))
+    u = ramp.U[120:280]
+    assert pytest.approx(0.4 * (P0 - T_M) * (1 / (1 + 0.008 / u) - 1), abs=3e-4) == (late - prompt)[120:280]
+    assert np.abs((late - prompt)[320:]).max() < 1e-9
+
+
 @pytest.mark.parametrize(("low", "allowed"), [(0.95, 1.0), (0.85, 0.8), (0.75, 0.4), (0.5, 0.0)])
 def test_traction_power_is_limited_linearly(low, allowed):
     added = slow("voltage_dependent_power_limit", low, limited_share=0.4, full_level=0.9, off_level=0.65)
@@ -403,7 +429,7 @@ def test_a_dc_link_lets_its_share_fall_late():
     excitation, s, T = dip(), 0.5, 0.04
     P, _ = run("dc_link_lag", excitation, values("dc_link_lag", lag_share=s, lag_time=T))
     share = P0 - T_M
-    (late,) = solved(excitation, lambda u, y: (share * u**P_V - y) / T, [share])
+    (late,) = solved(excitation, lambda u, y: u * (share * u**P_V - y) / T, [share])
     assert pytest.approx(s * (late - static(excitation)[0]), abs=1e-9) == P - base(excitation)[0]
 
 
@@ -426,22 +452,37 @@ def test_negative_sequence_brakes_by_the_rotor_loss():
     assert P[-1] - P0 == pytest.approx(U2**2 * rotor / square, rel=1e-6)
 
 
-def test_inrush_follows_a_rise_and_decays():
+def rise_after(low, **chosen):
+    """Reactive and active power of the inrush after a dip to `low` that ends at 500 ms in one sample."""
     t = np.arange(1500) * 1e-3
-    up = event(np.where(t < 0.5, 0.6, 0.95), 1e-3)
-    P, Q = run("transformer_inrush", up, values("transformer_inrush", inrush=0.5, inrush_time=0.3))
-    extra = Q - base(up)[1]
-    rise = 0.35 / 0.6
+    excitation = event(np.where((t >= 0.2) & (t < 0.5), low, 1.0))
+    P, Q = run("transformer_inrush", excitation, values("transformer_inrush", inrush=0.5, **chosen))
+    return Q - base(excitation)[1], P - base(excitation)[0]
+
+
+def test_inrush_follows_a_rise_and_decays():
+    extra, active = rise_after(0.6, inrush_time=0.3, knee_margin=0.0, inrush_loss=0.1)
     assert np.abs(extra[:500]).max() < 1e-12
-    assert 0.35 * rise < extra.max() < 0.5 * rise
-    assert extra[1300] / extra[1000] == pytest.approx(np.exp(-1.0), rel=1e-3)
-    assert pytest.approx(0.1 * extra, abs=1e-12) == P - base(up)[0]
-    down = event(np.where(t < 0.5, 0.95, 0.6), 1e-3)
-    falling = run("transformer_inrush", down, values("transformer_inrush", inrush=0.5))[1] - base(down)[1]
-    assert np.abs(falling).max() < 1e-12
+    assert 0.7 * 0.5 * 0.4**1.5 < extra.max() < 0.5 * 0.4**1.5 * (1 - 0.15 * 0.4)
+    x = 0.5 * (1 - 0.15 * (flux := 0.4 * np.exp((0.5 - np.array([1.0, 1.3])) / 0.3))) * flux**1.5
+    assert extra[1300] / extra[1000] == pytest.approx(x[1] / x[0], rel=0.02)  # nearly the power 3/2 of e^-1
+    assert pytest.approx(0.1 * extra, abs=1e-12) == active
 
 
-@pytest.mark.parametrize(("drop", "given"), [(0.004, 0.04 / np.sqrt(1 + 0.04**2)), (0.5, 5 / np.sqrt(26))])
+def test_inrush_ends_where_the_flux_is_back_below_the_knee():
+    extra, _ = rise_after(0.6, inrush_time=0.3, knee_margin=0.2)
+    assert extra[550] > 0.01
+    assert np.abs(extra[800:]).max() < 1e-12  # 0.4 e^-1 < 0.2
+
+
+def test_the_offset_of_the_flux_may_be_the_same_after_every_dip():
+    deep, shallow = (rise_after(low, offset_exponent=0.0, knee_margin=0.0)[0].max() for low in (0.5, 0.75))
+    assert shallow == pytest.approx(deep, rel=0.1)
+    deep, shallow = (rise_after(low, offset_exponent=1.0, knee_margin=0.0)[0].max() for low in (0.5, 0.75))
+    assert shallow == pytest.approx(deep / 2**1.5, rel=0.1)
+
+
+@pytest.mark.parametrize(("drop", "given"), [(0.004, 0.04 * 0.996), (0.5, 0.5)])
 def test_a_compensator_settles_at_its_gain_or_its_limit(drop, given):
     t = np.arange(1200) * 1e-3
     excitation = event(np.where(t < 0.1, 1.0, 1 - drop))

@@ -18,3 +18,8 @@ def gate(x, width):
     from tractexp.model.equations import sympy
 
     return 1 / (1 + sympy.exp(-x / width))
+
+
+def seen_late(eq, u, time):
+    """u as a control sees it through a fast filter: where it was `time` ago, to first order in `time`."""
+    return u * (1 - time * eq.U_rate / eq.U)

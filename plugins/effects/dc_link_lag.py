@@ -11,11 +11,11 @@ SOURCE = "small-signal models of four-quadrant converters, Hu et al. 2017, IEEE 
 class DcLinkLag(Effect):
     """A share of the static active power follows the voltage with a lag, for a dc link stores energy in between.
 
-        T_dc dx/dt = (P_s - P_s0) - x,   P_s -> (1 - s) P_s + s (P_s0 + x)
+        T_dc dx/dt = u (P_s - P_s0 - x),   P_s -> (1 - s) P_s + s (P_s0 + x),   u = U/U_0
 
     A positive share falls late. A negative one falls more than it settles at: converters that hold their current at
-    first and bring the power back while the dc-link controller acts. Power factor one: Q is untouched. At s = 0 the
-    base model, whatever T_dc.
+    first and bring the power back while the dc-link controller acts. The control acts by the current, so by less
+    power where the voltage is low. Power factor one: Q is untouched. At s = 0 the base model, whatever T_dc.
 
     Source: Hu et al. 2017: C U_dc dU_dc/dt = P_ac - P_inv with a controller of the dc voltage, linearized.
     Departures: controller and dc link are one time constant.
@@ -32,5 +32,5 @@ class DcLinkLag(Effect):
     def edit(self, eq):
         share, time = eq.declare(self.parameters)
         late = eq.state("late_power", "x_{dc}")
-        eq.moves(late, (eq.definitions[eq.symbol("P_static")] - eq.P_s0 - late) / time, 0)
+        eq.moves(late, eq.U / eq.U0 * (eq.definitions[eq.symbol("P_static")] - eq.P_s0 - late) / time, 0)
         eq.edit("P_static", lambda P: (1 - share) * P + share * (eq.P_s0 + late))

@@ -21,7 +21,7 @@ class ExponentialRecovery(Effect):
     Departures: P and Q share one time constant; the present exponent is that of whatever static load the model has.
     """
 
-    recovery_P = Parameter(0.0, (-2.0, 2.0), "1", "long-run less immediate exponent of P", SOURCE, r"D_p", null=0.0)
+    recovery_P = Parameter(0.0, (-3.0, 3.0), "1", "long-run less immediate exponent of P", SOURCE, r"D_p", null=0.0)
     recovery_Q = Parameter(0.0, (-3.0, 3.0), "1", "long-run less immediate exponent of Q", SOURCE, r"D_q", null=0.0)
     recovery_time = Parameter(0.5, (0.05, 60.0), "s", "time constant of the recovery", SOURCE, "T_r")
 

@@ -11,14 +11,15 @@ SOURCE = "Hu et al. 2017, IEEE Trans. Power Electronics; Energies 2022, 15, 7544
 class LowFrequencyOscillation(Effect):
     """A lightly damped mode of converters and network, excited by the change of the voltage.
 
-        dx/dt = w y,   dy/dt = w (u - 1 - x) - 2 zeta w y,   w = 2 pi f_o,   u = U/U_0
-        P -> P + a_P z,   Q -> Q + a_Q z,   z = cos(phi) y + sin(phi) (u - 1 - x - 2 zeta y)
+        dx/dt = w y,   dy/dt = w p,   p = u (1 - x - 2 zeta y) - 1,   w = 2 pi f_o,   u = U/U_0
+        P -> P + a_P z,   Q -> Q + a_Q z,   z = cos(phi) y + sin(phi) p
 
-    y and the term beside sin(phi) are the two ways such a mode can ring after a step and settle at zero. At
-    a_P = a_Q = 0 the base model, whatever the mode.
+    p is the power, less 1, of a converter whose dc-link energy y sets the current 1 - x - 2 zeta y: in a dip it rings
+    slower. y and p are the two ways such a mode can ring after a step and settle at zero. At a_P = a_Q = 0 the base
+    model, whatever the mode.
 
     Source: Hu et al. 2017; measured modes of 0.6-10 Hz in Energies 2022, 15, 7544.
-    Departures: one mode, linear, with one phase for P and Q.
+    Departures: one mode, with one phase for P and Q.
     """
 
     oscillation_P = Parameter(0.0, (-0.6, 0.6), "pu", "active power of the mode per U_0", SOURCE, "a_P", null=0.0)
@@ -37,9 +38,9 @@ class LowFrequencyOscillation(Effect):
         a_P, a_Q, frequency, damping, phase = eq.declare(self.parameters)
         x, y = eq.state("mode_x", "x_o"), eq.state("mode_y", "y_o")
         w = 2 * sympy.pi * frequency
-        accelerates = eq.U / eq.U0 - 1 - x - 2 * damping * y
+        power = eq.U / eq.U0 * (1 - x - 2 * damping * y) - 1
         eq.moves(x, w * y, 0)
-        eq.moves(y, w * accelerates, 0)
-        z = eq.define("oscillation", sympy.cos(phase) * y + sympy.sin(phase) * accelerates, "z")
+        eq.moves(y, w * power, 0)
+        z = eq.define("oscillation", sympy.cos(phase) * y + sympy.sin(phase) * power, "z")
         eq.consume(a_P * z, a_Q * z)
         eq.settled = False

@@ -21,7 +21,7 @@ class MagneticSaturation(Effect):
     the machine's at that point.
     """
 
-    saturation = Parameter(0.0, (0.0, 1.0), "1/pu²", "growth of sigma with flux squared", SOURCE, "k_s", null=0.0)
+    saturation = Parameter(0.0, (0.0, 3.0), "1/pu²", "growth of sigma with flux squared", SOURCE, "k_s", null=0.0)
 
     needs = ("E", "C", "coupling", "time_constant")
     relevant = {"saturation": 0.2}

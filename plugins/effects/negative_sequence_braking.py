@@ -22,7 +22,7 @@ class NegativeSequenceBraking(Effect):
     Departures: the unbalance before the event belongs to the steady state, so only its change counts.
     """
 
-    negative_sequence = Parameter(0.0, (0.0, 3.0), "1", "size relative to the theory", SOURCE, "k_2", null=0.0)
+    negative_sequence = Parameter(0.0, (0.0, 10.0), "1", "size relative to the theory", SOURCE, "k_2", null=0.0)
 
     needs = ("electrical_torque", "stator_impedance", "coupling", "time_constant")
     reads = ("U2",)

@@ -9,15 +9,15 @@ SOURCE = "Kundur 1994, section 11.2; Milano 2010, ch. 19 (SVC and STATCOM)"
 
 @plugin
 class StaticVarCompensator(Effect):
-    """A compensator that feeds reactive power into the bus when the voltage is low, up to its rating.
+    """A compensator that feeds reactive current into the bus when the voltage is low, up to its rating.
 
-        T_c dx/dt = sat(K (U_0 - U)) - x,   Q -> Q - q_c x,   sat(z) = z/sqrt(1 + z^2)
+        T_c dx/dt = sat(K (U_0 - U)) - x,   Q -> Q - q_c x u,   u = U/U_0,   sat(z) = max(-1, min(1, z))
 
-    A small drop dU brings K q_c dU, a deep one the rating q_c. The set point is the voltage before the event. At
-    q_c = 0 the base model, whatever gain and time constant.
+    A small drop dU brings a current of K q_c dU, a deep one the rating q_c. The set point is the voltage before the
+    event. At q_c = 0 the base model, whatever gain and time constant.
 
     Source: Kundur 1994, section 11.2; Milano 2010, ch. 19: proportional regulator, one lag, limits.
-    Departures: the limit is rounded, symmetric, and of reactive power (a STATCOM's is of current, an SVC's of
+    Departures: the limit is symmetric and of current, as a STATCOM's is (that of a thyristor-controlled one is of
     susceptance).
     """
 
@@ -35,6 +35,6 @@ class StaticVarCompensator(Effect):
         rating, gain, time = eq.declare(self.parameters)
         x = eq.state("compensation", "x_c")
         asked = gain * (eq.U0 - eq.U)
-        eq.moves(x, (asked / sympy.sqrt(1 + asked**2) - x) / time, 0)
-        eq.consume(0, -rating * x)
+        eq.moves(x, (sympy.Max(-1, sympy.Min(1, asked)) - x) / time, 0)
+        eq.consume(0, -rating * x * eq.U / eq.U0)
         eq.settled = False

@@ -5,39 +5,49 @@ from tractexp.parameter import Parameter
 from tractexp.plugin import plugin
 
 SOURCE = "Blume et al. 1951, Transformer Engineering; decay of the flux offset after energization"
-CYCLE = 0.02  # s: a rise of the voltage is what one cycle of it gains on the cycle before
-STILL = 0.02  # of U_0: slower rises leave no offset in the flux; keeps noise of the voltage out
-LOSS = 0.1  # active over reactive power of the inrush current
+CYCLE = 0.01  # s: a rise of the voltage is what half a cycle of it gains on the one before
+STILL = 0.005  # of U_0: slower rises leave no offset in the flux; keeps noise of the voltage out
+SHALLOW = 0.05  # of U_0: the least dip a rise is referred to
 
 
 @plugin
 class TransformerInrush(Effect):
-    """A sudden rise of the voltage leaves an offset in the transformers' flux, whose magnetizing current decays.
+    """A sudden rise of the voltage leaves an offset in the transformers' flux, which drives their cores past the knee.
 
-        dx/dt = max(0, u - y - 0.02)/T_c - x/T_i,   T_c dy/dt = u - y,   u = U/U_0,   T_c = 20 ms
-        Q -> Q + q_i x,   P -> P + 0.1 q_i x
+        dx/dt = max(0, u - y - 0.005)/T_c (1 - u_low)^(g - 1) - x/T_i,   T_c dy/dt = u - y,   T_c = 10 ms
+        Q -> Q + q_i u^2 e^(3/2) (1 - 0.15 e),   P -> P + r_i (the same),   e = max(0, 1 - (1 + m - x)/u),   u = U/U_0
 
-    After a step up of the voltage by du, x is a little less than du and decays with T_i. At q_i = 0 the base model.
+    After a step up of the voltage by du, x is a little less than du^g and decays with T_i. While the peak of the flux
+    is beyond the knee, m above that before, by the share e of the voltage, the core draws reactive power. u_low is the
+    lowest voltage so far. At q_i = 0 the base model, whatever the rest.
 
-    Source: Blume et al. 1951: the offset decays with the circuit's L/R, a tenth to about a second.
-    Departures: the current's dependence on the instant of recovery and its harmonics are left out; linear in the
-    rise of the voltage.
+    Source: Blume et al. 1951: two-slope core, the offset decays with the circuit's L/R, a tenth to about a second.
+    Departures: the offset's dependence on the instant of recovery is g alone (1: as the rise; 0: the same after any
+    dip); harmonics are left out; the two-slope core's fundamental acos(r) - r sqrt(1 - r^2), r = 1 - e, is its
+    first two terms.
     """
 
-    inrush = Parameter(0.0, (0.0, 2.0), "pu", "reactive power after a rise by U_0", SOURCE, "q_i", null=0.0)
+    inrush = Parameter(0.0, (0.0, 5.0), "pu", "reactive power at an excess flux of 1 pu", SOURCE, "q_i", null=0.0)
     inrush_time = Parameter(0.3, (0.03, 2.0), "s", "time constant of the decay", SOURCE, "T_i")
+    knee_margin = Parameter(0.1, (0.0, 0.6), "pu", "flux before to knee", SOURCE, "m")
+    offset_exponent = Parameter(1.0, (0.0, 1.5), "1", "how the offset grows with the rise", SOURCE, "g")
+    inrush_loss = Parameter(0.05, (0.0, 0.3), "1", "active over reactive power", SOURCE, "r_i")
 
-    grid = {"inrush_time": (0.05, 0.1, 0.3, 1.0)}
+    grid = {"inrush_time": (0.1, 0.3, 1.0), "knee_margin": (0.02, 0.2), "offset_exponent": (0.0, 1.0)}
     relevant = {"inrush": 0.05}
     confused_with = ("exponential_recovery", "magnetic_saturation")
 
     def edit(self, eq):
         from tractexp.model.equations import sympy
 
-        q, time = eq.declare(self.parameters)
+        q, time, margin, exponent, loss = eq.declare(self.parameters)
         x, y = eq.state("inrush_flux", "x"), eq.state("cycle_voltage", "y")
-        u = eq.U / eq.U0
-        eq.moves(x, sympy.Max(0, u - y - STILL) / CYCLE - x / time, 0)
+        u, lowest = eq.U / eq.U0, eq.memory("lowest_voltage", r"u_{low}")
+        eq.renews(lowest, sympy.Min(lowest, u), 1)
+        scale = sympy.exp((exponent - 1) * sympy.log(sympy.Max(SHALLOW, 1 - lowest)))
+        eq.moves(x, sympy.Max(0, u - y - STILL) / CYCLE * scale - x / time, 0)
         eq.moves(y, (u - y) / CYCLE, 1)
-        eq.consume(LOSS * q * x, q * x)
+        excess = sympy.Max(0, 1 - (1 + margin - x) / u)
+        drawn = q * u**2 * excess * sympy.sqrt(excess) * (1 - 0.15 * excess)
+        eq.consume(loss * drawn, drawn)
         eq.settled = False

@@ -7,18 +7,17 @@ from tractexp_plugins.effects._operators import gate
 
 SOURCE = "NERC 2016, Dynamic Load Modeling, app. A; WECC composite load model (Ftr1, Vtr1, Ttr1, Vrc1, Trc1)"
 LEVEL, TIME = 0.0025, 0.3  # how sharp the relay is: in voltage over U_0, and in samples
-HYSTERESIS = 0.02  # of U_0: the voltage has recovered when it is this much above the trip level
 
 
 @plugin
 class UndervoltageTrip(Effect):
     """A share F of the load drops out when the voltage stays below U_trip, and returns after it has recovered.
 
-    Two timers run on the samples: the first while the voltage is below u_t, the second while it is 2 % above; each
-    is empty again as soon as its condition ends. When the first reaches T_t the share is gone, when the second
-    reaches T_r it is back:
+    Two timers run on the samples: the first while the voltage is below u_t, the second while it is above u_t + h;
+    each is empty again as soon as its condition ends. When the first reaches T_t the share is gone, when the second
+    reaches T_r it comes back along a ramp of T_b:
 
-        P -> (1 - F g) P,   Q -> (1 - F g) Q,   g = 1 while tripped, else 0
+        P -> (1 - F g) P,   Q -> (1 - F g) Q,   g = 1 while tripped, down to 0 within T_b, else 0
 
     At F = 0 the base model, whatever the thresholds.
 
@@ -31,6 +30,8 @@ class UndervoltageTrip(Effect):
     trip_level = Parameter(0.7, (0.3, 0.95), "1", "voltage below which it trips, over U_0", SOURCE, "u_t")
     trip_delay = Parameter(0.05, (0.0, 0.5), "s", "time below the level before it trips", SOURCE, "T_t")
     reconnect_delay = Parameter(0.5, (0.02, 5.0), "s", "time after recovery before it returns", SOURCE, "T_r")
+    reconnect_margin = Parameter(0.05, (0.01, 0.5), "1", "recovered is this much above the level", SOURCE, "h")
+    reconnect_ramp = Parameter(0.1, (0.0, 2.0), "s", "time in which it returns", SOURCE, "T_b")
 
     order = 3
     grid = {"trip_level": (0.5, 0.7, 0.8, 0.9), "trip_delay": (0.02, 0.08), "reconnect_delay": (0.2, 1.0)}
@@ -38,16 +39,19 @@ class UndervoltageTrip(Effect):
     confused_with = ("exponential_recovery", "second_motor_group", "load_drift")
 
     def edit(self, eq):
-        share, level, delay, back = eq.declare(self.parameters)
+        from tractexp.model.equations import sympy
+
+        share, level, delay, back, margin, ramp = eq.declare(self.parameters)
         u = eq.U / eq.U0
         below, above = eq.memory("time_below", "t_b"), eq.memory("time_above", "t_a")
         tripped = eq.memory("tripped", "g")
         low = eq.define("voltage_low", gate(level - u, LEVEL), r"\ell")
-        high = eq.define("voltage_back", gate(u - level - HYSTERESIS, LEVEL), "h")
+        high = eq.define("voltage_back", gate(u - level - margin, LEVEL), "h")
         goes = eq.define("relay_goes", low * gate(below - delay, TIME * eq.step), "g_+")
         returns = eq.define("relay_returns", high * gate(above - back, TIME * eq.step), "g_-")
         eq.renews(below, low * (below + eq.step), 0)
         eq.renews(above, high * (above + eq.step), 0)
-        eq.renews(tripped, tripped + (1 - tripped) * goes - tripped * returns, 0)
+        left = sympy.Max(0, tripped - returns * eq.step / (ramp + eq.step))
+        eq.renews(tripped, left + (1 - left) * goes, 0)
         eq.P, eq.Q = eq.P * (1 - share * tripped), eq.Q * (1 - share * tripped)
         eq.settled = False
