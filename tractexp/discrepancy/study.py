@@ -1,7 +1,7 @@
-"""One model that holds every candidate, and refits of any subset of them side by side.
+"""One set of coordinates for every candidate, and refits of any subset of them side by side.
 
-All candidates sit in one model at their nulls, so that one kernel serves every score and every refit, and base and
-extended model are nested by construction. A refit is a lane of the batched descent with its own free columns.
+Base and extended models are points of the same coordinates with the other candidates at their nulls, nested by
+construction. A refit is a lane of the batched descent with its own free columns.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,16 +10,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.catalogue import Catalogue
-from tractexp.discrepancy.injection import Injection
+from tractexp.discrepancy.kernels import Kernels, side_by_side
 from tractexp.discrepancy.noise import Noise, estimate, quiet_stretches
-from tractexp.identify.descent import descend
+from tractexp.identify.descent import Apart, descend
 from tractexp.identify.likelihood import Likelihood
-from tractexp.identify.problem import Problem
-from tractexp.model.model import Model, compose
+from tractexp.model.model import Model
 from tractexp.record import Event
 
 STARTS = 24  # of the base fit
-ROUGH, EXACT = (12, 0.1), (40, 1e-3)  # iterations and tolerance of the deviance
+ROUGH, EXACT = (12, 0.3), (40, 0.02)  # iterations and tolerance of the deviance
+FIRST = 4  # iterations after which the worse half of a set's starts is given up
+HOPELESS = 60.0  # of the deviance: a set this far behind then is not refined
 KEPT = 3  # of them that are refined with the measurement chain free
 PRIOR = 5.0  # smallest relevant sizes: how far the measurement chain is believed to be off, one standard deviation
 
@@ -31,6 +32,12 @@ class Refit:
     names: tuple[str, ...]
     unit: np.ndarray
     deviance: float
+    parameters: int  # of the effects
+
+    @property
+    def cost(self) -> float:
+        """Akaike's criterion, by which sets of the same number of effects are compared: a parameter costs 2."""
+        return self.deviance + 2 * self.parameters
 
 
 class Study:
@@ -50,13 +57,12 @@ class Study:
         substeps: int | None = None,
     ):
         self.model, self.catalogue, self.events = model, catalogue, tuple(events)
-        base = self._alone = Problem(model, events, bounds, fixed, substeps)
-        union = compose(model.motor, model.static, [*model.effects, *catalogue.effects, Injection()])
-        self.problem = Problem(union, events, bounds, fixed, int(base.step.substeps.max()))
+        self.kernels = Kernels(model, catalogue, events, bounds, fixed, substeps)
+        self.problem = self.kernels.whole
         self.likelihood = Likelihood.of(self.problem)
         space = self.problem.space
         self.column = {name: k for k, name in enumerate(space.names)}
-        self.base = np.array([self.column[name] for name in base.space.names])
+        self.base = np.array([self.column[name] for name in self.kernels.bare.space.names])
         self.before = np.arange(space.dimension, space.dimension + 2 * len(events))
         self.dimension = space.dimension + 2 * len(events)
         self.null = self._null()
@@ -96,29 +102,61 @@ class Study:
                     return PRIOR * self.catalogue[name].relevant(p) / self.width(p.name)
         raise KeyError(column)
 
-    def residuals(self, unit: np.ndarray) -> np.ndarray:
-        """Calculated minus measured (n, 2, N) [pu] at coordinates (n, D)."""
-        self.simulations += len(unit)
-        return self.likelihood.residuals(unit)
+    def residuals(self, unit: np.ndarray, names: Sequence[str] | None = None) -> np.ndarray:
+        """Calculated minus measured (n, 2, N) [pu] at coordinates (n, D) where effects but `names` are at their null.
 
-    def rows(self, unit: np.ndarray, noise: Noise, chain: Sequence[int]) -> np.ndarray:
+        By default any effect may be there, at the price of the largest kernel.
+        """
+        self.simulations += len(unit)
+        key = None if names is None else self.kernels.key(names)
+        return side_by_side(lambda part: self.kernels.residuals(key, part), unit)
+
+    def rows(
+        self, unit: np.ndarray, noise: Noise, chain: Sequence[int], names: Sequence[str] | None = None
+    ) -> np.ndarray:
         """Whitened residuals (n, 2 N) and, after them, the prior of the free chain columns."""
-        white = noise.whiten(self.residuals(unit), self.problem.drive, self.likelihood.known)
+        self.simulations += len(unit)
+        key = None if names is None else self.kernels.key(names)
+
+        def white_of(part: np.ndarray) -> np.ndarray:
+            return noise.whiten(self.kernels.residuals(key, part), self.problem.drive, self.likelihood.known)
+
+        white = side_by_side(white_of, unit)
         prior = [(unit[:, k] - self.null[k]) / self.prior_deviation(k) for k in chain]
         return np.concatenate([white, *(p[:, None] for p in prior)], axis=1)
 
     def refit(
-        self,
-        noise: Noise,
-        wanted: Sequence[tuple[Sequence[str], np.ndarray]],
-        chain: Sequence[str] | None = None,
-        rough: bool = False,
+        self, noise: Noise, wanted: Sequence[tuple[Sequence[str], np.ndarray]], chain: Sequence[str] | None = None
     ) -> list[Refit]:
         """Fit sets of effects (names, start (D,)) side by side, with the named part of the chain free (all of it).
 
-        Of several starts of one set the best is returned; the result is in order of deviance. A `rough` refit is good
-        enough to rank sets that are far apart.
+        Of several starts of one set the best is returned; the result is in order of cost.
         """
+        return self._best(self._descended(noise, wanted, chain, EXACT))
+
+    def rough_refit(self, noise: Noise, wanted: Sequence[tuple[Sequence[str], np.ndarray]]) -> list[Refit]:
+        """As `refit`, good enough to rank sets that are far apart; what falls behind early is given up."""
+        begun = self._descended(noise, wanted, None, (FIRST, ROUGH[1]))
+        best = self._best(begun)
+        promising = [r.names for r in best if r.cost < best[0].cost + HOPELESS]
+        again = []
+        for names in promising:
+            starts = sorted((r for r in begun if r.names == names), key=lambda r: r.deviance)
+            again += [(names, r.unit) for r in starts[: -(-len(starts) // 2)]]
+        return self._best([*best, *self._descended(noise, again, None, (ROUGH[0] - FIRST, ROUGH[1]))])
+
+    @staticmethod
+    def _best(fits: Sequence[Refit]) -> list[Refit]:
+        """The best fit of each set, in order of cost."""
+        best: dict[tuple[str, ...], Refit] = {}
+        for fit in sorted(fits, key=lambda r: (r.cost, r.names)):
+            best.setdefault(fit.names, fit)
+        return list(best.values())
+
+    def _descended(
+        self, noise: Noise, wanted: Sequence[tuple[Sequence[str], np.ndarray]], chain: Sequence[str] | None,
+        effort: tuple[int, float],
+    ) -> list[Refit]:  # fmt: skip
         free_chain = self.catalogue.chain if chain is None else tuple(chain)
         always = [*self.base, *self.before, *self.parameters(free_chain)]
         columns = [[*always, *(k for k in self.parameters(names) if k not in always)] for names, _ in wanted]
@@ -128,21 +166,40 @@ class Study:
             table[lane, : len(free)] = free
         starts = np.array([np.r_[start, 0.0] for _, start in wanted])
         prior = self.parameters(free_chain)
+        keys = [self.kernels.key(names) for names, _ in wanted]
+        order = {key: k for k, key in enumerate(dict.fromkeys(keys))}
+        kernel = np.array([order[key] for key in keys])
+        sets = {k: next(names for (names, _), key in zip(wanted, keys, strict=True) if key == kernel_key)
+                for kernel_key, k in order.items()}  # fmt: skip
 
         def rows(x: np.ndarray, lanes: np.ndarray) -> np.ndarray:
             whole = starts[lanes]
             np.put_along_axis(whole, table[lanes], x, axis=1)
-            return self.rows(whole[:, :-1], noise, prior)
+            made = np.empty((len(x), 2 * self.problem.drive.samples + len(prior)))
+            for k, names in sets.items():
+                mine = kernel[lanes] == k
+                if mine.any():
+                    made[mine] = self.rows(whole[mine, :-1], noise, prior, names)
+            return made
 
         begin = np.take_along_axis(starts, table, axis=1)
-        done = descend(rows, begin, table == self.dimension, *(ROUGH if rough else EXACT))
+        done = descend(rows, begin, table == self.dimension, *effort, self._apart(len(prior)))
         np.put_along_axis(starts, table, done.unit, axis=1)
-        best: dict[tuple[str, ...], Refit] = {}
-        for lane, (names, _) in enumerate(wanted):
-            key = tuple(sorted(names))
-            if key not in best or done.deviance[lane] < best[key].deviance:
-                best[key] = Refit(key, starts[lane, :-1].copy(), float(done.deviance[lane]))
-        return sorted(best.values(), key=lambda r: (r.deviance, r.names))
+        return [
+            Refit(
+                tuple(sorted(names)), starts[lane, :-1].copy(), float(done.deviance[lane]), len(self.parameters(names))
+            )
+            for lane, (names, _) in enumerate(wanted)
+        ]
+
+    def _apart(self, more: int) -> list[Apart]:
+        """P0 and Q0 act on the rows of their own event only; `more` rows follow those of the records."""
+        events, N = len(self.events), self.problem.drive.samples
+        rows = np.zeros((events, 2 * N + more), dtype=bool)
+        for e in range(events):
+            part = self.problem.drive.part(e)
+            rows[e, part] = rows[e, N + part.start : N + part.stop] = True
+        return [Apart(len(self.base) + np.arange(events) * 2 + c, rows) for c in (0, 1)]
 
     def base_fit(self) -> tuple[Refit, Noise]:
         """The base model with the chain free, and the noise of its residuals in quiet stretches."""
@@ -155,8 +212,8 @@ class Study:
 
     def _base_starts(self) -> list[np.ndarray]:
         """The best fits of the base model alone, by its own fast kernel, from starts all over its box."""
-        likelihood = Likelihood.of(self._alone)
-        d = self._alone.space.dimension
+        likelihood = Likelihood.of(self.kernels.bare)
+        d = self.kernels.bare.space.dimension
         begin = np.full((STARTS + 1, d + len(self.before)), 0.5)
         begin[1:, :d] = np.random.default_rng(0).random((STARTS, d))
         done = descend(likelihood.rows, begin, tolerance=0.1)

@@ -4,7 +4,7 @@ Profiles, starts and subsets of events are lanes. A call with the differences of
 dampings of all steps replace hundreds of single simulations, which cost as much to call as to run.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +28,17 @@ class Descent:
     simulations: int
 
 
-def normal(rows: Rows, unit: np.ndarray, base: np.ndarray, lanes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+@dataclass(frozen=True, eq=False)
+class Apart:
+    """Coordinates (k,) that act on different rows, (k, R) where True: one simulation has the differences of all."""
+
+    coordinates: np.ndarray
+    rows: np.ndarray
+
+
+def normal(
+    rows: Rows, unit: np.ndarray, base: np.ndarray, lanes: np.ndarray, apart: Sequence[Apart] = ()
+) -> tuple[np.ndarray, np.ndarray]:
     """Gradient (n, D) and Gauss-Newton matrix (n, D, D) of half the sum of squares; `base` (n, R) are the rows there.
 
     Forward differences step away from the nearer wall. One that cannot be simulated is left at zero. Lanes are
@@ -36,14 +46,26 @@ def normal(rows: Rows, unit: np.ndarray, base: np.ndarray, lanes: np.ndarray) ->
     """
     n, d = unit.shape
     gradient, H = np.empty((n, d)), np.empty((n, d, d))
+    shared = {int(c) for group in apart for c in group.coordinates}
+    alone = np.array([c for c in range(d) if c not in shared], dtype=int)
+    steps = np.zeros((len(alone) + len(apart), d))  # which coordinates move in each simulation
+    steps[np.arange(len(alone)), alone] = 1
+    for k, group in enumerate(apart):
+        steps[len(alone) + k, group.coordinates] = 1
     together = max(1, MOST_NUMBERS // (d * base.shape[1]))
     for first in range(0, n, together):
         part = slice(first, first + together)
         x = unit[part]
         h = np.where(x > 0.5, -DIFFERENCE, DIFFERENCE)
-        moved = x[:, None, :] + np.eye(d) * h[:, :, None]
-        J = rows(moved.reshape(-1, d), np.repeat(lanes[part], d)).reshape(len(x), d, -1)
-        J -= base[part, None, :]
+        moved = x[:, None, :] + steps * h[:, None, :]
+        change = rows(moved.reshape(-1, d), np.repeat(lanes[part], len(steps))).reshape(len(x), len(steps), -1)
+        change -= base[part, None, :]
+        J = change
+        if apart:
+            J = np.empty((len(x), d, base.shape[1]))
+            J[:, alone] = change[:, : len(alone)]
+            for k, group in enumerate(apart, len(alone)):
+                J[:, group.coordinates] = change[:, k, None] * group.rows
         J /= h[:, :, None]
         np.nan_to_num(J, copy=False, nan=0.0)
         gradient[part] = (J @ base[part, :, None])[:, :, 0]
@@ -52,7 +74,12 @@ def normal(rows: Rows, unit: np.ndarray, base: np.ndarray, lanes: np.ndarray) ->
 
 
 def descend(
-    rows: Rows, start: np.ndarray, frozen: np.ndarray | None = None, iterations: int = 40, tolerance: float = 1e-4
+    rows: Rows,
+    start: np.ndarray,
+    frozen: np.ndarray | None = None,
+    iterations: int = 40,
+    tolerance: float = 1e-4,
+    apart: Sequence[Apart] = (),
 ) -> Descent:
     """Levenberg-Marquardt in the unit cube from `start` (n, D); columns where `frozen` (n, D) is True do not move.
 
@@ -72,7 +99,7 @@ def descend(
         if not len(lanes):
             break
         x = unit[lanes]
-        gradient, H = normal(rows, x, base[lanes], lanes)
+        gradient, H = normal(rows, x, base[lanes], lanes, apart)
         rest = frozen[lanes] | ((x <= 0) & (gradient > 0)) | ((x >= 1) & (gradient < 0))
         tried = damping[lanes, None] * DAMPINGS
         trials = np.clip(x[:, None, :] + _steps(H, gradient, rest, tried), 0.0, 1.0)

@@ -52,7 +52,7 @@ def remembered(parts: Iterable[object], generate: Callable[[], str]) -> str:
 @functools.cache
 def load(source: str) -> ModuleType:
     """Import the kernel with this source, writing it first where it is new. Safe in parallel processes."""
-    name = f"kernel_{hashlib.sha256(source.encode()).hexdigest()[:20]}"
+    name = _name(source)
     path = cache_folder() / f"{name}.py"
     if not path.exists() or path.read_text() != source:
         _write(path, source)
@@ -63,6 +63,31 @@ def load(source: str) -> ModuleType:
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
     return module
+
+
+def compile_missing(sources: Iterable[str], tell: Callable[[int], None] = lambda count: None) -> None:
+    """Compile the kernels that the cache lacks, side by side in processes; `tell` hears how many, if any."""
+    from joblib import Parallel, delayed
+
+    missing = [s for s in dict.fromkeys(sources) if not any(_compiled(s))]
+    if missing:
+        tell(len(missing))
+        Parallel(n_jobs=min(len(missing), os.cpu_count() or 1))(delayed(_compile)(s) for s in missing)
+
+
+def _compiled(source: str) -> Iterable[Path]:
+    return (cache_folder() / "__pycache__").glob(f"{_name(source)}.run-*.nbc")
+
+
+def _compile(source: str) -> None:
+    from numba import float64, int64
+
+    table, cube = float64[:, ::1], float64[:, :, ::1]
+    load(source).run.compile((cube, table, int64[::1], table, table, table, int64[::1], cube, table, cube))
+
+
+def _name(source: str) -> str:
+    return f"kernel_{hashlib.sha256(source.encode()).hexdigest()[:20]}"
 
 
 def _write(path: Path, source: str) -> None:

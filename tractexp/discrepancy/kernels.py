@@ -1,0 +1,105 @@
+"""Which kernel simulates which set of effects: few kernels, so that they are soon compiled, and each no larger than
+its set needs.
+
+Sets of one effect have kernels of their own, as fast as the base model's. Larger sets share one that holds every
+effect whose equations are short; a set with a long one, and the tests of all candidates at once, take the kernel of
+everything. All give the same response up to rounding.
+"""
+
+import functools
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from tractexp.discrepancy.catalogue import Catalogue
+from tractexp.discrepancy.injection import Injection
+from tractexp.identify.likelihood import Likelihood
+from tractexp.identify.problem import Problem
+from tractexp.model.kernel import compile_missing
+from tractexp.model.model import Model, compose
+from tractexp.record import Event
+
+LONG = 2.0  # times the source of the base model
+WORTH = 16  # simulations that are worth a thread
+
+
+def side_by_side(function: Callable[[np.ndarray], np.ndarray], unit: np.ndarray) -> np.ndarray:
+    """`function` of coordinates (n, D), on all cores: lanes do not know of each other, so the bits are the same."""
+    from numba import get_num_threads
+
+    parts = min(get_num_threads(), len(unit) // WORTH)
+    if parts < 2:
+        return function(unit)
+    return np.concatenate(list(_threads().map(function, np.array_split(unit, parts))))
+
+
+@functools.cache
+def _threads() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor()
+
+
+class Kernels:
+    """Simulates coordinates (n, D) of a study by the kernel of a set of effects."""
+
+    def __init__(
+        self,
+        model: Model,
+        catalogue: Catalogue,
+        events: Sequence[Event],
+        bounds: Mapping[str, Sequence[float]],
+        fixed: Mapping[str, float],
+        substeps: int | None = None,
+    ):
+        self.model, self.catalogue, self.events = model, catalogue, tuple(events)
+        self.bounds, self.fixed = bounds, fixed
+        self.bare = Problem(model, events, bounds, fixed, substeps)
+        self.substeps = int(self.bare.step.substeps.max())
+        everything = compose(model.motor, model.static, [*model.effects, *catalogue.effects, Injection()])
+        self.whole = Problem(everything, events, bounds, fixed, self.substeps)
+        self._column = {name: k for k, name in enumerate(self.whole.space.names)}
+        self._made = {None: self._simulator(self.whole)}
+
+    def with_effects(self, names: Iterable[str]) -> Model:
+        """The model with these load effects and the whole measurement chain."""
+        return compose(
+            self.model.motor,
+            self.model.static,
+            [*self.model.effects, *(self.catalogue[n].effect for n in sorted({*names, *self.catalogue.chain}))],
+        )
+
+    @functools.cached_property
+    def short(self) -> frozenset[str]:
+        """The load effects whose kernels are not much longer than the base model's."""
+        most = LONG * len(self.with_effects(()).source)
+        return frozenset(n for n in self.catalogue.load if len(self.with_effects((n,)).source) <= most)
+
+    def key(self, names: Iterable[str]) -> frozenset[str] | None:
+        """The effects of the kernel that serves a set of names; None is the kernel of everything."""
+        load = frozenset(names) - set(self.catalogue.chain)
+        if len(load) <= 1:
+            return load
+        short = self.short
+        return short if load <= short else None
+
+    def residuals(self, key: frozenset[str] | None, unit: np.ndarray) -> np.ndarray:
+        """Calculated minus measured (n, 2, N) [pu] at coordinates (n, D) of the study."""
+        if key not in self._made:
+            model = self.with_effects(key)
+            bounds, fixed = (
+                {n: v for n, v in given.items() if n in model.names} for given in (self.bounds, self.fixed)
+            )
+            self._made[key] = self._simulator(Problem(model, self.events, bounds, fixed, self.substeps))
+        likelihood, columns = self._made[key]
+        return likelihood.residuals(unit[:, columns])
+
+    def _simulator(self, problem: Problem) -> tuple[Likelihood, np.ndarray]:
+        """A problem's likelihood, and where its coordinates stand among the study's."""
+        before = self.whole.space.dimension + np.arange(2 * len(self.events))
+        return Likelihood.of(problem), np.r_[[self._column[n] for n in problem.space.names], before].astype(int)
+
+    def compile(self, tell: Callable[[str], None]) -> None:
+        """Compile what is not in the cache yet, side by side."""
+        sets = [self.short, *(frozenset((n,)) for n in self.catalogue.load), frozenset()]
+        sources = [self.whole.model.source, *(self.with_effects(s).source for s in sets)]
+        compile_missing(sources, lambda n: tell(f"compiling {n} kernels, once for this base model and these channels"))
