@@ -53,7 +53,7 @@ def silent():
 def test_names_the_effect_that_was_planted(planted):
     assert planted.verdict == "named"
     assert planted.names == ("stator_resistance",)
-    assert planted.first.p_unrest < 0.01
+    assert planted.first.p_left < 0.01
 
 
 def test_stays_silent_when_nothing_is_missing(silent):
@@ -129,7 +129,7 @@ def test_noise_that_is_drawn_is_noise_that_is_found():
     mix = np.linalg.inv(np.array([[0.004, 0.0], [0.002, 0.003]]))
     color = Autoregression(np.array([[0.0], [0.8]]), np.array([1.0, 0.6]))
     noise = PowerNoise(mix, (color, white_noise(1.0)))
-    drawn = noise.draw(np.random.default_rng(7), 40000)
+    drawn = noise.draw(np.random.default_rng(7), 1, 40000)[0]
     found = estimate(drawn, np.ones(drawn.shape, dtype=bool), [slice(0, 40000)])
     covariance = np.linalg.inv(mix) @ np.linalg.inv(mix).T
     assert np.cov(drawn) == pytest.approx(covariance, rel=0.1)
@@ -141,7 +141,7 @@ def test_candidates_at_their_null_leave_the_base_model(silent):
     made = events()
     whole = catalogue(base().motor, base().static, (), made, FEW)
     study = Study(base(), whole, made, {}, {})
-    alone = study._alone
+    alone = study.kernels.bare
     values = alone.space.from_unit(study.null[study.base])
     response = alone.model.simulate(alone.drive, alone.full(values), study.problem.step.substeps)
     rows = study.residuals(study.null[None])[0]

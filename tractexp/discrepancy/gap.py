@@ -8,12 +8,14 @@ import numpy as np
 from tractexp.discrepancy.catalogue import Catalogue
 from tractexp.discrepancy.noise import Noise
 from tractexp.discrepancy.study import Refit, Study
+from tractexp.discrepancy.tangent import injections, two_sided
 from tractexp.identify.result import relative_error
 from tractexp.model.model import Model
 from tractexp.record import Event
 
 BLOCKS = 40  # of the block bootstrap
 RESAMPLES = 999
+SAME = 0.03  # singular values below this share of the largest: pushes that differ from others in noise only
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +31,11 @@ class Curves:
 
 @dataclass(frozen=True, eq=False)
 class Gap:
-    """Before and after; `closed` is the share of the explainable gap, `gain` the least of the gain at 95 %."""
+    """Before and after; `closed` is the share of the explainable gap, `gain` the least of the gain at 95 %.
+
+    Explainable is what was gained and what pushes into the balances would still gain: the deviance itself moves with
+    the level of the noise, which is only estimated, by more than a small gap.
+    """
 
     before: Curves
     after: Curves
@@ -49,15 +55,37 @@ def curves(study: Study, unit: np.ndarray, noise: Noise) -> Curves:
     return Curves(calculated, *errors, deviance, deviance / max(study.likelihood.samples, 1))
 
 
-def gap(study: Study, base: np.ndarray, extended: np.ndarray, noise: Noise, free: int, seed: int) -> Gap:
-    """Compare two fits on the events of `study`; `free` parameters were fitted to them in the extended model."""
+def gap(study: Study, base: np.ndarray, extended: np.ndarray, noise: Noise, fitted: Sequence[int], seed: int) -> Gap:
+    """Compare two fits on the events of `study`; coordinates `fitted` were fitted to them in the extended model."""
     drive, known = study.problem.drive, study.likelihood.known
     before, after = curves(study, base, noise), curves(study, extended, noise)
-    explainable = before.deviance - (study.likelihood.samples - free)
-    closed = (before.deviance - after.deviance) / explainable if explainable > 0 else float("nan")
+    gained = before.deviance - after.deviance
+    explainable = gained + max(left_over(study, extended, noise, fitted), 0.0)
+    closed = gained / explainable if explainable > 0 else float("nan")
     white = noise.whiten(study.residuals(np.array([base, extended])), drive, known)
     gains = (white[0] ** 2 - white[1] ** 2).reshape(2, -1).sum(axis=0)
     return Gap(before, after, float(closed), _least(gains, seed))
+
+
+def left_over(study: Study, unit: np.ndarray, noise: Noise, fitted: Sequence[int]) -> float:
+    """How much more than chance pushes into all balances would still lower the deviance at coordinates (D,).
+
+    Unbiased: the energy in the space of the pushes less its dimension, what is `fitted` projected out.
+    """
+    pushes, _ = injections(study, unit)
+    up, down = two_sided(unit, fitted)
+    rows = noise.whiten(
+        study.residuals(np.concatenate([unit[None], up, down, pushes])), study.problem.drive, study.likelihood.known
+    )
+    rows = np.nan_to_num(rows)
+    r, k = rows[0], len(fitted)
+    nuisance, cells = rows[1 : 1 + k] - rows[1 + k : 1 + 2 * k], rows[1 + 2 * k :] - r
+    Q = np.linalg.qr(nuisance.T)[0]
+    cells -= (cells @ Q) @ Q.T
+    scale = np.linalg.norm(cells, axis=1, keepdims=True)
+    _, values, basis = np.linalg.svd(cells / np.maximum(scale, 1e-300), full_matrices=False)
+    basis = basis[values > SAME * values[0]]
+    return float(np.sum((basis @ r) ** 2) - len(basis))
 
 
 def _least(gains: np.ndarray, seed: int) -> float:

@@ -92,6 +92,7 @@ def investigate(
     found = catalogue(model.motor, model.static, model.effects, train, only)
     tell(f"testing {len(found.candidates)} effects, {len(found.untestable)} more cannot be tested on these events")
     study = Study(model, found, train, bounds, fixed)
+    study.kernels.compile(tell)
     naming = alpha - ADEQUATE if alpha > 2 * ADEQUATE else alpha / 2  # the rest is spent on the adequacy test
     explanation = explain(study, naming, seed, tell)
     survivors, rivals = surviving(study, explanation, seed)
@@ -105,7 +106,7 @@ def _conclude(
 ) -> Finding:  # fmt: skip
     noise = explanation.stages[-1].noise
     bare = study.refit(noise, [((), _unchained(study, explanation.stages[0].fit, ()))], chain=())[0]
-    adequate = [s for s in survivors if s.adequate]
+    adequate = [s for s in survivors if s.adequate] if survivors[0].adequate else []
     carried, validation, kept = None, None, adequate
     extended_of = lambda r: study.refit(noise, [(r.fit.names, _unchained(study, r.fit, chain))], chain=chain)[0]  # noqa: E731
     extended = {s.fit.names: extended_of(s) for s in (adequate or survivors[:1])}
@@ -113,7 +114,7 @@ def _conclude(
         tell(f"judging {len(adequate)} explanation{'s' * (len(adequate) > 1)} on the held-out events")
         fits = [bare, *(extended[s.fit.names] for s in adequate)]
         other, units, other_noise = held_out(study.model, study.catalogue, validate, study, fits, bounds, fixed)
-        gaps = {s.fit.names: gap(other, units[0], u, other_noise, 2 * len(validate), seed)
+        gaps = {s.fit.names: gap(other, units[0], u, other_noise, other.before, seed)
                 for s, u in zip(adequate, units[1:], strict=True)}  # fmt: skip
         kept = [s for s in adequate if gaps[s.fit.names].gain > 0]
         shown = (kept or adequate)[0]
@@ -124,13 +125,13 @@ def _conclude(
     sets = [tuple(sorted((*s.fit.names, *chain))) for s in kept] if verdict in ("named", "tied") else []
     names = sets[0] if verdict in ("named", "tied") else ()
     after = extended[chosen.fit.names] if names else bare
-    free = len(study.base) + len(study.before) + len(study.parameters(names))
+    fitted = [*study.base, *study.before, *study.parameters(names)]
     stage = chosen.stage or explanation.stages[-1]
     return Finding(
         verdict, reason, names, sets,
         where(explanation.stages[0].projection, explanation.stages[0].null, alpha) if verdict != "none" else [],
         study.catalogue, study, explanation, rivals, bare, after,
-        gap(study, bare.unit, after.unit, stage.noise, free, seed), carried if names else None,
+        gap(study, bare.unit, after.unit, stage.noise, fitted, seed), carried if names else None,
         validation if names else None,
         deciding_event(study, kept) if verdict == "tied" else None, alpha,
     )  # fmt: skip
@@ -152,12 +153,12 @@ def _verdict(
     """The verdict and the sentence behind it."""
     base = explanation.stages[0]
     nothing = not explanation.chosen.names and not chain
-    if nothing and base.p_unrest >= ADEQUATE:
+    if nothing and base.p_left >= ADEQUATE:
         return "none", f"no disagreement above the noise, at a false-alarm rate of {alpha:.0%}"
     if not adequate:
         return "unexplained", (
             "the model and the records disagree, and nothing in the catalogue explains it: what is left after the best"
-            f" explanation would come about by chance with p = {survivors[0].stage.p_unrest:.2g}"
+            f" explanation would come about by chance with p = {survivors[0].stage.p_left:.2g}"
         )
     if not kept:
         return "unexplained", "what fits the training events does not help on the held-out ones"

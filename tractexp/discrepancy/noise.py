@@ -17,6 +17,7 @@ from tractexp.record import Event
 HIGHEST = 8  # order of the autoregressions
 TAIL = 0.35  # share of the record after the dip that counts as quiet
 BURN_IN = 500  # samples
+MANY = 200  # quiet samples from which shocks are drawn as they were seen, with their tails and steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +26,7 @@ class Noise:
 
     mix: np.ndarray  # (2, 2)
     channels: tuple[Autoregression, Autoregression]
+    shocks: tuple[np.ndarray, np.ndarray] | None = None  # of unit variance, as they were seen; None: normal
 
     def whiten(self, residuals: np.ndarray, drive: Drive, known: np.ndarray) -> np.ndarray:
         """(n, 2, N) to rows (n, 2 N) of independent unit variance; samples that do not count are 0."""
@@ -37,15 +39,17 @@ class Noise:
                 rows[:, c, part] = channel.whiten(mixed[:, c, part], both[part])
         return rows.reshape(len(rows), -1)
 
-    def draw(self, rng: np.random.Generator, samples: int) -> np.ndarray:
-        """One stretch of noise (2, samples) [pu]."""
+    def draw(self, rng: np.random.Generator, count: int, samples: int) -> np.ndarray:
+        """Stretches of noise (count, 2, samples) [pu]."""
         from scipy.signal import lfilter
 
         made = []
-        for channel in self.channels:
-            shocks = rng.standard_normal(samples + BURN_IN) * channel.deviation[-1]
-            made.append(lfilter([1.0], np.r_[1.0, -channel.coefficients[-1]], shocks)[BURN_IN:])
-        return np.linalg.solve(self.mix, np.array(made))
+        size = (count, samples + BURN_IN)
+        for c, channel in enumerate(self.channels):
+            shocks = rng.standard_normal(size) if self.shocks is None else rng.choice(self.shocks[c], size)
+            shocks *= channel.deviation[-1]
+            made.append(lfilter([1.0], np.r_[1.0, -channel.coefficients[-1]], shocks)[:, BURN_IN:])
+        return np.linalg.solve(self.mix, np.stack(made, axis=1))
 
     def describe(self) -> str:
         """Level and color, as a run prints them."""
@@ -82,5 +86,14 @@ def estimate(residuals: np.ndarray, known: np.ndarray, quiet: Sequence[slice]) -
     covariance = together @ together.T / count
     covariance += 1e-18 * np.eye(2)
     mix = np.linalg.inv(np.linalg.cholesky(covariance))
-    channels = [fit_autoregression([(mix @ p)[c] for p in pieces], HIGHEST) for c in (0, 1)]
-    return Noise(mix, (channels[0], channels[1]))
+    # Sparing, because a color that is not there changes the weight of slow differences, which every effect makes.
+    P, Q = (fit_autoregression([(mix @ p)[c] for p in pieces], HIGHEST, sparing=True) for c in (0, 1))
+    if count < MANY:
+        return Noise(mix, (P, Q))
+    return Noise(mix, (P, Q), (_shocks(P, [(mix @ p)[0] for p in pieces]), _shocks(Q, [(mix @ p)[1] for p in pieces])))
+
+
+def _shocks(channel: Autoregression, pieces: Sequence[np.ndarray]) -> np.ndarray:
+    """What the past of a channel does not predict, centered and scaled to unit variance."""
+    white = np.concatenate([channel.whiten(p, np.ones(len(p), dtype=bool))[channel.order :] for p in pieces])
+    return (white - white.mean()) / max(float(white.std()), 1e-300)

@@ -7,8 +7,10 @@ samples are few, for the error of that estimate too: each draw then estimates it
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import gammaincc
 
 from tractexp.discrepancy.noise import Noise
+from tractexp.discrepancy.study import Study
 from tractexp.discrepancy.tangent import Projection, Tangent, re_estimated, rich_residuals, windows
 
 DRAWS = 199
@@ -33,15 +35,37 @@ class Null:
 
     least_p: np.ndarray  # over all candidates and the measurement chain
     unrest: np.ndarray
+    unsteadiness: np.ndarray
     energy: np.ndarray
 
     def critical_p(self, alpha: float) -> float:
         """The p a single candidate must undercut so that chance names any with probability `alpha`."""
         return float(np.quantile(self.least_p, alpha, method="lower"))
 
-    def p_unrest(self, value: float) -> float:
-        """How often chance leaves as much unrest."""
-        return float((1 + np.count_nonzero(self.unrest >= value)) / (1 + len(self.unrest)))
+    def p_left(self, projection: Projection, study: Study) -> float:
+        """How often chance leaves as much as a fit does, by the most surprised of three tests.
+
+        Pushes into the balances (`unrest`), parameters that differ from event to event (`unsteadiness`), and the
+        loudest cell. A test's tail is that of a gamma or, for the maximum, a Gumbel distribution with the moments of
+        the draws, so that it reaches further than their number.
+        """
+        ps = [_gamma_tail(self.unrest, projection.unrest()[0])]
+        if len(study.events) > 1:
+            ps.append(_gamma_tail(self.unsteadiness, projection.unsteadiness()[0]))
+        mean, spread = self.energy.mean(axis=0), self.energy.std(axis=0) + 1e-12
+        loudest = ((self.energy - mean) / spread).max(axis=1)
+        ps.append(_gumbel_tail(loudest, ((energies(projection, study)[0] - mean) / spread).max()))
+        return min(1.0, len(ps) * min(ps))
+
+
+def _gamma_tail(draws: np.ndarray, value: float) -> float:
+    mean, variance = draws.mean(), max(draws.var(), 1e-300)
+    return float(gammaincc(mean**2 / variance, max(value, 0.0) * mean / variance))
+
+
+def _gumbel_tail(draws: np.ndarray, value: float) -> float:
+    scale = draws.std() * np.sqrt(6) / np.pi
+    return float(-np.expm1(-np.exp(-(value - draws.mean()) / scale - np.euler_gamma)))
 
 
 def null_of(t: Tangent, noise: Noise, seed: int, plain: bool, draws: int = DRAWS) -> Null:
@@ -49,7 +73,7 @@ def null_of(t: Tangent, noise: Noise, seed: int, plain: bool, draws: int = DRAWS
     study, drive = t.study, t.study.problem.drive
     rng = np.random.default_rng(seed)
     lengths = np.diff(drive.first)
-    made = np.array([np.concatenate([noise.draw(rng, n) for n in lengths], axis=1) for _ in range(draws)])
+    made = np.concatenate([noise.draw(rng, draws, n) for n in lengths], axis=2)
     made *= study.likelihood.known
     quiet = sum(p.stop - p.start for p in study.quiet)
     if plain or quiet >= FEW:
@@ -58,19 +82,21 @@ def null_of(t: Tangent, noise: Noise, seed: int, plain: bool, draws: int = DRAWS
     return _collect([t.whitened(re_estimated(t, rest[b]), made[b : b + 1]) for b in range(draws)], study)
 
 
-def _collect(projections: list[Projection], study) -> Null:
-    everything, unrest, energy = [], [], []
+def _collect(projections: list[Projection], study: Study) -> Null:
+    everything, unrest, unsteadiness, energy = [], [], [], []
     for projection in projections:
-        _, p = projection.drops()
+        _, p = projection.drops
         least = p.min(axis=0, initial=1.0)
         chain = np.array(list(projection.chain_p().values())).reshape(-1, len(least))
         everything.append(np.minimum(least, chain.min(axis=0, initial=1.0)))
         unrest.append(projection.unrest())
+        unsteadiness.append(projection.unsteadiness())
         energy.append(energies(projection, study))
-    return Null(np.maximum(np.concatenate(everything), SMALLEST_P), np.concatenate(unrest), np.concatenate(energy))
+    least_p = np.maximum(np.concatenate(everything), SMALLEST_P)
+    return Null(least_p, *map(np.concatenate, (unrest, unsteadiness, energy)))
 
 
-def cells_of(study) -> list[Cell]:
+def cells_of(study: Study) -> list[Cell]:
     """Every window of every event, for P and for Q."""
     made = []
     for e, event in enumerate(study.events):
@@ -84,8 +110,9 @@ def cells_of(study) -> list[Cell]:
     return made
 
 
-def energies(projection: Projection, study) -> np.ndarray:
-    """Whitened, projected energy of each residual in each cell, (b, cells)."""
+def energies(projection: Projection, study: Study) -> np.ndarray:
+    """Whitened, projected energy of each residual in each cell, (b, cells), over that of a sample in quiet."""
     N = study.problem.drive.samples
     square = projection.r[:, : 2 * N].reshape(len(projection.r), 2, N) ** 2
+    square /= np.mean(np.concatenate([square[:, :, part] for part in study.quiet], axis=2), axis=2, keepdims=True)
     return np.stack([square[:, "PQ".index(c.channel), c.part].sum(axis=1) for c in cells_of(study)], axis=1)

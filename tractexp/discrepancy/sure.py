@@ -2,8 +2,9 @@
 
 A rival is rejected when, were it the truth, the chosen set would not fit as well as it does (a test of separate
 hypotheses, Cox 1961): with lambda the squared distance between the two fitted curves in standard deviations, the
-rival's advantage would be normal with mean lambda and variance 4 lambda. Adequacy is the injection test at each
-survivor: what is named must leave nothing that a push into some balance still explains.
+rival's advantage would be normal with mean lambda and variance 4 lambda. Curves closer than the test's own quantile
+are never told apart. Adequacy is tested at each survivor: what is named must leave nothing that a push into some
+balance, or other parameters in each event, would still explain.
 """
 
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from tractexp.discrepancy.study import Refit, Study
 from tractexp.discrepancy.which import Explanation, Stage, stage
 
 ONE_SIDED = 1.6449  # standard deviations: 5 %
+REJECTED = 3.5  # standard deviations: more than chance asks for, since a true effect's formula is not quite its physics
 ADEQUATE = 0.01  # probability of rejecting an adequate explanation
 
 
@@ -23,7 +25,7 @@ class Rival:
     """A set of names of the chosen size: how far behind, how far apart, and whether the data reject it."""
 
     fit: Refit
-    behind: float  # of the deviance
+    behind: float  # of Akaike's criterion
     distance: float  # lambda, squared standard deviations
     rejected: bool
     stage: Stage | None = None  # the tests at its fit, where they were made
@@ -31,7 +33,7 @@ class Rival:
     @property
     def adequate(self) -> bool:
         """Whether nothing is left that a push into some balance explains."""
-        return self.stage is not None and self.stage.p_unrest >= ADEQUATE
+        return self.stage is not None and self.stage.p_left >= ADEQUATE
 
 
 def rivals(study: Study, explanation: Explanation) -> tuple[list[Rival], Noise]:
@@ -45,9 +47,10 @@ def rivals(study: Study, explanation: Explanation) -> tuple[list[Rival], Noise]:
     distance = ((rows - rows[0]) ** 2).sum(axis=1)
     found = []
     for fit, apart in zip(fits, distance, strict=True):
-        behind = fit.deviance - fits[0].deviance
-        far = max(float(apart) - 2.0, 0.0)  # the fits' own noise moves the curves apart too
-        rejected = behind > ONE_SIDED * 2 * np.sqrt(far) - far
+        behind = fit.cost - fits[0].cost
+        noise = fit.parameters + fits[0].parameters  # the fits' own noise moves the curves apart too
+        far = max(float(apart) - noise, REJECTED**2)
+        rejected = behind > 2 * REJECTED * np.sqrt(far) - far
         found.append(Rival(fit, behind, float(apart), bool(rejected and fit is not fits[0])))
     return found, last.noise
 

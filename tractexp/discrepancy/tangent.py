@@ -5,6 +5,7 @@ their prior, M = I - N (N'N)^-1 N', s = M W dy/deta of a candidate. Adding the c
 (s'r)^2/s's; the one-step estimate of its size is -s'r/s's with standard deviation 1/|s|.
 """
 
+import functools
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from tractexp.discrepancy.study import Refit, Study
 
 REACH = 0.5  # smallest relevant sizes: the step of a candidate's difference quotient
 NUISANCE_STEP = 1e-4  # of a coordinate's range
+DISTINCT = 1e-3  # of the largest singular value: directions weaker than this are rounding
 WINDOWS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)  # s after the end of the dip
 
 
@@ -54,13 +56,20 @@ class Tangent:
     estimate: np.ndarray  # (k,) the nuisances' departure from their prior mean, in its standard deviations (or 0)
     chain: dict[str, list[int]]  # which nuisances belong to which effect of the measurement chain
     columns: tuple[Column, ...]
+    split: np.ndarray  # (e, 2, N) differences of the fitted parameters, each in one event only
     cells: np.ndarray  # (c, 2, N) responses to injections
     groups: np.ndarray  # (c,) which balance an injection pushes
 
     def whitened(self, noise: Noise, residuals: np.ndarray | None = None) -> "Projection":
         """Project under this noise; `residuals` (b, 2, N) replace the fit's own (for the bootstrap)."""
         own = residuals is None
-        raw = [self.nuisance, self.residual[None] if own else residuals, *(c.raw for c in self.columns), self.cells]
+        raw = [
+            self.nuisance,
+            self.residual[None] if own else residuals,
+            *(c.raw for c in self.columns),
+            self.split,
+            self.cells,
+        ]
         ends = np.cumsum([len(part) for part in raw])
         white = noise.whiten(np.concatenate(raw), self.study.problem.drive, self.study.likelihood.known)
         rows = np.concatenate([white, np.zeros((len(white), len(self.prior)))], axis=1)
@@ -74,7 +83,7 @@ class Tangent:
         rest -= along @ Q.T
         parts = np.split(rest, ends[1:-1] - ends[0])
         departure = self.estimate if own else np.zeros_like(self.estimate)
-        return Projection(self, Q, R, parts[0], along[: len(parts[0])], departure, parts[1:-1], parts[-1])
+        return Projection(self, Q, R, parts[0], along[: len(parts[0])], departure, parts[1:-2], *parts[-2:])
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,8 +97,10 @@ class Projection:
     along: np.ndarray  # (b, k) the residuals' part along the nuisances
     departure: np.ndarray  # (k,) where the nuisances stand, off their prior mean
     blocks: list[np.ndarray]  # per column (k, R)
+    split: np.ndarray  # (e, R)
     cells: np.ndarray  # (c, R)
 
+    @functools.cached_property
     def drops(self) -> tuple[np.ndarray, np.ndarray]:
         """Drop of the deviance (columns, b) by adding each column, sizes in their allowed direction, and its p."""
         drops, ps = [], []
@@ -104,7 +115,7 @@ class Projection:
     def scores(self) -> list[Score]:
         """The candidates by drop, each at its best setting, for the fit's own residual."""
         best: dict[str, Score] = {}
-        drops, ps = self.drops()
+        drops, ps = self.drops
         for k, (column, block) in enumerate(zip(self.tangent.columns, self.blocks, strict=True)):
             name = column.candidate.name
             if name in best and best[name].drop >= drops[k, 0]:
@@ -142,6 +153,15 @@ class Projection:
         scale = np.array([power[kept][groups == g].mean() for g in groups])
         return (z / scale).sum(axis=1)
 
+    def unsteadiness(self) -> np.ndarray:
+        """How much parameters of their own for each event would lower the deviance, (b,)."""
+        scale = np.linalg.norm(self.split, axis=1, keepdims=True)
+        rows = self.split[scale[:, 0] > 1e-12] / scale[scale > 1e-12][:, None]
+        if not len(rows):
+            return np.zeros(len(self.r))
+        _, values, basis = np.linalg.svd(rows, full_matrices=False)
+        return ((self.r @ basis[values > DISTINCT * values[0]].T) ** 2).sum(axis=1)
+
 
 def _signed_drop(block: np.ndarray, r: np.ndarray, signs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Drop (b,) of |r|^2 by a least-squares multiple of the rows of `block` that keeps the signs, and its p.
@@ -173,9 +193,9 @@ def tangent(study: Study, fit: Refit) -> Tangent:
     inside = [*study.base, *study.before, *study.parameters(fit.names)]
     chain = {name: study.sizes([name]) for name in study.catalogue.chain}
     nuisances = [*inside, *(k for members in chain.values() for k in members)]
-    up, down = _two_sided(fit.unit, nuisances)
+    up, down = two_sided(fit.unit, nuisances)
     points, spans, labels = _candidate_points(study, fit)
-    injected, groups = _injections(study, fit)
+    injected, groups = injections(study, fit.unit)
     batch = np.concatenate([fit.unit[None], up, down, points, injected])
     raw = study.residuals(batch)
     k, m = len(nuisances), len(points)
@@ -193,10 +213,22 @@ def tangent(study: Study, fit: Refit) -> Tangent:
     for row, i in enumerate(rows):
         prior[row, i] = 1 / study.prior_deviation(nuisances[i])
         departure[i] = fit.unit[nuisances[i]] - study.null[nuisances[i]]
-    return Tangent(study, base, nuisance, prior, departure, members, tuple(columns), cells, groups)
+    fitted = [i for i, column in enumerate(nuisances) if column in {*study.base, *study.parameters(fit.names)}]
+    split = _by_event(study, nuisance[fitted])
+    return Tangent(study, base, nuisance, prior, departure, members, tuple(columns), split, cells, groups)
 
 
-def _two_sided(unit: np.ndarray, columns: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+def _by_event(study: Study, columns: np.ndarray) -> np.ndarray:
+    """Columns (k, 2, N) cut into one for each event, (k E, 2, N)."""
+    split = np.zeros((len(study.events), *columns.shape))
+    for e, rows in enumerate(split):
+        part = study.problem.drive.part(e)
+        rows[..., part] = columns[..., part]
+    return split.reshape(-1, *columns.shape[1:])
+
+
+def two_sided(unit: np.ndarray, columns: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Points (k, D) a small step above and below in each of the columns."""
     up, down = (np.tile(unit, (len(columns), 1)) for _ in "ud")
     for row, k in enumerate(columns):
         up[row, k] = min(unit[k] + NUISANCE_STEP, 1.0)
@@ -233,13 +265,13 @@ def windows(study: Study, event: int) -> list[tuple[float, float]]:
     return [(a, b) for a, b in itertools.pairwise(edges) if b > a]
 
 
-def _injections(study: Study, fit: Refit) -> tuple[np.ndarray, np.ndarray]:
-    """Pushes into each balance in each window of the union of the events' windows."""
+def injections(study: Study, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points (c, D) with a push into one balance in one window of the union of the events', and which balance."""
     spans = sorted({w for e in range(len(study.events)) for w in windows(study, e)})
     points, groups = [], []
     for g, push in enumerate(PUSHES):
         for a, b in spans:
-            point = fit.unit.copy()
+            point = unit.copy()
             point[study.column[push]] += 1e-3 / study.width(push)
             point[study.column["window_on"]] = study.to_unit("window_on", a)
             point[study.column["window_off"]] = study.to_unit("window_off", b)

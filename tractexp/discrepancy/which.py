@@ -4,6 +4,7 @@ Subsets are ranked exhaustively on the linearised problem, because forward selec
 look alike; the shortlist is refitted nonlinearly from several starts, side by side.
 """
 
+import functools
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -24,8 +25,10 @@ from tractexp.discrepancy.tangent import (
 )
 
 MOST_EFFECTS = 3
-SHORTLIST = 6  # sets of one size that are refitted
+SHORTLIST = {1: 10, 2: 8, 3: 6}  # sets of each size that are refitted
 CLOSE = 12.0  # of the deviance: a rough refit this near the best is made exact
+RARER = 0.1  # by how much a load effect beside one of the measurement chain must be rarer by chance than alone
+FURTHER = 1e-6  # p a further name must undercut: it would spoil a right first one, or patch up a wrong one
 PLAIN = 1e-10  # a score of this p needs no exact threshold
 NESTED = 0.1  # a set may be worse than its own subset by no more than this, or the refit did not converge
 
@@ -41,18 +44,25 @@ class Stage:
     null: Null
     scores: list[Score]
 
-    @property
-    def p_unrest(self) -> float:
-        return self.null.p_unrest(float(self.projection.unrest()[0]))
+    @functools.cached_property
+    def p_left(self) -> float:
+        """How often chance leaves as much as this fit does."""
+        return self.null.p_left(self.projection, self.tangent.study)
 
     def significant(self, alpha: float) -> bool:
         """Whether any further effect of the load helps more than chance does."""
-        return bool(self.scores) and self.scores[0].p < self.null.critical_p(alpha)
+        level = self.null.critical_p(alpha)
+        if self.fit.names:
+            level = min(level, FURTHER)
+        elif self.chain(alpha):
+            level *= RARER  # small p are uniform under the null
+        return bool(self.scores) and self.scores[0].p < level
 
     def chain(self, alpha: float) -> list[str]:
         """The measurement-chain effects that are not at their null."""
         critical = self.null.critical_p(alpha)
-        return sorted(name for name, p in self.projection.chain_p().items() if p[0] < critical)
+        level = min(critical, FURTHER) if self.fit.names else critical
+        return sorted(name for name, p in self.projection.chain_p().items() if p[0] < level)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,14 +99,14 @@ def explain(study: Study, alpha: float, seed: int, tell: Callable[[str], None] =
         wanted = shortlist(stages, size, study)
         tell(f"refitting {len(wanted)} {'effect' if size == 1 else f'sets of {size}'}{'s' * (size == 1)}")
         noise = stages[-1].noise
-        fits = study.refit(noise, [s for n in wanted for s in starts(study, stages, refits, n)], rough=True)
-        near = [f for f in fits if f.deviance < fits[0].deviance + CLOSE]
+        fits = study.rough_refit(noise, [s for n in wanted for s in starts(study, stages, refits, n)])
+        near = [f for f in fits if f.cost < fits[0].cost + CLOSE]
         exact = {f.names: f for f in study.refit(noise, [(f.names, f.unit) for f in near])}
         fits = [exact.get(f.names, f) for f in fits]
         refits |= {f.names: f for f in fits}
         fits = nested(study, noise, refits, fits)
         refits |= {f.names: f for f in fits}
-        best = min(fits, key=lambda f: (f.deviance, f.names))
+        best = min(fits, key=lambda f: (f.cost, f.names))
         stages.append(stage(study, best, noise, seed + size))
     return Explanation(stages, refits)
 
@@ -105,7 +115,7 @@ def shortlist(stages: Sequence[Stage], size: int, study: Study) -> list[tuple[st
     """The sets of `size` effects that lower the linearised deviance most: from the base fit, and by adding one."""
     sets: dict[tuple[str, ...], float] = {}
     last = stages[-1]
-    for score in last.scores[:SHORTLIST]:
+    for score in last.scores[: SHORTLIST[size]]:
         key = tuple(sorted((*last.fit.names, score.name)))
         sets[key] = last.fit.deviance - score.drop
     if size > 1:
@@ -118,7 +128,7 @@ def shortlist(stages: Sequence[Stage], size: int, study: Study) -> list[tuple[st
             drop = side @ np.linalg.pinv(block @ block.T, rcond=1e-9, hermitian=True) @ side
             value = base.fit.deviance - float(drop)
             sets[subset] = min(sets.get(subset, np.inf), value)
-    return sorted(sets, key=lambda s: (sets[s], s))[:SHORTLIST]
+    return sorted(sets, key=lambda s: (sets[s], s))[: SHORTLIST[size]]
 
 
 def _column(base: Stage, score: Score) -> np.ndarray:
@@ -160,7 +170,7 @@ def _place(study: Study, at: Stage, name: str, rank: int, point: np.ndarray) -> 
 
 def ranked_settings(at: Stage, name: str) -> list[tuple[Column, np.ndarray]]:
     """A candidate's settings by how much they lower the deviance, each with its one-step sizes."""
-    drops, _ = at.projection.drops()
+    drops, _ = at.projection.drops
     rows = []
     for k, (column, block) in enumerate(zip(at.tangent.columns, at.projection.blocks, strict=True)):
         if column.candidate.name == name:

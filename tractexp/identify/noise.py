@@ -62,10 +62,12 @@ def white_noise(deviation: float) -> Autoregression:
     return Autoregression(np.empty((1, 0)), np.array([max(deviation, SMALLEST)]))
 
 
-def fit_autoregression(stretches: Sequence[np.ndarray], highest: int = HIGHEST_ORDER) -> Autoregression:
-    """The autoregression of least AICc, by Burg's method over several stretches (n_i,) of one channel.
+def fit_autoregression(
+    stretches: Sequence[np.ndarray], highest: int = HIGHEST_ORDER, sparing: bool = False
+) -> Autoregression:
+    """The autoregression of least AICc (BIC if `sparing`), by Burg's method over several stretches (n_i,) of a channel.
 
-    The result is stationary whatever the data. Source: Burg 1975; Hurvich and Tsai 1989 (AICc).
+    The result is stationary whatever the data. Source: Burg 1975; Hurvich and Tsai 1989 (AICc); Schwarz 1978 (BIC).
     """
     count = sum(map(len, stretches))
     power = sum(float(x @ x) for x in stretches) / max(count, 1)
@@ -82,7 +84,8 @@ def fit_autoregression(stretches: Sequence[np.ndarray], highest: int = HIGHEST_O
         pairs = [(f - reflection * b, b - reflection * f) for f, b in zip(forward, backward, strict=True)]
         forward, backward = [f[1:] for f, _ in pairs], [b[:-1] for _, b in pairs]
     orders = np.arange(len(variance))
-    criterion = count * np.log(variance) + 2 * (orders + 1) * count / np.maximum(count - orders - 2, 1)
+    price = np.log(max(count, 2)) if sparing else 2 * count / np.maximum(count - orders - 2, 1)
+    criterion = count * np.log(variance) + (orders + 1) * price
     order = int(np.argmin(criterion))
     coefficients = np.zeros((order + 1, order))
     for k in range(order + 1):

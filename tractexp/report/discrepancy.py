@@ -55,7 +55,7 @@ def _gate(finding: Finding) -> str:
     first = finding.first
     best = first.scores[0] if first.scores else None
     critical = first.null.critical_p(finding.alpha)
-    text = f"The structured test of the base fit gives p = {first.p_unrest:.2g}."
+    text = f"The structured test of the base fit gives p = {first.p_left:.2g}."
     if best is None:
         return text
     return (
@@ -83,7 +83,7 @@ def _sure(made: Page, finding: Finding) -> None:
     rows = [
         [" and ".join(r.fit.names) or "the base model", f"{r.fit.deviance:.1f}", f"{r.behind:.1f}", f"{r.distance:.1f}",
          "rejected" if r.rejected else "adequate" if r.adequate else "not adequate",
-         "" if r.stage is None else f"{r.stage.p_unrest:.2g}"]
+         "" if r.stage is None else f"{r.stage.p_left:.2g}"]
         for r in finding.rivals[:12]
     ]  # fmt: skip
     made.table(
