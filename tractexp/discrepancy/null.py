@@ -14,7 +14,7 @@ from tractexp.discrepancy.study import Study
 from tractexp.discrepancy.tangent import Projection, Tangent, re_estimated, rich_residuals, windows
 
 DRAWS = 199
-FEW = 600  # quiet samples below which the noise estimate is itself uncertain
+FEW = 150  # independent quiet samples below which the noise estimate is itself uncertain
 SMALLEST_P = 1e-300
 
 
@@ -72,23 +72,23 @@ def null_of(t: Tangent, noise: Noise, seed: int, plain: bool, draws: int = DRAWS
     """Draw the null of every statistic at a fit; where the case is `plain`, with the noise taken as known."""
     study, drive = t.study, t.study.problem.drive
     rng = np.random.default_rng(seed)
-    lengths = np.diff(drive.first)
-    made = np.concatenate([noise.draw(rng, draws, n) for n in lengths], axis=2)
+    made = noise.draw(rng, draws, np.diff(drive.first).tolist())
     made *= study.likelihood.known
-    quiet = sum(p.stop - p.start for p in study.quiet)
-    if plain or quiet >= FEW:
-        return _collect([t.whitened(noise, made)], study)
+    if plain or noise.worth(sum(p.stop - p.start for p in study.quiet)) >= FEW:
+        return _collect([t.whitened(noise, made)], study, noise.blurred)
     rest = rich_residuals(t, made)
-    return _collect([t.whitened(re_estimated(t, rest[b]), made[b : b + 1]) for b in range(draws)], study)
+    return _collect([t.whitened(re_estimated(t, rest[b]), made[b : b + 1]) for b in range(draws)], study, noise.blurred)
 
 
-def _collect(projections: list[Projection], study: Study) -> Null:
+def _collect(projections: list[Projection], study: Study, blurred: bool) -> Null:
     everything, unrest, unsteadiness, energy = [], [], [], []
     for projection in projections:
         _, p = projection.drops
         least = p.min(axis=0, initial=1.0)
-        chain = np.array(list(projection.chain_p().values())).reshape(-1, len(least))
-        everything.append(np.minimum(least, chain.min(axis=0, initial=1.0)))
+        if not blurred:
+            chain = np.array(list(projection.chain_p().values())).reshape(-1, len(least))
+            least = np.minimum(least, chain.min(axis=0, initial=1.0))
+        everything.append(least)
         unrest.append(projection.unrest())
         unsteadiness.append(projection.unsteadiness())
         energy.append(energies(projection, study))

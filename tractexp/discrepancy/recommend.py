@@ -1,7 +1,7 @@
 """The event that would decide between effects that fit equally well."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import ndtr
@@ -49,7 +49,9 @@ def _lambda(study: Study, truth: Rival, rival: Rival, depth: float, duration: fl
     points = np.concatenate([truth.fit.unit[None], rival.fit.unit[None], up, down])[:, : study.problem.space.dimension]
     values = study.problem.full(study.problem.space.from_unit(points))
     response = study.problem.model.simulate(drive, values, int(study.problem.step.substeps.max()))
-    rows = rival.stage.noise.whiten(np.stack([response.P, response.Q], axis=1), drive, drive.weights > 0)
+    rows = replace(rival.stage.noise, trust=None).whiten(
+        np.stack([response.P, response.Q], axis=1), drive, drive.weights > 0
+    )
     k = len(inside)
     d, J = rows[0] - rows[1], (rows[2 : 2 + k] - rows[2 + k :]) / width[:, None]
     if not np.isfinite(rows).all():

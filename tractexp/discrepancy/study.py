@@ -12,8 +12,11 @@ import numpy as np
 from tractexp.discrepancy.catalogue import Catalogue
 from tractexp.discrepancy.kernels import Kernels, side_by_side
 from tractexp.discrepancy.noise import Noise, estimate, quiet_stretches
+from tractexp.discrepancy.voltage import Blur, smooth
+from tractexp.discrepancy.wander import Wander, find
 from tractexp.identify.descent import Apart, descend
 from tractexp.identify.likelihood import Likelihood
+from tractexp.identify.problem import Problem
 from tractexp.model.model import Model
 from tractexp.record import Event
 
@@ -56,8 +59,10 @@ class Study:
         fixed: Mapping[str, float],
         substeps: int | None = None,
     ):
-        self.model, self.catalogue, self.events = model, catalogue, tuple(events)
-        self.kernels = Kernels(model, catalogue, events, bounds, fixed, substeps)
+        self.model, self.catalogue, self.recorded = model, catalogue, tuple(events)
+        self.events, self.left = smooth(events)
+        self.kernels = Kernels(model, catalogue, self.events, bounds, fixed, substeps)
+        self.blur: Blur | None = None
         self.problem = self.kernels.whole
         self.likelihood = Likelihood.of(self.problem)
         space = self.problem.space
@@ -205,6 +210,7 @@ class Study:
         """The base model with the chain free, and the noise of its residuals in quiet stretches."""
         noise = self.white()
         fit = self.refit(noise, [((), start) for start in self._base_starts()])[0]
+        self.blur = self._blurred(fit.unit)
         for _ in range(2):
             noise = self.noise(fit.unit)
             fit = self.refit(noise, [((), fit.unit)])[0]
@@ -231,4 +237,23 @@ class Study:
 
     def noise(self, unit: np.ndarray) -> Noise:
         """The noise of the quiet residuals at a fit."""
-        return estimate(self.residuals(unit[None])[0], self.likelihood.known, self.quiet)
+        return self.noise_in(self.residuals(unit[None])[0])
+
+    def noise_in(self, residual: np.ndarray) -> Noise:
+        """The noise of one residual (2, N) in quiet stretches."""
+        return estimate(residual, self.likelihood.known, self.quiet, self._wander, self.blur)
+
+    def _wander(self, mix: np.ndarray) -> Wander | None:
+        """How the load wanders before the events, in mixed channels."""
+        drive = self.problem.drive
+        before = [drive.measured[:, drive.part(e)][:, event.steady] for e, event in enumerate(self.events)]
+        return find([mix @ b for b in before if np.isfinite(b).all()], self.events[0].record.step)
+
+    def _blurred(self, unit: np.ndarray) -> Blur | None:
+        """What noise of the voltage does to the calculated power at a fit of the base model."""
+        if not self.left.any():
+            return None
+        bare, own = self.kernels.bare, np.r_[unit[self.base], unit[self.before]][None]
+        raw = Problem(self.model, self.recorded, self.kernels.bounds, self.kernels.fixed, self.kernels.substeps)
+        noisy, smooth = (Likelihood.of(p).residuals(own)[0] for p in (raw, bare))
+        return Blur(np.nan_to_num(noisy - smooth), self.left)

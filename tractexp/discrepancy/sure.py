@@ -2,9 +2,10 @@
 
 A rival is rejected when, were it the truth, the chosen set would not fit as well as it does (a test of separate
 hypotheses, Cox 1961): with lambda the squared distance between the two fitted curves in standard deviations, the
-rival's advantage would be normal with mean lambda and variance 4 lambda. Curves closer than the test's own quantile
-are never told apart. Adequacy is tested at each survivor: what is named must leave nothing that a push into some
-balance, or other parameters in each event, would still explain.
+rival's advantage would be normal with mean lambda and variance 4 lambda. Curves closer than the test's own quantile,
+and rivals that explain nearly as much, are never told apart: effects are formulas, not the physics. Adequacy is
+tested at each survivor: what is named must leave nothing that a push into some balance, or other parameters in each
+event, would still explain.
 """
 
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ from tractexp.discrepancy.which import Explanation, Stage, stage
 
 ONE_SIDED = 1.6449  # standard deviations: 5 %
 REJECTED = 3.5  # standard deviations: more than chance asks for, since a true effect's formula is not quite its physics
+ALIKE = 0.05  # of what the best explains: no rival this near is rejected, for no formula is that exact
 ADEQUATE = 0.01  # probability of rejecting an adequate explanation
 
 
@@ -42,6 +44,8 @@ def rivals(study: Study, explanation: Explanation) -> tuple[list[Rival], Noise]:
     size = len(last.fit.names)
     wanted = [(f.names, f.unit) for f in explanation.refits.values() if len(f.names) == size]
     fits = study.refit(last.noise, wanted)
+    base = study.refit(last.noise, [((), explanation.stages[0].fit.unit)])[0]
+    alike = ALIKE * max(base.cost - fits[0].cost, 0.0)
     chain = study.parameters(study.catalogue.chain)
     rows = study.rows(np.array([f.unit for f in fits]), last.noise, chain)
     distance = ((rows - rows[0]) ** 2).sum(axis=1)
@@ -50,7 +54,7 @@ def rivals(study: Study, explanation: Explanation) -> tuple[list[Rival], Noise]:
         behind = fit.cost - fits[0].cost
         noise = fit.parameters + fits[0].parameters  # the fits' own noise moves the curves apart too
         far = max(float(apart) - noise, REJECTED**2)
-        rejected = behind > 2 * REJECTED * np.sqrt(far) - far
+        rejected = behind > max(2 * REJECTED * np.sqrt(far) - far, alike)
         found.append(Rival(fit, behind, float(apart), bool(rejected and fit is not fits[0])))
     return found, last.noise
 

@@ -15,7 +15,7 @@ from scipy.special import chdtrc
 
 from tractexp.discrepancy.catalogue import Candidate
 from tractexp.discrepancy.injection import PUSHES
-from tractexp.discrepancy.noise import Noise, estimate
+from tractexp.discrepancy.noise import Noise
 from tractexp.discrepancy.study import Refit, Study
 
 REACH = 0.5  # smallest relevant sizes: the step of a candidate's difference quotient
@@ -293,4 +293,4 @@ def rich_residuals(t: Tangent, residuals: np.ndarray) -> np.ndarray:
 
 def re_estimated(t: Tangent, residual: np.ndarray) -> Noise:
     """Noise estimated anew from one residual (2, N)."""
-    return estimate(residual, t.study.likelihood.known, t.study.quiet)
+    return t.study.noise_in(residual)

@@ -59,7 +59,12 @@ class Stage:
         return bool(self.scores) and self.scores[0].p < level
 
     def chain(self, alpha: float) -> list[str]:
-        """The measurement-chain effects that are not at their null."""
+        """The measurement-chain effects that are not at their null.
+
+        None where the voltage is noisy: whatever smooths the calculated power would seem to be there.
+        """
+        if self.noise.blurred:
+            return []
         critical = self.null.critical_p(alpha)
         level = min(critical, FURTHER) if self.fit.names else critical
         return sorted(name for name, p in self.projection.chain_p().items() if p[0] < level)

@@ -1,0 +1,74 @@
+"""Slow wandering of the load: trains accelerate and others come and go while an event is recorded.
+
+A random walk over an event is a sum of cosines whose amplitudes fall with the frequency (Karhunen and Loeve); their
+prior is divided out of the residuals like the rest of the noise, so that no slow effect is named for it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.identify.noise import fit_autoregression
+
+MODES = 32
+SLOW = 3  # cosines of a stretch that belong to wandering before its fast noise is modelled
+SEEN = 3.0  # of twice the log-likelihood, without which there is no wandering
+GRID = np.geomspace(1e-3, 1e4, 71)  # of the intensity, variances of the channel per second
+
+
+@dataclass(frozen=True, eq=False)
+class Wander:
+    """Random walks of two channels: `intensity` (2,) is the variance gained in a second."""
+
+    intensity: np.ndarray
+    step: float  # s
+
+    def modes(self, channel: int, samples: int) -> np.ndarray:
+        """Cosines (k, samples) scaled by the standard deviation of their amplitudes."""
+        return np.sqrt(self.intensity[channel]) * _cosines(samples, self.step, min(MODES, samples // 8))
+
+
+def find(before: Sequence[np.ndarray], step: float) -> Wander | None:
+    """The wandering of two channels in stretches (2, n_i) before the events; None where there is none to be seen.
+
+    The intensity of most likelihood given the fast noise, and to be safe the largest that is half a unit of the
+    logarithm less likely.
+    """
+    stretches = [b for b in before if b.shape[1] >= 8 * (SLOW + 2)]
+    if not stretches:
+        return None
+    intensity = np.array([_intensity([s[c] for s in stretches], step) for c in (0, 1)])
+    return Wander(intensity, step) if intensity.any() else None
+
+
+def without_slow(stretch: np.ndarray) -> np.ndarray:
+    """A stretch (n,) without its mean and slowest cosines."""
+    basis = np.vstack([np.ones(len(stretch)), _cosines(len(stretch), 1.0, SLOW)])
+    basis /= np.linalg.norm(basis, axis=1, keepdims=True)
+    return stretch - (stretch @ basis.T) @ basis
+
+
+def _cosines(samples: int, step: float, count: int) -> np.ndarray:
+    """Modes (count, samples) of a random walk that gains a variance of one in a second."""
+    length = samples * step
+    w = np.pi * np.arange(1, count + 1)[:, None] / length
+    return np.sqrt(2 / length) / w * np.cos(w * (np.arange(samples) + 0.5) * step)
+
+
+def _intensity(stretches: Sequence[np.ndarray], step: float) -> float:
+    fast = fit_autoregression([without_slow(s) for s in stretches], sparing=True)
+    total = np.zeros(len(GRID) + 1)
+    for stretch in stretches:
+        n = len(stretch)
+        rows = np.vstack([np.ones(n), stretch, _cosines(n, step, min(MODES, n // 8))])
+        one, x, *modes = fast.whiten(rows, np.ones(n, dtype=bool))
+        one /= np.linalg.norm(one)
+        modes = np.array(modes) - np.outer(modes @ one, one)
+        _, values, basis = np.linalg.svd(modes, full_matrices=False)
+        spread = 1 + np.outer(np.concatenate(([0.0], GRID)), values**2)
+        total -= (np.log(spread) + (basis @ (x - (x @ one) * one)) ** 2 / spread).sum(axis=1) / 2
+    best = int(total.argmax())
+    if best == 0 or 2 * (total[best] - total[0]) < SEEN:
+        return 0.0
+    return float(GRID[np.flatnonzero(total[1:] > total[best] - 0.5)[-1]])
