@@ -6,6 +6,7 @@ other here, so that the tests stay short. The study over the whole catalogue is 
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,13 +15,16 @@ from test_cli import tractexp
 
 from hidden_effects import Case, Noise, make, write
 from tractexp.discrepancy.catalogue import catalogue
-from tractexp.discrepancy.contract import contract, write_model
+from tractexp.discrepancy.contract import contract, write_left, write_model
 from tractexp.discrepancy.investigate import check_events, investigate, judge
 from tractexp.discrepancy.noise import Noise as PowerNoise
 from tractexp.discrepancy.noise import estimate
 from tractexp.discrepancy.study import Study
 from tractexp.discrepancy.tangent import _signed_drop, tangent
+from tractexp.discrepancy.voltage import smoothed
+from tractexp.discrepancy.wander import Wander, find
 from tractexp.errors import UserError
+from tractexp.identify.descent import Apart, normal
 from tractexp.identify.noise import Autoregression, white_noise
 from tractexp.model.model import compose
 from tractexp.plugin import get
@@ -129,11 +133,92 @@ def test_noise_that_is_drawn_is_noise_that_is_found():
     mix = np.linalg.inv(np.array([[0.004, 0.0], [0.002, 0.003]]))
     color = Autoregression(np.array([[0.0], [0.8]]), np.array([1.0, 0.6]))
     noise = PowerNoise(mix, (color, white_noise(1.0)))
-    drawn = noise.draw(np.random.default_rng(7), 1, 40000)[0]
+    drawn = noise.draw(np.random.default_rng(7), 1, [40000])[0]
     found = estimate(drawn, np.ones(drawn.shape, dtype=bool), [slice(0, 40000)])
     covariance = np.linalg.inv(mix) @ np.linalg.inv(mix).T
     assert np.cov(drawn) == pytest.approx(covariance, rel=0.1)
     assert found.channels[0].coefficients[-1, 0] == pytest.approx(0.8, abs=0.03)
+
+
+def test_a_load_that_wanders_is_seen_before_the_events_and_steady_noise_is_not():
+    rng = np.random.default_rng(8)
+    white = [rng.normal(size=(2, 250)) for _ in range(3)]
+    assert find(white, 0.002) is None
+    walks = [w + np.cumsum(rng.normal(size=(2, 250)) * np.array([[0.05], [0.0]]), axis=1) for w in white]
+    found = find(walks, 0.002)
+    assert found.intensity[0] == pytest.approx(0.05**2 / 0.002, rel=1.0)  # the larger end of its interval
+    assert found.intensity[1] == 0
+
+
+def test_noise_of_a_wandering_load_is_white_once_whitened():
+    """Draws that wander come out of the whitening with unit variance, also in their slow sums."""
+    noise = PowerNoise(np.eye(2), (white_noise(1.0), white_noise(1.0)), wander=Wander(np.array([2.0, 0.0]), 0.002))
+    drive = SimpleNamespace(events=1, samples=600, part=lambda e: slice(0, 600))
+    drawn = noise.draw(np.random.default_rng(9), 400, [600])
+    rows = noise.whiten(drawn, drive, np.ones((2, 600), dtype=bool)).reshape(400, 2, 600)
+    slow = np.cos(np.pi * (np.arange(600) + 0.5) / 600) * np.sqrt(2 / 600)
+    assert np.var(drawn[:, 0] @ slow) > 50
+    assert np.var(rows[:, 0] @ slow) == pytest.approx(1.0, abs=0.2)
+    assert rows.var() == pytest.approx(1.0, abs=0.02)
+
+
+def test_noise_of_the_voltage_is_taken_out_where_it_is_smooth():
+    clean, noisy = (events(noise=Noise(0.002, voltage=v), count=1)[0] for v in (0.0, 0.002))
+    same, left = smoothed(clean)
+    assert same is clean
+    assert not left.any()
+    made, left = smoothed(noisy)
+    off = made.record.U - clean.record.U
+    quiet = slice(0, clean.start - 20)
+    assert off[quiet].std() < 0.3 * (noisy.record.U - clean.record.U)[quiet].std()
+    assert left[quiet].max() < 0.1
+    assert left[clean.start] > 1  # at the edge the average may be biased
+
+
+def test_a_voltage_too_noisy_to_tell_anything_is_refused():
+    with pytest.raises(UserError, match=r"noise of the recorded voltage moves the calculated power"):
+        investigate(base(), events(noise=Noise(0.0005, voltage=0.01)), (), {}, {}, only=FEW)
+
+
+def test_an_effect_outside_the_catalogue_is_unexplained_and_what_is_left_is_written(tmp_path):
+    found = investigate(base(), events("load_step", size=3.0, count=3)[:2], (), {}, {}, only=FEW)
+    assert found.verdict == "unexplained"
+    assert found.names == ()
+    made = contract(found)
+    if found.nearest is not None:
+        assert made["nearest"]["effects"]
+        assert 0 < made["nearest"]["explained"] < 1
+    rows = np.genfromtxt(write_left(found, tmp_path / "left.csv"), delimiter=",", names=True, dtype=None, encoding=None)
+    assert len(rows) == sum(e.record.samples for e in found.study.events)
+    assert np.abs(rows["P"]).max() > 5 * 0.002  # the step stands out of the noise
+
+
+def test_a_sets_own_kernel_gives_what_the_kernel_of_everything_gives(silent):
+    study = silent.study
+    unit = study.null.copy()
+    unit[study.sizes(["stator_resistance"])] = study.to_unit("R_s", 0.02)
+    own, whole = study.residuals(unit[None], ("stator_resistance",)), study.residuals(unit[None])
+    assert own == pytest.approx(whole, abs=1e-10)
+
+
+def test_coordinates_that_act_on_different_rows_share_one_difference():
+    """The normal equations are those of one difference for each coordinate, from fewer simulations."""
+    rng = np.random.default_rng(10)
+    J = rng.normal(size=(40, 3))
+    J[20:, 1], J[:20, 2] = 0, 0
+    calls = []
+
+    def rows(x, lanes):
+        calls.append(len(x))
+        return np.sin(x @ J.T)
+
+    unit, lanes = np.full((2, 3), 0.4), np.arange(2)
+    masks = np.array([np.arange(40) < 20, np.arange(40) >= 20])
+    alone = normal(rows, unit, rows(unit, lanes), lanes)
+    together = normal(rows, unit, rows(unit, lanes), lanes, [Apart(np.array([1, 2]), masks)])
+    for one, other in zip(alone, together, strict=True):
+        assert other == pytest.approx(one, rel=1e-9)
+    assert calls == [2, 6, 2, 4]
 
 
 def test_candidates_at_their_null_leave_the_base_model(silent):

@@ -23,6 +23,7 @@ def contract(finding: Finding) -> dict[str, Any]:
             "train": _gap(finding.train),
             "validate": None if finding.validate is None else _gap(finding.validate),
         },
+        "nearest": _nearest(finding),
         "candidates": [*_sets(finding), *_singles(finding)],
         "recommendation": recommendation(finding),
         "noise": finding.last.noise.describe(),
@@ -42,7 +43,9 @@ def recommendation(finding: Finding) -> str:
             f" with a probability of {d.probability:.0%}"
         )
     if finding.verdict == "unexplained":
-        return "look at the residual's waveform and at what switched at that time; no effect of the catalogue fits it"
+        return (
+            "look at what is left (unexplained.csv) and at what switched at that time; no effect of the catalogue fits"
+        )
     if finding.verdict == "named":
         return "use the extended model; judge it on further events as they come"
     return "use the base model; what is missing, if anything, is below the limits given for each effect"
@@ -73,6 +76,32 @@ def _standard_errors(finding: Finding) -> dict[str, float]:
 
 def _gap(gap: Gap) -> dict[str, Any]:
     return {"before": _curves(gap.before), "after": _curves(gap.after), "closed": _number(gap.closed)}
+
+
+def _nearest(finding: Finding) -> dict[str, Any] | None:
+    """The set that comes nearest where nothing explains the disagreement, with the shares it explains."""
+    near = finding.nearest
+    if near is None:
+        return None
+    others = [{"effects": list(names), "explained": _number(share)} for names, share in near.others]
+    return {
+        "effects": list(near.names), "explained": _number(near.fitted), "explained_held_out": _number(near.held_out),
+        "others": others,
+    }  # fmt: skip
+
+
+def write_left(finding: Finding, path: Path) -> Path:
+    """Write what the nearest candidates leave, measured less calculated [pu], as CSV: event, t [s], P, Q."""
+    study = finding.study
+    near = finding.train.before.calculated if finding.nearest is None else finding.nearest.calculated
+    part = path.with_suffix(".part")
+    with part.open("w", encoding="utf-8") as file:
+        file.write("event,t,P,Q\n")
+        for e, event in enumerate(study.events):
+            left = study.problem.drive.measured[:, study.problem.drive.part(e)] - near[:, study.problem.drive.part(e)]
+            for t, P, Q in zip(event.record.t, *left, strict=True):
+                file.write(f"{event.record.name},{t:.9g},{P:.9g},{Q:.9g}\n")
+    return part.replace(path)
 
 
 def _curves(curves: Curves) -> dict[str, float]:

@@ -8,7 +8,8 @@ import numpy as np
 from scipy.special import ndtr
 
 from tractexp.discrepancy.catalogue import Catalogue, catalogue
-from tractexp.discrepancy.gap import Gap, gap, held_out
+from tractexp.discrepancy.gap import Gap, curves, gap, held_out
+from tractexp.discrepancy.noise import Noise
 from tractexp.discrepancy.recommend import Decider, deciding_event
 from tractexp.discrepancy.study import Refit, Study
 from tractexp.discrepancy.sure import ADEQUATE, ONE_SIDED, Rival, surviving
@@ -20,6 +21,20 @@ from tractexp.model.model import Model
 from tractexp.record import Event
 
 TESTABLE = 0.8  # power at the smallest relevant size below which an effect cannot be tested on the data
+
+
+@dataclass(frozen=True, eq=False)
+class Nearest:
+    """Where nothing explains the disagreement: the set that comes nearest, and what it leaves.
+
+    Shares are of the deviance in excess of the noise, on the fitted and on the held-out events (nan without any).
+    """
+
+    names: tuple[str, ...]
+    fitted: float
+    held_out: float
+    calculated: np.ndarray  # (2, N) pu, of the fitted events end to end
+    others: list[tuple[tuple[str, ...], float]]  # the next ones, with their shares on the fitted events
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +56,7 @@ class Finding:
     validate: Gap | None
     validation: tuple[Study, list[np.ndarray]] | None  # held-out events, coordinates of base and extended there
     decider: Decider | None
+    nearest: Nearest | None  # where the verdict is "unexplained"
     alpha: float
 
     @property
@@ -133,8 +149,29 @@ def _conclude(
         study.catalogue, study, explanation, rivals, bare, after,
         gap(study, bare.unit, after.unit, stage.noise, fitted, seed), carried if names else None,
         validation if names else None,
-        deciding_event(study, kept) if verdict == "tied" else None, alpha,
+        deciding_event(study, kept) if verdict == "tied" else None,
+        _nearest(study, bare, rivals, noise, validate, bounds, fixed) if verdict == "unexplained" else None, alpha,
     )  # fmt: skip
+
+
+def _nearest(
+    study: Study, bare: Refit, rivals: list[Rival], noise: Noise, validate: Sequence[Event], bounds: Mapping,
+    fixed: Mapping,
+) -> Nearest | None:  # fmt: skip
+    if not rivals[0].fit.names:
+        return None
+    before, after = curves(study, bare.unit, noise), curves(study, rivals[0].fit.unit, noise)
+    excess = max(before.deviance - study.likelihood.samples, 1e-300)
+    held = float("nan")
+    if validate:
+        other, units, level = held_out(
+            study.model, study.catalogue, validate, study, [bare, rivals[0].fit], dict(bounds), dict(fixed)
+        )
+        there = [curves(other, u, level).deviance for u in units]
+        held = (there[0] - there[1]) / max(there[0] - other.likelihood.samples, 1e-300)
+    others = [(r.fit.names, (before.deviance - r.fit.deviance) / excess) for r in rivals[1:4]]
+    share = (before.deviance - after.deviance) / excess
+    return Nearest(rivals[0].fit.names, float(share), float(held), after.calculated, others)
 
 
 def _unchained(study: Study, fit: Refit, chain: Sequence[str]) -> np.ndarray:

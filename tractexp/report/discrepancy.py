@@ -12,12 +12,20 @@ from tractexp.report.page import Page
 
 KIND = {"none": "good", "named": "good", "tied": "plain", "unexplained": "bad"}
 
+CAPTIONS = {
+    "gap": "Before and after on the fitted events, measured less calculated.",
+    "gap_held_out": "Before and after on the held-out events, measured less calculated.",
+    "unexplained": "What the nearest candidates leave of the base model's residuals (gray): what is missing looks so.",
+}
+
 
 def report(folder: Path, finding: Finding, title: str) -> list[Path]:
-    """Write residuals.svg, gap.svg and discrepancy.html into `folder`; returns their paths."""
+    """Write the figures and discrepancy.html into `folder`; returns their paths."""
     figures = [residuals(folder / "residuals.svg", finding), smaller(folder / "gap.svg", finding, held=False)]
     if finding.validation is not None:
         figures.append(smaller(folder / "gap_held_out.svg", finding, held=True))
+    if finding.nearest is not None:
+        figures.append(left(folder / "unexplained.svg", finding))
     return [*figures, page(folder / "discrepancy.html", finding, figures, title)]
 
 
@@ -46,7 +54,7 @@ def page(path: Path, finding: Finding, figures: list[Path], title: str) -> Path:
     made.heading("7 Smaller")
     made.table(["events", "", "epsilon_p", "epsilon_q", "chi2 per sample", "gap closed"], _gap_rows(finding))
     for figure in figures[1:]:
-        made.figure(figure, "Before and after, measured less calculated.")
+        made.figure(figure, CAPTIONS[figure.stem])
     made.heading("Next").text(recommendation(finding))
     return made.write(path)
 
@@ -91,6 +99,13 @@ def _sure(made: Page, finding: Finding) -> None:
         "Every set of this size that was refitted. A set is rejected when, were it true, the best would not fit so"
         " well.", words=(4,),
     )  # fmt: skip
+    if finding.nearest is not None:
+        near = finding.nearest
+        held = f"{near.held_out:.0%}" if np.isfinite(near.held_out) else ""
+        rows = [[" and ".join(near.names), f"{near.fitted:.0%}", held]]
+        rows += [[" and ".join(names), f"{share:.0%}", ""] for names, share in near.others]
+        made.table(["nearest candidates", "explains on the fitted events", "on the held-out events"], rows,
+                   "None of them is adequate. Shares of the deviance in excess of the noise.")  # fmt: skip
     if len(finding.sets) > 1:
         made.text("These cannot be told apart on these events: " + "; ".join(" and ".join(s) for s in finding.sets))
 
@@ -135,6 +150,13 @@ def residuals(path: Path, finding: Finding) -> Path:
     """The base model's residuals of every event, with the intervals that stand out shaded."""
     study, calculated = finding.study, finding.train.before.calculated
     return _panels(path, study, [("base model", calculated, None)], finding.places)
+
+
+def left(path: Path, finding: Finding) -> Path:
+    """What the nearest candidates leave of the base model's residuals."""
+    assert finding.nearest is not None
+    before = ("base model", finding.train.before.calculated, style.BEHIND)
+    return _panels(path, finding.study, [before, ("nearest candidates", finding.nearest.calculated, None)], ())
 
 
 def smaller(path: Path, finding: Finding, held: bool) -> Path:

@@ -37,6 +37,8 @@ class Discrepancy(Task):
         extended = contract.write_model(finding, node, job.folder / "conf" / "model" / "extended.yaml")
         result = extended_result(job, finding, events)
         paths = [contract.write(finding, job.folder / "discrepancy.json"), extended, result]
+        if finding.verdict == "unexplained":
+            paths.append(contract.write_left(finding, job.folder / "unexplained.csv"))
         paths += draw(job, finding)
         for path in paths:
             say(f"  {path}")
@@ -77,6 +79,10 @@ def tell(finding: Any) -> None:
         say(f"share of the explainable gap closed on the fitted events: {finding.train.closed:.0%}")
     if finding.validate is not None:
         say(f"share of the explainable gap closed on the held-out events: {finding.validate.closed:.0%}")
+    if finding.nearest is not None:
+        near = finding.nearest
+        held = f", {near.held_out:.0%} on the held-out events" if np.isfinite(near.held_out) else ""
+        say(f"nearest: {' and '.join(near.names)} explains {near.fitted:.0%} of what exceeds the noise{held}")
     say(f"next: {recommendation(finding)}")
     say()
 
