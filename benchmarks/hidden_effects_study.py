@@ -1,27 +1,41 @@
 """Run the suites through the product and count: false alarms, names found, abstentions, gaps closed.
 
-    python hidden_effects_study.py --suite nulls --count 100        (from the folder benchmarks)
+    python hidden_effects_study.py --docs        (from the folder benchmarks)
 
-Each trial is made by the independent generator, investigated by `tractexp.discrepancy`, and also ranked by AIC, BIC
-and RMSE on the same refits. Rows are appended to a JSON-lines file, so that a study can be stopped and taken up.
+Each trial is made by the independent generator, its last event held out, and investigated by `tractexp.discrepancy`.
+AIC, BIC and RMSE rank the same candidates on the same data. Rows are appended to a JSON-lines file, so that a study
+can be stopped and taken up; `--docs` writes tables and figures into docs/missing-effects.md.
 """
 
 import argparse
 import json
 import os
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 for library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
+import hidden_effects_evidence as evidence  # noqa: E402
 import numpy as np  # noqa: E402
 
 from hidden_effects import cases  # noqa: E402
-from hidden_effects.effects import CATALOG  # noqa: E402
-from hidden_effects.generator import make  # noqa: E402
+from hidden_effects.effects import CATALOG, PHYSICAL  # noqa: E402
+from hidden_effects.generator import make, scene, truth  # noqa: E402
 from hidden_effects.outside import OUTSIDE  # noqa: E402
+
+SUITES = ("nulls", "nuisances", "single", "outside", "left_out", "pairs")
+LEFT_OUT = "left out "  # the group of trials whose effect is taken from the catalogue
+SAME = {  # effects whose amount is a parameter of the model, in its units
+    "stator_resistance": "R_s",
+    "speed_dependent_torque": "quadratic_share",
+    "second_motor_group": "group_share",
+    "undervoltage_trip": "tripped_share",
+    "time_skew": "skew",
+    "measurement_window": "window",
+}
 
 
 def suite(name: str, count: int, events: int) -> Iterator[tuple[str, cases.Trial]]:
@@ -41,112 +55,146 @@ def suite(name: str, count: int, events: int) -> Iterator[tuple[str, cases.Trial
                 yield from (
                     (f"outside {multiple:g} x", t) for t in cases.single(effect, multiple, count, events=events)
                 )
+    elif name == "left_out":
+        for multiple in (2.0, 4.0, 8.0):
+            for effect in PHYSICAL:
+                yield from (
+                    (f"{LEFT_OUT}{multiple:g} x", t) for t in cases.single(effect, multiple, count, events=events)
+                )
     elif name == "pairs":
         for multiple in (2.0, 4.0):
             yield from ((f"pairs {multiple:g} x", t) for t in cases.pairs(multiple, count, events=events))
     else:
-        raise SystemExit(f"there is no suite '{name}'; there are nulls, nuisances, single, outside, pairs")
+        raise SystemExit(f"there is no suite '{name}'; there are {', '.join(SUITES)}")
 
 
-def run(group: str, trial: cases.Trial) -> dict:
-    """One data set investigated. What fails is a row too, with its message."""
+def run(group: str, trial: cases.Trial, held: int) -> dict:
+    """One data set investigated, its last `held` events kept for validation. What fails is a row with its message."""
     from tractexp.discrepancy.investigate import investigate
     from tractexp.errors import UserError
     from tractexp.model.model import compose
-    from tractexp.plugin import get
+    from tractexp.plugin import discover, get
     from tractexp.record import Record, detect
 
-    truth = () if trial.case.effect is None else trial.case.effect
-    row = {"group": group, "label": trial.label, "truth": sorted([truth] if isinstance(truth, str) else truth)}
-    row |= {"seed": trial.seed, "multiples": list(trial.multiples), "events": trial.case.events}
+    hidden = [name for name, _ in trial.case.hidden]
+    row = {"group": group, "label": trial.label, "truth": sorted(hidden), "seed": trial.seed, "held": held}
+    row |= {"multiples": list(trial.multiples), "events": trial.case.events}
+    only = []
+    if group.startswith(LEFT_OUT):
+        row["truth"], only = [], [n for n in discover()["effect"] if n not in hidden]
     started = time.perf_counter()
     try:
         records = make(trial.case, trial.seed)
-        made = time.perf_counter() - started
-        events = [detect(Record(f"event{k + 1}", **r).check()) for k, r in enumerate(records)]
+        events = [detect(Record(f"event{k + 1}", **r, source=f"{k}").check()) for k, r in enumerate(records)]
         model = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
-        finding = investigate(model, events, (), {}, {}, seed=0)
-        row |= _counted(finding) | {"generated": made}
+        row["generated"] = time.perf_counter() - started
+        train, validate = events[: len(events) - held], events[len(events) - held :]
+        finding = investigate(model, train, validate, {}, {}, only=only, seed=0)
+        row |= _counted(finding) | _compared(finding, trial)
     except (UserError, ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
         row["failed"] = f"{type(error).__name__}: {error}"
     return row | {"seconds": time.perf_counter() - started}
 
 
 def _counted(finding) -> dict:
-    base, samples = finding.explanation.refits[()], finding.study.likelihood.samples
+    """What the product said, and what it said it with."""
+    first, study = finding.first, finding.study
     return {
         "verdict": finding.verdict,
         "names": list(finding.names),
         "sets": [list(s) for s in finding.sets],
         "chi2": finding.train.after.chi2_per_sample,
         "closed": finding.train.closed,
-        "p_first": finding.first.scores[0].p if finding.first.scores else 1.0,
-        "first": finding.first.scores[0].name if finding.first.scores else "",
+        "closed_held": None if finding.validate is None else finding.validate.closed,
+        "p_first": first.scores[0].p if first.scores else 1.0,
+        "first": first.scores[0].name if first.scores else "",
         "stages": [[list(s.fit.names), s.scores[0].name, s.scores[0].p] for s in finding.explanation.stages],
-        "unrest": [s.p_left for s in finding.explanation.stages],
-        "deviance": base.deviance,
-        "samples": samples,
-        "drops": {s.name: s.drop for s in finding.first.scores},
+        "left": [s.p_left for s in finding.explanation.stages],
+        "samples": study.likelihood.samples,
+        "drops": {s.name: s.drop for s in first.scores},
+        "parameters": {s.name: len(finding.catalogue[s.name].effect.parameters) for s in first.scores},
         "untestable": sorted(finding.catalogue.untestable),
-        "simulations": finding.study.simulations,
+        "simulations": study.simulations,
     }
 
 
-def summarize(rows: Iterable[dict]) -> list[dict]:
-    """One line per group: how often each verdict came, and how often it was right."""
-    groups: dict[str, list[dict]] = {}
-    for row in rows:
-        groups.setdefault(row["group"], []).append(row)
-    lines = []
-    for group, members in groups.items():
-        good = [r for r in members if "failed" not in r]
-        found = [r for r in good if r["verdict"] != "none"]
-        named = [r for r in good if r["verdict"] == "named"]
-        lines.append(
-            {
-                "group": group, "n": len(members), "failed": len(members) - len(good),
-                **{v: sum(r["verdict"] == v for r in good) for v in ("none", "named", "tied", "unexplained")},
-                "unique_right": sum(sorted(r["names"]) == r["truth"] for r in named),
-                "truth_in_set": sum(r["truth"] in [sorted(s) for s in r["sets"]] for r in found),
-                "first_right": sum(r["first"] in r["truth"] for r in good),
-                "seconds": float(np.median([r["seconds"] for r in members])),
-            }
-        )  # fmt: skip
-    return lines
+def _compared(finding, trial: cases.Trial) -> dict:
+    """What the product said, held against what was made: sizes, places, clean curves, and what was to be found."""
+    from tractexp.discrepancy.contract import parameters
+
+    told = truth(trial.case, trial.seed)
+    row = {"places": len(finding.places), "places_true": sum(_overlaps(p, told["where"]) for p in finding.places)}
+    hidden = [e["name"] for e in told["effects"]]
+    if len(hidden) == 1 and list(finding.names) == hidden and hidden[0] in SAME:
+        own = parameters(finding)[SAME[finding.names[0]]]
+        row |= {"estimate": own["value"], "error": own["standard_error"], "amount": told["effects"][0]["amount"]}
+    made = scene(trial.case, trial.seed)
+    clean = _powers(made.records())
+    if finding.validation is not None:
+        study, units = finding.validation
+        N = study.problem.drive.samples
+        got = study.residuals(np.array(units)) + study.problem.drive.measured - clean[:, -N:]
+        before, after = np.sum(got**2, axis=(1, 2))
+        row["closed_true"] = 1 - after / before
+    if made.effects and not finding.catalogue.untestable.keys() & {name for name, _ in made.effects}:
+        without = _powers(replace(made, effects=()).records())
+        N = finding.study.problem.drive.samples
+        change = (clean - without)[:, :N]
+        projection = finding.first.tangent.whitened(finding.first.noise, -change[None])
+        whole = float(projection.r[0] @ projection.r[0])
+        row |= {"lambda": whole, "lambda_left": whole - float(projection.drops[0].max(initial=0.0))}
+    return row
+
+
+def _powers(records: list[dict]) -> np.ndarray:
+    """P and Q of all events end to end, (2, N)."""
+    return np.concatenate([np.stack([r["P"], r["Q"]]) for r in records], axis=1)
+
+
+def _overlaps(place, where: list[dict]) -> bool:
+    """Whether a place that was found overlaps one in which something was changed."""
+    return any(
+        place.event == f"event{w['event'] + 1}" and place.start <= w["end"] and place.end >= w["start"] for w in where
+    )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--suite", action="append", required=True)
-    parser.add_argument("--count", type=int, default=5)
-    parser.add_argument("--events", type=int, default=3)
+    parser.add_argument("--suite", action="append", choices=SUITES, help="default: all")
+    parser.add_argument("--count", type=int, default=5, help="data sets of each row")
+    parser.add_argument("--events", type=int, default=3, help="events fitted")
+    parser.add_argument("--held", type=int, default=1, help="events held out beside them")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("outputs/hidden_effects.jsonl"))
     parser.add_argument("--minutes", type=float, default=1e9, help="begin no further trial after so long")
+    parser.add_argument("--docs", action="store_true", help="write tables and figures into docs/missing-effects.md")
     chosen = parser.parse_args()
     from joblib import Parallel, delayed
 
     chosen.out.parent.mkdir(parents=True, exist_ok=True)
-    before = [json.loads(line) for line in chosen.out.read_text().splitlines()] if chosen.out.exists() else []
-    done = {(r["group"], r["label"], r["seed"], r["events"]) for r in before}
-    started = time.perf_counter()
+    rows = [json.loads(line) for line in chosen.out.read_text().splitlines()] if chosen.out.exists() else []
+    done = {(r["group"], r["label"], r["seed"], r["events"], r["held"]) for r in rows}
+    started, total = time.perf_counter(), chosen.events + chosen.held
     wanted = (
         (group, trial)
-        for name in chosen.suite
-        for group, trial in suite(name, chosen.count, chosen.events)
-        if (group, trial.label, trial.seed, trial.case.events) not in done
+        for count in range(1, chosen.count + 1)  # one data set of every row before the second of any
+        for name in chosen.suite or SUITES
+        for group, trial in suite(name, count, total)
+        if (group, trial.label, trial.seed, total, chosen.held) not in done
+        and not done.add((group, trial.label, trial.seed, total, chosen.held))
         and time.perf_counter() - started < 60 * chosen.minutes
     )
-    jobs = (delayed(run)(group, trial) for group, trial in wanted)
+    jobs = (delayed(run)(group, trial, chosen.held) for group, trial in wanted)
     with chosen.out.open("a") as file:
         for row in Parallel(n_jobs=chosen.jobs, return_as="generator_unordered", pre_dispatch=4)(jobs):
-            before.append(row)
+            rows.append(row)
             file.write(json.dumps(row) + "\n")
             file.flush()
             told = row.get("failed") or f"{row['verdict']} {' '.join(row['names'])}"
             print(f"{row['group']}, {row['label']}, {row['seed']}: {told} ({row['seconds']:.1f} s)", flush=True)
-    for line in summarize(before):
-        print(json.dumps(line))
+    print(evidence.tables(rows))
+    if chosen.docs:
+        evidence.write(rows, Path(__file__).parent.parent / "docs")
 
 
 if __name__ == "__main__":

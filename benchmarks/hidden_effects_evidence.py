@@ -1,0 +1,284 @@
+"""Rows of the study as the tables and figures of docs/missing-effects.md. Shares come with exact 95 % intervals."""
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+Rows = list[dict]
+VERDICTS = ("none", "named", "tied", "unexplained")
+BINS = ((0, 20), (20, 40), (40, 80), (80, np.inf))  # of the non-centrality that the best single effect leaves
+BEGIN, END = "<!-- evidence: written by hidden_effects_study.py --docs -->", "<!-- end of evidence -->"
+
+
+def tables(rows: Rows) -> str:
+    """All tables, Markdown."""
+    good = [r for r in rows if "failed" not in r]
+    failed = len(rows) - len(good)
+    parts = [
+        f"{len(rows)} data sets" + (f", of which {failed} could not be made or investigated." if failed else "."),
+        *(_table(title, head, lines) for title, head, lines in (
+            _false_alarms(good), _singles(good), _abstention(good), _pairs(good), _sizes(good), _seconds(good)
+        ) if lines),
+    ]  # fmt: skip
+    return "\n\n".join(parts)
+
+
+def write(rows: Rows, docs: Path) -> None:
+    """Put the tables between the marks in missing-effects.md, and the figures into images/."""
+    good = [r for r in rows if "failed" not in r]
+    page = docs / "missing-effects.md"
+    text = page.read_text(encoding="utf-8")
+    head, rest = text.split(BEGIN)
+    _, tail = rest.split(END)
+    page.write_text(f"{head}{BEGIN}\n\n{tables(rows)}\n\n{END}{tail}", encoding="utf-8")
+    for name, draw in (("detection", _draw_detection), ("confusion", _draw_confusion)):
+        draw(good, docs / "images" / f"missing-effects-{name}.svg")
+
+
+def share(right: int, of: int) -> str:
+    """A percentage with its exact 95 % interval. Source: Clopper and Pearson 1934."""
+    from scipy.stats import binomtest
+
+    if not of:
+        return "-"
+    low, high = binomtest(right, of).proportion_ci(0.95, "exact")
+    return f"{right / of:.1%} ({low:.0%}-{high:.0%})" if of < 1000 else f"{right / of:.1%}"
+
+
+def _table(title: str, head: Sequence[str], lines: Sequence[Sequence[object]]) -> str:
+    rows = ["| " + " | ".join(map(str, line)) + " |" for line in (head, ["---"] * len(head), *lines)]
+    return f"### {title}\n\n" + "\n".join(rows)
+
+
+def _groups(rows: Rows, start: str) -> dict[str, Rows]:
+    found: dict[str, Rows] = {}
+    for row in rows:
+        if row["group"].startswith(start):
+            found.setdefault(row["group"], []).append(row)
+    return found
+
+
+def _rank(row: dict, price: Callable[[int, int], float]) -> str:
+    """The effect that a criterion picks by the drop of the deviance less a price; "" where it picks none."""
+    gain = {n: d - price(row["parameters"][n], row["samples"]) for n, d in row["drops"].items()}
+    best = max(gain, key=gain.__getitem__, default="")
+    return best if best and gain[best] > 0 else ""
+
+
+def aic(row: dict) -> str:
+    """What Akaike's criterion picks."""
+    return _rank(row, lambda k, n: 2 * k)
+
+
+def bic(row: dict) -> str:
+    """What Schwarz's criterion picks."""
+    return _rank(row, lambda k, n: k * np.log(n))
+
+
+def rmse(row: dict) -> str:
+    """What leaves the smallest error."""
+    return _rank(row, lambda k, n: 0.0)
+
+
+def wrong(row: dict) -> bool:
+    """Whether one set was named and it is not the truth."""
+    return row["verdict"] == "named" and sorted(row["names"]) != row["truth"]
+
+
+def right(row: dict) -> bool:
+    """Whether the truth alone was named."""
+    return row["verdict"] == "named" and sorted(row["names"]) == row["truth"]
+
+
+def in_set(row: dict) -> bool:
+    """Whether the truth is among the sets that were not rejected."""
+    return row["truth"] in [sorted(s) for s in row["sets"]]
+
+
+def _false_alarms(rows: Rows) -> tuple[str, list[str], list]:
+    lines, everything = [], []
+    for group, members in _groups(rows, "null").items():
+        if "nuisances" not in group:
+            everything += members
+        lines.append([group.removeprefix("null, "), *_alarms(members)])
+    if everything:
+        lines.append(["all but those with nuisances", *_alarms(everything)])
+    head = ["noise", "data sets", "anything said", "a name among it", "AIC names one", "BIC", "RMSE"]
+    return "Nothing is missing", head, lines
+
+
+def _alarms(members: Rows) -> list[str]:
+    """Nuisances that are there may be named: they are the truth of their data sets."""
+    n, chain = len(members), {"time_skew", "measurement_window", "load_drift"}
+    allowed = chain if members[0]["group"] == "null with nuisances" else set()
+    said = [r for r in members if r["verdict"] != "none" and not (r["names"] and set(r["names"]) <= allowed)]
+    named = sum(r["verdict"] in ("named", "tied") for r in said)
+    picks = [share(sum(bool(pick(r)) for r in members), n) for pick in (aic, bic, rmse)]
+    return [str(n), share(len(said), n), share(named, n), *picks]
+
+
+def _singles(rows: Rows) -> tuple[str, list[str], list]:
+    lines = []
+    for multiple in (0.5, 1.0, 2.0, 4.0, 8.0):
+        members = [r for r in _groups(rows, f"{multiple:g} x").get(f"{multiple:g} x", []) if reached(r, multiple)]
+        if not members:
+            continue
+        n = len(members)
+        found = [r for r in members if r["verdict"] in ("named", "tied")]
+        said = [r for r in members if r["verdict"] != "none"]
+        unique = [r for r in members if r["verdict"] == "named"]
+        held = np.array([r["closed_true"] for r in members if right(r) and "closed_true" in r])
+        placed = [r for r in said if r["places"]]
+        lines.append([
+            f"{multiple:g}", n, share(len(said), n), share(len(unique), n), share(sum(map(right, unique)), len(unique)),
+            share(sum(map(in_set, found)), len(found)), share(len(said) - len(found), n),
+            *(share(sum([pick(r)] == r["truth"] for r in members), n) for pick in (aic, bic, rmse)),
+            f"{np.median(held):.1%}, {np.mean(held >= 0.95):.0%}" if len(held) else "-",
+            share(sum(r["places_true"] > 0 for r in placed), len(placed)),
+        ])  # fmt: skip
+    head = [
+        "times the limit", "data sets", "disagreement found", "one name", "of these right", "truth among the names",
+        "unexplained", "AIC right", "BIC right", "RMSE right",
+        "gap closed on the held-out event: median, at least 95 %", "a place found is true",
+    ]  # fmt: skip
+    return "One effect is missing", head, lines
+
+
+def reached(row: dict, multiple: float) -> bool:
+    """Whether the effect could be made this many limits large."""
+    return all(m >= 0.9 * multiple for m in row["multiples"]) and not set(row["untestable"]) & set(row["truth"])
+
+
+def _abstention(rows: Rows) -> tuple[str, list[str], list]:
+    lines = []
+    for what, start in (("outside the catalogue", "outside"), ("left out of it", "left out")):
+        members = [r for rs in _groups(rows, start).values() for r in rs if "lambda_left" in r]
+        for low, high in BINS:
+            inside = [r for r in members if low <= r["lambda_left"] < high]
+            if inside:
+                span = f"{low:g} to {high:g}" if np.isfinite(high) else f"above {low:g}"
+                counts = [share(sum(r["verdict"] == v for r in inside), len(inside)) for v in VERDICTS]
+                lines.append([what, span, len(inside), counts[3], counts[0], counts[2], counts[1]])
+    head = ["effect", "non-centrality left by the best single effect", "data sets", "unexplained", "none", "tied",
+            "one wrong name"]  # fmt: skip
+    return "The missing effect is not in the catalogue", head, lines
+
+
+def _pairs(rows: Rows) -> tuple[str, list[str], list]:
+    lines = []
+    for group, members in _groups(rows, "pairs").items():
+        multiple = float(group.split()[1])
+        full = [r for r in members if reached(r, multiple)]
+        if full:
+            n = len(full)
+            partly = sum(r["verdict"] == "named" and set(r["names"]) < set(r["truth"]) for r in full)
+            lines.append([
+                group.split()[1], n, share(sum(map(right, full)), n), share(sum(map(in_set, full)), n),
+                share(partly, n), share(sum(r["verdict"] == "unexplained" for r in full), n),
+                share(sum(wrong(r) and not set(r["names"]) < set(r["truth"]) for r in full), n),
+            ])  # fmt: skip
+    head = ["times the limit, each", "data sets", "exactly the pair", "the pair among the sets", "one of the two",
+            "unexplained", "another name"]  # fmt: skip
+    return "Two effects are missing", head, lines
+
+
+def _sizes(rows: Rows) -> tuple[str, list[str], list]:
+    lines = []
+    for name in sorted({r["label"] for r in rows if "estimate" in r}):
+        members = [r for r in rows if r["label"] == name and "estimate" in r and r["error"]]
+        off = np.array([(r["estimate"] - r["amount"]) / r["error"] for r in members])
+        relative = np.array([r["estimate"] / r["amount"] - 1 for r in members])
+        if len(off) >= 5:
+            lines.append([name, len(off), f"{np.sqrt(np.mean(off**2)):.2f}", f"{np.median(off):+.2f}",
+                          share(int(np.sum(np.abs(off) < 1.96)), len(off)), f"{np.median(relative):+.1%}"])  # fmt: skip
+    head = ["effect", "data sets", "RMSE over standard error", "median of error over standard error",
+            "95 % interval holds the truth", "median relative error"]  # fmt: skip
+    return "How large it is", head, lines
+
+
+def _seconds(rows: Rows) -> tuple[str, list[str], list]:
+    lines = []
+    for verdict in VERDICTS:
+        spent = np.array([r["seconds"] - r.get("generated", 0.0) for r in rows if r["verdict"] == verdict])
+        if len(spent):
+            lines.append([verdict, len(spent), f"{np.median(spent):.1f}", f"{np.quantile(spent, 0.9):.1f}"])
+    return "Seconds of an investigation, one core each", ["verdict", "data sets", "median", "90 %"], lines
+
+
+def _draw_detection(rows: Rows, path: Path) -> None:
+    """Share of data sets in which something was found, over how many detection limits were hidden."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    from tractexp.report import style
+
+    multiples = [0.5, 1.0, 2.0, 4.0, 8.0]
+    with rc_context(style.SETTINGS):
+        figure = Figure(figsize=(6.4, 3.4), layout="constrained")
+        axes = figure.subplots()
+        members = [[r for r in rows if r["group"] == f"{m:g} x" and reached(r, m)] for m in multiples]
+        kept = [k for k, rs in enumerate(members) if rs]
+        x = [multiples[k] for k in kept]
+        for label, color, count in (
+            ("a disagreement is found", style.REACTIVE, lambda r: r["verdict"] != "none"),
+            ("the truth is among the names", style.ACTIVE, in_set),
+            ("the truth is the one name", style.VOLTAGE, right),
+        ):
+            axes.plot(x, [100 * np.mean([count(r) for r in members[k]]) for k in kept], "o-", color=color, label=label)
+        fine = np.geomspace(0.5, 8, 60)
+        axes.plot(fine, 100 * _power(fine), "--", color=style.FAINT, label="best possible: likelihood-ratio test")
+        axes.set(xscale="log", xticks=multiples, xticklabels=[f"{m:g}" for m in multiples], ylim=(0, 103))
+        axes.set(xlabel="times the detection limit", ylabel="share of data sets [%]")
+        axes.minorticks_off()
+        axes.legend(loc="lower right")
+        style.save(figure, path)
+
+
+def _power(multiple: np.ndarray) -> np.ndarray:
+    """Power of the two-sided test at the level of one of 20, where 1 has a power of 0.9."""
+    from scipy.stats import norm
+
+    z = norm.isf(0.05 / 40)
+    return norm.cdf(multiple * (z + norm.isf(0.1)) - z)
+
+
+def _draw_confusion(rows: Rows, path: Path, multiple: float = 4.0) -> None:
+    """What was said (columns) of what was hidden (rows), in percent, at four times the limit or as large as may be."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    from tractexp.report import style
+
+    members = [r for r in rows if r["group"] in (f"{multiple:g} x", f"outside {multiple:g} x")]
+    if not members:
+        return
+    labels = list(dict.fromkeys(r["label"] for r in members))
+    names = [n for n in labels if any(r["group"].startswith(f"{multiple:g}") and r["label"] == n for r in members)]
+    said = [*names, "several at once", "tied, truth among", "tied, truth not", "unexplained", "none"]
+    table = np.zeros((len(labels), len(said)))
+    for r in members:
+        table[labels.index(r["label"]), said.index(_column(r, names))] += 1
+    table *= 100 / np.maximum(table.sum(axis=1, keepdims=True), 1)
+    with rc_context({**style.SETTINGS, "axes.grid": False}):
+        figure = Figure(figsize=(8.6, 8.2), layout="constrained")
+        axes = figure.subplots()
+        axes.imshow(table, cmap="Blues", vmin=0, vmax=130, aspect="auto")
+        for (i, j), value in np.ndenumerate(table):
+            if value:
+                axes.text(j, i, f"{value:.0f}", ha="center", va="center", fontsize=7)
+        axes.set_xticks(range(len(said)), [s.replace("_", " ") for s in said], rotation=90)
+        axes.set_yticks(range(len(labels)), [s.replace("_", " ") for s in labels])
+        axes.axhline(len(names) - 0.5, color=style.FAINT, linewidth=0.8)
+        axes.axvline(len(names) - 0.5, color=style.FAINT, linewidth=0.8)
+        axes.set(xlabel="said", ylabel="hidden (below the line: not in the catalogue)")
+        axes.set_title(f"percent of the data sets of each row, {multiple:g} times the detection limit")
+        style.save(figure, path)
+
+
+def _column(row: dict, names: Iterable[str]) -> str:
+    if row["verdict"] == "named":
+        return row["names"][0] if len(row["names"]) == 1 and row["names"][0] in names else "several at once"
+    if row["verdict"] == "tied":
+        return "tied, truth among" if in_set(row) else "tied, truth not"
+    return row["verdict"]
