@@ -109,7 +109,7 @@ def investigate(
     tell(f"testing {len(found.candidates)} effects, {len(found.untestable)} more cannot be tested on these events")
     study = Study(model, found, train, bounds, fixed)
     study.kernels.compile(tell)
-    naming = alpha - ADEQUATE if alpha > 2 * ADEQUATE else alpha / 2  # the rest is spent on the adequacy test
+    naming = 0.8 * alpha  # the rest is spent on the adequacy test
     explanation = explain(study, naming, seed, tell)
     survivors, rivals = surviving(study, explanation, seed)
     chain = tuple(explanation.stages[-1].chain(naming))

@@ -20,6 +20,7 @@ from tractexp.discrepancy.study import Refit, Study
 
 REACH = 0.5  # smallest relevant sizes: the step of a candidate's difference quotient
 NUISANCE_STEP = 1e-4  # of a coordinate's range
+LEAST_KEPT = 0.2  # of a residual's variance: where columns explain more, it tells nothing of the noise
 DISTINCT = 1e-3  # of the largest singular value: directions weaker than this are rounding
 WINDOWS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)  # s after the end of the dip
 
@@ -281,14 +282,18 @@ def injections(study: Study, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def rich_residuals(t: Tangent, residuals: np.ndarray) -> np.ndarray:
-    """Residuals (b, 2, N) with everything any column explains taken away, unweighted: what noise is estimated from."""
+    """Residuals (b, 2, N) with everything any column explains taken away, unweighted: what noise is estimated from.
+
+    Each is divided by what is left of its variance then, so that the noise does not come out too small.
+    """
     basis = np.concatenate([t.nuisance, *(c.raw for c in t.columns)]).reshape(-1, residuals[0].size)
     scale = np.linalg.norm(basis, axis=1)
     basis = basis[scale > 0] / scale[scale > 0, None]
     _left, values, right = np.linalg.svd(basis, full_matrices=False)
     right = right[values > 1e-6 * values[0]]
     flat = residuals.reshape(len(residuals), -1)
-    return (flat - (flat @ right.T) @ right).reshape(residuals.shape)
+    kept = np.maximum(1 - np.einsum("kn,kn->n", right, right), LEAST_KEPT)
+    return ((flat - (flat @ right.T) @ right) / np.sqrt(kept)).reshape(residuals.shape)
 
 
 def re_estimated(t: Tangent, residual: np.ndarray) -> Noise:
