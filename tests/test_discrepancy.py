@@ -274,3 +274,21 @@ def test_the_command_tells_the_story_and_its_extended_model_runs_at_once(tmp_pat
     done = tractexp("--config-dir", str(Path("run") / "conf"), "model=extended", *data, *quick, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "R_s" in json.loads((tmp_path / "again" / "result.json").read_text())["parameters"]
+
+
+def test_on_a_real_record_it_says_that_it_does_not_know(shared_data, tmp_path):
+    """Two dips of a fault recorder: the base model does not fit, some effects help on both dips, none is adequate."""
+    record = shared_data / "dfr220kv-shandong" / "xtz.cfg"
+    data = ["data=comtrade", f"data.path={record}", "data.voltages=[4,5,6]", "data.currents=[8,9,10]", "data.train=[1]",
+            "data.validate=[2]", "tracking.enabled=false"]  # fmt: skip
+    only = "task.effects=[dc_link_lag,static_var_compensator]"
+    done = tractexp("task=discrepancy", only, *data, "hydra.run.dir=run", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    made = json.loads((tmp_path / "run" / "discrepancy.json").read_text())
+    assert made["verdict"] == "unexplained"
+    assert made["effects"] == []
+    assert made["gap"]["train"]["before"]["chi2_per_sample"] > 10
+    assert 0.2 < made["nearest"]["explained"] < 1
+    assert 0.2 < made["nearest"]["explained_held_out"] < 1
+    assert "measured less calculated" in (tmp_path / "run" / "discrepancy.html").read_text()
+    assert (tmp_path / "run" / "unexplained.csv").read_text().startswith("event,t,P,Q")

@@ -118,6 +118,15 @@ def test_children_point_to_their_sweep_which_closes_with_its_status(tmp_path, ur
     assert [a.path for a in client(uri).list_artifacts(parent)] == ["table.html"]
 
 
+def test_children_are_logged_below_their_run(uri):
+    child = tracking.Run("experiment", "candidate", metrics={"deviance_lowered_by": 12.5})
+    run_id = tracking.log(tracking.Run("experiment", "investigation", children=[child, child]), uri)
+    experiment = client(uri).get_run(run_id).info.experiment_id
+    found = client(uri).search_runs([experiment], f"tags.`mlflow.parentRunId` = '{run_id}'")
+    assert [r.data.metrics["deviance_lowered_by"] for r in found] == [12.5, 12.5]
+    assert all(r.info.status == "FINISHED" for r in found)
+
+
 def test_a_run_that_cannot_be_written_whole_is_marked_failed(uri):
     with pytest.raises(UserError, match="Names may only contain"):
         tracking.log(Run("e", "r", metrics={"a*b": 1.0}), uri)

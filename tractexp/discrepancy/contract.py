@@ -24,7 +24,7 @@ def contract(finding: Finding) -> dict[str, Any]:
             "validate": None if finding.validate is None else _gap(finding.validate),
         },
         "nearest": _nearest(finding),
-        "candidates": [*_sets(finding), *_singles(finding)],
+        "candidates": [*sets(finding), *_singles(finding)],
         "recommendation": recommendation(finding),
         "noise": finding.last.noise.describe(),
         "false_alarm_rate": finding.alpha,
@@ -112,9 +112,9 @@ def _curves(curves: Curves) -> dict[str, float]:
     }
 
 
-def _sets(finding: Finding) -> list[dict[str, Any]]:
+def sets(finding: Finding) -> list[dict[str, Any]]:
     """The refitted sets of the chosen size."""
-    base, rows = finding.explanation.refits[()].deviance, []
+    rows = []
     for rival in finding.rivals:
         names = rival.fit.names
         if not names:
@@ -122,7 +122,7 @@ def _sets(finding: Finding) -> list[dict[str, Any]]:
         status = "rejected" if rival.rejected else "adequate" if rival.adequate else "not adequate"
         labels = [p.name for n in names for p in finding.catalogue[n].effect.parameters]
         values = {n: {"value": finding.study.value(n, rival.fit.unit), "standard_error": None} for n in labels}
-        ratio = _number(base - rival.fit.deviance)
+        ratio = _number(rival.lowered)
         rows.append({"effects": list(names), "status": status, "likelihood_ratio": ratio, "parameters": values})
     return rows
 

@@ -197,6 +197,11 @@ def _verdict(
             "the model and the records disagree, and nothing in the catalogue explains it: what is left after the best"
             f" explanation would come about by chance with p = {survivors[0].stage.p_left:.2g}"
         )
+    if not kept and base.p_left >= ADEQUATE:
+        return "none", (
+            "what seemed to help on the fitted events does not help on the held-out ones, and what the base model"
+            " leaves is no more than chance leaves"
+        )
     if not kept:
         return "unexplained", "what fits the training events does not help on the held-out ones"
     names = " and ".join(sorted((*kept[0].fit.names, *chain)))

@@ -8,7 +8,7 @@ tested at each survivor: what is named must leave nothing that a push into some 
 event, would still explain.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,6 +27,7 @@ class Rival:
     """A set of names of the chosen size: how far behind, how far apart, and whether the data reject it."""
 
     fit: Refit
+    lowered: float  # by how much its deviance is below that of the base model
     behind: float  # of Akaike's criterion
     distance: float  # lambda, squared standard deviations
     rejected: bool
@@ -55,7 +56,9 @@ def rivals(study: Study, explanation: Explanation) -> tuple[list[Rival], Noise]:
         noise = fit.parameters + fits[0].parameters  # the fits' own noise moves the curves apart too
         far = max(float(apart) - noise, REJECTED**2)
         rejected = behind > max(2 * REJECTED * np.sqrt(far) - far, alike)
-        found.append(Rival(fit, behind, float(apart), bool(rejected and fit is not fits[0])))
+        found.append(
+            Rival(fit, base.deviance - fit.deviance, behind, float(apart), bool(rejected and fit is not fits[0]))
+        )
     return found, last.noise
 
 
@@ -64,7 +67,7 @@ def surviving(study: Study, explanation: Explanation, seed: int, most: int = 6) 
     everyone, noise = rivals(study, explanation)
     tested = []
     for k, rival in enumerate([r for r in everyone if not r.rejected][:most]):
-        at = explanation.stages[-1] if k == 0 else stage(study, rival.fit, noise, seed + 100 + k)
-        tested.append(Rival(rival.fit, rival.behind, rival.distance, False, at))
+        at = explanation.stages[-1] if k == 0 else stage(study, rival.fit, noise, seed + 100 + k, plain=True)
+        tested.append(replace(rival, rejected=False, stage=at))
     known = {r.fit.names: r for r in tested}
     return tested, [known.get(r.fit.names, r) for r in everyone]

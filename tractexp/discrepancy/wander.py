@@ -13,7 +13,7 @@ from tractexp.identify.noise import fit_autoregression
 
 MODES = 32
 SLOW = 3  # cosines of a stretch that belong to wandering before its fast noise is modelled
-SEEN = 3.0  # of twice the log-likelihood, without which there is no wandering
+SEEN = 1.5  # of twice the log-likelihood, without which there is no wandering
 GRID = np.geomspace(1e-3, 1e4, 71)  # of the intensity, variances of the channel per second
 
 

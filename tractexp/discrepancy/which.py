@@ -82,15 +82,15 @@ class Explanation:
         return self.stages[-1].fit
 
 
-def stage(study: Study, fit: Refit, noise: Noise, seed: int) -> Stage:
-    """All tests at one fit, under the noise of what no candidate explains there."""
+def stage(study: Study, fit: Refit, noise: Noise, seed: int, plain: bool = False) -> Stage:
+    """All tests at one fit, under the noise of what no candidate explains there; `plain` takes it as known."""
     t = tangent(study, fit)
     noise = re_estimated(t, rich_residuals(t, t.residual[None])[0])
     fit = study.refit(noise, [(fit.names, fit.unit)])[0]
     t = tangent(study, fit)
     projection = t.whitened(noise)
     scores = projection.scores()
-    plain = bool(scores) and scores[0].p < PLAIN
+    plain = plain or (bool(scores) and scores[0].p < PLAIN)
     return Stage(fit, noise, t, projection, null_of(t, noise, seed, plain), scores)
 
 

@@ -129,9 +129,6 @@ def log(job: Job, finding: Any, paths: list[Path], result: Path) -> None:
             metrics[f"{role}_{stage}_chi2_per_sample"] = curves.chi2_per_sample
         if np.isfinite(gap.closed):
             metrics[f"{role}_gap_closed"] = gap.closed
-    for rival in finding.rivals:
-        if rival.fit.names:
-            metrics[f"deviance_{'_and_'.join(rival.fit.names)}"] = rival.fit.deviance
     job.log(
         name=f"{finding.verdict} {' '.join(finding.names)}".strip(),
         values={},
@@ -139,4 +136,22 @@ def log(job: Job, finding: Any, paths: list[Path], result: Path) -> None:
         artifacts=[*paths, job.folder / ".hydra"],
         description=finding.reason,
         model=result,
+        children=candidates(job, finding),
     )
+
+
+def candidates(job: Job, finding: Any) -> list[Any]:
+    """A run below this one for every set of effects that was refitted: how far it lowers the deviance, and its size."""
+    from tractexp import tracking
+    from tractexp.discrepancy.contract import sets
+
+    return [
+        tracking.Run(
+            experiment=job.experiment,
+            name=" and ".join(row["effects"]),
+            metrics={"deviance_lowered_by": row["likelihood_ratio"] or 0.0}
+            | {name: at["value"] for name, at in row["parameters"].items()},
+            tags={"candidate": row["status"], "task": "discrepancy"},
+        )
+        for row in sets(finding)
+    ]  # fmt: skip

@@ -10,7 +10,7 @@ import re
 import subprocess
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -34,7 +34,7 @@ class Run:
     `curves` maps a name to (steps (n,) whole numbers, values (n,)), such as "fitness" by iteration. `artifacts` are
     files or folders to be copied. `parent` is the run id of the sweep. `seconds` is what the job took: MLflow shows
     it as the run's duration. `model` is a result file that `tractexp.identify.result.load` reads; with it the run
-    offers a model for `mlflow.pyfunc.load_model`. `description` is Markdown.
+    offers a model for `mlflow.pyfunc.load_model`. `description` is Markdown. `children` are logged below this run.
     """
 
     experiment: str
@@ -51,6 +51,7 @@ class Run:
     status: str = "FINISHED"
     seconds: float = 0.0
     model: Path | None = None
+    children: "Sequence[Run]" = ()
 
     def check(self) -> None:
         """Raise `UserError` for a missing name, an unknown status, a file that is not there or a lopsided curve."""
@@ -113,6 +114,8 @@ def log(run: Run, uri: str) -> str:
             client.set_terminated(run_id, "FAILED")
             raise
         client.set_terminated(run_id, run.status, end_time=ended)
+    for child in run.children:
+        log(replace(child, parent=run_id), uri)
     return run_id
 
 
