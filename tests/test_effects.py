@@ -1,7 +1,9 @@
 """Every registered effect: what all must satisfy, and for each what physics says it does."""
 
 import functools
+import importlib.util
 import itertools
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,7 @@ from tractexp.identify.problem import Problem
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
 from tractexp.model.parts import Measurement
+from tractexp.plugin import _registry as registry
 from tractexp.plugin import discover, get
 from tractexp.record import Record, detect
 
@@ -491,6 +494,28 @@ def test_a_compensator_settles_at_its_gain_or_its_limit(drop, given):
     assert extra[-1] == pytest.approx(-0.3 * given, rel=1e-6)
     later = extra[101:151]  # one time constant on
     assert later[-1] == pytest.approx(extra[-1] * (1 - np.exp(-1)), rel=0.02)
+
+
+def test_the_effect_of_the_documentation_does_what_it_says(tmp_path):
+    """The file shown in docs/effects.md, as it stands there: P_s grows with the slope of the voltage, nothing else."""
+    page = (Path(__file__).parent.parent / "docs" / "effects.md").read_text(encoding="utf-8")
+    file = tmp_path / "rate_dependence.py"
+    file.write_text(page.split("```python\n")[1].split("```")[0])
+    spec = importlib.util.spec_from_file_location("rate_dependence", file)
+    sys.modules["rate_dependence"] = module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+        own = module.RateDependence()
+        excitation, T_v = dip(), 0.05
+        grown = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")(), [own])
+        response = grown.simulate(Drive.of([excitation]), np.r_[TRUTH, T_v], 4)
+    finally:
+        del sys.modules["rate_dependence"]
+        registry["effect"].pop("rate_dependence")
+    t = np.arange(len(excitation.U)) * excitation.step
+    slope = Akima1DInterpolator(t, excitation.U, method="makima").derivative()(t)
+    assert pytest.approx(static(excitation)[0] * T_v * slope, abs=1e-9) == response.P[0] - base(excitation)[0]
+    assert pytest.approx(base(excitation)[1], abs=1e-12) == response.Q[0]
 
 
 def test_skew_is_a_shift():
