@@ -43,10 +43,10 @@ class Gap:
     gain: float
 
 
-def curves(study: Study, unit: np.ndarray, noise: Noise) -> Curves:
-    """What a fit leaves."""
+def curves(study: Study, unit: np.ndarray, noise: Noise, names: Sequence[str] | None = None) -> Curves:
+    """What a fit with the named effects (by default any) leaves."""
     drive = study.problem.drive
-    residual = study.residuals(unit[None])
+    residual = study.residuals(unit[None], names)
     white = noise.whiten(residual, drive, study.likelihood.known)[0]
     calculated = residual[0] + drive.measured
     measured = np.where(study.likelihood.known, drive.measured, np.nan)
@@ -55,28 +55,35 @@ def curves(study: Study, unit: np.ndarray, noise: Noise) -> Curves:
     return Curves(calculated, *errors, deviance, deviance / max(study.likelihood.samples, 1))
 
 
-def gap(study: Study, base: np.ndarray, extended: np.ndarray, noise: Noise, fitted: Sequence[int], seed: int) -> Gap:
-    """Compare two fits on the events of `study`; coordinates `fitted` were fitted to them in the extended model."""
+def gap(
+    study: Study, base: np.ndarray, extended: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int],
+    seed: int,
+) -> Gap:  # fmt: skip
+    """Compare the base model's fit and that with the named effects on the events of `study`.
+
+    Coordinates `fitted` were fitted to these events in the extended model.
+    """
     drive, known = study.problem.drive, study.likelihood.known
-    before, after = curves(study, base, noise), curves(study, extended, noise)
+    before, after = curves(study, base, noise, ()), curves(study, extended, noise, names)
     gained = before.deviance - after.deviance
-    explainable = gained + max(left_over(study, extended, noise, fitted), 0.0)
+    explainable = gained + max(left_over(study, extended, names, noise, fitted), 0.0)
     closed = gained / explainable if explainable > 0 else float("nan")
-    white = noise.whiten(study.residuals(np.array([base, extended])), drive, known)
+    both = study.residuals_of(np.array([base, extended]), [((), False), (names, False)])
+    white = noise.whiten(both, drive, known)
     gains = (white[0] ** 2 - white[1] ** 2).reshape(2, -1).sum(axis=0)
     return Gap(before, after, float(closed), _least(gains, seed))
 
 
-def left_over(study: Study, unit: np.ndarray, noise: Noise, fitted: Sequence[int]) -> float:
+def left_over(study: Study, unit: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int]) -> float:
     """How much more than chance pushes into all balances would still lower the deviance at coordinates (D,).
 
     Unbiased: the energy in the space of the pushes less its dimension, what is `fitted` projected out.
     """
     pushes, _ = injections(study, unit)
     up, down = two_sided(unit, fitted)
-    rows = noise.whiten(
-        study.residuals(np.concatenate([unit[None], up, down, pushes])), study.problem.drive, study.likelihood.known
-    )
+    sets = [(names, False)] * (1 + 2 * len(fitted)) + [(names, True)] * len(pushes)
+    raw = study.residuals_of(np.concatenate([unit[None], up, down, pushes]), sets)
+    rows = noise.whiten(raw, study.problem.drive, study.likelihood.known)
     rows = np.nan_to_num(rows)
     r, k = rows[0], len(fitted)
     nuisance, cells = rows[1 : 1 + k] - rows[1 + k : 1 + 2 * k], rows[1 + 2 * k :] - r
@@ -109,19 +116,19 @@ def held_out(
     for fit in fits:
         unit = study.null.copy()
         unit[: trained.problem.space.dimension] = fit.unit[: trained.problem.space.dimension]
-        units.append(_settled(study, unit, study.white()))
+        units.append(_settled(study, unit, study.white(), fit.names))
     noise = study.noise(units[-1])
-    return study, [_settled(study, unit, noise) for unit in units], noise
+    return study, [_settled(study, u, noise, fit.names) for u, fit in zip(units, fits, strict=True)], noise
 
 
-def _settled(study: Study, unit: np.ndarray, noise: Noise) -> np.ndarray:
+def _settled(study: Study, unit: np.ndarray, noise: Noise, names: Sequence[str]) -> np.ndarray:
     """Fit P0 and Q0 of each event alone."""
     from tractexp.identify.descent import descend
 
     def rows(x: np.ndarray, lanes: np.ndarray) -> np.ndarray:
         whole = np.tile(unit, (len(x), 1))
         whole[:, study.before] = x
-        return study.rows(whole, noise, ())
+        return study.rows(whole, noise, (), names)
 
     moved = unit.copy()
     moved[study.before] = descend(rows, unit[study.before][None]).unit[0]

@@ -130,7 +130,7 @@ def _conclude(
         tell(f"judging {len(adequate)} explanation{'s' * (len(adequate) > 1)} on the held-out events")
         fits = [bare, *(extended[s.fit.names] for s in adequate)]
         other, units, other_noise = held_out(study.model, study.catalogue, validate, study, fits, bounds, fixed)
-        gaps = {s.fit.names: gap(other, units[0], u, other_noise, other.before, seed)
+        gaps = {s.fit.names: gap(other, units[0], u, s.fit.names, other_noise, other.before, seed)
                 for s, u in zip(adequate, units[1:], strict=True)}  # fmt: skip
         kept = [s for s in adequate if gaps[s.fit.names].gain > 0]
         shown = (kept or adequate)[0]
@@ -147,7 +147,7 @@ def _conclude(
         verdict, reason, names, sets,
         where(explanation.stages[0].projection, explanation.stages[0].null, alpha) if verdict != "none" else [],
         study.catalogue, study, explanation, rivals, bare, after,
-        gap(study, bare.unit, after.unit, stage.noise, fitted, seed), carried if names else None,
+        gap(study, bare.unit, after.unit, after.names, stage.noise, fitted, seed), carried if names else None,
         validation if names else None,
         deciding_event(study, kept) if verdict == "tied" else None,
         _nearest(study, bare, rivals, noise, validate, bounds, fixed) if verdict == "unexplained" else None, alpha,

@@ -2,7 +2,7 @@
 its set needs.
 
 Sets of one effect have kernels of their own, as fast as the base model's. Larger sets share one that holds every
-effect whose equations are short; a set with a long one, and the tests of all candidates at once, take the kernel of
+effect whose equations are short, and the pushes of the adequacy test; a set with a long one takes the kernel of
 everything. All give the same response up to rounding.
 """
 
@@ -21,6 +21,7 @@ from tractexp.model.model import Model, compose
 from tractexp.record import Event
 
 LONG = 2.0  # times the source of the base model
+Key = tuple[frozenset[str], bool] | None  # load effects and whether pushes are in; None: everything is
 WORTH = 16  # simulations that are worth a thread
 
 
@@ -58,14 +59,13 @@ class Kernels:
         everything = compose(model.motor, model.static, [*model.effects, *catalogue.effects, Injection()])
         self.whole = Problem(everything, events, bounds, fixed, self.substeps)
         self._column = {name: k for k, name in enumerate(self.whole.space.names)}
-        self._made = {None: self._simulator(self.whole)}
+        self._made: dict[Key, tuple[Likelihood, np.ndarray]] = {None: self._simulator(self.whole)}
 
-    def with_effects(self, names: Iterable[str]) -> Model:
-        """The model with these load effects and the whole measurement chain."""
+    def with_effects(self, names: Iterable[str], pushed: bool = False) -> Model:
+        """The model with these load effects, the whole measurement chain and, where `pushed`, the pushes."""
+        effects = [self.catalogue[n].effect for n in sorted({*names, *self.catalogue.chain})]
         return compose(
-            self.model.motor,
-            self.model.static,
-            [*self.model.effects, *(self.catalogue[n].effect for n in sorted({*names, *self.catalogue.chain}))],
+            self.model.motor, self.model.static, [*self.model.effects, *effects, *([Injection()] if pushed else [])]
         )
 
     @functools.cached_property
@@ -74,18 +74,18 @@ class Kernels:
         most = LONG * len(self.with_effects(()).source)
         return frozenset(n for n in self.catalogue.load if len(self.with_effects((n,)).source) <= most)
 
-    def key(self, names: Iterable[str]) -> frozenset[str] | None:
-        """The effects of the kernel that serves a set of names; None is the kernel of everything."""
+    def key(self, names: Iterable[str], pushed: bool = False) -> Key:
+        """The kernel that serves a set of names, with pushes or without."""
         load = frozenset(names) - set(self.catalogue.chain)
-        if len(load) <= 1:
-            return load
-        short = self.short
-        return short if load <= short else None
+        if not load or (len(load) == 1 and not pushed):
+            return load, pushed
+        return (self.short, True) if load <= self.short else None
 
-    def residuals(self, key: frozenset[str] | None, unit: np.ndarray) -> np.ndarray:
+    def residuals(self, key: Key, unit: np.ndarray) -> np.ndarray:
         """Calculated minus measured (n, 2, N) [pu] at coordinates (n, D) of the study."""
         if key not in self._made:
-            model = self.with_effects(key)
+            assert key is not None
+            model = self.with_effects(*key)
             bounds, fixed = (
                 {n: v for n, v in given.items() if n in model.names} for given in (self.bounds, self.fixed)
             )
@@ -100,6 +100,7 @@ class Kernels:
 
     def compile(self, tell: Callable[[str], None]) -> None:
         """Compile what is not in the cache yet, side by side."""
-        sets = [self.short, *(frozenset((n,)) for n in self.catalogue.load), frozenset()]
-        sources = [self.whole.model.source, *(self.with_effects(s).source for s in sets)]
+        keys = [(self.short, True), *((frozenset((n,)), False) for n in self.catalogue.load)]
+        keys += [(frozenset(), True), (frozenset(), False)]
+        sources = [self.whole.model.source, *(self.with_effects(*key).source for key in keys)]
         compile_missing(sources, lambda n: tell(f"compiling {n} kernels, once for this base model and these channels"))

@@ -107,14 +107,24 @@ class Study:
                     return PRIOR * self.catalogue[name].relevant(p) / self.width(p.name)
         raise KeyError(column)
 
-    def residuals(self, unit: np.ndarray, names: Sequence[str] | None = None) -> np.ndarray:
+    def residuals(self, unit: np.ndarray, names: Sequence[str] | None = None, pushed: bool = False) -> np.ndarray:
         """Calculated minus measured (n, 2, N) [pu] at coordinates (n, D) where effects but `names` are at their null.
 
-        By default any effect may be there, at the price of the largest kernel.
+        By default any effect and any push may be there, at the price of the largest kernel.
         """
         self.simulations += len(unit)
-        key = None if names is None else self.kernels.key(names)
+        key = None if names is None else self.kernels.key(names, pushed)
         return side_by_side(lambda part: self.kernels.residuals(key, part), unit)
+
+    def residuals_of(self, unit: np.ndarray, sets: Sequence[tuple[Sequence[str], bool]]) -> np.ndarray:
+        """As `residuals`, with a set of names for each of the coordinates, and whether a push is in it."""
+        keys = [self.kernels.key(names, pushed) for names, pushed in sets]
+        made = np.empty((len(unit), 2, self.problem.drive.samples))
+        for key in dict.fromkeys(keys):
+            mine = np.array([k == key for k in keys])
+            first = sets[keys.index(key)]
+            made[mine] = self.residuals(unit[mine], *first)
+        return made
 
     def rows(
         self, unit: np.ndarray, noise: Noise, chain: Sequence[int], names: Sequence[str] | None = None

@@ -197,9 +197,11 @@ def tangent(study: Study, fit: Refit) -> Tangent:
     up, down = two_sided(fit.unit, nuisances)
     points, spans, labels = _candidate_points(study, fit)
     injected, groups = injections(study, fit.unit)
-    batch = np.concatenate([fit.unit[None], up, down, points, injected])
-    raw = study.residuals(batch)
     k, m = len(nuisances), len(points)
+    sets = [(fit.names, False)] * (1 + 2 * k)
+    sets += [((*fit.names, c.name), False) for c, _, first, last in labels for _ in range(first, last)]
+    sets += [(fit.names, True)] * len(injected)
+    raw = study.residuals_of(np.concatenate([fit.unit[None], up, down, points, injected]), sets)
     base = raw[0]
     up_rows, down_rows = raw[1 : 1 + k], raw[1 + k : 1 + 2 * k]
     width = np.array([u[c] - d[c] for u, d, c in zip(up, down, nuisances, strict=True)])
