@@ -13,8 +13,7 @@ from tractexp.identify.result import relative_error
 from tractexp.model.model import Model
 from tractexp.record import Event
 
-BLOCKS = 40  # of the block bootstrap
-RESAMPLES = 999
+SHOWN = 10.8  # expected gain at which a true explanation fails to gain anything in 5 % of cases: (2 x 1.645)^2
 SAME = 0.03  # singular values below this share of the largest: pushes that differ from others in noise only
 
 
@@ -31,7 +30,10 @@ class Curves:
 
 @dataclass(frozen=True, eq=False)
 class Gap:
-    """Before and after; `closed` is the share of the explainable gap, `gain` the least of the gain at 95 %.
+    """Before and after: `closed` is the share of the explainable gap, `gain` the deviance gained.
+
+    `expected` is the gain to be expected of a true explanation, the squared distance of both curves in standard
+    deviations; a true one scatters about it by twice its root.
 
     Explainable is what was gained and what pushes into the balances would still gain: the deviance itself moves with
     the level of the noise, which is only estimated, by more than a small gap.
@@ -41,6 +43,12 @@ class Gap:
     after: Curves
     closed: float
     gain: float
+    expected: float
+
+    @property
+    def helps(self) -> bool:
+        """Whether the extension helps on these events, or they are too mild to tell."""
+        return self.gain > 0 or self.expected < SHOWN
 
 
 def curves(study: Study, unit: np.ndarray, noise: Noise, names: Sequence[str] | None = None) -> Curves:
@@ -56,8 +64,7 @@ def curves(study: Study, unit: np.ndarray, noise: Noise, names: Sequence[str] | 
 
 
 def gap(
-    study: Study, base: np.ndarray, extended: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int],
-    seed: int,
+    study: Study, base: np.ndarray, extended: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int]
 ) -> Gap:  # fmt: skip
     """Compare the base model's fit and that with the named effects on the events of `study`.
 
@@ -68,10 +75,9 @@ def gap(
     gained = before.deviance - after.deviance
     explainable = gained + max(left_over(study, extended, names, noise, fitted), 0.0)
     closed = gained / explainable if explainable > 0 else float("nan")
-    both = study.residuals_of(np.array([base, extended]), [((), False), (names, False)])
-    white = noise.whiten(both, drive, known)
-    gains = (white[0] ** 2 - white[1] ** 2).reshape(2, -1).sum(axis=0)
-    return Gap(before, after, float(closed), _least(gains, seed))
+    apart = (after.calculated - before.calculated)[None] * known
+    rows = noise.whiten(apart, drive, known)[0]
+    return Gap(before, after, float(closed), float(gained), float(rows @ rows))
 
 
 def left_over(study: Study, unit: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int]) -> float:
@@ -93,14 +99,6 @@ def left_over(study: Study, unit: np.ndarray, names: Sequence[str], noise: Noise
     _, values, basis = np.linalg.svd(cells / np.maximum(scale, 1e-300), full_matrices=False)
     basis = basis[values > SAME * values[0]]
     return float(np.sum((basis @ r) ** 2) - len(basis))
-
-
-def _least(gains: np.ndarray, seed: int) -> float:
-    """Lower 95 % bound of the sum of serially dependent gains (N,), by resampling blocks."""
-    blocks = np.array([part.sum() for part in np.array_split(gains, min(BLOCKS, len(gains)))])
-    rng = np.random.default_rng(seed)
-    sums = blocks[rng.integers(len(blocks), size=(RESAMPLES, len(blocks)))].sum(axis=1)
-    return float(np.quantile(sums, 0.05))
 
 
 def held_out(

@@ -113,12 +113,12 @@ def investigate(
     explanation = explain(study, naming, seed, tell)
     survivors, rivals = surviving(study, explanation, seed)
     chain = tuple(explanation.stages[-1].chain(naming))
-    return _conclude(study, explanation, survivors, rivals, chain, validate, bounds, fixed, alpha, seed, tell)
+    return _conclude(study, explanation, survivors, rivals, chain, validate, bounds, fixed, alpha, tell)
 
 
 def _conclude(
     study: Study, explanation: Explanation, survivors: list[Rival], rivals: list[Rival], chain: tuple[str, ...],
-    validate: Sequence[Event], bounds: Mapping, fixed: Mapping, alpha: float, seed: int, tell: Callable[[str], None],
+    validate: Sequence[Event], bounds: Mapping, fixed: Mapping, alpha: float, tell: Callable[[str], None],
 ) -> Finding:  # fmt: skip
     noise = explanation.stages[-1].noise
     bare = study.refit(noise, [((), _unchained(study, explanation.stages[0].fit, ()))], chain=())[0]
@@ -130,9 +130,9 @@ def _conclude(
         tell(f"judging {len(adequate)} explanation{'s' * (len(adequate) > 1)} on the held-out events")
         fits = [bare, *(extended[s.fit.names] for s in adequate)]
         other, units, other_noise = held_out(study.model, study.catalogue, validate, study, fits, bounds, fixed)
-        gaps = {s.fit.names: gap(other, units[0], u, s.fit.names, other_noise, other.before, seed)
+        gaps = {s.fit.names: gap(other, units[0], u, s.fit.names, other_noise, other.before)
                 for s, u in zip(adequate, units[1:], strict=True)}  # fmt: skip
-        kept = [s for s in adequate if gaps[s.fit.names].gain > 0]
+        kept = [s for s in adequate if gaps[s.fit.names].helps]
         shown = (kept or adequate)[0]
         carried = gaps[shown.fit.names]
         validation = (other, [units[0], units[1 + adequate.index(shown)]])
@@ -147,7 +147,7 @@ def _conclude(
         verdict, reason, names, sets,
         where(explanation.stages[0].projection, explanation.stages[0].null, alpha) if verdict != "none" else [],
         study.catalogue, study, explanation, rivals, bare, after,
-        gap(study, bare.unit, after.unit, after.names, stage.noise, fitted, seed), carried if names else None,
+        gap(study, bare.unit, after.unit, after.names, stage.noise, fitted), carried if names else None,
         validation if names else None,
         deciding_event(study, kept) if verdict == "tied" else None,
         _nearest(study, bare, rivals, noise, validate, bounds, fixed) if verdict == "unexplained" else None, alpha,
