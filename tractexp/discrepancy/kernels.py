@@ -7,7 +7,7 @@ everything. All give the same response up to rounding.
 """
 
 import functools
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -99,8 +99,15 @@ class Kernels:
         return Likelihood.of(problem), np.r_[[self._column[n] for n in problem.space.names], before].astype(int)
 
     def compile(self, tell: Callable[[str], None]) -> None:
-        """Compile what is not in the cache yet, side by side."""
-        keys = [(self.short, True), *((frozenset((n,)), False) for n in self.catalogue.load)]
-        keys += [(frozenset(), True), (frozenset(), False)]
-        sources = [self.whole.model.source, *(self.with_effects(*key).source for key in keys)]
-        compile_missing(sources, lambda n: tell(f"compiling {n} kernels, once for this base model and these channels"))
+        """Compile what is not in the cache yet, side by side, the largest first."""
+        compile_missing(self._sources(), lambda: tell("compiling kernels, once for this base model and these channels"))
+
+    def _sources(self) -> Iterator[str]:
+        yield self.whole.model.source
+        for key in (
+            (frozenset(), False),
+            (frozenset(), True),
+            *((frozenset((n,)), False) for n in self.catalogue.load),
+        ):
+            yield self.with_effects(*key).source
+        yield self.with_effects(self.short, True).source

@@ -4,6 +4,7 @@ import functools
 import hashlib
 import importlib.metadata
 import importlib.util
+import itertools
 import os
 import sys
 import tempfile
@@ -65,14 +66,18 @@ def load(source: str) -> ModuleType:
     return module
 
 
-def compile_missing(sources: Iterable[str], tell: Callable[[int], None] = lambda count: None) -> None:
-    """Compile the kernels that the cache lacks, side by side in processes; `tell` hears how many, if any."""
+def compile_missing(sources: Iterable[str], tell: Callable[[], None] = lambda: None) -> None:
+    """Compile the kernels that the cache lacks, side by side in processes; `tell` is called once if there are any.
+
+    `sources` may be a generator: what it derives next is derived while others compile.
+    """
     from joblib import Parallel, delayed
 
-    missing = [s for s in dict.fromkeys(sources) if not any(_compiled(s))]
-    if missing:
-        tell(len(missing))
-        Parallel(n_jobs=min(len(missing), os.cpu_count() or 1))(delayed(_compile)(s) for s in missing)
+    missing = (s for s in sources if not any(_compiled(s)))
+    first = next(missing, None)
+    if first is not None:
+        tell()
+        Parallel(n_jobs=os.cpu_count() or 1)(delayed(_compile)(s) for s in itertools.chain((first,), missing))
 
 
 def _compiled(source: str) -> Iterable[Path]:
