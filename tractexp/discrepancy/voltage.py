@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tractexp.identify.noise import runs
 from tractexp.record import Event
 
 HALF_WIDTHS = (1, 2, 3, 5, 8, 12, 18, 27)  # samples; with the last an average has no bias to speak of
@@ -67,9 +68,7 @@ def _averaged(U: np.ndarray, deviation: float, agreement: float) -> tuple[np.nda
 def _smooth_stretches(agrees: np.ndarray) -> list[slice]:
     """Stretches long enough for a spline, away from where averages disagree."""
     edge = np.convolve(~agrees, np.ones(2 * MARGIN + 1), "same") > 0.5
-    bounds = np.flatnonzero(np.diff(np.concatenate(([True], edge, [True])).astype(int)))
-    parts = [slice(a, b) for a, b in bounds.reshape(-1, 2)]
-    return [p for p in parts if p.stop - p.start >= HALF_WIDTHS[-1]]
+    return [p for p in runs(~edge) if p.stop - p.start >= HALF_WIDTHS[-1]]
 
 
 def _spline(U: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.identify.information import SHARE
+from tractexp.identify.noise import runs
 from tractexp.identify.plan import Forecast, Shape, over_depth
 from tractexp.identify.uncertainty import Uncertainty
 from tractexp.identify.verdict import BOUND, EDGE, UNIDENTIFIED, WEAK, WITHIN, shown, size
@@ -96,6 +97,5 @@ def _goal(known: Uncertainty, j: int) -> tuple[float, list[float]]:
 
 def _spans(depths: np.ndarray, enough: np.ndarray) -> str:
     """The depths (n,) that are `enough`, as text: '5 to 15 % or 27.5 to 95 %'."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], enough, [False])).astype(int)))
-    spans = [(100 * depths[a], 100 * depths[b - 1]) for a, b in edges.reshape(-1, 2)]
+    spans = [(100 * depths[part][0], 100 * depths[part][-1]) for part in runs(enough)]
     return " or ".join(f"{a:.3g} to {b:.3g} %" if b > a else f"{a:.3g} %" for a, b in spans)

@@ -95,8 +95,13 @@ def fit_autoregression(
 
 def stretches(values: np.ndarray, known: np.ndarray) -> list[np.ndarray]:
     """The unbroken parts of `values` (N,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], known, [False])).astype(int)))
-    return [values[a:b] for a, b in edges.reshape(-1, 2)]
+    return [values[part] for part in runs(known)]
+
+
+def runs(mask: np.ndarray) -> list[slice]:
+    """The unbroken stretches in which `mask` (N,) is True."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(int)))
+    return [slice(a, b) for a, b in edges.reshape(-1, 2)]
 
 
 def _run_lengths(known: np.ndarray) -> np.ndarray:
