@@ -40,14 +40,19 @@ def remembered(parts: Iterable[object], generate: Callable[[], str]) -> str:
     folders = {Path(sys.modules[type(part).__module__].__file__ or "").parent for part in parts}
     digest = hashlib.sha256(f"{importlib.metadata.version('sympy')} {parts!r}".encode())
     for folder in sorted({Path(__file__).parent, *folders}):
-        for file in sorted(folder.glob("*.py")):
-            digest.update(file.read_bytes())
+        digest.update(_code(folder))
     path = cache_folder() / f"source_{digest.hexdigest()[:20]}.txt"
     if path.exists():
         return path.read_text()
     text = generate()
     _write(path, text)
     return text
+
+
+@functools.cache
+def _code(folder: Path) -> bytes:
+    """The code of a folder, read once: an investigation asks for the sources of some thirty models."""
+    return b"".join(file.read_bytes() for file in sorted(folder.glob("*.py")))
 
 
 @functools.cache
@@ -71,11 +76,11 @@ def compile_missing(sources: Iterable[str], tell: Callable[[], None] = lambda: N
 
     `sources` may be a generator: what it derives next is derived while others compile.
     """
-    from joblib import Parallel, delayed
-
     missing = (s for s in sources if not any(_compiled(s)))
     first = next(missing, None)
     if first is not None:
+        from joblib import Parallel, delayed
+
         tell()
         Parallel(n_jobs=os.cpu_count() or 1)(delayed(_compile)(s) for s in itertools.chain((first,), missing))
 
