@@ -8,7 +8,7 @@ import numpy as np
 from tractexp.discrepancy.catalogue import Catalogue
 from tractexp.discrepancy.noise import Noise
 from tractexp.discrepancy.study import Refit, Study
-from tractexp.discrepancy.tangent import injections, two_sided
+from tractexp.discrepancy.tangent import injections, spanned, two_sided
 from tractexp.identify.result import relative_error
 from tractexp.model.model import Model
 from tractexp.record import Event
@@ -95,9 +95,7 @@ def left_over(study: Study, unit: np.ndarray, names: Sequence[str], noise: Noise
     nuisance, cells = rows[1 : 1 + k] - rows[1 + k : 1 + 2 * k], rows[1 + 2 * k :] - r
     Q = np.linalg.qr(nuisance.T)[0]
     cells -= (cells @ Q) @ Q.T
-    scale = np.linalg.norm(cells, axis=1, keepdims=True)
-    _, values, basis = np.linalg.svd(cells / np.maximum(scale, 1e-300), full_matrices=False)
-    basis = basis[values > SAME * values[0]]
+    basis = spanned(cells, SAME)
     return float(np.sum((basis @ r) ** 2) - len(basis))
 
 
@@ -126,7 +124,7 @@ def _settled(study: Study, unit: np.ndarray, noise: Noise, names: Sequence[str])
     def rows(x: np.ndarray, lanes: np.ndarray) -> np.ndarray:
         whole = np.tile(unit, (len(x), 1))
         whole[:, study.before] = x
-        return study.rows(whole, noise, (), names)
+        return study.rows(whole, noise, (), [names] * len(x))
 
     moved = unit.copy()
     moved[study.before] = descend(rows, unit[study.before][None]).unit[0]

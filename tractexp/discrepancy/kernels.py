@@ -25,14 +25,14 @@ Key = tuple[frozenset[str], bool] | None  # load effects and whether pushes are 
 WORTH = 16  # simulations that are worth a thread
 
 
-def side_by_side(function: Callable[[np.ndarray], np.ndarray], unit: np.ndarray) -> np.ndarray:
-    """`function` of coordinates (n, D), on all cores: lanes do not know of each other, so the bits are the same."""
+def side_by_side(function: Callable[[np.ndarray], np.ndarray], lanes: np.ndarray) -> np.ndarray:
+    """`function` of lanes (n, ...), on all cores: they do not know of each other, so the bits are the same."""
     from numba import get_num_threads
 
-    parts = min(get_num_threads(), len(unit) // WORTH)
+    parts = min(get_num_threads(), len(lanes) // WORTH)
     if parts < 2:
-        return function(unit)
-    return np.concatenate(list(_threads().map(function, np.array_split(unit, parts))))
+        return function(lanes)
+    return np.concatenate(list(_threads().map(function, np.array_split(lanes, parts))))
 
 
 @functools.cache

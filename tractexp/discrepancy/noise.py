@@ -1,7 +1,7 @@
-"""The noise of P and Q together: correlated with each other (through the voltage's noise) and in time.
+"""The noise of P and Q together: correlated with each other and in time.
 
-The voltage's noise enters the model as an input and leaves it in P and Q at once. The residuals of a fit contain
-it with the noise of the power channels, so what is estimated here from quiet residuals covers both.
+Estimated from the quiet residuals of a fit. They contain the noise of the power channels, the wandering of the load,
+and what smoothing left of the voltage's noise, which enters the model and leaves it in P and Q at once.
 """
 
 from collections.abc import Callable, Sequence

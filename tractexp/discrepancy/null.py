@@ -11,7 +11,7 @@ from scipy.special import gammaincc
 
 from tractexp.discrepancy.noise import Noise
 from tractexp.discrepancy.study import Study
-from tractexp.discrepancy.tangent import Projection, Tangent, re_estimated, rich_residuals, windows
+from tractexp.discrepancy.tangent import Projection, Tangent, rich_residuals, windows
 
 DRAWS = 199
 FEW = 150  # independent quiet samples below which the noise estimate is itself uncertain
@@ -77,7 +77,7 @@ def null_of(t: Tangent, noise: Noise, seed: int, plain: bool, draws: int = DRAWS
     if plain or noise.worth(sum(p.stop - p.start for p in study.quiet)) >= FEW:
         return _collect([t.whitened(noise, made)], study, noise.blurred)
     rest = rich_residuals(t, made)
-    return _collect([t.whitened(re_estimated(t, rest[b]), made[b : b + 1]) for b in range(draws)], study, noise.blurred)
+    return _collect([t.whitened(study.noise_in(rest[b]), made[b : b + 1]) for b in range(draws)], study, noise.blurred)
 
 
 def _collect(projections: list[Projection], study: Study, blurred: bool) -> Null:

@@ -8,7 +8,7 @@ from scipy.special import ndtr
 
 from tractexp.discrepancy.study import Study
 from tractexp.discrepancy.sure import ONE_SIDED, Rival
-from tractexp.discrepancy.tangent import NUISANCE_STEP
+from tractexp.discrepancy.tangent import two_sided
 from tractexp.model.drive import Drive, Excitation
 
 DEPTHS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
@@ -41,10 +41,7 @@ def deciding_event(study: Study, tied: Sequence[Rival]) -> Decider:
 def _lambda(study: Study, truth: Rival, rival: Rival, depth: float, duration: float) -> float:
     drive = Drive.of([_dip(study, depth, duration)])
     inside = [*study.base, *study.parameters(rival.fit.names)]
-    up, down = (np.tile(rival.fit.unit, (len(inside), 1)) for _ in "ud")
-    for row, k in enumerate(inside):
-        up[row, k] = min(up[row, k] + NUISANCE_STEP, 1.0)
-        down[row, k] = max(down[row, k] - NUISANCE_STEP, 0.0)
+    up, down = two_sided(rival.fit.unit, inside)
     width = np.array([u[k] - d[k] for u, d, k in zip(up, down, inside, strict=True)])
     points = np.concatenate([truth.fit.unit[None], rival.fit.unit[None], up, down])[:, : study.problem.space.dimension]
     values = study.problem.full(study.problem.space.from_unit(points))

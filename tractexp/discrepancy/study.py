@@ -126,17 +126,10 @@ class Study:
             made[mine] = self.residuals(unit[mine], *first)
         return made
 
-    def rows(
-        self, unit: np.ndarray, noise: Noise, chain: Sequence[int], names: Sequence[str] | None = None
-    ) -> np.ndarray:
-        """Whitened residuals (n, 2 N) and, after them, the prior of the free chain columns."""
-        self.simulations += len(unit)
-        key = None if names is None else self.kernels.key(names)
-
-        def white_of(part: np.ndarray) -> np.ndarray:
-            return noise.whiten(self.kernels.residuals(key, part), self.problem.drive, self.likelihood.known)
-
-        white = side_by_side(white_of, unit)
+    def rows(self, unit: np.ndarray, noise: Noise, chain: Sequence[int], sets: Sequence[Sequence[str]]) -> np.ndarray:
+        """Whitened residuals (n, 2 N) of coordinates with a set of names each, then the prior of the free chain."""
+        raw = self.residuals_of(unit, [(names, False) for names in sets])
+        white = side_by_side(lambda part: noise.whiten(part, self.problem.drive, self.likelihood.known), raw)
         prior = [(unit[:, k] - self.null[k]) / self.prior_deviation(k) for k in chain]
         return np.concatenate([white, *(p[:, None] for p in prior)], axis=1)
 
@@ -181,21 +174,11 @@ class Study:
             table[lane, : len(free)] = free
         starts = np.array([np.r_[start, 0.0] for _, start in wanted])
         prior = self.parameters(free_chain)
-        keys = [self.kernels.key(names) for names, _ in wanted]
-        order = {key: k for k, key in enumerate(dict.fromkeys(keys))}
-        kernel = np.array([order[key] for key in keys])
-        sets = {k: next(names for (names, _), key in zip(wanted, keys, strict=True) if key == kernel_key)
-                for kernel_key, k in order.items()}  # fmt: skip
 
         def rows(x: np.ndarray, lanes: np.ndarray) -> np.ndarray:
             whole = starts[lanes]
             np.put_along_axis(whole, table[lanes], x, axis=1)
-            made = np.empty((len(x), 2 * self.problem.drive.samples + len(prior)))
-            for k, names in sets.items():
-                mine = kernel[lanes] == k
-                if mine.any():
-                    made[mine] = self.rows(whole[mine, :-1], noise, prior, names)
-            return made
+            return self.rows(whole[:, :-1], noise, prior, [wanted[lane][0] for lane in lanes])
 
         begin = np.take_along_axis(starts, table, axis=1)
         done = descend(rows, begin, table == self.dimension, *effort, self._apart(len(prior)))
@@ -265,5 +248,5 @@ class Study:
             return None
         bare, own = self.kernels.bare, np.r_[unit[self.base], unit[self.before]][None]
         raw = Problem(self.model, self.recorded, self.kernels.bounds, self.kernels.fixed, self.kernels.substeps)
-        noisy, smooth = (Likelihood.of(p).residuals(own)[0] for p in (raw, bare))
-        return Blur(np.nan_to_num(noisy - smooth), self.left)
+        noisy, calm = (Likelihood.of(p).residuals(own)[0] for p in (raw, bare))
+        return Blur(np.nan_to_num(noisy - calm), self.left)

@@ -48,7 +48,7 @@ def rivals(study: Study, explanation: Explanation) -> tuple[list[Rival], Noise]:
     base = study.refit(last.noise, [((), explanation.stages[0].fit.unit)])[0]
     alike = ALIKE * max(base.cost - fits[0].cost, 0.0)
     chain = study.parameters(study.catalogue.chain)
-    rows = study.rows(np.array([f.unit for f in fits]), last.noise, chain)
+    rows = study.rows(np.array([f.unit for f in fits]), last.noise, chain, [f.names for f in fits])
     distance = ((rows - rows[0]) ** 2).sum(axis=1)
     found = []
     for fit, apart in zip(fits, distance, strict=True):
@@ -68,6 +68,6 @@ def surviving(study: Study, explanation: Explanation, seed: int, most: int = 6) 
     tested = []
     for k, rival in enumerate([r for r in everyone if not r.rejected][:most]):
         at = explanation.stages[-1] if k == 0 else stage(study, rival.fit, noise, seed + 100 + k, plain=True)
-        tested.append(replace(rival, rejected=False, stage=at))
+        tested.append(replace(rival, stage=at))
     known = {r.fit.names: r for r in tested}
     return tested, [known.get(r.fit.names, r) for r in everyone]

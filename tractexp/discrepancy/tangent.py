@@ -156,12 +156,20 @@ class Projection:
 
     def unsteadiness(self) -> np.ndarray:
         """How much parameters of their own for each event would lower the deviance, (b,)."""
-        scale = np.linalg.norm(self.split, axis=1, keepdims=True)
-        rows = self.split[scale[:, 0] > 1e-12] / scale[scale > 1e-12][:, None]
-        if not len(rows):
-            return np.zeros(len(self.r))
-        _, values, basis = np.linalg.svd(rows, full_matrices=False)
-        return ((self.r @ basis[values > DISTINCT * values[0]].T) ** 2).sum(axis=1)
+        return ((self.r @ spanned(self.split, DISTINCT, least=1e-12).T) ** 2).sum(axis=1)
+
+
+def spanned(rows: np.ndarray, distinct: float, least: float = 0.0) -> np.ndarray:
+    """Orthonormal basis (m, R) of what rows (k, R) span, each scaled to length one; those of at most `least` are none.
+
+    Directions weaker than `distinct` times the strongest are left out.
+    """
+    length = np.linalg.norm(rows, axis=1)
+    rows = rows[length > least] / length[length > least, None]
+    if not len(rows):
+        return rows
+    _, values, basis = np.linalg.svd(rows, full_matrices=False)
+    return basis[values > distinct * values[0]]
 
 
 def _signed_drop(block: np.ndarray, r: np.ndarray, signs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -289,15 +297,7 @@ def rich_residuals(t: Tangent, residuals: np.ndarray) -> np.ndarray:
     Each is divided by what is left of its variance then, so that the noise does not come out too small.
     """
     basis = np.concatenate([t.nuisance, *(c.raw for c in t.columns)]).reshape(-1, residuals[0].size)
-    scale = np.linalg.norm(basis, axis=1)
-    basis = basis[scale > 0] / scale[scale > 0, None]
-    _left, values, right = np.linalg.svd(basis, full_matrices=False)
-    right = right[values > 1e-6 * values[0]]
+    right = spanned(basis, 1e-6)
     flat = residuals.reshape(len(residuals), -1)
     kept = np.maximum(1 - np.einsum("kn,kn->n", right, right), LEAST_KEPT)
     return ((flat - (flat @ right.T) @ right) / np.sqrt(kept)).reshape(residuals.shape)
-
-
-def re_estimated(t: Tangent, residual: np.ndarray) -> Noise:
-    """Noise estimated anew from one residual (2, N)."""
-    return t.study.noise_in(residual)

@@ -19,7 +19,6 @@ from tractexp.discrepancy.tangent import (
     Projection,
     Score,
     Tangent,
-    re_estimated,
     rich_residuals,
     tangent,
 )
@@ -85,7 +84,7 @@ class Explanation:
 def stage(study: Study, fit: Refit, noise: Noise, seed: int, plain: bool = False) -> Stage:
     """All tests at one fit, under the noise of what no candidate explains there; `plain` takes it as known."""
     t = tangent(study, fit)
-    noise = re_estimated(t, rich_residuals(t, t.residual[None])[0])
+    noise = study.noise_in(rich_residuals(t, t.residual[None])[0])
     fit = study.refit(noise, [(fit.names, fit.unit)])[0]
     t = tangent(study, fit)
     projection = t.whitened(noise)

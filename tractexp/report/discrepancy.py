@@ -36,8 +36,8 @@ def page(path: Path, finding: Finding, figures: list[Path], title: str) -> Path:
     made.verdict(f"{finding.verdict.upper()} {names}".strip(), finding.reason, kind=KIND[finding.verdict])
     made.heading("1 Noise").text(
         f"{finding.last.noise.describe()}. It is estimated where nothing happens, from what the fit leaves there, and"
-        " so contains the voltage's noise too. Time skew, measurement window and load drift are free in every fit, each"
-        " held by what is physically likely."
+        " so contains what smoothing leaves of the voltage's noise. Time skew, measurement window and load drift are"
+        " free in every fit, each held by what is physically likely."
     )
     made.heading("2 Is there a disagreement?").text(_gate(finding))
     made.heading("3 Where")
