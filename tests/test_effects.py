@@ -428,12 +428,22 @@ def test_traction_power_is_limited_linearly(low, allowed):
     assert added == pytest.approx(0.4 * (P0 - T_M) * (allowed - low**P_V), abs=0.002)
 
 
-def test_a_dc_link_lets_its_share_fall_late():
+def test_a_dc_link_that_holds_its_power_falls_late():
     excitation, s, T = dip(), 0.5, 0.04
-    P, _ = run("dc_link_lag", excitation, values("dc_link_lag", lag_share=s, lag_time=T))
+    P, _ = run("dc_link_lag", excitation, values("dc_link_lag", lag_share=s, lag_time=T, held_current=0.0))
     share = P0 - T_M
-    (late,) = solved(excitation, lambda u, y: u * (share * u**P_V - y) / T, [share])
+    (late,) = solved(excitation, lambda u, y: (share * u**P_V - y) / T, [share])
     assert pytest.approx(s * (late - static(excitation)[0]), abs=1e-9) == P - base(excitation)[0]
+
+
+def test_a_dc_link_that_holds_its_current_falls_with_the_voltage_and_comes_back():
+    """Energy W missing behind a constant demand D: dW/dt = D - P, P = u (D + W/T)."""
+    excitation, s, T = dip(), 0.5, 0.04
+    P, _ = run("dc_link_lag", excitation, values("dc_link_lag", lag_share=s, lag_time=T, held_current=1.0))
+    demand = P0 - T_M
+    (missing,) = solved(excitation, lambda u, W: demand - u * (demand + W / T), [0.0])
+    drawn = excitation.U * (demand + missing / T)
+    assert pytest.approx(s * (drawn - static(excitation)[0]), abs=1e-9) == P - base(excitation)[0]
 
 
 def test_a_capacitor_gives_reactive_power_with_the_square_of_voltage():
