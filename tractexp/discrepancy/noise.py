@@ -1,15 +1,15 @@
 """The noise of P and Q together: correlated with each other and in time.
 
-Estimated from the quiet residuals of a fit. They contain the noise of the power channels, the wandering of the load,
-and what smoothing left of the voltage's noise, which enters the model and leaves it in P and Q at once.
+Estimated from the quiet residuals of a fit. Beside fast noise there may be slow or local shapes of known variance: the
+wandering of the load, and what is left of the voltage's noise, which enters the model and leaves it in P and Q at once.
 """
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from tractexp.discrepancy.voltage import Blur
 from tractexp.discrepancy.wander import Wander, without_slow
 from tractexp.errors import UserError
 from tractexp.identify.noise import FEWEST, Autoregression, fit_autoregression
@@ -19,8 +19,8 @@ from tractexp.record import Event
 HIGHEST = 8  # order of the autoregressions
 TAIL = 0.35  # share of the record after the dip that counts as quiet
 BURN_IN = 500  # samples
-BLURRED = 0.5  # variance that noise of the voltage caused, over that of the power
-DROWNED = 4.0  # the same, above which what is left of it after smoothing looks like physics
+BLURRED = 0.5  # variance that noise of the voltage causes at some sample, over that of the power
+SEEN = 0.05  # standard deviations of the fast noise: shapes that do less are left out
 MANY = 200  # quiet samples from which shocks are drawn as they were seen, with their tails and steps
 
 
@@ -32,59 +32,80 @@ class Noise:
     channels: tuple[Autoregression, Autoregression]
     shocks: tuple[np.ndarray, np.ndarray] | None = None  # of unit variance, as they were seen; None: normal
     wander: Wander | None = None  # of the mixed channels
-    trust: np.ndarray | None = None  # (2, N) by which noise of the voltage lowers a sample's weight
-    blurred: bool = False  # whether noise of the voltage did as much as that of the power
-    _slow: dict[tuple[int, int], tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
+    blur: np.ndarray | None = None  # (k, 2, N) pu: what errors of the voltage do, each of one standard deviation
+    _slow: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict, init=False)
+
+    @property
+    def blurred(self) -> bool:
+        """Whether noise of the voltage does as much as that of the power."""
+        return self.blur is not None and bool((self._mixed(self.blur) ** 2).sum(axis=0).max() > BLURRED)
+
+    def _mixed(self, rows: np.ndarray) -> np.ndarray:
+        """Channels (n, 2, N) mixed so that their noise is independent."""
+        return np.einsum("ij,njt->nit", self.mix, rows)
 
     def whiten(self, residuals: np.ndarray, drive: Drive, known: np.ndarray) -> np.ndarray:
         """(n, 2, N) to rows (n, 2 N) of independent unit variance; samples that do not count are 0."""
-        mixed = np.einsum("ij,njt->nit", self.mix, residuals)
+        mixed = self._mixed(residuals)
         both = known.all(axis=0)
         rows = np.empty_like(mixed)
         for e in range(drive.events):
             part = drive.part(e)
-            for c, channel in enumerate(self.channels):
-                rows[:, c, part] = self._settled(channel.whiten(mixed[:, c, part], both[part]), c)
-        if self.trust is not None:
-            rows *= self.trust
+            white = self._fast(mixed[:, :, part], both[part])
+            rows[:, :, part] = self._settled(white, e, part, both[part])
         return rows.reshape(len(rows), -1)
 
-    def _settled(self, white: np.ndarray, c: int) -> np.ndarray:
-        """Whitened rows (n, samples) of an event without the excess variance of a wandering load.
+    def _fast(self, mixed: np.ndarray, known: np.ndarray) -> np.ndarray:
+        """Mixed channels (n, 2, samples) of one event without the color of the fast noise."""
+        rows = [channel.whiten(mixed[:, c], known) for c, channel in enumerate(self.channels)]
+        return np.stack(rows, axis=1)
 
-        With B the whitened modes, (I + B'B)^(-1/2) by their singular vectors.
+    def _settled(self, white: np.ndarray, event: int, part: slice, known: np.ndarray) -> np.ndarray:
+        """Whitened rows (n, 2, samples) of an event without the excess variance of its shapes.
+
+        With B the whitened shapes, (I + B'B)^(-1/2) by their singular vectors.
         """
-        if self.wander is None or not self.wander.intensity[c]:
+        if self.wander is None and self.blur is None:
             return white
-        key = c, white.shape[1]
-        if key not in self._slow:
-            modes = self.channels[c].whiten(self.wander.modes(c, white.shape[1]), np.ones(white.shape[1], dtype=bool))
-            _, values, basis = np.linalg.svd(modes, full_matrices=False)
-            self._slow[key] = basis, 1 - 1 / np.sqrt(1 + values**2)
-        basis, share = self._slow[key]
-        return white - ((white @ basis.T) * share) @ basis
+        flat = white.reshape(len(white), -1)
+        if event not in self._slow:
+            shapes = self._fast(self._shapes(part), known)
+            _, values, basis = np.linalg.svd(shapes.reshape(len(shapes), -1), full_matrices=False)
+            seen = values > SEEN
+            self._slow[event] = basis[seen], 1 - 1 / np.sqrt(1 + values[seen] ** 2)
+        basis, share = self._slow[event]
+        return (flat - ((flat @ basis.T) * share) @ basis).reshape(white.shape)
+
+    def _shapes(self, part: slice) -> np.ndarray:
+        """Shapes (k, 2, samples) of the mixed channels in one event, of one standard deviation each."""
+        made = [np.empty((0, 2, part.stop - part.start))]
+        if self.wander is not None:
+            for c in (0, 1):
+                modes = self.wander.modes(c, part.stop - part.start)
+                made.append(np.zeros((len(modes), *made[0].shape[1:])))
+                made[-1][:, c] = modes
+        if self.blur is not None:
+            made.append(self._mixed(self.blur[:, :, part]))
+        return np.concatenate(made)
 
     def draw(self, rng: np.random.Generator, count: int, lengths: Sequence[int]) -> np.ndarray:
         """Noise of events of these lengths end to end, (count, 2, N) [pu]."""
-        drawn = np.concatenate([self._drawn(rng, count, n) for n in lengths], axis=2)
-        if self.trust is not None:
-            drawn /= self.trust
-        return np.linalg.solve(self.mix, drawn)
+        ends = np.cumsum([0, *lengths])
+        drawn = [self._drawn(rng, count, slice(a, b)) for a, b in itertools.pairwise(ends.tolist())]
+        return np.linalg.solve(self.mix, np.concatenate(drawn, axis=2))
 
-    def _drawn(self, rng: np.random.Generator, count: int, samples: int) -> np.ndarray:
+    def _drawn(self, rng: np.random.Generator, count: int, part: slice) -> np.ndarray:
         """Mixed channels (count, 2, samples) of one event."""
         from scipy.signal import lfilter
 
         made = []
-        size = (count, samples + BURN_IN)
+        size = (count, part.stop - part.start + BURN_IN)
         for c, channel in enumerate(self.channels):
             shocks = rng.standard_normal(size) if self.shocks is None else rng.choice(self.shocks[c], size)
             shocks *= channel.deviation[-1]
             made.append(lfilter([1.0], np.r_[1.0, -channel.coefficients[-1]], shocks)[:, BURN_IN:])
-            if self.wander is not None:
-                modes = self.wander.modes(c, samples)
-                made[-1] += rng.standard_normal((count, len(modes))) @ modes
-        return np.stack(made, axis=1)
+        shapes = self._shapes(part)
+        return np.stack(made, axis=1) + np.einsum("bk,kct->bct", rng.standard_normal((count, len(shapes))), shapes)
 
     def worth(self, samples: int) -> float:
         """How many independent samples tell as much of the slowest of this noise, by the color's gain at rest."""
@@ -118,7 +139,7 @@ def estimate(
     known: np.ndarray,
     quiet: Sequence[slice],
     wander: Callable[[np.ndarray], Wander | None] = lambda mix: None,
-    blur: Blur | None = None,
+    blur: np.ndarray | None = None,
 ) -> Noise:
     """Noise from residuals (2, N) in quiet stretches; `wander` tells how the load wanders in channels mixed by `mix`.
 
@@ -136,17 +157,6 @@ def estimate(
     covariance = together @ together.T / count
     covariance += 1e-18 * np.eye(2)
     mix = np.linalg.inv(np.linalg.cholesky(covariance))
-    trust, blurred = None, False
-    if blur is not None:
-        jitter = np.mean((mix @ np.concatenate([blur.jitter[:, part] for part in quiet], axis=1)) ** 2, axis=1)
-        blurred = bool(jitter.max() > BLURRED)
-        if jitter.max() > DROWNED:
-            raise UserError(
-                f"noise of the recorded voltage moves the calculated power by {np.sqrt(jitter.max()):.1f} times the"
-                f" noise of the recorded power, and no missing effect can be told from that (up to {np.sqrt(DROWNED):g}"
-                " times can be dealt with); record the voltage with less noise, or average it before"
-            )
-        trust = 1 / np.sqrt(1 + jitter[:, None] * blur.left)
     slow = wander(mix)
     fast = [[(mix @ p)[c] for p in pieces] for c in (0, 1)]
     if slow is not None:
@@ -156,7 +166,7 @@ def estimate(
     shocks = None
     if count >= MANY:
         shocks = _shocks(P, fast[0]), _shocks(Q, fast[1])
-    return Noise(mix, (P, Q), shocks, slow, trust, blurred)
+    return Noise(mix, (P, Q), shocks, slow, blur)
 
 
 def _shocks(channel: Autoregression, pieces: Sequence[np.ndarray]) -> np.ndarray:

@@ -12,7 +12,7 @@ import numpy as np
 from tractexp.discrepancy.catalogue import Catalogue
 from tractexp.discrepancy.kernels import Kernels, side_by_side
 from tractexp.discrepancy.noise import Noise, estimate, quiet_stretches
-from tractexp.discrepancy.voltage import Blur, smooth
+from tractexp.discrepancy.voltage import smooth
 from tractexp.discrepancy.wander import Wander, find
 from tractexp.identify.descent import Apart, descend
 from tractexp.identify.likelihood import Likelihood
@@ -59,10 +59,10 @@ class Study:
         fixed: Mapping[str, float],
         substeps: int | None = None,
     ):
-        self.model, self.catalogue, self.recorded = model, catalogue, tuple(events)
-        self.events, self.left = smooth(events)
+        self.model, self.catalogue, self.smoothed = model, catalogue, smooth(events)
+        self.events = tuple(s.event for s in self.smoothed)
         self.kernels = Kernels(model, catalogue, self.events, bounds, fixed, substeps)
-        self.blur: Blur | None = None
+        self.blur: np.ndarray | None = None
         self.problem = self.kernels.whole
         self.likelihood = Likelihood.of(self.problem)
         space = self.problem.space
@@ -203,7 +203,6 @@ class Study:
         """The base model with the chain free, and the noise of its residuals in quiet stretches."""
         noise = self.white()
         fit = self.refit(noise, [((), start) for start in self._base_starts()])[0]
-        self.blur = self._blurred(fit.unit)
         for _ in range(2):
             noise = self.noise(fit.unit)
             fit = self.refit(noise, [((), fit.unit)])[0]
@@ -230,6 +229,8 @@ class Study:
 
     def noise(self, unit: np.ndarray) -> Noise:
         """The noise of the quiet residuals at a fit."""
+        if self.blur is None:
+            self.blur = self._blurred(unit)
         return self.noise_in(self.residuals(unit[None])[0])
 
     def noise_in(self, residual: np.ndarray) -> Noise:
@@ -242,11 +243,16 @@ class Study:
         before = [drive.measured[:, drive.part(e)][:, event.steady] for e, event in enumerate(self.events)]
         return find([mix @ b for b in before if np.isfinite(b).all()], self.events[0].record.step)
 
-    def _blurred(self, unit: np.ndarray) -> Blur | None:
-        """What noise of the voltage does to the calculated power at a fit of the base model."""
-        if not self.left.any():
+    def _blurred(self, unit: np.ndarray) -> np.ndarray | None:
+        """What errors of the voltage do to the power of the base model at a fit, (k, 2, N) [pu]; None without any."""
+        most = max(len(s.errors) for s in self.smoothed)
+        if not most:
             return None
         bare, own = self.kernels.bare, np.r_[unit[self.base], unit[self.before]][None]
-        raw = Problem(self.model, self.recorded, self.kernels.bounds, self.kernels.fixed, self.kernels.substeps)
-        noisy, calm = (Likelihood.of(p).residuals(own)[0] for p in (raw, bare))
-        return Blur(np.nan_to_num(noisy - calm), self.left)
+        moved = [self._at_voltage([s.off_by(k) for s in self.smoothed]) for k in range(most)]
+        calm = Likelihood.of(bare).residuals(own)
+        return np.nan_to_num(np.concatenate([Likelihood.of(p).residuals(own) for p in moved]) - calm)
+
+    def _at_voltage(self, events: Sequence[Event]) -> Problem:
+        """The base model driven by these events."""
+        return Problem(self.model, events, self.kernels.bounds, self.kernels.fixed, self.kernels.substeps)

@@ -1,10 +1,10 @@
 """The voltage channel's own noise. The load never saw it, but a simulation driven by the record does.
 
-Before the event the voltage is replaced by a straight line, and where it is smooth by a smoothing spline. Smooth is
-where wide averages agree with all narrower ones (intersection of confidence intervals: Goldenshluger and Nemirovski
-1997). Near the edges of a dip only narrow averages agree, biased by as much as they may scatter and over as many
-samples as they span; those samples weigh less. Left as recorded they would do more harm: whatever smooths the
-calculated power, such as a measurement window, would seem to be there.
+Where the voltage is smooth it is replaced by a cubic and cosines whose amplitudes fall with the square of the
+frequency: a smoothing spline in other words, its stiffness the likeliest (Wahba 1990). Near the edges of a dip it is
+left as recorded. Either way something of the noise remains; how much, and in which shapes, is known, and what they do
+to the calculated power is part of the noise of a study. Left out of account they would do harm: whatever smooths the
+calculated power, or wanders slowly, would seem to be there.
 """
 
 from collections.abc import Sequence
@@ -12,35 +12,61 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tractexp.discrepancy.wander import Walk, cosines
 from tractexp.identify.noise import runs
 from tractexp.record import Event
 
-HALF_WIDTHS = (1, 2, 3, 5, 8, 12, 18, 27)  # samples; with the last an average has no bias to speak of
-NARROW, WIDE = 2.0, 3.0  # standard deviations within which averages agree: at edges, and to call a stretch smooth
-MARGIN = 8  # samples beside an edge that are not smooth
+HALF_WIDTHS = (1, 2, 3, 5, 8)  # samples of the averages that must agree where the voltage is smooth
+AGREE = 2.5  # standard deviations within which they do
+MARGIN = 3  # samples beside an edge that are not smooth
+BOUND, BESIDE = 4.0, 2.0  # standard deviations of an average that smoothing may leave, and beside an edge
+SHORTEST = 24  # samples of a stretch worth smoothing
+DEGREE, COSINES = 3, 32  # of the curve through a smooth stretch
+UNSEEN = 0.01  # share of a direction's noise: less of it is left out
 SILENT = 1e-5  # pu: less noise than this is none
 
 
 @dataclass(frozen=True, eq=False)
-class Blur:
-    """What noise of the voltage did to the calculated power before it was taken out, and how much of it is left."""
+class Smoothed:
+    """An event with a smooth voltage, and what may still be wrong with it.
 
-    jitter: np.ndarray  # (2, N) pu
-    left: np.ndarray  # (N,) share of its variance, as white noise that does as much harm
+    `errors` (k, N) [pu] are shapes of it, independent, each of the size of one standard deviation.
+    """
+
+    event: Event
+    errors: np.ndarray
+
+    def off_by(self, shape: int) -> Event:
+        """The event with one of the errors, or without where there are fewer."""
+        if shape >= len(self.errors):
+            return self.event
+        record = self.event.record
+        return replace(self.event, record=replace(record, U=record.U + self.errors[shape]))
 
 
-def smoothed(event: Event) -> tuple[Event, np.ndarray]:
-    """The event with a smooth voltage, and the share of the noise's variance left at each sample, (N,)."""
+def smoothed(event: Event) -> Smoothed:
+    """Take the noise of the voltage out of one event."""
     U, deviation = event.record.U, noise_of(event.record.U[event.steady])
     if deviation < SILENT:
-        return event, np.zeros(len(U))
-    made, left = _averaged(U, deviation, NARROW)[0], np.full(len(U), 1 + NARROW**2)
-    for part in _smooth_stretches(_averaged(U, deviation, WIDE)[1]):
-        made[part], left[part] = _spline(U[part]), 3 / (part.stop - part.start)
-    t, steady = np.arange(len(U)), event.steady
-    made[steady] = np.polyval(np.polyfit(t[steady], U[steady], 1), t[steady])
-    left[steady] = 3 / (steady.stop - steady.start)
-    return replace(event, record=replace(event.record, U=made)), left
+        return Smoothed(event, np.empty((0, len(U))))
+    rough = _edges(U, deviation)
+    rough[[event.start, min(event.end, len(U) - 1)]] = True
+    rough = _widened(rough)
+    while True:
+        made, errors = U.copy(), []
+        for part in runs(~rough):
+            curve, own = _curve(U[part], deviation)
+            made[part] = curve
+            errors.append(np.zeros((len(own), len(U))))
+            errors[-1][:, part] = own
+        far = _distance(U - made, deviation) / np.where(_widened(rough), BESIDE, BOUND) * ~rough
+        if far.max() < 1:
+            break
+        rough[far.argmax()] = True
+        rough = _widened(rough)
+    raw = np.flatnonzero(rough)
+    errors.append(deviation * (np.arange(len(U)) == raw[:, None]))
+    return Smoothed(replace(event, record=replace(event.record, U=made)), np.concatenate(errors))
 
 
 def noise_of(U: np.ndarray) -> float:
@@ -49,37 +75,48 @@ def noise_of(U: np.ndarray) -> float:
     return float(np.median(np.abs(third)) / 0.6745 / np.sqrt(20)) if len(third) else 0.0
 
 
-def _averaged(U: np.ndarray, deviation: float, agreement: float) -> tuple[np.ndarray, np.ndarray]:
-    """The widest averages that agree with all narrower ones (N,), and whether that is the widest of all."""
+def _edges(U: np.ndarray, deviation: float) -> np.ndarray:
+    """Where the voltage (N,) moves faster than averages can follow."""
     index, sums = np.arange(len(U)), np.concatenate(([0.0], np.cumsum(U)))
-    best = U.copy()
-    low, high = U - agreement * deviation, U + agreement * deviation
-    agrees = np.ones(len(U), dtype=bool)
+    low, high = U - AGREE * deviation, U + AGREE * deviation
     for half in HALF_WIDTHS:
         h = np.minimum(half, np.minimum(index, index[::-1]))  # symmetric at the ends too, or a slope would bend
         mean = (sums[index + h + 1] - sums[index - h]) / (2 * h + 1)
-        reach = agreement * deviation / np.sqrt(2 * h + 1)
+        reach = AGREE * deviation / np.sqrt(2 * h + 1)
         low, high = np.maximum(low, mean - reach), np.minimum(high, mean + reach)
-        agrees &= low <= high
-        best = np.where(agrees, mean, best)
-    return best, agrees
+    return low > high
 
 
-def _smooth_stretches(agrees: np.ndarray) -> list[slice]:
-    """Stretches long enough for a spline, away from where averages disagree."""
-    edge = np.convolve(~agrees, np.ones(2 * MARGIN + 1), "same") > 0.5
-    return [p for p in runs(~edge) if p.stop - p.start >= HALF_WIDTHS[-1]]
+def _widened(rough: np.ndarray) -> np.ndarray:
+    """Rough samples with those beside them, and the stretches between them that are too short to be smoothed."""
+    wide = np.convolve(rough, np.ones(2 * MARGIN + 1), "same") > 0.5
+    for part in runs(~wide):
+        if part.stop - part.start < SHORTEST:
+            wide[part] = True
+    return wide
 
 
-def _spline(U: np.ndarray) -> np.ndarray:
-    """Cubic smoothing spline of a stretch (n,), its stiffness by generalized cross-validation."""
-    from scipy.interpolate import make_smoothing_spline
+def _distance(left: np.ndarray, deviation: float) -> np.ndarray:
+    """How far the worst average around each sample of what is left (N,) is from zero, in standard deviations."""
+    far = np.abs(left)
+    for half in HALF_WIDTHS:
+        window = np.ones(2 * half + 1) / np.sqrt(2 * half + 1)
+        far = np.maximum(far, np.abs(np.convolve(left, window, "same")))
+    return far / deviation
 
-    t = np.arange(len(U), dtype=float)
-    return make_smoothing_spline(t, U)(t)
+
+def _curve(U: np.ndarray, deviation: float) -> tuple[np.ndarray, np.ndarray]:
+    """The likeliest curve through a stretch (n,), and its errors (k, n) of one standard deviation each."""
+    n = len(U)
+    fixed = np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1, 1, n), DEGREE))[0].T
+    count = min(COSINES, n // 8)
+    walk = Walk.of(U / deviation, fixed, cosines(n, count) / np.arange(1, count + 1)[:, None] ** 2)
+    share = walk.share(walk.likeliest)
+    curve = (U @ fixed.T) @ fixed + deviation * ((walk.along * share) @ walk.basis)
+    seen = share > UNSEEN
+    return curve, deviation * np.concatenate([fixed, np.sqrt(share[seen, None]) * walk.basis[seen]])
 
 
-def smooth(events: Sequence[Event]) -> tuple[tuple[Event, ...], np.ndarray]:
-    """All events smoothed, and the shares left end to end."""
-    made = [smoothed(e) for e in events]
-    return tuple(e for e, _ in made), np.concatenate([left for _, left in made])
+def smooth(events: Sequence[Event]) -> list[Smoothed]:
+    """Take the noise of the voltage out of all events."""
+    return [smoothed(e) for e in events]

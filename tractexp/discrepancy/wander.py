@@ -14,7 +14,38 @@ from tractexp.identify.noise import fit_autoregression
 MODES = 32
 SLOW = 3  # cosines of a stretch that belong to wandering before its fast noise is modelled
 SEEN = 1.5  # of twice the log-likelihood, without which there is no wandering
-GRID = np.geomspace(1e-3, 1e4, 71)  # of the intensity, variances of the channel per second
+GRID = np.concatenate(([0.0], np.geomspace(1e-3, 1e4, 71)))  # of the intensity, variances of the channel per second
+STIFF = np.concatenate(([0.0], np.geomspace(1e-4, 1e12, 97)))  # of a single stretch, in variances of its noise
+
+
+@dataclass(frozen=True, eq=False)
+class Walk:
+    """A stretch of white noise of unit variance and of modes of random amplitude, whose intensity is looked for."""
+
+    values: np.ndarray  # (k,) singular values of the modes
+    basis: np.ndarray  # (k, n)
+    along: np.ndarray  # (k,) the stretch in this basis
+
+    @classmethod
+    def of(cls, stretch: np.ndarray, fixed: np.ndarray, modes: np.ndarray) -> "Walk":
+        """A stretch (n,) with orthonormal rows `fixed` of any amplitude, and modes of unit intensity (k, n)."""
+        _, values, basis = np.linalg.svd(modes - (modes @ fixed.T) @ fixed, full_matrices=False)
+        return cls(values, basis, basis @ (stretch - (stretch @ fixed.T) @ fixed))
+
+    def likelihood(self, grid: np.ndarray) -> np.ndarray:
+        """Logarithm of the likelihood of each intensity, up to a constant."""
+        spread = 1 + np.outer(grid, self.values**2)
+        return -(np.log(spread) + self.along**2 / spread).sum(axis=1) / 2
+
+    @property
+    def likeliest(self) -> float:
+        """The intensity of most likelihood, on a wide grid."""
+        return float(STIFF[self.likelihood(STIFF).argmax()])
+
+    def share(self, intensity: float) -> np.ndarray:
+        """Share (k,) of each direction that is mode and not noise."""
+        power = intensity * self.values**2
+        return power / (1 + power)
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +57,7 @@ class Wander:
 
     def modes(self, channel: int, samples: int) -> np.ndarray:
         """Cosines (k, samples) scaled by the standard deviation of their amplitudes."""
-        return np.sqrt(self.intensity[channel]) * _cosines(samples, self.step, min(MODES, samples // 8))
+        return np.sqrt(self.intensity[channel]) * _random_walk(samples, self.step, min(MODES, samples // 8))
 
 
 def find(before: Sequence[np.ndarray], step: float) -> Wander | None:
@@ -44,31 +75,32 @@ def find(before: Sequence[np.ndarray], step: float) -> Wander | None:
 
 def without_slow(stretch: np.ndarray) -> np.ndarray:
     """A stretch (n,) without its mean and slowest cosines."""
-    basis = np.vstack([np.ones(len(stretch)), _cosines(len(stretch), 1.0, SLOW)])
+    basis = np.vstack([np.ones(len(stretch)), cosines(len(stretch), SLOW)])
     basis /= np.linalg.norm(basis, axis=1, keepdims=True)
     return stretch - (stretch @ basis.T) @ basis
 
 
-def _cosines(samples: int, step: float, count: int) -> np.ndarray:
+def cosines(samples: int, count: int) -> np.ndarray:
+    """Half a wave over a stretch, a whole one, ...: (count, samples), each of length one."""
+    angle = np.pi * np.arange(1, count + 1)[:, None] / samples * (np.arange(samples) + 0.5)
+    return np.sqrt(2 / samples) * np.cos(angle)
+
+
+def _random_walk(samples: int, step: float, count: int) -> np.ndarray:
     """Modes (count, samples) of a random walk that gains a variance of one in a second."""
-    length = samples * step
-    w = np.pi * np.arange(1, count + 1)[:, None] / length
-    return np.sqrt(2 / length) / w * np.cos(w * (np.arange(samples) + 0.5) * step)
+    return np.sqrt(step) * samples / np.pi / np.arange(1, count + 1)[:, None] * cosines(samples, count)
 
 
 def _intensity(stretches: Sequence[np.ndarray], step: float) -> float:
     fast = fit_autoregression([without_slow(s) for s in stretches], sparing=True)
-    total = np.zeros(len(GRID) + 1)
+    total = np.zeros(len(GRID))
     for stretch in stretches:
         n = len(stretch)
-        rows = np.vstack([np.ones(n), stretch, _cosines(n, step, min(MODES, n // 8))])
+        rows = np.vstack([np.ones(n), stretch, _random_walk(n, step, min(MODES, n // 8))])
         one, x, *modes = fast.whiten(rows, np.ones(n, dtype=bool))
         one /= np.linalg.norm(one)
-        modes = np.array(modes) - np.outer(modes @ one, one)
-        _, values, basis = np.linalg.svd(modes, full_matrices=False)
-        spread = 1 + np.outer(np.concatenate(([0.0], GRID)), values**2)
-        total -= (np.log(spread) + (basis @ (x - (x @ one) * one)) ** 2 / spread).sum(axis=1) / 2
+        total += Walk.of(x, one[None], np.array(modes)).likelihood(GRID)
     best = int(total.argmax())
     if best == 0 or 2 * (total[best] - total[0]) < SEEN:
         return 0.0
-    return float(GRID[np.flatnonzero(total[1:] > total[best] - 0.5)[-1]])
+    return float(GRID[np.flatnonzero(total > total[best] - 0.5)[-1]])
