@@ -110,6 +110,7 @@ def _counted(finding) -> dict:
         "first": first.scores[0].name if first.scores else "",
         "stages": [[list(s.fit.names), s.scores[0].name, s.scores[0].p] for s in finding.explanation.stages],
         "left": [s.p_left for s in finding.explanation.stages],
+        "left_by": finding.last.left,
         "samples": study.likelihood.samples,
         "drops": {s.name: s.drop for s in first.scores},
         "parameters": {s.name: len(finding.catalogue[s.name].effect.parameters) for s in first.scores},

@@ -37,25 +37,30 @@ class Null:
     unrest: np.ndarray
     unsteadiness: np.ndarray
     energy: np.ndarray
+    blurred: bool  # whether noise of the voltage forbids to judge the measurement chain
 
     def critical_p(self, alpha: float) -> float:
         """The p a single candidate must undercut so that chance names any with probability `alpha`."""
         return float(np.quantile(self.least_p, alpha, method="lower"))
 
-    def p_left(self, projection: Projection, study: Study) -> float:
-        """How often chance leaves as much as a fit does, by the most surprised of three tests.
+    def left(self, projection: Projection, study: Study) -> dict[str, float]:
+        """How often chance leaves as much as a fit does, by each of the tests of adequacy.
 
-        Pushes into the balances (`unrest`), parameters that differ from event to event (`unsteadiness`), and the
-        loudest cell. A test's tail is that of a gamma or, for the maximum, a Gumbel distribution with the moments of
-        the draws, so that it reaches further than their number.
+        A test's tail is that of a gamma or, for the extreme of many, a Gumbel distribution with the moments of the
+        draws, so that it reaches further than their number.
         """
-        ps = [_gamma_tail(self.unrest, projection.unrest()[0])]
-        if len(study.events) > 1:
-            ps.append(_gamma_tail(self.unsteadiness, projection.unsteadiness()[0]))
         mean, spread = self.energy.mean(axis=0), self.energy.std(axis=0) + 1e-12
         loudest = ((self.energy - mean) / spread).max(axis=1)
-        ps.append(_gumbel_tail(loudest, ((energies(projection, study)[0] - mean) / spread).max()))
-        return min(1.0, len(ps) * min(ps))
+        found = ((energies(projection, study)[0] - mean) / spread).max()
+        further = np.log(least_p(projection, chain=not self.blurred)[0])
+        tests = {
+            "pushes into the balances": _gamma_tail(self.unrest, projection.unrest()[0]),
+            "the loudest window": _gumbel_tail(loudest, found),
+            "a further effect": _gumbel_tail(-np.log(self.least_p), -further),
+        }
+        if len(study.events) > 1:
+            tests["parameters of each event"] = _gamma_tail(self.unsteadiness, projection.unsteadiness()[0])
+        return tests
 
 
 def _gamma_tail(draws: np.ndarray, value: float) -> float:
@@ -80,20 +85,20 @@ def null_of(t: Tangent, noise: Noise, seed: int, plain: bool, draws: int = DRAWS
     return _collect([t.whitened(study.noise_in(rest[b]), made[b : b + 1]) for b in range(draws)], study, noise.blurred)
 
 
+def least_p(projection: Projection, chain: bool) -> np.ndarray:
+    """The smallest p (b,) of all candidates and, if wanted, of the measurement chain."""
+    _, p = projection.drops
+    least = p.min(axis=0, initial=1.0)
+    if chain:
+        least = np.minimum(least, np.array(list(projection.chain_p().values())).min(axis=0, initial=1.0))
+    return np.maximum(least, SMALLEST_P)
+
+
 def _collect(projections: list[Projection], study: Study, blurred: bool) -> Null:
-    everything, unrest, unsteadiness, energy = [], [], [], []
-    for projection in projections:
-        _, p = projection.drops
-        least = p.min(axis=0, initial=1.0)
-        if not blurred:
-            chain = np.array(list(projection.chain_p().values())).reshape(-1, len(least))
-            least = np.minimum(least, chain.min(axis=0, initial=1.0))
-        everything.append(least)
-        unrest.append(projection.unrest())
-        unsteadiness.append(projection.unsteadiness())
-        energy.append(energies(projection, study))
-    least_p = np.maximum(np.concatenate(everything), SMALLEST_P)
-    return Null(least_p, *map(np.concatenate, (unrest, unsteadiness, energy)))
+    draws = [
+        (least_p(p, chain=not blurred), p.unrest(), p.unsteadiness(), energies(p, study)) for p in projections
+    ]  # fmt: skip
+    return Null(*map(np.concatenate, zip(*draws, strict=True)), blurred)
 
 
 def cells_of(study: Study) -> list[Cell]:

@@ -44,9 +44,14 @@ class Stage:
     scores: list[Score]
 
     @functools.cached_property
+    def left(self) -> dict[str, float]:
+        """How often chance leaves as much as this fit does, by each test."""
+        return self.null.left(self.projection, self.tangent.study)
+
+    @property
     def p_left(self) -> float:
-        """How often chance leaves as much as this fit does."""
-        return self.null.p_left(self.projection, self.tangent.study)
+        """The same by the most surprised test, corrected for their number."""
+        return min(1.0, len(self.left) * min(self.left.values()))
 
     def significant(self, alpha: float) -> bool:
         """Whether any further effect of the load helps more than chance does."""
