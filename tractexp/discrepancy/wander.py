@@ -14,6 +14,7 @@ from tractexp.identify.noise import fit_autoregression
 MODES = 32
 SLOW = 3  # cosines of a stretch that belong to wandering before its fast noise is modelled
 SEEN = 1.5  # of twice the log-likelihood, without which there is no wandering
+LESS = 1.0  # of the log-likelihood: the intensity taken is the largest that is no less likely than this
 GRID = np.concatenate(([0.0], np.geomspace(1e-3, 1e4, 71)))  # of the intensity, variances of the channel per second
 STIFF = np.concatenate(([0.0], np.geomspace(1e-4, 1e12, 97)))  # of a single stretch, in variances of its noise
 
@@ -63,14 +64,18 @@ class Wander:
 def find(before: Sequence[np.ndarray], step: float) -> Wander | None:
     """The wandering of two channels in stretches (2, n_i) before the events; None where there is none to be seen.
 
-    The intensity of most likelihood given the fast noise, and to be safe the largest that is half a unit of the
-    logarithm less likely.
+    To be safe the largest intensity that is nearly as likely as the likeliest, given the fast noise; in both channels
+    where it is seen in one, for what wanders is the load.
     """
     stretches = [b for b in before if b.shape[1] >= 8 * (SLOW + 2)]
     if not stretches:
         return None
-    intensity = np.array([_intensity([s[c] for s in stretches], step) for c in (0, 1)])
-    return Wander(intensity, step) if intensity.any() else None
+    total = np.array([_likelihood([s[c] for s in stretches], step) for c in (0, 1)])
+    total -= total[:, :1]
+    if 2 * total.max() < SEEN:
+        return None
+    likely = total > total.max(axis=1, keepdims=True) - LESS
+    return Wander(np.array([GRID[np.flatnonzero(row)[-1]] for row in likely]), step)
 
 
 def without_slow(stretch: np.ndarray) -> np.ndarray:
@@ -91,7 +96,8 @@ def _random_walk(samples: int, step: float, count: int) -> np.ndarray:
     return np.sqrt(step) * samples / np.pi / np.arange(1, count + 1)[:, None] * cosines(samples, count)
 
 
-def _intensity(stretches: Sequence[np.ndarray], step: float) -> float:
+def _likelihood(stretches: Sequence[np.ndarray], step: float) -> np.ndarray:
+    """Logarithm of the likelihood of each intensity of the grid in stretches (n_i,) of one channel."""
     fast = fit_autoregression([without_slow(s) for s in stretches], sparing=True)
     total = np.zeros(len(GRID))
     for stretch in stretches:
@@ -100,7 +106,4 @@ def _intensity(stretches: Sequence[np.ndarray], step: float) -> float:
         one, x, *modes = fast.whiten(rows, np.ones(n, dtype=bool))
         one /= np.linalg.norm(one)
         total += Walk.of(x, one[None], np.array(modes)).likelihood(GRID)
-    best = int(total.argmax())
-    if best == 0 or 2 * (total[best] - total[0]) < SEEN:
-        return 0.0
-    return float(GRID[np.flatnonzero(total > total[best] - 0.5)[-1]])
+    return total
