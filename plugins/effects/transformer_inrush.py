@@ -5,8 +5,8 @@ from tractexp.parameter import Parameter
 from tractexp.plugin import plugin
 
 SOURCE = "Blume et al. 1951, Transformer Engineering; decay of the flux offset after energization"
-CYCLE = 0.01  # s: a rise of the voltage is what half a cycle of it gains on the one before
-STILL = 0.005  # of U_0: slower rises leave no offset in the flux; keeps noise of the voltage out
+CYCLE = 0.003  # s, or one sample where those are longer: a rise is what the voltage gains on itself so long ago
+STILL = 0.3  # of U_0 per s: slower rises leave no offset in the flux; keeps noise of the voltage out
 SHALLOW = 0.05  # of U_0: the least dip a rise is referred to
 
 
@@ -14,7 +14,7 @@ SHALLOW = 0.05  # of U_0: the least dip a rise is referred to
 class TransformerInrush(Effect):
     """A sudden rise of the voltage leaves an offset in the transformers' flux, which drives their cores past the knee.
 
-        dx/dt = max(0, u - y - 0.005)/T_c (1 - u_low)^(g - 1) - x/T_i,   T_c dy/dt = u - y,   T_c = 10 ms
+        dx/dt = max(0, (u - y)/T_c - 0.3) (1 - u_low)^(g - 1) - x/T_i,   T_c dy/dt = u - y,   T_c = 3 ms
         Q -> Q + q_i u^2 e^(3/2) (1 - 0.15 e),   P -> P + r_i (the same),   e = max(0, 1 - (1 + m - x)/u),   u = U/U_0
 
     After a step up of the voltage by du, x is a little less than du^g and decays with T_i. While the peak of the flux
@@ -45,8 +45,9 @@ class TransformerInrush(Effect):
         u, lowest = eq.U / eq.U0, eq.memory("lowest_voltage", r"u_{low}")
         eq.renews(lowest, sympy.Min(lowest, u), 1)
         scale = sympy.exp((exponent - 1) * sympy.log(sympy.Max(SHALLOW, 1 - lowest)))
-        eq.moves(x, sympy.Max(0, u - y - STILL) / CYCLE * scale - x / time, 0)
-        eq.moves(y, (u - y) / CYCLE, 1)
+        cycle = sympy.Max(CYCLE, eq.step)
+        eq.moves(x, sympy.Max(0, (u - y) / cycle - STILL) * scale - x / time, 0)
+        eq.moves(y, (u - y) / cycle, 1)
         excess = sympy.Max(0, 1 - (1 + margin - x) / u)
         drawn = q * u**2 * excess * sympy.sqrt(excess) * (1 - 0.15 * excess)
         eq.consume(loss * drawn, drawn)

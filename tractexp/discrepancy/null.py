@@ -34,10 +34,10 @@ class Null:
     """Draws of each statistic under the null, (b,), and of the energy in each cell, (b, cells)."""
 
     least_p: np.ndarray  # over all candidates and the measurement chain
+    further: np.ndarray  # over the candidates alone
     unrest: np.ndarray
     unsteadiness: np.ndarray
     energy: np.ndarray
-    blurred: bool  # whether noise of the voltage forbids to judge the measurement chain
 
     def critical_p(self, alpha: float) -> float:
         """The p a single candidate must undercut so that chance names any with probability `alpha`."""
@@ -52,11 +52,11 @@ class Null:
         mean, spread = self.energy.mean(axis=0), self.energy.std(axis=0) + 1e-12
         loudest = ((self.energy - mean) / spread).max(axis=1)
         found = ((energies(projection, study)[0] - mean) / spread).max()
-        further = np.log(least_p(projection, chain=not self.blurred)[0])
+        further = -np.log(_least_p(projection)[0])
         tests = {
             "pushes into the balances": _gamma_tail(self.unrest, projection.unrest()[0]),
             "the loudest window": _gumbel_tail(loudest, found),
-            "a further effect": _gumbel_tail(-np.log(self.least_p), -further),
+            "a further effect": _gumbel_tail(-np.log(self.further), further),
         }
         if len(study.events) > 1:
             tests["parameters of each event"] = _gamma_tail(self.unsteadiness, projection.unsteadiness()[0])
@@ -85,20 +85,21 @@ def null_of(t: Tangent, noise: Noise, seed: int, plain: bool, draws: int = DRAWS
     return _collect([t.whitened(study.noise_in(rest[b]), made[b : b + 1]) for b in range(draws)], study, noise.blurred)
 
 
-def least_p(projection: Projection, chain: bool) -> np.ndarray:
-    """The smallest p (b,) of all candidates and, if wanted, of the measurement chain."""
-    _, p = projection.drops
-    least = p.min(axis=0, initial=1.0)
-    if chain:
-        least = np.minimum(least, np.array(list(projection.chain_p().values())).min(axis=0, initial=1.0))
-    return np.maximum(least, SMALLEST_P)
+def _least_p(projection: Projection) -> np.ndarray:
+    """The smallest p (b,) of all candidates."""
+    return np.maximum(projection.drops[1].min(axis=0, initial=1.0), SMALLEST_P)
 
 
 def _collect(projections: list[Projection], study: Study, blurred: bool) -> Null:
-    draws = [
-        (least_p(p, chain=not blurred), p.unrest(), p.unsteadiness(), energies(p, study)) for p in projections
-    ]  # fmt: skip
-    return Null(*map(np.concatenate, zip(*draws, strict=True)), blurred)
+    draws = []
+    for projection in projections:
+        further = least = _least_p(projection)
+        if not blurred:
+            chain = np.array(list(projection.chain_p().values())).reshape(-1, len(least))
+            least = np.maximum(np.minimum(least, chain.min(axis=0, initial=1.0)), SMALLEST_P)
+        measures = projection.unrest(), projection.unsteadiness(), energies(projection, study)
+        draws.append((least, further, *measures))
+    return Null(*map(np.concatenate, zip(*draws, strict=True)))
 
 
 def cells_of(study: Study) -> list[Cell]:
