@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.null import Cell, Null, cells_of, energies
+from tractexp.discrepancy.left import LOUDEST, Cell, cells_of, statistics
+from tractexp.discrepancy.null import Null
 from tractexp.discrepancy.tangent import Projection
 
 
@@ -23,9 +24,10 @@ def where(projection: Projection, null: Null, alpha: float) -> list[Place]:
     """Intervals that stand out at a family-wise error of `alpha`, adjacent ones joined, the largest first."""
     study = projection.tangent.study
     cells = cells_of(study)
-    mean, spread = null.energy.mean(axis=0), null.energy.std(axis=0) + 1e-12
-    highest = ((null.energy - mean) / spread).max(axis=1)
-    excess = energies(projection, study)[0] - mean
+    drawn = null.left[LOUDEST]
+    mean, spread = drawn.mean(axis=0), drawn.std(axis=0) + 1e-12
+    highest = ((drawn - mean) / spread).max(axis=1)
+    excess = statistics(projection, study)[LOUDEST][0] - mean
     found = excess / spread > np.quantile(highest, 1 - alpha)
     total = np.maximum(excess, 0.0).sum()
     places = [

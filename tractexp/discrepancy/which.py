@@ -46,7 +46,7 @@ class Stage:
     @functools.cached_property
     def left(self) -> dict[str, float]:
         """How often chance leaves as much as this fit does, by each test."""
-        return self.null.left(self.projection, self.tangent.study)
+        return self.null.surprises(self.projection, self.tangent.study)
 
     @property
     def p_left(self) -> float:

@@ -1,0 +1,111 @@
+"""What a fit leaves: statistics of the whitened, projected residual, and how surprising they are.
+
+Each looks for another kind of thing that no effect of the catalogue accounts for. Sums of many parts (b,) have a gamma
+tail, the largest of many (b, k) that of a Gumbel distribution, both with the moments of draws under the null, so that
+the tails reach further than their number.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import gammaincc
+
+from tractexp.discrepancy.study import Study
+from tractexp.discrepancy.tangent import Projection, windows
+
+SMALLEST_P = 1e-300
+LOUDEST = "the loudest window"
+STRIDE = 4  # samples between the instants at which a step is looked for
+BINS = 1024  # of the transform in which an oscillation is looked for
+FEWEST = 8  # samples of a stretch with an oscillation
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """A stretch of one channel of one event, as samples of the drive and as times of the record."""
+
+    event: int
+    channel: str
+    part: slice
+    start: float  # s
+    end: float
+
+
+def statistics(projection: Projection, study: Study) -> dict[str, np.ndarray]:
+    """Every statistic by what it looks for: a sum (b,), or those of which the largest counts (b, k)."""
+    channels = projection.r[:, : 2 * study.problem.drive.samples].reshape(len(projection.r), 2, -1)
+    made = {
+        "pushes into the balances": projection.unrest(),
+        "a further effect": -np.log(least_p(projection))[:, None],
+        LOUDEST: energies(channels, study),
+        "a step": steps(channels, study),
+        "an oscillation": tones(channels, study),
+    }
+    if len(study.events) > 1:
+        made["parameters of each event"] = projection.unsteadiness()
+    return made
+
+
+def tail(draws: np.ndarray, value: np.ndarray) -> float:
+    """How often a statistic is at least as large as `value`, (1,) or (1, k), given draws (b,) or (b, k)."""
+    if draws.ndim == 1:
+        mean, variance = draws.mean(), max(draws.var(), 1e-300)
+        return float(gammaincc(mean**2 / variance, max(value[0], 0.0) * mean / variance))
+    mean, spread = draws.mean(axis=0), draws.std(axis=0) + 1e-12
+    largest = ((draws - mean) / spread).max(axis=1)
+    scale = max(largest.std() * np.sqrt(6) / np.pi, 1e-12)
+    found = ((value - mean) / spread).max()
+    return float(-np.expm1(-np.exp(-(found - largest.mean()) / scale - np.euler_gamma)))
+
+
+def least_p(projection: Projection) -> np.ndarray:
+    """The smallest p (b,) of all candidates."""
+    return np.maximum(projection.drops[1].min(axis=0, initial=1.0), SMALLEST_P)
+
+
+def cells_of(study: Study) -> list[Cell]:
+    """Every window of every event, for P and for Q."""
+    made = []
+    for e, event in enumerate(study.events):
+        first, step, origin = int(study.problem.drive.first[e]), event.record.step, event.record.t[0]
+        for a, b in windows(study, e):
+            i, j = round(a / step), min(round(b / step), event.record.samples)
+            if j - i < 2:
+                continue
+            part = slice(first + i, first + j)
+            made += [Cell(e, c, part, origin + i * step, origin + (j - 1) * step) for c in "PQ"]
+    return made
+
+
+def energies(channels: np.ndarray, study: Study) -> np.ndarray:
+    """Energy of each residual (b, 2, N) in each cell, (b, cells), over that of a sample in quiet."""
+    square = channels**2
+    square /= np.mean(np.concatenate([square[:, :, part] for part in study.quiet], axis=2), axis=2, keepdims=True)
+    return np.stack([square[:, "PQ".index(c.channel), c.part].sum(axis=1) for c in cells_of(study)], axis=1)
+
+
+def steps(channels: np.ndarray, study: Study) -> np.ndarray:
+    """Square of the sum from each instant to the end of an event, in P and in Q, (b, instants)."""
+    made = []
+    for e in range(len(study.events)):
+        sums = np.cumsum(channels[:, :, study.problem.drive.part(e)][:, :, ::-1], axis=2)[:, :, ::STRIDE]
+        made.append(sums**2)
+    return np.concatenate(made, axis=2).reshape(len(channels), -1)
+
+
+def tones(channels: np.ndarray, study: Study) -> np.ndarray:
+    """Power at each frequency of all events and channels, in the dip, after it and in both, (b, frequencies)."""
+    power = np.zeros((len(channels), 3, BINS // 2 + 1))
+    for e, event in enumerate(study.events):
+        own = channels[:, :, study.problem.drive.part(e)]
+        for k, part in enumerate((slice(event.start, event.end), slice(event.end, None), slice(event.start, None))):
+            stretch = own[:, :, part]
+            if stretch.shape[2] >= FEWEST:
+                power[:, k] += np.sum(_power(stretch), axis=1) / stretch.shape[2]
+    return power.reshape(len(channels), -1)
+
+
+def _power(stretch: np.ndarray) -> np.ndarray:
+    """Power (..., frequencies) of stretches (..., n), of long ones folded onto one transform's length."""
+    padded = -(-stretch.shape[-1] // BINS) * BINS
+    return np.abs(np.fft.rfft(stretch, padded, axis=-1)[..., :: padded // BINS]) ** 2
