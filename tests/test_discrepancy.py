@@ -104,6 +104,7 @@ def test_the_contract_holds_what_machines_read(planted, tmp_path):
         assert {"epsilon_p", "epsilon_q", "chi2_per_sample"} == made["gap"][role]["before"].keys()
     candidate = next(c for c in made["candidates"] if c["effects"] == ["stator_resistance"])
     assert {"status", "likelihood_ratio", "parameters"} <= candidate.keys()
+    assert min(made["left"].values()) > 0.001
     node = {"motor": {"name": "electromechanical"}, "static": {"name": "exponential"}, "bounds": {}, "fixed": {}}
     path = write_model(planted, node, tmp_path / "model" / "extended.yaml")
     assert "effects:\n- stator_resistance" in path.read_text()
@@ -146,7 +147,7 @@ def test_a_load_that_wanders_is_seen_before_the_events_and_steady_noise_is_not()
     rng = np.random.default_rng(8)
     white = [rng.normal(size=(2, 250)) for _ in range(3)]
     spoken = sum(find([rng.normal(size=(2, 250)) for _ in range(3)], 0.002) is not None for _ in range(40))
-    assert spoken < 20  # half a chi-square of one degree beyond 1.5, in either of two channels: 21 %
+    assert spoken < 8  # half a chi-square of one degree beyond 3.5, in either of two channels: 6 %
     walks = [w + np.cumsum(rng.normal(size=(2, 250)) * np.array([[0.05], [0.0]]), axis=1) for w in white]
     found = find(walks, 0.002)
     assert found.intensity[0] == pytest.approx(0.05**2 / 0.002, rel=1.0)  # the larger end of its interval
@@ -207,6 +208,29 @@ def test_the_voltages_noise_is_part_of_the_noise_of_the_power():
     assert loud.sum() > 20
     assert rows.var() == pytest.approx(1.0, abs=0.02)
     assert rows.reshape(drawn.shape)[:, loud].var() == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("looked_for", "shape"),
+    [
+        ("an oscillation", lambda t, event: 0.8 * np.sin(2 * np.pi * 31.0 * t) * (t >= event.t_start)),
+        ("a step", lambda t, event: 1.5 * (t >= event.t_end + 0.37) * (event.record.name == "event1")),
+        (
+            "the loudest window",
+            lambda t, event: 4.0 * (np.abs(t - event.t_start - 0.02) < 0.01) * (-1.0) ** (t // 0.004),
+        ),
+    ],
+)
+def test_what_no_effect_explains_is_found_by_the_test_that_looks_for_it(silent, looked_for, shape):
+    """Planted into what the base model leaves, in standard deviations of the noise; without it nothing is found."""
+    first, study = silent.first, silent.study
+    assert first.p_left > 0.01
+    planted = first.tangent.residual.copy()
+    for e, event in enumerate(study.events):
+        planted[0, study.problem.drive.part(e)] += 0.002 * shape(event.record.t, event)
+    found = first.null.surprises(first.tangent.whitened(first.noise, planted[None]), study)
+    assert min(found, key=found.get) == looked_for
+    assert found[looked_for] < 1e-5
 
 
 def test_an_effect_outside_the_catalogue_is_unexplained_and_what_is_left_is_written(tmp_path):

@@ -23,6 +23,7 @@ def contract(finding: Finding) -> dict[str, Any]:
             "train": _gap(finding.train),
             "validate": None if finding.validate is None else _gap(finding.validate),
         },
+        "left": finding.last.left,
         "nearest": _nearest(finding),
         "candidates": [*sets(finding), *_singles(finding)],
         "recommendation": recommendation(finding),

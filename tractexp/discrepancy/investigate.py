@@ -195,7 +195,8 @@ def _verdict(
     if not adequate:
         return "unexplained", (
             "the model and the records disagree, and nothing in the catalogue explains it: what is left after the best"
-            f" explanation would come about by chance with p = {survivors[0].stage.p_left:.2g}"
+            f" explanation would come about by chance with p = {survivors[0].stage.p_left:.2g}; what stands out most:"
+            f" {survivors[0].stage.loudest}"
         )
     if not kept and base.p_left >= ADEQUATE:
         return "none", (

@@ -13,7 +13,7 @@ from tractexp.identify.noise import fit_autoregression
 
 MODES = 32
 SLOW = 3  # cosines of a stretch that belong to wandering before its fast noise is modelled
-SEEN = 1.5  # of twice the log-likelihood, without which there is no wandering
+SEEN = 3.5  # of twice the log-likelihood, without which there is no wandering
 LESS = 1.0  # of the log-likelihood: the intensity taken is the largest that is no less likely than this
 GRID = np.concatenate(([0.0], np.geomspace(1e-3, 1e4, 71)))  # of the intensity, variances of the channel per second
 STIFF = np.concatenate(([0.0], np.geomspace(1e-4, 1e12, 97)))  # of a single stretch, in variances of its noise

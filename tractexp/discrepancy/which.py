@@ -53,6 +53,11 @@ class Stage:
         """The same by the most surprised test, corrected for their number."""
         return min(1.0, len(self.left) * min(self.left.values()))
 
+    @property
+    def loudest(self) -> str:
+        """What stands out most of that which this fit leaves."""
+        return min(self.left, key=self.left.__getitem__)
+
     def significant(self, alpha: float) -> bool:
         """Whether any further effect of the load helps more than chance does."""
         level = self.null.critical_p(alpha)

@@ -7,6 +7,7 @@ import numpy as np
 
 from tractexp.discrepancy.contract import parameters, recommendation
 from tractexp.discrepancy.investigate import Finding, judge
+from tractexp.discrepancy.sure import ADEQUATE
 from tractexp.report import style
 from tractexp.report.page import Page
 
@@ -63,7 +64,8 @@ def _gate(finding: Finding) -> str:
     first = finding.first
     best = first.scores[0] if first.scores else None
     critical = first.null.critical_p(finding.alpha)
-    text = f"The structured test of the base fit gives p = {first.p_left:.2g}."
+    text = f"What the base fit leaves would come about by chance with p = {first.p_left:.2g}"
+    text += f"; {first.loudest} stands out." if first.p_left < ADEQUATE else "."
     if best is None:
         return text
     return (
