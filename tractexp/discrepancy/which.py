@@ -27,7 +27,7 @@ MOST_EFFECTS = 3
 SHORTLIST = {1: 10, 2: 8, 3: 6}  # sets of each size that are refitted
 CLOSE = 12.0  # of the deviance: a rough refit this near the best is made exact
 RARER = 0.1  # by how much a load effect beside one of the measurement chain must be rarer by chance than alone
-FURTHER = 1e-6  # p a further name must undercut: it would spoil a right first one, or patch up a wrong one
+FURTHER = 1e-5  # p a further name must undercut: it would spoil a right first one, or patch up a wrong one
 PLAIN = 1e-10  # a score of this p needs no exact threshold
 NESTED = 0.1  # a set may be worse than its own subset by no more than this, or the refit did not converge
 
