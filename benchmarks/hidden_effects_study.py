@@ -105,6 +105,7 @@ def _counted(finding) -> dict:
         "sets": [list(s) for s in finding.sets],
         "chi2": finding.train.after.chi2_per_sample,
         "closed": finding.train.closed,
+        "refitted": finding.refitted,
         "closed_held": None if finding.validate is None else finding.validate.closed,
         "p_first": first.scores[0].p if first.scores else 1.0,
         "first": first.scores[0].name if first.scores else "",
@@ -131,8 +132,8 @@ def _compared(finding, trial: cases.Trial) -> dict:
         row |= {"estimate": own["value"], "error": own["standard_error"], "amount": told["effects"][0]["amount"]}
     made = scene(trial.case, trial.seed)
     clean = _powers(made.records())
-    if finding.validation is not None:
-        study, units = finding.validation
+    if finding.held_out is not None:
+        study, units = finding.held_out.study, finding.held_out.units
         N = study.problem.drive.samples
         got = study.residuals(np.array(units)) + study.problem.drive.measured - clean[:, -N:]
         before, after = np.sum(got**2, axis=(1, 2))

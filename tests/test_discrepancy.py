@@ -18,6 +18,7 @@ from hidden_effects import Case, Noise, make, write
 from tractexp.discrepancy.catalogue import catalogue
 from tractexp.discrepancy.contract import contract, write_left, write_model
 from tractexp.discrepancy.gap import SHOWN
+from tractexp.discrepancy.held_out import together
 from tractexp.discrepancy.investigate import check_events, investigate, judge
 from tractexp.discrepancy.noise import Noise as PowerNoise
 from tractexp.discrepancy.noise import estimate
@@ -282,6 +283,17 @@ def test_a_held_out_event_speaks_only_where_it_can_show_the_effect(planted):
     assert shown.helps
     assert not replace(shown, gain=-1.0).helps
     assert replace(shown, gain=-1.0, expected=1.0).helps
+
+
+def test_all_events_together_confirm_only_what_the_held_out_ones_show(planted):
+    """An event with the effect adds to the evidence of the fitted ones, one without it takes from it."""
+    trained, alone, noise = planted.study, planted.extended, planted.last.noise
+    fit = lambda made: together(trained, made, planted.bare, [alone], noise, (), {}, {}, seed=0)  # noqa: E731
+    (confirmed,) = fit(events("stator_resistance", size=2.0, count=3)[2:])
+    assert confirmed.names == ("stator_resistance",)
+    assert confirmed.unit.shape == alone.unit.shape
+    assert trained.value("R_s", confirmed.unit) == pytest.approx(trained.value("R_s", alone.unit), rel=0.2)
+    assert fit(events(None, count=3)[2:]) == []
 
 
 def test_candidates_at_their_null_leave_the_base_model(silent):

@@ -22,6 +22,7 @@ def contract(finding: Finding) -> dict[str, Any]:
         "gap": {
             "train": _gap(finding.train),
             "validate": None if finding.validate is None else _gap(finding.validate),
+            "fitted_to_both": finding.refitted,
         },
         "left": finding.last.left,
         "nearest": _nearest(finding),

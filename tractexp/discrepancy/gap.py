@@ -5,13 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.catalogue import Catalogue
 from tractexp.discrepancy.noise import Noise
-from tractexp.discrepancy.study import Refit, Study
+from tractexp.discrepancy.study import Study
 from tractexp.discrepancy.tangent import injections, spanned, two_sided
 from tractexp.identify.result import relative_error
-from tractexp.model.model import Model
-from tractexp.record import Event
 
 SHOWN = 10.8  # expected gain at which a true explanation fails to gain anything in 5 % of cases: (2 x 1.645)^2
 SAME = 0.03  # singular values below this share of the largest: pushes that differ from others in noise only
@@ -97,35 +94,3 @@ def left_over(study: Study, unit: np.ndarray, names: Sequence[str], noise: Noise
     cells -= (cells @ Q) @ Q.T
     basis = spanned(cells, SAME)
     return float(np.sum((basis @ r) ** 2) - len(basis))
-
-
-def held_out(
-    model: Model, catalogue: Catalogue, events: Sequence[Event], trained: Study, fits: Sequence[Refit],
-    bounds: dict, fixed: dict,
-) -> tuple[Study, list[np.ndarray], Noise]:  # fmt: skip
-    """Carry fits over to held-out events: everything keeps its trained value but P0 and Q0 of each event.
-
-    Returns the study of those events, the coordinates of each fit there, and the noise of the last one.
-    """
-    study = Study(model, catalogue, events, bounds, fixed, int(trained.problem.step.substeps.max()))
-    units = []
-    for fit in fits:
-        unit = study.null.copy()
-        unit[: trained.problem.space.dimension] = fit.unit[: trained.problem.space.dimension]
-        units.append(_settled(study, unit, study.white(), fit.names))
-    noise = study.noise(units[-1])
-    return study, [_settled(study, u, noise, fit.names) for u, fit in zip(units, fits, strict=True)], noise
-
-
-def _settled(study: Study, unit: np.ndarray, noise: Noise, names: Sequence[str]) -> np.ndarray:
-    """Fit P0 and Q0 of each event alone."""
-    from tractexp.identify.descent import descend
-
-    def rows(x: np.ndarray, lanes: np.ndarray) -> np.ndarray:
-        whole = np.tile(unit, (len(x), 1))
-        whole[:, study.before] = x
-        return study.rows(whole, noise, (), [names] * len(x))
-
-    moved = unit.copy()
-    moved[study.before] = descend(rows, unit[study.before][None]).unit[0]
-    return moved

@@ -8,7 +8,8 @@ import numpy as np
 from scipy.special import ndtr
 
 from tractexp.discrepancy.catalogue import Catalogue, catalogue
-from tractexp.discrepancy.gap import Gap, curves, gap, held_out
+from tractexp.discrepancy.gap import Gap, curves, gap
+from tractexp.discrepancy.held_out import Judged, carried, judged, together
 from tractexp.discrepancy.noise import Noise
 from tractexp.discrepancy.recommend import Decider, deciding_event
 from tractexp.discrepancy.study import Refit, Study
@@ -53,11 +54,16 @@ class Finding:
     bare: Refit  # the base model alone
     extended: Refit  # with the names added
     train: Gap
-    validate: Gap | None
-    validation: tuple[Study, list[np.ndarray]] | None  # held-out events, coordinates of base and extended there
+    held_out: Judged | None
+    refitted: bool  # whether the extended model was fitted to the held-out events, too
     decider: Decider | None
     nearest: Nearest | None  # where the verdict is "unexplained"
     alpha: float
+
+    @property
+    def validate(self) -> Gap | None:
+        """The gap on the held-out events."""
+        return None if self.held_out is None else self.held_out.gap
 
     @property
     def first(self) -> Stage:
@@ -105,50 +111,46 @@ def investigate(
     names.
     """
     check_events(train, validate)
-    found = catalogue(model.motor, model.static, model.effects, train, only)
-    tell(f"testing {len(found.candidates)} effects, {len(found.untestable)} more cannot be tested on these events")
-    study = Study(model, found, train, bounds, fixed)
+    known = catalogue(model.motor, model.static, model.effects, train, only)
+    tell(f"testing {len(known.candidates)} effects, {len(known.untestable)} more cannot be tested on these events")
+    study = Study(model, known, train, bounds, fixed)
     study.kernels.compile(tell)
     naming = 0.8 * alpha  # the rest is spent on the adequacy test
     explanation = explain(study, naming, seed, tell)
     survivors, rivals = surviving(study, explanation, seed)
     chain = tuple(explanation.stages[-1].chain(naming))
-    return _conclude(study, explanation, survivors, rivals, chain, validate, bounds, fixed, alpha, tell)
-
-
-def _conclude(
-    study: Study, explanation: Explanation, survivors: list[Rival], rivals: list[Rival], chain: tuple[str, ...],
-    validate: Sequence[Event], bounds: Mapping, fixed: Mapping, alpha: float, tell: Callable[[str], None],
-) -> Finding:  # fmt: skip
     noise = explanation.stages[-1].noise
     bare = study.refit(noise, [((), _unchained(study, explanation.stages[0].fit, ()))], chain=())[0]
     adequate = [s for s in survivors if s.adequate] if survivors[0].adequate else []
-    carried, validation, kept = None, None, adequate
-    extended_of = lambda r: study.refit(noise, [(r.fit.names, _unchained(study, r.fit, chain))], chain=chain)[0]  # noqa: E731
-    extended = {s.fit.names: extended_of(s) for s in (adequate or survivors[:1])}
+    extended = {
+        s.fit.names: study.refit(noise, [(s.fit.names, _unchained(study, s.fit, chain))], chain=chain)[0]
+        for s in (adequate or survivors[:1])
+    }
+    found, again = {}, []
     if validate and any(s.fit.names or chain for s in adequate):
         tell(f"judging {len(adequate)} explanation{'s' * (len(adequate) > 1)} on the held-out events")
-        fits = [bare, *(extended[s.fit.names] for s in adequate)]
-        other, units, other_noise = held_out(study.model, study.catalogue, validate, study, fits, bounds, fixed)
-        gaps = {s.fit.names: gap(other, units[0], u, s.fit.names, other_noise, other.before)
-                for s, u in zip(adequate, units[1:], strict=True)}  # fmt: skip
-        kept = [s for s in adequate if gaps[s.fit.names].helps]
-        shown = (kept or adequate)[0]
-        carried = gaps[shown.fit.names]
-        validation = (other, [units[0], units[1 + adequate.index(shown)]])
+        found = judged(study, validate, bare, list(extended.values()), bounds, fixed)
+        if not any(j.gap.helps for j in found.values()):
+            again = together(study, validate, bare, list(extended.values()), noise, chain, bounds, fixed, seed)
+            found |= judged(study, validate, bare, again, bounds, fixed) if again else {}
+            extended |= {f.names: f for f in again}
+    kept = [s for s in adequate if s.fit.names not in found or found[s.fit.names].gap.helps]
     verdict, reason = _verdict(explanation, survivors, adequate, kept, chain, alpha)
+    if again and kept:
+        reason += "; what the fitted events leave open of it was fitted to the held-out ones, too"
     chosen = (kept or adequate or survivors)[0]
     sets = [tuple(sorted((*s.fit.names, *chain))) for s in kept] if verdict in ("named", "tied") else []
-    names = sets[0] if verdict in ("named", "tied") else ()
+    names = sets[0] if sets else ()
     after = extended[chosen.fit.names] if names else bare
+    last = chosen.stage or explanation.stages[-1]
     fitted = [*study.base, *study.before, *study.parameters(names)]
-    stage = chosen.stage or explanation.stages[-1]
+    first = explanation.stages[0]
     return Finding(
         verdict, reason, names, sets,
-        where(explanation.stages[0].projection, explanation.stages[0].null, alpha) if verdict != "none" else [],
-        study.catalogue, study, explanation, rivals, bare, after,
-        gap(study, bare.unit, after.unit, after.names, stage.noise, fitted), carried if names else None,
-        validation if names else None,
+        where(first.projection, first.null, alpha) if verdict != "none" else [],
+        known, study, explanation, rivals, bare, after,
+        gap(study, bare.unit, after.unit, after.names, last.noise, fitted),
+        found.get(chosen.fit.names) if names else None, bool(again and kept),
         deciding_event(study, kept) if verdict == "tied" else None,
         _nearest(study, bare, rivals, noise, validate, bounds, fixed) if verdict == "unexplained" else None, alpha,
     )  # fmt: skip
@@ -164,9 +166,7 @@ def _nearest(
     excess = max(before.deviance - study.likelihood.samples, 1e-300)
     held = float("nan")
     if validate:
-        other, units, level = held_out(
-            study.model, study.catalogue, validate, study, [bare, rivals[0].fit], dict(bounds), dict(fixed)
-        )
+        other, units, level = carried(study, validate, [bare, rivals[0].fit], bounds, fixed)
         there = [curves(other, u, level).deviance for u in units]
         held = (there[0] - there[1]) / max(there[0] - other.likelihood.samples, 1e-300)
     others = [(r.fit.names, (before.deviance - r.fit.deviance) / excess) for r in rivals[1:4]]

@@ -59,7 +59,8 @@ class Study:
         fixed: Mapping[str, float],
         substeps: int | None = None,
     ):
-        self.model, self.catalogue, self.smoothed = model, catalogue, smooth(events)
+        self.model, self.catalogue, self.recorded = model, catalogue, tuple(events)
+        self.smoothed = smooth(events)
         self.events = tuple(s.event for s in self.smoothed)
         self.kernels = Kernels(model, catalogue, self.events, bounds, fixed, substeps)
         self.blur: np.ndarray | None = None
@@ -230,7 +231,7 @@ class Study:
     def noise(self, unit: np.ndarray) -> Noise:
         """The noise of the quiet residuals at a fit."""
         if self.blur is None:
-            self.blur = self._blurred(unit)
+            self.blur = self.blur_at(unit)
         return self.noise_in(self.residuals(unit[None])[0])
 
     def noise_in(self, residual: np.ndarray) -> Noise:
@@ -243,7 +244,7 @@ class Study:
         before = [drive.measured[:, drive.part(e)][:, event.steady] for e, event in enumerate(self.events)]
         return find([mix @ b for b in before if np.isfinite(b).all()], self.events[0].record.step)
 
-    def _blurred(self, unit: np.ndarray) -> np.ndarray | None:
+    def blur_at(self, unit: np.ndarray) -> np.ndarray | None:
         """What errors of the voltage do to the power of the base model at a fit, (k, 2, N) [pu]; None without any."""
         most = max(len(s.errors) for s in self.smoothed)
         if not most:

@@ -23,7 +23,7 @@ CAPTIONS = {
 def report(folder: Path, finding: Finding, title: str) -> list[Path]:
     """Write the figures and discrepancy.html into `folder`; returns their paths."""
     figures = [residuals(folder / "residuals.svg", finding), smaller(folder / "gap.svg", finding, held=False)]
-    if finding.validation is not None:
+    if finding.held_out is not None:
         figures.append(smaller(folder / "gap_held_out.svg", finding, held=True))
     if finding.nearest is not None:
         figures.append(left(folder / "unexplained.svg", finding))
@@ -163,7 +163,7 @@ def left(path: Path, finding: Finding) -> Path:
 
 def smaller(path: Path, finding: Finding, held: bool) -> Path:
     """Residuals before and after, on the fitted or the held-out events."""
-    study = finding.validation[0] if held else finding.study
+    study = finding.held_out.study if held else finding.study
     gap = finding.validate if held else finding.train
     pairs = [("before", gap.before.calculated, style.MEASURED), ("after", gap.after.calculated, None)]
     return _panels(path, study, pairs if finding.names else pairs[:1], ())

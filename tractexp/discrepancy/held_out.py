@@ -1,0 +1,117 @@
+"""What held-out events say of explanations that were found without them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tractexp.discrepancy.gap import SHOWN, Gap, gap
+from tractexp.discrepancy.noise import Noise
+from tractexp.discrepancy.study import Refit, Study
+from tractexp.discrepancy.sure import ADEQUATE
+from tractexp.discrepancy.which import stage
+from tractexp.identify.descent import descend
+from tractexp.record import Event
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """The gap of one explanation on the held-out events, and the coordinates of both models there."""
+
+    gap: Gap
+    study: Study
+    units: list[np.ndarray]
+
+
+def judged(
+    trained: Study, events: Sequence[Event], bare: Refit, extended: Sequence[Refit], bounds: Mapping, fixed: Mapping
+) -> dict[tuple[str, ...], Judged]:  # fmt: skip
+    """Compare the base model and extended ones, as they were fitted, on held-out events."""
+    study, units, noise = carried(trained, events, [bare, *extended], bounds, fixed)
+    return {
+        fit.names: Judged(gap(study, units[0], unit, fit.names, noise, study.before), study, [units[0], unit])
+        for fit, unit in zip(extended, units[1:], strict=True)
+    }
+
+
+def carried(
+    trained: Study, events: Sequence[Event], fits: Sequence[Refit], bounds: Mapping, fixed: Mapping
+) -> tuple[Study, list[np.ndarray], Noise]:  # fmt: skip
+    """Carry fits over to held-out events: everything keeps its trained value but P0 and Q0 of each event.
+
+    Returns the study of those events, the coordinates of each fit there, and the noise of the last one.
+    """
+    study = _study_of(trained, events, bounds, fixed)
+    units = []
+    for fit in fits:
+        unit = study.null.copy()
+        unit[: trained.problem.space.dimension] = fit.unit[: trained.problem.space.dimension]
+        units.append(_settled(study, unit, study.white(), fit.names))
+    noise = study.noise(units[-1])
+    return study, [_settled(study, u, noise, fit.names) for u, fit in zip(units, fits, strict=True)], noise
+
+
+def together(
+    trained: Study, events: Sequence[Event], bare: Refit, extended: Sequence[Refit], noise: Noise,
+    chain: Sequence[str], bounds: Mapping, fixed: Mapping, seed: int,
+) -> list[Refit]:  # fmt: skip
+    """Explanations for which fitted and held-out events together speak louder than the fitted ones alone.
+
+    What the fitted events leave open, such as the level of a relay between the depths of two dips, may be wrong on the
+    held-out ones though the effect is there. They must be adequate for all events. Returns the fits to all of them, in
+    coordinates of the fitted events.
+    """
+    study = _study_of(trained, (*trained.recorded, *events), bounds, fixed)
+    noise = replace(noise, blur=study.blur_at(_widened(study, trained, bare.unit)))
+    first = study.refit(noise, [((), _widened(study, trained, bare.unit))], chain=())[0]
+    wanted = [
+        (fit.names, _placed(study, start, setting))
+        for fit in extended
+        for start in [_widened(study, trained, fit.unit)]
+        for setting in _settings(study, fit.names)
+    ]
+    confirmed = []
+    for fit in study.refit(noise, wanted, chain=chain):
+        alone = next(e for e in extended if e.names == fit.names)
+        louder = first.deviance - fit.deviance > bare.deviance - alone.deviance + SHOWN
+        if louder and stage(study, fit, noise, seed, plain=True).p_left >= ADEQUATE:
+            unit = np.r_[fit.unit[: study.problem.space.dimension], fit.unit[study.before][: len(trained.before)]]
+            confirmed.append(replace(fit, unit=unit))
+    return confirmed
+
+
+def _study_of(trained: Study, events: Sequence[Event], bounds: Mapping, fixed: Mapping) -> Study:
+    substeps = int(trained.problem.step.substeps.max())
+    return Study(trained.model, trained.catalogue, events, bounds, fixed, substeps)
+
+
+def _widened(study: Study, trained: Study, unit: np.ndarray) -> np.ndarray:
+    """Coordinates of the fitted events as those of a study with more events after them."""
+    wide = study.null.copy()
+    wide[: len(unit)] = unit
+    return wide
+
+
+def _settings(study: Study, names: Sequence[str]) -> list[dict[str, float]]:
+    """No change, and every setting of the scanned parameters of one of the effects."""
+    return [{}, *(s for name in names for s in study.catalogue[name].settings)]
+
+
+def _placed(study: Study, unit: np.ndarray, setting: Mapping[str, float]) -> np.ndarray:
+    moved = unit.copy()
+    for name, value in setting.items():
+        moved[study.column[name]] = study.to_unit(name, value)
+    return moved
+
+
+def _settled(study: Study, unit: np.ndarray, noise: Noise, names: Sequence[str]) -> np.ndarray:
+    """Fit P0 and Q0 of each event alone."""
+
+    def rows(x: np.ndarray, lanes: np.ndarray) -> np.ndarray:
+        whole = np.tile(unit, (len(x), 1))
+        whole[:, study.before] = x
+        return study.rows(whole, noise, (), [names] * len(x))
+
+    moved = unit.copy()
+    moved[study.before] = descend(rows, unit[study.before][None]).unit[0]
+    return moved
