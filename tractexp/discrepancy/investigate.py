@@ -10,6 +10,7 @@ from scipy.special import ndtr
 from tractexp.discrepancy.catalogue import Catalogue, catalogue
 from tractexp.discrepancy.gap import Gap, curves, gap
 from tractexp.discrepancy.held_out import Judged, carried, judged, together
+from tractexp.discrepancy.kernels import Family
 from tractexp.discrepancy.noise import Noise
 from tractexp.discrepancy.recommend import Decider, deciding_event
 from tractexp.discrepancy.study import Refit, Study
@@ -113,8 +114,8 @@ def investigate(
     check_events(train, validate)
     known = catalogue(model.motor, model.static, model.effects, train, only)
     tell(f"testing {len(known.candidates)} effects, {len(known.untestable)} more cannot be tested on these events")
+    Family(model, known).compile(tell)
     study = Study(model, known, train, bounds, fixed)
-    study.kernels.compile(tell)
     naming = 0.8 * alpha  # the rest is spent on the adequacy test
     explanation = explain(study, naming, seed, tell)
     survivors, rivals = surviving(study, explanation, seed)

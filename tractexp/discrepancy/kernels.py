@@ -1,14 +1,15 @@
 """Which kernel simulates which set of effects: few kernels, so that they are soon compiled, and each no larger than
 its set needs.
 
-Sets of one effect have kernels of their own, as fast as the base model's. Larger sets share one that holds every
-effect whose equations are short, and the pushes of the adequacy test; a set with a long one takes the kernel of
-everything. All give the same response up to rounding.
+Two effects share a kernel nearly as fast as the base model's, for sets of one of them or of both. Larger sets share
+one that holds every effect whose equations are short, and the pushes of the adequacy test; a set with a long one takes
+the kernel of everything. All give the same response up to rounding.
 """
 
 import functools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from tractexp.model.model import Model, compose
 from tractexp.record import Event
 
 LONG = 2.0  # times the source of the base model
+SHARED = 2  # effects of one kernel: one each would take longer to compile, more would be slower
 Key = tuple[frozenset[str], bool] | None  # load effects and whether pushes are in; None: everything is
 WORTH = 16  # simulations that are worth a thread
 
@@ -40,26 +42,12 @@ def _threads() -> ThreadPoolExecutor:
     return ThreadPoolExecutor()
 
 
-class Kernels:
-    """Simulates coordinates (n, D) of a study by the kernel of a set of effects."""
+@dataclass(frozen=True, eq=False)
+class Family:
+    """A base model with all sets of effects of a catalogue."""
 
-    def __init__(
-        self,
-        model: Model,
-        catalogue: Catalogue,
-        events: Sequence[Event],
-        bounds: Mapping[str, Sequence[float]],
-        fixed: Mapping[str, float],
-        substeps: int | None = None,
-    ):
-        self.model, self.catalogue, self.events = model, catalogue, tuple(events)
-        self.bounds, self.fixed = bounds, fixed
-        self.bare = Problem(model, events, bounds, fixed, substeps)
-        self.substeps = int(self.bare.step.substeps.max())
-        everything = compose(model.motor, model.static, [*model.effects, *catalogue.effects, Injection()])
-        self.whole = Problem(everything, events, bounds, fixed, self.substeps)
-        self._column = {name: k for k, name in enumerate(self.whole.space.names)}
-        self._made: dict[Key, tuple[Likelihood, np.ndarray]] = {None: self._simulator(self.whole)}
+    model: Model
+    catalogue: Catalogue
 
     def with_effects(self, names: Iterable[str], pushed: bool = False) -> Model:
         """The model with these load effects, the whole measurement chain and, where `pushed`, the pushes."""
@@ -69,23 +57,72 @@ class Kernels:
         )
 
     @functools.cached_property
+    def whole(self) -> Model:
+        """The model with everything."""
+        return self.with_effects(self.catalogue.load, True)
+
+    @functools.cached_property
     def short(self) -> frozenset[str]:
         """The load effects whose kernels are not much longer than the base model's."""
-        most = LONG * len(self.with_effects(()).source)
-        return frozenset(n for n in self.catalogue.load if len(self.with_effects((n,)).source) <= most)
+        most = LONG * self._length(())
+        return frozenset(n for n in self.catalogue.load if self._length((n,)) <= most)
+
+    @functools.cached_property
+    def groups(self) -> tuple[frozenset[str], ...]:
+        """Load effects that share a kernel: short ones of nearly the same length, long ones by themselves."""
+        ranked = sorted(self.short, key=lambda n: (self._length((n,)), n))
+        together = [frozenset(ranked[k : k + SHARED]) for k in range(0, len(ranked), SHARED)]
+        return *together, *(frozenset((n,)) for n in self.catalogue.load if n not in self.short)
+
+    def _length(self, names: Iterable[str]) -> int:
+        return len(self.with_effects(names).source)
 
     def key(self, names: Iterable[str], pushed: bool = False) -> Key:
         """The kernel that serves a set of names, with pushes or without."""
         load = frozenset(names) - set(self.catalogue.chain)
-        if not load or (len(load) == 1 and not pushed):
-            return load, pushed
+        if not pushed:
+            for group in (frozenset(), *self.groups):
+                if load <= group:
+                    return group, False
         return (self.short, True) if load <= self.short else None
+
+    def compile(self, tell: Callable[[str], None]) -> None:
+        """Compile what is not in the cache yet, side by side."""
+        compile_missing(self._sources(), lambda: tell("compiling kernels, once for this base model and these channels"))
+
+    def _sources(self) -> Iterator[str]:
+        """Two that are soon derived, so that something compiles while the largest is; then the largest first."""
+        yield self.model.source
+        yield self.with_effects(()).source
+        yield self.whole.source
+        yield self.with_effects(self.short, True).source
+        for group in self.groups:
+            yield self.with_effects(group).source
+
+
+class Kernels:
+    """Simulates coordinates (n, D) of a study by the kernel of a set of effects."""
+
+    def __init__(
+        self,
+        family: Family,
+        events: Sequence[Event],
+        bounds: Mapping[str, Sequence[float]],
+        fixed: Mapping[str, float],
+        substeps: int | None = None,
+    ):
+        self.family, self.events, self.bounds, self.fixed = family, tuple(events), bounds, fixed
+        self.bare = Problem(family.model, events, bounds, fixed, substeps)
+        self.substeps = int(self.bare.step.substeps.max())
+        self.whole = Problem(family.whole, events, bounds, fixed, self.substeps)
+        self._column = {name: k for k, name in enumerate(self.whole.space.names)}
+        self._made: dict[Key, tuple[Likelihood, np.ndarray]] = {None: self._simulator(self.whole)}
 
     def residuals(self, key: Key, unit: np.ndarray) -> np.ndarray:
         """Calculated minus measured (n, 2, N) [pu] at coordinates (n, D) of the study."""
         if key not in self._made:
             assert key is not None
-            model = self.with_effects(*key)
+            model = self.family.with_effects(*key)
             bounds, fixed = (
                 {n: v for n, v in given.items() if n in model.names} for given in (self.bounds, self.fixed)
             )
@@ -97,17 +134,3 @@ class Kernels:
         """A problem's likelihood, and where its coordinates stand among the study's."""
         before = self.whole.space.dimension + np.arange(2 * len(self.events))
         return Likelihood.of(problem), np.r_[[self._column[n] for n in problem.space.names], before].astype(int)
-
-    def compile(self, tell: Callable[[str], None]) -> None:
-        """Compile what is not in the cache yet, side by side, the largest first."""
-        compile_missing(self._sources(), lambda: tell("compiling kernels, once for this base model and these channels"))
-
-    def _sources(self) -> Iterator[str]:
-        yield self.whole.model.source
-        for key in (
-            (frozenset(), False),
-            (frozenset(), True),
-            *((frozenset((n,)), False) for n in self.catalogue.load),
-        ):
-            yield self.with_effects(*key).source
-        yield self.with_effects(self.short, True).source

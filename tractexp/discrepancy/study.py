@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.catalogue import Catalogue
-from tractexp.discrepancy.kernels import Kernels, side_by_side
+from tractexp.discrepancy.kernels import Family, Kernels, side_by_side
 from tractexp.discrepancy.noise import Noise, estimate, quiet_stretches
 from tractexp.discrepancy.voltage import smooth
 from tractexp.discrepancy.wander import Wander, find
@@ -62,7 +62,7 @@ class Study:
         self.model, self.catalogue, self.recorded = model, catalogue, tuple(events)
         self.smoothed = smooth(events)
         self.events = tuple(s.event for s in self.smoothed)
-        self.kernels = Kernels(model, catalogue, self.events, bounds, fixed, substeps)
+        self.kernels = Kernels(Family(model, catalogue), self.events, bounds, fixed, substeps)
         self.blur: np.ndarray | None = None
         self.problem = self.kernels.whole
         self.likelihood = Likelihood.of(self.problem)
@@ -114,12 +114,12 @@ class Study:
         By default any effect and any push may be there, at the price of the largest kernel.
         """
         self.simulations += len(unit)
-        key = None if names is None else self.kernels.key(names, pushed)
+        key = None if names is None else self.kernels.family.key(names, pushed)
         return side_by_side(lambda part: self.kernels.residuals(key, part), unit)
 
     def residuals_of(self, unit: np.ndarray, sets: Sequence[tuple[Sequence[str], bool]]) -> np.ndarray:
         """As `residuals`, with a set of names for each of the coordinates, and whether a push is in it."""
-        keys = [self.kernels.key(names, pushed) for names, pushed in sets]
+        keys = [self.kernels.family.key(names, pushed) for names, pushed in sets]
         made = np.empty((len(unit), 2, self.problem.drive.samples))
         for key in dict.fromkeys(keys):
             mine = np.array([k == key for k in keys])

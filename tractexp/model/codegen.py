@@ -171,7 +171,7 @@ def source(lowered: Lowered, title: str) -> str:
     own = [*rows, *lowered.event, *lowered.starts]
     if lowered.rest is not None:
         text += _phase("_rest", own, lowered.rest) + _settle(lowered, rows)
-    text += _function("_constants", own, (), [e for _, e in lowered.constants])
+    text += _phase("_constants", own, lowered.constant)
     text += _function("_drive", scalars, (), [e for _, e in lowered.derivative.signals])
     text += _function("_signals", scalars, (), [e for _, e in sample_signals])
     for name in PHASES:
@@ -199,7 +199,7 @@ class _Rows:
 
     def __init__(self, lowered: Lowered):
         lane = [*lowered.parameters, sympy.Symbol("P0", real=True), sympy.Symbol("Q0", real=True)]
-        lane += [*lowered.starts, *(s for s, _ in lowered.constants)]
+        lane += [*lowered.starts, *lowered.constants]
         used = {name: symbols(getattr(lowered, name)) for name in PHASES}
         self.needed = {name: [s for s in lane if s in used[name]] for name in PHASES}
         self.carried = [s for s in lane if any(s in needed for needed in self.needed.values())]
@@ -246,15 +246,14 @@ def _fill_signals(lowered: Lowered) -> list[str]:
 
 
 def _load_candidate(lowered: Lowered, rows: list[sympy.Symbol], at: _Rows) -> list[str]:
-    constants = [s for s, _ in lowered.constants]
     lines = [f"{s} = candidates[e, {i}, k]" for i, s in enumerate(rows)]
     lines.append(f"{_names([*lowered.starts, 'm'])} = _start({_names([*rows, *lowered.event])})")
     arguments = _names([*rows, *lowered.event, *lowered.starts])
     if lowered.rest is not None:
         lines.append(f"{_targets([*lowered.starts[: len(lowered.states)], 'unsettled'])} = _settle({arguments})")
         lines.append("m = min(m + unsettled, 1e6)")
-    if constants:
-        lines.append(f"{_targets(constants)} = _constants({arguments})")
+    if lowered.constants:
+        lines.append(f"{_targets(lowered.constants)} = _constants({arguments})")
     carried = zip((*lowered.states, *lowered.memories), lowered.starts, strict=True)
     lines += [f"W[{at[s]} + l] = {begin}" for s, begin in carried]
     return lines + [f"W[{at[s]} + l] = {s}" for s in at.carried]

@@ -39,7 +39,8 @@ class Lowered:
     starts: tuple[Symbol, ...]  # states and memories before the event
     start: Phase  # states and memories before the event, then the slack of each requirement
     rest: Phase | None  # what vanishes before the event, where the start is only a guess to be solved
-    constants: tuple[tuple[Symbol, sympy.Expr], ...]
+    constants: tuple[Symbol, ...]
+    constant: Phase  # their values, which hold for a whole event
     derivative: Phase
     renewal: Phase
     output: Phase
@@ -118,7 +119,7 @@ def lower(eq: Equations) -> Lowered:
     used = tuple(s for s in inputs if s == eq.U or any(s in symbols(p) for p in phases))
     lowered = Lowered(
         parameters, used, event, states, memories, starts, start, rest,
-        tuple((s, e) for e, s in hoist.constants.items()), *phases,
+        tuple(hoist.constants.values()), _phase(None, list(hoist.constants)), *phases,
     )  # fmt: skip
     _check_closed(lowered, lane)
     return lowered
@@ -188,10 +189,10 @@ def _check_names(names: Iterable[str]) -> None:
 
 def _check_closed(lowered: Lowered, lane: set[Symbol]) -> None:
     known = lane | {*lowered.inputs, *lowered.event, *lowered.states, *lowered.memories}
-    for phase in (lowered.start, lowered.rest, lowered.derivative, lowered.renewal, lowered.output):
+    for phase in (lowered.start, lowered.rest, lowered.constant, lowered.derivative, lowered.renewal, lowered.output):
         if phase is None:
             continue
-        own = {s for s, _ in (*phase.temporaries, *phase.signals, *lowered.constants)}
+        own = {*lowered.constants, *(s for s, _ in (*phase.temporaries, *phase.signals))}
         if stray := symbols(phase) - known - own:
             raise ValueError(f"the equations use {sorted(map(str, stray))}, which nothing declares")
 
