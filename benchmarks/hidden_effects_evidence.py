@@ -7,6 +7,7 @@ import numpy as np
 
 Rows = list[dict]
 VERDICTS = ("none", "named", "tied", "unexplained")
+FITTED = 3  # events, where nothing else is said
 BINS = ((0, 20), (20, 40), (40, 80), (80, np.inf))  # of the non-centrality that the best single effect leaves
 BEGIN, END = "<!-- evidence: written by hidden_effects_study.py --docs -->", "<!-- end of evidence -->"
 
@@ -14,11 +15,12 @@ BEGIN, END = "<!-- evidence: written by hidden_effects_study.py --docs -->", "<!
 def tables(rows: Rows) -> str:
     """All tables, Markdown."""
     good = [r for r in rows if "failed" not in r]
-    failed = len(rows) - len(good)
+    failed, usual = len(rows) - len(good), [r for r in good if fitted(r) == FITTED]
     parts = [
         f"{len(rows)} data sets" + (f", of which {failed} could not be made or investigated." if failed else "."),
         *(_table(title, head, lines) for title, head, lines in (
-            _false_alarms(good), _singles(good), _abstention(good), _pairs(good), _sizes(good), _seconds(good)
+            _false_alarms(usual), _singles(usual), _events(good), _abstention(usual), _pairs(usual), _sizes(usual),
+            _seconds(usual),
         ) if lines),
     ]  # fmt: skip
     return "\n\n".join(parts)
@@ -26,7 +28,7 @@ def tables(rows: Rows) -> str:
 
 def write(rows: Rows, docs: Path) -> None:
     """Put the tables between the marks in missing-effects.md, and the figures into images/."""
-    good = [r for r in rows if "failed" not in r]
+    good = [r for r in rows if "failed" not in r and fitted(r) == FITTED]
     page = docs / "missing-effects.md"
     text = page.read_text(encoding="utf-8")
     head, rest = text.split(BEGIN)
@@ -44,6 +46,11 @@ def share(right: int, of: int) -> str:
         return "-"
     low, high = binomtest(right, of).proportion_ci(0.95, "exact")
     return f"{right / of:.1%} ({low:.0%}-{high:.0%})" if of < 1000 else f"{right / of:.1%}"
+
+
+def fitted(row: dict) -> int:
+    """Number of events fitted."""
+    return row["events"] - row["held"]
 
 
 def _table(title: str, head: Sequence[str], lines: Sequence[Sequence[object]]) -> str:
@@ -143,6 +150,22 @@ def _singles(rows: Rows) -> tuple[str, list[str], list]:
         "gap closed on the held-out event: median, at least 95 %", "a place found is true",
     ]  # fmt: skip
     return "One effect is missing", head, lines
+
+
+def _events(rows: Rows, multiple: float = 4.0) -> tuple[str, list[str], list]:
+    lines = []
+    for count in sorted({fitted(r) for r in rows}):
+        members = [r for r in rows if r["group"] == f"{multiple:g} x" and fitted(r) == count and reached(r, multiple)]
+        if members:
+            n, unique = len(members), [r for r in members if r["verdict"] == "named"]
+            verdicts = [share(sum(r["verdict"] == v for r in members), n) for v in ("named", "tied", "unexplained")]
+            known = [r for r in members if r["verdict"] in ("named", "tied")]
+            lines.append([
+                count, n, verdicts[0], share(sum(map(right, unique)), len(unique)), verdicts[1],
+                share(sum(map(in_set, known)), len(known)), verdicts[2],
+            ])  # fmt: skip
+    head = ["events fitted", "data sets", "one name", "of these right", "tied", "truth among the names", "unexplained"]
+    return f"Fewer events, {multiple:g} times the limit of their own", head, lines
 
 
 def reached(row: dict, multiple: float) -> bool:
