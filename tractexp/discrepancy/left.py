@@ -50,12 +50,12 @@ def tail(draws: np.ndarray, value: np.ndarray) -> float:
     """How often a statistic is at least as large as `value`, (1,) or (1, k), given draws (b,) or (b, k)."""
     if draws.ndim == 1:
         mean, variance = draws.mean(), max(draws.var(), 1e-300)
-        return float(gammaincc(mean**2 / variance, max(value[0], 0.0) * mean / variance))
+        return max(float(gammaincc(mean**2 / variance, max(value[0], 0.0) * mean / variance)), SMALLEST_P)
     mean, spread = draws.mean(axis=0), draws.std(axis=0) + 1e-12
     largest = ((draws - mean) / spread).max(axis=1)
     scale = max(largest.std() * np.sqrt(6) / np.pi, 1e-12)
     found = ((value - mean) / spread).max()
-    return float(-np.expm1(-np.exp(-(found - largest.mean()) / scale - np.euler_gamma)))
+    return max(float(-np.expm1(-np.exp(-(found - largest.mean()) / scale - np.euler_gamma))), SMALLEST_P)
 
 
 def least_p(projection: Projection) -> np.ndarray:
