@@ -495,11 +495,12 @@ def test_the_offset_of_the_flux_may_be_the_same_after_every_dip():
     assert shallow == pytest.approx(deep / 2**1.5, rel=0.1)
 
 
-@pytest.mark.parametrize(("drop", "given"), [(0.004, 0.04 * 0.996), (0.5, 0.5)])
-def test_a_compensator_settles_at_its_gain_or_its_limit(drop, given):
+@pytest.mark.parametrize(("drop", "exponent", "given"), [(0.004, 1.0, 0.04 * 0.996), (0.5, 1.0, 0.5), (0.5, 2.0, 0.25)])
+def test_a_compensator_settles_at_its_gain_or_its_limit(drop, exponent, given):
     t = np.arange(1200) * 1e-3
     excitation = event(np.where(t < 0.1, 1.0, 1 - drop))
-    chosen = values("static_var_compensator", compensator=0.3, compensator_gain=10.0, compensator_time=0.05)
+    size = {"compensator": 0.3, "compensator_gain": 10.0, "compensator_time": 0.05, "compensator_exponent": exponent}
+    chosen = values("static_var_compensator", **size)
     extra = run("static_var_compensator", excitation, chosen)[1] - base(excitation)[1]
     assert extra[-1] == pytest.approx(-0.3 * given, rel=1e-6)
     later = extra[101:151]  # one time constant on

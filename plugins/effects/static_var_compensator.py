@@ -11,19 +11,21 @@ SOURCE = "Kundur 1994, section 11.2; Milano 2010, ch. 19 (SVC and STATCOM)"
 class StaticVarCompensator(Effect):
     """A compensator that feeds reactive current into the bus when the voltage is low, up to its rating.
 
-        T_c dx/dt = sat(K (U_0 - U)) - x,   Q -> Q - q_c x u,   u = U/U_0,   sat(z) = max(-1, min(1, z))
+        T_c dx/dt = sat(K (U_0 - U)) - x,   Q -> Q - q_c x u^n,   u = U/U_0,   sat(z) = max(-1, min(1, z))
 
-    A small drop dU brings a current of K q_c dU, a deep one the rating q_c. The set point is the voltage before the
-    event. At q_c = 0 the base model, whatever gain and time constant.
+    A small drop dU brings K q_c dU, a deep one the rating q_c: of current where n = 1 (STATCOM), of susceptance where
+    n = 2 (thyristor-controlled). The set point is the voltage before the event. At q_c = 0 the base model, whatever
+    the rest.
 
     Source: Kundur 1994, section 11.2; Milano 2010, ch. 19: proportional regulator, one lag, limits.
-    Departures: the limit is symmetric and of current, as a STATCOM's is (that of a thyristor-controlled one is of
-    susceptance).
+    Departures: the limit is symmetric.
     """
 
     compensator = Parameter(0.0, (0.0, 1.0), "pu", "rating on the record's base", SOURCE, "q_c", null=0.0)
     compensator_gain = Parameter(10.0, (1.0, 100.0), "1/pu", "gain per rating, 1/droop", SOURCE, "K")
     compensator_time = Parameter(0.03, (0.005, 0.3), "s", "time constant", SOURCE, "T_c")
+
+    compensator_exponent = Parameter(1.0, (1.0, 2.0), "1", "of voltage: 1 current, 2 susceptance", SOURCE, "n")
 
     grid = {"compensator_gain": (2.0, 10.0, 50.0), "compensator_time": (0.01, 0.03, 0.1)}
     relevant = {"compensator": 0.05}
@@ -32,9 +34,9 @@ class StaticVarCompensator(Effect):
     def edit(self, eq):
         from tractexp.model.equations import sympy
 
-        rating, gain, time = eq.declare(self.parameters)
+        rating, gain, time, exponent = eq.declare(self.parameters)
         x = eq.state("compensation", "x_c")
         asked = gain * (eq.U0 - eq.U)
         eq.moves(x, (sympy.Max(-1, sympy.Min(1, asked)) - x) / time, 0)
-        eq.consume(0, -rating * x * eq.U / eq.U0)
+        eq.consume(0, -rating * x * (eq.U / eq.U0) ** exponent)
         eq.settled = False

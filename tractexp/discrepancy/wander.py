@@ -13,7 +13,7 @@ from tractexp.identify.noise import fit_autoregression
 
 MODES = 32
 SLOW = 3  # cosines of a stretch that belong to wandering before its fast noise is modelled
-SEEN = 3.5  # of twice the log-likelihood, without which there is no wandering
+SEEN = 2.0  # of twice the log-likelihood, without which there is no wandering
 LESS = 1.0  # of the log-likelihood: the intensity taken is the largest that is no less likely than this
 GRID = np.concatenate(([0.0], np.geomspace(1e-3, 1e4, 71)))  # of the intensity, variances of the channel per second
 STIFF = np.concatenate(([0.0], np.geomspace(1e-4, 1e12, 97)))  # of a single stretch, in variances of its noise
@@ -85,6 +85,13 @@ def without_slow(stretch: np.ndarray) -> np.ndarray:
     return stretch - (stretch @ basis.T) @ basis
 
 
+def without_drift(stretches: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Stretches (n_i,) without the slope that they share: a load that drifts does so in every event."""
+    times = [np.arange(len(s)) - (len(s) - 1) / 2 for s in stretches]
+    slope = sum(t @ s for t, s in zip(times, stretches, strict=True)) / sum(t @ t for t in times)
+    return [s - slope * t for t, s in zip(times, stretches, strict=True)]
+
+
 def cosines(samples: int, count: int) -> np.ndarray:
     """Half a wave over a stretch, a whole one, ...: (count, samples), each of length one."""
     angle = np.pi * np.arange(1, count + 1)[:, None] / samples * (np.arange(samples) + 0.5)
@@ -99,6 +106,7 @@ def _random_walk(samples: int, step: float, count: int) -> np.ndarray:
 def _likelihood(stretches: Sequence[np.ndarray], step: float) -> np.ndarray:
     """Logarithm of the likelihood of each intensity of the grid in stretches (n_i,) of one channel."""
     fast = fit_autoregression([without_slow(s) for s in stretches], sparing=True)
+    stretches = without_drift(stretches)
     total = np.zeros(len(GRID))
     for stretch in stretches:
         n = len(stretch)

@@ -27,7 +27,7 @@ MOST_EFFECTS = 3
 SHORTLIST = {1: 10, 2: 8, 3: 6}  # sets of each size that are refitted
 CLOSE = 12.0  # of the deviance: a rough refit this near the best is made exact
 RARER = 0.1  # by how much a load effect beside one of the measurement chain must be rarer by chance than alone
-FURTHER = 1e-5  # p a further name must undercut: it would spoil a right first one, or patch up a wrong one
+FURTHER = (1e-5, 1e-9)  # p a second and a third name must undercut: they spoil right ones, or patch up wrong ones
 PLAIN = 1e-10  # a score of this p needs no exact threshold
 NESTED = 0.1  # a set may be worse than its own subset by no more than this, or the refit did not converge
 
@@ -54,6 +54,11 @@ class Stage:
         return min(1.0, len(self.left) * min(self.left.values()))
 
     @property
+    def further(self) -> float:
+        """The p that one more name must undercut."""
+        return FURTHER[min(len(self.fit.names), len(FURTHER)) - 1]
+
+    @property
     def loudest(self) -> str:
         """What stands out most of that which this fit leaves."""
         return min(self.left, key=self.left.__getitem__)
@@ -62,7 +67,7 @@ class Stage:
         """Whether any further effect of the load helps more than chance does."""
         level = self.null.critical_p(alpha)
         if self.fit.names:
-            level = min(level, FURTHER)
+            level = min(level, self.further)
         elif self.chain(alpha):
             level *= RARER  # small p are uniform under the null
         return bool(self.scores) and self.scores[0].p < level
@@ -75,7 +80,7 @@ class Stage:
         if self.noise.blurred:
             return []
         critical = self.null.critical_p(alpha)
-        level = min(critical, FURTHER) if self.fit.names else critical
+        level = min(critical, self.further) if self.fit.names else critical
         return sorted(name for name, p in self.projection.chain_p().items() if p[0] < level)
 
 
