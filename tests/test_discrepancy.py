@@ -19,7 +19,8 @@ from tractexp.discrepancy.catalogue import catalogue
 from tractexp.discrepancy.contract import contract, write_left, write_model
 from tractexp.discrepancy.gap import SHOWN
 from tractexp.discrepancy.held_out import together
-from tractexp.discrepancy.investigate import check_events, investigate, judge
+from tractexp.discrepancy.investigate import check_events, investigate
+from tractexp.discrepancy.judgement import judge
 from tractexp.discrepancy.noise import Noise as PowerNoise
 from tractexp.discrepancy.noise import estimate
 from tractexp.discrepancy.study import Study
@@ -288,7 +289,7 @@ def test_a_held_out_event_speaks_only_where_it_can_show_the_effect(planted):
 def test_all_events_together_confirm_only_what_the_held_out_ones_show(planted):
     """An event with the effect adds to the evidence of the fitted ones, one without it takes from it."""
     trained, alone, noise = planted.study, planted.extended, planted.last.noise
-    fit = lambda made: together(trained, made, planted.bare, [alone], noise, (), {}, {}, seed=0)  # noqa: E731
+    fit = lambda made: together(trained, made, planted.bare, [alone], noise, (), seed=0)  # noqa: E731
     (confirmed,) = fit(events("stator_resistance", size=2.0, count=3)[2:])
     assert confirmed.names == ("stator_resistance",)
     assert confirmed.unit.shape == alone.unit.shape
@@ -356,7 +357,7 @@ def test_on_a_real_record_it_says_that_it_does_not_know(shared_data, tmp_path):
     record = shared_data / "dfr220kv-shandong" / "xtz.cfg"
     data = ["data=comtrade", f"data.path={record}", "data.voltages=[4,5,6]", "data.currents=[8,9,10]", "data.train=[1]",
             "data.validate=[2]", "tracking.enabled=false"]  # fmt: skip
-    only = "task.effects=[dc_link_lag,static_var_compensator]"
+    only = "task.effects=[exponential_recovery,static_var_compensator]"
     done = tractexp("task=discrepancy", only, *data, "hydra.run.dir=run", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     made = json.loads((tmp_path / "run" / "discrepancy.json").read_text())

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from tractexp.discrepancy.gap import Curves, Gap
-from tractexp.discrepancy.investigate import Finding, judge
+from tractexp.discrepancy.investigate import Finding
+from tractexp.discrepancy.judgement import judge
 
 
 def contract(finding: Finding) -> dict[str, Any]:

@@ -23,11 +23,23 @@ class Judged:
     units: list[np.ndarray]
 
 
+def weighed(
+    trained: Study, events: Sequence[Event], bare: Refit, extended: Sequence[Refit], noise: Noise,
+    chain: Sequence[str], seed: int,
+) -> tuple[dict[tuple[str, ...], Judged], list[Refit]]:  # fmt: skip
+    """Judge explanations on held-out events; where none helps as it was fitted, also those that all events confirm."""
+    found = judged(trained, events, bare, extended)
+    if any(j.gap.helps for j in found.values()):
+        return found, []
+    again = together(trained, events, bare, extended, noise, chain, seed)
+    return found | (judged(trained, events, bare, again) if again else {}), again
+
+
 def judged(
-    trained: Study, events: Sequence[Event], bare: Refit, extended: Sequence[Refit], bounds: Mapping, fixed: Mapping
+    trained: Study, events: Sequence[Event], bare: Refit, extended: Sequence[Refit]
 ) -> dict[tuple[str, ...], Judged]:  # fmt: skip
     """Compare the base model and extended ones, as they were fitted, on held-out events."""
-    study, units, noise = carried(trained, events, [bare, *extended], bounds, fixed)
+    study, units, noise = carried(trained, events, [bare, *extended])
     return {
         fit.names: Judged(gap(study, units[0], unit, fit.names, noise, study.before), study, [units[0], unit])
         for fit, unit in zip(extended, units[1:], strict=True)
@@ -35,13 +47,13 @@ def judged(
 
 
 def carried(
-    trained: Study, events: Sequence[Event], fits: Sequence[Refit], bounds: Mapping, fixed: Mapping
+    trained: Study, events: Sequence[Event], fits: Sequence[Refit]
 ) -> tuple[Study, list[np.ndarray], Noise]:  # fmt: skip
     """Carry fits over to held-out events: everything keeps its trained value but P0 and Q0 of each event.
 
     Returns the study of those events, the coordinates of each fit there, and the noise of the last one.
     """
-    study = _study_of(trained, events, bounds, fixed)
+    study = _study_of(trained, events)
     units = []
     for fit in fits:
         unit = study.null.copy()
@@ -53,7 +65,7 @@ def carried(
 
 def together(
     trained: Study, events: Sequence[Event], bare: Refit, extended: Sequence[Refit], noise: Noise,
-    chain: Sequence[str], bounds: Mapping, fixed: Mapping, seed: int,
+    chain: Sequence[str], seed: int,
 ) -> list[Refit]:  # fmt: skip
     """Explanations for which fitted and held-out events together speak louder than the fitted ones alone.
 
@@ -61,7 +73,7 @@ def together(
     held-out ones though the effect is there. They must be adequate for all events. Returns the fits to all of them, in
     coordinates of the fitted events.
     """
-    study = _study_of(trained, (*trained.recorded, *events), bounds, fixed)
+    study = _study_of(trained, (*trained.recorded, *events))
     noise = replace(noise, blur=study.blur_at(_widened(study, trained, bare.unit)))
     first = study.refit(noise, [((), _widened(study, trained, bare.unit))], chain=())[0]
     wanted = [
@@ -80,9 +92,10 @@ def together(
     return confirmed
 
 
-def _study_of(trained: Study, events: Sequence[Event], bounds: Mapping, fixed: Mapping) -> Study:
-    substeps = int(trained.problem.step.substeps.max())
-    return Study(trained.model, trained.catalogue, events, bounds, fixed, substeps)
+def _study_of(trained: Study, events: Sequence[Event]) -> Study:
+    """A study of other events in the same terms."""
+    kernels = trained.kernels
+    return Study(trained.model, trained.catalogue, events, kernels.bounds, kernels.fixed, kernels.substeps)
 
 
 def _widened(study: Study, trained: Study, unit: np.ndarray) -> np.ndarray:

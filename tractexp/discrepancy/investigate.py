@@ -2,27 +2,22 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from scipy.special import ndtr
 
 from tractexp.discrepancy.catalogue import Catalogue, catalogue
 from tractexp.discrepancy.gap import Gap, curves, gap
-from tractexp.discrepancy.held_out import Judged, carried, judged, together
+from tractexp.discrepancy.held_out import Judged, carried, weighed
 from tractexp.discrepancy.kernels import Family
 from tractexp.discrepancy.noise import Noise
 from tractexp.discrepancy.recommend import Decider, deciding_event
 from tractexp.discrepancy.study import Refit, Study
-from tractexp.discrepancy.sure import ADEQUATE, ONE_SIDED, Rival, surviving
-from tractexp.discrepancy.tangent import Score
+from tractexp.discrepancy.sure import ADEQUATE, Rival, surviving
 from tractexp.discrepancy.where import Place, where
 from tractexp.discrepancy.which import Explanation, Stage, explain
 from tractexp.errors import UserError
 from tractexp.model.model import Model
 from tractexp.record import Event
-
-TESTABLE = 0.8  # power at the smallest relevant size below which an effect cannot be tested on the data
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,11 +125,8 @@ def investigate(
     found, again = {}, []
     if validate and any(s.fit.names or chain for s in adequate):
         tell(f"judging {len(adequate)} explanation{'s' * (len(adequate) > 1)} on the held-out events")
-        found = judged(study, validate, bare, list(extended.values()), bounds, fixed)
-        if not any(j.gap.helps for j in found.values()):
-            again = together(study, validate, bare, list(extended.values()), noise, chain, bounds, fixed, seed)
-            found |= judged(study, validate, bare, again, bounds, fixed) if again else {}
-            extended |= {f.names: f for f in again}
+        found, again = weighed(study, validate, bare, list(extended.values()), noise, chain, seed)
+        extended |= {f.names: f for f in again}
     kept = [s for s in adequate if s.fit.names not in found or found[s.fit.names].gap.helps]
     verdict, reason = _verdict(explanation, survivors, adequate, kept, chain, alpha)
     if again and kept:
@@ -153,13 +145,12 @@ def investigate(
         gap(study, bare.unit, after.unit, after.names, last.noise, fitted),
         found.get(chosen.fit.names) if names else None, bool(again and kept),
         deciding_event(study, kept) if verdict == "tied" else None,
-        _nearest(study, bare, rivals, noise, validate, bounds, fixed) if verdict == "unexplained" else None, alpha,
+        _nearest(study, bare, rivals, noise, validate) if verdict == "unexplained" else None, alpha,
     )  # fmt: skip
 
 
 def _nearest(
-    study: Study, bare: Refit, rivals: list[Rival], noise: Noise, validate: Sequence[Event], bounds: Mapping,
-    fixed: Mapping,
+    study: Study, bare: Refit, rivals: list[Rival], noise: Noise, validate: Sequence[Event]
 ) -> Nearest | None:  # fmt: skip
     if not rivals[0].fit.names:
         return None
@@ -167,7 +158,7 @@ def _nearest(
     excess = max(before.deviance - study.likelihood.samples, 1e-300)
     held = float("nan")
     if validate:
-        other, units, level = carried(study, validate, [bare, rivals[0].fit], bounds, fixed)
+        other, units, level = carried(study, validate, [bare, rivals[0].fit])
         there = [curves(other, u, level).deviance for u in units]
         held = (there[0] - there[1]) / max(there[0] - other.likelihood.samples, 1e-300)
     others = [(r.fit.names, (before.deviance - r.fit.deviance) / excess) for r in rivals[1:4]]
@@ -210,51 +201,3 @@ def _verdict(
     if len(kept) == 1:
         return "named", f"{names} explains the disagreement, and no other set of this size does"
     return "tied", f"{len(kept)} explanations fit equally well on these events and cannot be told apart"
-
-
-@dataclass(frozen=True)
-class Judgement:
-    """What the data say of one effect: relevant, irrelevant, ruled out, or not testable, and why."""
-
-    name: str
-    status: str
-    why: str
-    score: Score | None = None
-
-
-def judge(finding: Finding) -> list[Judgement]:
-    """Every effect of the catalogue classified (Saris, Satorra and van der Veld 2009), at the chosen model."""
-    critical = finding.first.null.critical_p(finding.alpha)
-    quantile = -_normal_quantile(critical)
-    scores = {s.name: s for s in finding.last.scores}
-    made = [Judgement(name, "not testable", why) for name, why in finding.catalogue.untestable.items()]
-    for candidate in finding.catalogue.candidates:
-        score = scores.get(candidate.name)
-        if candidate.name in finding.names:
-            made.append(Judgement(candidate.name, "relevant", "added"))
-        elif score is None:
-            made.append(Judgement(candidate.name, "irrelevant", "in the fit as a nuisance, not above its noise"))
-        else:
-            made.append(_judged(candidate, score, critical, quantile))
-    return sorted(made, key=lambda j: j.name)
-
-
-def _judged(candidate: Any, score: Score, critical: float, quantile: float) -> Judgement:
-    main = candidate.sizes[0]
-    size, deviation = score.size[main.name], score.deviation[main.name]
-    limit = abs(size) + ONE_SIDED * deviation
-    below = f"{main.name} within {limit:.2g} {main.unit} of its null"
-    if score.p < critical:
-        return Judgement(candidate.name, "relevant", f"its score stands out (p = {score.p:.2g})", score)
-    if ndtr(candidate.relevant(main) / max(deviation, 1e-300) - quantile) < TESTABLE:
-        why = f"a size of {candidate.relevant(main):g} {main.unit} would stay in the noise on these events ({below})"
-        return Judgement(candidate.name, "not testable", why, score)
-    if limit < candidate.relevant(main):
-        return Judgement(candidate.name, "ruled out", below, score)
-    return Judgement(candidate.name, "irrelevant", below, score)
-
-
-def _normal_quantile(p: float) -> float:
-    from scipy.special import ndtri
-
-    return float(ndtri(p))

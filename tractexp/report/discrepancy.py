@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from tractexp.discrepancy.contract import parameters, recommendation
-from tractexp.discrepancy.investigate import Finding, judge
+from tractexp.discrepancy.investigate import Finding
+from tractexp.discrepancy.judgement import judge
 from tractexp.discrepancy.sure import ADEQUATE
 from tractexp.report import style
 from tractexp.report.page import Page

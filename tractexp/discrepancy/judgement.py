@@ -1,0 +1,57 @@
+"""What the data say of every effect of the catalogue: relevant, irrelevant, ruled out, or not testable, and why."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+from tractexp.discrepancy.catalogue import Candidate
+from tractexp.discrepancy.investigate import Finding
+from tractexp.discrepancy.sure import ONE_SIDED
+from tractexp.discrepancy.tangent import Score
+
+TESTABLE = 0.8  # power at the smallest relevant size below which an effect cannot be tested on the data
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What the data say of one effect, and its score where it has one."""
+
+    name: str
+    status: str
+    why: str
+    score: Score | None = None
+
+
+def judge(finding: Finding) -> list[Judgement]:
+    """Every effect of the catalogue classified (Saris, Satorra and van der Veld 2009), at the chosen model."""
+    critical = finding.first.null.critical_p(finding.alpha)
+    scores = {s.name: s for s in finding.last.scores}
+    made = [Judgement(name, "not testable", why) for name, why in finding.catalogue.untestable.items()]
+    for candidate in finding.catalogue.candidates:
+        name, score = candidate.name, scores.get(candidate.name)
+        if name in finding.names:
+            made.append(Judgement(name, "relevant", "added"))
+        elif name in finding.last.fit.names:
+            made.append(Judgement(name, "relevant", "in the best explanation, which was not accepted"))
+        elif score is None:
+            made.append(Judgement(name, "irrelevant", "in the fit as a nuisance, not above its noise"))
+        else:
+            made.append(Judgement(name, *_judged(candidate, score, critical), score))
+    return sorted(made, key=lambda j: j.name)
+
+
+def _judged(candidate: Candidate, score: Score, critical: float) -> tuple[str, str]:
+    """Status and reason of an effect outside the chosen model."""
+    main = candidate.sizes[0]
+    unit = "" if main.unit == "1" else f" {main.unit}"
+    size, deviation, relevant = score.size[main.name], score.deviation[main.name], candidate.relevant(main)
+    if score.p < critical:
+        return "relevant", f"its score stands out (p = {score.p:.2g})"
+    if not np.isfinite(deviation):
+        return "not testable", "these events cannot show it"
+    limit = abs(size) + ONE_SIDED * deviation
+    below = f"{main.name} within {limit:.2g}{unit} of its null"
+    if ndtr(relevant / max(deviation, 1e-300) + ndtri(critical)) < TESTABLE:
+        return "not testable", f"a size of {relevant:g}{unit} would stay in the noise on these events ({below})"
+    return ("ruled out" if limit < relevant else "irrelevant"), below
