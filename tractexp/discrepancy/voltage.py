@@ -22,6 +22,7 @@ MARGIN = 3  # samples beside an edge that are not smooth
 BOUND, BESIDE = 4.0, 2.0  # standard deviations of an average that smoothing may leave, and beside an edge
 SHORTEST = 24  # samples of a stretch worth smoothing
 DEGREE, COSINES = 3, 32  # of the curve through a smooth stretch
+MOST = 400  # samples as recorded whose errors are followed up, the nearest to the dip: each costs a simulation
 UNSEEN = 0.01  # share of a direction's noise: less of it is left out
 SILENT = 1e-5  # pu: less noise than this is none
 
@@ -65,6 +66,8 @@ def smoothed(event: Event) -> Smoothed:
         rough[far.argmax()] = True
         rough = _widened(rough)
     raw = np.flatnonzero(rough)
+    apart = np.maximum(event.start - raw, 0) + np.maximum(raw - event.end, 0)
+    raw = raw[np.argsort(apart, kind="stable")[:MOST]]
     errors.append(deviation * (np.arange(len(U)) == raw[:, None]))
     return Smoothed(replace(event, record=replace(event.record, U=made)), np.concatenate(errors))
 
