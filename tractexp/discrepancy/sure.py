@@ -19,7 +19,7 @@ from tractexp.discrepancy.which import Explanation, Stage, stage
 ONE_SIDED = 1.6449  # standard deviations: 5 %
 REJECTED = 3.5  # standard deviations: more than chance asks for, since a true effect's formula is not quite its physics
 ALIKE = 0.05  # of what the best explains: no rival this near is rejected, for no formula is that exact
-ADEQUATE = 0.01  # p below which something is left: with the level of naming, 5 % of false alarms in all
+ADEQUATE = 0.01  # p below which an explanation leaves something
 
 
 @dataclass(frozen=True, eq=False)
