@@ -298,17 +298,17 @@ def test_submitit_runs_a_sweep_isolates_a_failure_and_logs_below_the_parent(site
 def test_a_sweep_that_is_ended_keeps_what_is_finished_and_closes_its_parent(way, tmp_path):
     command = [sys.executable, "-m", "tractexp", "-m", "optimizer=pso", "seed=range(0,400)", "budget=20000", HERE]
     process = subprocess.Popen(
-        [*command, "optimizer.iterations=4000"], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [*command, "optimizer.iterations=4000"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(way, signal.SIG_DFL),  # a shell has what it runs behind ignore interrupts
     )
     while process.poll() is None and "finished" not in str(statuses(tmp_path / "sweep")):
         time.sleep(0.2)
-    for patience in (20, 20, 60):  # Python drops an interrupt that lands in a callback: press again, as one does
-        process.send_signal(way)
-        try:
-            _, err = process.communicate(timeout=patience)
-            break
-        except subprocess.TimeoutExpired:
-            continue
+    process.send_signal(way)
+    _, err = process.communicate(timeout=60)
     assert process.returncode == 130
     assert err.startswith("tractexp: the sweep is interrupted; repeat the command")
     assert err.count("\n") == 1, err
