@@ -74,8 +74,10 @@ def together(
     coordinates of the fitted events.
     """
     study = _study_of(trained, (*trained.recorded, *events))
-    noise = replace(noise, blur=study.blur_at(_widened(study, trained, bare.unit)))
-    first = study.refit(noise, [((), _widened(study, trained, bare.unit))], chain=())[0]
+    plain = _widened(study, trained, bare.unit)
+    study.see_blur(plain)
+    noise = replace(noise, blur=study.blur)
+    first = study.refit(noise, [((), plain)], chain=())[0]
     wanted = [
         (fit.names, _placed(study, start, setting))
         for fit in extended

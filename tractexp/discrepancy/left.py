@@ -33,7 +33,7 @@ class Cell:
 
 def statistics(projection: Projection, study: Study) -> dict[str, np.ndarray]:
     """Every statistic by what it looks for: a sum (b,), or those of which the largest counts (b, k)."""
-    channels = projection.r[:, : 2 * study.problem.drive.samples].reshape(len(projection.r), 2, -1)
+    channels = channels_of(projection, study)
     made = {
         "pushes into the balances": projection.unrest(),
         "a further effect": -np.log(least_p(projection))[:, None],
@@ -51,16 +51,26 @@ def tail(draws: np.ndarray, value: np.ndarray) -> float:
     if draws.ndim == 1:
         mean, variance = draws.mean(), max(draws.var(), 1e-300)
         return max(float(gammaincc(mean**2 / variance, max(value[0], 0.0) * mean / variance)), SMALLEST_P)
-    mean, spread = draws.mean(axis=0), draws.std(axis=0) + 1e-12
-    largest = ((draws - mean) / spread).max(axis=1)
+    mean, spread, largest = extremes(draws)
     scale = max(largest.std() * np.sqrt(6) / np.pi, 1e-12)
     found = ((value - mean) / spread).max()
     return max(float(-np.expm1(-np.exp(-(found - largest.mean()) / scale - np.euler_gamma))), SMALLEST_P)
 
 
+def extremes(draws: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mean and spread (k,) of draws (b, k), and the largest of each in these terms, (b,)."""
+    mean, spread = draws.mean(axis=0), draws.std(axis=0) + 1e-12
+    return mean, spread, ((draws - mean) / spread).max(axis=1)
+
+
 def least_p(projection: Projection) -> np.ndarray:
     """The smallest p (b,) of all candidates."""
     return np.maximum(projection.drops[1].min(axis=0, initial=1.0), SMALLEST_P)
+
+
+def channels_of(projection: Projection, study: Study) -> np.ndarray:
+    """Whitened, projected residuals (b, 2, N), without the rows of the prior."""
+    return projection.r[:, : 2 * study.problem.drive.samples].reshape(len(projection.r), 2, -1)
 
 
 def cells_of(study: Study) -> list[Cell]:

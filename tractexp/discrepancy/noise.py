@@ -4,6 +4,7 @@ Estimated from the quiet residuals of a fit. Beside fast noise there may be slow
 wandering of the load, and what is left of the voltage's noise, which enters the model and leaves it in P and Q at once.
 """
 
+import functools
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -35,7 +36,7 @@ class Noise:
     blur: np.ndarray | None = None  # (k, 2, N) pu: what errors of the voltage do, each of one standard deviation
     _slow: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict, init=False)
 
-    @property
+    @functools.cached_property
     def blurred(self) -> bool:
         """Whether noise of the voltage does as much as that of the power."""
         return self.blur is not None and bool((self._mixed(self.blur) ** 2).sum(axis=0).max() > BLURRED)

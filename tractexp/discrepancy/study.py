@@ -12,7 +12,7 @@ import numpy as np
 from tractexp.discrepancy.catalogue import Catalogue
 from tractexp.discrepancy.kernels import Family, Kernels, side_by_side
 from tractexp.discrepancy.noise import Noise, estimate, quiet_stretches
-from tractexp.discrepancy.voltage import smooth
+from tractexp.discrepancy.voltage import smoothed
 from tractexp.discrepancy.wander import Wander, find
 from tractexp.identify.descent import Apart, descend
 from tractexp.identify.likelihood import Likelihood
@@ -60,10 +60,10 @@ class Study:
         substeps: int | None = None,
     ):
         self.model, self.catalogue, self.recorded = model, catalogue, tuple(events)
-        self.smoothed = smooth(events)
+        self.smoothed = [smoothed(event) for event in events]
         self.events = tuple(s.event for s in self.smoothed)
         self.kernels = Kernels(Family(model, catalogue), self.events, bounds, fixed, substeps)
-        self.blur: np.ndarray | None = None
+        self.blur: np.ndarray | None = None  # (k, 2, N) pu, once seen; None where the voltage has no noise
         self.problem = self.kernels.whole
         self.likelihood = Likelihood.of(self.problem)
         space = self.problem.space
@@ -230,8 +230,7 @@ class Study:
 
     def noise(self, unit: np.ndarray) -> Noise:
         """The noise of the quiet residuals at a fit."""
-        if self.blur is None:
-            self.blur = self.blur_at(unit)
+        self.see_blur(unit)
         return self.noise_in(self.residuals(unit[None])[0])
 
     def noise_in(self, residual: np.ndarray) -> Noise:
@@ -244,15 +243,15 @@ class Study:
         before = [drive.measured[:, drive.part(e)][:, event.steady] for e, event in enumerate(self.events)]
         return find([mix @ b for b in before if np.isfinite(b).all()], self.events[0].record.step)
 
-    def blur_at(self, unit: np.ndarray) -> np.ndarray | None:
-        """What errors of the voltage do to the power of the base model at a fit, (k, 2, N) [pu]; None without any."""
+    def see_blur(self, unit: np.ndarray) -> None:
+        """Find out once, at a fit, what errors of the voltage do to the power of the base model."""
         most = max(len(s.errors) for s in self.smoothed)
-        if not most:
-            return None
+        if self.blur is not None or not most:
+            return
         bare, own = self.kernels.bare, np.r_[unit[self.base], unit[self.before]][None]
         moved = [self._at_voltage([s.off_by(k) for s in self.smoothed]) for k in range(most)]
         calm = Likelihood.of(bare).residuals(own)
-        return np.nan_to_num(np.concatenate([Likelihood.of(p).residuals(own) for p in moved]) - calm)
+        self.blur = np.nan_to_num(np.concatenate([Likelihood.of(p).residuals(own) for p in moved]) - calm)
 
     def _at_voltage(self, events: Sequence[Event]) -> Problem:
         """The base model driven by these events."""

@@ -7,7 +7,6 @@ to the calculated power is part of the noise of a study. Left out of account the
 calculated power, or wanders slowly, would seem to be there.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -118,8 +117,3 @@ def _curve(U: np.ndarray, deviation: float) -> tuple[np.ndarray, np.ndarray]:
     curve = (U @ fixed.T) @ fixed + deviation * ((walk.along * share) @ walk.basis)
     seen = share > UNSEEN
     return curve, deviation * np.concatenate([fixed, np.sqrt(share[seen, None]) * walk.basis[seen]])
-
-
-def smooth(events: Sequence[Event]) -> list[Smoothed]:
-    """Take the noise of the voltage out of all events."""
-    return [smoothed(e) for e in events]

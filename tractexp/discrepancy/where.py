@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.left import LOUDEST, Cell, cells_of, statistics
+from tractexp.discrepancy.left import LOUDEST, Cell, cells_of, channels_of, energies, extremes
 from tractexp.discrepancy.null import Null
 from tractexp.discrepancy.tangent import Projection
 
@@ -24,10 +24,8 @@ def where(projection: Projection, null: Null, alpha: float) -> list[Place]:
     """Intervals that stand out at a family-wise error of `alpha`, adjacent ones joined, the largest first."""
     study = projection.tangent.study
     cells = cells_of(study)
-    drawn = null.left[LOUDEST]
-    mean, spread = drawn.mean(axis=0), drawn.std(axis=0) + 1e-12
-    highest = ((drawn - mean) / spread).max(axis=1)
-    excess = statistics(projection, study)[LOUDEST][0] - mean
+    mean, spread, highest = extremes(null.left[LOUDEST])
+    excess = energies(channels_of(projection, study), study)[0] - mean
     found = excess / spread > np.quantile(highest, 1 - alpha)
     total = np.maximum(excess, 0.0).sum()
     places = [
