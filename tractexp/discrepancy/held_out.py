@@ -16,23 +16,44 @@ from tractexp.record import Event
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """The gap of one explanation on the held-out events, and the coordinates of both models there."""
+    """The gap of one explanation on the held-out events, and the coordinates of both models there.
+
+    `stands` tells whether a fit to all events leaves nothing, where that was asked.
+    """
 
     gap: Gap
     study: Study
     units: list[np.ndarray]
+    stands: bool = True
+
+    @property
+    def helps(self) -> bool:
+        """Whether the explanation is worth having beyond the events it was fitted to."""
+        return self.gap.helps and self.stands
 
 
 def weighed(
     trained: Study, events: Sequence[Event], bare: Refit, extended: Sequence[Refit], noise: Noise,
     chain: Sequence[str], seed: int,
 ) -> tuple[dict[tuple[str, ...], Judged], list[Refit]]:  # fmt: skip
-    """Judge explanations on held-out events; where none helps as it was fitted, also those that all events confirm."""
+    """Judge explanations on held-out events; where none helps as it was fitted, also those that all events confirm.
+
+    Several effects at once, chosen among hundreds of sets, must also leave nothing in a fit to all events.
+    """
     found = judged(trained, events, bare, extended)
-    if any(j.gap.helps for j in found.values()):
-        return found, []
-    again = together(trained, events, bare, extended, noise, chain, seed)
-    return found | (judged(trained, events, bare, again) if again else {}), again
+    helping = [fit for fit in extended if found[fit.names].gap.helps]
+    if not helping:
+        again = [
+            fit
+            for fit, louder, stands in together(trained, events, bare, extended, noise, chain, seed)
+            if louder and stands
+        ]
+        return found | (judged(trained, events, bare, again) if again else {}), again
+    several = [fit for fit in helping if len(fit.names) > 1]
+    if several:
+        for fit, _, stands in together(trained, events, bare, several, noise, chain, seed):
+            found[fit.names] = replace(found[fit.names], stands=stands)
+    return found, []
 
 
 def judged(
@@ -66,12 +87,12 @@ def carried(
 def together(
     trained: Study, events: Sequence[Event], bare: Refit, extended: Sequence[Refit], noise: Noise,
     chain: Sequence[str], seed: int,
-) -> list[Refit]:  # fmt: skip
-    """Explanations for which fitted and held-out events together speak louder than the fitted ones alone.
+) -> list[tuple[Refit, bool, bool]]:  # fmt: skip
+    """Explanations fitted to fitted and held-out events together, in coordinates of the fitted events.
 
-    What the fitted events leave open, such as the level of a relay between the depths of two dips, may be wrong on the
-    held-out ones though the effect is there. They must be adequate for all events. Returns the fits to all of them, in
-    coordinates of the fitted events.
+    With each, whether all events speak louder for it than the fitted ones alone, and whether it leaves nothing. What
+    the fitted events leave open, such as the level of a relay between the depths of two dips, may be wrong on the
+    held-out ones though the effect is there.
     """
     study = _study_of(trained, (*trained.recorded, *events))
     plain = _widened(study, trained, bare.unit)
@@ -84,14 +105,14 @@ def together(
         for start in [_widened(study, trained, fit.unit)]
         for setting in _settings(study, fit.names)
     ]
-    confirmed = []
+    made = []
     for fit in study.refit(noise, wanted, chain=chain):
         alone = next(e for e in extended if e.names == fit.names)
         louder = first.deviance - fit.deviance > bare.deviance - alone.deviance + SHOWN
-        if louder and stage(study, fit, noise, seed, plain=True).p_left >= ADEQUATE:
-            unit = np.r_[fit.unit[: study.problem.space.dimension], fit.unit[study.before][: len(trained.before)]]
-            confirmed.append(replace(fit, unit=unit))
-    return confirmed
+        stands = stage(study, fit, noise, seed, plain=True).p_left >= ADEQUATE
+        unit = np.r_[fit.unit[: study.problem.space.dimension], fit.unit[study.before][: len(trained.before)]]
+        made.append((replace(fit, unit=unit), louder, stands))
+    return made
 
 
 def _study_of(trained: Study, events: Sequence[Event]) -> Study:

@@ -11,6 +11,7 @@ from tractexp.discrepancy.held_out import Judged, carried, weighed
 from tractexp.discrepancy.kernels import Family
 from tractexp.discrepancy.noise import Noise
 from tractexp.discrepancy.recommend import Decider, deciding_event
+from tractexp.discrepancy.recorder import opened
 from tractexp.discrepancy.study import Refit, Study
 from tractexp.discrepancy.sure import Rival, surviving
 from tractexp.discrepancy.where import Place, where
@@ -112,9 +113,9 @@ def investigate(
     known = catalogue(model.motor, model.static, model.effects, train, only)
     tell(f"testing {len(known.candidates)} effects, {len(known.untestable)} more cannot be tested on these events")
     Family(model, known).compile(tell)
-    study = Study(model, known, train, bounds, fixed)
+    study, first = opened(model, known, train, bounds, fixed, seed, tell)
     naming = 0.8 * alpha  # the rest is spent on the adequacy test
-    explanation = explain(study, naming, seed, tell)
+    explanation = explain(study, first, naming, seed, tell)
     survivors, rivals = surviving(study, explanation, seed)
     chain = tuple(explanation.stages[-1].chain(naming))
     noise = explanation.stages[-1].noise
@@ -129,7 +130,7 @@ def investigate(
         tell(f"judging {len(adequate)} explanation{'s' * (len(adequate) > 1)} on the held-out events")
         found, again = weighed(study, validate, bare, list(extended.values()), noise, chain, seed)
         extended |= {f.names: f for f in again}
-    kept = [s for s in adequate if s.fit.names not in found or found[s.fit.names].gap.helps]
+    kept = [s for s in adequate if s.fit.names not in found or found[s.fit.names].helps]
     verdict, reason = _verdict(explanation, survivors, adequate, kept, chain, alpha)
     if again and kept:
         reason += "; what the fitted events leave open of it was fitted to the held-out ones, too"
@@ -139,7 +140,6 @@ def investigate(
     after = extended[chosen.fit.names] if names else bare
     last = chosen.stage or explanation.stages[-1]
     fitted = [*study.base, *study.before, *study.parameters(names)]
-    first = explanation.stages[0]
     return Finding(
         verdict, reason, names, sets,
         where(first.projection, first.null, alpha) if verdict != "none" else [],

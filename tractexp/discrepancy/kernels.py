@@ -52,9 +52,9 @@ class Family:
     def with_effects(self, names: Iterable[str], pushed: bool = False) -> Model:
         """The model with these load effects, the whole measurement chain and, where `pushed`, the pushes."""
         effects = [self.catalogue[n].effect for n in sorted({*names, *self.catalogue.chain})]
-        return compose(
-            self.model.motor, self.model.static, [*self.model.effects, *effects, *([Injection()] if pushed else [])]
-        )
+        pushes = [Injection()] if pushed else []
+        made = compose(self.model.motor, self.model.static, [*self.model.effects, *effects, *pushes])
+        return made.behind(self.model.recorder)
 
     @functools.cached_property
     def whole(self) -> Model:

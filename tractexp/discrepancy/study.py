@@ -5,13 +5,14 @@ construction. A refit is a lane of the batched descent with its own free columns
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tractexp.discrepancy.catalogue import Catalogue
 from tractexp.discrepancy.kernels import Family, Kernels, side_by_side
 from tractexp.discrepancy.noise import Noise, estimate, quiet_stretches
+from tractexp.discrepancy.phasors import Phasors
 from tractexp.discrepancy.voltage import smoothed
 from tractexp.discrepancy.wander import Wander, find
 from tractexp.identify.descent import Apart, descend
@@ -61,6 +62,9 @@ class Study:
     ):
         self.model, self.catalogue, self.recorded = model, catalogue, tuple(events)
         self.smoothed = [smoothed(event) for event in events]
+        if isinstance(model.recorder, Phasors):
+            sharpened = model.recorder.sharpened
+            self.smoothed = [replace(s, event=sharpened(s.event)) for s in self.smoothed]
         self.events = tuple(s.event for s in self.smoothed)
         self.kernels = Kernels(Family(model, catalogue), self.events, bounds, fixed, substeps)
         self.blur: np.ndarray | None = None  # (k, 2, N) pu, once seen; None where the voltage has no noise
@@ -200,10 +204,13 @@ class Study:
             rows[e, part] = rows[e, N + part.start : N + part.stop] = True
         return [Apart(len(self.base) + np.arange(events) * 2 + c, rows) for c in (0, 1)]
 
-    def base_fit(self) -> tuple[Refit, Noise]:
-        """The base model with the chain free, and the noise of its residuals in quiet stretches."""
+    def base_fit(self, starts: Sequence[np.ndarray] = ()) -> tuple[Refit, Noise]:
+        """The base model with the chain free, and the noise of its residuals in quiet stretches.
+
+        `starts` (D,) save the search of the whole box.
+        """
         noise = self.white()
-        fit = self.refit(noise, [((), start) for start in self._base_starts()])[0]
+        fit = self.refit(noise, [((), start) for start in starts or self._base_starts()])[0]
         for _ in range(2):
             noise = self.noise(fit.unit)
             fit = self.refit(noise, [((), fit.unit)])[0]
@@ -248,11 +255,11 @@ class Study:
         most = max(len(s.errors) for s in self.smoothed)
         if self.blur is not None or not most:
             return
-        bare, own = self.kernels.bare, np.r_[unit[self.base], unit[self.before]][None]
-        moved = [self._at_voltage([s.off_by(k) for s in self.smoothed]) for k in range(most)]
-        calm = Likelihood.of(bare).residuals(own)
-        self.blur = np.nan_to_num(np.concatenate([Likelihood.of(p).residuals(own) for p in moved]) - calm)
+        calm = self.at_voltage(self.events, unit)
+        off = [self.at_voltage([s.off_by(k) for s in self.smoothed], unit) - calm for k in range(most)]
+        self.blur = np.nan_to_num(np.array(off))
 
-    def _at_voltage(self, events: Sequence[Event]) -> Problem:
-        """The base model driven by these events."""
-        return Problem(self.model, events, self.kernels.bounds, self.kernels.fixed, self.kernels.substeps)
+    def at_voltage(self, events: Sequence[Event], unit: np.ndarray) -> np.ndarray:
+        """Residuals (2, N) of the base model at coordinates (D,), driven by the voltages of other events."""
+        problem = Problem(self.model, events, self.kernels.bounds, self.kernels.fixed, self.kernels.substeps)
+        return Likelihood.of(problem).residuals(np.r_[unit[self.base], unit[self.before]][None])[0]

@@ -108,11 +108,15 @@ def stage(study: Study, fit: Refit, noise: Noise, seed: int, plain: bool = False
     return Stage(fit, noise, t, projection, null_of(t, noise, seed, plain), scores)
 
 
-def explain(study: Study, alpha: float, seed: int, tell: Callable[[str], None] = lambda line: None) -> Explanation:
-    """Add effects one by one as long as the best one helps more than chance, searching all sets of each size."""
-    fit, noise = study.base_fit()
-    stages = [stage(study, fit, noise, seed)]
-    refits = {(): fit}
+def explain(
+    study: Study, first: Stage, alpha: float, seed: int, tell: Callable[[str], None] = lambda line: None
+) -> Explanation:
+    """Add effects one by one as long as the best one helps more than chance, searching all sets of each size.
+
+    `first` holds the tests of the base model.
+    """
+    stages = [first]
+    refits = {(): first.fit}
     while stages[-1].significant(alpha) and len(stages[-1].fit.names) < MOST_EFFECTS:
         size = len(stages[-1].fit.names) + 1
         wanted = shortlist(stages, size, study)

@@ -1,5 +1,6 @@
 """A composed load model: parameters, simulation and objective of many candidates at once, equations in LaTeX."""
 
+import copy
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -47,8 +48,17 @@ class Model:
         self.motor, self.static = motor, static
         self.effects = tuple(sorted(effects, key=lambda e: (e.order, e.name)))  # the same model in whatever order given
         self.chain = tuple(e for e in self.effects if isinstance(e, Measurement))
+        self.recorder: Measurement | None = None
         load = f"{motor.name} motor and {static.name} static load"
         self.title = " with ".join([load, *(effect.name for effect in self.effects)])
+
+    def behind(self, recorder: Measurement | None) -> "Model":
+        """The same load as a recorder shows it that is known: without parameters, before the measurement chain."""
+        if recorder is None:
+            return self
+        made = copy.copy(self)
+        made.recorder, made.chain = recorder, (recorder, *self.chain)
+        return made
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -1,0 +1,40 @@
+"""Whether what the base model leaves is the work of the recorder: phasors averaged over whole cycles.
+
+It is looked for before anything else. A window that the recorder does not have makes the voltage bend where the power
+does not, which costs more than any effect explains; so one that helps as much as the best effect is believed.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+
+from tractexp.discrepancy.catalogue import Catalogue
+from tractexp.discrepancy.phasors import Phasors, windows_of
+from tractexp.discrepancy.study import Study
+from tractexp.discrepancy.which import Stage, stage
+from tractexp.model.model import Model
+from tractexp.record import Event
+
+CLEAR = 10.0  # of the deviance: what a window must explain
+BEHIND = 5.0  # of it: what the best effect may explain beyond that, for effects have parameters to fit
+
+
+def opened(
+    model: Model, catalogue: Catalogue, events: Sequence[Event], bounds: Mapping[str, Sequence[float]],
+    fixed: Mapping[str, float], seed: int, tell: Callable[[str], None],
+) -> tuple[Study, Stage]:  # fmt: skip
+    """The study of the events and the tests of its base model, behind the recorder's window if it has one."""
+    study = Study(model, catalogue, events, bounds, fixed)
+    first = stage(study, *study.base_fit(), seed)
+    found, least = None, max(CLEAR, max((s.drop for s in first.scores), default=0.0) - BEHIND)
+    for cycles, window in windows_of(study.events).items():
+        behind = Study(model.behind(Phasors(window)), catalogue, events, bounds, fixed, study.kernels.substeps)
+        fit = behind.refit(first.noise, [((), first.fit.unit)])[0]
+        gained = first.fit.deviance - fit.deviance
+        if cycles == 1 and gained <= 0:
+            break  # an average over several cycles is one of averages over one
+        if gained > least:
+            found, least = (behind, fit, window), gained
+    if found is None:
+        return study, first
+    study, fit, window = found
+    tell(f"the recorder averages phasors over {1000 * window:.0f} ms: taken into account from here on")
+    return study, stage(study, *study.base_fit([fit.unit]), seed)
