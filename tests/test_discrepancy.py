@@ -291,10 +291,14 @@ def test_all_events_together_confirm_only_what_the_held_out_ones_show(planted):
     trained, alone, noise = planted.study, planted.extended, planted.last.noise
     fit = lambda made: together(trained, made, planted.bare, [alone], noise, (), seed=0)  # noqa: E731
     (confirmed,) = fit(events("stator_resistance", size=2.0, count=3)[2:])
-    assert confirmed.names == ("stator_resistance",)
-    assert confirmed.unit.shape == alone.unit.shape
-    assert trained.value("R_s", confirmed.unit) == pytest.approx(trained.value("R_s", alone.unit), rel=0.2)
-    assert fit(events(None, count=3)[2:]) == []
+    assert confirmed.louder
+    assert confirmed.stands
+    assert confirmed.fit.names == ("stator_resistance",)
+    assert confirmed.fit.unit.shape == alone.unit.shape
+    assert trained.value("R_s", confirmed.fit.unit) == pytest.approx(trained.value("R_s", alone.unit), rel=0.2)
+    (denied,) = fit(events(None, count=3)[2:])
+    assert not denied.louder
+    assert not denied.stands
 
 
 def test_candidates_at_their_null_leave_the_base_model(silent):

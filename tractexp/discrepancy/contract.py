@@ -30,6 +30,7 @@ def contract(finding: Finding) -> dict[str, Any]:
         "candidates": [*sets(finding), *_singles(finding)],
         "recommendation": recommendation(finding),
         "noise": finding.last.noise.describe(),
+        "phasor_window": None if finding.study.phasors is None else finding.study.phasors.window,
         "false_alarm_rate": finding.alpha,
         "parameters": parameters(finding),
         "simulations": finding.study.simulations,

@@ -32,6 +32,15 @@ class Judged:
         return self.gap.helps and self.stands
 
 
+@dataclass(frozen=True, eq=False)
+class Refitted:
+    """An explanation fitted to fitted and held-out events together, in coordinates of the fitted ones."""
+
+    fit: Refit
+    louder: bool  # whether all events speak louder for it than the fitted ones alone
+    stands: bool  # whether it leaves nothing
+
+
 def weighed(
     trained: Study, events: Sequence[Event], bare: Refit, extended: Sequence[Refit], noise: Noise,
     chain: Sequence[str], seed: int,
@@ -43,16 +52,13 @@ def weighed(
     found = judged(trained, events, bare, extended)
     helping = [fit for fit in extended if found[fit.names].gap.helps]
     if not helping:
-        again = [
-            fit
-            for fit, louder, stands in together(trained, events, bare, extended, noise, chain, seed)
-            if louder and stands
-        ]
+        all_of_them = together(trained, events, bare, extended, noise, chain, seed)
+        again = [refitted.fit for refitted in all_of_them if refitted.louder and refitted.stands]
         return found | (judged(trained, events, bare, again) if again else {}), again
     several = [fit for fit in helping if len(fit.names) > 1]
     if several:
-        for fit, _, stands in together(trained, events, bare, several, noise, chain, seed):
-            found[fit.names] = replace(found[fit.names], stands=stands)
+        for refitted in together(trained, events, bare, several, noise, chain, seed):
+            found[refitted.fit.names] = replace(found[refitted.fit.names], stands=refitted.stands)
     return found, []
 
 
@@ -87,12 +93,11 @@ def carried(
 def together(
     trained: Study, events: Sequence[Event], bare: Refit, extended: Sequence[Refit], noise: Noise,
     chain: Sequence[str], seed: int,
-) -> list[tuple[Refit, bool, bool]]:  # fmt: skip
-    """Explanations fitted to fitted and held-out events together, in coordinates of the fitted events.
+) -> list[Refitted]:  # fmt: skip
+    """Explanations fitted to fitted and held-out events together.
 
-    With each, whether all events speak louder for it than the fitted ones alone, and whether it leaves nothing. What
-    the fitted events leave open, such as the level of a relay between the depths of two dips, may be wrong on the
-    held-out ones though the effect is there.
+    What the fitted events leave open, such as the level of a relay between the depths of two dips, may be wrong on
+    the held-out ones though the effect is there.
     """
     study = _study_of(trained, (*trained.recorded, *events))
     plain = _widened(study, trained, bare.unit)
@@ -111,7 +116,7 @@ def together(
         louder = first.deviance - fit.deviance > bare.deviance - alone.deviance + SHOWN
         stands = stage(study, fit, noise, seed, plain=True).p_left >= ADEQUATE
         unit = np.r_[fit.unit[: study.problem.space.dimension], fit.unit[study.before][: len(trained.before)]]
-        made.append((replace(fit, unit=unit), louder, stands))
+        made.append(Refitted(replace(fit, unit=unit), louder, stands))
     return made
 
 

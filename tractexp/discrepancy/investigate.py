@@ -134,6 +134,8 @@ def investigate(
     verdict, reason = _verdict(explanation, survivors, adequate, kept, chain, alpha)
     if again and kept:
         reason += "; what the fitted events leave open of it was fitted to the held-out ones, too"
+    if study.phasors is not None:
+        reason += f"; {study.phasors.describe()}, which is taken into account"
     chosen = (kept or adequate or survivors)[0]
     sets = [tuple(sorted((*s.fit.names, *chain))) for s in kept] if verdict in ("named", "tied") else []
     names = sets[0] if sets else ()
@@ -198,7 +200,7 @@ def _verdict(
             " leaves is no more than chance leaves"
         )
     if not kept:
-        return "unexplained", "what fits the training events does not help on the held-out ones"
+        return "unexplained", "what explains the fitted events does not hold on the held-out ones"
     names = " and ".join(sorted((*kept[0].fit.names, *chain)))
     if len(kept) == 1:
         return "named", f"{names} explains the disagreement, and no other set of this size does"

@@ -32,6 +32,10 @@ class Phasors(Measurement):
     def __repr__(self) -> str:
         return f"Phasors({self.window})"
 
+    def describe(self) -> str:
+        """The window, as a run tells it."""
+        return f"the recorder averages phasors over {1000 * self.window:.0f} ms"
+
     def observe(self, power: np.ndarray, drive: Drive, values: dict[str, np.ndarray]) -> np.ndarray:
         made = np.empty_like(power)
         for e in range(drive.events):

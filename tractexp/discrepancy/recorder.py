@@ -26,15 +26,16 @@ def opened(
     first = stage(study, *study.base_fit(), seed)
     found, least = None, max(CLEAR, max((s.drop for s in first.scores), default=0.0) - BEHIND)
     for cycles, window in windows_of(study.events).items():
-        behind = Study(model.behind(Phasors(window)), catalogue, events, bounds, fixed, study.kernels.substeps)
+        phasors = Phasors(window)
+        behind = Study(model.behind(phasors), catalogue, events, bounds, fixed, study.kernels.substeps)
         fit = behind.refit(first.noise, [((), first.fit.unit)])[0]
         gained = first.fit.deviance - fit.deviance
         if cycles == 1 and gained <= 0:
             break  # an average over several cycles is one of averages over one
         if gained > least:
-            found, least = (behind, fit, window), gained
+            found, least = (behind, fit, phasors), gained
     if found is None:
         return study, first
-    study, fit, window = found
-    tell(f"the recorder averages phasors over {1000 * window:.0f} ms: taken into account from here on")
+    study, fit, phasors = found
+    tell(f"{phasors.describe()}: taken into account from here on")
     return study, stage(study, *study.base_fit([fit.unit]), seed)

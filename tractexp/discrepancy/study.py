@@ -62,9 +62,9 @@ class Study:
     ):
         self.model, self.catalogue, self.recorded = model, catalogue, tuple(events)
         self.smoothed = [smoothed(event) for event in events]
-        if isinstance(model.recorder, Phasors):
-            sharpened = model.recorder.sharpened
-            self.smoothed = [replace(s, event=sharpened(s.event)) for s in self.smoothed]
+        self.phasors = model.recorder if isinstance(model.recorder, Phasors) else None
+        if self.phasors is not None:
+            self.smoothed = [replace(s, event=self.phasors.sharpened(s.event)) for s in self.smoothed]
         self.events = tuple(s.event for s in self.smoothed)
         self.kernels = Kernels(Family(model, catalogue), self.events, bounds, fixed, substeps)
         self.blur: np.ndarray | None = None  # (k, 2, N) pu, once seen; None where the voltage has no noise

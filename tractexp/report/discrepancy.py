@@ -40,6 +40,12 @@ def page(path: Path, finding: Finding, figures: list[Path], title: str) -> Path:
         " so contains what smoothing leaves of the voltage's noise. Time skew, measurement window and load drift are"
         " free in every fit, each held by what is physically likely."
     )
+    if finding.study.phasors is not None:
+        made.text(
+            f"{finding.study.phasors.describe().capitalize()}: voltage and current alike, which explains more than any"
+            " effect does. The voltage that the load saw is reckoned back from the record, and the current of the"
+            " model is averaged as the recorder does. The extended configuration does not do so."
+        )
     made.heading("2 Is there a disagreement?").text(_gate(finding))
     made.heading("3 Where")
     if finding.places:
