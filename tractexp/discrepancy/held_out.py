@@ -52,7 +52,7 @@ def weighed(
     found = judged(trained, events, bare, extended)
     helping = [fit for fit in extended if found[fit.names].gap.helps]
     if not helping:
-        all_of_them = together(trained, events, bare, extended, noise, chain, seed)
+        all_of_them = together(trained, events, bare, extended, noise, chain, seed, anew=True)
         again = [refitted.fit for refitted in all_of_them if refitted.louder and refitted.stands]
         return found | (judged(trained, events, bare, again) if again else {}), again
     several = [fit for fit in helping if len(fit.names) > 1]
@@ -92,9 +92,9 @@ def carried(
 
 def together(
     trained: Study, events: Sequence[Event], bare: Refit, extended: Sequence[Refit], noise: Noise,
-    chain: Sequence[str], seed: int,
+    chain: Sequence[str], seed: int, *, anew: bool = False,
 ) -> list[Refitted]:  # fmt: skip
-    """Explanations fitted to fitted and held-out events together.
+    """Explanations fitted to fitted and held-out events together, from every setting if `anew`.
 
     What the fitted events leave open, such as the level of a relay between the depths of two dips, may be wrong on
     the held-out ones though the effect is there.
@@ -108,7 +108,7 @@ def together(
         (fit.names, _placed(study, start, setting))
         for fit in extended
         for start in [_widened(study, trained, fit.unit)]
-        for setting in _settings(study, fit.names)
+        for setting in (_settings(study, fit.names) if anew else [{}])
     ]
     made = []
     for fit in study.refit(noise, wanted, chain=chain):

@@ -19,7 +19,7 @@ from tractexp.record import Event
 
 CYCLES = (1, 2, 3, 4, 5, 6)
 EDGE = 0.05  # s on either side of a window around an edge, in which the voltage may bend
-BENT, CALM = 0.05, 3e-4  # pu: second differences of the voltage there, and elsewhere
+BENT, CALM = 0.01, 3e-4  # pu: second differences of the voltage there, and elsewhere
 ERROR = 2e-4  # pu: how exactly the averaged voltage must be the recorded one, if its noise allows
 
 

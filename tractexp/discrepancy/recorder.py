@@ -1,7 +1,8 @@
 """Whether what the base model leaves is the work of the recorder: phasors averaged over whole cycles.
 
 It is looked for before anything else. A window that the recorder does not have makes the voltage bend where the power
-does not, which costs more than any effect explains; so one that helps as much as the best effect is believed.
+does not: that costs much, with effects in the load or without. So one is believed that helps clearly, or at least as
+much as the best effect does.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -13,8 +14,9 @@ from tractexp.discrepancy.which import Stage, stage
 from tractexp.model.model import Model
 from tractexp.record import Event
 
-CLEAR = 10.0  # of the deviance: what a window must explain
+LEAST = 10.0  # of the deviance: what a window must explain
 BEHIND = 5.0  # of it: what the best effect may explain beyond that, for effects have parameters to fit
+CLEAR, SHARE = 30.0, 0.05  # of it, and of what the best effect explains: enough, for there may be both
 
 
 def opened(
@@ -24,7 +26,8 @@ def opened(
     """The study of the events and the tests of its base model, behind the recorder's window if it has one."""
     study = Study(model, catalogue, events, bounds, fixed)
     first = stage(study, *study.base_fit(), seed)
-    found, least = None, max(CLEAR, max((s.drop for s in first.scores), default=0.0) - BEHIND)
+    best = max((s.drop for s in first.scores), default=0.0)
+    found, least = None, max(LEAST, min(best - BEHIND, max(CLEAR, SHARE * best)))
     for cycles, window in windows_of(study.events).items():
         phasors = Phasors(window)
         behind = Study(model.behind(phasors), catalogue, events, bounds, fixed, study.kernels.substeps)

@@ -1,0 +1,88 @@
+"""Recorders that average phasors over whole cycles: the average, the voltage reckoned back, and what is said of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from hidden_effects import Case, Noise, make
+from tractexp.discrepancy.contract import contract
+from tractexp.discrepancy.investigate import investigate
+from tractexp.discrepancy.phasors import Phasors, averaged, windows_of
+from tractexp.model.model import compose
+from tractexp.plugin import get
+from tractexp.record import Record, detect
+
+FEW = ("stator_resistance", "exponential_recovery", "second_motor_group")
+
+
+def base():
+    return compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
+
+
+def events(nuisances=(), effect=None, size=1.0, seed=3, count=3):
+    made = make(Case(effect, size, events=count, noise=Noise(0.002), nuisances=nuisances), seed)
+    return [detect(Record(f"event{k + 1}", **r, source=f"made {k + 1}").check()) for k, r in enumerate(made)]
+
+
+@pytest.mark.parametrize("samples", [1.0, 2.5, 10.0, 16.67])
+def test_the_average_is_the_integral_over_the_window(samples):
+    rng = np.random.default_rng(0)
+    y = rng.normal(size=60)
+    curve = lambda x: np.interp(x, np.arange(60), y)  # noqa: E731
+    for at in (0, 7, 31, 59):
+        low, high = at - samples / 2, at + samples / 2
+        knots = np.arange(np.ceil(low), np.ceil(high))
+        area, _ = quad(curve, low, high, points=knots, limit=200)
+        assert averaged(y, samples)[at] == pytest.approx(area / samples, abs=1e-10)
+
+
+def test_a_straight_line_is_its_own_average():
+    y = np.outer([1.0, -2.0], np.arange(50))
+    assert averaged(y, 12.3)[:, 8:-8] == pytest.approx(y[:, 8:-8])
+
+
+@pytest.mark.parametrize("cycles", [1, 2, 4])
+def test_the_voltage_reckoned_back_is_that_which_was_averaged(cycles):
+    (event,) = events(count=1)
+    step, window = event.record.step, 0.02 * cycles
+    shown = replace(event, record=replace(event.record, U=averaged(event.record.U, window / step)))
+    back = Phasors(window).sharpened(shown).record.U
+    shows, error = shown.record.U - event.record.U, back - event.record.U
+    assert np.abs(shows).max() > 0.01
+    # What repeats with the window itself cannot be told: corners lose a little where it is shorter than the edges.
+    assert error @ error < (0.2 if cycles == 1 else 1e-3) * (shows @ shows)
+
+
+def test_windows_are_whole_cycles_that_the_sampling_resolves():
+    (event,) = events(count=1)
+    assert windows_of([event]) == pytest.approx({k: 0.02 * k for k in (1, 2, 3, 4, 5, 6)})
+    slow = replace(event, record=replace(event.record, t=event.record.t * 10))
+    assert min(windows_of([slow])) * 0.02 >= 2 * slow.record.step
+
+
+def test_a_window_of_phasors_is_no_missing_effect():
+    """The load is nonlinear, so that a window on voltage and current shows, and no effect is named for it."""
+    made = events(nuisances=(("phasor_window", 3.0),))
+    told = []
+    finding = investigate(base(), made[:2], made[2:], {}, {}, only=FEW, tell=told.append)
+    assert finding.names == ()
+    assert finding.verdict == "none"
+    assert contract(finding)["phasor_window"] == pytest.approx(0.06)
+    assert any("60 ms" in line for line in told)
+    assert "60 ms" in finding.reason
+
+
+def test_no_window_is_found_where_there_is_none():
+    for effect in (None, "stator_resistance"):
+        made = events(effect=effect, size=2.0)
+        finding = investigate(base(), made[:2], made[2:], {}, {}, only=FEW)
+        assert contract(finding)["phasor_window"] is None
+        assert finding.names == ((effect,) if effect else ())
+
+
+def test_an_effect_is_found_behind_a_window():
+    made = events(nuisances=(("phasor_window", 2.0),), effect="stator_resistance", size=3.0)
+    finding = investigate(base(), made[:2], made[2:], {}, {}, only=FEW)
+    assert "stator_resistance" in finding.names
