@@ -26,7 +26,7 @@ from tractexp.discrepancy.noise import estimate
 from tractexp.discrepancy.study import Study
 from tractexp.discrepancy.tangent import _signed_drop, tangent
 from tractexp.discrepancy.voltage import smoothed
-from tractexp.discrepancy.wander import Wander, find
+from tractexp.discrepancy.wander import Rest, Wander, find
 from tractexp.errors import UserError
 from tractexp.identify.descent import Apart, normal
 from tractexp.identify.noise import Autoregression, white_noise
@@ -147,18 +147,19 @@ def test_noise_that_is_drawn_is_noise_that_is_found():
 
 def test_a_load_that_wanders_is_seen_before_the_events_and_steady_noise_is_not():
     rng = np.random.default_rng(8)
-    white = [rng.normal(size=(2, 250)) for _ in range(3)]
-    spoken = sum(find([rng.normal(size=(2, 250)) for _ in range(3)], 0.002) is not None for _ in range(40))
+    calm = lambda: [rng.normal(size=(2, 250)) for _ in range(3)]  # noqa: E731
+    spoken = sum(find(calm(), 0.002, np.ones(250)) is not None for _ in range(40))
     assert spoken < 14  # half a chi-square of one degree beyond 2, in either of two channels: 16 %
-    walks = [w + np.cumsum(rng.normal(size=(2, 250)) * np.array([[0.05], [0.0]]), axis=1) for w in white]
-    found = find(walks, 0.002)
+    walks = [w + np.cumsum(rng.normal(size=(2, 250)) * np.array([[0.05], [0.0]]), axis=1) for w in calm()]
+    found = find(walks, 0.002, np.ones(250))
     assert found.intensity[0] == pytest.approx(0.05**2 / 0.002, rel=1.0)  # the larger end of its interval
     assert found.intensity[1] < found.intensity[0] / 2
 
 
 def test_noise_of_a_wandering_load_is_white_once_whitened():
     """Draws that wander come out of the whitening with unit variance, also in their slow sums."""
-    noise = PowerNoise(np.eye(2), (white_noise(1.0), white_noise(1.0)), wander=Wander(np.array([2.0, 0.0]), 0.002))
+    wander = Wander(np.array([2.0, 0.0]), 0.002, np.where(np.arange(600) < 300, 1.0, 0.5))
+    noise = PowerNoise(np.eye(2), (white_noise(1.0), white_noise(1.0)), wander=wander)
     drive = SimpleNamespace(events=1, samples=600, part=lambda e: slice(0, 600))
     drawn = noise.draw(np.random.default_rng(9), 400, [600])
     rows = noise.whiten(drawn, drive, np.ones((2, 600), dtype=bool)).reshape(400, 2, 600)
@@ -166,6 +167,21 @@ def test_noise_of_a_wandering_load_is_white_once_whitened():
     assert np.var(drawn[:, 0] @ slow) > 50
     assert np.var(rows[:, 0] @ slow) == pytest.approx(1.0, abs=0.2)
     assert rows.var() == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_load_that_seems_steady_before_the_events_may_wander_within_them():
+    """What is left of the events adds evidence, as long as the stretches before do not speak against it."""
+    rng = np.random.default_rng(11)
+    white = lambda n: rng.normal(size=(2, n))  # noqa: E731
+    walk = lambda n: np.cumsum(rng.normal(size=(2, n)) * np.array([[0.03], [0.0]]), axis=1)  # noqa: E731
+    columns = rng.normal(size=(3, 2, 1000))
+    rest = lambda left: Rest(left, columns, np.ones(1000))  # noqa: E731
+    calm = [white(250) for _ in range(3)]
+    assert find(calm, 0.002, np.ones(1000)) is None
+    assert find(calm, 0.002, np.ones(1000), [rest(white(1000)) for _ in range(3)]) is None
+    assert find(calm, 0.002, np.ones(1000), [rest(white(1000) + walk(1000)) for _ in range(3)]) is not None
+    explained = [rest(white(1000) + 5 * columns[0]) for _ in range(3)]
+    assert find(calm, 0.002, np.ones(1000), explained) is None
 
 
 def test_noise_of_the_voltage_is_taken_out_where_it_is_smooth():
@@ -216,7 +232,7 @@ def test_the_voltages_noise_is_part_of_the_noise_of_the_power():
     ("looked_for", "shape"),
     [
         ("an oscillation", lambda t, event: 0.8 * np.sin(2 * np.pi * 31.0 * t) * (t >= event.t_start)),
-        ("a step", lambda t, event: 1.5 * (t >= event.t_end + 0.37) * (event.record.name == "event1")),
+        ("a step or a pulse", lambda t, event: 1.5 * (t >= event.t_end + 0.37) * (event.record.name == "event1")),
         (
             "the loudest window",
             lambda t, event: 4.0 * (np.abs(t - event.t_start - 0.02) < 0.01) * (-1.0) ** (t // 0.004),

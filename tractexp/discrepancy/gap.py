@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.noise import Noise
+from tractexp.discrepancy.span import spanned
 from tractexp.discrepancy.study import Study
-from tractexp.discrepancy.tangent import injections, spanned, two_sided
+from tractexp.discrepancy.tangent import injections, two_sided
 from tractexp.identify.result import relative_error
 
 SHOWN = 10.8  # expected gain at which a true explanation fails to gain anything in 5 % of cases: (2 x 1.645)^2

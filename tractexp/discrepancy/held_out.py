@@ -55,7 +55,7 @@ def weighed(
         all_of_them = together(trained, events, bare, extended, noise, chain, seed, anew=True)
         again = [refitted.fit for refitted in all_of_them if refitted.louder and refitted.stands]
         return found | (judged(trained, events, bare, again) if again else {}), again
-    several = [fit for fit in helping if len(fit.names) > 1]
+    several = [fit for fit in helping if len(fit.names) + len(chain) > 1]
     if several:
         for refitted in together(trained, events, bare, several, noise, chain, seed):
             found[refitted.fit.names] = replace(found[refitted.fit.names], stands=refitted.stands)
@@ -102,7 +102,7 @@ def together(
     study = _study_of(trained, (*trained.recorded, *events))
     plain = _widened(study, trained, bare.unit)
     study.see_blur(plain)
-    noise = replace(noise, blur=study.blur)
+    noise = noise.on(study.profile, study.blur)
     first = study.refit(noise, [((), plain)], chain=())[0]
     wanted = [
         (fit.names, _placed(study, start, setting))

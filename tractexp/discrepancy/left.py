@@ -17,6 +17,8 @@ SMALLEST_P = 1e-300
 LOUDEST = "the loudest window"
 STRIDE = 4  # samples between the instants at which a step is looked for
 BINS = 1024  # of the transform in which an oscillation is looked for
+PULSES = (0.01, 0.03, 0.1)  # s, lengths of the pulses that are looked for after the dips
+BURSTS = (0.1, 0.3)  # s, lengths of the stretches after the dips in which an oscillation may come and go
 FEWEST = 8  # samples of a stretch with an oscillation
 
 
@@ -34,12 +36,13 @@ class Cell:
 def statistics(projection: Projection, study: Study) -> dict[str, np.ndarray]:
     """Every statistic by what it looks for: a sum (b,), or those of which the largest counts (b, k)."""
     channels = channels_of(projection, study)
+    after = aligned(channels, study)
     made = {
         "pushes into the balances": projection.unrest(),
         "a further effect": -np.log(least_p(projection))[:, None],
         LOUDEST: energies(channels, study),
-        "a step": steps(channels, study),
-        "an oscillation": tones(channels, study),
+        "a step or a pulse": np.concatenate([steps(channels, study), pulses(after, study)], axis=1),
+        "an oscillation": np.concatenate([tones(channels, study), bursts(after, study)], axis=1),
     }
     if len(study.events) > 1:
         made["parameters of each event"] = projection.unsteadiness()
@@ -94,6 +97,17 @@ def energies(channels: np.ndarray, study: Study) -> np.ndarray:
     return np.stack([square[:, "PQ".index(c.channel), c.part].sum(axis=1) for c in cells_of(study)], axis=1)
 
 
+def aligned(channels: np.ndarray, study: Study) -> np.ndarray:
+    """What follows the dips, summed over the events at the same time after each, (b, 2, n) of unit variance.
+
+    Timers and controls answer every dip alike, however little each event shows of it.
+    """
+    drive = study.problem.drive
+    parts = [channels[:, :, drive.part(e)][:, :, event.end :] for e, event in enumerate(study.events)]
+    common = min(p.shape[2] for p in parts)
+    return sum(p[:, :, :common] for p in parts) / np.sqrt(len(parts))
+
+
 def steps(channels: np.ndarray, study: Study) -> np.ndarray:
     """Square of the sum from each instant to the end of an event, in P and in Q, (b, instants)."""
     made = []
@@ -101,6 +115,17 @@ def steps(channels: np.ndarray, study: Study) -> np.ndarray:
         sums = np.cumsum(channels[:, :, study.problem.drive.part(e)][:, :, ::-1], axis=2)[:, :, ::STRIDE]
         made.append(sums**2)
     return np.concatenate(made, axis=2).reshape(len(channels), -1)
+
+
+def pulses(after: np.ndarray, study: Study) -> np.ndarray:
+    """Square of the sum over each short stretch of aligned residuals (b, 2, n), in P and in Q, (b, stretches)."""
+    sums = np.cumsum(np.pad(after, ((0, 0), (0, 0), (1, 0))), axis=2)
+    made = [np.empty((len(after), 0))]
+    for length in PULSES:
+        n = max(round(length / study.events[0].record.step), 1)
+        if n < sums.shape[2]:
+            made.append(((sums[:, :, n:] - sums[:, :, :-n])[:, :, :: -(-n // 4)] ** 2 / n).reshape(len(after), -1))
+    return np.concatenate(made, axis=1)
 
 
 def tones(channels: np.ndarray, study: Study) -> np.ndarray:
@@ -113,6 +138,18 @@ def tones(channels: np.ndarray, study: Study) -> np.ndarray:
             if stretch.shape[2] >= FEWEST:
                 power[:, k] += np.sum(_power(stretch), axis=1) / stretch.shape[2]
     return power.reshape(len(channels), -1)
+
+
+def bursts(after: np.ndarray, study: Study) -> np.ndarray:
+    """Power of aligned residuals (b, 2, n) by frequency in stretches that overlap by half, (b, cells)."""
+    made = [np.empty((len(after), 0))]
+    for length in BURSTS:
+        n = round(length / study.events[0].record.step)
+        if FEWEST <= n <= after.shape[2]:
+            stretches = np.lib.stride_tricks.sliding_window_view(after, n, axis=2)[:, :, :: n // 2]
+            power = np.abs(np.fft.rfft(stretches, 2 * n, axis=3)) ** 2 / n
+            made.append(power.sum(axis=1).reshape(len(after), -1))
+    return np.concatenate(made, axis=1)
 
 
 def _power(stretch: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ wandering of the load, and what is left of the voltage's noise, which enters the
 import functools
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -40,6 +40,11 @@ class Noise:
     def blurred(self) -> bool:
         """Whether noise of the voltage does as much as that of the power."""
         return self.blur is not None and bool((self._mixed(self.blur) ** 2).sum(axis=0).max() > BLURRED)
+
+    def on(self, profile: np.ndarray, blur: np.ndarray | None = None) -> "Noise":
+        """The same noise on other events: their power over that before (N,), what errors of their voltage do."""
+        wander = None if self.wander is None else replace(self.wander, profile=profile)
+        return replace(self, wander=wander, blur=blur)
 
     def _mixed(self, rows: np.ndarray) -> np.ndarray:
         """Channels (n, 2, N) mixed so that their noise is independent."""
@@ -82,7 +87,7 @@ class Noise:
         made = [np.empty((0, 2, part.stop - part.start))]
         if self.wander is not None:
             for c in (0, 1):
-                modes = self.wander.modes(c, part.stop - part.start)
+                modes = self.wander.modes(c, part)
                 made.append(np.zeros((len(modes), *made[0].shape[1:])))
                 made[-1][:, c] = modes
         if self.blur is not None:

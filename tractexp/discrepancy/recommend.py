@@ -1,7 +1,7 @@
 """The event that would decide between effects that fit equally well."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import ndtr
@@ -46,7 +46,7 @@ def _lambda(study: Study, truth: Rival, rival: Rival, depth: float, duration: fl
     points = np.concatenate([truth.fit.unit[None], rival.fit.unit[None], up, down])[:, : study.problem.space.dimension]
     values = study.problem.full(study.problem.space.from_unit(points))
     response = study.problem.model.simulate(drive, values, int(study.problem.step.substeps.max()))
-    rows = replace(rival.stage.noise, blur=None).whiten(
+    rows = rival.stage.noise.on(np.ones(drive.samples)).whiten(
         np.stack([response.P, response.Q], axis=1), drive, drive.weights > 0
     )
     k = len(inside)

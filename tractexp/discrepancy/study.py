@@ -4,6 +4,7 @@ Base and extended models are points of the same coordinates with the other candi
 construction. A refit is a lane of the batched descent with its own free columns.
 """
 
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -14,7 +15,7 @@ from tractexp.discrepancy.kernels import Family, Kernels, side_by_side
 from tractexp.discrepancy.noise import Noise, estimate, quiet_stretches
 from tractexp.discrepancy.phasors import Phasors
 from tractexp.discrepancy.voltage import smoothed
-from tractexp.discrepancy.wander import Wander, find
+from tractexp.discrepancy.wander import Rest, Wander, find
 from tractexp.identify.descent import Apart, descend
 from tractexp.identify.likelihood import Likelihood
 from tractexp.identify.problem import Problem
@@ -76,6 +77,7 @@ class Study:
         self.before = np.arange(space.dimension, space.dimension + 2 * len(events))
         self.dimension = space.dimension + 2 * len(events)
         self.null = self._null()
+        self.profile = self._profile()
         self.quiet = quiet_stretches(self.events, self.problem.drive)
         self.simulations = 0
 
@@ -84,6 +86,12 @@ class Study:
         chosen = {p.name: p.default if p.null is None else p.null for p in self.problem.parameters}
         values = np.array([chosen[name] for name in self.problem.space.names])
         return np.r_[self.problem.space.to_unit(values), np.full(2 * len(self.events), 0.5)]
+
+    def _profile(self) -> np.ndarray:
+        """Apparent power over that before each event, (N,)."""
+        drive = self.problem.drive
+        before = np.repeat(np.linalg.norm(drive.before, axis=1), np.diff(drive.first))
+        return np.linalg.norm(drive.measured, axis=0) / np.maximum(before, 1e-9)
 
     def to_unit(self, name: str, value: float) -> float:
         k = self.column[name]
@@ -240,15 +248,31 @@ class Study:
         self.see_blur(unit)
         return self.noise_in(self.residuals(unit[None])[0])
 
-    def noise_in(self, residual: np.ndarray) -> Noise:
-        """The noise of one residual (2, N) in quiet stretches."""
-        return estimate(residual, self.likelihood.known, self.quiet, self._wander, self.blur)
+    def noise_in(self, residual: np.ndarray, rest: Rest | None = None) -> Noise:
+        """The noise of one residual (2, N) in quiet stretches.
 
-    def _wander(self, mix: np.ndarray) -> Wander | None:
-        """How the load wanders before the events, in mixed channels."""
+        `rest`, of all events end to end, tells more of how the load wanders.
+        """
+        wander = functools.partial(self._wander, rest)
+        return estimate(residual, self.likelihood.known, self.quiet, wander, self.blur)
+
+    def _wander(self, rest: Rest | None, mix: np.ndarray) -> Wander | None:
+        """How the load wanders before the events and during them, in mixed channels."""
         drive = self.problem.drive
         before = [drive.measured[:, drive.part(e)][:, event.steady] for e, event in enumerate(self.events)]
-        return find([mix @ b for b in before if np.isfinite(b).all()], self.events[0].record.step)
+        rests = []
+        if rest is not None and self.likelihood.known.all():
+            rests = [
+                replace(
+                    rest,
+                    left=mix @ rest.left[:, part],
+                    columns=np.einsum("ij,kjt->kit", mix, rest.columns[:, :, part]),
+                    profile=self.profile[part],
+                )
+                for part in map(drive.part, range(drive.events))
+            ]
+        step = self.events[0].record.step
+        return find([mix @ b for b in before if np.isfinite(b).all()], step, self.profile, rests)
 
     def see_blur(self, unit: np.ndarray) -> None:
         """Find out once, at a fit, what errors of the voltage do to the power of the base model."""

@@ -16,6 +16,7 @@ from scipy.special import chdtrc
 from tractexp.discrepancy.catalogue import Candidate
 from tractexp.discrepancy.injection import PUSHES
 from tractexp.discrepancy.noise import Noise
+from tractexp.discrepancy.span import spanned
 from tractexp.discrepancy.study import Refit, Study
 
 REACH = 0.5  # smallest relevant sizes: the step of a candidate's difference quotient
@@ -60,6 +61,11 @@ class Tangent:
     split: np.ndarray  # (e, 2, N) differences of the fitted parameters, each in one event only
     cells: np.ndarray  # (c, 2, N) responses to injections
     groups: np.ndarray  # (c,) which balance an injection pushes
+
+    @property
+    def explaining(self) -> np.ndarray:
+        """All that the fit or any candidate could change, (k, 2, N)."""
+        return np.concatenate([self.nuisance, *(c.raw for c in self.columns)])
 
     def whitened(self, noise: Noise, residuals: np.ndarray | None = None) -> "Projection":
         """Project under this noise; `residuals` (b, 2, N) replace the fit's own (for the bootstrap)."""
@@ -157,19 +163,6 @@ class Projection:
     def unsteadiness(self) -> np.ndarray:
         """How much parameters of their own for each event would lower the deviance, (b,)."""
         return ((self.r @ spanned(self.split, DISTINCT, least=1e-12).T) ** 2).sum(axis=1)
-
-
-def spanned(rows: np.ndarray, distinct: float, least: float = 0.0) -> np.ndarray:
-    """Orthonormal basis (m, R) of what rows (k, R) span, each scaled to length one; those of at most `least` are none.
-
-    Directions weaker than `distinct` times the strongest are left out.
-    """
-    length = np.linalg.norm(rows, axis=1)
-    rows = rows[length > least] / length[length > least, None]
-    if not len(rows):
-        return rows
-    _, values, basis = np.linalg.svd(rows, full_matrices=False)
-    return basis[values > distinct * values[0]]
 
 
 def _signed_drop(block: np.ndarray, r: np.ndarray, signs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -296,8 +289,7 @@ def rich_residuals(t: Tangent, residuals: np.ndarray) -> np.ndarray:
 
     Each is divided by what is left of its variance then, so that the noise does not come out too small.
     """
-    basis = np.concatenate([t.nuisance, *(c.raw for c in t.columns)]).reshape(-1, residuals[0].size)
-    right = spanned(basis, 1e-6)
+    right = spanned(t.explaining.reshape(-1, residuals[0].size), 1e-6)
     flat = residuals.reshape(len(residuals), -1)
     kept = np.maximum(1 - np.einsum("kn,kn->n", right, right), LEAST_KEPT)
     return ((flat - (flat @ right.T) @ right) / np.sqrt(kept)).reshape(residuals.shape)

@@ -9,11 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.identify.noise import fit_autoregression
+from tractexp.discrepancy.span import spanned
+from tractexp.identify.noise import Autoregression, fit_autoregression
 
-MODES = 32
+MODES = 48
 SLOW = 3  # cosines of a stretch that belong to wandering before its fast noise is modelled
 SEEN = 2.0  # of twice the log-likelihood, without which there is no wandering
+MORE = 2.0  # of it, that the rest of the events must show beyond that
+DISTINCT = 0.03  # of the strongest direction: columns that differ by less from others are none of their own
 LESS = 1.0  # of the log-likelihood: the intensity taken is the largest that is no less likely than this
 GRID = np.concatenate(([0.0], np.geomspace(1e-3, 1e4, 71)))  # of the intensity, variances of the channel per second
 STIFF = np.concatenate(([0.0], np.geomspace(1e-4, 1e12, 97)))  # of a single stretch, in variances of its noise
@@ -55,27 +58,46 @@ class Wander:
 
     intensity: np.ndarray
     step: float  # s
+    profile: np.ndarray  # (N,) power over that before: what wanders are customers, who draw less in a dip
 
-    def modes(self, channel: int, samples: int) -> np.ndarray:
-        """Cosines (k, samples) scaled by the standard deviation of their amplitudes."""
-        return np.sqrt(self.intensity[channel]) * _random_walk(samples, self.step, min(MODES, samples // 8))
+    def modes(self, channel: int, part: slice) -> np.ndarray:
+        """Cosines (k, samples) of one event, scaled by the standard deviation of their amplitudes."""
+        n = part.stop - part.start
+        return np.sqrt(self.intensity[channel]) * _random_walk(n, self.step, min(MODES, n // 8)) * self.profile[part]
 
 
-def find(before: Sequence[np.ndarray], step: float) -> Wander | None:
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """What a fit leaves of an event (2, n), and all that something known could still explain (k, 2, n)."""
+
+    left: np.ndarray
+    columns: np.ndarray
+    profile: np.ndarray  # (n,) power over that before
+
+
+def find(before: Sequence[np.ndarray], step: float, profile: np.ndarray, rests: Sequence[Rest] = ()) -> Wander | None:
     """The wandering of two channels in stretches (2, n_i) before the events; None where there is none to be seen.
 
     To be safe the largest intensity that is nearly as likely as the likeliest, given the fast noise; in both channels
-    where it is seen in one, for what wanders is the load.
+    where it is seen in one, for what wanders is the load. What is left of the events counts, too, but no more than the
+    stretches before them allow: what answers a dip does not wander.
     """
     stretches = [b for b in before if b.shape[1] >= 8 * (SLOW + 2)]
     if not stretches:
         return None
-    total = np.array([_likelihood([s[c] for s in stretches], step) for c in (0, 1)])
+    fast = [fit_autoregression([without_slow(s[c]) for s in stretches], sparing=True) for c in (0, 1)]
+    total = np.array([_likelihood([s[c] for s in stretches], fast[c], step) for c in (0, 1)])
     total -= total[:, :1]
-    if 2 * total.max() < SEEN:
-        return None
-    likely = total > total.max(axis=1, keepdims=True) - LESS
-    return Wander(np.array([GRID[np.flatnonzero(row)[-1]] for row in likely]), step)
+    most = [_last(row, LESS) for row in total]
+    within = np.array([sum(_within(r, c, fast[c], step) for r in rests) * np.ones(len(GRID)) for c in (0, 1)])
+    both = total + within - within[:, :1]
+    seen = max(2 * total.max(), *(2 * row[: last + 1].max() - MORE for row, last in zip(both, most, strict=True)))
+    return Wander(GRID[most], step, profile) if seen >= SEEN else None
+
+
+def _last(likelihood: np.ndarray, less: float) -> int:
+    """Index of the last of the intensities that are less likely than the likeliest by no more than `less`."""
+    return int(np.flatnonzero(likelihood > likelihood.max() - less)[-1])
 
 
 def without_slow(stretch: np.ndarray) -> np.ndarray:
@@ -103,15 +125,27 @@ def _random_walk(samples: int, step: float, count: int) -> np.ndarray:
     return np.sqrt(step) * samples / np.pi / np.arange(1, count + 1)[:, None] * cosines(samples, count)
 
 
-def _likelihood(stretches: Sequence[np.ndarray], step: float) -> np.ndarray:
+def _likelihood(stretches: Sequence[np.ndarray], fast: Autoregression, step: float) -> np.ndarray:
     """Logarithm of the likelihood of each intensity of the grid in stretches (n_i,) of one channel."""
-    fast = fit_autoregression([without_slow(s) for s in stretches], sparing=True)
-    stretches = without_drift(stretches)
     total = np.zeros(len(GRID))
-    for stretch in stretches:
-        n = len(stretch)
-        rows = np.vstack([np.ones(n), stretch, _random_walk(n, step, min(MODES, n // 8))])
-        one, x, *modes = fast.whiten(rows, np.ones(n, dtype=bool))
-        one /= np.linalg.norm(one)
-        total += Walk.of(x, one[None], np.array(modes)).likelihood(GRID)
+    for stretch in without_drift(stretches):
+        total += _of(stretch, np.ones((1, len(stretch))), fast, step)
     return total
+
+
+def _within(rest: Rest, channel: int, fast: Autoregression, step: float) -> np.ndarray:
+    """The same of what is left of one event, whatever its columns explain left out."""
+    columns = rest.columns[:, channel]
+    columns = columns[np.linalg.norm(columns, axis=1) > 0]
+    fixed = np.vstack([np.ones(columns.shape[1]), columns])
+    return _of(rest.left[channel], fixed, fast, step, rest.profile)
+
+
+def _of(
+    stretch: np.ndarray, columns: np.ndarray, fast: Autoregression, step: float, profile: np.ndarray | float = 1.0
+) -> np.ndarray:  # fmt: skip
+    """Logarithm of the likelihood of each intensity in a stretch (n,) with columns (k, n) of any amplitude."""
+    n, k = len(stretch), len(columns)
+    modes = _random_walk(n, step, min(MODES, n // 8)) * profile
+    rows = fast.whiten(np.vstack([columns, stretch, modes]), np.ones(n, dtype=bool))
+    return Walk.of(rows[k], spanned(rows[:k], DISTINCT), rows[k + 1 :]).likelihood(GRID)
