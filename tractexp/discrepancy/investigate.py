@@ -13,14 +13,12 @@ from tractexp.discrepancy.noise import Noise
 from tractexp.discrepancy.recommend import Decider, deciding_event
 from tractexp.discrepancy.recorder import opened
 from tractexp.discrepancy.study import Refit, Study
-from tractexp.discrepancy.sure import Rival, surviving
+from tractexp.discrepancy.sure import ADEQUATE, Rival, surviving
 from tractexp.discrepancy.where import Place, where
 from tractexp.discrepancy.which import Explanation, Stage, explain
 from tractexp.errors import UserError
 from tractexp.model.model import Model
 from tractexp.record import Event
-
-DISAGREES = 0.003  # p below which the base model alone leaves something: rarer than 199 draws can tell by themselves
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +184,7 @@ def _verdict(
     """The verdict and the sentence behind it."""
     base = explanation.stages[0]
     nothing = not explanation.chosen.names and not chain
-    if nothing and base.p_left >= DISAGREES:
+    if nothing and base.p_left >= ADEQUATE:
         return "none", f"no disagreement above the noise, at a false-alarm rate of {alpha:.0%}"
     if not adequate:
         return "unexplained", (
@@ -194,7 +192,7 @@ def _verdict(
             f" explanation would come about by chance with p = {survivors[0].stage.p_left:.2g}; what stands out most:"
             f" {survivors[0].stage.loudest}"
         )
-    if not kept and base.p_left >= DISAGREES:
+    if not kept and base.p_left >= ADEQUATE:
         return "none", (
             "what seemed to help on the fitted events does not help on the held-out ones, and what the base model"
             " leaves is no more than chance leaves"

@@ -19,7 +19,7 @@ from tractexp.discrepancy.which import Explanation, Stage, stage
 ONE_SIDED = 1.6449  # standard deviations: 5 %
 REJECTED = 3.5  # standard deviations: more than chance asks for, since a true effect's formula is not quite its physics
 ALIKE = 0.05  # of what the best explains: no rival this near is rejected, for no formula is that exact
-ADEQUATE = 0.01  # p below which an explanation leaves something
+ADEQUATE = 0.003  # p below which a fit leaves something: rarer than 199 draws can tell by themselves
 
 
 @dataclass(frozen=True, eq=False)

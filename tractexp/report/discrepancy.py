@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 
 from tractexp.discrepancy.contract import parameters, recommendation
-from tractexp.discrepancy.investigate import DISAGREES, Finding
+from tractexp.discrepancy.investigate import Finding
 from tractexp.discrepancy.judgement import judge
+from tractexp.discrepancy.sure import ADEQUATE
 from tractexp.report import style
 from tractexp.report.page import Page
 
@@ -71,7 +72,7 @@ def _gate(finding: Finding) -> str:
     best = first.scores[0] if first.scores else None
     critical = first.null.critical_p(finding.alpha)
     text = f"What the base fit leaves would come about by chance with p = {first.p_left:.2g}"
-    text += f"; {first.loudest} stands out." if first.p_left < DISAGREES else "."
+    text += f"; {first.loudest} stands out." if first.p_left < ADEQUATE else "."
     if best is None:
         return text
     return (
