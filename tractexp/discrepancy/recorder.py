@@ -28,8 +28,8 @@ def opened(
     first = stage(study, *study.base_fit(), seed)
     best = max((s.drop for s in first.scores), default=0.0)
     found, least = None, max(LEAST, min(best - BEHIND, max(CLEAR, SHARE * best)))
-    # Like the other faults of the measurement chain, a window cannot be told where noise of the voltage does as much.
-    for cycles, window in ({} if first.noise.blurred else windows_of(study.events)).items():
+    windows = {} if first.noise.blurred else windows_of(study.events)  # noise of the voltage would pass for one
+    for cycles, window in windows.items():
         phasors = Phasors(window)
         behind = Study(model.behind(phasors), catalogue, events, bounds, fixed, study.kernels.substeps)
         fit = behind.refit(first.noise, [((), first.fit.unit)])[0]
