@@ -11,7 +11,7 @@ import argparse
 import json
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -38,31 +38,33 @@ SAME = {  # effects whose amount is a parameter of the model, in its units
 }
 
 
-def suite(name: str, count: int, events: int) -> Iterator[tuple[str, cases.Trial]]:
-    """(group, trial) of one suite; `count` data sets of each row."""
+def suite(
+    name: str, count: int, events: int, multiples: Container[float] = cases.MULTIPLES
+) -> Iterator[tuple[str, cases.Trial]]:
+    """(group, trial) of one suite; `count` data sets of each row, hidden effects of these multiples of their limits."""
     if name == "nulls":
         for noise in cases.NOISES:
             yield from ((f"null, {noise}", t) for t in cases.nulls(noise, count, events=events))
     elif name == "nuisances":
         yield from (("null with nuisances", t) for t in cases.nuisances(count, events=events))
     elif name == "single":
-        for multiple in cases.MULTIPLES:
+        for multiple in (m for m in cases.MULTIPLES if m in multiples):
             for effect in CATALOG:
                 yield from ((f"{multiple:g} x", t) for t in cases.single(effect, multiple, count, events=events))
     elif name == "outside":
-        for multiple in (2.0, 4.0, 8.0):
+        for multiple in (m for m in (2.0, 4.0, 8.0) if m in multiples):
             for effect in OUTSIDE:
                 yield from (
                     (f"outside {multiple:g} x", t) for t in cases.single(effect, multiple, count, events=events)
                 )
     elif name == "left_out":
-        for multiple in (2.0, 4.0, 8.0):
+        for multiple in (m for m in (2.0, 4.0, 8.0) if m in multiples):
             for effect in PHYSICAL:
                 yield from (
                     (f"{LEFT_OUT}{multiple:g} x", t) for t in cases.single(effect, multiple, count, events=events)
                 )
     elif name == "pairs":
-        for multiple in (2.0, 4.0):
+        for multiple in (m for m in (2.0, 4.0) if m in multiples):
             yield from ((f"pairs {multiple:g} x", t) for t in cases.pairs(multiple, count, events=events))
     else:
         raise SystemExit(f"there is no suite '{name}'; there are {', '.join(SUITES)}")
@@ -165,6 +167,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--suite", action="append", choices=SUITES, help="default: all")
     parser.add_argument("--count", type=int, default=5, help="data sets of each row")
+    parser.add_argument("--multiple", action="append", type=float, choices=cases.MULTIPLES, help="default: all")
     parser.add_argument("--events", type=int, default=3, help="events fitted")
     parser.add_argument("--held", type=int, default=1, help="events held out beside them")
     parser.add_argument("--jobs", type=int, default=2)
@@ -182,7 +185,7 @@ def main() -> None:
         (group, trial)
         for count in range(1, chosen.count + 1)  # one data set of every row before the second of any
         for name in chosen.suite or SUITES
-        for group, trial in suite(name, count, total)
+        for group, trial in suite(name, count, total, chosen.multiple or cases.MULTIPLES)
         if (group, trial.label, trial.seed, total, chosen.held) not in done
         and not done.add((group, trial.label, trial.seed, total, chosen.held))
         and time.perf_counter() - started < 60 * chosen.minutes

@@ -61,9 +61,15 @@ def tail(draws: np.ndarray, value: np.ndarray) -> float:
 
 
 def extremes(draws: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mean and spread (k,) of draws (b, k), and the largest of each in these terms, (b,)."""
-    mean, spread = draws.mean(axis=0), draws.std(axis=0) + 1e-12
-    return mean, spread, ((draws - mean) / spread).max(axis=1)
+    """Mean and spread (k,) of draws (b, k), and the largest of each in these terms, (b,).
+
+    Each draw is judged by the others: among many columns its own part in their mean and spread would tell.
+    """
+    b, whole, squares = len(draws), draws.sum(axis=0), (draws**2).sum(axis=0)
+    mean = (whole - draws) / (b - 1)
+    spread = np.sqrt(np.maximum((squares - draws**2) / (b - 1) - mean**2, 0.0)) + 1e-12
+    largest = ((draws - mean) / spread).max(axis=1)
+    return draws.mean(axis=0), draws.std(axis=0) + 1e-12, largest
 
 
 def least_p(projection: Projection) -> np.ndarray:
