@@ -21,6 +21,7 @@ from tractexp.discrepancy.gap import SHOWN
 from tractexp.discrepancy.held_out import together
 from tractexp.discrepancy.investigate import check_events, investigate
 from tractexp.discrepancy.judgement import judge
+from tractexp.discrepancy.left import tail
 from tractexp.discrepancy.noise import Noise as PowerNoise
 from tractexp.discrepancy.noise import estimate
 from tractexp.discrepancy.study import Study
@@ -233,6 +234,11 @@ def test_the_voltages_noise_is_part_of_the_noise_of_the_power():
     [
         ("an oscillation", lambda t, event: 0.8 * np.sin(2 * np.pi * 31.0 * t) * (t >= event.t_start)),
         ("a step or a pulse", lambda t, event: 1.5 * (t >= event.t_end + 0.37) * (event.record.name == "event1")),
+        ("a step or a pulse", lambda t, event: 3.0 * (np.abs(t - event.t_end - 0.3) < 0.006)),
+        (
+            "an oscillation",
+            lambda t, event: 1.5 * np.sin(97.0 * (t - event.t_end)) * (np.abs(t - event.t_end - 0.4) < 0.1),
+        ),
         (
             "the loudest window",
             lambda t, event: 4.0 * (np.abs(t - event.t_start - 0.02) < 0.01) * (-1.0) ** (t // 0.004),
@@ -249,6 +255,18 @@ def test_what_no_effect_explains_is_found_by_the_test_that_looks_for_it(silent, 
     found = first.null.surprises(first.tangent.whitened(first.noise, planted[None]), study)
     assert min(found, key=found.get) == looked_for
     assert found[looked_for] < 1e-5
+
+
+def test_the_largest_of_many_comes_about_by_chance_as_often_as_it_says():
+    """With thousands of columns a draw must not have a part in the mean and the spread that it is measured by."""
+    rng = np.random.default_rng(12)
+    p = []
+    for _ in range(6):
+        draws, fresh = rng.normal(size=(199, 3000)) ** 2, rng.normal(size=(100, 3000)) ** 2
+        p += [tail(draws, row[None]) for row in fresh]
+    assert 0.05 < np.mean(np.array(p) < 0.1) < 0.15
+    assert np.mean(np.array(p) < 0.01) < 0.03
+    assert 0.4 < np.mean(np.array(p) < 0.5) < 0.6
 
 
 def test_an_effect_outside_the_catalogue_is_unexplained_and_what_is_left_is_written(tmp_path):
