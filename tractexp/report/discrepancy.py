@@ -8,6 +8,7 @@ import numpy as np
 from tractexp.discrepancy.contract import parameters, recommendation
 from tractexp.discrepancy.investigate import Finding
 from tractexp.discrepancy.judgement import judge
+from tractexp.discrepancy.left import SMALLEST_P
 from tractexp.discrepancy.sure import ADEQUATE
 from tractexp.report import style
 from tractexp.report.page import Page
@@ -43,9 +44,9 @@ def page(path: Path, finding: Finding, figures: list[Path], title: str) -> Path:
     )
     if finding.study.phasors is not None:
         made.text(
-            f"{finding.study.phasors.describe().capitalize()}: voltage and current alike, which explains more than any"
-            " effect does. The voltage that the load saw is reckoned back from the record, and the current of the"
-            " model is averaged as the recorder does. The extended configuration does not do so."
+            f"{finding.study.phasors.describe().capitalize()}, of voltage and current alike: any other window would make"
+            " the voltage bend where the power does not. The voltage that the load saw is reckoned back from the record,"
+            " and the current of the model is averaged as the recorder does. The extended configuration does not do so."
         )
     made.heading("2 Is there a disagreement?").text(_gate(finding))
     made.heading("3 Where")
@@ -76,7 +77,7 @@ def _gate(finding: Finding) -> str:
     if best is None:
         return text
     return (
-        f"The most helpful single effect, {best.name}, lowers the deviance by {best.drop:.1f} (p = {best.p:.2g}; chance"
+        f"The most helpful single effect, {best.name}, lowers the deviance by {best.drop:.1f} (p = {max(best.p, SMALLEST_P):.2g}; chance"
         f" gives less than {critical:.2g} to the best of all candidates in {finding.alpha:.0%} of cases). {text}"
     )
 
