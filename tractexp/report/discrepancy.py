@@ -44,9 +44,10 @@ def page(path: Path, finding: Finding, figures: list[Path], title: str) -> Path:
     )
     if finding.study.phasors is not None:
         made.text(
-            f"{finding.study.phasors.describe().capitalize()}, of voltage and current alike: any other window would make"
-            " the voltage bend where the power does not. The voltage that the load saw is reckoned back from the record,"
-            " and the current of the model is averaged as the recorder does. The extended configuration does not do so."
+            f"{finding.study.phasors.describe().capitalize()}, of voltage and current alike: any other window would"
+            " make the voltage bend where the power does not. The voltage that the load saw is reckoned back from the"
+            " record, and the current of the model is averaged as the recorder does. The extended configuration does"
+            " not do so."
         )
     made.heading("2 Is there a disagreement?").text(_gate(finding))
     made.heading("3 Where")
@@ -76,8 +77,9 @@ def _gate(finding: Finding) -> str:
     text += f"; {first.loudest} stands out." if first.p_left < ADEQUATE else "."
     if best is None:
         return text
+    p = max(best.p, SMALLEST_P)
     return (
-        f"The most helpful single effect, {best.name}, lowers the deviance by {best.drop:.1f} (p = {max(best.p, SMALLEST_P):.2g}; chance"
+        f"The most helpful single effect, {best.name}, lowers the deviance by {best.drop:.1f} (p = {p:.2g}; chance"
         f" gives less than {critical:.2g} to the best of all candidates in {finding.alpha:.0%} of cases). {text}"
     )
 
