@@ -97,6 +97,17 @@ def test_a_plugin_without_a_source_is_refused():
             """No origin."""
 
 
+def test_a_plugin_without_the_method_that_its_base_leaves_to_it_is_refused():
+    with pytest.raises(UserError, match="lacks what every plugin of group 'optimizer' must do: define search"):
+
+        @plugin
+        class Idle(Optimizer):
+            """Does nothing.
+
+            Source: nobody.
+            """
+
+
 def test_a_plugin_without_a_base_is_refused():
     with pytest.raises(UserError, match="must subclass one of the framework's bases"):
 

@@ -47,8 +47,8 @@ _schemas: dict[type[Plugin], type] = {}
 def plugin(cls: Class) -> Class:
     """Register a plugin class under its module's name, in its base's group.
 
-    Raises `UserError` when the name is taken, when the class belongs to no group, or when its docstring does
-    not say where its equations come from (a line starting with "Source:").
+    Raises `UserError` when the name is taken, when the class belongs to no group or lacks a method its base leaves to
+    it, or when its docstring does not say where its equations come from (a line starting with "Source:").
     """
     name = cls.__module__.rpartition(".")[2]
     where = f"plugin {cls.__module__}.{cls.__qualname__}"
@@ -62,6 +62,8 @@ def plugin(cls: Class) -> Class:
         raise UserError(
             f"{where}: the name '{name}' in group '{group}' is taken by {known[name].__module__}; rename the file"
         )
+    if missing := sorted(n for n in dir(cls) if getattr(getattr(cls, n), "__isabstractmethod__", False)):
+        raise UserError(f"{where} lacks what every plugin of group '{group}' must do: define {' and '.join(missing)}")
     made = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
     made.name = name
     made.parameters = tuple(p for c in reversed(cls.__mro__) for p in vars(c).values() if isinstance(p, Parameter))

@@ -1,5 +1,6 @@
 """What an export is: an identified load, and the formats that write it for other simulators."""
 
+from abc import abstractmethod
 from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
@@ -71,9 +72,9 @@ class Format(Plugin):
     statics: ClassVar[Collection[str] | None] = None
     effects: ClassVar[Collection[str] | None] = None
 
+    @abstractmethod
     def text(self, load: Identified) -> str:
         """The file's content. `check_parts` has passed; raises `UserError` for values it cannot represent."""
-        raise NotImplementedError
 
     def notes(self, load: Identified) -> list[str]:
         """What a user must know to use the file, one sentence each."""

@@ -1,5 +1,6 @@
 """What an optimizer is given and what it must do. Counting, clipping and keeping the best are not its business."""
 
+from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
@@ -71,10 +72,10 @@ class Optimizer(Plugin):
     def check(self) -> None:
         check_choice("optimizer.space", self.space, ("unit", "raw"))
 
+    @abstractmethod
     def search(self, evaluate: Evaluate, box: Box, rng: np.random.Generator) -> Iterator[None]:
         """Search `box`, yielding once at the end of each iteration (the initial population is iteration 0).
 
         A generator: the search loop runs it until it returns or a budget is spent, in which case `evaluate`
         raises and the generator simply ends. All randomness comes from `rng`.
         """
-        raise NotImplementedError

@@ -1,5 +1,6 @@
 """What a reader plugin must do: turn the `data` configuration into records."""
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -20,6 +21,6 @@ class Reader(Plugin):
 
     group: ClassVar[str] = "data"
 
+    @abstractmethod
     def read(self) -> Events:
         """Read and check everything; raises `UserError` naming the file, the place and the value."""
-        raise NotImplementedError
