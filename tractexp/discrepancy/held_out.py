@@ -13,6 +13,8 @@ from tractexp.discrepancy.which import stage
 from tractexp.identify.descent import descend
 from tractexp.record import Event
 
+QUIETER = 3.0  # of the deviance: so much less may all events say for an explanation that the held-out ones do not show
+
 
 @dataclass(frozen=True, eq=False)
 class Judged:
@@ -37,23 +39,25 @@ class Refitted:
     """An explanation fitted to fitted and held-out events together, in coordinates of the fitted ones."""
 
     fit: Refit
-    louder: bool  # whether all events speak louder for it than the fitted ones alone
+    louder: float  # by how much all events speak louder for it than the fitted ones alone, of the deviance
     stands: bool  # whether it leaves nothing
 
 
 def weighed(
     trained: Study, events: Sequence[Event], bare: Refit, extended: Sequence[Refit], noise: Noise,
-    chain: Sequence[str], seed: int,
+    chain: Sequence[str], seed: int, doubted: bool,
 ) -> tuple[dict[tuple[str, ...], Judged], list[Refit]]:  # fmt: skip
     """Judge explanations on held-out events; where none helps as it was fitted, also those that all events confirm.
 
+    Where the base model is `doubted` all events need only bear with them: the held-out ones may not show them at all.
     Several effects at once, chosen among hundreds of sets, must also leave nothing in a fit to all events.
     """
     found = judged(trained, events, bare, extended)
     helping = [fit for fit in extended if found[fit.names].gap.helps]
     if not helping:
         all_of_them = together(trained, events, bare, extended, noise, chain, seed, anew=True)
-        again = [refitted.fit for refitted in all_of_them if refitted.louder and refitted.stands]
+        least = -QUIETER if doubted else SHOWN
+        again = [refitted.fit for refitted in all_of_them if refitted.louder > least and refitted.stands]
         return found | (judged(trained, events, bare, again) if again else {}), again
     several = [fit for fit in helping if len(fit.names) + len(chain) > 1]
     if several:
@@ -113,7 +117,7 @@ def together(
     made = []
     for fit in study.refit(noise, wanted, chain=chain):
         alone = next(e for e in extended if e.names == fit.names)
-        louder = first.deviance - fit.deviance > bare.deviance - alone.deviance + SHOWN
+        louder = (first.deviance - fit.deviance) - (bare.deviance - alone.deviance)
         stands = stage(study, fit, noise, seed, plain=True).p_left >= ADEQUATE
         unit = np.r_[fit.unit[: study.problem.space.dimension], fit.unit[study.before][: len(trained.before)]]
         made.append(Refitted(replace(fit, unit=unit), louder, stands))

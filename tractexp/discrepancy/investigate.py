@@ -126,7 +126,8 @@ def investigate(
     found, again = {}, []
     if validate and any(s.fit.names or chain for s in adequate):
         tell(f"judging {len(adequate)} explanation{'s' * (len(adequate) > 1)} on the held-out events")
-        found, again = weighed(study, validate, bare, list(extended.values()), noise, chain, seed)
+        doubted = first.p_left < ADEQUATE
+        found, again = weighed(study, validate, bare, list(extended.values()), noise, chain, seed, doubted)
         extended |= {f.names: f for f in again}
     kept = [s for s in adequate if s.fit.names not in found or found[s.fit.names].helps]
     verdict, reason = _verdict(explanation, survivors, adequate, kept, chain, alpha)

@@ -30,6 +30,7 @@ CLOSE = 12.0  # of the deviance: a rough refit this near the best is made exact
 RARER = 0.1  # by how much a load effect beside one of the measurement chain must be rarer by chance than alone
 FURTHER = (1e-5, 1e-9)  # p a second and a third name must undercut: they spoil right ones, or patch up wrong ones
 PLAIN = 1e-10  # a score of this p needs no exact threshold
+PATCHED = 4  # sets of one size that are tried before a further effect is added
 NESTED = 0.1  # a set may be worse than its own subset by no more than this, or the refit did not converge
 
 
@@ -130,9 +131,24 @@ def explain(
         refits |= {f.names: f for f in fits}
         fits = nested(study, noise, refits, fits)
         refits |= {f.names: f for f in fits}
-        best = min(fits, key=lambda f: (f.cost, f.names))
-        stages.append(stage(study, best, noise, seed + size))
+        ranked = sorted(fits, key=lambda f: (f.cost, f.names))
+        stages.append(sufficient(study, ranked, noise, alpha, seed + size))
     return Explanation(stages, refits)
+
+
+def sufficient(study: Study, ranked: Sequence[Refit], noise: Noise, alpha: float, seed: int) -> Stage:
+    """The tests at the best fit, or at the first of those close to it that asks for no further effect where it does.
+
+    Formulas are not the physics: of two that fit nearly alike, the one that needs no patch is the better.
+    """
+    best = stage(study, ranked[0], noise, seed)
+    if not best.significant(alpha):
+        return best
+    for other in [f for f in ranked[1:PATCHED] if f.cost < ranked[0].cost + CLOSE]:
+        at = stage(study, other, noise, seed)
+        if not at.significant(alpha) and at.p_left > best.p_left:
+            return at
+    return best
 
 
 def shortlist(stages: Sequence[Stage], size: int, study: Study) -> list[tuple[str, ...]]:
