@@ -8,6 +8,7 @@ can be stopped and taken up; `--docs` writes tables and figures into docs/missin
 """
 
 import argparse
+import itertools
 import json
 import os
 import time
@@ -181,14 +182,17 @@ def main() -> None:
     rows = [json.loads(line) for line in chosen.out.read_text().splitlines()] if chosen.out.exists() else []
     done = {(r["group"], r["label"], r["seed"], r["events"], r["held"]) for r in rows}
     started, total = time.perf_counter(), chosen.events + chosen.held
-    wanted = (
-        (group, trial)
+    trials = (
+        found
         for count in range(1, chosen.count + 1)  # one data set of every row before the second of any
         for name in chosen.suite or SUITES
-        for group, trial in suite(name, count, total, chosen.multiple or cases.MULTIPLES)
+        for found in suite(name, count, total, chosen.multiple or cases.MULTIPLES)
+    )
+    wanted = (
+        (group, trial)
+        for group, trial in itertools.takewhile(lambda _: time.perf_counter() - started < 60 * chosen.minutes, trials)
         if (group, trial.label, trial.seed, total, chosen.held) not in done
         and not done.add((group, trial.label, trial.seed, total, chosen.held))
-        and time.perf_counter() - started < 60 * chosen.minutes
     )
     jobs = (delayed(run)(group, trial, chosen.held) for group, trial in wanted)
     with chosen.out.open("a") as file:
