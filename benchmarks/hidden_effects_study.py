@@ -110,7 +110,6 @@ def _counted(finding) -> dict:
         "closed": finding.train.closed,
         "refitted": finding.refitted,
         "closed_held": None if finding.validate is None else finding.validate.closed,
-        "gain_held": None if finding.validate is None else [finding.validate.gain, finding.validate.expected],
         "p_first": first.scores[0].p if first.scores else 1.0,
         "first": first.scores[0].name if first.scores else "",
         "stages": [[list(s.fit.names), s.scores[0].name, s.scores[0].p] for s in finding.explanation.stages],

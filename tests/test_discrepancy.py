@@ -43,8 +43,8 @@ def base():
     return compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
 
 
-def events(effect=None, size=1.0, seed=3, count=2, noise=QUIET):
-    records = make(Case(effect, size, events=count, noise=noise), seed)
+def events(effect=None, size=1.0, seed=3, count=2, noise=QUIET, **settings):
+    records = make(Case(effect, size, events=count, noise=noise, **settings), seed)
     return [detect(Record(f"event{k + 1}", **r, source=f"made {k + 1}").check()) for k, r in enumerate(records)]
 
 

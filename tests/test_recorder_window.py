@@ -5,25 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from test_discrepancy import base, events
 
-from hidden_effects import Case, Noise, make
 from tractexp.discrepancy.contract import contract
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.phasors import Phasors, averaged, windows_of
-from tractexp.model.model import compose
-from tractexp.plugin import get
-from tractexp.record import Record, detect
 
 FEW = ("stator_resistance", "exponential_recovery", "second_motor_group")
-
-
-def base():
-    return compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
-
-
-def events(nuisances=(), effect=None, size=1.0, seed=3, count=3):
-    made = make(Case(effect, size, events=count, noise=Noise(0.002), nuisances=nuisances), seed)
-    return [detect(Record(f"event{k + 1}", **r, source=f"made {k + 1}").check()) for k, r in enumerate(made)]
 
 
 @pytest.mark.parametrize("samples", [1.0, 2.5, 10.0, 16.67])
@@ -64,7 +52,7 @@ def test_windows_are_whole_cycles_that_the_sampling_resolves():
 
 def test_a_window_of_phasors_is_no_missing_effect():
     """The load is nonlinear, so that a window on voltage and current shows, and no effect is named for it."""
-    made = events(nuisances=(("phasor_window", 3.0),))
+    made = events(count=3, nuisances=(("phasor_window", 3.0),))
     told = []
     finding = investigate(base(), made[:2], made[2:], {}, {}, only=FEW, tell=told.append)
     assert finding.names == ()
@@ -76,13 +64,13 @@ def test_a_window_of_phasors_is_no_missing_effect():
 
 def test_no_window_is_found_where_there_is_none():
     for effect in (None, "stator_resistance"):
-        made = events(effect=effect, size=2.0)
+        made = events(effect, size=2.0, count=3)
         finding = investigate(base(), made[:2], made[2:], {}, {}, only=FEW)
         assert contract(finding)["phasor_window"] is None
         assert finding.names == ((effect,) if effect else ())
 
 
 def test_an_effect_is_found_behind_a_window():
-    made = events(nuisances=(("phasor_window", 2.0),), effect="stator_resistance", size=3.0)
+    made = events("stator_resistance", size=3.0, count=3, nuisances=(("phasor_window", 2.0),))
     finding = investigate(base(), made[:2], made[2:], {}, {}, only=FEW)
     assert "stator_resistance" in finding.names

@@ -253,27 +253,24 @@ class Study:
         self.see_blur(unit)
         return self.noise_in(self.residuals(unit[None])[0])
 
-    def noise_in(self, residual: np.ndarray, rest: Rest | None = None) -> Noise:
+    def noise_in(
+        self, residual: np.ndarray, left: np.ndarray | None = None, columns: np.ndarray | None = None
+    ) -> Noise:
         """The noise of one residual (2, N) in quiet stretches.
 
-        `rest`, of all events end to end, tells more of how the load wanders.
+        What a fit leaves (2, N), and columns of all that could explain it (k, 2, N), tell more of how the load wanders.
         """
-        wander = functools.partial(self._wander, rest)
+        wander = functools.partial(self._wander, left, columns)
         return estimate(residual, self.likelihood.known, self.quiet, wander, self.blur)
 
-    def _wander(self, rest: Rest | None, mix: np.ndarray) -> Wander | None:
+    def _wander(self, left: np.ndarray | None, columns: np.ndarray | None, mix: np.ndarray) -> Wander | None:
         """How the load wanders before the events and during them, in mixed channels."""
         drive = self.problem.drive
         before = [drive.measured[:, drive.part(e)][:, event.steady] for e, event in enumerate(self.events)]
         rests = []
-        if rest is not None and self.likelihood.known.all():
+        if left is not None and columns is not None and self.likelihood.known.all():
             rests = [
-                replace(
-                    rest,
-                    left=mix @ rest.left[:, part],
-                    columns=np.einsum("ij,kjt->kit", mix, rest.columns[:, :, part]),
-                    profile=self.profile[part],
-                )
+                Rest(mix @ left[:, part], np.einsum("ij,kjt->kit", mix, columns[:, :, part]), self.profile[part])
                 for part in map(drive.part, range(drive.events))
             ]
         step = self.events[0].record.step

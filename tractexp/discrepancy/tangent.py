@@ -62,7 +62,7 @@ class Tangent:
     cells: np.ndarray  # (c, 2, N) responses to injections
     groups: np.ndarray  # (c,) which balance an injection pushes
 
-    @property
+    @functools.cached_property
     def explaining(self) -> np.ndarray:
         """All that the fit or any candidate could change, (k, 2, N)."""
         return np.concatenate([self.nuisance, *(c.raw for c in self.columns)])

@@ -89,10 +89,13 @@ def find(before: Sequence[np.ndarray], step: float, profile: np.ndarray, rests: 
     total = np.array([_likelihood([s[c] for s in stretches], fast[c], step) for c in (0, 1)])
     total -= total[:, :1]
     most = [_last(row, LESS) for row in total]
+    found = Wander(GRID[most], step, profile)
+    if 2 * total.max() >= SEEN:
+        return found
     within = np.array([sum(_within(r, c, fast[c], step) for r in rests) * np.ones(len(GRID)) for c in (0, 1)])
     both = total + within - within[:, :1]
-    seen = max(2 * total.max(), *(2 * row[: last + 1].max() - MORE for row, last in zip(both, most, strict=True)))
-    return Wander(GRID[most], step, profile) if seen >= SEEN else None
+    seen = max(2 * row[: last + 1].max() for row, last in zip(both, most, strict=True))
+    return found if seen - MORE >= SEEN else None
 
 
 def _last(likelihood: np.ndarray, less: float) -> int:

@@ -22,7 +22,6 @@ from tractexp.discrepancy.tangent import (
     rich_residuals,
     tangent,
 )
-from tractexp.discrepancy.wander import Rest
 
 MOST_EFFECTS = 3
 SHORTLIST = {1: 10, 2: 8, 3: 6}  # sets of each size that are refitted
@@ -101,7 +100,7 @@ class Explanation:
 def stage(study: Study, fit: Refit, noise: Noise, seed: int, plain: bool = False) -> Stage:
     """All tests at one fit, under the noise of what no candidate explains there; `plain` takes it as known."""
     t = tangent(study, fit)
-    noise = study.noise_in(rich_residuals(t, t.residual[None])[0], Rest(t.residual, t.explaining, study.profile))
+    noise = study.noise_in(rich_residuals(t, t.residual[None])[0], t.residual, t.explaining)
     fit = study.refit(noise, [(fit.names, fit.unit)])[0]
     t = tangent(study, fit)
     projection = t.whitened(noise)
