@@ -78,12 +78,13 @@ def catalogue(
         if name not in known:
             raise UserError(f"task.effects names '{name}', which is no effect{among(name, known)}")
     here = {effect.name for effect in present}
+    equations = compose(motor, static, present).equations
     found, untestable = [], {}
     for name in sorted(known):
         effect = get("effect", name)()
         if name in here or (only and name not in only and not isinstance(effect, Measurement)):
             continue
-        if why := missing_channel(effect, events) or _refusal(effect, motor, static, present):
+        if why := missing_channel(effect, events) or effect.refusal(equations):
             untestable[name] = why
         else:
             found.append(_candidate(effect))
@@ -98,10 +99,6 @@ def missing_channel(effect: Effect, events: Sequence[Event]) -> str:
         if channel == "f" and all(np.ptp(e.record.f) < 0.05 for e in events):
             return "it is seen through the frequency, which moves by less than 0.05 Hz"
     return ""
-
-
-def _refusal(effect: Effect, motor: Motor, static: Static, present: Sequence[Effect]) -> str:
-    return effect.refusal(compose(motor, static, present).equations) or ""
 
 
 def _candidate(effect: Effect) -> Candidate:

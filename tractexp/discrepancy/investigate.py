@@ -119,19 +119,18 @@ def investigate(
     noise = explanation.stages[-1].noise
     bare = study.refit(noise, [((), _unchained(study, explanation.stages[0].fit, ()))], chain=())[0]
     adequate = [s for s in survivors if s.adequate] if survivors[0].adequate else []
-    extended = {
-        s.fit.names: study.refit(noise, [(s.fit.names, _unchained(study, s.fit, chain))], chain=chain)[0]
-        for s in (adequate or survivors[:1])
-    }
-    found, again = {}, []
+    wanted = [(s.fit.names, _unchained(study, s.fit, chain)) for s in (adequate or survivors[:1])]
+    exact = {f.names: f for f in study.refit(noise, wanted, chain=chain)}
+    extended = {names: exact[names] for names, _ in wanted}
+    found, together = {}, []
     if validate and any(s.fit.names or chain for s in adequate):
         tell(f"judging {len(adequate)} explanation{'s' * (len(adequate) > 1)} on the held-out events")
         doubted = first.p_left < ADEQUATE
-        found, again = weighed(study, validate, bare, list(extended.values()), noise, chain, seed, doubted)
-        extended |= {f.names: f for f in again}
+        found, together = weighed(study, validate, bare, list(extended.values()), noise, chain, seed, doubted)
+        extended |= {f.names: f for f in together}
     kept = [s for s in adequate if s.fit.names not in found or found[s.fit.names].helps]
     verdict, reason = _verdict(explanation, survivors, adequate, kept, chain, alpha)
-    if again and kept:
+    if together and kept:
         reason += "; what the fitted events leave open of it was fitted to the held-out ones, too"
     if study.phasors is not None:
         reason += f"; {study.phasors.describe()}, which is taken into account"
@@ -146,7 +145,7 @@ def investigate(
         where(first.projection, first.null, alpha) if verdict != "none" else [],
         known, study, explanation, rivals, bare, after,
         gap(study, bare.unit, after.unit, after.names, last.noise, fitted),
-        found.get(chosen.fit.names) if names else None, bool(again and kept),
+        found.get(chosen.fit.names) if names else None, bool(together and kept),
         deciding_event(study, kept) if verdict == "tied" else None,
         _nearest(study, bare, rivals, noise, validate) if verdict == "unexplained" else None, alpha,
     )  # fmt: skip

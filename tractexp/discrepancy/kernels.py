@@ -10,6 +10,7 @@ import functools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,24 +18,36 @@ from tractexp.discrepancy.catalogue import Catalogue
 from tractexp.discrepancy.injection import Injection
 from tractexp.identify.likelihood import Likelihood
 from tractexp.identify.problem import Problem
+from tractexp.model.codegen import LANES
+from tractexp.model.drive import Drive
 from tractexp.model.kernel import compile_missing
 from tractexp.model.model import Model, compose
 from tractexp.record import Event
 
 LONG = 2.0  # times the source of the base model
 SHARED = 2  # effects of one kernel: one each would take longer to compile, more would be slower
+Item, Result = TypeVar("Item"), TypeVar("Result")
 Key = tuple[frozenset[str], bool] | None  # load effects and whether pushes are in; None: everything is
-WORTH = 16  # simulations that are worth a thread
 
 
 def side_by_side(function: Callable[[np.ndarray], np.ndarray], lanes: np.ndarray) -> np.ndarray:
     """`function` of lanes (n, ...), on all cores: they do not know of each other, so the bits are the same."""
     from numba import get_num_threads
 
-    parts = min(get_num_threads(), len(lanes) // WORTH)
+    parts = min(get_num_threads(), -(-len(lanes) // LANES))
     if parts < 2:
         return function(lanes)
     return np.concatenate(list(_threads().map(function, np.array_split(lanes, parts))))
+
+
+def each_apart(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+    """`function` of each item, on all cores. It may itself work `side_by_side`, whose threads are others."""
+    from numba import get_num_threads
+
+    if min(get_num_threads(), len(items)) < 2:
+        return [function(item) for item in items]
+    with ThreadPoolExecutor(get_num_threads()) as pool:
+        return list(pool.map(function, items))
 
 
 @functools.cache
@@ -120,6 +133,23 @@ class Kernels:
 
     def residuals(self, key: Key, unit: np.ndarray) -> np.ndarray:
         """Calculated minus measured (n, 2, N) [pu] at coordinates (n, D) of the study."""
+        likelihood, columns = self._of(key)
+        return likelihood.residuals(unit[:, columns])
+
+    def simulate(self, names: Iterable[str], unit: np.ndarray, drive: Drive) -> np.ndarray:
+        """P and Q (n, 2, N) [pu] under other voltages, with these effects at coordinates (n, D) of the study."""
+        likelihood, columns = self._of(self.family.key(names))
+        problem = likelihood.problem
+        values = problem.full(likelihood.values(unit[:, columns]))
+
+        def simulated(part: np.ndarray) -> np.ndarray:
+            response = problem.model.simulate(drive, part, self.substeps)
+            return np.stack([response.P, response.Q], axis=1)
+
+        return side_by_side(simulated, values)
+
+    def _of(self, key: Key) -> tuple[Likelihood, np.ndarray]:
+        """The likelihood by one kernel, and where its coordinates stand among the study's."""
         if key not in self._made:
             assert key is not None
             model = self.family.with_effects(*key)
@@ -127,10 +157,8 @@ class Kernels:
                 {n: v for n, v in given.items() if n in model.names} for given in (self.bounds, self.fixed)
             )
             self._made[key] = self._simulator(Problem(model, self.events, bounds, fixed, self.substeps))
-        likelihood, columns = self._made[key]
-        return likelihood.residuals(unit[:, columns])
+        return self._made[key]
 
     def _simulator(self, problem: Problem) -> tuple[Likelihood, np.ndarray]:
-        """A problem's likelihood, and where its coordinates stand among the study's."""
         before = self.whole.space.dimension + np.arange(2 * len(self.events))
         return Likelihood.of(problem), np.r_[[self._column[n] for n in problem.space.names], before].astype(int)

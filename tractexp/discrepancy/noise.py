@@ -48,7 +48,7 @@ class Noise:
 
     def _mixed(self, rows: np.ndarray) -> np.ndarray:
         """Channels (n, 2, N) mixed so that their noise is independent."""
-        return np.einsum("ij,njt->nit", self.mix, rows)
+        return self.mix @ rows
 
     def whiten(self, residuals: np.ndarray, drive: Drive, known: np.ndarray) -> np.ndarray:
         """(n, 2, N) to rows (n, 2 N) of independent unit variance; samples that do not count are 0."""
@@ -102,14 +102,12 @@ class Noise:
 
     def _drawn(self, rng: np.random.Generator, count: int, part: slice) -> np.ndarray:
         """Mixed channels (count, 2, samples) of one event."""
-        from scipy.signal import lfilter
-
         made = []
         size = (count, part.stop - part.start + BURN_IN)
         for c, channel in enumerate(self.channels):
             shocks = rng.standard_normal(size) if self.shocks is None else rng.choice(self.shocks[c], size)
             shocks *= channel.deviation[-1]
-            made.append(lfilter([1.0], np.r_[1.0, -channel.coefficients[-1]], shocks)[:, BURN_IN:])
+            made.append(channel.recurring(shocks)[:, BURN_IN:])
         shapes = self._shapes(part)
         return np.stack(made, axis=1) + np.einsum("bk,kct->bct", rng.standard_normal((count, len(shapes))), shapes)
 

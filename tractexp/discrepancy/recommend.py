@@ -1,5 +1,6 @@
 """The event that would decide between effects that fit equally well."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -31,31 +32,40 @@ def deciding_event(study: Study, tied: Sequence[Rival]) -> Decider:
     lambda = d'(1 + J H^-1 J')^-1 d with d the difference of both predictions, J the rival's tangent and H what the
     training events already know of it; the rival is rejected with probability Phi(sqrt(lambda) - 1.64).
     """
-    first, second = tied[0], tied[1]
-    options = [(d, w, _lambda(study, first, second, d, w)) for d in DEPTHS for w in DURATIONS]
-    rated = [Decider(d, w, float(ndtr(np.sqrt(max(far, 0.0)) - ONE_SIDED))) for d, w, far in options]
+    dips = list(itertools.product(DEPTHS, DURATIONS))
+    d, J = _response(study, tied[0], tied[1], [_dip(study, depth, duration) for depth, duration in dips])
+    R, order = tied[1].stage.projection.R, _order(study, tied[1])
+    known = (R.T @ R)[np.ix_(order, order)]
+    likely = [float(ndtr(np.sqrt(_apart(d[e], J[:, e], known)) - ONE_SIDED)) for e in range(len(dips))]
+    rated = [Decider(*dip, p) for dip, p in zip(dips, likely, strict=True)]
     enough = [r for r in rated if r.probability >= DECIDED]
     return min(enough, key=lambda r: r.depth * r.duration) if enough else max(rated, key=lambda r: r.probability)
 
 
-def _lambda(study: Study, truth: Rival, rival: Rival, depth: float, duration: float) -> float:
-    drive = Drive.of([_dip(study, depth, duration)])
+def _apart(d: np.ndarray, J: np.ndarray, known: np.ndarray) -> float:
+    """lambda of one dip; 0 where a model does not survive it."""
+    if not (np.isfinite(d).all() and np.isfinite(J).all()):
+        return 0.0
+    return max(float(d @ d - d @ J.T @ np.linalg.pinv(known + J @ J.T, hermitian=True) @ J @ d), 0.0)
+
+
+def _response(
+    study: Study, truth: Rival, rival: Rival, dips: Sequence[Excitation]
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Whitened difference of both predictions (E, R) and the rival's tangent (k, E, R) in dips of equal length."""
     inside = [*study.base, *study.parameters(rival.fit.names)]
     up, down = two_sided(rival.fit.unit, inside)
     width = np.array([u[k] - d[k] for u, d, k in zip(up, down, inside, strict=True)])
-    points = np.concatenate([truth.fit.unit[None], rival.fit.unit[None], up, down])[:, : study.problem.space.dimension]
-    values = study.problem.full(study.problem.space.from_unit(points))
-    response = study.problem.model.simulate(drive, values, int(study.problem.step.substeps.max()))
-    rows = rival.stage.noise.on(np.ones(drive.samples)).whiten(
-        np.stack([response.P, response.Q], axis=1), drive, drive.weights > 0
-    )
+    points = np.concatenate([truth.fit.unit[None], rival.fit.unit[None], up, down])
+    chain = study.parameters(study.catalogue.chain)
+    points[:, chain] = study.null[chain]  # what the recorder does to those events says nothing of the load
+    made = study.kernels.simulate((*truth.fit.names, *rival.fit.names), points, Drive.of(dips))
+    each = np.moveaxis(made.reshape(len(points), 2, len(dips), -1), 2, 1).reshape(-1, 2, len(dips[0].U))
+    one = Drive.of(dips[:1])
+    noise = rival.stage.noise.on(np.ones(one.samples))
+    rows = noise.whiten(each, one, one.weights > 0).reshape(len(points), len(dips), -1)
     k = len(inside)
-    d, J = rows[0] - rows[1], (rows[2 : 2 + k] - rows[2 + k :]) / width[:, None]
-    if not np.isfinite(rows).all():
-        return 0.0
-    R = rival.stage.projection.R
-    known = (R.T @ R)[np.ix_(_order(study, rival), _order(study, rival))]
-    return float(d @ d - d @ J.T @ np.linalg.pinv(known + J @ J.T, hermitian=True) @ J @ d)
+    return rows[0] - rows[1], (rows[2 : 2 + k] - rows[2 + k :]) / width[:, None, None]
 
 
 def _order(study: Study, rival: Rival) -> list[int]:
@@ -68,7 +78,7 @@ def _dip(study: Study, depth: float, duration: float) -> Excitation:
     """A dip as the events of this study start and are sampled, with edges of two cycles."""
     event = study.events[0]
     step, lead = event.record.step, 0.3
-    t = np.arange(round((lead + duration + 1.5) / step)) * step
+    t = np.arange(round((lead + max(DURATIONS) + 1.5) / step)) * step
     fall, rise = np.clip((t - lead) / 0.04, 0, 1), np.clip((t - lead - duration) / 0.04, 0, 1)
     U = event.U0 * (1 - depth * (fall - rise))
     return Excitation(

@@ -7,6 +7,7 @@ construction. A refit is a lane of the batched descent with its own free columns
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from threading import Lock
 
 import numpy as np
 
@@ -81,7 +82,7 @@ class Study:
         self.null = self._null()
         self.profile = self._profile()
         self.quiet = quiet_stretches(self.events, self.problem.drive)
-        self.simulations = 0
+        self.simulations, self._counting = 0, Lock()
 
     def _null(self) -> np.ndarray:
         """Coordinates with every candidate at its null, the base parameters at their defaults."""
@@ -127,7 +128,8 @@ class Study:
 
         By default any effect and any push may be there, at the price of the largest kernel.
         """
-        self.simulations += len(unit)
+        with self._counting:
+            self.simulations += len(unit)
         key = None if names is None else self.kernels.family.key(names, pushed)
         return side_by_side(lambda part: self.kernels.residuals(key, part), unit)
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tractexp.discrepancy.kernels import each_apart
 from tractexp.discrepancy.noise import Noise
 from tractexp.discrepancy.study import Refit, Study
 from tractexp.discrepancy.which import Explanation, Stage, stage
@@ -65,9 +66,12 @@ def rivals(study: Study, explanation: Explanation) -> tuple[list[Rival], Noise]:
 def surviving(study: Study, explanation: Explanation, seed: int, most: int = 6) -> tuple[list[Rival], list[Rival]]:
     """(survivors with their adequacy tested, all rivals), the best first."""
     everyone, noise = rivals(study, explanation)
-    tested = []
-    for k, rival in enumerate([r for r in everyone if not r.rejected][:most]):
+
+    def tested(k: int, rival: Rival) -> Rival:
         at = explanation.stages[-1] if k == 0 else stage(study, rival.fit, noise, seed + 100 + k, plain=True)
-        tested.append(replace(rival, stage=at))
-    known = {r.fit.names: r for r in tested}
-    return tested, [known.get(r.fit.names, r) for r in everyone]
+        return replace(rival, stage=at)
+
+    left = [r for r in everyone if not r.rejected][:most]
+    survivors = each_apart(lambda k: tested(k, left[k]), range(len(left)))
+    known = {r.fit.names: r for r in survivors}
+    return survivors, [known.get(r.fit.names, r) for r in everyone]

@@ -67,7 +67,7 @@ def normal(
             for k, group in enumerate(apart, len(alone)):
                 J[:, group.coordinates] = change[:, k, None] * group.rows
         J /= h[:, :, None]
-        np.nan_to_num(J, copy=False, nan=0.0)
+        J[~np.isfinite(J)] = 0.0
         gradient[part] = (J @ base[part, :, None])[:, :, 0]
         H[part] = J @ np.swapaxes(J, 1, 2)
     return gradient, H

@@ -56,6 +56,13 @@ class Autoregression:
             white[..., pick(0)] = error / self.deviation[k]
         return white
 
+    def recurring(self, shocks: np.ndarray) -> np.ndarray:
+        """What the recurrence of full order makes of shocks (n, N) from rest: the banded system that whitens."""
+        from scipy.linalg import solve_banded
+
+        bands = np.repeat(np.r_[1.0, -self.coefficients[-1]][:, None], shocks.shape[1], axis=1)
+        return solve_banded((self.order, 0), bands, shocks.T).T
+
 
 def white_noise(deviation: float) -> Autoregression:
     """Independent samples of one standard deviation [pu]."""
