@@ -11,20 +11,22 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.special import chdtrc
+from scipy.special import chdtrc, ndtr
 from test_cli import tractexp
 
 from hidden_effects import Case, Noise, make, write
 from tractexp.discrepancy.catalogue import catalogue
 from tractexp.discrepancy.contract import contract, write_left, write_model
 from tractexp.discrepancy.gap import SHOWN
-from tractexp.discrepancy.held_out import together
+from tractexp.discrepancy.held_out import CONVINCING, together, weighed
 from tractexp.discrepancy.investigate import check_events, investigate
 from tractexp.discrepancy.judgement import judge
 from tractexp.discrepancy.left import tail
 from tractexp.discrepancy.noise import Noise as PowerNoise
 from tractexp.discrepancy.noise import estimate
+from tractexp.discrepancy.recommend import deciding_event
 from tractexp.discrepancy.study import Study
+from tractexp.discrepancy.sure import ONE_SIDED
 from tractexp.discrepancy.tangent import _signed_drop, tangent
 from tractexp.discrepancy.voltage import smoothed
 from tractexp.discrepancy.wander import Rest, Wander, find
@@ -144,6 +146,14 @@ def test_noise_that_is_drawn_is_noise_that_is_found():
     covariance = np.linalg.inv(mix) @ np.linalg.inv(mix).T
     assert np.cov(drawn) == pytest.approx(covariance, rel=0.1)
     assert found.channels[0].coefficients[-1, 0] == pytest.approx(0.8, abs=0.03)
+
+
+def test_a_recurrence_is_undone_by_its_own_whitening():
+    color = Autoregression(np.array([[0.0, 0.0], [0.6, 0.0], [0.9, -0.3]]), np.array([1.5, 1.2, 1.0]))
+    shocks = np.random.default_rng(0).standard_normal((3, 50))
+    made = color.recurring(shocks)
+    assert made[:, 0] == pytest.approx(shocks[:, 0])
+    assert color.whiten(made, np.ones(50, dtype=bool))[:, 2:] == pytest.approx(shocks[:, 2:])
 
 
 def test_a_load_that_wanders_is_seen_before_the_events_and_steady_noise_is_not():
@@ -333,6 +343,41 @@ def test_all_events_together_confirm_only_what_the_held_out_ones_show(planted):
     (denied,) = fit(events(None, count=3)[2:])
     assert denied.louder < 0
     assert not denied.stands
+
+
+def test_an_effect_that_closes_little_of_the_held_out_gap_must_leave_nothing_in_a_fit_to_all_events(planted):
+    """A step of the load after the held-out dip is seen beside the effect; without it nobody asks for that fit."""
+
+    def judged_on(made):
+        found, again = weighed(
+            planted.study, made, planted.bare, [planted.extended], planted.last.noise, (), seed=0, doubted=True
+        )
+        assert again == []
+        return found["stator_resistance",]
+
+    (clean,) = events("stator_resistance", size=2.0, count=3)[2:]
+    assert judged_on([clean]).gap.closed > CONVINCING
+    assert judged_on([clean]).helps
+    record = clean.record
+    later = record.t > record.t[clean.end] + 0.2
+    stepped = judged_on([replace(clean, record=replace(record, P=record.P + 0.05 * clean.P0 * later))])
+    assert stepped.gap.helps
+    assert stepped.gap.closed < CONVINCING
+    assert not stepped.helps
+
+
+def test_the_deciding_dip_looks_at_the_load_and_not_at_what_the_recorder_did(planted):
+    """A set is never told from itself, whatever skew and drift its two fits found in the events."""
+    study, rival = planted.study, planted.rivals[0]
+    unit = rival.fit.unit.copy()
+    unit[study.parameters(["time_skew", "load_drift"])] += 0.1
+    assert deciding_event(study, [rival, rival]).probability == pytest.approx(ndtr(-ONE_SIDED))
+    skewed = deciding_event(study, [rival, replace(rival, fit=replace(rival.fit, unit=unit))])
+    assert skewed.probability == pytest.approx(ndtr(-ONE_SIDED))
+    other = rival.fit.unit.copy()
+    other[study.parameters(["stator_resistance"])] += 0.2
+    decided = deciding_event(study, [rival, replace(rival, fit=replace(rival.fit, unit=other))])
+    assert 0.1 < decided.probability <= 1
 
 
 def test_candidates_at_their_null_leave_the_base_model(silent):

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.discrepancy.gap import SHOWN, Gap, gap
+from tractexp.discrepancy.kernels import each_apart
 from tractexp.discrepancy.noise import Noise
 from tractexp.discrepancy.study import Refit, Study
 from tractexp.discrepancy.sure import ADEQUATE
@@ -13,6 +14,7 @@ from tractexp.discrepancy.which import stage
 from tractexp.identify.descent import descend
 from tractexp.record import Event
 
+CONVINCING = 0.8  # of the explainable gap: an effect that closes as much on held-out events is not doubted
 QUIETER = 3.0  # of the deviance: so much less may all events say for an explanation that the held-out ones do not show
 
 
@@ -50,7 +52,8 @@ def weighed(
     """Judge explanations on held-out events; where none helps as it was fitted, also those that all events confirm.
 
     Where the base model is `doubted` all events need only bear with them: the held-out ones may not show them at all.
-    Several effects at once, chosen among hundreds of sets, must also leave nothing in a fit to all events.
+    Several effects at once, chosen among hundreds of sets, must also leave nothing in a fit to all events, and so must
+    a single one that closes less of the gap there than a true one does.
     """
     found = judged(trained, events, bare, extended)
     helping = [fit for fit in extended if found[fit.names].gap.helps]
@@ -59,10 +62,9 @@ def weighed(
         least = -QUIETER if doubted else SHOWN
         again = [refitted.fit for refitted in all_of_them if refitted.louder > least and refitted.stands]
         return found | (judged(trained, events, bare, again) if again else {}), again
-    several = [fit for fit in helping if len(fit.names) + len(chain) > 1]
-    if several:
-        for refitted in together(trained, events, bare, several, noise, chain, seed):
-            found[refitted.fit.names] = replace(found[refitted.fit.names], stands=refitted.stands)
+    doubtful = [f for f in helping if len(f.names) + len(chain) > 1 or not found[f.names].gap.closed >= CONVINCING]
+    for refitted in together(trained, events, bare, doubtful, noise, chain, seed) if doubtful else ():
+        found[refitted.fit.names] = replace(found[refitted.fit.names], stands=refitted.stands)
     return found, []
 
 
@@ -114,14 +116,15 @@ def together(
         for start in [_widened(study, trained, fit.unit)]
         for setting in (_settings(study, fit.names) if anew else [{}])
     ]
-    made = []
-    for fit in study.refit(noise, wanted, chain=chain):
+
+    def told(fit: Refit) -> Refitted:
         alone = next(e for e in extended if e.names == fit.names)
         louder = (first.deviance - fit.deviance) - (bare.deviance - alone.deviance)
         stands = stage(study, fit, noise, seed, plain=True).p_left >= ADEQUATE
         unit = np.r_[fit.unit[: study.problem.space.dimension], fit.unit[study.before][: len(trained.before)]]
-        made.append(Refitted(replace(fit, unit=unit), louder, stands))
-    return made
+        return Refitted(replace(fit, unit=unit), louder, stands)
+
+    return each_apart(told, study.refit(noise, wanted, chain=chain))
 
 
 def _study_of(trained: Study, events: Sequence[Event]) -> Study:

@@ -4,6 +4,7 @@ Everything given as text is escaped. Figures are inline SVG, equations are types
 elsewhere.
 """
 
+import functools
 import html
 import io
 import itertools
@@ -149,6 +150,7 @@ def _displayed(latex: str) -> str:
     return "".join(r"\d" if i in outside else c for i, c in enumerate(latex))
 
 
+@functools.cache
 def _typeset(latex: str) -> str | None:
     """SVG of an equation, or None for LaTeX beyond mathtext."""
     from matplotlib import rc_context
