@@ -27,8 +27,14 @@ from hidden_effects.effects import CATALOG, PHYSICAL  # noqa: E402
 from hidden_effects.generator import make, scene, truth  # noqa: E402
 from hidden_effects.outside import OUTSIDE  # noqa: E402
 
-SUITES = ("nulls", "nuisances", "single", "outside", "left_out", "pairs")
 LEFT_OUT = "left out "  # the group of trials whose effect is taken from the catalogue
+PAIRED, LARGE = (2.0, 4.0), (2.0, 4.0, 8.0)  # multiples of the detection limit
+HIDDEN = {  # one effect is hidden: group of trials, multiples, effects
+    "single": ("", cases.MULTIPLES, CATALOG),
+    "outside": ("outside ", LARGE, OUTSIDE),
+    "left_out": (LEFT_OUT, LARGE, PHYSICAL),
+}
+SUITES = ("nulls", "nuisances", *HIDDEN, "pairs")
 SAME = {  # effects whose amount is a parameter of the model, in its units
     "stator_resistance": "R_s",
     "speed_dependent_torque": "quadratic_share",
@@ -48,27 +54,13 @@ def suite(
             yield from ((f"null, {noise}", t) for t in cases.nulls(noise, count, events=events))
     elif name == "nuisances":
         yield from (("null with nuisances", t) for t in cases.nuisances(count, events=events))
-    elif name == "single":
-        for multiple in (m for m in cases.MULTIPLES if m in multiples):
-            for effect in CATALOG:
-                yield from ((f"{multiple:g} x", t) for t in cases.single(effect, multiple, count, events=events))
-    elif name == "outside":
-        for multiple in (m for m in (2.0, 4.0, 8.0) if m in multiples):
-            for effect in OUTSIDE:
-                yield from (
-                    (f"outside {multiple:g} x", t) for t in cases.single(effect, multiple, count, events=events)
-                )
-    elif name == "left_out":
-        for multiple in (m for m in (2.0, 4.0, 8.0) if m in multiples):
-            for effect in PHYSICAL:
-                yield from (
-                    (f"{LEFT_OUT}{multiple:g} x", t) for t in cases.single(effect, multiple, count, events=events)
-                )
     elif name == "pairs":
-        for multiple in (m for m in (2.0, 4.0) if m in multiples):
+        for multiple in (m for m in PAIRED if m in multiples):
             yield from ((f"pairs {multiple:g} x", t) for t in cases.pairs(multiple, count, events=events))
     else:
-        raise SystemExit(f"there is no suite '{name}'; there are {', '.join(SUITES)}")
+        group, sizes, effects = HIDDEN[name]
+        for multiple, effect in itertools.product((m for m in sizes if m in multiples), effects):
+            yield from ((f"{group}{multiple:g} x", t) for t in cases.single(effect, multiple, count, events=events))
 
 
 def run(group: str, trial: cases.Trial, held: int) -> dict:

@@ -26,10 +26,11 @@ from tractexp.discrepancy.noise import Noise as PowerNoise
 from tractexp.discrepancy.noise import estimate
 from tractexp.discrepancy.recommend import deciding_event
 from tractexp.discrepancy.study import Study
-from tractexp.discrepancy.sure import ONE_SIDED
+from tractexp.discrepancy.sure import ADEQUATE, ONE_SIDED
 from tractexp.discrepancy.tangent import _signed_drop, tangent
 from tractexp.discrepancy.voltage import smoothed
 from tractexp.discrepancy.wander import Rest, Wander, find
+from tractexp.discrepancy.which import stage
 from tractexp.errors import UserError
 from tractexp.identify.descent import Apart, normal
 from tractexp.identify.noise import Autoregression, white_noise
@@ -392,8 +393,20 @@ def test_candidates_at_their_null_leave_the_base_model(silent):
     assert rows[0] == pytest.approx(response.P[0] - alone.drive.measured[0], abs=1e-10)
 
 
+def test_what_only_a_parameter_beyond_its_bounds_explains_is_left(silent):
+    """The best fit lies on a wall; a projection that lets the parameter leave the box would find nothing."""
+    study = silent.study
+    T = study.value("T_prime", silent.first.fit.unit)
+    made = Study(study.model, study.catalogue, events(), {"T_prime": [1.05 * T, 2 * T]}, {})
+    first = stage(made, *made.base_fit(), seed=0)
+    assert first.fit.unit[made.column["T_prime"]] == 0.0
+    assert first.fit.deviance > silent.first.fit.deviance + 50
+    assert silent.first.p_left > ADEQUATE
+    assert first.p_left < 1e-6
+
+
 def test_nuisance_columns_are_orthogonal_to_the_projected_residual(silent):
-    projection = tangent(silent.study, silent.first.fit).whitened(silent.first.noise)
+    projection = tangent(silent.study, silent.first.fit, silent.first.noise).whitened(silent.first.noise)
     assert np.abs(projection.r @ projection.Q).max() < 1e-8
     for block in projection.blocks:
         assert np.abs(block @ projection.Q).max() < 1e-6 * max(np.abs(block).max(), 1.0)

@@ -8,7 +8,7 @@ import numpy as np
 from tractexp.discrepancy.noise import Noise
 from tractexp.discrepancy.span import spanned
 from tractexp.discrepancy.study import Study
-from tractexp.discrepancy.tangent import injections, two_sided
+from tractexp.discrepancy.tangent import injections, resting, two_sided
 from tractexp.identify.result import relative_error
 
 SHOWN = 10.8  # expected gain at which a true explanation fails to gain anything in 5 % of cases: (2 x 1.645)^2
@@ -91,6 +91,7 @@ def left_over(study: Study, unit: np.ndarray, names: Sequence[str], noise: Noise
     rows = np.nan_to_num(rows)
     r, k = rows[0], len(fitted)
     nuisance, cells = rows[1 : 1 + k] - rows[1 + k : 1 + 2 * k], rows[1 + 2 * k :] - r
+    nuisance = nuisance[~resting(unit[list(fitted)], nuisance @ r)]
     Q = np.linalg.qr(nuisance.T)[0]
     cells -= (cells @ Q) @ Q.T
     basis = spanned(cells, SAME)

@@ -26,7 +26,8 @@ from tractexp.record import Event
 
 LONG = 2.0  # times the source of the base model
 SHARED = 2  # effects of one kernel: one each would take longer to compile, more would be slower
-Item, Result = TypeVar("Item"), TypeVar("Result")
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 Key = tuple[frozenset[str], bool] | None  # load effects and whether pushes are in; None: everything is
 
 

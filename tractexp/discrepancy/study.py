@@ -15,21 +15,18 @@ from tractexp.discrepancy.catalogue import Catalogue
 from tractexp.discrepancy.kernels import Family, Kernels, side_by_side
 from tractexp.discrepancy.noise import Noise, estimate, quiet_stretches
 from tractexp.discrepancy.phasors import Phasors
+from tractexp.discrepancy.valleys import best_fits
 from tractexp.discrepancy.voltage import smoothed
 from tractexp.discrepancy.wander import Rest, Wander, find
 from tractexp.identify.descent import Apart, descend
 from tractexp.identify.likelihood import Likelihood
-from tractexp.identify.problem import Problem, even
+from tractexp.identify.problem import Problem
 from tractexp.model.model import Model
 from tractexp.record import Event
 
-SCREENED = 4096  # points of the base model's box that are simulated
-STARTS, APART = 24, 0.5  # of the base fit: the best of them that are so far apart in the unit cube
-FEW, PROMISING = 8, 10  # iterations after which only so many of them are refined
 ROUGH, EXACT = (12, 0.3), (40, 0.02)  # iterations and tolerance of the deviance
 FIRST = 4  # iterations after which the worse half of a set's starts is given up
 HOPELESS = 60.0  # of the deviance: a set this far behind then is not refined
-KEPT = 3  # of them that are refined with the measurement chain free
 PRIOR = 5.0  # smallest relevant sizes: how far the measurement chain is believed to be off, one standard deviation
 
 
@@ -229,18 +226,10 @@ class Study:
         return fit, noise
 
     def _base_starts(self) -> list[np.ndarray]:
-        """The best fits of the base model alone, by its own fast kernel, from the best points all over its box."""
-        likelihood, apart = Likelihood.of(self.kernels.bare), self._apart(0)
-        points = _best_apart(self.kernels.bare, STARTS)
-        begin = np.full((len(points), len(self.base) + len(self.before)), 0.5)
-        begin[:, : len(self.base)] = points
-        begun = descend(likelihood.rows, begin, None, FEW, 0.1, apart)
-        begin = begun.unit[np.argsort(begun.deviance)[:PROMISING]]
-        done = descend(likelihood.rows, begin, None, EXACT[0], 0.1, apart)
-        starts = np.tile(self.null, (min(KEPT, len(begin)), 1))
-        best = np.argsort(done.deviance)[:KEPT]
-        starts[:, self.base] = done.unit[best, : len(self.base)]
-        starts[:, self.before] = done.unit[best, len(self.base) :]
+        """The best fits of the base model alone, by its own fast kernel."""
+        found = best_fits(self.kernels.bare, self._apart(0))
+        starts = np.tile(self.null, (len(found), 1))
+        starts[:, [*self.base, *self.before]] = found
         return list(starts)
 
     def white(self) -> Noise:
@@ -291,18 +280,3 @@ class Study:
         """Residuals (2, N) of the base model at coordinates (D,), driven by the voltages of other events."""
         problem = Problem(self.model, events, self.kernels.bounds, self.kernels.fixed, self.kernels.substeps)
         return Likelihood.of(problem).residuals(np.r_[unit[self.base], unit[self.before]][None])[0]
-
-
-def _best_apart(problem: Problem, count: int) -> np.ndarray:
-    """The best of many points that fill the unit cube, none near another, (at most count, d).
-
-    The base model has valleys of its own that hold all but a few random starts.
-    """
-    points = even(SCREENED, problem.space.dimension)
-    chosen: list[int] = []
-    for k in np.argsort(problem.objective(problem.space.from_unit(points)), kind="stable"):
-        if all(np.linalg.norm(points[k] - points[c]) > APART for c in chosen):
-            chosen.append(int(k))
-        if len(chosen) == count:
-            break
-    return points[chosen]

@@ -21,6 +21,7 @@ from tractexp.discrepancy.study import Refit, Study
 
 REACH = 0.5  # smallest relevant sizes: the step of a candidate's difference quotient
 NUISANCE_STEP = 1e-4  # of a coordinate's range
+HELD = 1e-6  # of it: how far a parameter on its wall may move
 LEAST_KEPT = 0.2  # of a residual's variance: where columns explain more, it tells nothing of the noise
 DISTINCT = 1e-3  # of the largest singular value: directions weaker than this are rounding
 WINDOWS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)  # s after the end of the dip
@@ -190,8 +191,11 @@ def _signed_drop(block: np.ndarray, r: np.ndarray, signs: np.ndarray) -> tuple[n
     return drop, chdtrc(len(signs), drop)
 
 
-def tangent(study: Study, fit: Refit) -> Tangent:
-    """Differences of everything at a fit, in one batch. What is in the fit, and the chain, are nuisances."""
+def tangent(study: Study, fit: Refit, noise: Noise) -> Tangent:
+    """Differences of everything at a fit, in one batch. What is in the fit, and the chain, are nuisances.
+
+    A parameter on a wall that would leave the box is held there: what only values beyond its bounds explain is left.
+    """
     inside = [*study.base, *study.before, *study.parameters(fit.names)]
     chain = {name: study.sizes([name]) for name in study.catalogue.chain}
     nuisances = [*inside, *(k for members in chain.values() for k in members)]
@@ -211,15 +215,22 @@ def tangent(study: Study, fit: Refit) -> Tangent:
     cells = np.nan_to_num(raw[1 + 2 * k + m :] - base)
     columns = [Column(c, s, moved[a:b]) for c, s, a, b in labels]
     members = {name: [nuisances.index(c) for c in cols] for name, cols in chain.items()}
-    rows = sorted(i for group in members.values() for i in group)
+    white = noise.whiten(np.concatenate([nuisance, base[None]]), study.problem.drive, study.likelihood.known)
+    held = {i for i in np.flatnonzero(resting(fit.unit[nuisances], white[:k] @ white[k])) if i < len(inside)}
+    rows = sorted({*held, *(i for group in members.values() for i in group)})
     prior = np.zeros((len(rows), k))
     departure = np.zeros(k)
     for row, i in enumerate(rows):
-        prior[row, i] = 1 / study.prior_deviation(nuisances[i])
-        departure[i] = fit.unit[nuisances[i]] - study.null[nuisances[i]]
-    fitted = [i for i, column in enumerate(nuisances) if column in {*study.base, *study.parameters(fit.names)}]
-    split = _by_event(study, nuisance[fitted])
+        prior[row, i] = 1 / (HELD if i in held else study.prior_deviation(nuisances[i]))
+        departure[i] = 0.0 if i in held else fit.unit[nuisances[i]] - study.null[nuisances[i]]
+    fitted = {*study.base, *study.parameters(fit.names)}
+    split = _by_event(study, nuisance[[i for i, c in enumerate(nuisances) if c in fitted and i not in held]])
     return Tangent(study, base, nuisance, prior, departure, members, tuple(columns), split, cells, groups)
+
+
+def resting(unit: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+    """Which coordinates (k,) lie on a wall of the unit cube beyond which the deviance, with this gradient, falls."""
+    return ((unit <= 0) & (gradient > 0)) | ((unit >= 1) & (gradient < 0))
 
 
 def _by_event(study: Study, columns: np.ndarray) -> np.ndarray:

@@ -99,10 +99,10 @@ class Explanation:
 
 def stage(study: Study, fit: Refit, noise: Noise, seed: int, plain: bool = False) -> Stage:
     """All tests at one fit, under the noise of what no candidate explains there; `plain` takes it as known."""
-    t = tangent(study, fit)
+    t = tangent(study, fit, noise)
     noise = study.noise_in(rich_residuals(t, t.residual[None])[0], t.residual, t.explaining)
     fit = study.refit(noise, [(fit.names, fit.unit)])[0]
-    t = tangent(study, fit)
+    t = tangent(study, fit, noise)
     projection = t.whitened(noise)
     scores = projection.scores()
     plain = plain or (bool(scores) and scores[0].p < PLAIN)
