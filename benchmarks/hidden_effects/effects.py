@@ -178,9 +178,9 @@ class FeederImpedance(Hidden):
 
 @dataclass(frozen=True)
 class ShuntCapacitor(Hidden):
-    """A fixed bank, which gives with the square of the voltage and with frequency."""
+    """A fixed bank, which gives with the square of the voltage and with frequency; no larger than what it serves."""
 
-    reference, largest, unit = 0.3, 3.0, "pu"
+    reference, largest, unit = 0.3, 0.5, "pu"
 
     def apply(self, site: Site) -> Site:
         return beside(site, Capacitor(self.amount))
