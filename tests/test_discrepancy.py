@@ -400,6 +400,8 @@ def test_what_only_a_parameter_beyond_its_bounds_explains_is_left(silent):
     made = Study(study.model, study.catalogue, events(), {"T_prime": [1.05 * T, 2 * T]}, {})
     first = stage(made, *made.base_fit(), seed=0)
     assert first.fit.unit[made.column["T_prime"]] == 0.0
+    assert "T_prime" in first.resting
+    assert silent.first.resting == []
     assert first.fit.deviance > silent.first.fit.deviance + 50
     assert silent.first.p_left > ADEQUATE
     assert first.p_left < 1e-6

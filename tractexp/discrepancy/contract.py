@@ -68,13 +68,13 @@ def _own(finding: Finding) -> list[str]:
 
 
 def _standard_errors(finding: Finding) -> dict[str, float]:
-    """From the curvature at the chosen fit; a parameter the data do not hold has no number."""
+    """From the curvature at the chosen fit; a parameter that rests on its bound has no number."""
     study, stage = finding.study, finding.last
     inside = [*study.base, *study.before, *study.parameters(stage.fit.names)]
     columns = inside + [k for name in study.catalogue.chain for k in study.sizes([name])]
     inverse = np.linalg.pinv(stage.projection.R, rcond=1e-10)
     spread = np.sqrt(np.einsum("ij,ij->i", inverse, inverse))
-    labels = {k: name for name, k in study.column.items()}
+    labels = {k: name for name, k in study.column.items() if k not in stage.tangent.held}
     return {labels[k]: float(s * study.width(labels[k])) for k, s in zip(columns, spread, strict=True) if k in labels}
 
 

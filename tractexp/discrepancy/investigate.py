@@ -139,6 +139,8 @@ def investigate(
     names = sets[0] if sets else ()
     after = extended[chosen.fit.names] if names else bare
     last = chosen.stage or explanation.stages[-1]
+    if resting := (last if names else first).resting:
+        reason += f"; on a bound: {', '.join(resting)}"
     fitted = [*study.base, *study.before, *study.parameters(names)]
     return Finding(
         verdict, reason, names, sets,

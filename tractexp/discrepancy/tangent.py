@@ -62,6 +62,7 @@ class Tangent:
     split: np.ndarray  # (e, 2, N) differences of the fitted parameters, each in one event only
     cells: np.ndarray  # (c, 2, N) responses to injections
     groups: np.ndarray  # (c,) which balance an injection pushes
+    held: tuple[int, ...]  # columns of the parameters that rest on a wall
 
     @functools.cached_property
     def explaining(self) -> np.ndarray:
@@ -225,7 +226,8 @@ def tangent(study: Study, fit: Refit, noise: Noise) -> Tangent:
         departure[i] = 0.0 if i in held else fit.unit[nuisances[i]] - study.null[nuisances[i]]
     fitted = {*study.base, *study.parameters(fit.names)}
     split = _by_event(study, nuisance[[i for i, c in enumerate(nuisances) if c in fitted and i not in held]])
-    return Tangent(study, base, nuisance, prior, departure, members, tuple(columns), split, cells, groups)
+    walls = tuple(nuisances[i] for i in sorted(held))
+    return Tangent(study, base, nuisance, prior, departure, members, tuple(columns), split, cells, groups, walls)
 
 
 def resting(unit: np.ndarray, gradient: np.ndarray) -> np.ndarray:

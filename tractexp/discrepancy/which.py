@@ -64,6 +64,12 @@ class Stage:
         """What stands out most of that which this fit leaves."""
         return min(self.left, key=self.left.__getitem__)
 
+    @property
+    def resting(self) -> list[str]:
+        """Parameters that rest on a bound: better values lie beyond it."""
+        names = {k: name for name, k in self.tangent.study.column.items()}
+        return [names[k] for k in self.tangent.held]
+
     def significant(self, alpha: float) -> bool:
         """Whether any further effect of the load helps more than chance does."""
         level = self.null.critical_p(alpha)

@@ -143,7 +143,10 @@ def _added(made: Page, finding: Finding) -> None:
     with made.folded("All equations of the extended model"):
         for line in after:
             made.equation(line)
-    rows = [[n, f"{v['value']:.5g}", f"{v['standard_error']:.2g}"] for n, v in parameters(finding).items()]
+    rows = []
+    for name, at in parameters(finding).items():
+        error = at["standard_error"]
+        rows.append([name, f"{at['value']:.5g}", f"{error:.2g}" if np.isfinite(error) else "at its bound"])
     made.table(["parameter", "value", "standard error"], rows)
 
 
