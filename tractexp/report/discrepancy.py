@@ -204,10 +204,9 @@ def _panels(path: Path, study: Any, curves: list[tuple[str, np.ndarray, str | No
                 panel.axhline(0.0, color=style.FAINT, linewidth=0.6, zorder=0.5)
                 if e == 0:
                     panel.set_ylabel(f"residual of {name} [pu]")
-                    panel.legend(loc="best")
+                    panel.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none")
             panels[0, e].set_title(event.record.name)
             panels[1, e].set_xlabel("t [s]")
-        figure.subplots_adjust(
-            left=0.8 / figure.get_figwidth(), right=0.985, bottom=0.11, top=0.93, hspace=0.1, wspace=0.08
-        )
+        wide = figure.get_figwidth()
+        figure.subplots_adjust(left=0.8 / wide, right=1 - 0.2 / wide, bottom=0.11, top=0.93, hspace=0.1, wspace=0.08)
         return style.save(figure, path)

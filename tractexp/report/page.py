@@ -38,7 +38,7 @@ th { vertical-align: bottom; white-space: normal; border-bottom-color: var(--fai
 th:first-child, td:first-child, .words { text-align: left; }
 td.words { white-space: normal; }
 figure { margin: 1rem 0; break-inside: avoid; }
-figure svg { width: 100%; height: auto; }
+figure svg { max-width: 100%; height: auto; }
 figcaption { color: var(--faint); font-size: .88rem; max-width: 46rem; }
 .equation { margin: .7rem 0 .7rem 1.5rem; overflow-x: auto; } .equation svg { vertical-align: middle; }
 li { margin: .3rem 0; max-width: 46rem; }
