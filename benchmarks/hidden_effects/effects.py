@@ -28,7 +28,7 @@ class StatorResistance(Hidden):
 class SpeedDependentTorque(Hidden):
     """A share of the driven machines are fans and pumps, whose torque grows with the square of the speed."""
 
-    reference, largest, unit = 0.5, 1.5, "1"
+    reference, largest, unit = 0.5, 1.0, "1"
 
     def apply(self, site: Site) -> Site:
         return motors(site, fan=self.amount)

@@ -91,7 +91,7 @@ def left_over(study: Study, unit: np.ndarray, names: Sequence[str], noise: Noise
     rows = np.nan_to_num(rows)
     r, k = rows[0], len(fitted)
     nuisance, cells = rows[1 : 1 + k] - rows[1 + k : 1 + 2 * k], rows[1 + 2 * k :] - r
-    nuisance = nuisance[~resting(unit[list(fitted)], nuisance @ r)]
+    nuisance = nuisance[~resting(study, unit, fitted, nuisance @ r)]
     Q = np.linalg.qr(nuisance.T)[0]
     cells -= (cells @ Q) @ Q.T
     basis = spanned(cells, SAME)

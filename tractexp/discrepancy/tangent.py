@@ -62,7 +62,7 @@ class Tangent:
     split: np.ndarray  # (e, 2, N) differences of the fitted parameters, each in one event only
     cells: np.ndarray  # (c, 2, N) responses to injections
     groups: np.ndarray  # (c,) which balance an injection pushes
-    held: tuple[int, ...]  # columns of the parameters that rest on a wall
+    held: tuple[int, ...]  # columns of the base model's parameters that rest on a wall
 
     @functools.cached_property
     def explaining(self) -> np.ndarray:
@@ -195,7 +195,8 @@ def _signed_drop(block: np.ndarray, r: np.ndarray, signs: np.ndarray) -> tuple[n
 def tangent(study: Study, fit: Refit, noise: Noise) -> Tangent:
     """Differences of everything at a fit, in one batch. What is in the fit, and the chain, are nuisances.
 
-    A parameter on a wall that would leave the box is held there: what only values beyond its bounds explain is left.
+    A parameter of the base model on a wall that would leave the box is held there: what only values beyond its bounds
+    explain is left. Those of effects are not: they belong to a formula, not to the load.
     """
     inside = [*study.base, *study.before, *study.parameters(fit.names)]
     chain = {name: study.sizes([name]) for name in study.catalogue.chain}
@@ -217,7 +218,7 @@ def tangent(study: Study, fit: Refit, noise: Noise) -> Tangent:
     columns = [Column(c, s, moved[a:b]) for c, s, a, b in labels]
     members = {name: [nuisances.index(c) for c in cols] for name, cols in chain.items()}
     white = noise.whiten(np.concatenate([nuisance, base[None]]), study.problem.drive, study.likelihood.known)
-    held = {i for i in np.flatnonzero(resting(fit.unit[nuisances], white[:k] @ white[k])) if i < len(inside)}
+    held = set(np.flatnonzero(resting(study, fit.unit, nuisances, white[:k] @ white[k])).tolist())
     rows = sorted({*held, *(i for group in members.values() for i in group)})
     prior = np.zeros((len(rows), k))
     departure = np.zeros(k)
@@ -230,9 +231,14 @@ def tangent(study: Study, fit: Refit, noise: Noise) -> Tangent:
     return Tangent(study, base, nuisance, prior, departure, members, tuple(columns), split, cells, groups, walls)
 
 
-def resting(unit: np.ndarray, gradient: np.ndarray) -> np.ndarray:
-    """Which coordinates (k,) lie on a wall of the unit cube beyond which the deviance, with this gradient, falls."""
-    return ((unit <= 0) & (gradient > 0)) | ((unit >= 1) & (gradient < 0))
+def resting(study: Study, unit: np.ndarray, columns: Sequence[int], gradient: np.ndarray) -> np.ndarray:
+    """Which of the columns are parameters of the base model on a wall beyond which the deviance falls.
+
+    `gradient` of the deviance is needed for its sign only.
+    """
+    x = unit[list(columns)]
+    leaving = ((x <= 0) & (gradient > 0)) | ((x >= 1) & (gradient < 0))
+    return leaving & np.isin(columns, study.base)
 
 
 def _by_event(study: Study, columns: np.ndarray) -> np.ndarray:
