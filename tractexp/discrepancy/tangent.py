@@ -21,7 +21,7 @@ from tractexp.discrepancy.study import Refit, Study
 
 REACH = 0.5  # smallest relevant sizes: the step of a candidate's difference quotient
 NUISANCE_STEP = 1e-4  # of a coordinate's range
-HELD = 1e-6  # of it: how far a parameter on its wall may move
+WALL, HELD = 1e-3, 1e-6  # of it: how near a wall a parameter rests on it, and how far it may move then
 LEAST_KEPT = 0.2  # of a residual's variance: where columns explain more, it tells nothing of the noise
 DISTINCT = 1e-3  # of the largest singular value: directions weaker than this are rounding
 WINDOWS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)  # s after the end of the dip
@@ -237,7 +237,7 @@ def resting(study: Study, unit: np.ndarray, columns: Sequence[int], gradient: np
     `gradient` of the deviance is needed for its sign only.
     """
     x = unit[list(columns)]
-    leaving = ((x <= 0) & (gradient > 0)) | ((x >= 1) & (gradient < 0))
+    leaving = ((x <= WALL) & (gradient > 0)) | ((x >= 1 - WALL) & (gradient < 0))
     return leaving & np.isin(columns, study.base)
 
 
