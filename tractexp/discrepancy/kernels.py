@@ -154,9 +154,8 @@ class Kernels:
         if key not in self._made:
             assert key is not None
             model = self.family.with_effects(*key)
-            bounds, fixed = (
-                {n: v for n, v in given.items() if n in model.names} for given in (self.bounds, self.fixed)
-            )
+            bounds = {n: v for n, v in self.bounds.items() if n in model.names}
+            fixed = {n: v for n, v in self.fixed.items() if n in model.names}
             self._made[key] = self._simulator(Problem(model, self.events, bounds, fixed, self.substeps))
         return self._made[key]
 

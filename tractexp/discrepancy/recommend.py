@@ -34,6 +34,7 @@ def deciding_event(study: Study, tied: Sequence[Rival]) -> Decider:
     """
     dips = list(itertools.product(DEPTHS, DURATIONS))
     d, J = _response(study, tied[0], tied[1], [_dip(study, depth, duration) for depth, duration in dips])
+    assert tied[1].stage is not None
     R, order = tied[1].stage.projection.R, _order(study, tied[1])
     known = (R.T @ R)[np.ix_(order, order)]
     likely = [float(ndtr(np.sqrt(_apart(d[e], J[:, e], known)) - ONE_SIDED)) for e in range(len(dips))]
@@ -62,6 +63,7 @@ def _response(
     made = study.kernels.simulate((*truth.fit.names, *rival.fit.names), points, Drive.of(dips))
     each = np.moveaxis(made.reshape(len(points), 2, len(dips), -1), 2, 1).reshape(-1, 2, len(dips[0].U))
     one = Drive.of(dips[:1])
+    assert rival.stage is not None
     noise = rival.stage.noise.on(np.ones(one.samples))
     rows = noise.whiten(each, one, one.weights > 0).reshape(len(points), len(dips), -1)
     k = len(inside)
