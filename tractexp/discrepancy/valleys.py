@@ -15,27 +15,31 @@ SCREENED = 4096  # points of the box that are simulated
 STARTS, APART = 24, 0.5  # the best of them that are so far apart in the unit cube
 FEW, PROMISING = 8, 10  # iterations after which only so many of them are refined
 MORE, TOLERANCE = 12, 0.1  # iterations of those, and of the deviance
-KEPT = 3
+KEPT, DISTINCT = 3, 0.1  # of their ends, and how far apart in the unit cube: several end in the same valley
 
 
 def best_fits(problem: Problem, apart: Sequence[Apart]) -> np.ndarray:
-    """Coordinates (at most 3, free + 2 E) of the best fits: free parameters, then P0 and Q0 of each event."""
-    likelihood, points = Likelihood.of(problem), _best_apart(problem)
+    """Coordinates (at most 3, free + 2 E) of the best fits of distinct valleys: parameters, P0 and Q0 of each event.
+
+    The best of them may not stay so once what the recorder did is free.
+    """
+    likelihood, points = Likelihood.of(problem), even(SCREENED, problem.space.dimension)
+    points = points[_apart(points, problem.objective(problem.space.from_unit(points)), APART, STARTS)]
     begin = np.full((len(points), points.shape[1] + 2 * problem.drive.events), 0.5)
     begin[:, : points.shape[1]] = points
     begun = descend(likelihood.rows, begin, None, FEW, TOLERANCE, apart)
     promising = begun.unit[np.argsort(begun.deviance)[:PROMISING]]
     done = descend(likelihood.rows, promising, None, MORE, TOLERANCE, apart)
-    return done.unit[np.argsort(done.deviance)[:KEPT]]
+    ends = done.unit[:, : points.shape[1]]
+    return done.unit[_apart(ends, done.deviance, DISTINCT, KEPT)]
 
 
-def _best_apart(problem: Problem) -> np.ndarray:
-    """The best of many points that fill the unit cube, none near another, (at most 24, free)."""
-    points = even(SCREENED, problem.space.dimension)
+def _apart(points: np.ndarray, values: np.ndarray, distance: float, count: int) -> list[int]:
+    """Which points (n, d) have the lowest values (n,), at most `count`, none nearer than `distance` to another."""
     chosen: list[int] = []
-    for k in np.argsort(problem.objective(problem.space.from_unit(points)), kind="stable"):
-        if all(np.linalg.norm(points[k] - points[c]) > APART for c in chosen):
+    for k in np.argsort(values, kind="stable"):
+        if all(np.linalg.norm(points[k] - points[c]) > distance for c in chosen):
             chosen.append(int(k))
-        if len(chosen) == STARTS:
+        if len(chosen) == count:
             break
-    return points[chosen]
+    return chosen
