@@ -219,14 +219,15 @@ class Study:
         `starts` (D,) save the search of the whole box.
         """
         noise = self.white()
-        fit = self.refit(noise, [((), start) for start in starts or self._base_starts()])[0]
+        fit = self.refit(noise, [((), start) for start in starts or self.starts])[0]
         for _ in range(2):
             noise = self.noise(fit.unit)
             fit = self.refit(noise, [((), fit.unit)])[0]
         return fit, noise
 
-    def _base_starts(self) -> list[np.ndarray]:
-        """The best fits of the base model alone, by its own fast kernel."""
+    @functools.cached_property
+    def starts(self) -> list[np.ndarray]:
+        """The best fits (D,) of the base model alone, by its own fast kernel."""
         found = best_fits(self.kernels.bare, self._apart(0))
         starts = np.tile(self.null, (len(found), 1))
         starts[:, [*self.base, *self.before]] = found
