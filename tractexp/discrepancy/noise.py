@@ -52,13 +52,14 @@ class Noise:
 
     def whiten(self, residuals: np.ndarray, drive: Drive, known: np.ndarray) -> np.ndarray:
         """(n, 2, N) to rows (n, 2 N) of independent unit variance; samples that do not count are 0."""
-        mixed = self._mixed(residuals)
         both = known.all(axis=0)
-        rows = np.empty_like(mixed)
-        for e in range(drive.events):
-            part = drive.part(e)
-            white = self._fast(mixed[:, :, part], both[part])
-            rows[:, :, part] = self._settled(white, e, part, both[part])
+        with np.errstate(over="ignore", invalid="ignore"):  # what diverges has a deviance that is not finite
+            mixed = self._mixed(residuals)
+            rows = np.empty_like(mixed)
+            for e in range(drive.events):
+                part = drive.part(e)
+                white = self._fast(mixed[:, :, part], both[part])
+                rows[:, :, part] = self._settled(white, e, part, both[part])
         return rows.reshape(len(rows), -1)
 
     def _fast(self, mixed: np.ndarray, known: np.ndarray) -> np.ndarray:

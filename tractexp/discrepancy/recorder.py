@@ -32,7 +32,8 @@ def opened(
     for cycles, window in windows.items():
         phasors = Phasors(window)
         behind = Study(model.behind(phasors), catalogue, events, bounds, fixed, study.kernels.substeps)
-        fit = behind.refit(first.noise, [((), start) for start in (first.fit.unit, *study.starts)])[0]
+        begun = behind.rough_refit(first.noise, [((), start) for start in (first.fit.unit, *study.starts)])[0]
+        fit = behind.refit(first.noise, [((), begun.unit)])[0]
         gained = first.fit.deviance - fit.deviance
         if cycles == 1 and gained <= 0:
             break  # an average over several cycles is one of averages over one

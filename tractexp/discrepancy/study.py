@@ -160,7 +160,7 @@ class Study:
         """As `refit`, good enough to rank sets that are far apart; what falls behind early is given up."""
         begun = self._descended(noise, wanted, None, (FIRST, ROUGH[1]))
         best = self._best(begun)
-        promising = [r.names for r in best if r.cost < best[0].cost + HOPELESS]
+        promising = [r.names for r in best if r.cost <= best[0].cost + HOPELESS]
         again = []
         for names in promising:
             starts = sorted((r for r in begun if r.names == names), key=lambda r: r.deviance)
