@@ -35,6 +35,7 @@ HIDDEN = {  # one effect is hidden: group of trials, multiples, effects
     "left_out": (LEFT_OUT, LARGE, PHYSICAL),
 }
 SUITES = ("nulls", "nuisances", *HIDDEN, "pairs")
+BEST = 3  # single effects of which the least that any leaves is taken
 SAME = {  # effects whose amount is a parameter of the model, in its units
     "stator_resistance": "R_s",
     "speed_dependent_torque": "quadratic_share",
@@ -102,6 +103,8 @@ def _counted(finding) -> dict:
         "closed": finding.train.closed,
         "refitted": finding.refitted,
         "closed_held": None if finding.validate is None else finding.validate.closed,
+        "gain_held": None if finding.validate is None else [finding.validate.gain, finding.validate.expected],
+        "left_of_all": None if finding.held_out is None else finding.held_out.p_left,
         "p_first": first.scores[0].p if first.scores else 1.0,
         "first": first.scores[0].name if first.scores else "",
         "stages": [[list(s.fit.names), s.scores[0].name, s.scores[0].p] for s in finding.explanation.stages],
@@ -138,9 +141,28 @@ def _compared(finding, trial: cases.Trial) -> dict:
         N = finding.study.problem.drive.samples
         change = (clean - without)[:, :N]
         projection = finding.first.tangent.whitened(finding.first.noise, -change[None])
-        whole = float(projection.r[0] @ projection.r[0])
-        row |= {"lambda": whole, "lambda_left": whole - float(projection.drops[0].max(initial=0.0))}
+        row |= {"lambda": float(projection.r[0] @ projection.r[0]), "lambda_left": _left(finding, clean[:, :N])}
     return row
+
+
+def _left(finding, clean: np.ndarray) -> float:
+    """Non-centrality that the best single effect leaves of clean curves (2, N), refitted to the noisy ones.
+
+    At its fit the problem is linear enough: what its parameters and the nuisances can still take is projected out.
+    """
+    from tractexp.discrepancy.tangent import tangent
+    from tractexp.discrepancy.which import searched
+
+    study, first, refits = finding.study, finding.first, finding.explanation.refits
+    singles = [fit for names, fit in refits.items() if len(names) == 1]
+    singles = singles or searched(study, [first], {(): first.fit}, 1, lambda line: None)
+    left = []
+    for fit in sorted(singles, key=lambda f: f.cost)[:BEST]:
+        t = tangent(study, fit, first.noise)
+        off = (t.residual + study.problem.drive.measured - clean) * study.likelihood.known
+        rows = t.whitened(first.noise, off[None]).r[0]
+        left.append(float(rows @ rows))
+    return min(left)
 
 
 def _powers(records: list[dict]) -> np.ndarray:

@@ -26,11 +26,11 @@ from tractexp.discrepancy.noise import Noise as PowerNoise
 from tractexp.discrepancy.noise import estimate
 from tractexp.discrepancy.recommend import deciding_event
 from tractexp.discrepancy.study import Study
-from tractexp.discrepancy.sure import ADEQUATE, ONE_SIDED
+from tractexp.discrepancy.sure import ONE_SIDED
 from tractexp.discrepancy.tangent import _signed_drop, tangent
 from tractexp.discrepancy.voltage import smoothed
 from tractexp.discrepancy.wander import Rest, Wander, find
-from tractexp.discrepancy.which import stage
+from tractexp.discrepancy.which import ADEQUATE, elsewhere, stage
 from tractexp.errors import UserError
 from tractexp.identify.descent import Apart, normal
 from tractexp.identify.noise import Autoregression, white_noise
@@ -337,13 +337,13 @@ def test_all_events_together_confirm_only_what_the_held_out_ones_show(planted):
     fit = lambda made: together(trained, made, planted.bare, [alone], noise, (), seed=0)  # noqa: E731
     (confirmed,) = fit(events("stator_resistance", size=2.0, count=3)[2:])
     assert confirmed.louder > SHOWN
-    assert confirmed.stands
+    assert confirmed.p_left > ADEQUATE
     assert confirmed.fit.names == ("stator_resistance",)
     assert confirmed.fit.unit.shape == alone.unit.shape
     assert trained.value("R_s", confirmed.fit.unit) == pytest.approx(trained.value("R_s", alone.unit), rel=0.2)
     (denied,) = fit(events(None, count=3)[2:])
     assert denied.louder < 0
-    assert not denied.stands
+    assert denied.p_left < ADEQUATE
 
 
 def test_an_effect_that_closes_little_of_the_held_out_gap_must_leave_nothing_in_a_fit_to_all_events(planted):
@@ -365,6 +365,20 @@ def test_an_effect_that_closes_little_of_the_held_out_gap_must_leave_nothing_in_
     assert stepped.gap.helps
     assert stepped.gap.closed < CONVINCING
     assert not stepped.helps
+
+
+def test_an_effect_is_looked_for_from_the_other_valleys_of_the_base_model():
+    """A large capacitor draws the base fit to another leakage and dispersion, where none of any size would help."""
+    only = ("shunt_capacitor", "low_frequency_oscillation")
+    found = investigate(
+        base(), events("shunt_capacitor", size=0.5 / 0.3, seed=2048740674, count=3), (), {}, {}, only=only
+    )
+    first, single = found.first, found.explanation.refits["shunt_capacitor",]
+    ground, better = elsewhere(found.study, first, {(): first.fit}, lambda line: None)
+    assert ground.fit.deviance > first.fit.deviance + 1000
+    assert single.deviance < first.fit.deviance - 1000
+    assert min(better, key=lambda f: f.deviance).names == ("shunt_capacitor",)
+    assert found.names == ("shunt_capacitor",)
 
 
 def test_the_deciding_dip_looks_at_the_load_and_not_at_what_the_recorder_did(planted):
@@ -403,7 +417,7 @@ def test_what_only_a_parameter_beyond_its_bounds_explains_is_left(silent):
     assert "T_prime" in first.resting
     assert silent.first.resting == []
     assert first.fit.deviance > silent.first.fit.deviance + 50
-    assert silent.first.p_left > ADEQUATE
+    assert silent.first.adequate
     assert first.p_left < 1e-6
 
 

@@ -9,12 +9,12 @@ from tractexp.discrepancy.gap import SHOWN, Gap, gap
 from tractexp.discrepancy.kernels import each_apart
 from tractexp.discrepancy.noise import Noise
 from tractexp.discrepancy.study import Refit, Study
-from tractexp.discrepancy.sure import ADEQUATE
-from tractexp.discrepancy.which import stage
+from tractexp.discrepancy.which import ADEQUATE, stage
 from tractexp.identify.descent import descend
 from tractexp.record import Event
 
 CONVINCING = 0.8  # of the explainable gap: an effect that closes as much on held-out events is not doubted
+STANDS = 0.05  # p that it must else leave in a fit to all events: every second wrong name lies below
 QUIETER = 3.0  # of the deviance: so much less may all events say for an explanation that the held-out ones do not show
 
 
@@ -22,18 +22,19 @@ QUIETER = 3.0  # of the deviance: so much less may all events say for an explana
 class Judged:
     """The gap of one explanation on the held-out events, and the coordinates of both models there.
 
-    `stands` tells whether a fit to all events leaves nothing, where that was asked.
+    `p_left` tells how often chance leaves as much as a fit to all events does, where that was asked.
     """
 
     gap: Gap
     study: Study
     units: list[np.ndarray]
-    stands: bool = True
+    p_left: float = 1.0
 
     @property
     def helps(self) -> bool:
         """Whether the explanation is worth having beyond the events it was fitted to."""
-        return self.gap.helps and self.stands
+        least = STANDS if self.gap.expected >= SHOWN else ADEQUATE  # no event of which little is expected denies it
+        return self.gap.helps and self.p_left >= least
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,12 +43,12 @@ class Refitted:
 
     fit: Refit
     louder: float  # by how much all events speak louder for it than the fitted ones alone, of the deviance
-    stands: bool  # whether it leaves nothing
+    p_left: float  # how often chance leaves as much as it does
 
 
 def weighed(
     trained: Study, events: Sequence[Event], bare: Refit, extended: Sequence[Refit], noise: Noise,
-    chain: Sequence[str], seed: int, doubted: bool,
+    chain: Sequence[str], seed: int, *, doubted: bool,
 ) -> tuple[dict[tuple[str, ...], Judged], list[Refit]]:  # fmt: skip
     """Judge explanations on held-out events; where none helps as it was fitted, also those that all events confirm.
 
@@ -60,11 +61,11 @@ def weighed(
     if not helping:
         all_of_them = together(trained, events, bare, extended, noise, chain, seed, anew=True)
         least = -QUIETER if doubted else SHOWN
-        again = [refitted.fit for refitted in all_of_them if refitted.louder > least and refitted.stands]
+        again = [refitted.fit for refitted in all_of_them if refitted.louder > least and refitted.p_left >= ADEQUATE]
         return found | (judged(trained, events, bare, again) if again else {}), again
     doubtful = [f for f in helping if len(f.names) + len(chain) > 1 or not found[f.names].gap.closed >= CONVINCING]
     for refitted in together(trained, events, bare, doubtful, noise, chain, seed) if doubtful else ():
-        found[refitted.fit.names] = replace(found[refitted.fit.names], stands=refitted.stands)
+        found[refitted.fit.names] = replace(found[refitted.fit.names], p_left=refitted.p_left)
     return found, []
 
 
@@ -120,9 +121,9 @@ def together(
     def told(fit: Refit) -> Refitted:
         alone = next(e for e in extended if e.names == fit.names)
         louder = (first.deviance - fit.deviance) - (bare.deviance - alone.deviance)
-        stands = stage(study, fit, noise, seed, plain=True).p_left >= ADEQUATE
+        p_left = stage(study, fit, noise, seed, plain=True).p_left
         unit = np.r_[fit.unit[: study.problem.space.dimension], fit.unit[study.before][: len(trained.before)]]
-        return Refitted(replace(fit, unit=unit), louder, stands)
+        return Refitted(replace(fit, unit=unit), louder, p_left)
 
     return each_apart(told, study.refit(noise, wanted, chain=chain))
 

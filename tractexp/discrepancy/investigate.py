@@ -13,7 +13,7 @@ from tractexp.discrepancy.noise import Noise
 from tractexp.discrepancy.recommend import Decider, deciding_event
 from tractexp.discrepancy.recorder import opened
 from tractexp.discrepancy.study import Refit, Study
-from tractexp.discrepancy.sure import ADEQUATE, Rival, surviving
+from tractexp.discrepancy.sure import Rival, surviving
 from tractexp.discrepancy.where import Place, where
 from tractexp.discrepancy.which import Explanation, Stage, explain
 from tractexp.errors import UserError
@@ -125,8 +125,8 @@ def investigate(
     found, together = {}, []
     if validate and any(s.fit.names or chain for s in adequate):
         tell(f"judging {len(adequate)} explanation{'s' * (len(adequate) > 1)} on the held-out events")
-        doubted = first.p_left < ADEQUATE
-        found, together = weighed(study, validate, bare, list(extended.values()), noise, chain, seed, doubted)
+        judging = (bare, list(extended.values()), noise, chain, seed)
+        found, together = weighed(study, validate, *judging, doubted=not first.adequate)
         extended |= {f.names: f for f in together}
     kept = [s for s in adequate if s.fit.names not in found or found[s.fit.names].helps]
     verdict, reason = _verdict(explanation, survivors, adequate, kept, chain, alpha)
@@ -186,7 +186,7 @@ def _verdict(
     """The verdict and the sentence behind it."""
     base = explanation.stages[0]
     nothing = not explanation.chosen.names and not chain
-    if nothing and base.p_left >= ADEQUATE:
+    if nothing and base.adequate:
         return "none", f"no disagreement above the noise, at a false-alarm rate of {alpha:.0%}"
     if not adequate:
         return "unexplained", (
@@ -194,7 +194,7 @@ def _verdict(
             f" explanation would come about by chance with p = {survivors[0].stage.p_left:.2g}; what stands out most:"
             f" {survivors[0].stage.loudest}"
         )
-    if not kept and base.p_left >= ADEQUATE:
+    if not kept and base.adequate:
         return "none", (
             "what seemed to help on the fitted events does not help on the held-out ones, and what the base model"
             " leaves is no more than chance leaves"

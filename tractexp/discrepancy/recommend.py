@@ -37,13 +37,13 @@ def deciding_event(study: Study, tied: Sequence[Rival]) -> Decider:
     assert tied[1].stage is not None
     R, order = tied[1].stage.projection.R, _order(study, tied[1])
     known = (R.T @ R)[np.ix_(order, order)]
-    likely = [float(ndtr(np.sqrt(_apart(d[e], J[:, e], known)) - ONE_SIDED)) for e in range(len(dips))]
+    likely = [float(ndtr(np.sqrt(_separation(d[e], J[:, e], known)) - ONE_SIDED)) for e in range(len(dips))]
     rated = [Decider(*dip, p) for dip, p in zip(dips, likely, strict=True)]
     enough = [r for r in rated if r.probability >= DECIDED]
     return min(enough, key=lambda r: r.depth * r.duration) if enough else max(rated, key=lambda r: r.probability)
 
 
-def _apart(d: np.ndarray, J: np.ndarray, known: np.ndarray) -> float:
+def _separation(d: np.ndarray, J: np.ndarray, known: np.ndarray) -> float:
     """lambda of one dip; 0 where a model does not survive it."""
     if not (np.isfinite(d).all() and np.isfinite(J).all()):
         return 0.0

@@ -32,7 +32,8 @@ def opened(
     for cycles, window in windows.items():
         phasors = Phasors(window)
         behind = Study(model.behind(phasors), catalogue, events, bounds, fixed, study.kernels.substeps)
-        begun = behind.rough_refit(first.noise, [((), start) for start in (first.fit.unit, *study.starts)])[0]
+        behind.starts = study.starts  # the load's valleys: no window moves them far
+        begun = behind.rough_refit(first.noise, [((), start) for start in (first.fit.unit, *behind.starts)])[0]
         fit = behind.refit(first.noise, [((), begun.unit)])[0]
         gained = first.fit.deviance - fit.deviance
         if cycles == 1 and gained <= 0:

@@ -26,7 +26,7 @@ from tractexp.record import Event
 
 ROUGH, EXACT = (12, 0.3), (40, 0.02)  # iterations and tolerance of the deviance
 FIRST = 4  # iterations after which the worse half of a set's starts is given up
-HOPELESS = 60.0  # of the deviance: a set this far behind then is not refined
+HOPELESS, SLOW = 60.0, 0.3  # of the deviance, and of what it spans: a set this far behind then is not refined
 PRIOR = 5.0  # smallest relevant sizes: how far the measurement chain is believed to be off, one standard deviation
 
 
@@ -160,7 +160,8 @@ class Study:
         """As `refit`, good enough to rank sets that are far apart; what falls behind early is given up."""
         begun = self._descended(noise, wanted, None, (FIRST, ROUGH[1]))
         best = self._best(begun)
-        promising = [r.names for r in best if r.cost <= best[0].cost + HOPELESS]
+        far = max(HOPELESS, SLOW * (best[-1].cost - best[0].cost))
+        promising = [r.names for r in best if r.cost <= best[0].cost + far]
         again = []
         for names in promising:
             starts = sorted((r for r in begun if r.names == names), key=lambda r: r.deviance)
@@ -232,6 +233,11 @@ class Study:
         starts = np.tile(self.null, (len(found), 1))
         starts[:, [*self.base, *self.before]] = found
         return list(starts)
+
+    def valleys_but(self, unit: np.ndarray) -> list[np.ndarray]:
+        """The best fits of the base model but the one nearest to coordinates (D,)."""
+        far = [float(np.linalg.norm((start - unit)[self.base])) for start in self.starts]
+        return [start for start, distance in zip(self.starts, far, strict=True) if distance > min(far)]
 
     def white(self) -> Noise:
         """White noise of the level before the dips: what is known before the first fit."""

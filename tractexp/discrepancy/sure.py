@@ -20,7 +20,6 @@ from tractexp.discrepancy.which import Explanation, Stage, stage
 ONE_SIDED = 1.6449  # standard deviations: 5 %
 REJECTED = 3.5  # standard deviations: more than chance asks for, since a true effect's formula is not quite its physics
 ALIKE = 0.05  # of what the best explains: no rival this near is rejected, for no formula is that exact
-ADEQUATE = 0.003  # p below which a fit leaves something: rarer than 199 draws can tell by themselves
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +36,7 @@ class Rival:
     @property
     def adequate(self) -> bool:
         """Whether nothing is left that a push into some balance explains."""
-        return self.stage is not None and self.stage.p_left >= ADEQUATE
+        return self.stage is not None and self.stage.adequate
 
 
 def rivals(study: Study, explanation: Explanation) -> tuple[list[Rival], Noise]:

@@ -13,28 +13,28 @@ from tractexp.identify.problem import Problem, even
 
 SCREENED = 4096  # points of the box that are simulated
 STARTS, APART = 24, 0.5  # the best of them that are so far apart in the unit cube
-FEW, PROMISING = 8, 10  # iterations after which only so many of them are refined
+FEW, SAME, PROMISING = 8, 0.05, 10  # iterations after which only so many, so far apart, are refined
 MORE, TOLERANCE = 12, 0.1  # iterations of those, and of the deviance
-KEPT, DISTINCT = 3, 0.1  # of their ends, and how far apart in the unit cube: several end in the same valley
+KEPT, DISTINCT = 4, 0.2  # of their ends, and how far apart in the unit cube: several end in the same valley
 
 
 def best_fits(problem: Problem, apart: Sequence[Apart]) -> np.ndarray:
-    """Coordinates (at most 3, free + 2 E) of the best fits of distinct valleys: parameters, P0 and Q0 of each event.
+    """Coordinates (at most 4, free + 2 E) of the best fits of distinct valleys: parameters, P0 and Q0 of each event.
 
     The best of them may not stay so once what the recorder did is free.
     """
     likelihood, points = Likelihood.of(problem), even(SCREENED, problem.space.dimension)
-    points = points[_apart(points, problem.objective(problem.space.from_unit(points)), APART, STARTS)]
+    points = points[_distinct(points, problem.objective(problem.space.from_unit(points)), APART, STARTS)]
     begin = np.full((len(points), points.shape[1] + 2 * problem.drive.events), 0.5)
     begin[:, : points.shape[1]] = points
     begun = descend(likelihood.rows, begin, None, FEW, TOLERANCE, apart)
-    promising = begun.unit[np.argsort(begun.deviance)[:PROMISING]]
+    free = slice(points.shape[1])
+    promising = begun.unit[_distinct(begun.unit[:, free], begun.deviance, SAME, PROMISING)]
     done = descend(likelihood.rows, promising, None, MORE, TOLERANCE, apart)
-    ends = done.unit[:, : points.shape[1]]
-    return done.unit[_apart(ends, done.deviance, DISTINCT, KEPT)]
+    return done.unit[_distinct(done.unit[:, free], done.deviance, DISTINCT, KEPT)]
 
 
-def _apart(points: np.ndarray, values: np.ndarray, distance: float, count: int) -> list[int]:
+def _distinct(points: np.ndarray, values: np.ndarray, distance: float, count: int) -> list[int]:
     """Which points (n, d) have the lowest values (n,), at most `count`, none nearer than `distance` to another."""
     chosen: list[int] = []
     for k in np.argsort(values, kind="stable"):

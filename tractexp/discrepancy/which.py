@@ -6,8 +6,8 @@ look alike; the shortlist is refitted nonlinearly from several starts, side by s
 
 import functools
 import itertools
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from tractexp.discrepancy.tangent import (
     rich_residuals,
     tangent,
 )
+from tractexp.discrepancy.valleys import DISTINCT
 
 MOST_EFFECTS = 3
 SHORTLIST = {1: 10, 2: 8, 3: 6}  # sets of each size that are refitted
@@ -30,6 +31,7 @@ RARER = 0.1  # by how much a load effect beside one of the measurement chain mus
 FURTHER = (1e-5, 1e-9)  # p a second and a third name must undercut: they spoil right ones, or patch up wrong ones
 PLAIN = 1e-10  # a score of this p needs no exact threshold
 PATCHED = 4  # sets of one size that are tried before a further effect is added
+ADEQUATE = 0.003  # p below which a fit leaves something: rarer than 199 draws can tell by themselves
 NESTED = 0.1  # a set may be worse than its own subset by no more than this, or the refit did not converge
 
 
@@ -53,6 +55,11 @@ class Stage:
     def p_left(self) -> float:
         """The same by the most surprised test, corrected for their number."""
         return min(1.0, len(self.left) * min(self.left.values()))
+
+    @property
+    def adequate(self) -> bool:
+        """Whether chance alone may leave as much."""
+        return self.p_left >= ADEQUATE
 
     @property
     def further(self) -> float:
@@ -122,23 +129,59 @@ def explain(
 
     `first` holds the tests of the base model.
     """
-    stages = [first]
+    stages, ground = [first], first
     refits = {(): first.fit}
     while stages[-1].significant(alpha) and len(stages[-1].fit.names) < MOST_EFFECTS:
         size = len(stages[-1].fit.names) + 1
-        wanted = shortlist(stages, size, study)
-        tell(f"refitting {len(wanted)} {'effect' if size == 1 else f'sets of {size}'}{'s' * (size == 1)}")
-        noise = stages[-1].noise
-        fits = study.rough_refit(noise, [s for n in wanted for s in starts(study, stages, refits, n)])
-        near = [f for f in fits if f.cost < fits[0].cost + CLOSE]
-        exact = {f.names: f for f in study.refit(noise, [(f.names, f.unit) for f in near])}
-        fits = [exact.get(f.names, f) for f in fits]
+        fits = searched(study, [ground, *stages[1:]], refits, size, tell)
         refits |= {f.names: f for f in fits}
-        fits = nested(study, noise, refits, fits)
-        refits |= {f.names: f for f in fits}
-        ranked = sorted(fits, key=lambda f: (f.cost, f.names))
-        stages.append(sufficient(study, ranked, noise, alpha, seed + size))
+        found = sufficient(study, fits, stages[-1].noise, alpha, seed + size)
+        if size == 1 and (found.significant(alpha) or not found.adequate):
+            ground, better = elsewhere(study, first, refits, tell)
+            if better:
+                refits |= {f.names: f for f in better}
+                fits = sorted((f for f in refits.values() if f.names), key=lambda f: (f.cost, f.names))
+                found = sufficient(study, fits, first.noise, alpha, seed + size)
+        stages.append(found)
     return Explanation(stages, refits)
+
+
+def searched(
+    study: Study, stages: Sequence[Stage], refits: Mapping[tuple[str, ...], Refit], size: int,
+    tell: Callable[[str], None],
+) -> list[Refit]:  # fmt: skip
+    """The most promising sets of one size refitted, the best first. `stages` begin with one without effects."""
+    wanted = shortlist(stages, size, study)
+    tell(f"refitting {len(wanted)} {'effect' if size == 1 else f'sets of {size}'}{'s' * (size == 1)}")
+    noise = stages[-1].noise
+    fits = study.rough_refit(noise, [s for n in wanted for s in starts(study, stages, refits, n)])
+    near = [f for f in fits if f.cost < fits[0].cost + CLOSE]
+    exact = {f.names: f for f in study.refit(noise, [(f.names, f.unit) for f in near])}
+    fits = [exact.get(f.names, f) for f in fits]
+    fits = nested(study, noise, {**refits, **{f.names: f for f in fits}}, fits)
+    return sorted(fits, key=lambda f: (f.cost, f.names))
+
+
+def elsewhere(
+    study: Study, first: Stage, refits: Mapping[tuple[str, ...], Refit], tell: Callable[[str], None]
+) -> tuple[Stage, list[Refit]]:
+    """Single effects that explain more from another valley of the base model, and the base model there.
+
+    Where an effect is missing, a wrong valley may fit better than the right one.
+    """
+    ground, found = first, dict(refits)
+    for valley in study.valleys_but(first.fit.unit):
+        fit = study.refit(first.noise, [((), valley)])[0]
+        if np.linalg.norm((fit.unit - first.fit.unit)[study.base]) < DISTINCT:
+            continue
+        t = tangent(study, fit, first.noise)
+        projection = t.whitened(first.noise)
+        at = replace(first, fit=fit, tangent=t, projection=projection, scores=projection.scores())
+        fits = searched(study, [at], {(): fit}, 1, tell)
+        if fits[0].cost < min(f.cost for f in found.values()):
+            ground = at
+        found |= {f.names: f for f in fits if f.names not in found or f.cost < found[f.names].cost}
+    return ground, [f for f in found.values() if refits.get(f.names) is not f]
 
 
 def sufficient(study: Study, ranked: Sequence[Refit], noise: Noise, alpha: float, seed: int) -> Stage:
@@ -183,7 +226,7 @@ def _column(base: Stage, score: Score) -> np.ndarray:
 
 
 def starts(
-    study: Study, stages: Sequence[Stage], refits: dict[tuple[str, ...], Refit], names: tuple[str, ...]
+    study: Study, stages: Sequence[Stage], refits: Mapping[tuple[str, ...], Refit], names: tuple[str, ...]
 ) -> list[tuple[tuple[str, ...], np.ndarray]]:
     """Starts for one set: each subset's fit with the others at their one-step size, at their best two settings."""
     made = []
@@ -224,7 +267,7 @@ def ranked_settings(at: Stage, name: str) -> list[tuple[Column, np.ndarray]]:
     return [(c, s) for _, c, s in sorted(rows, key=lambda row: -row[0])]
 
 
-def nested(study: Study, noise: Noise, refits: dict[tuple[str, ...], Refit], fits: list[Refit]) -> list[Refit]:
+def nested(study: Study, noise: Noise, refits: Mapping[tuple[str, ...], Refit], fits: list[Refit]) -> list[Refit]:
     """Refit from its best subset any set that came out worse than that subset: its search had not converged."""
     again = []
     for fit in fits:

@@ -9,7 +9,6 @@ from tractexp.discrepancy.contract import parameters, recommendation
 from tractexp.discrepancy.investigate import Finding
 from tractexp.discrepancy.judgement import judge
 from tractexp.discrepancy.left import SMALLEST_P
-from tractexp.discrepancy.sure import ADEQUATE
 from tractexp.report import style
 from tractexp.report.page import Page
 
@@ -74,7 +73,7 @@ def _gate(finding: Finding) -> str:
     best = first.scores[0] if first.scores else None
     critical = first.null.critical_p(finding.alpha)
     text = f"What the base fit leaves would come about by chance with p = {first.p_left:.2g}"
-    text += f"; {first.loudest} stands out." if first.p_left < ADEQUATE else "."
+    text += f"; {first.loudest} stands out." if not first.adequate else "."
     if best is None:
         return text
     p = max(best.p, SMALLEST_P)
