@@ -177,7 +177,7 @@ def elsewhere(
         t = tangent(study, fit, first.noise)
         projection = t.whitened(first.noise)
         at = replace(first, fit=fit, tangent=t, projection=projection, scores=projection.scores())
-        fits = searched(study, [at], {(): fit}, 1, tell)
+        fits = searched(study, [at], {(): fit}, 1, lambda line: tell(f"{line} from another valley of the base model"))
         if fits[0].cost < min(f.cost for f in found.values()):
             ground = at
         found |= {f.names: f for f in fits if f.names not in found or f.cost < found[f.names].cost}
