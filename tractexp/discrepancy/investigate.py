@@ -125,8 +125,9 @@ def investigate(
     found, together = {}, []
     if validate and any(s.fit.names or chain for s in adequate):
         tell(f"judging {len(adequate)} explanation{'s' * (len(adequate) > 1)} on the held-out events")
-        judging = (bare, list(extended.values()), noise, chain, seed)
-        found, together = weighed(study, validate, *judging, doubted=not first.adequate)
+        found, together = weighed(
+            study, validate, bare, list(extended.values()), noise, chain, seed, doubted=not first.adequate
+        )
         extended |= {f.names: f for f in together}
     kept = [s for s in adequate if s.fit.names not in found or found[s.fit.names].helps]
     verdict, reason = _verdict(explanation, survivors, adequate, kept, chain, alpha)
