@@ -5,7 +5,7 @@ construction. A refit is a lane of the batched descent with its own free columns
 """
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from threading import Lock
 
@@ -154,22 +154,22 @@ class Study:
 
         Of several starts of one set the best is returned; the result is in order of cost.
         """
-        return self._best(self._descended(noise, wanted, chain, EXACT))
+        return self.best(self._descended(noise, wanted, chain, EXACT))
 
     def rough_refit(self, noise: Noise, wanted: Sequence[tuple[Sequence[str], np.ndarray]]) -> list[Refit]:
         """As `refit`, good enough to rank sets that are far apart; what falls behind early is given up."""
         begun = self._descended(noise, wanted, None, (FIRST, ROUGH[1]))
-        best = self._best(begun)
+        best = self.best(begun)
         far = max(HOPELESS, SLOW * (best[-1].cost - best[0].cost))
         promising = [r.names for r in best if r.cost <= best[0].cost + far]
         again = []
         for names in promising:
             starts = sorted((r for r in begun if r.names == names), key=lambda r: r.deviance)
             again += [(names, r.unit) for r in starts[: -(-len(starts) // 2)]]
-        return self._best([*best, *self._descended(noise, again, None, (ROUGH[0] - FIRST, ROUGH[1]))])
+        return self.best([*best, *self._descended(noise, again, None, (ROUGH[0] - FIRST, ROUGH[1]))])
 
     @staticmethod
-    def _best(fits: Sequence[Refit]) -> list[Refit]:
+    def best(fits: Iterable[Refit]) -> list[Refit]:
         """The best fit of each set, in order of cost."""
         best: dict[tuple[str, ...], Refit] = {}
         for fit in sorted(fits, key=lambda r: (r.cost, r.names)):

@@ -140,7 +140,7 @@ def explain(
             ground, better = elsewhere(study, first, refits, tell)
             if better:
                 refits |= {f.names: f for f in better}
-                fits = sorted((f for f in refits.values() if f.names), key=lambda f: (f.cost, f.names))
+                fits = study.best(f for f in refits.values() if f.names)
                 found = sufficient(study, fits, first.noise, alpha, seed + size)
         stages.append(found)
     return Explanation(stages, refits)
@@ -158,8 +158,7 @@ def searched(
     near = [f for f in fits if f.cost < fits[0].cost + CLOSE]
     exact = {f.names: f for f in study.refit(noise, [(f.names, f.unit) for f in near])}
     fits = [exact.get(f.names, f) for f in fits]
-    fits = nested(study, noise, {**refits, **{f.names: f for f in fits}}, fits)
-    return sorted(fits, key=lambda f: (f.cost, f.names))
+    return study.best(nested(study, noise, {**refits, **{f.names: f for f in fits}}, fits))
 
 
 def elsewhere(
@@ -169,7 +168,7 @@ def elsewhere(
 
     Where an effect is missing, a wrong valley may fit better than the right one.
     """
-    ground, found = first, dict(refits)
+    ground, found = first, study.best(refits.values())
     for valley in study.valleys_but(first.fit.unit):
         fit = study.refit(first.noise, [((), valley)])[0]
         if np.linalg.norm((fit.unit - first.fit.unit)[study.base]) < DISTINCT:
@@ -178,10 +177,10 @@ def elsewhere(
         projection = t.whitened(first.noise)
         at = replace(first, fit=fit, tangent=t, projection=projection, scores=projection.scores())
         fits = searched(study, [at], {(): fit}, 1, lambda line: tell(f"{line} from another valley of the base model"))
-        if fits[0].cost < min(f.cost for f in found.values()):
+        if fits[0].cost < found[0].cost:
             ground = at
-        found |= {f.names: f for f in fits if f.names not in found or f.cost < found[f.names].cost}
-    return ground, [f for f in found.values() if refits.get(f.names) is not f]
+        found = study.best([*found, *fits])
+    return ground, [f for f in found if refits.get(f.names) is not f]
 
 
 def sufficient(study: Study, ranked: Sequence[Refit], noise: Noise, alpha: float, seed: int) -> Stage:
