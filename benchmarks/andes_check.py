@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tractexp.export.format import Identified
-from tractexp.identify.result import Result
+from tractexp.exchange.format import Identified
+from tractexp.identification.result import Result
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
 from tractexp.plugin import build, get

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tractexp.identify.search import Limits, search
+from tractexp.identification.search import Limits, search
 from tractexp.plugin import build, discover
 
 DIMENSION, HALF_WIDTH, SHIFT = 10, 5.0, 1.0

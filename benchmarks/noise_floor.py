@@ -19,9 +19,9 @@ import numpy as np
 from make_tibet import EDGES, LOAD, MACHINE, RECORDER
 
 from independent import Dip, record, simulate
-from tractexp.identify.problem import Problem
-from tractexp.identify.result import parts
-from tractexp.identify.search import Limits, search
+from tractexp.identification.problem import Problem
+from tractexp.identification.result import parts
+from tractexp.identification.search import Limits, search
 from tractexp.model.model import compose
 from tractexp.plugin import build
 from tractexp.record import Event, Record, detect

@@ -16,7 +16,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tractexp.identify.search import Limits, search
+from tractexp.identification.search import Limits, search
 from tractexp.plugin import build, discover
 
 DIMENSION, POPULATION, EVALUATIONS = 7, 50, 15_000

@@ -31,7 +31,7 @@ def compute(folder: Path) -> float:
         os.environ[f"{library}_NUM_THREADS"] = "1"
     import yaml
 
-    from tractexp.identify.search import Limits, search
+    from tractexp.identification.search import Limits, search
     from tractexp.tasks.task import Job
 
     spent, problem = 0.0, None

@@ -112,10 +112,10 @@ def model():
 
 def identified(load, events, seed: int = 0, starts: int = 3, bounds: dict | None = None):
     """Search and judgement as in `task=identify`: the values of Eq. (8), and the `Uncertainty`."""
-    from tractexp.identify.problem import Problem
-    from tractexp.identify.profile import checked
-    from tractexp.identify.search import search
-    from tractexp.identify.uncertainty import assess
+    from tractexp.identification.problem import Problem
+    from tractexp.identification.profile import checked
+    from tractexp.identification.search import search
+    from tractexp.identification.uncertainty import assess
     from tractexp.plugin import get
 
     problem = Problem(load, events, bounds)
@@ -126,10 +126,10 @@ def identified(load, events, seed: int = 0, starts: int = 3, bounds: dict | None
 
 def bound(load, events, truth: np.ndarray, deviation: float, correlation: float):
     """Cramér-Rao: the information at the truth under the noise that was really added, P0 and Q0 unknown."""
-    from tractexp.identify.information import Information
-    from tractexp.identify.likelihood import Likelihood
-    from tractexp.identify.noise import Autoregression
-    from tractexp.identify.problem import Problem
+    from tractexp.identification.information import Information
+    from tractexp.identification.likelihood import Likelihood
+    from tractexp.identification.noise import Autoregression
+    from tractexp.identification.problem import Problem
 
     shock = deviation * np.sqrt(1 - correlation**2)
     true = Autoregression(np.array([[0.0], [correlation]]), np.array([deviation, shock]))
@@ -264,10 +264,10 @@ def independent_record(seed: int) -> dict:
 
 def timing(repeats: int = 9) -> dict:
     """Seconds for fit, judgement and seven profiles of a record of 1,000 samples, the kernel loaded; medians."""
-    from tractexp.identify.problem import Problem
-    from tractexp.identify.profile import profiles
-    from tractexp.identify.search import search
-    from tractexp.identify.uncertainty import assess
+    from tractexp.identification.problem import Problem
+    from tractexp.identification.profile import profiles
+    from tractexp.identification.search import search
+    from tractexp.identification.uncertainty import assess
     from tractexp.plugin import get
 
     load, (t, U) = model(), Shape(0.5).voltage()

@@ -8,10 +8,10 @@ import pytest
 from test_cli import tractexp
 from test_report_page import read
 
-from tractexp.compare import bbob
-from tractexp.compare.bbob import GROUPS, Bbob, Benchmark, Plan, Run, perform, run, seed_of
+from tractexp.comparison import bbob
+from tractexp.comparison.bbob import GROUPS, Bbob, Benchmark, Plan, Run, perform, run, seed_of
 from tractexp.errors import UserError
-from tractexp.identify.search import Limits, search
+from tractexp.identification.search import Limits, search
 from tractexp.plugin import build
 from tractexp.report import benchmark as report
 

@@ -67,7 +67,7 @@ def test_the_main_job_writes_the_contracted_result(main_job):
 
 def test_the_objective_is_that_of_the_calculated_power(main_job):
     """Eq. (8) and Eq. (20) recomputed from predictions for the recorded voltage."""
-    from tractexp.identify.result import load
+    from tractexp.identification.result import load
     from tractexp.plugin import build
     from tractexp.record import detect
 

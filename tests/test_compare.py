@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from test_report_page import read
 
-from tractexp.compare import claims, load
-from tractexp.compare.comparison import compare
-from tractexp.compare.runs import Run, gather
-from tractexp.compare.summary import ECDF_TARGETS, band, floor_of, running_time, runtimes, summarize
+from tractexp.comparison import claims, load
+from tractexp.comparison.comparison import compare
+from tractexp.comparison.runs import Run, gather
+from tractexp.comparison.summary import ECDF_TARGETS, band, floor_of, running_time, runtimes, summarize
 from tractexp.errors import UserError
 
 FLOOR = 8.1e-6

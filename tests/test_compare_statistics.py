@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tractexp.compare import statistics as st
+from tractexp.comparison import statistics as st
 
 RNG = np.random.default_rng(7)
 

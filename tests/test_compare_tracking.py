@@ -18,7 +18,7 @@ import pytest
 from test_compare import samples, write_sweep
 
 from tractexp import tracking
-from tractexp.compare import load
+from tractexp.comparison import load
 from tractexp.errors import UserError
 from tractexp.tracking.attach import attach
 from tractexp.tracking.find import find

@@ -32,8 +32,8 @@ from tractexp.discrepancy.voltage import smoothed
 from tractexp.discrepancy.wander import Rest, Wander, find
 from tractexp.discrepancy.which import ADEQUATE, elsewhere, stage
 from tractexp.errors import UserError
-from tractexp.identify.descent import Apart, normal
-from tractexp.identify.noise import Autoregression, white_noise
+from tractexp.identification.descent import Apart, normal
+from tractexp.identification.noise import Autoregression, white_noise
 from tractexp.model.model import compose
 from tractexp.plugin import get
 from tractexp.record import Record, detect

@@ -13,7 +13,7 @@ from scipy.interpolate import Akima1DInterpolator
 from scipy.optimize import fsolve
 
 from tractexp.errors import UserError
-from tractexp.identify.problem import Problem
+from tractexp.identification.problem import Problem
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
 from tractexp.model.parts import Measurement

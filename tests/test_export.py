@@ -14,8 +14,8 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import Akima1DInterpolator
 
 from tractexp.errors import UserError
-from tractexp.export.circuit import Circuit
-from tractexp.export.format import Identified
+from tractexp.exchange.circuit import Circuit
+from tractexp.exchange.format import Identified
 from tractexp.model.drive import Drive, Excitation
 from tractexp.plugin import build, discover
 

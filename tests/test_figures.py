@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tractexp.errors import UserError
-from tractexp.identify.search import REFUSED
+from tractexp.identification.search import REFUSED
 from tractexp.report import figures, style
 
 

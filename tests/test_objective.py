@@ -7,9 +7,9 @@ import pytest
 import uncertainty as study
 
 from tractexp.errors import UserError
-from tractexp.identify.problem import Problem, even
-from tractexp.identify.search import search
-from tractexp.identify.uncertainty import assess
+from tractexp.identification.problem import Problem, even
+from tractexp.identification.search import search
+from tractexp.identification.uncertainty import assess
 from tractexp.plugin import build, get
 
 

@@ -8,8 +8,8 @@ import pytest
 
 import tractexp_plugins.optimizers as folder
 from tractexp.errors import UserError
-from tractexp.identify.optimizer import REFUSED, Box
-from tractexp.identify.search import Limits, search
+from tractexp.identification.optimizer import REFUSED, Box
+from tractexp.identification.search import Limits, search
 from tractexp.plugin import build, discover, schema
 
 CONF = Path(__file__).parents[1] / "conf"

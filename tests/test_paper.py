@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from tractexp.errors import UserError
-from tractexp.paper import claims, equations, maps, printed, searches
-from tractexp.paper.study import Study
+from tractexp.replication import claims, equations, maps, printed, searches
+from tractexp.replication.study import Study
 from tractexp.report.markdown import Markdown
 from tractexp.tasks.paper import PARTS
 
@@ -222,8 +222,8 @@ def test_workers_change_no_result():
 
 
 def _recipe():
-    from tractexp.identify.problem import Problem
-    from tractexp.identify.result import parts
+    from tractexp.identification.problem import Problem
+    from tractexp.identification.result import parts
     from tractexp.model.model import compose
     from tractexp.plugin import build
     from tractexp.record import detect

@@ -14,12 +14,12 @@ import uncertainty as study
 from test_report_page import read
 
 from tractexp.errors import UserError
-from tractexp.identify.advice import advise
-from tractexp.identify.plan import Shape, best_events, combined, depth_needed, each, forecast, guess, over_depth
-from tractexp.identify.problem import Problem
-from tractexp.identify.profile import checked
-from tractexp.identify.uncertainty import assess
-from tractexp.identify.verdict import IDENTIFIED, UNIDENTIFIED, WEAK
+from tractexp.identification.advice import advise
+from tractexp.identification.plan import Shape, best_events, combined, depth_needed, each, forecast, guess, over_depth
+from tractexp.identification.problem import Problem
+from tractexp.identification.profile import checked
+from tractexp.identification.uncertainty import assess
+from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK
 from tractexp.model.model import compose
 from tractexp.plugin import get
 

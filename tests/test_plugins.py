@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tractexp.errors import UserError
-from tractexp.identify.optimizer import Optimizer
+from tractexp.identification.optimizer import Optimizer
 from tractexp.model.parts import Static
 from tractexp.parameter import Parameter, Space
 from tractexp.plugin import Plugin, build, discover, get, plugin, schema

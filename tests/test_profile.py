@@ -7,10 +7,10 @@ import pytest
 import uncertainty as study
 
 from tractexp.errors import UserError
-from tractexp.identify.problem import Problem
-from tractexp.identify.profile import End, Profile, checked, profiles, revised, threshold
-from tractexp.identify.uncertainty import assess, conclude
-from tractexp.identify.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, Verdict
+from tractexp.identification.problem import Problem
+from tractexp.identification.profile import End, Profile, checked, profiles, revised, threshold
+from tractexp.identification.uncertainty import assess, conclude
+from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, Verdict
 
 
 def events(depths, deviation, seed=1, Q_s0=0.35):
@@ -100,7 +100,7 @@ def test_two_minima_and_open_sides_change_the_verdict():
 
 def test_the_posterior_confirms_the_intervals(quiet):
     pytest.importorskip("emcee", reason="the optional extra [posterior] is not installed")
-    from tractexp.identify.posterior import sample
+    from tractexp.identification.posterior import sample
 
     drawn = sample(quiet, walkers=40, steps=600, seed=1)
     again = sample(quiet, walkers=40, steps=600, seed=1)
@@ -112,7 +112,7 @@ def test_the_posterior_confirms_the_intervals(quiet):
 
 def test_too_few_walkers_are_refused(quiet):
     pytest.importorskip("emcee", reason="the optional extra [posterior] is not installed")
-    from tractexp.identify.posterior import sample
+    from tractexp.identification.posterior import sample
 
     with pytest.raises(UserError, match=r"task.walkers=10 is too few: 9 coordinates need at least 18"):
         sample(quiet, walkers=10, steps=100, seed=0)

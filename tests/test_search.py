@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from tractexp.errors import UserError
-from tractexp.identify.optimizer import REFUSED, Box, Evaluate, Optimizer
-from tractexp.identify.polish import APART, Elite, _Residuals, descend, race, spread
-from tractexp.identify.search import Limits, search
+from tractexp.identification.optimizer import REFUSED, Box, Evaluate, Optimizer
+from tractexp.identification.polish import APART, Elite, _Residuals, descend, race, spread
+from tractexp.identification.search import Limits, search
 from tractexp.plugin import build
 
 LOWER, UPPER = np.array([-2.0, 0.5, 100.0]), np.array([3.0, 0.75, 900.0])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tractexp.errors import UserError
-from tractexp.identify.result import Result, load
+from tractexp.identification.result import Result, load
 from tractexp.plugin import get
 from tractexp.tasks.simulate import chosen
 

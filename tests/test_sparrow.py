@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from tractexp.identify.optimizer import Box
-from tractexp.identify.search import search
+from tractexp.identification.optimizer import Box
+from tractexp.identification.search import search
 from tractexp.plugin import build
 from tractexp_plugins.optimizers import _sparrow as sparrow
 from tractexp_plugins.optimizers import issa

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tractexp.errors import UserError
-from tractexp.identify.problem import Problem
+from tractexp.identification.problem import Problem
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
 from tractexp.plugin import build, get

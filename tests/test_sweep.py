@@ -61,7 +61,7 @@ def site(tmp_path_factory):
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: faulty\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text("[tractexp.plugins]\nfaulty = faulty\n")
     for name, body in PLUGINS.items():
-        head = "import os, pathlib\nfrom tractexp.identify.optimizer import Optimizer\n"
+        head = "import os, pathlib\nfrom tractexp.identification.optimizer import Optimizer\n"
         head += "from tractexp.plugin import plugin\n"
         settings = "    odds: float = 0.5\n    marker: str = 'marker'\n"
         text = (

@@ -315,9 +315,9 @@ class Model:
     """Stands in for the identified model: P is a share of U, Q follows the frequency where it is known."""
     def __init__(self, path): self.share = json.loads(path.read_text())["share"]
     def predict(self, t, U, f=None): return self.share * U, (U if f is None else f / 50.0)
-stand_in = types.ModuleType("tractexp.identify.result")
+stand_in = types.ModuleType("tractexp.identification.result")
 stand_in.load = Model
-sys.modules["tractexp.identify.result"] = stand_in
+sys.modules["tractexp.identification.result"] = stand_in
 import mlflow, pandas as pd
 mlflow.set_tracking_uri(sys.argv[1])
 model = mlflow.pyfunc.load_model(sys.argv[2])

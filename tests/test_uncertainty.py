@@ -10,15 +10,15 @@ import uncertainty as study
 from scipy.linalg import cholesky, toeplitz
 from scipy.signal import lfilter
 
-from tractexp.identify.descent import descend
-from tractexp.identify.diagnosis import jarque_bera, ljung_box, louder
-from tractexp.identify.information import Information
-from tractexp.identify.likelihood import Likelihood
-from tractexp.identify.noise import Autoregression, fit_autoregression, stretches
-from tractexp.identify.problem import Problem
-from tractexp.identify.profile import checked
-from tractexp.identify.uncertainty import assess, compare_events
-from tractexp.identify.verdict import IDENTIFIED, UNIDENTIFIED, WEAK
+from tractexp.identification.descent import descend
+from tractexp.identification.diagnosis import jarque_bera, ljung_box, louder
+from tractexp.identification.information import Information
+from tractexp.identification.likelihood import Likelihood
+from tractexp.identification.noise import Autoregression, fit_autoregression, stretches
+from tractexp.identification.problem import Problem
+from tractexp.identification.profile import checked
+from tractexp.identification.uncertainty import assess, compare_events
+from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK
 
 
 def ar1(rng, n, a):

@@ -2,7 +2,7 @@
 
 import json
 
-from tractexp.export.format import Format
+from tractexp.exchange.format import Format
 from tractexp.plugin import plugin
 
 SMALLEST = 1e-6  # pu: ANDES reads a resistance of 0 as "not given" and takes 0.01
@@ -14,7 +14,7 @@ class Andes(Format):
     """Tables of an ANDES case in JSON: the bus, the motor, and the static load with the PQ it replaces.
 
     `electromechanical` is Motor3 and `double_cage` Motor5, on a machine base equal to the record's, with constant load
-    torque (c1 = T_m) and the T-circuit of `tractexp.export.circuit`; `exponential` and `exponential_frequency` are
+    torque (c1 = T_m) and the T-circuit of `tractexp.exchange.circuit`; `exponential` and `exponential_frequency` are
     FLoad, the other static loads ZIP. Add the tables to a case and connect the bus.
 
     Not to be confused with a complete case: there is no source in it.

@@ -3,7 +3,7 @@
 import re
 
 from tractexp.errors import UserError
-from tractexp.export.format import Format
+from tractexp.exchange.format import Format
 from tractexp.plugin import plugin
 
 

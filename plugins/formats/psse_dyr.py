@@ -1,6 +1,6 @@
 """PSS/E dynamics data: CIM5BL and IEELBL."""
 
-from tractexp.export.format import Format
+from tractexp.exchange.format import Format
 from tractexp.plugin import plugin
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tractexp.errors import check_range
-from tractexp.identify.loss import Loss
+from tractexp.identification.loss import Loss
 from tractexp.plugin import plugin
 
 

@@ -1,6 +1,6 @@
 """Least squares."""
 
-from tractexp.identify.loss import Loss
+from tractexp.identification.loss import Loss
 from tractexp.plugin import plugin
 
 

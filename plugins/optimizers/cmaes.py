@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import UserError, check_range
-from tractexp.identify.optimizer import Box, Evaluate, Optimizer
+from tractexp.identification.optimizer import Box, Evaluate, Optimizer
 from tractexp.plugin import plugin
 
 

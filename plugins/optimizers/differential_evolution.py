@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from tractexp.errors import check_choice, check_range
-from tractexp.identify.optimizer import Box, Evaluate, Optimizer
+from tractexp.identification.optimizer import Box, Evaluate, Optimizer
 from tractexp.plugin import plugin
 
 STRATEGIES = tuple(

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from tractexp.errors import check_choice, check_range
-from tractexp.identify.optimizer import Box
+from tractexp.identification.optimizer import Box
 from tractexp.plugin import plugin
 from tractexp_plugins.optimizers._sparrow import Flock, Sparrow
 

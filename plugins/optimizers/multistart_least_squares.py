@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from tractexp.errors import check_range
-from tractexp.identify.optimizer import REFUSED, Box, Evaluate, Optimizer
-from tractexp.identify.polish import race, spread
+from tractexp.identification.optimizer import REFUSED, Box, Evaluate, Optimizer
+from tractexp.identification.polish import race, spread
 from tractexp.plugin import plugin
 
 CLOSER = 10  # scatters drawn ever closer about the least refused point before a search gives up

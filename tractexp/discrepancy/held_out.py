@@ -10,7 +10,7 @@ from tractexp.discrepancy.kernels import each_apart
 from tractexp.discrepancy.noise import Noise
 from tractexp.discrepancy.study import Refit, Study
 from tractexp.discrepancy.which import ADEQUATE, stage
-from tractexp.identify.descent import descend
+from tractexp.identification.descent import descend
 from tractexp.record import Event
 
 CONVINCING = 0.8  # of the explainable gap: an effect that closes as much on held-out events is not doubted

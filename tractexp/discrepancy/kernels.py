@@ -16,8 +16,8 @@ import numpy as np
 
 from tractexp.discrepancy.catalogue import Catalogue
 from tractexp.discrepancy.injection import Injection
-from tractexp.identify.likelihood import Likelihood
-from tractexp.identify.problem import Problem
+from tractexp.identification.likelihood import Likelihood
+from tractexp.identification.problem import Problem
 from tractexp.model.codegen import LANES
 from tractexp.model.drive import Drive
 from tractexp.model.kernel import compile_missing

@@ -13,7 +13,7 @@ import numpy as np
 
 from tractexp.discrepancy.wander import Wander, without_slow
 from tractexp.errors import UserError
-from tractexp.identify.noise import FEWEST, Autoregression, fit_autoregression
+from tractexp.identification.noise import FEWEST, Autoregression, fit_autoregression
 from tractexp.model.drive import Drive
 from tractexp.record import Event
 

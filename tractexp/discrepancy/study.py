@@ -18,9 +18,9 @@ from tractexp.discrepancy.phasors import Phasors
 from tractexp.discrepancy.valleys import best_fits
 from tractexp.discrepancy.voltage import smoothed
 from tractexp.discrepancy.wander import Rest, Wander, find
-from tractexp.identify.descent import Apart, descend
-from tractexp.identify.likelihood import Likelihood
-from tractexp.identify.problem import Problem
+from tractexp.identification.descent import Apart, descend
+from tractexp.identification.likelihood import Likelihood
+from tractexp.identification.problem import Problem
 from tractexp.model.model import Model
 from tractexp.record import Event
 
@@ -241,7 +241,7 @@ class Study:
 
     def white(self) -> Noise:
         """White noise of the level before the dips: what is known before the first fit."""
-        from tractexp.identify.noise import white_noise
+        from tractexp.identification.noise import white_noise
 
         level = [np.sqrt(np.mean([getattr(e, f"noise_{c}") ** 2 for e in self.events])) for c in "PQ"]
         return Noise(np.eye(2), (white_noise(level[0]), white_noise(level[1])))

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tractexp.identify.descent import Apart, descend
-from tractexp.identify.likelihood import Likelihood
-from tractexp.identify.problem import Problem, even
+from tractexp.identification.descent import Apart, descend
+from tractexp.identification.likelihood import Likelihood
+from tractexp.identification.problem import Problem, even
 
 SCREENED = 4096  # points of the box that are simulated
 STARTS, APART = 24, 0.5  # the best of them that are so far apart in the unit cube

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.span import spanned
-from tractexp.identify.noise import Autoregression, fit_autoregression
+from tractexp.identification.noise import Autoregression, fit_autoregression
 
 MODES = 48
 SLOW = 3  # cosines of a stretch that belong to wandering before its fast noise is modelled

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from tractexp.compare.bbob import Benchmark
+from tractexp.comparison.bbob import Benchmark
 from tractexp.errors import UserError
 from tractexp.report.compare import runtime_curves
 from tractexp.report.page import Page

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tractexp.compare.runs import Variant
-from tractexp.compare.statistics import Ranks
-from tractexp.compare.summary import ECDF_TARGETS, Band, Floor, band, runtimes
+from tractexp.comparison.runs import Variant
+from tractexp.comparison.statistics import Ranks
+from tractexp.comparison.summary import ECDF_TARGETS, Band, Floor, band, runtimes
 from tractexp.report import style
 
 if TYPE_CHECKING:

@@ -7,12 +7,12 @@ from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import Any
 
-from tractexp.compare import claims
-from tractexp.compare.ablation import Ablation
-from tractexp.compare.claims import number, p_value
-from tractexp.compare.comparison import Comparison, Pair
-from tractexp.compare.statistics import ALPHA, size_of
-from tractexp.compare.summary import AT_FLOOR, Spread
+from tractexp.comparison import claims
+from tractexp.comparison.ablation import Ablation
+from tractexp.comparison.claims import number, p_value
+from tractexp.comparison.comparison import Comparison, Pair
+from tractexp.comparison.statistics import ALPHA, size_of
+from tractexp.comparison.summary import AT_FLOOR, Spread
 from tractexp.errors import UserError
 from tractexp.report import compare as figures
 from tractexp.report.page import Page

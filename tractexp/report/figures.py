@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.identify.search import REFUSED
+from tractexp.identification.search import REFUSED
 from tractexp.report import style
 
 if TYPE_CHECKING:

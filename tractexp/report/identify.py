@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from tractexp.identify.uncertainty import Together, Uncertainty
-from tractexp.identify.verdict import BOUND, IDENTIFIED
+from tractexp.identification.uncertainty import Together, Uncertainty
+from tractexp.identification.verdict import BOUND, IDENTIFIED
 from tractexp.report.page import Page
 
 

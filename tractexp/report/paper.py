@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.compare.runs import Run, Variant
-from tractexp.compare.summary import Floor
-from tractexp.paper import equations, maps, printed
-from tractexp.paper.claims import CONFIRMED, IMPOSSIBLE, OPEN, REFUTED, Claim, claims, number
-from tractexp.paper.study import AT_FLOOR, TARGETS, Study
+from tractexp.comparison.runs import Run, Variant
+from tractexp.comparison.summary import Floor
+from tractexp.replication import equations, maps, printed
+from tractexp.replication.claims import CONFIRMED, IMPOSSIBLE, OPEN, REFUTED, Claim, claims, number
+from tractexp.replication.study import AT_FLOOR, TARGETS, Study
 from tractexp.report import compare, figures, paper_figures
 from tractexp.report.markdown import Markdown, Together
 from tractexp.report.page import Page

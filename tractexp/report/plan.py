@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tractexp.identify.plan import INERTIA, Choice, Forecast, Needed
-from tractexp.identify.problem import Problem
+from tractexp.identification.plan import INERTIA, Choice, Forecast, Needed
+from tractexp.identification.problem import Problem
 from tractexp.report.page import Page
 
 ROWS = 20  # of a table, about: of a longer scan every other row

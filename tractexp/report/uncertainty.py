@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from tractexp.identify.diagnosis import LAGS, autocorrelation
-from tractexp.identify.plan import Forecast
-from tractexp.identify.profile import Profiles
-from tractexp.identify.uncertainty import Uncertainty
+from tractexp.identification.diagnosis import LAGS, autocorrelation
+from tractexp.identification.plan import Forecast
+from tractexp.identification.profile import Profiles
+from tractexp.identification.uncertainty import Uncertainty
 from tractexp.report import style
 
 CEILING = 10.0  # times the value: wider intervals are drawn no further

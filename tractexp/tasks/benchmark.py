@@ -44,7 +44,7 @@ class Benchmark(Task):
             check_range("task.cores", self.cores, 1)
 
     def run(self, job: Job) -> None:
-        from tractexp.compare.bbob import Plan, package, perform
+        from tractexp.comparison.bbob import Plan, package, perform
         from tractexp.report import benchmark as report
 
         refuse_unread(job)

@@ -38,8 +38,8 @@ class Compare(Task):
         check_range("task.ties", self.ties, 0.0, 1.0)
 
     def run(self, job: Job) -> None:
-        from tractexp.compare.comparison import compare
-        from tractexp.compare.runs import gather
+        from tractexp.comparison.comparison import compare
+        from tractexp.comparison.runs import gather
         from tractexp.report.comparison import write_json, write_page
 
         runs, source, folder = self._runs(job)
@@ -60,7 +60,7 @@ class Compare(Task):
 
     def _runs(self, job: Job) -> tuple[list[Any], str, Path | None]:
         """The runs, where they are from in words, and the folder of the sweep."""
-        from tractexp.compare import load
+        from tractexp.comparison import load
 
         if self.filter is None:
             folder = Path(self.sweep) if self.sweep is not None else load.newest_sweep(SWEEPS)
@@ -87,8 +87,8 @@ def plain() -> dict[str, str]:
 
 def report(comparison: Any, source: str) -> None:
     """Print the table and the sentences."""
-    from tractexp.compare import claims
-    from tractexp.compare.claims import number
+    from tractexp.comparison import claims
+    from tractexp.comparison.claims import number
 
     target, hardest = min((target, i) for i, target in enumerate(comparison.targets))
     say(f"{source}: {comparison.gathered.problem}")

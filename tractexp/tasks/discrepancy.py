@@ -89,9 +89,9 @@ def tell(finding: Any) -> None:
 
 def extended_result(job: Job, finding: Any, events: Any) -> Path:
     """Write the extended model's parameters as a result file, which predicts and is logged as a model."""
-    from tractexp.identify.problem import Problem
-    from tractexp.identify.result import conclude, parts
-    from tractexp.identify.search import Found, History
+    from tractexp.identification.problem import Problem
+    from tractexp.identification.result import conclude, parts
+    from tractexp.identification.search import Found, History
     from tractexp.model.model import compose
 
     node = job.config["model"]

@@ -24,8 +24,8 @@ class Export(Task):
         check_range("task.voltage", self.voltage, low=1e-6)
 
     def run(self, job: Job) -> None:
-        from tractexp.export.format import Identified
-        from tractexp.identify.result import load
+        from tractexp.exchange.format import Identified
+        from tractexp.identification.result import load
 
         if self.parameters is None:
             raise UserError("task.parameters is not given; it is the path of a result.json, which task=identify writes")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import UserError, check_range
-from tractexp.identify.search import Limits, search
+from tractexp.identification.search import Limits, search
 from tractexp.plugin import build, plugin
 from tractexp.tasks.console import say, searching, table
 from tractexp.tasks.identify import announce
@@ -36,8 +36,8 @@ class Generalise(Task):
             build("optimizer", {"name": name})
 
     def run(self, job: Job) -> None:
-        from tractexp.identify.result import conclude
-        from tractexp.paper.searches import by_depth
+        from tractexp.identification.result import conclude
+        from tractexp.replication.searches import by_depth
 
         job = with_siblings(job)
         events = job.events()
@@ -90,7 +90,7 @@ def compared(job: Job, names: list[str]) -> dict[str, Any]:
 
 def residuals(result: Any, fits: list[Any], kinds: list[str]) -> list[dict[str, Any]]:
     """Eq. (21) and Eq. (20) of P and Q on each held-out dip."""
-    from tractexp.paper.searches import mean_residual
+    from tractexp.replication.searches import mean_residual
 
     return [
         {

@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from tractexp.identify.search import REFUSED, Limits, search
+from tractexp.identification.search import REFUSED, Limits, search
 from tractexp.plugin import plugin
 from tractexp.tasks.console import say, searching, table
 from tractexp.tasks.task import Job, Task
 
 if TYPE_CHECKING:
-    from tractexp.identify.problem import Problem
-    from tractexp.identify.result import Fit, Result
-    from tractexp.identify.search import Found
-    from tractexp.identify.uncertainty import Together, Uncertainty
+    from tractexp.identification.problem import Problem
+    from tractexp.identification.result import Fit, Result
+    from tractexp.identification.search import Found
+    from tractexp.identification.uncertainty import Together, Uncertainty
 
 ASTRAY = 0.99  # of the search's objective: least squares that get below it have left its valley or finished its work
 
@@ -28,8 +28,8 @@ class Identify(Task):
     predictor: bool | None = None  # log the model for mlflow.pyfunc; null: in single runs, not in sweeps
 
     def run(self, job: Job) -> None:
-        from tractexp.identify.result import write_history
-        from tractexp.identify.uncertainty import compare_events
+        from tractexp.identification.result import write_history
+        from tractexp.identification.uncertainty import compare_events
 
         problem, found, result, fits, known = identified(job)
         together = compare_events(known) if len(problem.events) > 1 else None
@@ -59,9 +59,9 @@ class Identified(NamedTuple):
 
 def identified(job: Job) -> Identified:
     """Read the records, search, judge the outcome; says what is read and how far the search is."""
-    from tractexp.identify.profile import checked
-    from tractexp.identify.result import conclude
-    from tractexp.identify.uncertainty import assess
+    from tractexp.identification.profile import checked
+    from tractexp.identification.result import conclude
+    from tractexp.identification.uncertainty import assess
 
     config, events, optimizer = job.config, job.events(), job.optimizer
     problem = job.problem(events.train)
@@ -129,8 +129,8 @@ def astray(problem: "Problem", found: "Found", known: "Uncertainty") -> list[str
 
 def explain(known: "Uncertainty", together: "Together | None", result: Any) -> list[str]:
     """Print how sure each parameter is, what is odd, and what to do next; return the advice."""
-    from tractexp.identify.advice import advise
-    from tractexp.identify.verdict import IDENTIFIED
+    from tractexp.identification.advice import advise
+    from tractexp.identification.verdict import IDENTIFIED
     from tractexp.report.identify import headline, rows
 
     brief = [[name, value, interval, error, ""] for name, value, _, interval, error, _ in rows(known, result.units)]

@@ -61,9 +61,9 @@ class Paper(Task):
 
 def study(job: Job, seeds: int, workers: int | None) -> Any:
     """The experiments on a job's records; the shipped record brings its siblings where none is held out."""
-    from tractexp.identify.search import Limits
-    from tractexp.paper.study import Study
+    from tractexp.identification.search import Limits
     from tractexp.record import describe
+    from tractexp.replication.study import Study
 
     job = with_siblings(job)
     events = job.events()

@@ -66,7 +66,7 @@ class Plan(Task):
 
     def planned(self, job: Job) -> "Planned":
         """Everything forecast: how deep, over what, and the best events."""
-        from tractexp.identify.plan import best_events, column, depth_needed
+        from tractexp.identification.plan import best_events, column, depth_needed
         from tractexp.report.plan import Planned
 
         recorded = job.events().train
@@ -93,7 +93,7 @@ class Plan(Task):
 
     def shape(self, event: Any) -> Any:
         """The dip to plan for: the recorded one with what is set replaced."""
-        from tractexp.identify.plan import Shape
+        from tractexp.identification.plan import Shape
 
         shape = Shape.of(event)
         given = {key: getattr(self, key) for key in ("depth", "duration", "rate")}
@@ -104,8 +104,8 @@ class Plan(Task):
 
     def guess(self, job: Job, event: Any) -> np.ndarray:
         """Free values (d,) to plan at."""
-        from tractexp.identify.plan import guess
-        from tractexp.identify.result import load
+        from tractexp.identification.plan import guess
+        from tractexp.identification.result import load
 
         problem = job.problem([event])
         if self.values == FIT:
@@ -121,7 +121,7 @@ class Plan(Task):
 
     def scans(self, problem: Any, values: np.ndarray, shape: Any) -> dict[str, Any]:
         """{label: (x, forecasts)}: one property of the dip varied at a time."""
-        from tractexp.identify.plan import forecast, over_depth
+        from tractexp.identification.plan import forecast, over_depth
 
         def over(key: str, grid: tuple[float, ...]) -> Any:
             shapes = [replace(shape, **{key: x}) for x in grid]

@@ -25,8 +25,8 @@ class Posterior(Task):
         check_range("task.steps", self.steps, 100)
 
     def run(self, job: Job) -> None:
-        from tractexp.identify.posterior import sample
-        from tractexp.identify.result import write_history
+        from tractexp.identification.posterior import sample
+        from tractexp.identification.result import write_history
 
         problem, found, result, _, known = identified(job)
         started = time.perf_counter()

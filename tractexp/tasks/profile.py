@@ -22,8 +22,8 @@ class Profile(Task):
         check_range("task.points", self.points, 3, 1000)
 
     def run(self, job: Job) -> None:
-        from tractexp.identify.profile import profiles
-        from tractexp.identify.result import write_history
+        from tractexp.identification.profile import profiles
+        from tractexp.identification.result import write_history
         from tractexp.report import uncertainty
 
         problem, found, result, _, known = identified(job)

@@ -43,7 +43,7 @@ class Simulate(Task):
         check_range("task.length", self.length, max(20 / self.rate, self.start + self.duration), 3600.0)
 
     def run(self, job: Job) -> None:
-        from tractexp.identify.result import load
+        from tractexp.identification.result import load
 
         result = load(Path(self.parameters)) if self.parameters else None
         model = _model(result, job)
@@ -105,7 +105,7 @@ def chosen(names: tuple[str, ...], found: Mapping[str, float], given: Mapping[st
 
 
 def _model(result: Any, job: Job) -> Any:
-    from tractexp.identify.result import parts
+    from tractexp.identification.result import parts
     from tractexp.model.model import compose
 
     return compose(*parts(result.model)) if result else job.model
@@ -155,7 +155,7 @@ class Played:
 
 def recorded(model: Any, values: np.ndarray, job: Job) -> Iterator[Played]:
     """The recorded events, fitted and held out alike, played through the model."""
-    from tractexp.identify.result import respond
+    from tractexp.identification.result import respond
 
     events = job.events()
     for event in (*events.train, *events.validate):

@@ -42,14 +42,14 @@ class Job:
 
     @functools.cached_property
     def model(self) -> Any:
-        from tractexp.identify.result import parts
+        from tractexp.identification.result import parts
         from tractexp.model.model import compose
 
         return compose(*parts(self.config["model"]))
 
     def problem(self, events: Any) -> Any:
         """The identification problem of these events (a `Problem`)."""
-        from tractexp.identify.problem import Problem
+        from tractexp.identification.problem import Problem
 
         node, loss = self.config["model"], build("objective", self.config["objective"])
         return Problem(

@@ -33,7 +33,7 @@ class Run:
     `parameters` is the flattened configuration with the identified values, `metrics` the figures of the result.
     `curves` maps a name to (steps (n,) whole numbers, values (n,)), such as "fitness" by iteration. `artifacts` are
     files or folders to be copied. `parent` is the run id of the sweep. `seconds` is what the job took: MLflow shows
-    it as the run's duration. `model` is a result file that `tractexp.identify.result.load` reads; with it the run
+    it as the run's duration. `model` is a result file that `tractexp.identification.result.load` reads; with it the run
     offers a model for `mlflow.pyfunc.load_model`. `description` is Markdown. `children` are logged below this run.
     """
 

@@ -1,7 +1,7 @@
 """A shrinking random step from the best point."""
 
 from tractexp.errors import check_range
-from tractexp.identify.optimizer import Optimizer
+from tractexp.identification.optimizer import Optimizer
 from tractexp.plugin import plugin
 
 

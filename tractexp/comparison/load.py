@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.compare.runs import Run
+from tractexp.comparison.runs import Run
 from tractexp.errors import UserError
 
 TASK = "identify"  # the task whose runs are compared

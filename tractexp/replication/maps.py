@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.identify.optimizer import Box
+from tractexp.identification.optimizer import Box
 from tractexp.plugin import build
 
 DRAWS = 200  # flocks of each kind whose discrepancy is taken

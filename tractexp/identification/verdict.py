@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.identify.information import SHARE, Information
+from tractexp.identification.information import SHARE, Information
 
 IDENTIFIED, WEAK, UNIDENTIFIED, BOUND = (
     "identified",

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.compare.statistics import expected_running_time
+from tractexp.comparison.statistics import expected_running_time
 from tractexp.errors import UserError
-from tractexp.identify.optimizer import Optimizer
-from tractexp.identify.search import Limits, search
+from tractexp.identification.optimizer import Optimizer
+from tractexp.identification.search import Limits, search
 
 GROUPS = {
     "separable": range(1, 6),

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.identify.problem import Problem, excitation
-from tractexp.identify.search import REFUSED, Found, History
+from tractexp.identification.problem import Problem, excitation
+from tractexp.identification.search import REFUSED, Found, History
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import Model, compose
 from tractexp.plugin import build

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.compare.statistics import ALPHA, LEAST_SEEDS, holm, vargha_delaney, wilcoxon
-from tractexp.identify.result import ACCEPTED
-from tractexp.paper import equations, maps, printed
-from tractexp.paper.study import TARGETS, Study
+from tractexp.comparison.statistics import ALPHA, LEAST_SEEDS, holm, vargha_delaney, wilcoxon
+from tractexp.identification.result import ACCEPTED
+from tractexp.replication import equations, maps, printed
+from tractexp.replication.study import TARGETS, Study
 
 CONFIRMED, REFUTED = "confirmed", "not confirmed"
 IMPOSSIBLE = "cannot be reproduced"

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.identify.information import SHARE
-from tractexp.identify.noise import runs
-from tractexp.identify.plan import Forecast, Shape, over_depth
-from tractexp.identify.uncertainty import Uncertainty
-from tractexp.identify.verdict import BOUND, EDGE, UNIDENTIFIED, WEAK, WITHIN, shown, size
+from tractexp.identification.information import SHARE
+from tractexp.identification.noise import runs
+from tractexp.identification.plan import Forecast, Shape, over_depth
+from tractexp.identification.uncertainty import Uncertainty
+from tractexp.identification.verdict import BOUND, EDGE, UNIDENTIFIED, WEAK, WITHIN, shown, size
 
 
 def advise(known: Uncertainty, odd: Sequence[str] = ()) -> list[str]:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.errors import UserError, among
-from tractexp.identify.loss import Loss
-from tractexp.identify.search import REFUSED
+from tractexp.identification.loss import Loss
+from tractexp.identification.search import REFUSED
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import MOST_SUBSTEPS, Model
 from tractexp.model.parts import Effect

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.compare.runs import Run, Variant
-from tractexp.compare.statistics import expected_running_time
+from tractexp.comparison.runs import Run, Variant
+from tractexp.comparison.statistics import expected_running_time
 
 AT_FLOOR = 0.01  # a run within this share of the floor has reached it
 COSTS = ("simulations", "seconds")

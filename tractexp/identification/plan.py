@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.errors import UserError, among, check_range
-from tractexp.identify.descent import descend
-from tractexp.identify.information import Information
-from tractexp.identify.likelihood import Likelihood, Noise, before_the_event
-from tractexp.identify.noise import Autoregression
-from tractexp.identify.problem import Problem, even
-from tractexp.identify.uncertainty import LEVEL
+from tractexp.identification.descent import descend
+from tractexp.identification.information import Information
+from tractexp.identification.likelihood import Likelihood, Noise, before_the_event
+from tractexp.identification.noise import Autoregression
+from tractexp.identification.problem import Problem, even
+from tractexp.identification.uncertainty import LEVEL
 from tractexp.record import Base, Event, Record
 
 BEFORE, AFTER = 0.3, 1.5  # s recorded before and after a planned dip

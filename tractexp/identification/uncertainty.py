@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.identify.descent import Rows, descend
-from tractexp.identify.diagnosis import Test, jarque_bera, ljung_box, louder
-from tractexp.identify.information import Information
-from tractexp.identify.likelihood import QUIET_ORDER, Likelihood
-from tractexp.identify.noise import FEWEST, fit_autoregression, stretches, white_noise
-from tractexp.identify.problem import Problem
-from tractexp.identify.verdict import Verdict, judge
+from tractexp.identification.descent import Rows, descend
+from tractexp.identification.diagnosis import Test, jarque_bera, ljung_box, louder
+from tractexp.identification.information import Information
+from tractexp.identification.likelihood import QUIET_ORDER, Likelihood
+from tractexp.identification.noise import FEWEST, fit_autoregression, stretches, white_noise
+from tractexp.identification.problem import Problem
+from tractexp.identification.verdict import Verdict, judge
 
 LEVEL = 0.95
 ALONG = (0.3, 0.6, 0.9)  # of the way to the wall: where other valleys are looked for

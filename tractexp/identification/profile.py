@@ -11,9 +11,9 @@ from enum import StrEnum
 
 import numpy as np
 
-from tractexp.identify.descent import descend
-from tractexp.identify.uncertainty import LEVEL, Uncertainty, conclude
-from tractexp.identify.verdict import BOUND, IDENTIFIED, UNIDENTIFIED, WEAK, WITHIN, Verdict, size
+from tractexp.identification.descent import descend
+from tractexp.identification.uncertainty import LEVEL, Uncertainty, conclude
+from tractexp.identification.verdict import BOUND, IDENTIFIED, UNIDENTIFIED, WEAK, WITHIN, Verdict, size
 
 BEYOND = 1.6  # of the threshold: a lane ends when its deviance has risen so far
 OVERSHOOT = 3.0  # of the threshold: a step that rises so far at once is taken back

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.identify.problem import Problem
-from tractexp.identify.result import Fit, parts, respond
-from tractexp.identify.search import search
-from tractexp.identify.uncertainty import Uncertainty, assess
-from tractexp.identify.verdict import IDENTIFIED
+from tractexp.identification.problem import Problem
+from tractexp.identification.result import Fit, parts, respond
+from tractexp.identification.search import search
+from tractexp.identification.uncertainty import Uncertainty, assess
+from tractexp.identification.verdict import IDENTIFIED
 from tractexp.model.model import compose
 from tractexp.plugin import build
 from tractexp.record import Event

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.compare.statistics import expected_running_time, vargha_delaney, wilcoxon
+from tractexp.comparison.statistics import expected_running_time, vargha_delaney, wilcoxon
 from tractexp.errors import UserError
-from tractexp.identify.problem import Problem
-from tractexp.identify.result import Fit, respond
-from tractexp.identify.search import Found, Limits
-from tractexp.paper import equations, maps, orders, printed, searches
+from tractexp.identification.problem import Problem
+from tractexp.identification.result import Fit, respond
+from tractexp.identification.search import Found, Limits
 from tractexp.record import Event
+from tractexp.replication import equations, maps, orders, printed, searches
 
 ALPHAS = (0.1, 0.3, 0.5, 0.7, 0.9)  # of the tent map
 TARGETS = (10.0, 2.0)  # of running times, times the floor
@@ -126,7 +126,7 @@ class Study:
 
         Where that reaches the floor, the search was not caught in a local optimum: it was not done.
         """
-        from tractexp.identify.descent import descend
+        from tractexp.identification.descent import descend
 
         space, scale = self.problem.space, 1 / np.sqrt(DESCENT * self.floor)
 

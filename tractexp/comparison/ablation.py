@@ -12,8 +12,8 @@ from itertools import combinations
 
 import numpy as np
 
-from tractexp.compare.runs import Variant
-from tractexp.compare.statistics import bootstrap
+from tractexp.comparison.runs import Variant
+from tractexp.comparison.statistics import bootstrap
 
 On = frozenset[str]  # the switches that are on
 

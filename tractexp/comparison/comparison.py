@@ -6,9 +6,9 @@ from itertools import combinations
 
 import numpy as np
 
-from tractexp.compare.ablation import Ablation, ablate
-from tractexp.compare.runs import Gathered, Variant
-from tractexp.compare.statistics import (
+from tractexp.comparison.ablation import Ablation, ablate
+from tractexp.comparison.runs import Gathered, Variant
+from tractexp.comparison.statistics import (
     ALPHA,
     LEAST_SEEDS,
     Ranks,
@@ -17,7 +17,7 @@ from tractexp.compare.statistics import (
     vargha_delaney,
     wilcoxon,
 )
-from tractexp.compare.summary import Floor, Summary, floor_of, summarize
+from tractexp.comparison.summary import Floor, Summary, floor_of, summarize
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.identify.uncertainty import LEVEL, Uncertainty
+from tractexp.identification.uncertainty import LEVEL, Uncertainty
 
 BURN = 0.3  # of the steps are thrown away
 ENOUGH = 50.0  # autocorrelation times that a chain should last (emcee's own advice)

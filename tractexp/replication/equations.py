@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.identify.search import Limits, search
-from tractexp.paper import printed
+from tractexp.identification.search import Limits, search
 from tractexp.plugin import build
+from tractexp.replication import printed
 
 Field = Callable[[np.ndarray], np.ndarray]
 

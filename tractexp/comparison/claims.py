@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from tractexp.compare.ablation import Ablation, Effect
-from tractexp.compare.comparison import Comparison, Pair
-from tractexp.compare.statistics import ALPHA
-from tractexp.compare.summary import AT_FLOOR, Spread
+from tractexp.comparison.ablation import Ablation, Effect
+from tractexp.comparison.comparison import Comparison, Pair
+from tractexp.comparison.statistics import ALPHA
+from tractexp.comparison.summary import AT_FLOOR, Spread
 
 
 def number(value: float, digits: int = 3) -> str:

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.identify.noise import SMALLEST, Autoregression, fit_autoregression, stretches
-from tractexp.identify.problem import Problem
+from tractexp.identification.noise import SMALLEST, Autoregression, fit_autoregression, stretches
+from tractexp.identification.problem import Problem
 from tractexp.record import Event
 
 POWER_RANGE = 0.2  # of the apparent power before the event: how far P0 and Q0 may move

@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.export.circuit import Circuit
-from tractexp.identify.result import Result, parts
+from tractexp.exchange.circuit import Circuit
+from tractexp.identification.result import Result, parts
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import Model, compose
 from tractexp.plugin import Plugin

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.identify.problem import Problem
-from tractexp.identify.search import Found, Limits, search
+from tractexp.identification.problem import Problem
+from tractexp.identification.search import Found, Limits, search
 from tractexp.plugin import build
 from tractexp.record import Event
 
