@@ -22,18 +22,18 @@ from tractexp.discrepancy.held_out import CONVINCING, together, weighed
 from tractexp.discrepancy.investigate import check_events, investigate
 from tractexp.discrepancy.judgement import judge
 from tractexp.discrepancy.left import tail
-from tractexp.discrepancy.noise import Noise as PowerNoise
-from tractexp.discrepancy.noise import estimate
+from tractexp.noise.model import Noise as PowerNoise
+from tractexp.noise.model import estimate
 from tractexp.discrepancy.recommend import deciding_event
 from tractexp.discrepancy.study import Study
 from tractexp.discrepancy.sure import ONE_SIDED
 from tractexp.discrepancy.tangent import _signed_drop, tangent
-from tractexp.discrepancy.voltage import smoothed
-from tractexp.discrepancy.wander import Rest, Wander, find
+from tractexp.noise.voltage import smoothed
+from tractexp.noise.wander import Rest, Wander, find
 from tractexp.discrepancy.which import ADEQUATE, elsewhere, stage
 from tractexp.errors import UserError
 from tractexp.identification.descent import Apart, normal
-from tractexp.identification.noise import Autoregression, white_noise
+from tractexp.noise.color import Autoregression, white_noise
 from tractexp.model.model import compose
 from tractexp.plugin import get
 from tractexp.record import Record, detect

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.noise import Noise
-from tractexp.discrepancy.span import spanned
 from tractexp.discrepancy.study import Study
 from tractexp.discrepancy.tangent import injections, resting, two_sided
 from tractexp.identification.result import relative_error
+from tractexp.noise.model import Noise
+from tractexp.noise.span import spanned
 
 SHOWN = 10.8  # expected gain at which a true explanation fails to gain anything in 5 % of cases: (2 x 1.645)^2
 SAME = 0.03  # singular values below this share of the largest: pushes that differ from others in noise only

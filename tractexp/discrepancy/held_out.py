@@ -7,10 +7,10 @@ import numpy as np
 
 from tractexp.discrepancy.gap import SHOWN, Gap, gap
 from tractexp.discrepancy.kernels import each_apart
-from tractexp.discrepancy.noise import Noise
 from tractexp.discrepancy.study import Refit, Study
 from tractexp.discrepancy.which import ADEQUATE, stage
 from tractexp.identification.descent import descend
+from tractexp.noise.model import Noise
 from tractexp.record import Event
 
 CONVINCING = 0.8  # of the explainable gap: an effect that closes as much on held-out events is not doubted

@@ -9,7 +9,6 @@ from tractexp.discrepancy.catalogue import Catalogue, catalogue
 from tractexp.discrepancy.gap import Gap, curves, gap
 from tractexp.discrepancy.held_out import Judged, carried, weighed
 from tractexp.discrepancy.kernels import Family
-from tractexp.discrepancy.noise import Noise
 from tractexp.discrepancy.recommend import Decider, deciding_event
 from tractexp.discrepancy.recorder import opened
 from tractexp.discrepancy.study import Refit, Study
@@ -18,6 +17,7 @@ from tractexp.discrepancy.where import Place, where
 from tractexp.discrepancy.which import Explanation, Stage, explain
 from tractexp.errors import UserError
 from tractexp.model.model import Model
+from tractexp.noise.model import Noise
 from tractexp.record import Event
 
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.left import SMALLEST_P, least_p, statistics, tail
-from tractexp.discrepancy.noise import Noise
 from tractexp.discrepancy.study import Study
 from tractexp.discrepancy.tangent import Projection, Tangent, rich_residuals
+from tractexp.noise.model import Noise
 
 DRAWS = 199
 FEW = 150  # independent quiet samples below which the noise estimate is itself uncertain

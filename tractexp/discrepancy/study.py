@@ -13,15 +13,15 @@ import numpy as np
 
 from tractexp.discrepancy.catalogue import Catalogue
 from tractexp.discrepancy.kernels import Family, Kernels, side_by_side
-from tractexp.discrepancy.noise import Noise, estimate, quiet_stretches
 from tractexp.discrepancy.phasors import Phasors
 from tractexp.discrepancy.valleys import best_fits
-from tractexp.discrepancy.voltage import smoothed
-from tractexp.discrepancy.wander import Rest, Wander, find
 from tractexp.identification.descent import Apart, descend
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.problem import Problem
 from tractexp.model.model import Model
+from tractexp.noise.model import Noise, estimate, quiet_stretches
+from tractexp.noise.voltage import smoothed
+from tractexp.noise.wander import Rest, Wander, find
 from tractexp.record import Event
 
 ROUGH, EXACT = (12, 0.3), (40, 0.02)  # iterations and tolerance of the deviance
@@ -241,7 +241,7 @@ class Study:
 
     def white(self) -> Noise:
         """White noise of the level before the dips: what is known before the first fit."""
-        from tractexp.identification.noise import white_noise
+        from tractexp.noise.color import white_noise
 
         level = [np.sqrt(np.mean([getattr(e, f"noise_{c}") ** 2 for e in self.events])) for c in "PQ"]
         return Noise(np.eye(2), (white_noise(level[0]), white_noise(level[1])))

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.discrepancy.kernels import each_apart
-from tractexp.discrepancy.noise import Noise
 from tractexp.discrepancy.study import Refit, Study
 from tractexp.discrepancy.which import Explanation, Stage, stage
+from tractexp.noise.model import Noise
 
 ONE_SIDED = 1.6449  # standard deviations: 5 %
 REJECTED = 3.5  # standard deviations: more than chance asks for, since a true effect's formula is not quite its physics

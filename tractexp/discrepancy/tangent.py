@@ -15,9 +15,9 @@ from scipy.special import chdtrc
 
 from tractexp.discrepancy.catalogue import Candidate
 from tractexp.discrepancy.injection import PUSHES
-from tractexp.discrepancy.noise import Noise
-from tractexp.discrepancy.span import spanned
 from tractexp.discrepancy.study import Refit, Study
+from tractexp.noise.model import Noise
+from tractexp.noise.span import spanned
 
 REACH = 0.5  # smallest relevant sizes: the step of a candidate's difference quotient
 NUISANCE_STEP = 1e-4  # of a coordinate's range

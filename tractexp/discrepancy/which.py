@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.discrepancy.noise import Noise
 from tractexp.discrepancy.null import Null, null_of
 from tractexp.discrepancy.study import Refit, Study
 from tractexp.discrepancy.tangent import (
@@ -23,6 +22,7 @@ from tractexp.discrepancy.tangent import (
     tangent,
 )
 from tractexp.discrepancy.valleys import DISTINCT
+from tractexp.noise.model import Noise
 
 MOST_EFFECTS = 3
 SHORTLIST = {1: 10, 2: 8, 3: 6}  # sets of each size that are refitted

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.span import spanned
-from tractexp.identification.noise import Autoregression, fit_autoregression
+from tractexp.noise.color import Autoregression, fit_autoregression
+from tractexp.noise.span import spanned
 
 MODES = 48
 SLOW = 3  # cosines of a stretch that belong to wandering before its fast noise is modelled

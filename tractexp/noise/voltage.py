@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.discrepancy.wander import Walk, cosines
-from tractexp.identification.noise import runs
+from tractexp.noise.color import runs
+from tractexp.noise.wander import Walk, cosines
 from tractexp.record import Event
 
 HALF_WIDTHS = (1, 2, 3, 5, 8)  # samples of the averages that must agree where the voltage is smooth
