@@ -14,10 +14,7 @@ from tractexp.noise.span import spanned
 
 MODES = 48
 SLOW = 3  # cosines of a stretch that belong to wandering before its fast noise is modelled
-SEEN = 2.0  # of twice the log-likelihood, without which there is no wandering
-MORE = 2.0  # of it, that the rest of the events must show beyond that
 DISTINCT = 0.03  # of the strongest direction: columns that differ by less from others are none of their own
-LESS = 1.0  # of the log-likelihood: the intensity taken is the largest that is no less likely than this
 GRID = np.concatenate(([0.0], np.geomspace(1e-3, 1e4, 71)))  # of the intensity, variances of the channel per second
 STIFF = np.concatenate(([0.0], np.geomspace(1e-4, 1e12, 97)))  # of a single stretch, in variances of its noise
 
@@ -75,12 +72,16 @@ class Rest:
     profile: np.ndarray  # (n,) power over that before
 
 
-def find(before: Sequence[np.ndarray], step: float, profile: np.ndarray, rests: Sequence[Rest] = ()) -> Wander | None:
+def find(
+    before: Sequence[np.ndarray], step: float, profile: np.ndarray, rests: Sequence[Rest] = (),
+    *, seen: float, within: float, less: float,
+) -> Wander | None:  # fmt: skip
     """The wandering of two channels in stretches (2, n_i) before the events; None where there is none to be seen.
 
-    To be safe the largest intensity that is nearly as likely as the likeliest, given the fast noise; in both channels
-    where it is seen in one, for what wanders is the load. What is left of the events counts, too, but no more than the
-    stretches before them allow: what answers a dip does not wander.
+    To be safe the largest intensity whose log-likelihood is at most `less` below the likeliest's, given the fast
+    noise; in both channels where it is seen in one, for what wanders is the load. It is seen where twice the
+    log-likelihood gains `seen`. What is left of the events counts, too, where it shows `within` more, but no more than
+    the stretches before them allow: what answers a dip does not wander.
     """
     stretches = [b for b in before if b.shape[1] >= 8 * (SLOW + 2)]
     if not stretches:
@@ -88,14 +89,14 @@ def find(before: Sequence[np.ndarray], step: float, profile: np.ndarray, rests: 
     fast = [fit_autoregression([without_slow(s[c]) for s in stretches], sparing=True) for c in (0, 1)]
     total = np.array([_likelihood([s[c] for s in stretches], fast[c], step) for c in (0, 1)])
     total -= total[:, :1]
-    most = [_last(row, LESS) for row in total]
+    most = [_last(row, less) for row in total]
     found = Wander(GRID[most], step, profile)
-    if 2 * total.max() >= SEEN:
+    if 2 * total.max() >= seen:
         return found
-    within = np.array([sum(_within(r, c, fast[c], step) for r in rests) * np.ones(len(GRID)) for c in (0, 1)])
-    both = total + within - within[:, :1]
-    seen = max(2 * row[: last + 1].max() for row, last in zip(both, most, strict=True))
-    return found if seen - MORE >= SEEN else None
+    rest = np.array([sum(_within(r, c, fast[c], step) for r in rests) * np.ones(len(GRID)) for c in (0, 1)])
+    both = total + rest - rest[:, :1]
+    gained = max(2 * row[: last + 1].max() for row, last in zip(both, most, strict=True))
+    return found if gained - within >= seen else None
 
 
 def _last(likelihood: np.ndarray, less: float) -> int:

@@ -23,27 +23,29 @@ class Discrepancy(Task):
         check_range("task.false_alarms", self.false_alarms, 0.001, 0.5)
 
     def run(self, job: Job) -> None:
-        from tractexp.discrepancy import contract
+        from tractexp.discrepancy import discrepancy_json
+        from tractexp.discrepancy.criteria import Criteria
         from tractexp.discrepancy.investigate import investigate
 
         events, node = job.events(), job.config["model"]
         read(events)
         job.prepare_log()
-        finding = investigate(
+        found = investigate(
             job.model, events.train, events.validate, node["bounds"], node["fixed"],
-            only=self.effects, alpha=self.false_alarms, seed=job.seed, tell=lambda line: say(f"  {line}"),
+            only=self.effects, criteria=Criteria(false_alarms=self.false_alarms), seed=job.seed,
+            tell=lambda line: say(f"  {line}"),
         )  # fmt: skip
-        tell(finding)
-        extended = contract.write_model(finding, node, job.folder / "conf" / "model" / "extended.yaml")
-        result = extended_result(job, finding, events)
-        paths = [contract.write(finding, job.folder / "discrepancy.json"), extended, result]
-        if finding.verdict == "unexplained":
-            paths.append(contract.write_left(finding, job.folder / "unexplained.csv"))
-        paths += draw(job, finding)
+        tell(found)
+        extended = discrepancy_json.write_model(found, node, job.folder / "conf" / "model" / "extended.yaml")
+        result = extended_result(job, found, events)
+        paths = [discrepancy_json.write(found, job.folder / "discrepancy.json"), extended, result]
+        if found.verdict.word == "unexplained":
+            paths.append(discrepancy_json.write_left(found, job.folder / "unexplained.csv"))
+        paths += draw(job, found)
         for path in paths:
             say(f"  {path}")
         say(f"the extended model: python -m tractexp --config-dir {job.folder / 'conf'} model=extended")
-        log(job, finding, [p for p in paths if p != extended] + [job.folder / "conf"], result)
+        log(job, found, [p for p in paths if p != extended] + [job.folder / "conf"], result)
 
 
 def read(events: Any) -> None:
@@ -57,17 +59,17 @@ def read(events: Any) -> None:
                 say(f"  note: {note}")
 
 
-def tell(finding: Any) -> None:
+def tell(found: Any) -> None:
     """Print the story: noise, disagreement, where, which, how sure, how much smaller."""
-    from tractexp.discrepancy.contract import recommendation
+    from tractexp.discrepancy.discrepancy_json import recommendation
 
-    say(f"noise: {finding.last.noise.describe()}")
-    say(f"verdict: {finding.verdict.upper()} {', '.join(finding.names)}")
-    say(f"  {finding.reason}")
-    for place in finding.places[:5]:
+    say(f"noise: {found.last.noise.describe()}")
+    say(f"verdict: {found.verdict.word.upper()} {', '.join(found.names)}")
+    say(f"  {found.verdict.reason}")
+    for place in found.places[:5]:
         say(f"  where: {place.event}, {place.channel}, {place.start:.3f} to {place.end:.3f} s, {place.share:.0%}")
     rows = []
-    for label, gap in (("fitted", finding.train), ("held out", finding.validate)):
+    for label, gap in (("fitted", found.train), ("held out", found.validate)):
         if gap is None:
             continue
         for stage, curves in (("before", gap.before), ("after", gap.after)):
@@ -75,19 +77,19 @@ def tell(finding: Any) -> None:
                 [label, stage, f"{curves.epsilon_p:.3%}", f"{curves.epsilon_q:.3%}", f"{curves.chi2_per_sample:.3f}"]
             )
     table(["events", "", "epsilon_p", "epsilon_q", "chi2 per sample"], rows)
-    if finding.names:
-        say(f"share of the explainable gap closed on the fitted events: {finding.train.closed:.0%}")
-    if finding.validate is not None:
-        say(f"share of the explainable gap closed on the held-out events: {finding.validate.closed:.0%}")
-    if finding.nearest is not None:
-        near = finding.nearest
+    if found.names:
+        say(f"share of the explainable gap closed on the fitted events: {found.train.closed:.0%}")
+    if found.validate is not None:
+        say(f"share of the explainable gap closed on the held-out events: {found.validate.closed:.0%}")
+    if found.verdict.nearest is not None:
+        near = found.verdict.nearest
         held = f", {near.held_out:.0%} on the held-out events" if np.isfinite(near.held_out) else ""
         say(f"nearest: {' and '.join(near.names)} explains {near.fitted:.0%} of what exceeds the noise{held}")
-    say(f"next: {recommendation(finding)}")
+    say(f"next: {recommendation(found)}")
     say()
 
 
-def extended_result(job: Job, finding: Any, events: Any) -> Path:
+def extended_result(job: Job, found: Any, events: Any) -> Path:
     """Write the extended model's parameters as a result file, which predicts and is logged as a model."""
     from tractexp.identification.problem import Problem
     from tractexp.identification.result import conclude, parts
@@ -95,33 +97,31 @@ def extended_result(job: Job, finding: Any, events: Any) -> Path:
     from tractexp.model.model import compose
 
     node = job.config["model"]
-    names = sorted({*node["effects"], *finding.names})
+    names = sorted({*node["effects"], *found.names})
     settings = {"motor": node["motor"], "static": node["static"], "effects": names}
     model = compose(*parts(settings))
-    problem = Problem(
-        model, events.train, node["bounds"], node["fixed"], int(finding.study.problem.step.substeps.max())
-    )
-    values = np.array([finding.study.value(n, finding.extended.unit) for n in problem.space.names])
+    problem = Problem(model, events.train, node["bounds"], node["fixed"], int(found.bench.problem.step.substeps.max()))
+    values = np.array([found.bench.coordinates.value(n, found.extended.unit) for n in problem.space.names])
     objective = float(problem.objective(values[None])[0])
-    one = np.array([finding.study.simulations])
+    one = np.array([found.bench.effort.simulations])
     history = History(one, np.array([objective]), values[None], np.zeros(1))
-    status = f"ended with the verdict {finding.verdict}"
-    found = Found(values, objective, finding.study.simulations, 0, 0, 0.0, status, history)
-    result, _ = conclude(problem, found, events.validate, job.seed, settings, "descent")
+    status = f"ended with the verdict {found.verdict.word}"
+    ended = Found(values, objective, found.bench.effort.simulations, 0, 0, 0.0, status, history)
+    result, _ = conclude(problem, ended, events.validate, job.seed, settings, "descent")
     return result.write(job.folder / "result.json")
 
 
-def draw(job: Job, finding: Any) -> list[Path]:
+def draw(job: Job, found: Any) -> list[Path]:
     """The figures and the page."""
     from tractexp.report import discrepancy
 
-    return discrepancy.report(job.folder, finding, f"{job.choices['data']}")
+    return discrepancy.report(job.folder, found, f"{job.choices['data']}")
 
 
-def log(job: Job, finding: Any, paths: list[Path], result: Path) -> None:
+def log(job: Job, found: Any, paths: list[Path], result: Path) -> None:
     """Log verdict, gap and page."""
     metrics = {}
-    for role, gap in (("train", finding.train), ("validate", finding.validate)):
+    for role, gap in (("train", found.train), ("validate", found.validate)):
         if gap is None:
             continue
         for stage, curves in (("before", gap.before), ("after", gap.after)):
@@ -130,20 +130,20 @@ def log(job: Job, finding: Any, paths: list[Path], result: Path) -> None:
         if np.isfinite(gap.closed):
             metrics[f"{role}_gap_closed"] = gap.closed
     job.log(
-        name=f"{finding.verdict} {' '.join(finding.names)}".strip(),
+        name=f"{found.verdict.word} {' '.join(found.names)}".strip(),
         values={},
         metrics=metrics,
         artifacts=[*paths, job.folder / ".hydra"],
-        description=finding.reason,
+        description=found.verdict.reason,
         model=result,
-        children=candidates(job, finding),
+        children=candidates(job, found),
     )
 
 
-def candidates(job: Job, finding: Any) -> list[Any]:
+def candidates(job: Job, found: Any) -> list[Any]:
     """A run below this one for every set of effects that was refitted: how far it lowers the deviance, and its size."""
     from tractexp import tracking
-    from tractexp.discrepancy.contract import sets
+    from tractexp.discrepancy.discrepancy_json import sets
 
     return [
         tracking.Run(
@@ -153,5 +153,5 @@ def candidates(job: Job, finding: Any) -> list[Any]:
             | {name: at["value"] for name, at in row["parameters"].items()},
             tags={"candidate": row["status"], "task": "discrepancy"},
         )
-        for row in sets(finding)
+        for row in sets(found)
     ]  # fmt: skip

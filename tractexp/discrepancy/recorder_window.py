@@ -24,13 +24,13 @@ ERROR = 2e-4  # pu: how exactly the averaged voltage must be the recorded one, i
 
 
 @dataclass(frozen=True, eq=False)
-class Phasors(Measurement):
+class RecorderWindow(Measurement):
     """A recorder that forms phasors over a window [s]."""
 
     window: float
 
     def __repr__(self) -> str:
-        return f"Phasors({self.window})"
+        return f"RecorderWindow({self.window})"
 
     def describe(self) -> str:
         """The window, as a run tells it."""

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import gammaincc
 
-from tractexp.discrepancy.study import Study
-from tractexp.discrepancy.tangent import Projection, windows
+from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.projection import Projection
+from tractexp.discrepancy.pushes import windows
 
 SMALLEST_P = 1e-300
 LOUDEST = "the loudest window"
@@ -33,18 +34,18 @@ class Cell:
     end: float
 
 
-def statistics(projection: Projection, study: Study) -> dict[str, np.ndarray]:
+def statistics(projection: Projection, bench: Bench) -> dict[str, np.ndarray]:
     """Every statistic by what it looks for: a sum (b,), or those of which the largest counts (b, k)."""
-    channels = channels_of(projection, study)
-    after = aligned(channels, study)
+    channels = channels_of(projection, bench)
+    after = aligned(channels, bench)
     made = {
         "pushes into the balances": projection.unrest(),
         "a further effect": -np.log(least_p(projection))[:, None],
-        LOUDEST: energies(channels, study),
-        "a step or a pulse": np.concatenate([steps(channels, study), pulses(after, study)], axis=1),
-        "an oscillation": np.concatenate([tones(channels, study), bursts(after, study)], axis=1),
+        LOUDEST: energies(channels, bench),
+        "a step or a pulse": np.concatenate([steps(channels, bench), pulses(after, bench)], axis=1),
+        "an oscillation": np.concatenate([tones(channels, bench), bursts(after, bench)], axis=1),
     }
-    if len(study.events) > 1:
+    if len(bench.events) > 1:
         made["parameters of each event"] = projection.unsteadiness()
     return made
 
@@ -77,17 +78,17 @@ def least_p(projection: Projection) -> np.ndarray:
     return np.maximum(projection.drops[1].min(axis=0, initial=1.0), SMALLEST_P)
 
 
-def channels_of(projection: Projection, study: Study) -> np.ndarray:
+def channels_of(projection: Projection, bench: Bench) -> np.ndarray:
     """Whitened, projected residuals (b, 2, N), without the rows of the prior."""
-    return projection.r[:, : 2 * study.problem.drive.samples].reshape(len(projection.r), 2, -1)
+    return projection.r[:, : 2 * bench.drive.samples].reshape(len(projection.r), 2, -1)
 
 
-def cells_of(study: Study) -> list[Cell]:
+def cells_of(bench: Bench) -> list[Cell]:
     """Every window of every event, for P and for Q."""
     made = []
-    for e, event in enumerate(study.events):
-        first, step, origin = int(study.problem.drive.first[e]), event.record.step, event.record.t[0]
-        for a, b in windows(study, e):
+    for e, event in enumerate(bench.events):
+        first, step, origin = int(bench.drive.first[e]), event.record.step, event.record.t[0]
+        for a, b in windows(bench, e):
             i, j = round(a / step), min(round(b / step), event.record.samples)
             if j - i < 2:
                 continue
@@ -96,49 +97,49 @@ def cells_of(study: Study) -> list[Cell]:
     return made
 
 
-def energies(channels: np.ndarray, study: Study) -> np.ndarray:
+def energies(channels: np.ndarray, bench: Bench) -> np.ndarray:
     """Energy of each residual (b, 2, N) in each cell, (b, cells), over that of a sample in quiet."""
     square = channels**2
-    square /= np.mean(np.concatenate([square[:, :, part] for part in study.quiet], axis=2), axis=2, keepdims=True)
-    return np.stack([square[:, "PQ".index(c.channel), c.part].sum(axis=1) for c in cells_of(study)], axis=1)
+    square /= np.mean(np.concatenate([square[:, :, part] for part in bench.quiet], axis=2), axis=2, keepdims=True)
+    return np.stack([square[:, "PQ".index(c.channel), c.part].sum(axis=1) for c in cells_of(bench)], axis=1)
 
 
-def aligned(channels: np.ndarray, study: Study) -> np.ndarray:
+def aligned(channels: np.ndarray, bench: Bench) -> np.ndarray:
     """What follows the dips, summed over the events at the same time after each, (b, 2, n) of unit variance.
 
     Timers and controls answer every dip alike, however little each event shows of it.
     """
-    drive = study.problem.drive
-    parts = [channels[:, :, drive.part(e)][:, :, event.end :] for e, event in enumerate(study.events)]
+    drive = bench.drive
+    parts = [channels[:, :, drive.part(e)][:, :, event.end :] for e, event in enumerate(bench.events)]
     common = min(p.shape[2] for p in parts)
     return sum(p[:, :, :common] for p in parts) / np.sqrt(len(parts))
 
 
-def steps(channels: np.ndarray, study: Study) -> np.ndarray:
+def steps(channels: np.ndarray, bench: Bench) -> np.ndarray:
     """Square of the sum from each instant to the end of an event, in P and in Q, (b, instants)."""
     made = []
-    for e in range(len(study.events)):
-        sums = np.cumsum(channels[:, :, study.problem.drive.part(e)][:, :, ::-1], axis=2)[:, :, ::STRIDE]
+    for e in range(len(bench.events)):
+        sums = np.cumsum(channels[:, :, bench.drive.part(e)][:, :, ::-1], axis=2)[:, :, ::STRIDE]
         made.append(sums**2)
     return np.concatenate(made, axis=2).reshape(len(channels), -1)
 
 
-def pulses(after: np.ndarray, study: Study) -> np.ndarray:
+def pulses(after: np.ndarray, bench: Bench) -> np.ndarray:
     """Square of the sum over each short stretch of aligned residuals (b, 2, n), in P and in Q, (b, stretches)."""
     sums = np.cumsum(np.pad(after, ((0, 0), (0, 0), (1, 0))), axis=2)
     made = [np.empty((len(after), 0))]
     for length in PULSES:
-        n = max(round(length / study.events[0].record.step), 1)
+        n = max(round(length / bench.events[0].record.step), 1)
         if n < sums.shape[2]:
             made.append(((sums[:, :, n:] - sums[:, :, :-n])[:, :, :: -(-n // 4)] ** 2 / n).reshape(len(after), -1))
     return np.concatenate(made, axis=1)
 
 
-def tones(channels: np.ndarray, study: Study) -> np.ndarray:
+def tones(channels: np.ndarray, bench: Bench) -> np.ndarray:
     """Power at each frequency of all events and channels, in the dip, after it and in both, (b, frequencies)."""
     power = np.zeros((len(channels), 3, BINS // 2 + 1))
-    for e, event in enumerate(study.events):
-        own = channels[:, :, study.problem.drive.part(e)]
+    for e, event in enumerate(bench.events):
+        own = channels[:, :, bench.drive.part(e)]
         for k, part in enumerate((slice(event.start, event.end), slice(event.end, None), slice(event.start, None))):
             stretch = own[:, :, part]
             if stretch.shape[2] >= FEWEST:
@@ -146,11 +147,11 @@ def tones(channels: np.ndarray, study: Study) -> np.ndarray:
     return power.reshape(len(channels), -1)
 
 
-def bursts(after: np.ndarray, study: Study) -> np.ndarray:
+def bursts(after: np.ndarray, bench: Bench) -> np.ndarray:
     """Power of aligned residuals (b, 2, n) by frequency in stretches that overlap by half, (b, cells)."""
     made = [np.empty((len(after), 0))]
     for length in BURSTS:
-        n = round(length / study.events[0].record.step)
+        n = round(length / bench.events[0].record.step)
         if FEWEST <= n <= after.shape[2]:
             stretches = np.lib.stride_tricks.sliding_window_view(after, n, axis=2)[:, :, :: n // 2]
             power = np.abs(np.fft.rfft(stretches, 2 * n, axis=3)) ** 2 / n

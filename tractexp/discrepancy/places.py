@@ -4,9 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.left import LOUDEST, Cell, cells_of, channels_of, energies, extremes
-from tractexp.discrepancy.null import Null
-from tractexp.discrepancy.tangent import Projection
+from tractexp.discrepancy.adequacy import LOUDEST, Cell, cells_of, channels_of, energies, extremes
+from tractexp.discrepancy.disagreement import Disagreement
 
 
 @dataclass(frozen=True)
@@ -20,22 +19,22 @@ class Place:
     share: float
 
 
-def where(projection: Projection, null: Null, alpha: float) -> list[Place]:
-    """Intervals that stand out at a family-wise error of `alpha`, adjacent ones joined, the largest first."""
-    study = projection.tangent.study
-    cells = cells_of(study)
-    mean, spread, highest = extremes(null.left[LOUDEST])
-    excess = energies(channels_of(projection, study), study)[0] - mean
-    found = excess / spread > np.quantile(highest, 1 - alpha)
+def places(at: Disagreement) -> list[Place]:
+    """Intervals that stand out at the family-wise error of `false_alarms`, adjacent ones joined, the largest first."""
+    bench = at.bench
+    cells = cells_of(bench)
+    mean, spread, highest = extremes(at.chance.left[LOUDEST])
+    excess = energies(channels_of(at.projection, bench), bench)[0] - mean
+    found = excess / spread > np.quantile(highest, 1 - at.criteria.false_alarms)
     total = np.maximum(excess, 0.0).sum()
-    places = [
+    made = [
         Place(
-            study.events[group[0].event].record.name, group[0].channel, group[0].start, group[-1].end,
+            bench.events[group[0].event].record.name, group[0].channel, group[0].start, group[-1].end,
             float(sum(excess[cells.index(c)] for c in group) / total),
         )
         for group in _joined([c for c, yes in zip(cells, found, strict=True) if yes])
     ]  # fmt: skip
-    return sorted(places, key=lambda p: -p.share)
+    return sorted(made, key=lambda p: -p.share)
 
 
 def _joined(cells: list[Cell]) -> list[list[Cell]]:

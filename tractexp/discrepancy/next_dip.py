@@ -7,18 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr
 
-from tractexp.discrepancy.study import Study
-from tractexp.discrepancy.sure import ONE_SIDED, Rival
+from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.survivors import Rival
 from tractexp.discrepancy.tangent import two_sided
 from tractexp.model.drive import Drive, Excitation
 
 DEPTHS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
 DURATIONS = (0.1, 0.2, 0.4, 0.8)  # s
-DECIDED = 0.95
+ONE_SIDED = 1.6449  # standard deviations: 5 %
 
 
 @dataclass(frozen=True)
-class Decider:
+class NextDip:
     """A dip to wait for, and how likely it is to tell the first two sets apart."""
 
     depth: float
@@ -26,20 +26,20 @@ class Decider:
     probability: float
 
 
-def deciding_event(study: Study, tied: Sequence[Rival]) -> Decider:
-    """The mildest realistic dip that tells the first two tied sets apart with 95 %, or else the most likely one.
+def next_dip(bench: Bench, tied: Sequence[Rival]) -> NextDip:
+    """The mildest realistic dip that tells the first two tied sets apart as surely as asked, or else the surest.
 
     lambda = d'(1 + J H^-1 J')^-1 d with d the difference of both predictions, J the rival's tangent and H what the
     training events already know of it; the rival is rejected with probability Phi(sqrt(lambda) - 1.64).
     """
     dips = list(itertools.product(DEPTHS, DURATIONS))
-    d, J = _response(study, tied[0], tied[1], [_dip(study, depth, duration) for depth, duration in dips])
-    assert tied[1].stage is not None
-    R, order = tied[1].stage.projection.R, _order(study, tied[1])
+    d, J = _response(bench, tied[0], tied[1], [_dip(bench, depth, duration) for depth, duration in dips])
+    assert tied[1].tests is not None
+    R, order = tied[1].tests.projection.R, _order(bench, tied[1])
     known = (R.T @ R)[np.ix_(order, order)]
     likely = [float(ndtr(np.sqrt(_separation(d[e], J[:, e], known)) - ONE_SIDED)) for e in range(len(dips))]
-    rated = [Decider(*dip, p) for dip, p in zip(dips, likely, strict=True)]
-    enough = [r for r in rated if r.probability >= DECIDED]
+    rated = [NextDip(*dip, p) for dip, p in zip(dips, likely, strict=True)]
+    enough = [r for r in rated if r.probability >= bench.criteria.decided]
     return min(enough, key=lambda r: r.depth * r.duration) if enough else max(rated, key=lambda r: r.probability)
 
 
@@ -51,34 +51,36 @@ def _separation(d: np.ndarray, J: np.ndarray, known: np.ndarray) -> float:
 
 
 def _response(
-    study: Study, truth: Rival, rival: Rival, dips: Sequence[Excitation]
+    bench: Bench, truth: Rival, rival: Rival, dips: Sequence[Excitation]
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Whitened difference of both predictions (E, R) and the rival's tangent (k, E, R) in dips of equal length."""
-    inside = [*study.base, *study.parameters(rival.fit.names)]
+    at = bench.coordinates
+    inside = [*at.base, *at.parameters(rival.fit.names)]
     up, down = two_sided(rival.fit.unit, inside)
     width = np.array([u[k] - d[k] for u, d, k in zip(up, down, inside, strict=True)])
     points = np.concatenate([truth.fit.unit[None], rival.fit.unit[None], up, down])
-    chain = study.parameters(study.catalogue.chain)
-    points[:, chain] = study.null[chain]  # what the recorder does to those events says nothing of the load
-    made = study.kernels.simulate((*truth.fit.names, *rival.fit.names), points, Drive.of(dips))
+    faults = at.parameters(bench.catalogue.of_measurement)
+    points[:, faults] = at.null[faults]  # what the recorder does to those events says nothing of the load
+    made = bench.kernels.simulate((*truth.fit.names, *rival.fit.names), points, Drive.of(dips))
     each = np.moveaxis(made.reshape(len(points), 2, len(dips), -1), 2, 1).reshape(-1, 2, len(dips[0].U))
     one = Drive.of(dips[:1])
-    assert rival.stage is not None
-    noise = rival.stage.noise.on(np.ones(one.samples))
+    assert rival.tests is not None
+    noise = rival.tests.noise.on(np.ones(one.samples))
     rows = noise.whiten(each, one, one.weights > 0).reshape(len(points), len(dips), -1)
     k = len(inside)
     return rows[0] - rows[1], (rows[2 : 2 + k] - rows[2 + k :]) / width[:, None, None]
 
 
-def _order(study: Study, rival: Rival) -> list[int]:
+def _order(bench: Bench, rival: Rival) -> list[int]:
     """Where the base's and the rival's parameters stand among the nuisances of its tangent."""
-    nb, ne = len(study.base), len(study.before)
-    return [*range(nb), *range(nb + ne, nb + ne + len(study.parameters(rival.fit.names)))]
+    at = bench.coordinates
+    nb, ne = len(at.base), len(at.before)
+    return [*range(nb), *range(nb + ne, nb + ne + len(at.parameters(rival.fit.names)))]
 
 
-def _dip(study: Study, depth: float, duration: float) -> Excitation:
-    """A dip as the events of this study start and are sampled, with edges of two cycles."""
-    event = study.events[0]
+def _dip(bench: Bench, depth: float, duration: float) -> Excitation:
+    """A dip as the events of this bench start and are sampled, with edges of two cycles."""
+    event = bench.events[0]
     step, lead = event.record.step, 0.3
     t = np.arange(round((lead + max(DURATIONS) + 1.5) / step)) * step
     fall, rise = np.clip((t - lead) / 0.04, 0, 1), np.clip((t - lead - duration) / 0.04, 0, 1)
