@@ -128,8 +128,8 @@ def bound(load, events, truth: np.ndarray, deviation: float, correlation: float)
     """Cramér-Rao: the information at the truth under the noise that was really added, P0 and Q0 unknown."""
     from tractexp.identification.information import Information
     from tractexp.identification.likelihood import Likelihood
-    from tractexp.noise import Autoregression, Noise
     from tractexp.identification.problem import Problem
+    from tractexp.noise import Autoregression, Noise
 
     shock = deviation * np.sqrt(1 - correlation**2)
     true = Autoregression(np.array([[0.0], [correlation]]), np.array([deviation, shock]))

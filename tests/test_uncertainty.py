@@ -14,12 +14,12 @@ from tractexp.identification.descent import descend
 from tractexp.identification.diagnosis import jarque_bera, ljung_box, louder
 from tractexp.identification.information import Information
 from tractexp.identification.likelihood import Likelihood
-from tractexp.noise import Noise
-from tractexp.noise.color import Autoregression, fit_autoregression, stretches
 from tractexp.identification.problem import Problem
 from tractexp.identification.profile import checked
 from tractexp.identification.uncertainty import assess, compare_events
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK
+from tractexp.noise import Noise
+from tractexp.noise.color import Autoregression, fit_autoregression, stretches
 
 
 def ar1(rng, n, a):
