@@ -89,7 +89,7 @@ def catalogue(
         if why := missing_channel(effect, events, swing) or effect.refusal(equations):
             untestable[name] = why
         else:
-            found.append(_candidate(effect))
+            found.append(candidate(effect))
     return Catalogue(tuple(found), untestable)
 
 
@@ -103,7 +103,8 @@ def missing_channel(effect: Effect, events: Sequence[Event], swing: float) -> st
     return ""
 
 
-def _candidate(effect: Effect) -> Candidate:
+def candidate(effect: Effect) -> Candidate:
+    """An effect as it is looked for: its sizes, and the settings of its other parameters."""
     sizes = tuple(p for p in effect.parameters if p.null is not None)
     scanned = [p for p in effect.parameters if p.null is None]
     grid = getattr(effect, "grid", {})

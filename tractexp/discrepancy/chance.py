@@ -40,7 +40,7 @@ def chance_at(t: Tangent, noise: Noise, quiet: QuietNoise, seed: int, plain: boo
     rng = np.random.default_rng(seed)
     made = noise.draw(rng, draws, np.diff(bench.drive.first).tolist())
     made *= bench.known
-    if plain or noise.worth(sum(p.stop - p.start for p in bench.quiet)) >= bench.criteria.quiet_worth:
+    if plain or bench.criteria.knows_noise(noise.worth(sum(p.stop - p.start for p in bench.quiet))):
         return _collected(t, [t.whitened(noise, made)], noise)
     rest = rich_residuals(t, made)
     projections = []

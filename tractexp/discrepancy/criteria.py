@@ -148,6 +148,10 @@ class Criteria:
         """The p that one more name must undercut where there are some already."""
         return self.second_name_p if names == 1 else self.third_name_p
 
+    def knows_noise(self, worth: float) -> bool:
+        """Whether quiet stretches worth so many independent samples tell the noise exactly enough."""
+        return worth >= self.quiet_worth
+
     def least_window(self, best: float) -> float:
         """The deviance that a recorder's window must explain where the best effect explains `best`."""
         clear = max(self.window_clear, self.window_share * best)

@@ -36,11 +36,11 @@ def judgements(found: Investigation) -> list[Judgement]:
         elif score is None:
             made.append(Judgement(name, "irrelevant", "in the fit as a nuisance, not above its noise"))
         else:
-            made.append(Judgement(name, *_judged(candidate, score, critical, criteria.testable), score))
+            made.append(Judgement(name, *judged(candidate, score, critical, criteria.testable), score))
     return sorted(made, key=lambda j: j.name)
 
 
-def _judged(candidate: Candidate, score: Score, critical: float, testable: float) -> tuple[str, str]:
+def judged(candidate: Candidate, score: Score, critical: float, testable: float) -> tuple[str, str]:
     """Status and reason of an effect outside the chosen model."""
     main = candidate.sizes[0]
     unit = "" if main.unit == "1" else f" {main.unit}"

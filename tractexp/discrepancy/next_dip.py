@@ -38,9 +38,13 @@ def next_dip(bench: Bench, tied: Sequence[Rival]) -> NextDip:
     R, order = tied[1].tests.projection.R, _order(bench, tied[1])
     known = (R.T @ R)[np.ix_(order, order)]
     likely = [float(ndtr(np.sqrt(_separation(d[e], J[:, e], known)) - ONE_SIDED)) for e in range(len(dips))]
-    rated = [NextDip(*dip, p) for dip, p in zip(dips, likely, strict=True)]
-    enough = [r for r in rated if r.probability >= bench.criteria.decided]
-    return min(enough, key=lambda r: r.depth * r.duration) if enough else max(rated, key=lambda r: r.probability)
+    return mildest([NextDip(*dip, p) for dip, p in zip(dips, likely, strict=True)], bench.criteria.decided)
+
+
+def mildest(dips: Sequence[NextDip], decided: float) -> NextDip:
+    """The dip of least depth times duration that decides with a probability of `decided`, or else the surest."""
+    enough = [dip for dip in dips if dip.probability >= decided]
+    return min(enough, key=lambda dip: dip.depth * dip.duration) if enough else max(dips, key=lambda d: d.probability)
 
 
 def _separation(d: np.ndarray, J: np.ndarray, known: np.ndarray) -> float:
