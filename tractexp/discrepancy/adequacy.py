@@ -38,7 +38,7 @@ def statistics(projection: Projection, bench: Bench) -> dict[str, np.ndarray]:
     """Every statistic by what it looks for: a sum (b,), or those of which the largest counts (b, k)."""
     channels = channels_of(projection, bench)
     after = aligned(channels, bench)
-    made = {
+    by_test = {
         "pushes into the balances": projection.unrest(),
         "a further effect": -np.log(least_p(projection))[:, None],
         LOUDEST: energies(channels, bench),
@@ -46,8 +46,8 @@ def statistics(projection: Projection, bench: Bench) -> dict[str, np.ndarray]:
         "an oscillation": np.concatenate([tones(channels, bench), bursts(after, bench)], axis=1),
     }
     if len(bench.events) > 1:
-        made["parameters of each event"] = projection.unsteadiness()
-    return made
+        by_test["parameters of each event"] = projection.unsteadiness()
+    return by_test
 
 
 def tail(draws: np.ndarray, value: np.ndarray) -> float:
@@ -85,7 +85,7 @@ def channels_of(projection: Projection, bench: Bench) -> np.ndarray:
 
 def cells_of(bench: Bench) -> list[Cell]:
     """Every window of every event, for P and for Q."""
-    made = []
+    cells = []
     for e, event in enumerate(bench.events):
         first, step, origin = int(bench.drive.first[e]), event.record.step, event.record.t[0]
         for a, b in windows(bench, e):
@@ -93,8 +93,8 @@ def cells_of(bench: Bench) -> list[Cell]:
             if j - i < 2:
                 continue
             part = slice(first + i, first + j)
-            made += [Cell(e, c, part, origin + i * step, origin + (j - 1) * step) for c in "PQ"]
-    return made
+            cells += [Cell(e, c, part, origin + i * step, origin + (j - 1) * step) for c in "PQ"]
+    return cells
 
 
 def energies(channels: np.ndarray, bench: Bench) -> np.ndarray:
@@ -110,29 +110,29 @@ def aligned(channels: np.ndarray, bench: Bench) -> np.ndarray:
     Timers and controls answer every dip alike, however little each event shows of it.
     """
     drive = bench.drive
-    parts = [channels[:, :, drive.part(e)][:, :, event.end :] for e, event in enumerate(bench.events)]
-    common = min(p.shape[2] for p in parts)
-    return sum(p[:, :, :common] for p in parts) / np.sqrt(len(parts))
+    after = [channels[:, :, drive.part(e)][:, :, event.end :] for e, event in enumerate(bench.events)]
+    common = min(p.shape[2] for p in after)
+    return sum(p[:, :, :common] for p in after) / np.sqrt(len(after))
 
 
 def steps(channels: np.ndarray, bench: Bench) -> np.ndarray:
     """Square of the sum from each instant to the end of an event, in P and in Q, (b, instants)."""
-    made = []
+    columns = []
     for e in range(len(bench.events)):
         sums = np.cumsum(channels[:, :, bench.drive.part(e)][:, :, ::-1], axis=2)[:, :, ::STRIDE]
-        made.append(sums**2)
-    return np.concatenate(made, axis=2).reshape(len(channels), -1)
+        columns.append(sums**2)
+    return np.concatenate(columns, axis=2).reshape(len(channels), -1)
 
 
 def pulses(after: np.ndarray, bench: Bench) -> np.ndarray:
     """Square of the sum over each short stretch of aligned residuals (b, 2, n), in P and in Q, (b, stretches)."""
     sums = np.cumsum(np.pad(after, ((0, 0), (0, 0), (1, 0))), axis=2)
-    made = [np.empty((len(after), 0))]
+    columns = [np.empty((len(after), 0))]
     for length in PULSES:
         n = max(round(length / bench.events[0].record.step), 1)
         if n < sums.shape[2]:
-            made.append(((sums[:, :, n:] - sums[:, :, :-n])[:, :, :: -(-n // 4)] ** 2 / n).reshape(len(after), -1))
-    return np.concatenate(made, axis=1)
+            columns.append(((sums[:, :, n:] - sums[:, :, :-n])[:, :, :: -(-n // 4)] ** 2 / n).reshape(len(after), -1))
+    return np.concatenate(columns, axis=1)
 
 
 def tones(channels: np.ndarray, bench: Bench) -> np.ndarray:
@@ -149,14 +149,14 @@ def tones(channels: np.ndarray, bench: Bench) -> np.ndarray:
 
 def bursts(after: np.ndarray, bench: Bench) -> np.ndarray:
     """Power of aligned residuals (b, 2, n) by frequency in stretches that overlap by half, (b, cells)."""
-    made = [np.empty((len(after), 0))]
+    columns = [np.empty((len(after), 0))]
     for length in BURSTS:
         n = round(length / bench.events[0].record.step)
         if FEWEST <= n <= after.shape[2]:
             stretches = np.lib.stride_tricks.sliding_window_view(after, n, axis=2)[:, :, :: n // 2]
             power = np.abs(np.fft.rfft(stretches, 2 * n, axis=3)) ** 2 / n
-            made.append(power.sum(axis=1).reshape(len(after), -1))
-    return np.concatenate(made, axis=1)
+            columns.append(power.sum(axis=1).reshape(len(after), -1))
+    return np.concatenate(columns, axis=1)
 
 
 def _power(stretch: np.ndarray) -> np.ndarray:

@@ -38,25 +38,25 @@ def chance_at(t: Tangent, noise: Noise, quiet: QuietNoise, seed: int, plain: boo
     """Draw every statistic at a fit as chance makes it; where the case is `plain`, with the noise taken as known."""
     bench = t.bench
     rng = np.random.default_rng(seed)
-    made = noise.draw(rng, draws, np.diff(bench.drive.first).tolist())
-    made *= bench.known
+    drawn = noise.draw(rng, draws, np.diff(bench.drive.first).tolist())
+    drawn *= bench.known
     if plain or bench.criteria.knows_noise(noise.worth(sum(p.stop - p.start for p in bench.quiet))):
-        return _collected(t, [t.whitened(noise, made)], noise)
-    rest = rich_residuals(t, made)
+        return _collected(t, [t.whitened(noise, drawn)], noise)
+    rest = rich_residuals(t, drawn)
     projections = []
     for b in range(draws):
         bench.effort.spend(0)
-        projections.append(t.whitened(quiet.of(rest[b]), made[b : b + 1]))
+        projections.append(t.whitened(quiet.of(rest[b]), drawn[b : b + 1]))
     return _collected(t, projections, noise)
 
 
 def _collected(t: Tangent, projections: list[Projection], noise: Noise) -> Chance:
-    least, found = [], []
+    least, by_test = [], []
     for projection in projections:
         p = least_p(projection)
         if noise.loudest_blur <= t.bench.criteria.blurred:
             faults = np.array(list(projection.fault_p().values())).reshape(-1, len(p))
             p = np.maximum(np.minimum(p, faults.min(axis=0, initial=1.0)), SMALLEST_P)
         least.append(p)
-        found.append(statistics(projection, t.bench))
-    return Chance(np.concatenate(least), {name: np.concatenate([f[name] for f in found]) for name in found[0]})
+        by_test.append(statistics(projection, t.bench))
+    return Chance(np.concatenate(least), {name: np.concatenate([f[name] for f in by_test]) for name in by_test[0]})

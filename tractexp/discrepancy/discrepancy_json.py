@@ -13,63 +13,64 @@ from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.verdict import NAMED, UNEXPLAINED
 
 
-def content(found: Investigation) -> dict[str, Any]:
+def content(investigation: Investigation) -> dict[str, Any]:
     """The content of `discrepancy.json`."""
+    window = investigation.bench.records.window
     return {
-        "verdict": found.verdict.word,
-        "reason": found.verdict.reason,
-        "effects": list(found.names),
-        "name_sets": [list(names) for names in found.verdict.sets],
-        "where": [asdict(place) for place in found.places],
+        "verdict": investigation.verdict.word,
+        "reason": investigation.verdict.reason,
+        "effects": list(investigation.names),
+        "name_sets": [list(names) for names in investigation.verdict.sets],
+        "where": [asdict(place) for place in investigation.places],
         "gap": {
-            "train": _gap(found.train),
-            "validate": None if found.validate is None else _gap(found.validate),
-            "fitted_to_both": found.fitted_to_both,
+            "train": _gap(investigation.train),
+            "validate": None if investigation.validate is None else _gap(investigation.validate),
+            "fitted_to_both": investigation.fitted_to_both,
         },
-        "left": found.last.left,
-        "nearest": _nearest(found),
-        "candidates": [*sets(found), *_singles(found)],
-        "recommendation": recommendation(found),
-        "noise": found.last.noise.describe(),
-        "phasor_window": None if found.bench.records.window is None else found.bench.records.window.window,
-        "false_alarm_rate": found.bench.criteria.false_alarms,
-        "parameters": parameters(found),
-        "simulations": found.bench.effort.simulations,
+        "left": investigation.last.left,
+        "nearest": _nearest(investigation),
+        "candidates": [*sets(investigation), *_singles(investigation)],
+        "recommendation": recommendation(investigation),
+        "noise": investigation.last.noise.describe(),
+        "phasor_window": None if window is None else window.window,
+        "false_alarm_rate": investigation.bench.criteria.false_alarms,
+        "parameters": parameters(investigation),
+        "simulations": investigation.bench.effort.simulations,
     }
 
 
-def recommendation(found: Investigation) -> str:
+def recommendation(investigation: Investigation) -> str:
     """What to do next, one sentence."""
-    if (d := found.verdict.next_dip) is not None:
-        first, second = (" and ".join(names) for names in found.verdict.sets[:2])
+    if (d := investigation.verdict.next_dip) is not None:
+        first, second = (" and ".join(names) for names in investigation.verdict.sets[:2])
         return (
             f"record a dip of {d.depth:.0%} or more lasting {1000 * d.duration:.0f} ms: it tells {first} from {second}"
             f" with a probability of {d.probability:.0%}"
         )
-    if found.verdict.word == UNEXPLAINED:
+    if investigation.verdict.word == UNEXPLAINED:
         return (
             "look at what is left (unexplained.csv) and at what switched at that time; no effect of the catalogue fits"
         )
-    if found.verdict.word == NAMED:
+    if investigation.verdict.word == NAMED:
         return "use the extended model; judge it on further events as they come"
     return "use the base model; what is missing, if anything, is below the limits given for each effect"
 
 
-def parameters(found: Investigation) -> dict[str, dict[str, float]]:
+def parameters(investigation: Investigation) -> dict[str, dict[str, float]]:
     """Parameters of the extended model, each with its standard error where the fit gives one."""
-    at, unit = found.bench.coordinates, found.extended.unit
-    names = [*(at.names[k] for k in at.base), *_own(found)]
-    errors = _standard_errors(found)
+    at, unit = investigation.bench.coordinates, investigation.extended.unit
+    names = [*(at.names[k] for k in at.base), *_own(investigation)]
+    errors = _standard_errors(investigation)
     return {n: {"value": at.value(n, unit), "standard_error": errors.get(n, float("nan"))} for n in names}
 
 
-def _own(found: Investigation) -> list[str]:
-    return [p.name for name in found.names for p in found.catalogue[name].effect.parameters]
+def _own(investigation: Investigation) -> list[str]:
+    return [p.name for name in investigation.names for p in investigation.catalogue[name].effect.parameters]
 
 
-def _standard_errors(found: Investigation) -> dict[str, float]:
+def _standard_errors(investigation: Investigation) -> dict[str, float]:
     """From the curvature at the chosen fit; a parameter that rests on its bound has no number."""
-    at, tests = found.bench.coordinates, found.last
+    at, tests = investigation.bench.coordinates, investigation.last
     inside = [*at.base, *at.before, *at.parameters(tests.fit.names)]
     columns = inside + [k for name in at.catalogue.of_measurement for k in at.sizes([name])]
     inverse = np.linalg.pinv(tests.projection.R, rcond=1e-10)
@@ -82,9 +83,9 @@ def _gap(gap: Gap) -> dict[str, Any]:
     return {"before": _curves(gap.before), "after": _curves(gap.after), "closed": _number(gap.closed)}
 
 
-def _nearest(found: Investigation) -> dict[str, Any] | None:
+def _nearest(investigation: Investigation) -> dict[str, Any] | None:
     """The set that comes nearest where nothing explains the disagreement, with the shares it explains."""
-    near = found.verdict.nearest
+    near = investigation.verdict.nearest
     if near is None:
         return None
     others = [{"effects": list(names), "explained": _number(share)} for names, share in near.others]
@@ -94,12 +95,12 @@ def _nearest(found: Investigation) -> dict[str, Any] | None:
     }  # fmt: skip
 
 
-def write_left(found: Investigation, path: Path) -> Path:
+def write_left(investigation: Investigation, path: Path) -> Path:
     """Write what the nearest candidates leave, measured less calculated [pu], as CSV: event, t [s], P, Q."""
-    drive, nearest = found.bench.drive, found.verdict.nearest
-    near = found.train.before.calculated if nearest is None else nearest.calculated
+    drive, nearest = investigation.bench.drive, investigation.verdict.nearest
+    near = investigation.train.before.calculated if nearest is None else nearest.calculated
     lines = ["event,t,P,Q"]
-    for e, event in enumerate(found.bench.events):
+    for e, event in enumerate(investigation.bench.events):
         left = drive.measured[:, drive.part(e)] - near[:, drive.part(e)]
         rows = zip(event.record.t, *left, strict=True)
         lines += [f"{event.record.name},{t:.9g},{P:.9g},{Q:.9g}" for t, P, Q in rows]
@@ -114,30 +115,28 @@ def _curves(curves: Curves) -> dict[str, float]:
     }
 
 
-def sets(found: Investigation) -> list[dict[str, Any]]:
+def sets(investigation: Investigation) -> list[dict[str, Any]]:
     """The refitted sets of the chosen size."""
-    rows = []
-    for rival in found.survivors.rivals:
+    rows, at = [], investigation.bench.coordinates
+    for rival in investigation.survivors.rivals:
         names = rival.fit.names
         if not names:
             continue
         status = "rejected" if rival.rejected else "adequate" if rival.adequate else "not adequate"
-        labels = [p.name for n in names for p in found.catalogue[n].effect.parameters]
-        values = {
-            n: {"value": found.bench.coordinates.value(n, rival.fit.unit), "standard_error": None} for n in labels
-        }
+        labels = [p.name for n in names for p in investigation.catalogue[n].effect.parameters]
+        values = {n: {"value": at.value(n, rival.fit.unit), "standard_error": None} for n in labels}
         ratio = _number(rival.lowered)
         rows.append({"effects": list(names), "status": status, "likelihood_ratio": ratio, "parameters": values})
     return rows
 
 
-def _singles(found: Investigation) -> list[dict[str, Any]]:
+def _singles(investigation: Investigation) -> list[dict[str, Any]]:
     """Every effect of the catalogue, with its one-step size at the chosen model."""
     rows = []
-    for j in judgements(found):
+    for j in judgements(investigation):
         values = {}
         if j.score is not None:
-            null = {p.name: p.null for p in found.catalogue[j.name].sizes}
+            null = {p.name: p.null for p in investigation.catalogue[j.name].sizes}
             values = {
                 n: {"value": null[n] + size, "standard_error": _number(j.score.deviation[n])}
                 for n, size in j.score.size.items()
@@ -154,16 +153,16 @@ def _number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def write(found: Investigation, path: Path) -> Path:
+def write(investigation: Investigation, path: Path) -> Path:
     """Write `discrepancy.json`."""
-    return files.write_json(path, content(found))
+    return files.write_json(path, content(investigation))
 
 
-def write_model(found: Investigation, node: dict[str, Any], path: Path) -> Path:
+def write_model(investigation: Investigation, node: dict[str, Any], path: Path) -> Path:
     """Write the extended model as a choice of the group `model`, usable at once through `--config-dir`."""
     import yaml
 
-    effects = sorted({*node.get("effects", ()), *found.names})
+    effects = sorted({*node.get("effects", ()), *investigation.names})
     settings = {part: {k: v for k, v in node[part].items() if k != "name"} for part in ("motor", "static")}
     extended: dict[str, Any] = {
         "defaults": [{"motor": node["motor"]["name"]}, {"static": node["static"]["name"]}, "_self_"],

@@ -84,26 +84,26 @@ class HeldOut:
         )
 
 
-def held_out(found: Survivors, events: Sequence[Event], seed: int) -> HeldOut:
+def held_out(surviving: Survivors, events: Sequence[Event], seed: int) -> HeldOut:
     """Refit the survivors without needless faults of the measurement, and judge them on held-out events, if any."""
-    explained = found.explanations
+    explained = surviving.explanations
     bench, noise, faults = explained.base.bench, explained.last.noise, explained.faults
     at = bench.coordinates
     bare = refit(bench, noise, [((), at.without_faults(explained.steps[0].fit.unit, ()))], faults=())[0]
-    wanted = [(s.fit.names, at.without_faults(s.fit.unit, faults)) for s in (found.adequate or found.kept[:1])]
+    wanted = [(s.fit.names, at.without_faults(s.fit.unit, faults)) for s in (surviving.adequate or surviving.kept[:1])]
     exact = {f.names: f for f in refit(bench, noise, wanted, faults=faults)}
-    made = HeldOut(found, noise, faults, bare, {names: exact[names] for names, _ in wanted})
-    if not events or not any(s.fit.names or faults for s in found.adequate):
-        return made
-    count = len(found.adequate)
+    as_fitted = HeldOut(surviving, noise, faults, bare, {names: exact[names] for names, _ in wanted})
+    if not events or not any(s.fit.names or faults for s in surviving.adequate):
+        return as_fitted
+    count = len(surviving.adequate)
     bench.effort.say(f"judging {count} explanation{'s' * (count > 1)} on the held-out events")
-    judged, again = weighed(bench, events, made, seed, doubted=not explained.steps[0].adequate)
-    extended = {**made.extended, **{f.names: f for f in again}}
-    return replace(made, judged=judged, together=tuple(again), extended=extended)
+    judged, again = weighed(bench, events, as_fitted, seed, doubted=not explained.steps[0].adequate)
+    extended = {**as_fitted.extended, **{f.names: f for f in again}}
+    return replace(as_fitted, judged=judged, together=tuple(again), extended=extended)
 
 
 def weighed(
-    bench: Bench, events: Sequence[Event], found: HeldOut, seed: int, *, doubted: bool
+    bench: Bench, events: Sequence[Event], as_fitted: HeldOut, seed: int, *, doubted: bool
 ) -> tuple[dict[Names, Judged], list[Refit]]:
     """Judge explanations on held-out events; where none helps as it was fitted, also those that all events confirm.
 
@@ -111,15 +111,15 @@ def weighed(
     Several effects at once, chosen among hundreds of sets, must also leave nothing in a fit to all events, and so must
     a single one that closes less of the gap there than a true one does.
     """
-    extended = list(found.extended.values())
-    judged = judged_on(bench, events, found.bare, extended)
+    extended = list(as_fitted.extended.values())
+    judged = judged_on(bench, events, as_fitted.bare, extended)
     helping = [fit for fit in extended if judged[fit.names].gap.helps]
     if not helping:
-        fits = together(bench, events, found, extended, seed, anew=True)
+        fits = together(bench, events, as_fitted, extended, seed, anew=True)
         again = [fitted.fit for fitted in fits if fitted.confirmed(bench.criteria, doubted)]
-        return judged | (judged_on(bench, events, found.bare, again) if again else {}), again
-    doubtful = [f for f in helping if len(f.names) + len(found.faults) > 1 or not judged[f.names].convincing]
-    for fitted in together(bench, events, found, doubtful, seed) if doubtful else ():
+        return judged | (judged_on(bench, events, as_fitted.bare, again) if again else {}), again
+    doubtful = [f for f in helping if len(f.names) + len(as_fitted.faults) > 1 or not judged[f.names].convincing]
+    for fitted in together(bench, events, as_fitted, doubtful, seed) if doubtful else ():
         judged[fitted.fit.names] = replace(judged[fitted.fit.names], p_left=fitted.p_left)
     return judged, []
 
@@ -149,7 +149,13 @@ def carried(bench: Bench, events: Sequence[Event], fits: Sequence[Refit]) -> tup
 
 
 def together(
-    bench: Bench, events: Sequence[Event], found: HeldOut, extended: Sequence[Refit], seed: int, *, anew: bool = False
+    bench: Bench,
+    events: Sequence[Event],
+    as_fitted: HeldOut,
+    extended: Sequence[Refit],
+    seed: int,
+    *,
+    anew: bool = False,
 ) -> list[Together]:
     """Explanations fitted to fitted and held-out events together, from every setting if `anew`.
 
@@ -157,10 +163,10 @@ def together(
     the held-out ones though the effect is there.
     """
     whole = bench.on(Records.of((*bench.records.recorded, *events), bench.records.window))
-    bare, d, before = found.bare, len(bench.coordinates.names), len(bench.coordinates.before)
+    bare, d, before = as_fitted.bare, len(bench.coordinates.names), len(bench.coordinates.before)
     plain = _widened(whole, bare.unit)
     quiet = QuietNoise.at(whole, plain)
-    noise = found.noise.on(whole.profile, quiet.blur)
+    noise = as_fitted.noise.on(whole.profile, quiet.blur)
     first = refit(whole, noise, [((), plain)], faults=())[0]
     wanted = [
         (fit.names, _placed(whole, start, setting))
@@ -176,7 +182,7 @@ def together(
         unit = np.r_[fit.unit[:d], fit.unit[whole.coordinates.before][:before]]
         return Together(replace(fit, unit=unit), louder, p_left)
 
-    return each_apart(told, refit(whole, noise, wanted, faults=found.faults))
+    return each_apart(told, refit(whole, noise, wanted, faults=as_fitted.faults))
 
 
 def _widened(bench: Bench, unit: np.ndarray) -> np.ndarray:

@@ -21,17 +21,17 @@ class Judgement:
     score: Score | None = None
 
 
-def judgements(found: Investigation) -> list[Judgement]:
+def judgements(investigation: Investigation) -> list[Judgement]:
     """Every effect of the catalogue classified (Saris, Satorra and van der Veld 2009), at the chosen model."""
-    criteria = found.bench.criteria
-    critical = found.first.chance.critical_p(criteria.false_alarms)
-    scores = {s.name: s for s in found.last.scores}
-    made = [Judgement(name, "not testable", why) for name, why in found.catalogue.untestable.items()]
-    for candidate in found.catalogue.candidates:
+    criteria = investigation.bench.criteria
+    critical = investigation.first.chance.critical_p(criteria.false_alarms)
+    scores = {s.name: s for s in investigation.last.scores}
+    made = [Judgement(name, "not testable", why) for name, why in investigation.catalogue.untestable.items()]
+    for candidate in investigation.catalogue.candidates:
         name, score = candidate.name, scores.get(candidate.name)
-        if name in found.names:
+        if name in investigation.names:
             made.append(Judgement(name, "relevant", "added"))
-        elif name in found.last.fit.names:
+        elif name in investigation.last.fit.names:
             made.append(Judgement(name, "relevant", "in the best explanation, which was not accepted"))
         elif score is None:
             made.append(Judgement(name, "irrelevant", "in the fit as a nuisance, not above its noise"))

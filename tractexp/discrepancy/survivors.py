@@ -51,9 +51,9 @@ class Survivors:
         return tuple(s for s in self.kept if s.adequate) if self.kept[0].adequate else ()
 
 
-def survivors(found: Explanations, seed: int) -> Survivors:
+def survivors(explained: Explanations, seed: int) -> Survivors:
     """Test every refitted set of the chosen size against the best one."""
-    everyone, last, quiet = rivals(found), found.last, found.base.quiet
+    everyone, last, quiet = rivals(explained), explained.last, explained.base.quiet
 
     def tested(k: int, rival: Rival) -> Rival:
         tests = last if k == 0 else examined(quiet, rival.fit, last.noise, seed + 100 + k, plain=True)
@@ -62,22 +62,22 @@ def survivors(found: Explanations, seed: int) -> Survivors:
     left = [r for r in everyone if not r.rejected][:MOST]
     kept = each_apart(lambda k: tested(k, left[k]), range(len(left)))
     by_name = {r.fit.names: r for r in kept}
-    return Survivors(found, tuple(kept), tuple(by_name.get(r.fit.names, r) for r in everyone))
+    return Survivors(explained, tuple(kept), tuple(by_name.get(r.fit.names, r) for r in everyone))
 
 
-def rivals(found: Explanations) -> list[Rival]:
+def rivals(explained: Explanations) -> list[Rival]:
     """Every refitted set of the chosen size under the noise of the last tests, the best first."""
-    bench, noise = found.base.bench, found.last.noise
-    wanted = [(f.names, f.unit) for f in found.refits.values() if len(f.names) == len(found.chosen.names)]
+    bench, noise = explained.base.bench, explained.last.noise
+    wanted = [(f.names, f.unit) for f in explained.refits.values() if len(f.names) == len(explained.chosen.names)]
     fits = refit(bench, noise, wanted)
-    base = refit(bench, noise, [((), found.steps[0].fit.unit)])[0]
+    base = refit(bench, noise, [((), explained.steps[0].fit.unit)])[0]
     best = fits[0]
     faults = bench.coordinates.parameters(bench.catalogue.of_measurement)
     rows = bench.rows(np.array([f.unit for f in fits]), noise, faults, [f.names for f in fits])
     distances = ((rows - rows[0]) ** 2).sum(axis=1)
-    made = []
+    ranked = []
     for fit, distance in zip(fits, distances.tolist(), strict=True):
         behind, parameters = fit.cost - best.cost, fit.parameters + best.parameters
         rejected = fit is not best and bench.criteria.rejects(behind, distance, parameters, base.cost - best.cost)
-        made.append(Rival(fit, base.deviance - fit.deviance, behind, distance, rejected))
-    return made
+        ranked.append(Rival(fit, base.deviance - fit.deviance, behind, distance, rejected))
+    return ranked

@@ -48,20 +48,20 @@ class Verdict:
     nearest: Nearest | None  # where nothing explains
 
 
-def verdict(found: HeldOut, validate: Sequence[Event]) -> Verdict:
-    """Weigh what was found."""
-    left = found.survivors
+def verdict(weighed: HeldOut, validate: Sequence[Event]) -> Verdict:
+    """Weigh what remains."""
+    left = weighed.survivors
     explained = left.explanations
     bench, first = explained.base.bench, explained.steps[0]
-    word, reason = _worded(explained, left, found)
-    if found.together and found.kept:
+    word, reason = _worded(explained, left, weighed)
+    if weighed.together and weighed.kept:
         reason += "; what the fitted events leave open of it was fitted to the held-out ones, too"
     if (window := bench.records.window) is not None:
         reason += f"; {window.describe()}, which is taken into account"
-    chosen = (found.kept or left.adequate or left.kept)[0]
+    chosen = (weighed.kept or left.adequate or left.kept)[0]
     sets: tuple[tuple[str, ...], ...] = ()
     if word in (NAMED, TIED):
-        sets = tuple(tuple(sorted((*s.fit.names, *found.faults))) for s in found.kept)
+        sets = tuple(tuple(sorted((*s.fit.names, *weighed.faults))) for s in weighed.kept)
     names = sets[0] if sets else ()
     at = (chosen.tests or explained.last) if names else first
     if at.resting:
@@ -72,12 +72,12 @@ def verdict(found: HeldOut, validate: Sequence[Event]) -> Verdict:
         names=names,
         sets=sets,
         chosen=chosen,
-        next_dip=next_dip(bench, found.kept) if word == TIED else None,
-        nearest=_nearest(bench, found.bare, left.rivals, found.noise, validate) if word == UNEXPLAINED else None,
+        next_dip=next_dip(bench, weighed.kept) if word == TIED else None,
+        nearest=_nearest(bench, weighed.bare, left.rivals, weighed.noise, validate) if word == UNEXPLAINED else None,
     )
 
 
-def _worded(explained: Explanations, left: Survivors, found: HeldOut) -> tuple[str, str]:
+def _worded(explained: Explanations, left: Survivors, weighed: HeldOut) -> tuple[str, str]:
     """The word and its reason."""
     first, criteria = explained.steps[0], explained.base.bench.criteria
     if explained.empty and first.adequate:
@@ -90,17 +90,17 @@ def _worded(explained: Explanations, left: Survivors, found: HeldOut) -> tuple[s
             f" explanation would come about by chance with p = {tests.p_left:.2g}; what stands out most:"
             f" {tests.loudest}"
         )
-    if not found.kept and first.adequate:
+    if not weighed.kept and first.adequate:
         return NONE, (
             "what seemed to help on the fitted events does not help on the held-out ones, and what the base model"
             " leaves is no more than chance leaves"
         )
-    if not found.kept:
+    if not weighed.kept:
         return UNEXPLAINED, "what explains the fitted events does not hold on the held-out ones"
-    if len(found.kept) == 1:
-        names = " and ".join(sorted((*found.kept[0].fit.names, *found.faults)))
+    if len(weighed.kept) == 1:
+        names = " and ".join(sorted((*weighed.kept[0].fit.names, *weighed.faults)))
         return NAMED, f"{names} explains the disagreement, and no other set of this size does"
-    return TIED, f"{len(found.kept)} explanations fit equally well on these events and cannot be told apart"
+    return TIED, f"{len(weighed.kept)} explanations fit equally well on these events and cannot be told apart"
 
 
 def _nearest(
