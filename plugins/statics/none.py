@@ -1,7 +1,6 @@
 """No static load: a motor alone."""
 
-from tractexp.model.parts import Static
-from tractexp.plugin import plugin
+from tractexp.extend import Static, plugin
 
 
 @plugin
@@ -19,11 +18,13 @@ class NoStatic(Static):
     Departures: none.
     """
 
-    def declare(self, eq):
-        for power, name in ((eq.P0, "active"), (eq.Q0, "reactive")):
-            eq.require(
-                power,
+    def law(self, u):
+        return None
+
+    def require(self, P0, Q0):
+        for power, name in ((P0, "active"), (Q0, "reactive")):
+            sentence = (
                 f"a motor alone consumes {name} power, and before the event {power.name} is {{value:.3g}} pu;"
-                " choose a static load, such as model/static=exponential",
-                power,
+                " choose a static load, such as model/static=exponential"
             )
+            yield power, sentence
