@@ -1,6 +1,6 @@
 """Everything a plugin imports, in one place; docs/plugins.md tells what each is for.
 
-    from tractexp.extend import Effect, Parameter, plugin, sites
+from tractexp.extend import Effect, Parameter, plugin, sites
 """
 
 from tractexp.errors import UserError, check_choice, check_range

@@ -40,7 +40,7 @@ class Plugin:
 
     @classmethod
     def check_class(cls, where: str) -> None:
-        """Raise `UserError`, starting with `where`, for what is declared wrongly. Called when the class is registered."""
+        """Raise `UserError`, starting with `where`, for what is declared wrongly. Called at registration."""
 
 
 Class = TypeVar("Class", bound=type[Plugin])

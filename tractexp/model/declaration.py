@@ -10,7 +10,7 @@ from sympy import conjugate, im, re
 from tractexp.errors import UserError
 from tractexp.model import sites
 from tractexp.model.equations import Equations
-from tractexp.model.parts import Effect, Motor, Static, Unfit
+from tractexp.model.parts import Effect, Measurement, Motor, Static, Unfit
 from tractexp.model.signature import asked
 
 ROUNDING = 1e-9  # how far from 1 a law may be before the event
@@ -37,6 +37,13 @@ def declared(motor: Motor, static: Static, effects: Sequence[Effect], title: str
     if eq.P == 0 and eq.Q == 0:
         raise UserError(f"the {title} draw no power; choose a model/motor or a model/static other than 'none'")
     eq.close()
+    return eq
+
+
+def motor_alone(motor: Motor) -> Equations:
+    """What a motor declares by itself."""
+    eq = Equations()
+    _motor(eq, motor)
     return eq
 
 
@@ -95,4 +102,6 @@ def _effect(eq: Equations, effect: Effect) -> None:
     if why := effect.refusal(eq):
         raise Unfit(why)
     eq.write(effect.name)
+    if not isinstance(effect, Measurement):
+        eq.edits[effect.name] = []
     effect.edit(eq, **eq.declare(effect.parameters))

@@ -99,7 +99,7 @@ class Equations:
         self.states: dict[Symbol, State] = {}
         self.memories: dict[Symbol, Memory] = {}
         self.requirements: list[Requirement] = []
-        self.edits: dict[str, list[str]] = {}  # names of the sites that each part edited
+        self.edits: dict[str, list[str]] = {}  # names of the sites that each effect edits; of the load's effects only
         self.latex_names: dict[Symbol, str] = {
             self.omega_s: r"\omega_s", self.U0: "U_0", self.omega_s0: r"\omega_{s0}",
             self.P0: "P_0", self.Q0: "Q_0", self.omega_n: r"\omega_n", self.U2: "U_2", self.U20: "U_{20}",
@@ -203,7 +203,7 @@ class Equations:
 
     def _define(self, symbol: Symbol, expression: sympy.Expr, latex: str) -> Symbol:
         if symbol.name in self:
-            raise UserError(f"'{symbol.name}' is defined twice in this model; the {self._writer} must name it otherwise")
+            raise UserError(f"'{symbol.name}' is defined twice in this model; {self._writer} must name it otherwise")
         self.latex_names[symbol] = latex
         self.definitions[symbol] = expression
         return symbol

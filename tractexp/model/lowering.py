@@ -37,7 +37,7 @@ class Lowered:
     memories: tuple[Symbol, ...]
     starts: tuple[Symbol, ...]  # states and memories before the event
     start: Phase  # states and memories before the event, then the slack of each requirement
-    rest: Phase | None  # what vanishes before the event, where the start is only a guess to be solved
+    rest: Phase | None  # what vanishes before the event, where the start is only a guess: always with an effect
     constants: tuple[Symbol, ...]
     constant: Phase  # their values, which hold for a whole event
     derivative: Phase
@@ -120,7 +120,7 @@ def lower(eq: Equations) -> Lowered:
         tuple(hoist.constants.values()), _phase(None, list(hoist.constants)), *phases,
     )  # fmt: skip
     _check_closed(lowered, lane)
-    return replace(lowered, rest=None) if settled(eq, start, balances, starts) else lowered
+    return replace(lowered, rest=None) if not eq.edits and settled(eq, start, balances, starts) else lowered
 
 
 def symbols(phase: Phase) -> set[Symbol]:
