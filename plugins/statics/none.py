@@ -5,7 +5,7 @@ from tractexp.extend import Static, plugin
 
 @plugin
 class NoStatic(Static):
-    """The motor draws all of the power before the event, and nothing else takes up what it leaves.
+    """The motor draws all of the power before the event, and nothing else takes up what it leaves: P_s = Q_s = 0.
 
     With a static load P_0 and Q_0 are met exactly, whatever the motor's parameters, because the static load draws
     the remainder. Without one they are met as well as the motor can: T_m is its active power, and X', C and T_m

@@ -115,9 +115,9 @@ def says_what_it_is(cls: type[Part]) -> None:
     """The docstring has equations, their source and what departs from it; every parameter is told and bounded."""
     text = cls.__doc__ or ""
     for needed, what in (
-        ("=", "an equation"),
-        ("Source:", "a line 'Source:'"),
-        ("Departures:", "a line 'Departures:'"),
+        ("=", "equation"),
+        ("Source:", "line 'Source:'"),
+        ("Departures:", "line 'Departures:'"),
     ):
         assert needed in text, f"the docstring of '{cls.name}' has no {what}"
     for parameter in cls.parameters:
