@@ -6,6 +6,8 @@ import pytest
 
 import tractexp  # noqa: F401  before NumPy: it keeps BLAS to one thread, as every command does
 
+collect_ignore = ["acme"]  # a package of its own, whose tests run where it is installed
+
 
 @pytest.fixture
 def shared_data() -> Path:

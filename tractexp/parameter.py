@@ -25,17 +25,22 @@ class Parameter:
     name: str = field(default="", compare=False)
 
     def __set_name__(self, owner: type, name: str) -> None:
-        object.__setattr__(self, "name", name)
-        object.__setattr__(self, "symbol", self.symbol or name)
-        self.check(f"{owner.__name__}.{name}")
+        if not self.name:  # one of several classes' has its name already
+            object.__setattr__(self, "name", name)
+            object.__setattr__(self, "symbol", self.symbol or name)
 
     def check(self, where: str) -> None:
-        """Raise `UserError` unless low <= default <= high, low < high, all finite."""
+        """Raise `UserError` unless low <= default, null <= high, low < high, all finite, and everything is told."""
+        for what in ("unit", "about", "source"):
+            if not getattr(self, what).strip():
+                raise UserError(f"{where}: the parameter has no {what}; say it ('1' where a number has no unit)")
         low, high = self.bounds
         if not (np.isfinite([low, high]).all() and low < high):
             raise UserError(f"{where}: bounds [{low:g}, {high:g}] must be two finite numbers, the lower one first")
         if not low <= self.default <= high:
             raise UserError(f"{where}: the default {self.default:g} is outside the bounds [{low:g}, {high:g}]")
+        if self.null is not None and not low <= self.null <= high:
+            raise UserError(f"{where}: the null {self.null:g} is outside the bounds [{low:g}, {high:g}]")
 
 
 @dataclass(frozen=True)

@@ -80,13 +80,13 @@ def catalogue(
         if name not in known:
             raise UserError(f"task.effects names '{name}', which is no effect{among(name, known)}")
     here = {effect.name for effect in present}
-    equations = compose(motor, static, present).equations
+    base = compose(motor, static, present)
     found, untestable = [], {}
     for name in sorted(known):
         effect = get("effect", name)()
         if name in here or (only and name not in only and not isinstance(effect, Measurement)):
             continue
-        if why := missing_channel(effect, events, swing) or effect.refusal(equations):
+        if why := missing_channel(effect, events, swing) or base.acceptance(effect).refusal:
             untestable[name] = why
         else:
             found.append(candidate(effect))
