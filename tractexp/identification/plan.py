@@ -14,7 +14,8 @@ from tractexp.identification.descent import descend
 from tractexp.identification.information import Information
 from tractexp.identification.likelihood import Likelihood, Noise, before_the_event
 from tractexp.identification.noise import Autoregression
-from tractexp.identification.problem import Problem, even
+from tractexp.identification.problem import Problem
+from tractexp.identification.starts import even
 from tractexp.identification.uncertainty import LEVEL
 from tractexp.record import Base, Event, Record
 
