@@ -57,7 +57,7 @@ def sample(known: Uncertainty, walkers: int, steps: int, seed: int) -> Posterior
     start[~np.isfinite(log_probability(start))] = np.clip(known.unit, 1e-6, 1 - 1e-6)
     start = np.clip(start + 1e-7 * rng.standard_normal(start.shape), 0, 1)
     sampler = emcee.EnsembleSampler(walkers, d, log_probability, vectorize=True)
-    sampler._random = np.random.RandomState(seed)
+    sampler.random_state = np.random.RandomState(seed).get_state()
     sampler.run_mcmc(start, steps)
     kept = sampler.get_chain(discard=int(BURN * steps), flat=True)
     time = float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))
