@@ -49,7 +49,8 @@ class Grid(Sweeper):
         self.params, self.redo = params or {}, redo
 
     def setup(self, *, hydra_context: Any, task_function: Any, config: Any) -> None:
-        self.loader, self.config = hydra_context.config_loader, config
+        self.loader = hydra_context.config_loader
+        self.config: Any = config
         self.launcher: Any = Plugins.instance().instantiate_launcher(
             hydra_context=hydra_context, task_function=task_function, config=config
         )
