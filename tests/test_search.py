@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from tractexp.errors import UserError
+from tractexp.identification.least_squares import APART, Elite, _Residuals, least_squares_from, race
 from tractexp.identification.optimizer import REFUSED, Box, Evaluate, Optimizer
-from tractexp.identification.polish import APART, Elite, _Residuals, least_squares_from, race
 from tractexp.identification.search import Limits, search
 from tractexp.identification.starts import best_distinct
 from tractexp.plugin import build

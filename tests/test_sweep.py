@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import os
+import pathlib
 import shutil
 import signal
 import sqlite3
@@ -318,6 +319,27 @@ def test_a_sweep_that_is_ended_keeps_what_is_finished_and_closes_its_parent(way,
     parent = json.loads((tmp_path / "sweep" / "sweep.json").read_text())["run"]
     assert ask(tmp_path, f"select status from runs where run_uuid = '{parent}'") == [("KILLED",)]
     assert len(ask(tmp_path, "select 1 from runs where status = 'FINISHED'")) >= 1
+
+
+def test_workers_end_with_a_parent_that_is_killed():
+    script = """
+import os, time
+from tractexp.sweep.workers import processes
+with processes(1) as executor:
+    print(executor.submit(os.getpid).result(), flush=True)
+    executor.submit(time.sleep, 600).result()
+"""
+    process = subprocess.Popen(
+        [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    worker = int(process.stdout.readline())
+    process.kill()
+    process.communicate(timeout=60)  # returns when the worker, too, has closed what it shares with its parent
+    deadline = time.monotonic() + 60
+    while pathlib.Path(f"/proc/{worker}").exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    with pytest.raises(ProcessLookupError):
+        os.kill(worker, 0)
 
 
 @pytest.mark.parametrize(

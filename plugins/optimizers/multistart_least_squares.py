@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from tractexp.errors import check_range
+from tractexp.identification.least_squares import APART, race
 from tractexp.identification.optimizer import REFUSED, Box, Evaluate, Optimizer
-from tractexp.identification.polish import APART, race
 from tractexp.identification.starts import best_distinct
 from tractexp.plugin import plugin
 

@@ -87,7 +87,7 @@ def descend(
     1 is one squared standard deviation) or when no damping helps. A coordinate on a wall that would leave the
     box rests for that step. Source: Marquardt 1963, with several dampings per step.
 
-    Not `polish.least_squares_from`, which is SciPy's, one start at a time: it is counted and stopped by the search.
+    Not `least_squares.least_squares_from`: that is SciPy's, from one start, counted and stopped by the search loop.
     """
     unit = np.clip(start, 0.0, 1.0)
     n = len(unit)

@@ -59,7 +59,7 @@ def sample(known: Uncertainty, walkers: int, steps: int, seed: int) -> Posterior
     sampler = emcee.EnsembleSampler(walkers, d, log_probability, vectorize=True)
     sampler.random_state = np.random.RandomState(seed).get_state()
     sampler.run_mcmc(start, steps)
-    kept = sampler.get_chain(discard=int(BURN * steps), flat=True)
+    kept = np.asarray(sampler.get_chain(discard=int(BURN * steps), flat=True))
     time = float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))
     draws = likelihood.values(kept)
     return Posterior(known.names, draws, steps, time, float(sampler.acceptance_fraction.mean()), walkers * (steps + 2))

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from tractexp.identification.descent import Rows, descend
-from tractexp.identification.diagnosis import Test, jarque_bera, ljung_box, louder
 from tractexp.identification.information import Information
 from tractexp.identification.likelihood import QUIET_ORDER, Likelihood
 from tractexp.identification.noise import FEWEST, fit_autoregression, stretches, white_noise
 from tractexp.identification.problem import Problem
+from tractexp.identification.residual_tests import Test, jarque_bera, ljung_box, louder
 from tractexp.identification.verdict import Verdict, judge
 
 LEVEL = 0.95

@@ -13,6 +13,7 @@ import signal
 import threading
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
+from typing import Any
 
 from tractexp.errors import UserError
 
@@ -48,7 +49,7 @@ def dask_cluster(n: int, address: str | None) -> Iterator[Executor]:
     Raises `UserError` where Dask is not installed or no scheduler answers.
     """
     try:
-        import dask
+        import dask.config
         from distributed import Client, LocalCluster
     except ImportError:
         raise UserError(
@@ -59,7 +60,8 @@ def dask_cluster(n: int, address: str | None) -> Iterator[Executor]:
     with contextlib.ExitStack() as stack:
         stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 0}))  # we count ourselves
         if address is None:
-            cluster = LocalCluster(n_workers=n, threads_per_worker=1, dashboard_address=None, silence_logs=50)
+            local: Any = LocalCluster  # its annotations know neither a cluster without a dashboard nor its address
+            cluster = local(n_workers=n, threads_per_worker=1, dashboard_address=None, silence_logs=50)
             address = stack.enter_context(cluster).scheduler_address
         try:
             client = stack.enter_context(Client(address, timeout="10s"))
