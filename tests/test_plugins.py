@@ -14,7 +14,7 @@ import pytest
 from tractexp.errors import UserError
 from tractexp.identification.optimizer import Optimizer
 from tractexp.model.parts import Effect, Measurement, Motor, Static
-from tractexp.parameter import Parameter, Space
+from tractexp.parameter import Box, Parameter
 from tractexp.plugin import Plugin, build, discover, get, plugin, schema
 
 TESTS = Path(__file__).parent
@@ -262,8 +262,8 @@ def test_a_parameter_checks_itself(settings, sentence):
         replace(PLAIN, **settings).check("here")
 
 
-def test_the_space_maps_names_to_the_unit_cube_and_back():
-    space = Space(("a", "b"), np.array([0.0, -2.0]), np.array([1.0, 2.0]))
+def test_a_box_maps_names_to_the_unit_cube_and_back():
+    space = Box(np.array([0.0, -2.0]), np.array([1.0, 2.0]), ("a", "b"))
     assert space.from_unit(space.to_unit([[0.25, 1.0]])).tolist() == [[0.25, 1.0]]
     assert space.index("b") == 1
     with pytest.raises(UserError, match="this model has no parameter 'c'"):

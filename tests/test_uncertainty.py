@@ -11,11 +11,11 @@ from scipy.linalg import cholesky, toeplitz
 from scipy.signal import lfilter
 
 from tractexp.identification.descent import descend
-from tractexp.identification.diagnosis import jarque_bera, ljung_box, louder
 from tractexp.identification.information import Information
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.problem import Problem
 from tractexp.identification.profile import checked
+from tractexp.identification.residual_tests import jarque_bera, ljung_box, louder
 from tractexp.identification.uncertainty import assess, compare_events
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK
 from tractexp.noise import Noise

@@ -44,31 +44,53 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class Space:
-    """The box of the free parameters: names <-> columns, physical values <-> the unit cube."""
+class Box:
+    """What a search may try: bounds (d,), and the way to the unit cube and back.
 
-    names: tuple[str, ...]
+    A problem's box has the names of its columns. An optimizer's has none: it is the unit cube, or the problem's
+    bounds where the optimizer asks for `space="raw"`.
+    """
+
     lower: np.ndarray  # (d,)
     upper: np.ndarray  # (d,)
+    names: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, parameters: tuple[Parameter, ...]) -> "Space":
+    def of(cls, parameters: tuple[Parameter, ...]) -> "Box":
+        """The box of some parameters, named as they are."""
         bounds = np.array([p.bounds for p in parameters], dtype=float).reshape(-1, 2)
-        return cls(tuple(p.name for p in parameters), bounds[:, 0].copy(), bounds[:, 1].copy())
+        return cls(bounds[:, 0].copy(), bounds[:, 1].copy(), tuple(p.name for p in parameters))
+
+    @classmethod
+    def unit(cls, dimension: int) -> "Box":
+        """The unit cube."""
+        return cls(np.zeros(dimension), np.ones(dimension))
 
     @property
     def dimension(self) -> int:
-        return len(self.names)
+        return len(self.lower)
 
-    def to_unit(self, values: np.ndarray) -> np.ndarray:
-        """Physical values (..., d) to the unit cube."""
-        return (values - self.lower) / (self.upper - self.lower)
+    @property
+    def width(self) -> np.ndarray:
+        return self.upper - self.lower
+
+    def clip(self, x: np.ndarray) -> np.ndarray:
+        return np.clip(x, self.lower, self.upper)
+
+    def uniform(self, rng: np.random.Generator, n: int) -> np.ndarray:
+        """(n, d) points drawn uniformly."""
+        return self.from_unit(rng.random((n, self.dimension)))
 
     def from_unit(self, unit: np.ndarray) -> np.ndarray:
-        """Points of the unit cube (..., d) to physical values, never outside the bounds by rounding."""
-        return np.clip(self.lower + unit * (self.upper - self.lower), self.lower, self.upper)
+        """Points (..., d) of the unit cube in this box's coordinates, never outside the bounds by rounding."""
+        return self.clip(self.lower + self.width * unit)
+
+    def to_unit(self, x: np.ndarray) -> np.ndarray:
+        """Points (..., d) of this box in the unit cube."""
+        return (x - self.lower) / self.width
 
     def index(self, name: str) -> int:
+        """The column of a name. Raises `UserError` for one there is not."""
         if name not in self.names:
             raise UserError(f"this model has no parameter '{name}'{among(name, self.names, 'Parameters')}")
         return self.names.index(name)

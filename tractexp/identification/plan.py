@@ -13,7 +13,8 @@ from tractexp.errors import UserError, among, check_range
 from tractexp.identification.descent import descend
 from tractexp.identification.information import Information
 from tractexp.identification.likelihood import Likelihood, before_the_event
-from tractexp.identification.problem import Problem, even
+from tractexp.identification.problem import Problem
+from tractexp.identification.starts import even
 from tractexp.identification.uncertainty import LEVEL
 from tractexp.noise import Autoregression, Noise
 from tractexp.record import Base, Event, Record

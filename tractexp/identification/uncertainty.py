@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from tractexp.identification.descent import Rows, descend
-from tractexp.identification.diagnosis import Test, jarque_bera, ljung_box, louder
 from tractexp.identification.information import Information
 from tractexp.identification.likelihood import QUIET_ORDER, Likelihood
 from tractexp.identification.problem import Problem
+from tractexp.identification.residual_tests import Test, jarque_bera, ljung_box, louder
 from tractexp.identification.verdict import Verdict, judge
 from tractexp.noise.color import FEWEST, fit_autoregression, stretches, white_noise
 from tractexp.noise.model import Noise, Pair

@@ -8,25 +8,16 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from tractexp.identification.optimizer import REFUSED, Box, Evaluate
+from tractexp.identification.starts import best_distinct
 
 DIFFERENCE = 1e-6  # of the box's width; rounding (3e-13 relative) and curvature both stay below 1e-6 of a column
 EDGE = 1e-9  # SciPy's interior method starts strictly inside the box
 ELITE = 30  # starts of a polish: the valley sought may rank twentieth where the motor stalls
-APART = 0.3  # between starts: a search that has settled in one valley must not fill the elite with points of it
+# between starts, in the coordinate that differs most: a search that has settled in one valley must not fill the elite
+# with points of it
+APART = 0.3
 
 ROUGH, ROUGH_TRIALS = 1e-2, 12  # relative tolerance and trials of a descent that has yet to prove itself
-
-
-def spread(unit: np.ndarray, f: np.ndarray, count: int) -> np.ndarray:
-    """Indices of at most `count` points, best first, each further than `APART` from every better one chosen.
-
-    `unit` (n, d) in the unit cube, `f` (n,) objectives; the distance is the largest coordinate's.
-    """
-    left, chosen = np.argsort(f, kind="stable"), []
-    while len(left) and len(chosen) < count:
-        chosen.append(left[0])
-        left = left[np.abs(unit[left] - unit[left[0]]).max(axis=1) > APART]
-    return np.array(chosen, dtype=int)
 
 
 class Elite:
@@ -41,7 +32,7 @@ class Elite:
         better = f < (self.f[-1] if len(self.f) == ELITE else REFUSED)
         if better.any():
             x, f = np.concatenate((self.x, x[better])), np.concatenate((self.f, f[better]))
-            chosen = spread(self.box.to_unit(x), f, ELITE)
+            chosen = best_distinct(self.box.to_unit(x), f, APART, ELITE)
             self.x, self.f = x[chosen], f[chosen]
 
 
@@ -75,7 +66,7 @@ class _Residuals:
         return np.nan_to_num((rows - self(unit)) / h[:, None], nan=0.0).T
 
 
-def descend(
+def least_squares_from(
     evaluate: Evaluate, box: Box, start: np.ndarray, objective: float, tolerance: float = 1e-8, trials: int = 100
 ) -> tuple[np.ndarray, float]:
     """Bounded least squares (SciPy's trust region reflective) from `start` (d,), whose objective is known.
@@ -83,6 +74,9 @@ def descend(
     Works in the unit cube and on residuals scaled to a sum of squares of one, so that `tolerance` is relative:
     the descent ends when the objective, the step or the gradient is below it, or after `trials` trials. Returns
     the point (d,) it ended at and its objective; a start that cannot be simulated is left at once.
+
+    Not `descent.descend`: here each simulation is counted and the search loop may stop it anywhere, and the method is a
+    library's; there hundreds of lanes share each simulation call.
     """
     from scipy.optimize import least_squares  # its annotations know `jac` as a string only
 
@@ -107,14 +101,14 @@ def race(
     """
     left, best = [], np.inf
     for start, objective in starts:
-        x, f = descend(evaluate, box, start, objective, ROUGH, ROUGH_TRIALS)
+        x, f = least_squares_from(evaluate, box, start, objective, ROUGH, ROUGH_TRIALS)
         if f < best:
-            best = descend(evaluate, box, x, f, tolerance, trials)[1]
+            best = least_squares_from(evaluate, box, x, f, tolerance, trials)[1]
         else:
             left.append((x, f))
         yield
     for x, f in sorted(left, key=lambda end: end[1]):
-        descend(evaluate, box, x, f, tolerance, trials)
+        least_squares_from(evaluate, box, x, f, tolerance, trials)
         yield
 
 
