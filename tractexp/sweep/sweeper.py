@@ -14,6 +14,7 @@ from hydra.core.override_parser.overrides_parser import OverridesParser
 from omegaconf import OmegaConf
 
 from tractexp.errors import UserError
+from tractexp.plugin import get
 from tractexp.sweep import status
 from tractexp.sweep.compose import Composer
 from tractexp.sweep.job import SweepJob
@@ -21,6 +22,7 @@ from tractexp.sweep.launcher import Cores
 from tractexp.sweep.parent import parent_run
 from tractexp.sweep.status import FAILED, FINISHED, RUNNING
 from tractexp.tasks.console import say, table
+from tractexp.tasks.given import refuse_unread
 
 INTERRUPTED = "interrupted"
 REPEAT = "repeat the command to go on with the jobs that are left"
@@ -78,6 +80,7 @@ class Grid(BasicSweeper):
         made: dict[str, SweepJob] = {}
         for overrides in self.split_arguments(parsed, None)[0]:
             job = SweepJob.of(*compose(overrides), overrides, Path())
+            refuse_unread(get("task", job.config["task"]["name"]), job.given)
             made.setdefault(job.configuration, job)
         return list(made.values())
 

@@ -11,12 +11,17 @@ from tractexp.plugin import build, get, plugin
 from tractexp.tasks.console import counting, say, table
 from tractexp.tasks.task import Job, Task
 
-NOT_READ = {"budget": "task.multiplier", "target": "task.targets", "time_limit": "task.multiplier"}
-
 
 @plugin
 class Benchmark(Task):
     """Run the optimizer and those it is set against on BBOB: ERT and ECDF tables, figures, one page, JSON."""
+
+    reads = ("optimizer",)
+    instead = {
+        "budget": "set task.multiplier instead",
+        "time_limit": "set task.multiplier instead",
+        "target": "set task.targets instead",
+    }
 
     functions: list[int] = field(default_factory=lambda: list(range(1, 25)))
     instances: list[int] = field(default_factory=lambda: [1, 2, 3])
@@ -47,7 +52,6 @@ class Benchmark(Task):
         from tractexp.comparison.bbob import Plan, package, perform
         from tractexp.report import benchmark as report
 
-        refuse_unread(job)
         package()
         targets = tuple(sorted(self.targets, reverse=True))
         plan = Plan(
@@ -92,13 +96,6 @@ def distinct(where: str, values: list[Any]) -> None:
     for value in values:
         if values.count(value) > 1:
             raise UserError(f"{where} names {value} twice; name each once")
-
-
-def refuse_unread(job: Job) -> None:
-    """Raise `UserError` for a limit of the search that this task would silently ignore."""
-    for key, instead in NOT_READ.items():
-        if job.config[key] is not None:
-            raise UserError(f"{key}={job.config[key]:g} is not read by task=benchmark; set {instead} instead")
 
 
 def progress(runs: Iterable[Any], total: int) -> Iterator[Any]:

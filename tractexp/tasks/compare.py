@@ -18,6 +18,9 @@ SAID = 8  # sentences on the terminal; the page has all
 class Compare(Task):
     """Settle which optimizer is better: tables, tests over paired seeds, figures, one page, sentences to quote."""
 
+    reads = ()
+    instead = {"data": "choose among the runs by task.data"}
+
     sweep: str | None = None  # folder of a sweep; null: the newest under outputs/sweeps
     filter: str | None = None  # instead: a filter over MLflow, "tags.data = 'tibet_50pct'"
     data: str | None = None  # compare the runs on this choice of data only

@@ -26,6 +26,9 @@ PARTS = (
 class Paper(Task):
     """Measure what the paper claims, on the shipped stand-ins or on records of your own: paper.html and paper.md."""
 
+    reads = ("data", "model", "objective", "budget", "time_limit", "target")
+    instead = {"optimizer": "it compares the paper's three; task=generalise takes any"}
+
     parts: list[str] = field(default_factory=list)  # such as [table1,figure9]; empty: all
     seeds: int = 30
     workers: int | None = None  # processes that search; null: one for each core
