@@ -28,7 +28,7 @@ class Benchmark(Task):
     dimensions: list[int] = field(default_factory=lambda: [5])
     multiplier: int = 3000  # evaluations per dimension in each run
     targets: list[float] = field(default_factory=lambda: [10.0**k for k in range(2, -9, -1)])  # f - f_opt
-    against: list[str] = field(default_factory=lambda: ["cmaes", "differential_evolution"])
+    against: list[str] = field(default_factory=list)  # optimizers with their own defaults
     cores: int | None = None  # processes; null: all cores, one for a job of a sweep
 
     def check(self) -> None:

@@ -16,7 +16,7 @@ class Export(Task):
     instead = {"model": "the model is that of task.parameters"}
 
     parameters: str | None = None  # path of a result.json
-    format: str = "andes"  # andes, psse_dyr, modelica, or a format of an installed package
+    format: str = ""  # andes, psse_dyr, modelica, or a format of an installed package
     bus: int = 1  # number of the bus the load is on
     power: float = 100.0  # MVA, what 1 pu of the record stands for
     voltage: float = 110.0  # kV, line to line

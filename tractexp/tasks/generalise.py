@@ -15,9 +15,6 @@ from tractexp.tasks.console import say, searching, table
 from tractexp.tasks.identify import announce
 from tractexp.tasks.task import Job, Task
 
-SHIPPED = "tibet_50pct"
-SIBLINGS = ("pkg://tractexp.data/tibet_30pct.csv", "pkg://tractexp.data/tibet_65pct.csv")
-
 
 @plugin
 class Generalise(Task):
@@ -27,7 +24,8 @@ class Generalise(Task):
     defaults. All have the same limits.
     """
 
-    optimizers: list[str] = field(default_factory=lambda: ["issa", "ssa", "pso"])
+    optimizers: list[str] = field(default_factory=list)
+    held_out: dict[str, list[str]] = field(default_factory=dict)  # {choice of data: files}; without data.validate
     seeds: int = 1  # searches of each optimizer: job seed and the ones after it
 
     def check(self) -> None:
@@ -39,7 +37,7 @@ class Generalise(Task):
         from tractexp.identification.result import conclude
         from tractexp.replication.searches import by_depth
 
-        job = with_siblings(job)
+        job = with_siblings(job, self.held_out)
         events = job.events()
         if not events.validate:
             raise UserError(
@@ -73,12 +71,12 @@ class Generalise(Task):
         job.log(name="generalisation", values={}, metrics=metrics, artifacts=paths)
 
 
-def with_siblings(job: Job) -> Job:
-    """The job with the milder and the deeper shipped dip held out, where it fits the shipped one and names none."""
+def with_siblings(job: Job, held_out: Mapping[str, list[str]]) -> Job:
+    """The job with the files held out that belong to its choice of data, where it names none itself."""
     data: Mapping[str, Any] = job.config["data"]
-    if job.choices["data"] != SHIPPED or data.get("validate"):
+    if job.choices["data"] not in held_out or data.get("validate"):
         return job
-    held = [path for path in SIBLINGS if path not in data["train"]]
+    held = [path for path in held_out[job.choices["data"]] if path not in data["train"]]
     return replace(job, config={**job.config, "data": {**data, "validate": held}})
 
 

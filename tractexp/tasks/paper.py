@@ -30,6 +30,7 @@ class Paper(Task):
     instead = {"optimizer": "it compares the paper's three; task=generalise takes any"}
 
     parts: list[str] = field(default_factory=list)  # such as [table1,figure9]; empty: all
+    held_out: dict[str, list[str]] = field(default_factory=dict)  # {choice of data: files}; without data.validate
     seeds: int = 30
     workers: int | None = None  # processes that search; null: one for each core
     docs: str | None = None  # write paper.md to this file too, without its figures
@@ -45,7 +46,7 @@ class Paper(Task):
         from tractexp.report.paper import write
 
         started = time.perf_counter()
-        made = study(job, self.seeds, self.workers)
+        made = study(with_siblings(job, self.held_out), self.seeds, self.workers)
         parts = [part for part in PARTS if part in self.parts or not self.parts]
         need_held_out(made, parts)
         paths, judged = write(made, parts, job.folder)
@@ -63,12 +64,11 @@ class Paper(Task):
 
 
 def study(job: Job, seeds: int, workers: int | None) -> Any:
-    """The experiments on a job's records; the shipped record brings its siblings where none is held out."""
+    """The experiments on a job's records."""
     from tractexp.identification.search import Limits
     from tractexp.record import describe
     from tractexp.replication.study import Study
 
-    job = with_siblings(job)
     events = job.events()
     for role, group in (("fit", events.train), ("hold out", events.validate)):
         for event in group:
