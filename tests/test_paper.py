@@ -10,11 +10,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tractexp.api.paper import PARTS
 from tractexp.errors import UserError
 from tractexp.replication import claims, equations, maps, printed, searches
 from tractexp.replication.study import Study
 from tractexp.report.markdown import Markdown
-from tractexp.tasks.paper import PARTS
 
 QUICK = ("task=paper", "task.seeds=1", "task.workers=1", "budget=300", "tracking.enabled=false")
 EXPERIMENTS = [

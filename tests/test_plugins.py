@@ -1,5 +1,6 @@
 """Registration, refusals at registration, and a stranger's package installed for real."""
 
+import ast
 import json
 import os
 import re
@@ -15,10 +16,11 @@ from tractexp.errors import UserError
 from tractexp.identification.optimizer import Optimizer
 from tractexp.model.parts import Effect, Measurement, Motor, Static
 from tractexp.parameter import Box, Parameter
-from tractexp.plugin import Plugin, build, discover, get, plugin, schema
+from tractexp.plugin import CONF, Plugin, build, discover, get, plugin, schema
 
 TESTS = Path(__file__).parent
 PAGE = TESTS.parent / "docs" / "plugins.md"
+FRAMEWORK = TESTS.parent / "tractexp"
 
 
 def tractexp(*arguments, cwd, **environment):
@@ -268,3 +270,26 @@ def test_a_box_maps_names_to_the_unit_cube_and_back():
     assert space.index("b") == 1
     with pytest.raises(UserError, match="this model has no parameter 'c'"):
         space.index("c")
+
+
+def test_a_second_package_replaces_a_shipped_default(acme, tmp_path):
+    shown = ("task=export", "--cfg", "job", "--package", "task.format")
+    assert "andes" in tractexp(*shown, cwd=tmp_path).stdout
+    done = tractexp(*shown, cwd=tmp_path, PYTHONPATH=str(acme))
+    assert "modelica" in done.stdout, done.stderr
+
+
+ENGLISH = {"none", "voltage"}  # words first, and names of plugins besides
+THE_PAPER = ("replication/", "report/paper")  # what the paper compares is named there: it is the subject
+
+
+def test_the_framework_names_no_plugin():
+    names = {name for group, classes in discover().items() if group != "task" for name in classes}
+    names |= {path.stem for group in ("data", "model", "optimizer") for path in (CONF / group).glob("*.yaml")}
+    found = []
+    for path in sorted(FRAMEWORK.rglob("*.py")):
+        where = path.relative_to(FRAMEWORK).as_posix()
+        if not where.startswith(THE_PAPER):
+            strings = (node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Constant))
+            found += [f"{where}:{s.lineno} '{s.value}'" for s in strings if s.value in names - ENGLISH]
+    assert not found

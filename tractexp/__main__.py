@@ -2,7 +2,6 @@
 
 import os
 import sys
-from pathlib import Path
 
 # The matrices of a fit are small: threads of a BLAS cost more than they bring (30 times on two busy cores), and the
 # cores are for the jobs of a sweep. Set before NumPy is imported; an explicit choice of the user's stands.
@@ -10,9 +9,8 @@ for library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 from tractexp.errors import UserError  # noqa: E402
+from tractexp.plugin import CONF  # noqa: E402
 
-HERE = Path(__file__).resolve().parent
-CONF = next(p for p in (HERE / "conf", HERE.parent / "conf") if (p / "config.yaml").is_file())
 FULL_ERROR = "HYDRA_FULL_ERROR"  # Hydra's own switch: set it to see tracebacks
 
 

@@ -14,11 +14,11 @@ from tractexp.schema import Config
 
 
 class PluginSearchPath(SearchPathPlugin):
-    """Adds the `conf/` folder of every installed plugin package to Hydra's search path."""
+    """Puts the `conf/` folder of every installed plugin package before ours: a file of the same name replaces ours."""
 
     def manipulate_search_path(self, search_path: Any) -> None:
         for folder in plugin.configuration_folders():
-            search_path.append("tractexp", f"file://{folder}")
+            search_path.prepend("tractexp", f"file://{folder}", "main")
 
 
 def register() -> None:
@@ -32,13 +32,19 @@ def register() -> None:
     for group, classes in plugin.discover().items():
         for name, cls in classes.items():
             if cls.chosen:
-                store.store(group=group, name=name, node=plugin.schema(cls))
+                where = f"schema/{group}" if _configured(group, name) else group
+                store.store(group=where, name=name, node=plugin.schema(cls))
     store.store(group="hydra/sweeper", name="grid", node=GridConfig)
     store.store(group="hydra/launcher", name="cores", node=CoresConfig)
     Plugins.instance().register(PluginSearchPath)
     for cls in (Grid, Cores):
         hydra_plugins.admit(cls)
     OmegaConf.register_new_resolver("fingerprint", _fingerprint, replace=True)
+
+
+def _configured(group: str, name: str) -> bool:
+    """Whether a file gives this plugin its defaults: it begins with the schema, as conf/task/export.yaml does."""
+    return any((folder / group / f"{name}.yaml").is_file() for folder in (plugin.CONF, *plugin.configuration_folders()))
 
 
 def _fingerprint(overrides: Any) -> str:

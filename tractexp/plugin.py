@@ -24,6 +24,8 @@ from tractexp.errors import UserError, among
 from tractexp.parameter import Parameter
 
 ENTRY_POINTS = "tractexp.plugins"
+HERE = Path(__file__).resolve().parent
+CONF = next(p for p in (HERE / "conf", HERE.parent / "conf") if (p / "config.yaml").is_file())  # in a wheel, in a clone
 
 
 class Plugin:

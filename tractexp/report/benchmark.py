@@ -7,8 +7,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from tractexp import files
 from tractexp.comparison.bbob import Benchmark
-from tractexp.errors import UserError
 from tractexp.report.compare import runtime_curves
 from tractexp.report.page import Page
 
@@ -132,10 +132,10 @@ def _reading(page: Page) -> Page:
     )
 
 
-def write_json(benchmark: Benchmark, settings: Mapping[str, Any], path: Path) -> Path:
-    """Write `benchmark.json`: the plan, each optimizer's settings, every run; the same for the same seed.
+def content(benchmark: Benchmark, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """What `benchmark.json` holds: the plan, each optimizer's settings, every run; the same for the same seed.
 
-    Evaluations to a target that was not met, and running times to one that no run met, are null.
+    Evaluations to a target that was not met, and running times to one that no run met, are None.
     """
     plan = benchmark.plan
     times = [
@@ -157,7 +157,7 @@ def write_json(benchmark: Benchmark, settings: Mapping[str, Any], path: Path) ->
         }
         for name in benchmark.optimizers for d in plan.dimensions
     ]  # fmt: skip
-    content = {
+    return {
         **asdict(plan),
         "optimizers": settings,
         "summary": summary,
@@ -165,11 +165,12 @@ def write_json(benchmark: Benchmark, settings: Mapping[str, Any], path: Path) ->
         "runs": [asdict(run) | {"hits": [_finite(n) for n in run.hits]} for run in benchmark.runs],
         "sentences": sentences(benchmark),
     }
-    try:
-        path.write_text(json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise UserError(f"{path} cannot be written: {error.strerror}") from error
-    return path
+
+
+def write_json(benchmark: Benchmark, settings: Mapping[str, Any], path: Path) -> Path:
+    """Write `benchmark.json`."""
+    text = json.dumps(content(benchmark, settings), indent=1, ensure_ascii=False, allow_nan=False)
+    return files.write(path, text + "\n")
 
 
 def _finite(value: float) -> float | None:

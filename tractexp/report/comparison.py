@@ -1,19 +1,18 @@
 """A comparison as one self-contained page for people, and as one JSON file for machines."""
 
-import json
 import math
 import tempfile
 from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import Any
 
+from tractexp import files
 from tractexp.comparison import claims
 from tractexp.comparison.ablation import Ablation
 from tractexp.comparison.claims import number, p_value
 from tractexp.comparison.comparison import Comparison, Pair
 from tractexp.comparison.statistics import ALPHA, size_of
 from tractexp.comparison.summary import AT_FLOOR, Spread
-from tractexp.errors import UserError
 from tractexp.report import compare as figures
 from tractexp.report.page import Page
 
@@ -184,9 +183,9 @@ def _reading(page: Page, comparison: Comparison) -> None:
     )
 
 
-def write_json(comparison: Comparison, path: Path, source: str) -> Path:
-    """Write `comparison.json`: every number of the page. What is not finite is null."""
-    content = {
+def content(comparison: Comparison, source: str) -> dict[str, Any]:
+    """What `comparison.json` holds: every number of the page. What is not finite is None."""
+    told = {
         "source": source,
         "problem": comparison.gathered.problem,
         "floor": comparison.floor,
@@ -205,21 +204,18 @@ def write_json(comparison: Comparison, path: Path, source: str) -> Path:
             if not run.finished
         ],
     }
-    try:
-        text = json.dumps(_plain(content), indent=2, ensure_ascii=False, allow_nan=False)
-        path.write_text(text + "\n", encoding="utf-8")
-    except OSError as error:
-        raise UserError(f"{path} cannot be written: {error.strerror}") from error
-    return path
+    return files.plain(_as_dicts(told))
 
 
-def _plain(value: Any) -> Any:
+def write_json(comparison: Comparison, path: Path, source: str) -> Path:
+    """Write `comparison.json`."""
+    return files.write_json(path, content(comparison, source))
+
+
+def _as_dicts(value: Any) -> Any:
+    """Data classes within as dictionaries."""
     if is_dataclass(value) and not isinstance(value, type):
         value = asdict(value)
     if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+        return {key: _as_dicts(item) for key, item in value.items()}
+    return [_as_dicts(item) for item in value] if isinstance(value, list | tuple) else value

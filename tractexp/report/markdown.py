@@ -1,11 +1,10 @@
 """A page as Markdown: the same calls as `Page`, so that one description makes both."""
 
-import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from tractexp.errors import UserError
+from tractexp import files
 
 
 class Markdown:
@@ -42,14 +41,7 @@ class Markdown:
 
     def write(self, path: Path) -> Path:
         """Write the page in one move. Raises `UserError` where that is impossible."""
-        path = Path(path)
-        part = path.with_name(f"{path.name}.{os.getpid()}.part")
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            part.write_text("\n\n".join(self._parts) + "\n", encoding="utf-8")
-            return part.replace(path)
-        except OSError as error:
-            raise UserError(f"the page {path} cannot be written: {error.strerror}") from error
+        return files.write(path, "\n\n".join(self._parts) + "\n")
 
     def _add(self, *parts: str) -> "Markdown":
         self._parts += parts

@@ -8,13 +8,13 @@ import functools
 import html
 import io
 import itertools
-import os
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from tractexp import files
 from tractexp.errors import UserError, check_choice
 
 STYLE = """
@@ -120,14 +120,7 @@ class Page:
         body = "\n".join([top, *self._parts])
         head = f"<head>{head}<style>{STYLE}</style></head>"
         whole = f'<!DOCTYPE html>\n<html lang="en">{head}\n<body>\n{body}\n</body></html>\n'
-        path = Path(path)
-        part = path.with_name(f"{path.name}.{os.getpid()}.part")
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            part.write_text(whole, encoding="utf-8")
-            return part.replace(path)
-        except OSError as error:
-            raise UserError(f"the page {path} cannot be written: {error.strerror}") from error
+        return files.write(path, whole)
 
     def _add(self, *parts: str) -> "Page":
         self._parts += parts

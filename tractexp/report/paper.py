@@ -10,7 +10,7 @@ import numpy as np
 from tractexp.comparison.runs import Run, Variant
 from tractexp.comparison.summary import Floor
 from tractexp.replication import equations, maps, printed
-from tractexp.replication.claims import CONFIRMED, IMPOSSIBLE, OPEN, REFUTED, Claim, claims, number
+from tractexp.replication.claims import CONFIRMED, IMPOSSIBLE, OPEN, REFUTED, Claim, number
 from tractexp.replication.study import AT_FLOOR, TARGETS, Study
 from tractexp.report import compare, figures, paper_figures
 from tractexp.report.markdown import Markdown, Together
@@ -26,21 +26,20 @@ LABELS = {"issa": "ISSA", "ssa": "SSA", "pso": "PSO"}
 Draw = Callable[[str], Path]  # name of a figure -> where it goes
 
 
-def write(study: Study, parts: Sequence[str], folder: Path) -> tuple[list[Path], list[Claim]]:
-    """Measure and write `parts` into a folder: paper.html, paper.md and the figures; returns paths and claims."""
+def write(study: Study, parts: Sequence[str], judged: Sequence[Claim], folder: Path) -> list[Path]:
+    """Measure and write `parts` and their claims into a folder: paper.html, paper.md and the figures."""
     drawn: list[Path] = []
 
     def draw(name: str) -> Path:
         drawn.append(folder / f"{name}.svg")
         return drawn[-1]
 
-    judged = claims(study, parts)
     page, text = Page(TITLE, LEAD), Markdown(TITLE, LEAD)
     sheet: Any = Together(page, text)
     _top(sheet, study, judged)
     for part in parts:
         SECTIONS[part](sheet, study, draw)
-    return [page.write(folder / "paper.html"), text.write(folder / "paper.md"), *drawn], judged
+    return [page.write(folder / "paper.html"), text.write(folder / "paper.md"), *drawn]
 
 
 def _top(sheet: Any, study: Study, judged: Sequence[Claim]) -> None:

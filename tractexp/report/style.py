@@ -1,14 +1,14 @@
 """How figures look: sizes, colors, the settings that make them small, alike on every machine and reproducible."""
 
+import io
 import itertools
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tractexp.errors import UserError
+from tractexp import files
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -93,10 +93,6 @@ def save(figure: "Figure", path: Path) -> Path:
     """Write a figure as SVG or PNG, by the suffix; the same figure gives the same bytes. Raises `UserError`."""
     path = Path(path)
     metadata = {"Date": None, "Creator": "tractexp"} if path.suffix == ".svg" else {"Software": "tractexp"}
-    part = path.with_name(f"{path.stem}.{os.getpid()}{path.suffix}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(part, metadata=metadata, dpi=150)
-        return part.replace(path)
-    except OSError as error:
-        raise UserError(f"the figure {path} cannot be written: {error.strerror}") from error
+    drawn = io.BytesIO()
+    figure.savefig(drawn, format=path.suffix[1:], metadata=metadata, dpi=150)
+    return files.write(path, drawn.getvalue())

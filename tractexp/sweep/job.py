@@ -6,7 +6,7 @@ import signal
 import time
 import traceback
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from tractexp.errors import UserError
 from tractexp.sweep import identity
 from tractexp.sweep.parent import parent_of
 from tractexp.sweep.status import FAILED, FINISHED, RUNNING, Status
+from tractexp.tasks.given import given
 
 OUTPUT, TRACEBACK = "output.txt", "traceback.txt"
 
@@ -29,13 +30,15 @@ class SweepJob:
     configuration: str
     inputs: str
     folder: Path
+    given: Mapping[str, str] = field(default_factory=dict)  # what the user chose, {"optimizer": "pso"}
 
     @classmethod
     def of(cls, config: Mapping[str, Any], choices: Mapping[str, str], overrides: Any, folder: Path) -> "SweepJob":
         """A job from its composed configuration; Hydra's own choices are left out."""
         kept = {g: c for g, c in sorted(choices.items()) if c and g != "experiment" and not g.startswith("hydra/")}
         told = identity.configuration(config, kept)
-        return cls(config, kept, tuple(overrides), told, identity.inputs(config), folder)
+        chosen = given(overrides, choices)
+        return cls(config, kept, tuple(overrides), told, identity.inputs(config), folder, chosen)
 
     @property
     def status(self) -> Status:
@@ -79,7 +82,7 @@ def _run(job: SweepJob) -> str:
     from tractexp.tasks.task import Job
 
     try:
-        perform(Job(job.config, job.choices, job.folder, parent_of(job.folder.parent), in_sweep=True))
+        perform(Job(job.config, job.choices, job.folder, parent_of(job.folder.parent), in_sweep=True, given=job.given))
     except UserError as error:
         return str(error)
     except (Exception, SystemExit) as error:

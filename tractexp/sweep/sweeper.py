@@ -18,6 +18,7 @@ from omegaconf import OmegaConf
 
 from tractexp.doors.hydra_plugins import NAMESPACE
 from tractexp.errors import UserError
+from tractexp.plugin import get
 from tractexp.sweep import status
 from tractexp.sweep.compose import Composer
 from tractexp.sweep.job import SweepJob
@@ -25,6 +26,7 @@ from tractexp.sweep.launcher import Cores
 from tractexp.sweep.parent import parent_run
 from tractexp.sweep.status import FAILED, FINISHED, RUNNING
 from tractexp.tasks.console import say, table
+from tractexp.tasks.given import refuse_unread
 
 INTERRUPTED = "interrupted"
 REPEAT = "repeat the command to go on with the jobs that are left"
@@ -78,6 +80,7 @@ class Grid(Sweeper):
         for combination in itertools.product(*choices.values()):
             overrides = [f"{key}={value}" for key, value in zip(choices, combination, strict=True)]
             job = SweepJob.of(*compose(overrides), overrides, Path())
+            refuse_unread(get("task", job.config["task"]["name"]), job.given)
             made.setdefault(job.configuration, job)
         return list(made.values())
 

@@ -1,72 +1,52 @@
 """Optimizers on functions that nobody here wrote."""
 
-import dataclasses
 from collections.abc import Iterable, Iterator
 from dataclasses import field
 from pathlib import Path
 from typing import Any
 
-from tractexp.errors import UserError, check_range
+from tractexp.api.benchmark import DIMENSIONS, FUNCTIONS, INSTANCES, MULTIPLIER, TARGETS, benchmark, check
+from tractexp.api.inputs import distinct
 from tractexp.plugin import build, get, plugin
 from tractexp.tasks.console import counting, say, table
 from tractexp.tasks.task import Job, Task
-
-NOT_READ = {"budget": "task.multiplier", "target": "task.targets", "time_limit": "task.multiplier"}
 
 
 @plugin
 class Benchmark(Task):
     """Run the optimizer and those it is set against on BBOB: ERT and ECDF tables, figures, one page, JSON."""
 
-    functions: list[int] = field(default_factory=lambda: list(range(1, 25)))
-    instances: list[int] = field(default_factory=lambda: [1, 2, 3])
-    dimensions: list[int] = field(default_factory=lambda: [5])
-    multiplier: int = 3000  # evaluations per dimension in each run
-    targets: list[float] = field(default_factory=lambda: [10.0**k for k in range(2, -9, -1)])  # f - f_opt
-    against: list[str] = field(default_factory=lambda: ["cmaes", "differential_evolution"])
+    reads = ("optimizer",)
+    instead = {
+        "budget": "set task.multiplier instead",
+        "time_limit": "set task.multiplier instead",
+        "target": "set task.targets instead",
+    }
+
+    functions: list[int] = field(default_factory=lambda: list(FUNCTIONS))
+    instances: list[int] = field(default_factory=lambda: list(INSTANCES))
+    dimensions: list[int] = field(default_factory=lambda: list(DIMENSIONS))
+    multiplier: int = MULTIPLIER  # evaluations per dimension in each run
+    targets: list[float] = field(default_factory=lambda: list(TARGETS))  # f - f_opt
+    against: list[str] = field(default_factory=list)  # optimizers with their own defaults
     cores: int | None = None  # processes; null: all cores, one for a job of a sweep
 
     def check(self) -> None:
-        for key, low, high in (("functions", 1, 24), ("instances", 1, 10_000), ("dimensions", 2, 100)):
-            values = getattr(self, key)
-            distinct(f"task.{key}", values)
-            for value in values:
-                check_range(f"task.{key}", value, low, high)
-        check_range("task.multiplier", self.multiplier, 1)
-        distinct("task.targets", self.targets)
-        for target in self.targets:
-            check_range("task.targets", target, 1e-12, 1e12)
+        check(self.functions, self.instances, self.dimensions, self.multiplier, self.targets, self.cores, "task.")
         if self.against:
             distinct("task.against", self.against)
         for name in self.against:
             get("optimizer", name)
-        if self.cores is not None:
-            check_range("task.cores", self.cores, 1)
 
     def run(self, job: Job) -> None:
-        from tractexp.comparison.bbob import Plan, package, perform
-        from tractexp.report import benchmark as report
-
-        refuse_unread(job)
-        package()
-        targets = tuple(sorted(self.targets, reverse=True))
-        plan = Plan(
-            tuple(self.functions), tuple(self.dimensions), tuple(self.instances), self.multiplier, targets, job.seed
-        )
-        optimizers = self.optimizers(job)
+        plan = {key: getattr(self, key) for key in ("functions", "instances", "dimensions", "multiplier", "targets")}
         cores = self.cores or (1 if job.in_sweep else None)
-        made = perform(optimizers, plan, cores, progress)
-        show(made)
-        settings = {name: {"name": it.name, **dataclasses.asdict(it)} for name, it in optimizers.items()}
-        figures = report.draw(made, job.folder)
-        paths = [
-            report.write_page(made, figures, job.folder / "benchmark.html"),
-            report.write_json(made, settings, job.folder / "benchmark.json"),
-            *figures.values(),
-        ]
+        made = benchmark(self.optimizers(job), **plan, seed=job.seed, cores=cores, progress=progress)
+        show(made.made)
+        paths = made.write(job.folder)
         for path in paths[:2]:
             say(f"  {path}")
-        track(job, made, paths)
+        track(job, made.made, paths)
 
     def optimizers(self, job: Job) -> dict[str, Any]:
         """The optimizer of the job, and those it is set against as they are by default, by name."""
@@ -76,29 +56,7 @@ class Benchmark(Task):
             default = build("optimizer", {"name": name})
             if default != job.optimizer:
                 made[f"{name} by default" if name == chosen else name] = default
-        for name, it in made.items():
-            if it.polish:
-                raise UserError(
-                    f"optimizer {name} polishes by least squares, which need residuals that a BBOB function does not"
-                    " have; set optimizer.polish=false"
-                )
         return made
-
-
-def distinct(where: str, values: list[Any]) -> None:
-    """Raise `UserError` for an empty list or one that names something twice."""
-    if not values:
-        raise UserError(f"{where} is empty; give at least one")
-    for value in values:
-        if values.count(value) > 1:
-            raise UserError(f"{where} names {value} twice; name each once")
-
-
-def refuse_unread(job: Job) -> None:
-    """Raise `UserError` for a limit of the search that this task would silently ignore."""
-    for key, instead in NOT_READ.items():
-        if job.config[key] is not None:
-            raise UserError(f"{key}={job.config[key]:g} is not read by task=benchmark; set {instead} instead")
 
 
 def progress(runs: Iterable[Any], total: int) -> Iterator[Any]:

@@ -5,18 +5,19 @@ from dataclasses import field
 from pathlib import Path
 from typing import Any
 
-from tractexp.errors import UserError, check_range
-from tractexp.plugin import discover, get, plugin
+from tractexp.plugin import plugin
 from tractexp.tasks.console import say, table
 from tractexp.tasks.task import Job, Task
 
-SWEEPS = Path("outputs", "sweeps")
 SAID = 8  # sentences on the terminal; the page has all
 
 
 @plugin
 class Compare(Task):
     """Settle which optimizer is better: tables, tests over paired seeds, figures, one page, sentences to quote."""
+
+    reads = ()
+    instead = {"data": "choose among the runs by task.data"}
 
     sweep: str | None = None  # folder of a sweep; null: the newest under outputs/sweeps
     filter: str | None = None  # instead: a filter over MLflow, "tags.data = 'tibet_50pct'"
@@ -27,50 +28,23 @@ class Compare(Task):
     reference: str | None = None  # test only against this variant; null: every pair
 
     def check(self) -> None:
-        if self.sweep is not None and self.filter is not None:
-            raise UserError("task.sweep and task.filter are both given; the runs come from one or the other")
-        if self.floor is not None and not 0 < self.floor < float("inf"):
-            raise UserError(f"task.floor={self.floor:g} must be an objective above 0, in pu²")
-        if not self.targets:
-            raise UserError("task.targets is empty; it lists multiples of the floor, such as [10,2,1.01]")
-        for target in self.targets:
-            check_range("task.targets", target, 1.0)
-        check_range("task.ties", self.ties, 0.0, 1.0)
+        from tractexp.api.compare import check
+
+        check(self.sweep, self.filter, self.targets, self.ties, self.floor, where="task.")
 
     def run(self, job: Job) -> None:
-        from tractexp.comparison.comparison import compare
-        from tractexp.comparison.runs import gather
-        from tractexp.report.comparison import write_json, write_page
-
-        runs, source, folder = self._runs(job)
-        gathered = gather(runs, source, self.data)
-        comparison = compare(
-            gathered, targets=self.targets, ties=self.ties, floor=self.floor, reference=self.reference, plain=plain()
-        )
-        report(comparison, source)
-        paths = [
-            write_page(comparison, job.folder / "comparison.html", source),
-            write_json(comparison, job.folder / "comparison.json", source),
-        ]
-        if folder is not None:
-            paths = [Path(shutil.copy2(path, folder / path.name)) for path in paths] + paths
-        for path in paths:
-            say(f"  {path}")
-        track(job, comparison, folder, paths[-2:])
-
-    def _runs(self, job: Job) -> tuple[list[Any], str, Path | None]:
-        """The runs, where they are from in words, and the folder of the sweep."""
-        from tractexp.comparison import load
-
-        if self.filter is None:
-            folder = Path(self.sweep) if self.sweep is not None else load.newest_sweep(SWEEPS)
-            return load.from_sweep(folder), f"the sweep {folder}", folder
-        from tractexp.tracking.find import find
+        from tractexp.api.compare import compare
 
         node = job.config["tracking"]
-        logged = find(store(job), self.filter, node["experiment"])
-        source = f"the filter {self.filter}"
-        return load.from_logged(logged, source), source, None
+        settings = {key: getattr(self, key) for key in ("filter", "data", "targets", "ties", "floor", "reference")}
+        made = compare(self.sweep, uri=node["uri"], experiment=node["experiment"], **settings)
+        report(made.comparison, made.source)
+        paths = made.write(job.folder)
+        if made.folder is not None:
+            paths = [Path(shutil.copy2(path, made.folder / path.name)) for path in paths] + paths
+        for path in paths:
+            say(f"  {path}")
+        track(job, made.comparison, made.folder, paths[-2:])
 
 
 def store(job: Job) -> str:
@@ -78,11 +52,6 @@ def store(job: Job) -> str:
     from tractexp import tracking
 
     return tracking.address(job.config["tracking"]["uri"])
-
-
-def plain() -> dict[str, str]:
-    """For each optimizer the one that it is with all its switches off, "" where there is none."""
-    return {name: get("optimizer", name).plain for name in discover()["optimizer"]}
 
 
 def report(comparison: Any, source: str) -> None:

@@ -9,12 +9,15 @@ import numpy as np
 from tractexp.errors import check_range
 from tractexp.plugin import plugin
 from tractexp.tasks.console import say, table
-from tractexp.tasks.task import Job, Task
+from tractexp.tasks.task import LOAD, Job, Task
 
 
 @plugin
 class Discrepancy(Task):
     """Investigate the training events, judge what is found on the held-out ones, tell it in one page."""
+
+    reads = ("data", *LOAD, "model.bounds", "model.fixed", "model.substeps")
+    instead = {"model.per_event": "its parameters are shared by all events, so leave it out"}
 
     effects: list[str] = field(default_factory=list)  # only these effects are tested; empty: the whole catalogue
     false_alarms: float = 0.05  # probability of naming anything where nothing is missing

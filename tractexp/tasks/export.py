@@ -12,8 +12,11 @@ from tractexp.tasks.task import Job, Task
 class Export(Task):
     """Turn `result.json` of an identification into a file of the format chosen; nothing is written where it cannot."""
 
+    reads = ()
+    instead = {"model": "the model is that of task.parameters"}
+
     parameters: str | None = None  # path of a result.json
-    format: str = "andes"  # andes, psse_dyr, modelica, or a format of an installed package
+    format: str = ""  # andes, psse_dyr, modelica, or a format of an installed package
     bus: int = 1  # number of the bus the load is on
     power: float = 100.0  # MVA, what 1 pu of the record stands for
     voltage: float = 110.0  # kV, line to line

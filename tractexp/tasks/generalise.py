@@ -1,22 +1,15 @@
 """Identify on one dip, judge on a milder and a deeper one: Tables 4 and 5 of the paper, for any optimizers."""
 
-import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import field, replace
-from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from tractexp.errors import UserError, check_range
-from tractexp.identification.search import Limits, search
+from tractexp.errors import check_range
 from tractexp.plugin import build, plugin
 from tractexp.tasks.console import say, searching, table
 from tractexp.tasks.identify import announce
 from tractexp.tasks.task import Job, Task
-
-SHIPPED = "tibet_50pct"
-SIBLINGS = ("pkg://tractexp.data/tibet_30pct.csv", "pkg://tractexp.data/tibet_65pct.csv")
 
 
 @plugin
@@ -27,7 +20,8 @@ class Generalise(Task):
     defaults. All have the same limits.
     """
 
-    optimizers: list[str] = field(default_factory=lambda: ["issa", "ssa", "pso"])
+    optimizers: list[str] = field(default_factory=list)
+    held_out: dict[str, list[str]] = field(default_factory=dict)  # {choice of data: files}; without data.validate
     seeds: int = 1  # searches of each optimizer: job seed and the ones after it
 
     def check(self) -> None:
@@ -36,49 +30,29 @@ class Generalise(Task):
             build("optimizer", {"name": name})
 
     def run(self, job: Job) -> None:
-        from tractexp.identification.result import conclude
-        from tractexp.replication.searches import by_depth
+        from tractexp.api.generalise import generalise
 
-        job = with_siblings(job)
-        events = job.events()
-        if not events.validate:
-            raise UserError(
-                "task=generalise needs dips that are not fitted: name them in data.validate, a milder one to"
-                " interpolate and a deeper one to extrapolate"
-            )
-        problem = job.problem(events.train)
-        announce(job, events, problem)
-        config = job.config
-        limits = Limits(config["budget"], config["time_limit"], config["target"])
-        settings = {part: config["model"][part] for part in ("motor", "static", "effects")}
-        kinds = by_depth(events.validate, events.train)
-        found = []
-        for name, optimizer in compared(job, self.optimizers).items():
-            for seed in range(job.seed, job.seed + self.seeds):
-                say(f"{name}, seed {seed}")
-                with searching(getattr(optimizer, "iterations", None), limits.simulations) as progress:
-                    ended = search(problem, optimizer, seed, limits, progress)
-                result, fits = conclude(problem, ended, events.validate, seed, settings, name)
-                found.append((result, fits[len(events.train) :]))
-        rows = [row for result, fits in found for row in residuals(result, fits, kinds)]
-        show(rows)
-        paths = [write(job.folder / "generalise.json", rows, found), *draw(job.folder, found, kinds)]
+        job = with_siblings(job, self.held_out)
+        events, config = job.events(), job.config
+        limits = {key: config[key] for key in ("budget", "time_limit", "target")}
+        made = generalise(
+            events.train, events.validate, model=config["model"], optimizers=compared(job, self.optimizers),
+            seeds=self.seeds, seed=job.seed, objective=config["objective"], **limits,
+            begin=lambda problem: announce(job, events, problem), watch=watch(config["budget"]),
+        )  # fmt: skip
+        show(made.medians)
+        paths = made.write(job.folder)
         for path in paths:
             say(f"  {path}")
-        metrics = {
-            f"validate_{1 + k % len(kinds)}_residual_{c}_{row['optimizer']}": row[f"residual_{c}"]
-            for k, row in reversed(list(enumerate(rows)))  # the first seed's stand
-            for c in "PQ"
-        }
-        job.log(name="generalisation", values={}, metrics=metrics, artifacts=paths)
+        job.log(name="generalisation", values={}, metrics=metrics(made.residuals), artifacts=paths)
 
 
-def with_siblings(job: Job) -> Job:
-    """The job with the milder and the deeper shipped dip held out, where it fits the shipped one and names none."""
+def with_siblings(job: Job, held_out: Mapping[str, list[str]]) -> Job:
+    """The job with the files held out that belong to its choice of data, where it names none itself."""
     data: Mapping[str, Any] = job.config["data"]
-    if job.choices["data"] != SHIPPED or data.get("validate"):
+    if job.choices["data"] not in held_out or data.get("validate"):
         return job
-    held = [path for path in SIBLINGS if path not in data["train"]]
+    held = [path for path in held_out[job.choices["data"]] if path not in data["train"]]
     return replace(job, config={**job.config, "data": {**data, "validate": held}})
 
 
@@ -88,72 +62,36 @@ def compared(job: Job, names: list[str]) -> dict[str, Any]:
     return made | {job.choices["optimizer"]: job.optimizer}
 
 
-def residuals(result: Any, fits: list[Any], kinds: list[str]) -> list[dict[str, Any]]:
-    """Eq. (21) and Eq. (20) of P and Q on each held-out dip."""
-    from tractexp.replication.searches import mean_residual
+def watch(budget: int | None) -> Any:
+    """What says that a search begins and how far it is."""
 
-    return [
-        {
-            "optimizer": result.optimizer,
-            "seed": result.seed,
-            "event": fit.event.record.name,
-            "kind": kind,
-            "depth": fit.event.depth,
-            "residual_P": mean_residual(fit.event.record.P, fit.P),
-            "residual_Q": mean_residual(fit.event.record.Q, fit.Q),
-            "epsilon_p": fit.epsilon_p,
-            "epsilon_q": fit.epsilon_q,
-        }
-        for fit, kind in zip(fits, kinds, strict=True)
-    ]
+    @contextmanager
+    def watched(name: str, optimizer: Any, seed: int) -> Iterator[Any]:
+        say(f"{name}, seed {seed}")
+        with searching(getattr(optimizer, "iterations", None), budget) as progress:
+            yield progress
+
+    return watched
 
 
-def show(rows: list[dict[str, Any]]) -> None:
+def show(medians: Sequence[Mapping[str, Any]]) -> None:
     """Print a table for each held-out dip, medians over the seeds."""
     say()
-    for event, kind in dict.fromkeys((row["event"], row["kind"]) for row in rows):
-        cells = []
-        for optimizer in dict.fromkeys(row["optimizer"] for row in rows):
-            members = [row for row in rows if (row["event"], row["optimizer"]) == (event, optimizer)]
-            P, Q, p, q = (
-                float(np.median([m[key] for m in members]))
-                for key in ("residual_P", "residual_Q", "epsilon_p", "epsilon_q")
-            )
-            cells.append([optimizer, f"{P:.3e}", f"{Q:.3e}", f"{p:.3%}", f"{q:.3%}", ""])
+    for event, kind in dict.fromkeys((row["event"], row["kind"]) for row in medians):
+        cells = [
+            [row["optimizer"], *(f"{row[key]:.3e}" for key in ("residual_P", "residual_Q")),
+             *(f"{row[key]:.3%}" for key in ("epsilon_p", "epsilon_q")), ""]
+            for row in medians if row["event"] == event
+        ]  # fmt: skip
         table(["optimizer", "residual P", "residual Q", "epsilon_p", "epsilon_q", ""], cells, f"{kind}: {event}")
     say("residuals: mean absolute value of Eq. (21), pu")
 
 
-def write(path: Path, rows: list[dict[str, Any]], found: list[tuple[Any, Any]]) -> Path:
-    """The residuals, and the parameters they come from."""
-    identified = [
-        {"optimizer": r.optimizer, "seed": r.seed, "objective": r.objective, "simulations": r.simulations,
-         "parameters": r.parameters}
-        for r, _ in found
-    ]  # fmt: skip
-    content = {"residuals": rows, "identified": identified}
-    part = path.with_suffix(".part")
-    part.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    return part.replace(path)
-
-
-def draw(folder: Path, found: list[tuple[Any, Any]], kinds: list[str]) -> list[Path]:
-    """Curves and residuals of each optimizer's first seed on each held-out dip: issa_interpolation.svg, ..."""
-    from tractexp.report import figures
-
-    paths, seen = [], set()
-    for result, fits in found:
-        if result.optimizer in seen:
-            continue
-        seen.add(result.optimizer)
-        for k, (fit, kind) in enumerate(zip(fits, kinds, strict=True)):
-            record = fit.event.record
-            suffix = f"_{k + 1}" if kinds.count(kind) > 1 else ""
-            paths.append(
-                figures.fit(
-                    folder / f"{result.optimizer}_{kind}{suffix}.svg", record.t, record.U, (record.P, record.Q),
-                    (fit.P, fit.Q), title=f"{record.name} ({kind}), {result.optimizer}, seed {result.seed}",
-                    epsilon=(fit.epsilon_p, fit.epsilon_q), notes=record.notes,
-                )
-            )  # fmt: skip
-    return paths
+def metrics(rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
+    """The residuals of each optimizer's first seed, by the number of the held-out dip."""
+    dips = sum((row["optimizer"], row["seed"]) == (rows[0]["optimizer"], rows[0]["seed"]) for row in rows)
+    return {
+        f"validate_{1 + k % dips}_residual_{c}_{row['optimizer']}": row[f"residual_{c}"]
+        for k, row in reversed(list(enumerate(rows)))  # the first seed's stand
+        for c in "PQ"
+    }

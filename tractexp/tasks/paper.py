@@ -1,105 +1,68 @@
 """The paper's tables and figures, done again: one page, one verdict for each claim."""
 
-import functools
 import re
 import sys
 import time
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import field
 from pathlib import Path
 from typing import Any
 
-from tractexp.errors import UserError, check_choice, check_range
+from tractexp import files
+from tractexp.api.paper import SEEDS, check, paper
 from tractexp.plugin import plugin
 from tractexp.tasks.console import NEXT_LINES, say
 from tractexp.tasks.generalise import with_siblings
 from tractexp.tasks.task import Job, Task
-
-PARTS = (
-    "table1", "table2", "table3", "table4", "table5", "figure3", "figure4", "figure6", "figure8", "figure9", "figure10",
-    "figure11", "equations",
-)  # fmt: skip
 
 
 @plugin
 class Paper(Task):
     """Measure what the paper claims, on the shipped stand-ins or on records of your own: paper.html and paper.md."""
 
+    reads = ("data", "model", "objective", "budget", "time_limit", "target")
+    instead = {"optimizer": "it compares the paper's three; task=generalise takes any"}
+
     parts: list[str] = field(default_factory=list)  # such as [table1,figure9]; empty: all
-    seeds: int = 30
+    held_out: dict[str, list[str]] = field(default_factory=dict)  # {choice of data: files}; without data.validate
+    seeds: int = SEEDS
     workers: int | None = None  # processes that search; null: one for each core
     docs: str | None = None  # write paper.md to this file too, without its figures
 
     def check(self) -> None:
-        for part in self.parts:
-            check_choice("task.parts", part, PARTS)
-        check_range("task.seeds", self.seeds, 1)
-        if self.workers is not None:
-            check_range("task.workers", self.workers, 1)
+        check(self.parts, self.seeds, self.workers, where="task.")
 
     def run(self, job: Job) -> None:
-        from tractexp.report.paper import write
-
         started = time.perf_counter()
-        made = study(job, self.seeds, self.workers)
-        parts = [part for part in PARTS if part in self.parts or not self.parts]
-        need_held_out(made, parts)
-        paths, judged = write(made, parts, job.folder)
-        counts = Counter(claim.verdict for claim in judged)
-        for claim in judged:
+        made = replicated(with_siblings(job, self.held_out), self.parts, self.seeds, self.workers)
+        paths = made.write(job.folder)
+        for claim in made.claims:
             say(f"  {claim.verdict}: {claim.text}")
             say(f"    {claim.measured}")
-        say(f"{len(judged)} claims: " + ", ".join(f"{n} {verdict}" for verdict, n in counts.items()))
+        say(f"{len(made.claims)} claims: " + ", ".join(f"{n} {verdict}" for verdict, n in made.counts.items()))
         say(f"in {time.perf_counter() - started:.0f} s")
         if self.docs is not None:
             paths.append(publish(paths, Path(self.docs)))
         for path in paths:
             say(f"  {path}")
-        log(job, paths, counts)
+        log(job, paths, made.counts)
 
 
-def study(job: Job, seeds: int, workers: int | None) -> Any:
-    """The experiments on a job's records; the shipped record brings its siblings where none is held out."""
-    from tractexp.identification.search import Limits
+def replicated(job: Job, parts: list[str], seeds: int, workers: int | None) -> Any:
+    """What is measured on a job's records, which are told first."""
     from tractexp.record import describe
-    from tractexp.replication.study import Study
 
-    job = with_siblings(job)
-    events = job.events()
+    events, config = job.events(), job.config
     for role, group in (("fit", events.train), ("hold out", events.validate)):
         for event in group:
             say(f"{role}: {describe(event)}")
             for note in event.record.notes:
                 say(f"  note: {note}")
-    limits = Limits(job.config["budget"], job.config["time_limit"], job.config["target"])
-    return Study(
-        recipe=functools.partial(problem, job.config, events.train),
-        node=job.config["model"],
-        train=tuple(events.train),
-        held_out=tuple(events.validate),
-        seeds=seeds,
-        seed=job.seed,
-        workers=workers,
-        limits=limits,
-        tell=lambda line: say(f"  {line}"),
-        count=Counting(),
-    )
-
-
-def problem(config: Mapping[str, Any], events: Any) -> Any:
-    """The identification problem of these events, composed anew: compiled code does not travel to a worker."""
-    return Job(config, {}, Path()).problem(events)
-
-
-def need_held_out(made: Any, parts: list[str]) -> None:
-    """Raise `UserError`, before anything is measured, where a part needs a dip that is not there."""
-    for kind, needing in (
-        ("interpolation", {"table4", "figure10"}),
-        ("extrapolation", {"table5", "figure11"}),
-    ):
-        if needing & set(parts):
-            made.held(kind)
+    return paper(
+        events.train, events.validate, model=config["model"], parts=parts, seeds=seeds, seed=job.seed, workers=workers,
+        objective=config["objective"], **{key: config[key] for key in ("budget", "time_limit", "target")},
+        tell=lambda line: say(f"  {line}"), count=Counting(),
+    )  # fmt: skip
 
 
 class Counting:
@@ -119,12 +82,7 @@ class Counting:
 def publish(paths: list[Path], docs: Path) -> Path:
     """Write the Markdown page to `docs` without its figures, which are named where they stand in the run's page."""
     text = next(path for path in paths if path.suffix == ".md").read_text(encoding="utf-8")
-    try:
-        docs.parent.mkdir(parents=True, exist_ok=True)
-        docs.write_text(re.sub(r"!\[(.*?)\]\((.*?)\)", r"*\2 of the run's folder: \1*", text), encoding="utf-8")
-    except OSError as error:
-        raise UserError(f"task.docs={docs}: the page cannot be written there: {error.strerror}") from error
-    return docs
+    return files.write(docs, re.sub(r"!\[(.*?)\]\((.*?)\)", r"*\2 of the run's folder: \1*", text))
 
 
 def log(job: Job, paths: list[Path], counts: Counter[str]) -> None:

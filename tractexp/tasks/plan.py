@@ -32,6 +32,8 @@ class Plan(Task):
     that record, or are the model's defaults, or those of an earlier result.json.
     """
 
+    reads = ("data", "model")
+
     parameter: str = "H"  # how deep a dip is needed for this one (H stands for M)
     within: float = 0.05  # half of the 95 % interval, as a share of the value
     depth: float | None = None  # of the voltage before; null: as recorded

@@ -6,6 +6,7 @@ from typing import Any
 
 from tractexp.errors import UserError
 from tractexp.plugin import build
+from tractexp.tasks.given import given, refuse_unread
 from tractexp.tasks.task import Job
 
 
@@ -14,11 +15,11 @@ def run(config: Any) -> None:
     from hydra.core.hydra_config import HydraConfig
     from omegaconf import OmegaConf
 
-    hydra = HydraConfig.get().runtime
-    folder = Path(hydra.output_dir)
+    hydra = HydraConfig.get()
+    folder, choices = Path(hydra.runtime.output_dir), dict(hydra.runtime.choices)
     try:
         plain: Any = OmegaConf.to_container(config, resolve=True)
-        perform(Job(plain, dict(hydra.choices), folder))
+        perform(Job(plain, choices, folder, given=given(hydra.overrides.task, choices)))
     except UserError:
         if {p.name for p in folder.iterdir()} <= {".hydra"}:
             shutil.rmtree(folder)
@@ -30,4 +31,6 @@ def perform(job: Job) -> None:
     from tractexp.schema import check
 
     check(job.config)
-    build("task", job.config["task"]).run(job)
+    task = build("task", job.config["task"])
+    refuse_unread(task, job.given, task.needless())
+    task.run(job)

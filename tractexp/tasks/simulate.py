@@ -10,7 +10,7 @@ import numpy as np
 from tractexp.errors import UserError, among, check_range
 from tractexp.plugin import plugin
 from tractexp.tasks.console import say, table
-from tractexp.tasks.task import Job, Task
+from tractexp.tasks.task import LOAD, Job, Task
 
 
 @plugin
@@ -20,6 +20,12 @@ class Simulate(Task):
     The parameters are those of a `result.json`, with its model, or `values` for the model chosen; values also replace
     single parameters of the result.
     """
+
+    reads = ("data", *LOAD)
+    instead = {
+        "model": "with task.parameters the model is that of the result",
+        "data": "with task.depth no record is played",
+    }
 
     parameters: str | None = None  # path of a result.json
     values: dict[str, float] = field(default_factory=dict)  # {name: value}
@@ -33,6 +39,9 @@ class Simulate(Task):
     U0: float | None = None  # pu, voltage before the dip; null: the result's, or 1
     P0: float | None = None  # pu, power before the dip; null: the result's, or 1
     Q0: float | None = None  # pu; null: the result's, or 0.5
+
+    def needless(self) -> tuple[str, ...]:
+        return (*(LOAD if self.parameters else ()), *(("data",) if self.depth is not None else ()))
 
     def check(self):
         if self.depth is not None:

@@ -2,11 +2,14 @@
 
 import functools
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
 from tractexp.plugin import Plugin, build
+
+SEARCH = ("objective", "optimizer", "budget", "time_limit", "target")  # the settings of a search
+LOAD = ("model.motor", "model.static", "model.effects")  # the parts of a model, without what is known of its parameters
 
 
 class Task(Plugin):
@@ -14,6 +17,12 @@ class Task(Plugin):
 
     group: ClassVar[str] = "task"
     sourced: ClassVar[bool] = False
+    reads: ClassVar[tuple[str, ...]] = ("data", "model", *SEARCH)  # what is chosen beside these is refused
+    instead: ClassVar[Mapping[str, str]] = {}  # {setting it does not read: what to do, as the refusal's last words}
+
+    def needless(self) -> tuple[str, ...]:
+        """The parts of `reads` that are not read with the settings it has."""
+        return ()
 
     def run(self, job: "Job") -> None:
         """Do the task. Raises `UserError` before anything is logged where the input is wrong."""
@@ -28,6 +37,9 @@ class Job:
     folder: Path
     sweep: str | None = None  # run id of the sweep this job belongs to, where that is logged
     in_sweep: bool = False  # one of many: what only a person looks at may be left out
+    given: Mapping[str, str] = field(
+        default_factory=dict
+    )  # what the user chose, {"optimizer": "pso"}: not the defaults
 
     def events(self) -> Any:
         """The recorded events, read and with their dips found (`Events` of `Event`)."""

@@ -1,0 +1,133 @@
+"""Optimizers on functions with known optima that nobody here wrote."""
+
+import dataclasses
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from tractexp.api.inputs import Written, distinct, optimizers_by_name
+from tractexp.errors import UserError, check_range
+from tractexp.outcome import Table
+
+if TYPE_CHECKING:
+    from tractexp.comparison.bbob import Benchmark, Run
+
+FUNCTIONS, INSTANCES, DIMENSIONS = tuple(range(1, 25)), (1, 2, 3), (5,)
+MULTIPLIER = 3000
+TARGETS = tuple(10.0**k for k in range(2, -9, -1))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Benchmarked(Written):
+    """All runs on BBOB, and what they come to. `optimizers` holds the settings of each, by its name."""
+
+    kind = "benchmark"
+
+    made: "Benchmark"
+    optimizers: Mapping[str, Mapping[str, Any]]
+
+    @property
+    def sentences(self) -> list[str]:
+        """What may be quoted."""
+        from tractexp.report.benchmark import sentences
+
+        return sentences(self.made)
+
+    def table(self) -> Table:
+        from tractexp.report.benchmark import scale
+
+        made = self.made
+        rows = [
+            [name, d, *(made.share(name, d, fs) for fs in (made.plan.functions, *made.groups().values())),
+             made.solved(name, d)]
+            for d in made.plan.dimensions for name in made.optimizers
+        ]  # fmt: skip
+        columns = ["optimizer", "dimension", "all", *made.groups(), "solved"]
+        return Table(columns, rows, f"share of targets met, functions solved: {scale(made)}", self.sentences)
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write benchmark.html, benchmark.json and the figures."""
+        from tractexp.report import benchmark as report
+
+        figures = report.draw(self.made, folder)
+        page = report.write_page(self.made, figures, folder / "benchmark.html")
+        return [page, report.write_json(self.made, self.optimizers, folder / "benchmark.json"), *figures.values()]
+
+    def to_dict(self) -> dict[str, Any]:
+        from tractexp.report.benchmark import content
+
+        return {**content(self.made, self.optimizers), "titles": self.made.titles}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        from tractexp.comparison.bbob import Benchmark, Plan, Run
+
+        def run(told: Mapping[str, Any]) -> Run:
+            return Run(**{**told, "hits": tuple(np.inf if n is None else n for n in told["hits"])})
+
+        plan = Plan(*(_tuple(content[item.name]) for item in dataclasses.fields(Plan)))
+        titles = {int(function): title for function, title in content["titles"].items()}
+        made = Benchmark(plan, tuple(content["optimizers"]), titles, [run(told) for told in content["runs"]])
+        return cls(made, content["optimizers"])
+
+
+def benchmark(
+    optimizers: Any,
+    *,
+    functions: Sequence[int] = FUNCTIONS,
+    instances: Sequence[int] = INSTANCES,
+    dimensions: Sequence[int] = DIMENSIONS,
+    multiplier: int = MULTIPLIER,
+    targets: Sequence[float] = TARGETS,
+    seed: int = 0,
+    cores: int | None = None,
+    progress: "Callable[[Iterable[Run], int], Iterable[Run]]" = lambda runs, total: runs,
+) -> Benchmarked:
+    """Run optimizers on the noiseless functions of BBOB; the same seed gives the same runs on any number of cores.
+
+    `optimizers` are names or plugins, or a mapping of names to these. Each run may make `multiplier` evaluations per
+    dimension; `targets` are distances to the optimum; `cores` None means all. `progress(runs, total)` passes on the
+    runs as they end. Raises `UserError` for arguments out of range, an optimizer that needs residuals, and where the
+    package `ioh` is missing.
+    """
+    from tractexp.comparison.bbob import Plan, package, perform
+
+    check(functions, instances, dimensions, multiplier, targets, cores)
+    check_range("seed", seed, 0)
+    tried = optimizers_by_name(optimizers)
+    for name, optimizer in tried.items():
+        if optimizer.polish:
+            raise UserError(
+                f"optimizer {name} polishes by least squares, which need residuals that a BBOB function does not"
+                " have; set optimizer.polish=false"
+            )
+    package()
+    ordered = tuple(sorted(targets, reverse=True))
+    plan = Plan(tuple(functions), tuple(dimensions), tuple(instances), multiplier, ordered, seed)
+    made = perform(tried, plan, cores, progress)
+    return Benchmarked(made, {name: {"name": it.name, **dataclasses.asdict(it)} for name, it in tried.items()})
+
+
+def check(
+    functions: Sequence[int], instances: Sequence[int], dimensions: Sequence[int], multiplier: int,
+    targets: Sequence[float], cores: int | None, where: str = "",
+) -> None:  # fmt: skip
+    """Raise `UserError` for arguments out of range; `where` stands before their names."""
+    numbers = {
+        "functions": (functions, 1, 24), "instances": (instances, 1, 10_000), "dimensions": (dimensions, 2, 100),
+        "targets": (targets, 1e-12, 1e12),
+    }  # fmt: skip
+    for name, (values, low, high) in numbers.items():
+        distinct(f"{where}{name}", values)
+        for value in values:
+            check_range(f"{where}{name}", value, low, high)
+    check_range(f"{where}multiplier", multiplier, 1)
+    if cores is not None:
+        check_range(f"{where}cores", cores, 1)
+
+
+def _tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value

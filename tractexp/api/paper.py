@@ -1,0 +1,129 @@
+"""The paper's tables and figures, done again: one page, one verdict for each claim."""
+
+import functools
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+from tractexp.api.inputs import Setup, Written
+from tractexp.errors import check_choice, check_range
+from tractexp.outcome import Table
+
+if TYPE_CHECKING:
+    from tractexp.model.model import Model
+    from tractexp.record import Event, Record
+    from tractexp.replication.claims import Claim
+    from tractexp.replication.study import Study
+
+PARTS = (
+    "table1", "table2", "table3", "table4", "table5", "figure3", "figure4", "figure6", "figure8", "figure9", "figure10",
+    "figure11", "equations",
+)  # fmt: skip
+HELD_OUT = {"interpolation": {"table4", "figure10"}, "extrapolation": {"table5", "figure11"}}  # what needs which dip
+SEEDS = 30
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Replicated(Written):
+    """The paper's claims, judged. Of a loaded result the page is measured again, from the records it holds."""
+
+    kind = "paper"
+
+    setup: Setup
+    settings: Mapping[str, Any]  # seeds, workers
+    parts: Sequence[str]
+    claims: "Sequence[Claim]"
+
+    @functools.cached_property
+    def study(self) -> "Study":
+        """What stands behind the page, each part measured when first asked for."""
+        return _study(self.setup, **self.settings)
+
+    @property
+    def counts(self) -> Counter[str]:
+        """How many claims got which verdict."""
+        return Counter(claim.verdict for claim in self.claims)
+
+    def table(self) -> Table:
+        rows = [[claim.part, claim.text, claim.verdict, claim.measured] for claim in self.claims]
+        told = ", ".join(f"{n} {verdict}" for verdict, n in self.counts.items())
+        return Table(["where", "the paper's claim", "verdict", "measured"], rows, f"{len(rows)} claims: {told}")
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write paper.html, paper.md and the figures."""
+        from tractexp.report.paper import write
+
+        return write(self.study, self.parts, self.claims, folder)
+
+    def to_dict(self) -> dict[str, Any]:
+        told = {"settings": dict(self.settings), "parts": list(self.parts)}
+        return {"claims": [asdict(claim) for claim in self.claims], **told, "setup": self.setup.to_dict()}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        from tractexp.replication.claims import Claim
+
+        judged = [Claim(**told) for told in content["claims"]]
+        return cls(Setup.from_dict(content["setup"]), content["settings"], content["parts"], judged)
+
+
+def paper(
+    records: "Sequence[Event | Record]",
+    validate: "Sequence[Event | Record]" = (),
+    *,
+    model: "Model | Mapping[str, Any]",
+    parts: Sequence[str] = (),
+    seeds: int = SEEDS,
+    seed: int = 0,
+    workers: int | None = None,
+    bounds: Mapping[str, Sequence[float]] | None = None,
+    fixed: Mapping[str, float] | None = None,
+    substeps: int | None = None,
+    per_event: Sequence[str] | None = None,
+    objective: Any = None,
+    budget: int | None = None,
+    time_limit: float | None = None,
+    target: float | None = None,
+    tell: Callable[[str], None] = lambda line: None,
+    count: Callable[[int, int], None] = lambda done, total: None,
+) -> Replicated:
+    """Measure what the paper claims on records fitted and held out; `parts` are tables and figures (none: all).
+
+    Each of the paper's optimizers searches under `seeds` seeds, on `workers` processes (None: one for each core).
+    `tell(line)` and `count(done, total)` hear how far it is. Raises `UserError` for wrong input, and where a part
+    needs a dip that is not there.
+    """
+    check(parts, seeds, workers)
+    known = {"bounds": bounds, "fixed": fixed, "substeps": substeps, "per_event": per_event}
+    limits = {"budget": budget, "time_limit": time_limit, "target": target}
+    setup = Setup.of(records, validate, model, known, objective, seed, **limits)
+    settings = {"seeds": seeds, "workers": workers}
+    study, chosen = _study(setup, **settings, tell=tell, count=count), [p for p in PARTS if p in parts or not parts]
+    for kind, needing in HELD_OUT.items():
+        if needing & set(chosen):
+            study.held(kind)
+    from tractexp.replication.claims import claims
+
+    made = Replicated(setup, settings, chosen, claims(study, chosen))
+    vars(made)["study"] = study
+    return made
+
+
+def check(parts: Sequence[str], seeds: int, workers: int | None, where: str = "") -> None:
+    """Raise `UserError` for arguments out of range; `where` stands before their names."""
+    for part in parts:
+        check_choice(f"{where}parts", part, PARTS)
+    check_range(f"{where}seeds", seeds, 1)
+    if workers is not None:
+        check_range(f"{where}workers", workers, 1)
+
+
+def _study(setup: Setup, seeds: int, workers: int | None, **heard: Any) -> "Study":
+    from tractexp.replication.study import Study
+
+    return Study(
+        recipe=setup.problem, node=setup.model, train=setup.train, held_out=setup.held_out, seeds=seeds,
+        seed=setup.seed, workers=workers, limits=setup.search_limits, **heard,
+    )  # fmt: skip
