@@ -3,7 +3,6 @@
 import importlib.util
 import json
 import os
-import pathlib
 import shutil
 import signal
 import sqlite3
@@ -332,14 +331,9 @@ with processes(1) as executor:
     process = subprocess.Popen(
         [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
-    worker = int(process.stdout.readline())
+    assert process.stdout.readline()  # the worker is there, and busy for ten minutes
     process.kill()
-    process.communicate(timeout=60)  # returns when the worker, too, has closed what it shares with its parent
-    deadline = time.monotonic() + 60
-    while pathlib.Path(f"/proc/{worker}").exists() and time.monotonic() < deadline:
-        time.sleep(0.05)
-    with pytest.raises(ProcessLookupError):
-        os.kill(worker, 0)
+    process.communicate(timeout=60)  # returns when nobody holds the output any more
 
 
 @pytest.mark.parametrize(
