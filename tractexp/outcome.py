@@ -81,8 +81,17 @@ class Outcome:
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        """The result that `to_dict` told. Raises `UserError` where something is missing."""
+        """The result that `to_dict` told."""
         raise NotImplementedError
+
+    @classmethod
+    def revived(cls, content: Mapping[str, Any]) -> Self:
+        """As `from_dict`; raises `UserError` where something is missing or of the wrong kind."""
+        try:
+            return cls.from_dict(content)
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            told = f"it lacks {error}" if isinstance(error, KeyError) else str(error)
+            raise UserError(f"this is not a whole saved {cls.kind}: {told}; save it again") from error
 
     def to_frame(self) -> Any:
         """The table as a pandas frame."""
@@ -106,7 +115,7 @@ class Outcome:
         content = saved(path)
         if content["kind"] != cls.kind:
             raise UserError(f"{path} holds a result of kind '{content['kind']}', not '{cls.kind}'; read it by load()")
-        return cls.from_dict(content)
+        return cls.revived(content)
 
 
 def saved(path: Path | str) -> dict[str, Any]:

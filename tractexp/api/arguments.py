@@ -14,12 +14,15 @@ from typing import Any, ParamSpec, TypeVar, Union, get_args, get_origin, get_typ
 from tractexp import plugin
 from tractexp.errors import UserError, among
 
-P, R = ParamSpec("P"), TypeVar("R")
+P = ParamSpec("P")
+R = TypeVar("R")
 
 PACKAGE = Path(__file__).resolve().parents[1]
 CONF = next(p for p in (PACKAGE / "conf", PACKAGE.parent / "conf") if (p / "config.yaml").is_file())
 SECTIONS = "task|model|data"  # of the configuration, whose keys the arguments of a call are
-WORDS = {int: "a whole number", float: "a number", bool: "True or False", str: "a text", type(None): "None"}
+WORDS = {
+    int: "a whole number", float: "a number", bool: "True or False", str: "a text", type(None): "None", Any: "anything",
+}  # fmt: skip
 
 
 def public(function: Callable[P, R]) -> Callable[P, R]:
@@ -60,8 +63,7 @@ def check_kind(name: str, value: Any, annotation: Any) -> None:
     if not _is(value, annotation):
         kinds = get_args(annotation) if get_origin(annotation) in (Union, types.UnionType) else (annotation,)
         allowed = " or ".join(dict.fromkeys(_word(kind) for kind in kinds))
-        shown = f"{value!r:.60}"
-        raise UserError(f"{name}={shown} is {_article(type(value).__name__)}, but it must be {allowed}")
+        raise UserError(f"{name}={value!r:.60} is {_article(type(value).__name__)}, but it must be {allowed}")
 
 
 def _is(value: Any, kind: Any) -> bool:
@@ -83,7 +85,7 @@ def _word(kind: Any) -> str:
     if origin in (Sequence, list, tuple):
         return f"a list, each {_word(get_args(kind)[0])}"
     if origin is Mapping or origin is dict:
-        return f"a mapping of names to {_word(get_args(kind)[1])}"
+        return f"a mapping, each value {_word(get_args(kind)[1])}"
     return WORDS.get(kind) or _article(getattr(kind, "__name__", str(kind)))
 
 
@@ -99,10 +101,15 @@ class Choice:
     node: Mapping[str, Any]
 
     @classmethod
-    def of(cls, group: str, chosen: "str | Mapping[str, Any] | Choice") -> "Choice":
-        """The choice of a name, or of a mapping of `name` and settings that replace the choice's own."""
+    def of(cls, group: str, chosen: "str | Mapping[str, Any] | Choice | None") -> "Choice":
+        """The choice of a name, or of a mapping of `name` and settings that replace the choice's own.
+
+        None is the default of `conf/config.yaml`.
+        """
         if isinstance(chosen, Choice):
             return chosen
+        chosen = default(group) if chosen is None else chosen
+        check_kind(group, chosen, str | Mapping[str, Any])
         asked = {"name": chosen} if isinstance(chosen, str) else dict(chosen)
         if "name" not in asked:
             raise UserError(f"{group}={asked} lacks 'name'; give a name, or a mapping of 'name' and settings")
@@ -154,10 +161,18 @@ def read_choice(group: str, name: str) -> dict[str, Any]:
     return made
 
 
-def choices(group: str) -> list[str]:
-    """The names one may choose in a group."""
-    files = {file.stem for folder in _folders() for file in (folder / group).glob("*.yaml")}
-    return sorted({*files, *plugin.discover().get(group, {})})
+def default(group: str) -> str:
+    """What is chosen in a group where nothing else is: that of `conf/config.yaml`, as on the command line."""
+    import yaml
+
+    content = yaml.safe_load((CONF / "config.yaml").read_text(encoding="utf-8"))
+    return next(item[group] for item in content["defaults"] if isinstance(item, dict) and group in item)
+
+
+def choices(group: str, *, files: bool = False) -> list[str]:
+    """The names one may choose in a group, or those among them that have a file."""
+    named = {file.stem for folder in _folders() for file in (folder / group).glob("*.yaml")}
+    return sorted(named if files else {*named, *plugin.discover().get(group, {})})
 
 
 def _folders() -> list[Path]:

@@ -8,14 +8,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tractexp.api.arguments import Choice, check_kind, public, read_choice
+from tractexp.api.arguments import Choice, check_kind, default, public, read_choice
 from tractexp.errors import UserError, among
 from tractexp.outcome import Table
 
 if TYPE_CHECKING:
     from tractexp.model.model import Model
 
-GROUP, PARTS, KEPT = "model", ("motor", "static"), ("bounds", "fixed", "substeps", "per_event")
+GROUP, PARTS = "model", ("motor", "static")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -103,25 +103,24 @@ def compose(
     Raises `UserError` for an unknown name or an effect that does not fit the equations; the values are checked where
     the model is used.
     """
-    made = model_of(DEFAULT if model is None else model)
-    part = {key: Choice.of(f"model/{key}", chosen).node for key, chosen in zip(PARTS, (motor, static), strict=True) if chosen}
-    made = made.with_(effects=effects, bounds=bounds, fixed=fixed, substeps=substeps, per_event=per_event, **part)
+    made = model_of(model)
+    given = {"motor": motor, "static": static}
+    parts = {part: Choice.of(f"model/{part}", chosen).node for part, chosen in given.items() if chosen is not None}
+    made = made.with_(effects=effects, bounds=bounds, fixed=fixed, substeps=substeps, per_event=per_event, **parts)
     _ = made.parameters
     for key in made.fixed:
         if key not in made.parameters:
-            raise UserError(f"fixed.{key}: this model has no parameter '{key}'{among(key, made.parameters, 'Parameters')}")
+            known = among(key, made.parameters, "Parameters")
+            raise UserError(f"fixed.{key}: this model has no parameter '{key}'{known}")
     return made
-
-
-DEFAULT = "third_order_exponential"
 
 
 def model_of(given: Any) -> LoadModel:
     """What a call takes as `model`: a name, a path, a mapping of parts, a `LoadModel` or a composed `Model`."""
     if isinstance(given, LoadModel):
         return given
-    if isinstance(given, str | Path):
-        given = read_choice(GROUP, str(given))
+    if given is None or isinstance(given, str | Path):
+        given = read_choice(GROUP, str(given or default(GROUP)))
     elif not isinstance(given, Mapping):
         given = _node(given)
     known = [f.name for f in dataclasses.fields(LoadModel)]
@@ -144,4 +143,4 @@ def _node(model: Any) -> dict[str, Any]:
         return {"motor": motor, "static": static, "effects": [effect.name for effect in model.effects]}
     except AttributeError:
         kind = type(model).__name__
-        raise UserError(f"model is a {kind}; give a name such as '{DEFAULT}', or what tractexp.compose makes") from None
+        raise UserError(f"model is of type {kind}; give a name, or what tractexp.compose makes") from None

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 
 from tractexp.api.arguments import Choice, public
-from tractexp.api.compose import DEFAULT, LoadModel, model_of
+from tractexp.api.compose import LoadModel, model_of
 from tractexp.api.pages import Shown, shown
-from tractexp.api.read import Dips, again, events, kept
+from tractexp.api.read import Dips, again, dips_of, kept
 from tractexp.api.response import Response, respond_to
 from tractexp.errors import UserError, check_range
 from tractexp.identification.result import Result
@@ -52,8 +52,8 @@ class Setup:
             if search.get(key) is not None:
                 check_range(key, search[key], least)
         return cls(
-            events("records", records, least=1),
-            events("validate", validate),
+            dips_of("records", records, least=1),
+            dips_of("validate", validate),
             model_of(model).with_(**known),
             Choice.of("objective", objective),
             Choice.of("optimizer", optimizer),
@@ -71,26 +71,17 @@ class Setup:
         m, loss = self.model, self.objective.build("objective")
         return Problem(m.model, train, m.bounds, m.fixed, m.substeps, m.per_event, loss=loss)
 
-    def lines(self) -> Iterator[str]:
-        """What is read and what will be done."""
-        problem = self.problem
-        for role, group in (("fit", self.train), ("validate", self.validate)):
-            for event in group:
-                yield f"{role}: {describe(event)}"
-                yield from (f"  note: {note}" for note in event.record.notes)
-        free = f"{problem.space.dimension} parameters"
-        yield f"model: {problem.model.title}, {free}; Runge-Kutta steps: {problem.step.describe(problem.events)}"
-        yield f"optimizer: {self.optimizer.name}, seed {self.seed}"
-
     def search(self, progress: Progress) -> "Found":
         """Search; raises `UserError` where the input is wrong, before anything is told."""
         from tractexp.identification.search import Limits, search
 
-        for line in self.lines() if callable(progress) else ():
-            progress(line)  # type: ignore[operator]
+        problem = self.problem
+        for line in lines(self.train, self.validate, problem, self.optimizer.name, self.seed):
+            if callable(progress):
+                progress(line)
         optimizer, limits = self.optimizer.build("optimizer"), Limits(self.budget, self.time_limit, self.target)
         with searching(getattr(optimizer, "iterations", None), limits.simulations, progress) as callback:
-            return search(self.problem, optimizer, self.seed, limits, callback)
+            return search(problem, optimizer, self.seed, limits, callback)
 
     def to_dict(self) -> dict[str, Any]:
         plain = {key: getattr(self, key) for key in (*LEAST, "check_intervals")}
@@ -102,6 +93,19 @@ class Setup:
         made = dict(content) | {key: Dips(map(again, content[key])) for key in ("train", "validate")}
         made |= {key: Choice(**content[key]) for key in ("objective", "optimizer")}
         return cls(**made | {"model": LoadModel(**content["model"])})
+
+
+def lines(
+    train: Sequence[Event], validate: Sequence[Event], problem: "Problem", optimizer: str, seed: int
+) -> Iterator[str]:
+    """What is read and what will be done, a sentence each."""
+    for role, group in (("fit", train), ("validate", validate)):
+        for event in group:
+            yield f"{role}: {describe(event)}"
+            yield from (f"  note: {note}" for note in event.record.notes)
+    free = f"{problem.space.dimension} parameters"
+    yield f"model: {problem.model.title}, {free}; Runge-Kutta steps: {problem.step.describe(problem.events)}"
+    yield f"optimizer: {optimizer}, seed {seed}"
 
 
 @dataclass(frozen=True)
@@ -220,7 +224,7 @@ class Identification(Outcome):
             raise UserError("predict() needs either an event, or both t= and U=")
         if event is not None:
             values = np.array([self.result.parameters[name] for name in self.model.model.names])
-            (one,) = events("event", event, least=1)[:1]
+            (one,) = dips_of("event", event, least=1)[:1]
             return respond_to(self.model.model, values, one)
         P, Q = self.result.predict(t, U, f, P0, Q0)
         return Response("prediction", np.asarray(t, dtype=float), np.asarray(U, dtype=float), P, Q)
@@ -230,17 +234,21 @@ class Identification(Outcome):
         return shown(lambda folder: self.write_page(folder, self.write_fits(folder)))
 
     def table(self) -> Table:
+        span = "{:.4g} .. {:.4g}".format
         rows = [
-            [e.name, e.value, e.unit, f"{e.interval[0]:.4g} .. {e.interval[1]:.4g}" if e.interval else "",
-             e.standard_error, e.verdict]
+            [e.name, e.value, e.most_likely, e.unit, span(*e.interval) if e.interval else "", e.standard_error,
+             e.verdict]
             for e in self.parameters.values()
         ]  # fmt: skip
         r, holds = self.result, "holds" if self.result.acceptable else "does NOT hold"
-        said = [f"{e['name']} ({e['role']}): epsilon_p {e['epsilon_p']:.3%}, epsilon_q {e['epsilon_q']:.3%}" for e in r.events]
+        said = [
+            f"{e['name']} ({e['role']}): epsilon_p {e['epsilon_p']:.3%}, epsilon_q {e['epsilon_q']:.3%}"
+            for e in r.events
+        ]
         said.append(f"acceptance of Eq. (20), epsilon_p and epsilon_q below 5 %: {holds}; the search {r.status}")
         said += [f"note: {note}" for note in r.uncertainty.get("notes", ())]
         said += [f"next: {sentence}" for sentence in (self.advice if "judged" in self.__dict__ else ())]
-        columns = ["parameter", "value", "unit", "95 % interval", "standard error", "verdict"]
+        columns = ["parameter", "value", "most likely", "unit", "95 % interval", "standard error", "verdict"]
         return Table(columns, rows, self.model.model.title, said)
 
     def to_dict(self) -> dict[str, Any]:
@@ -251,14 +259,11 @@ class Identification(Outcome):
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         from tractexp.identification.search import Found, History
 
-        try:
-            setup, found = content["setup"], content["found"]
-            if found is not None:
-                history = History(**{key: np.array(v, dtype=float) for key, v in found["history"].items()})
-                found = Found(**found | {"values": np.array(found["values"], dtype=float), "history": history})
-            return cls(Result(**content["result"]), setup and Setup.from_dict(setup), found)
-        except (KeyError, TypeError) as error:
-            raise UserError(f"this is not a saved {cls.kind}, or not a whole one: {error}") from error
+        setup, found = content["setup"], content["found"]
+        if found is not None:
+            history = History(**{key: np.array(v, dtype=float) for key, v in found["history"].items()})
+            found = Found(**found | {"values": np.array(found["values"], dtype=float), "history": history})
+        return cls(Result(**content["result"]), setup and Setup.from_dict(setup), found)
 
     def write_fits(self, folder: Path) -> list[Path]:
         """Write fit.svg (fit_2.svg and so on for further events) and fitness.svg."""
@@ -303,15 +308,15 @@ class Identification(Outcome):
 @public
 def identify(
     records: Any,
-    model: Any = DEFAULT,
+    model: Any = None,
     *,
     validate: Any = (),
     bounds: Mapping[str, Sequence[float]] | None = None,
     fixed: Mapping[str, float] | None = None,
     per_event: Sequence[str] | None = None,
     substeps: int | None = None,
-    objective: Any = "squares",
-    optimizer: Any = "issa",
+    objective: Any = None,
+    optimizer: Any = None,
     budget: int | None = None,
     time_limit: float | None = None,
     target: float | None = None,
@@ -325,10 +330,11 @@ def identify(
     judged. `model` is a choice of `conf/model`, the path of such a YAML file, or what `tractexp.compose` or an
     investigation (`found.extended`) made; `bounds`, `fixed`, `per_event` and `substeps` are as in `tractexp.compose`.
 
-    `objective` and `optimizer` are names, or mappings of `name` and settings: `{"name": "pso", "population": 100}`. The
-    search ends after `budget` simulations, `time_limit` [s], at the objective `target` [pu²], or by itself. The same
-    `seed` gives the same bits. `check_intervals` confirms wide intervals by profile likelihood. `progress`: None shows
-    how far the search is, False does not; a callable is told what is read and done, a sentence at a time.
+    `objective` and `optimizer` are names, or mappings of `name` and settings: `{"name": "pso", "population": 100}`. A
+    model, an objective or an optimizer left out is that of `conf/config.yaml`, as on the command line. The search ends
+    after `budget` simulations, `time_limit` [s], at the objective `target` [pu²], or by itself. The same `seed` gives
+    the same bits. `check_intervals` confirms wide intervals by profile likelihood. `progress`: None shows how far the
+    search is, False does not; a callable is told what is read and done, a sentence at a time.
 
     Raises `UserError` for wrong names or values, records that lack what the model reads, and where nothing tried can be
     simulated.

@@ -1,5 +1,6 @@
 """Read a saved result back."""
 
+import importlib.util
 import json
 from pathlib import Path
 
@@ -23,8 +24,9 @@ def load(path: str | Path) -> Outcome:
     content = saved(path)
     known = known_kinds()
     if content["kind"] not in known:
-        raise UserError(f"{path} holds a result of kind '{content['kind']}', which is not known{among(content['kind'], known, 'Kinds')}")
-    return known[content["kind"]].from_dict(content)
+        why = among(content["kind"], known, "Kinds")
+        raise UserError(f"{path} holds a result of kind '{content['kind']}', which is not known{why}")
+    return known[content["kind"]].revived(content)
 
 
 def _bare(path: Path) -> bool:
@@ -38,8 +40,6 @@ def _bare(path: Path) -> bool:
 
 def known_kinds() -> dict[str, type[Outcome]]:
     """The kinds of results, by name; each is known once its module is imported."""
-    import importlib
-
     from tractexp import PUBLIC
 
     for module in dict.fromkeys(PUBLIC.values()):

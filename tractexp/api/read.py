@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, fields, replace
 from pathlib import Path
-from typing import Any, SupportsIndex
+from typing import Any
 
 import numpy as np
 
@@ -20,9 +20,8 @@ GROUP = "data"
 class Dips(list[Event]):
     """Events in a list that prints as a table."""
 
-    def __getitem__(self, k: SupportsIndex | slice) -> Any:
-        made = super().__getitem__(k)
-        return Dips(made) if isinstance(k, slice) else made
+    def __getitem__(self, k: Any) -> Any:
+        return Dips(super().__getitem__(k)) if isinstance(k, slice) else super().__getitem__(k)
 
     def table(self) -> Table:
         """One row for each event; below it what a reader or the detection found odd."""
@@ -87,7 +86,7 @@ def read(
     return Dips(detect(replace(r, name=r.where) if names.count(r.name) > 1 else r) for r in records)
 
 
-def events(argument: str, given: Any, least: int = 0) -> Dips:
+def dips_of(argument: str, given: Any, least: int = 0) -> Dips:
     """What a call takes as its records: events, or whatever `read` reads, one or a list of them."""
     listed = given if isinstance(given, Sequence) and not isinstance(given, str) else [given]
     made = Dips(e for one in listed for e in ([one] if isinstance(one, Event) else read(one)))
@@ -105,9 +104,8 @@ def table(columns: Mapping[str, Any], name: str, settings: Mapping[str, Any]) ->
         check_kind(key, value, float | None)
         known[key] = value
     if missing := [key for key in REQUIRED if key not in columns]:
-        raise UserError(
-            f"{name}: {', '.join(missing)} is missing; {', '.join(REQUIRED)} are needed{among(missing[0], columns, 'Columns')}"
-        )
+        lack = f"{name}: {', '.join(missing)} missing; {', '.join(REQUIRED)} are needed"
+        raise UserError(f"{lack}{among(missing[0], columns, 'Columns')}")
     spare = [str(key) for key in columns if key not in (*REQUIRED, *OPTIONAL)]
     notes = (f"columns not used: {', '.join(spare)}",) if spare else ()
     values = {key: _array(columns[key], f"{name}: {key}") for key in (*REQUIRED, *OPTIONAL) if key in columns}
@@ -139,18 +137,22 @@ def _records(source: Any, settings: Mapping[str, Any]) -> Iterator[Record]:
 
 def _file(path: str, settings: Mapping[str, Any]) -> list[Record]:
     """The records of a file, by the reader its ending names, or of a choice of `conf/data`."""
-    readers = {ending: cls for cls in plugin.discover()[GROUP].values() for ending in cls.endings}  # type: ignore[attr-defined]
+    readers = {ending: cls for cls in _readers() for ending in cls.endings}
     ending = Path(path).suffix.lower()
     if ending in readers:
         node = {"name": readers[ending].name, **readers[ending].of(path), **settings}
     elif ending or Path(path).exists():
         raise UserError(f"{path}: no reader takes files ending in '{ending}'; Endings: {', '.join(sorted(readers))}")
-    elif path in choices(GROUP):
+    elif path in (shipped := choices(GROUP, files=True)):
         node = {**Choice.of(GROUP, path).node, **settings}
     else:
-        raise UserError(f"{path} is neither a file with an ending nor a shipped record{among(path, choices(GROUP))}")
+        raise UserError(f"{path} is neither a file with an ending nor a shipped record{among(path, shipped)}")
     read = plugin.build(GROUP, node).read()
     return [*read.train, *read.validate]
+
+
+def _readers() -> list[Any]:
+    return [*plugin.discover()[GROUP].values()]
 
 
 def kept(event: Event) -> dict[str, Any]:
