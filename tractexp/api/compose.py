@@ -129,7 +129,7 @@ def model_of(given: Any) -> LoadModel:
             raise UserError(f"model.{key}: there is no such key{among(key, known, 'Keys')}")
     if missing := [part for part in PARTS if not given.get(part)]:
         raise UserError(f"model lacks {' and '.join(missing)}; name a motor and a static load ('none' for without)")
-    made = dict(given) | {part: Choice.of(f"model/{part}", given[part]).node for part in PARTS}
+    made: dict[str, Any] = dict(given) | {part: Choice.of(f"model/{part}", given[part]).node for part in PARTS}
     for item in dataclasses.fields(LoadModel):
         if item.name in made:
             check_kind(f"model.{item.name}", made[item.name], item.type)

@@ -90,9 +90,10 @@ class Setup:
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> "Setup":
-        made = dict(content) | {key: Dips(map(again, content[key])) for key in ("train", "validate")}
+        made: dict[str, Any] = {**content, "model": LoadModel(**content["model"])}
+        made |= {key: Dips(map(again, content[key])) for key in ("train", "validate")}
         made |= {key: Choice(**content[key]) for key in ("objective", "optimizer")}
-        return cls(**made | {"model": LoadModel(**content["model"])})
+        return cls(**made)
 
 
 def lines(
@@ -195,7 +196,8 @@ class Identification(Outcome):
         likely, made = r.uncertainty.get("most_likely", {}), Estimates()
         for name, value in values.items():
             of, interval = name.partition("[")[0], r.intervals.get(name)
-            verdict = r.verdicts.get(name) or ("mean of its events" if name in r.per_event else FIXED)
+            without = "mean of its events" if name in r.per_event else FIXED if r.verdicts else ""
+            verdict = r.verdicts.get(name, without)
             bounds = tuple(r.bounds.get(of, (float("nan"),) * 2))
             made[name] = Estimate(
                 name, value, likely.get(name, value), r.units.get(of, ""), tuple(interval) if interval else None,  # type: ignore[arg-type]
@@ -226,8 +228,8 @@ class Identification(Outcome):
             values = np.array([self.result.parameters[name] for name in self.model.model.names])
             (one,) = dips_of("event", event, least=1)[:1]
             return respond_to(self.model.model, values, one)
-        P, Q = self.result.predict(t, U, f, P0, Q0)
-        return Response("prediction", np.asarray(t, dtype=float), np.asarray(U, dtype=float), P, Q)
+        time, voltage = (np.asarray(values, dtype=float) for values in (t, U))
+        return Response("prediction", time, voltage, *self.result.predict(time, voltage, f, P0, Q0))
 
     def report(self) -> Shown:
         """The page an engineer reads, as a notebook shows it; `save(path)` writes it."""

@@ -6,7 +6,7 @@ and `Investigation.write`.
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -46,8 +46,9 @@ class Question:
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> "Question":
-        records = {key: Dips(map(again, content[key])) for key in ("train", "validate")}
-        return cls(**dict(content) | records | {"model": LoadModel(**content["model"])})
+        made: dict[str, Any] = {**content, "model": LoadModel(**content["model"])}
+        made |= {key: Dips(map(again, content[key])) for key in ("train", "validate")}
+        return cls(**made)
 
 
 @dataclass(frozen=True)
@@ -144,7 +145,8 @@ class Investigation(Outcome):
     @functools.cached_property
     def fit(self) -> Identification:
         """The extended model with the parameters that the investigation found; it predicts, simulates and exports."""
-        return Identification(self.result)
+        errors = {name: at["standard_error"] for name, at in self.content["parameters"].items()}
+        return Identification(replace(self.result, standard_errors=errors))
 
     def predict(self, event: Any = None, **voltage: Any) -> Response:
         """What the extended model draws in an event, or from a voltage: see `Identification.predict`."""

@@ -110,7 +110,8 @@ def table(columns: Mapping[str, Any], name: str, settings: Mapping[str, Any]) ->
     notes = (f"columns not used: {', '.join(spare)}",) if spare else ()
     values = {key: _array(columns[key], f"{name}: {key}") for key in (*REQUIRED, *OPTIONAL) if key in columns}
     base = Base(known["base_voltage"] or 1.0, known["base_power"] or 1.0, known["frequency"] or 50.0)
-    return Record(name, base=base, notes=notes, **base.per_unit(values)).uniform().check()
+    made: Any = base.per_unit(values)
+    return Record(name, base=base, notes=notes, **made).uniform().check()
 
 
 def _array(values: Any, where: str) -> np.ndarray:
@@ -162,6 +163,6 @@ def kept(event: Event) -> dict[str, Any]:
 
 def again(content: Mapping[str, Any]) -> Event:
     """The event of what `kept` told; its dip is found again."""
-    arrays = {k: np.array(content[k], dtype=float) for k in (*REQUIRED, *OPTIONAL) if content[k] is not None}
+    arrays: Any = {k: np.array(content[k], dtype=float) for k in (*REQUIRED, *OPTIONAL) if content[k] is not None}
     base, notes = Base(**content["base"]), tuple(content["notes"])
     return detect(Record(content["name"], base=base, source=content["source"], notes=notes, **arrays))

@@ -1,5 +1,7 @@
 """The power a load draws in one event, calculated and, where it was recorded, measured."""
 
+import io
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -43,6 +45,10 @@ class Response:
         errors = ", epsilon_p {:.3%}, epsilon_q {:.3%}".format(*self.epsilon) if self.epsilon else ""
         return f"{self.title}: t, U, P, Q of {len(self.t)} samples{errors}"
 
+    def _repr_svg_(self) -> str:
+        with tempfile.TemporaryDirectory() as folder:
+            return self.draw(Path(folder) / "response.svg").read_text(encoding="utf-8")
+
     def to_frame(self) -> Any:
         """A pandas frame of the columns."""
         import pandas
@@ -51,8 +57,6 @@ class Response:
 
     def write(self, folder: Path, number: int) -> list[Path]:
         """Write response.csv and response.svg, with a number from the second event on."""
-        import io
-
         stem = folder / ("response" if number == 1 else f"response_{number}")
         text, columns = io.StringIO(), self.columns
         rows = np.column_stack(list(columns.values()))

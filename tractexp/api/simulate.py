@@ -75,7 +75,7 @@ class Simulation(Outcome):
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         def response(told: Mapping[str, Any]) -> Response:
-            arrays = {key: np.array(told[key], dtype=float) for key in ("t", "U", "P", "Q")}
+            arrays: Any = {key: np.array(told[key], dtype=float) for key in ("t", "U", "P", "Q")}
             notes = tuple(told["notes"])
             if told["measured"]:
                 P, Q = (np.array(values, dtype=float) for values in told["measured"])
@@ -146,7 +146,8 @@ def _played(load: LoadModel, values: np.ndarray, dip: Dip, before: Mapping[str, 
     drive = Drive.of([event])
     if refusal := load.model.refusal(values, drive):
         raise UserError(refusal)
-    response = load.model.simulate(drive, values, load.model.substeps(drive, values)[0])
+    substeps: Any = load.model.substeps(drive, values)[0]
+    response = load.model.simulate(drive, values, substeps)
     return Response(f"dip of {dip.depth:.0%} for {dip.duration:g} s", t, U, response.P[0], response.Q[0])
 
 
