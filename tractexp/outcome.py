@@ -35,14 +35,18 @@ class Table:
         return "\n".join([*([self.title] if self.title else []), *ruled, *self.said])
 
     def _repr_html_(self) -> str:
-        def row(cells: Sequence[Any], tag: str) -> str:
-            return "<tr>" + "".join(f"<{tag}>{html.escape(_told(c))}</{tag}>" for c in cells) + "</tr>"
+        def cell(content: Any, tag: str) -> str:
+            side = "left" if isinstance(content, str) else "right"
+            return f'<{tag} style="text-align:{side}">{html.escape(_told(content))}</{tag}>'
 
-        head = f"<caption>{html.escape(self.title)}</caption>" if self.title else ""
-        head += f"<thead>{row(self.columns, 'th')}</thead>"
+        def row(cells: Sequence[Any], tag: str) -> str:
+            return "<tr>" + "".join(cell(content, tag) for content in cells) + "</tr>"
+
+        title = f'<caption style="text-align:left"><b>{html.escape(self.title)}</b></caption>' if self.title else ""
+        head = f"<thead>{row(self.columns, 'th')}</thead>" if self.columns else ""
         body = "".join(row(cells, "td") for cells in self.rows)
-        said = "".join(f"<p>{html.escape(sentence)}</p>" for sentence in self.said)
-        return f"<table>{head}<tbody>{body}</tbody></table>{said}"
+        said = "<br>".join(html.escape(sentence) for sentence in self.said)
+        return f"<table>{title}{head}<tbody>{body}</tbody></table>" + (f"<p>{said}</p>" if said else "")
 
     def to_frame(self) -> Any:
         """A pandas frame of the rows."""

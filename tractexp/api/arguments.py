@@ -52,7 +52,8 @@ def public(function: Callable[P, R]) -> Callable[P, R]:
             return function(*args, **keywords)
         except UserError as error:
             keys = "|".join([*named, *keywords, *(_settings("data") if open_ended else ())])
-            sentence = re.sub(rf"\b(?:{SECTIONS})\.(?=(?:{keys})\b)", "", str(error))
+            sentence = str(error).replace("data.train", "records") if "records" in named else str(error)
+            sentence = re.sub(rf"\b(?:{SECTIONS})\.(?=(?:{keys})\b)", "", sentence)
             raise UserError(sentence) from error.__cause__
 
     return called
