@@ -8,12 +8,12 @@ import sys
 
 import numpy as np
 import pytest
+from conftest import MOTOR
 
 import tractexp
 from tractexp.errors import UserError
 
 QUICK = {"name": "multistart_least_squares", "starts": 2}
-TRUTH = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p_v": 1.4, "q_v": 3.0}
 
 
 def same(one, other):
@@ -22,22 +22,8 @@ def same(one, other):
 
 
 @pytest.fixture(scope="module")
-def files(tmp_path_factory):
-    """Three dips of a motor with a stator resistance, as CSV files."""
-    folder, noise = tmp_path_factory.mktemp("dips"), np.random.default_rng(7)
-    load, paths = tractexp.compose(effects=["stator_resistance"]), []
-    for depth, duration in ((0.3, 0.2), (0.5, 0.15), (0.4, 0.3)):
-        made = tractexp.simulate(load, TRUTH | {"R_s": 0.02}, depth=depth, duration=duration, rate=200, length=2)
-        frame = made.responses[0].to_frame()
-        frame[["P", "Q"]] += 0.003 * noise.standard_normal((len(frame), 2))
-        paths.append(folder / f"dip{len(paths) + 1}.csv")
-        frame.to_csv(paths[-1], index=False)
-    return paths
-
-
-@pytest.fixture(scope="module")
-def dips(files):
-    return tractexp.read(*files)
+def dips(resistive_dips):
+    return tractexp.read(*resistive_dips)
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +61,7 @@ def test_values_have_names(fit, dips):
     assert response.epsilon[0] == pytest.approx(np.linalg.norm(response.P - record.P) / np.linalg.norm(record.P))
     assert "weakly identified" in repr(fit) or "identified" in repr(fit)
     assert "<table>" in fit._repr_html_()
-    assert fit.to_frame()["parameter"].tolist() == list(TRUTH)
+    assert fit.to_frame()["parameter"].tolist() == list(MOTOR)
     assert fit.report().html.startswith("<!DOCTYPE html>")
     assert fit.report()._repr_html_().startswith("<iframe")
 
@@ -128,9 +114,9 @@ def test_a_posterior_comes_back_too(fit, tmp_path):
     assert np.array_equal(again.draws["M"], drawn.draws["M"])
 
 
-def test_frames_and_arrays_give_the_fit_of_the_file(files, fit):
+def test_frames_and_arrays_give_the_fit_of_the_file(resistive_dips, fit):
     pandas = pytest.importorskip("pandas")
-    frame = pandas.read_csv(files[0])
+    frame = pandas.read_csv(resistive_dips[0])
     arrays = {name: frame[name].to_numpy() for name in ("t", "U", "P", "Q")}
     given = [tractexp.read(**arrays, name="dip1"), tractexp.read(frame), tractexp.read(arrays)]
     try:
@@ -140,16 +126,16 @@ def test_frames_and_arrays_give_the_fit_of_the_file(files, fit):
     else:
         given.append(tractexp.read(polars.from_dict(arrays)))
     small = {"optimizer": QUICK, "check_intervals": False, "progress": False}
-    one = tractexp.identify(files[0], **small)
+    one = tractexp.identify(resistive_dips[0], **small)
     for read in given:
         other = tractexp.identify(read, **small)
         assert other.result.parameters == one.result.parameters
         assert other.result.intervals == one.result.intervals
 
 
-def test_a_base_makes_a_table_per_unit(files):
+def test_a_base_makes_a_table_per_unit(resistive_dips):
     pandas = pytest.importorskip("pandas")
-    frame = pandas.read_csv(files[0])
+    frame = pandas.read_csv(resistive_dips[0])
     scaled = frame.assign(U=27.5 * frame["U"], P=20 * frame["P"], Q=20 * frame["Q"], extra=1.0)
     (event,) = tractexp.read(scaled, base_voltage=27.5, base_power=20)
     np.testing.assert_allclose(event.record.P, frame["P"])
@@ -157,15 +143,15 @@ def test_a_base_makes_a_table_per_unit(files):
     assert event.record.notes == ("columns not used: extra",)
 
 
-def test_the_command_and_the_call_give_the_same_numbers(files, tmp_path):
+def test_the_command_and_the_call_give_the_same_numbers(resistive_dips, tmp_path):
     settings = {"seed": 2, "budget": 600, "per_event": ["T_m"], "bounds": {"C": [0.5, 0.95]}, "fixed": {"q_v": 3.0}}
     call = tractexp.identify(
-        [*map(str, files[:2])], validate=str(files[2]), objective={"name": "squares", "weight_P": 2.0},
+        [*map(str, resistive_dips[:2])], validate=str(resistive_dips[2]), objective={"name": "squares", "weight_P": 2.0},
         optimizer="issa_polish", progress=False, **settings,
     )  # fmt: skip
     command = [
-        sys.executable, "-m", "tractexp", "data=csv", f"data.train=[{files[0]},{files[1]}]",
-        f"data.validate=[{files[2]}]", "objective.weight_P=2", "optimizer=issa_polish", "seed=2", "budget=600",
+        sys.executable, "-m", "tractexp", "data=csv", f"data.train=[{resistive_dips[0]},{resistive_dips[1]}]",
+        f"data.validate=[{resistive_dips[2]}]", "objective.weight_P=2", "optimizer=issa_polish", "seed=2", "budget=600",
         "model.per_event=[T_m]", "model.bounds.C=[0.5,0.95]", "model.fixed.q_v=3", "task.figures=false",
         "tracking.enabled=false", "hydra.run.dir=run",
     ]  # fmt: skip
@@ -245,9 +231,9 @@ REFUSED = {
     "U has shape (99,) where t has 100 samples": lambda d: tractexp.read(t=T, U=T[1:], P=T, Q=T),
     "values.T_prim: this model has no parameter 'T_prim'": lambda d: tractexp.simulate(None, {"T_prim": 1}, depth=0),
     "no value for T_prime": lambda d: tractexp.simulate(depth=0.3),
-    "depth=1.5 is out of range": lambda d: tractexp.simulate(values=TRUTH, depth=1.5),
-    "either records to play, or the depth of a dip": lambda d: tractexp.simulate(values=TRUTH),
-    "duration describes a dip made by hand": lambda d: tractexp.simulate(values=TRUTH, records=d, duration=0.3),
+    "depth=1.5 is out of range": lambda d: tractexp.simulate(values=MOTOR, depth=1.5),
+    "either records to play, or the depth of a dip": lambda d: tractexp.simulate(values=MOTOR),
+    "duration describes a dip made by hand": lambda d: tractexp.simulate(values=MOTOR, records=d, duration=0.3),
     "parameter=X_prim is not a free parameter": lambda d: tractexp.plan(d, parameter="X_prim"),
     "fit='result.json' is a str, but it must be an Identification": lambda d: tractexp.profile("result.json"),
     "nowhere.json cannot be read": lambda d: tractexp.load("nowhere.json"),
