@@ -146,7 +146,8 @@ def test_a_base_makes_a_table_per_unit(resistive_dips):
 def test_the_command_and_the_call_give_the_same_numbers(resistive_dips, tmp_path):
     settings = {"seed": 2, "budget": 600, "per_event": ["T_m"], "bounds": {"C": [0.5, 0.95]}, "fixed": {"q_v": 3.0}}
     call = tractexp.identify(
-        [*map(str, resistive_dips[:2])], validate=str(resistive_dips[2]), objective={"name": "squares", "weight_P": 2.0},
+        [*map(str, resistive_dips[:2])], validate=str(resistive_dips[2]),
+        objective={"name": "squares", "weight_P": 2.0},
         optimizer="issa_polish", progress=False, **settings,
     )  # fmt: skip
     command = [

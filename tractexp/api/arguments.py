@@ -156,7 +156,8 @@ def read_choice(group: str, name: str) -> dict[str, Any]:
             ((part, chosen),) = item.items()
             made[part] = read_choice(f"{group}/{part}", chosen)
         elif item != "_self_":
-            made |= read_choice(group, item)
+            place, _, chosen = item.partition("@")[0].rpartition("/")
+            made |= read_choice(place.removeprefix("/").removeprefix("schema/") or group, chosen)
     for key, value in content.items():
         made[key] = {**made[key], **value} if isinstance(value, dict) and isinstance(made.get(key), dict) else value
     return made
@@ -177,7 +178,7 @@ def choices(group: str, *, files: bool = False) -> list[str]:
 
 
 def _folders() -> list[Path]:
-    return [CONF, *plugin.configuration_folders()]
+    return [*plugin.configuration_folders(), CONF]
 
 
 def _file(group: str, name: str) -> Path | None:

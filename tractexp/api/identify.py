@@ -75,11 +75,11 @@ class Setup:
         """Search; raises `UserError` where the input is wrong, before anything is told."""
         from tractexp.identification.search import Limits, search
 
+        optimizer, limits = self.optimizer.build("optimizer"), Limits(self.budget, self.time_limit, self.target)
         problem = self.problem
         for line in lines(self.train, self.validate, problem, self.optimizer.name, self.seed):
             if callable(progress):
                 progress(line)
-        optimizer, limits = self.optimizer.build("optimizer"), Limits(self.budget, self.time_limit, self.target)
         with searching(getattr(optimizer, "iterations", None), limits.simulations, progress) as callback:
             return search(problem, optimizer, self.seed, limits, callback)
 

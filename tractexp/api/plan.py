@@ -97,7 +97,6 @@ def plan(
     bounds: Mapping[str, Sequence[float]] | None = None,
     fixed: Mapping[str, float] | None = None,
     substeps: int | None = None,
-    objective: Any = None,
 ) -> Forecasts:
     """Forecast the intervals that a recording would give, without fitting it.
 
@@ -106,7 +105,7 @@ def plan(
     `rate` [1/s] or `noise` (standard deviation, as a share of P before the event; white) are given. `values` are what
     is planned at: "fit", a quick fit to that record; "default", the model's; an identification; or the path of a
     `result.json`. Of several records those that tell most together are chosen, until another one narrows the intervals
-    by less than the share `least`, at most `events` of them. The rest is as in `tractexp.identify`.
+    by less than the share `least`, at most `events` of them. The model is as in `tractexp.identify`.
 
     Raises `UserError` for wrong names or values, and for a model with `per_event`.
     """
@@ -117,7 +116,7 @@ def plan(
     if noise is not None:
         check_range("task.noise", noise, 1e-9, 1.0)
     known = {"bounds": bounds, "fixed": fixed, "substeps": substeps}
-    setup = Setup.of(records, model, (), objective, Choice("", {}), known)
+    setup = Setup.of(records, model, (), None, Choice("", {}), known)
     if isinstance(values, Identification):
         values = values.result.parameters
     asked = {

@@ -39,9 +39,7 @@ class Plan(Task):
         from tractexp.api.plan import plan
 
         asked = {key: getattr(self, key) for key in ASKED}
-        made = call(
-            plan, job.events().train, job.config["model"], objective=job.config["objective"], **asked
-        )  # fmt: skip
+        made = call(plan, job.events().train, job.config["model"], **asked)
         tell(made.planned)
         paths = made.write(job.folder)
         for path in paths:
