@@ -9,6 +9,7 @@ import sys
 import numpy as np
 import pytest
 from conftest import MOTOR
+from test_readers_comtrade import waveforms, write
 
 import tractexp
 from tractexp.errors import UserError
@@ -131,6 +132,15 @@ def test_frames_and_arrays_give_the_fit_of_the_file(resistive_dips, fit):
         other = tractexp.identify(read, **small)
         assert other.result.parameters == one.result.parameters
         assert other.result.intervals == one.result.intervals
+
+
+def test_all_dips_of_a_comtrade_file_are_read(tmp_path):
+    t = np.arange(6400) / 3200
+    path = write(tmp_path, waveforms(t, 50.0, [(0.5, 0.7, 0.4), (1.3, 1.4, 0.2)]), [(3200, 6400)])
+    made = tractexp.read(path, voltages=[0, 1, 2], currents=[3, 4, 5])
+    assert [round(e.depth, 1) for e in made] == [0.4, 0.2]
+    with pytest.raises(UserError, match=r"^voltages=\[\] must name three channels"):
+        tractexp.read(path)
 
 
 def test_a_base_makes_a_table_per_unit(resistive_dips):
