@@ -33,7 +33,8 @@ class Discrepancy(Task):
         job.prepare_log()
         found = call(
             investigate, events.train, node, validate=events.validate, effects=self.effects,
-            false_alarms=self.false_alarms, criteria=self.criteria, seed=job.seed, progress=lambda line: say(f"  {line}"),
+            false_alarms=self.false_alarms, criteria=self.criteria, seed=job.seed,
+            progress=lambda line: say(f"  {line}"),
         )  # fmt: skip
         tell(found)
         paths = [*found.write(job.folder), *found.write_pages(job.folder)]
