@@ -30,8 +30,13 @@ class Effort:
         """Count simulations that are about to run."""
         with self._lock:
             self.simulations += simulations
+        self.still(f"{self.simulations} simulations")
+
+    def still(self, done: str) -> None:
+        """Say what is done so far, if nothing has been said for a while."""
+        with self._lock:
             now = time.perf_counter()
             if now - self._said < SILENCE:
                 return
-            self._said, spent, total = now, now - self._begun, self.simulations
-        self._tell(f"  still {self._step or 'at work'}: {total} simulations, {spent:.0f} s")
+            self._said, spent = now, now - self._begun
+        self._tell(f"  still {self._step or 'at work'}: {done}, {spent:.0f} s")

@@ -104,7 +104,7 @@ def investigate(
     missing = catalogue(model.motor, model.static, model.effects, train, only, criteria.frequency_swing)
     some, others = len(missing.candidates), len(missing.untestable)
     effort.say(f"testing {some} effects, {others} more cannot be tested on these events")
-    Family(model, missing).compile(effort.say)
+    Family(model, missing).compile(effort)
 
     records = Records.of(train)
     base = base_fit(Bench.of(model, missing, records, bounds or {}, fixed or {}, criteria, effort, substeps))
