@@ -134,6 +134,17 @@ def test_what_an_edit_does_wrong_is_a_sentence(stranger, edit, sentence):
         _ = loads.model(motor, static, stranger(Effect, edit=edit)).equations
 
 
+def test_a_static_load_with_a_parameter_of_the_motor_is_refused(stranger):
+    motor, _ = loads.partners()
+    taken = motor.parameters[0]
+    law = eval(f"lambda self, u, {taken.name}: (1, 1)")
+    static = stranger(Static, law=law, **{taken.name: taken})
+    with pytest.raises(
+        UserError, match=f"static load 'stranger' do not compose: .* a parameter '{taken.name}' already"
+    ):
+        _ = loads.model(motor, static).equations
+
+
 def test_a_package_without_plugins_is_refused():
     with pytest.raises(UserError, match="the package 'json' has no plugin"):
         tractexp.testing.contract("json")
