@@ -1,9 +1,150 @@
-"""Every built-in plugin against the contracts that a third party's plugins are held to."""
+"""Every built-in plugin against the contracts that a third party's plugins are held to, and that these can fail."""
+
+import numpy as np
+import pytest
 
 import tractexp.testing
+from tractexp.errors import UserError
+from tractexp.extend import Effect, Measurement, Optimizer, Parameter, Reader, Static, plugin, sites
+from tractexp.plugin import _registry as registry
+from tractexp.testing import loads, readers, searches
 
-SAMPLES = {
-    "csv": [{"train": ["pkg://tractexp.data/tibet_50pct.csv"], "validate": ["pkg://tractexp.data/tibet_30pct.csv"]}]
-}
+TIBET = [f"pkg://tractexp.data/tibet_{depth}pct.csv" for depth in (50, 30)]
+SAMPLES = {"csv": [{"train": TIBET[:1], "validate": TIBET[1:]}]}
 
 TestBuiltIn = tractexp.testing.contract("tractexp_plugins", SAMPLES)
+
+
+@pytest.fixture
+def stranger():
+    """Registers a class with these methods as the plugin `stranger`, until the test ends."""
+    made = []
+
+    def register(base, **attributes):
+        size = {"a": Parameter(0.0, (0.0, 1.0), "1", "size", "here", null=0.0)} if issubclass(base, Effect) else {}
+        body = {"__doc__": "a = b. Source: here.", "__module__": "elsewhere.stranger", "__annotations__": {}}
+        made.append(plugin(type("Stranger", (base,), body | size | attributes)))
+        return made[-1]
+
+    yield register
+    for cls in made:
+        registry[cls.group].pop("stranger")
+    for remembered in (loads.model, loads.partners, loads._base):
+        remembered.cache_clear()
+
+
+def halved(self, power, drive, values):
+    return power * (0.5 + values["a"].mean())
+
+
+def mixed(self, power, drive, values):
+    return power + values["a"].mean() * np.cumsum(power, axis=2) / 100
+
+
+def doubled(self, eq, a):
+    eq.edit(sites.P_static, lambda P: P * (1 + a) * (1 + eq.U_rate))
+
+
+def unmoved(self, eq, a):
+    eq.edit(sites.P_static, lambda P: P * (1 + 1e-9 * a * eq.U_rate))
+
+
+def growing(self, eq, a):
+    eq.consume(a * eq.t, 0)
+
+
+def proposed(self, evaluate, box, rng):
+    for _ in range(5):
+        evaluate(np.random.default_rng().random((10, box.dimension)))
+        yield
+
+
+def stuck(self, evaluate, box, rng):
+    x, _ = evaluate(box.uniform(rng, 20))
+    yield
+    evaluate(x)
+    yield
+
+
+def missing(self):
+    raise KeyError("file")
+
+
+@pytest.mark.parametrize(
+    ("base", "attributes", "check", "sentence"),
+    [
+        (Measurement, {"observe": halved}, loads.is_the_base_model_at_its_null, "pu away from the base model"),
+        (Measurement, {"observe": mixed}, loads.sees_each_event_by_itself, "mixes events"),
+        (Effect, {"edit": doubled}, loads.is_the_base_model_at_its_null, "pu away from the base model"),
+        (Effect, {"edit": doubled}, loads.has_sizes_that_matter, "does not say in 'relevant'"),
+        (Effect, {"edit": unmoved}, loads.is_seen_in_a_dip, "shows nothing"),
+        (Effect, {"edit": growing}, loads.rests, "under a steady voltage"),
+        (Effect, {"edit": growing}, loads.says_what_it_is, "has no line 'Departures:'"),
+        (Optimizer, {"search": proposed}, searches.gives_the_same_bits_for_the_same_seed, "another history"),
+        (Optimizer, {"search": stuck}, searches.finds_the_bottom_of_a_bowl, "after a start of"),
+    ],
+)
+def test_a_contract_that_is_broken_says_how(stranger, base, attributes, check, sentence):
+    with pytest.raises(AssertionError, match=sentence):
+        check(stranger(base, **attributes))
+
+
+def test_a_reader_that_falls_over_fails_its_contract(stranger):
+    with pytest.raises(KeyError):
+        readers.refuses_what_is_missing_in_a_sentence(stranger(Reader, read=missing), {})
+
+
+def test_an_effect_that_nothing_takes_fails_with_the_reason(stranger):
+    def edit(self, eq, a):
+        eq["no_such_quantity"]
+
+    with pytest.raises(AssertionError, match="no registered motor and static load take the effect 'stranger'"):
+        loads.rests(stranger(Effect, edit=edit))
+
+
+@pytest.mark.parametrize(
+    ("law", "sentence"),
+    [
+        (lambda self, u: (2 * u, u), "P/P_s0 is 2 before the event"),
+        (lambda self, u: u, "it must return two expressions"),
+    ],
+)
+def test_a_law_that_is_none_is_refused_when_the_model_is_composed(stranger, law, sentence):
+    with pytest.raises(UserError, match=sentence):
+        _ = loads.with_part(stranger(Static, law=law)).equations
+
+
+@pytest.mark.parametrize(
+    ("edit", "sentence"),
+    [
+        (lambda self, eq, a: eq.edit(sites.load_torque, lambda T: T + a * eq["E"]), "load_torque is real, and what"),
+        (lambda self, eq, a: eq.edit("load_torqe", lambda T: T), "no site 'load_torqe'; did you mean 'load_torque'"),
+        (lambda self, eq, a: eq.omgea, r"offer no 'eq\.omgea'; did you mean 'omega'"),
+        (lambda self, eq, a: setattr(eq, "P", 0), r"eq\.P cannot be assigned; eq\.edit"),
+        (lambda self, eq, a: eq.place(sites.coupling, a), "coupling is taken already|belongs to the motor"),
+        (lambda self, eq, a: eq.moves(eq.U, a, 0), "given 'U', which is no state"),
+        (lambda self, eq, a: eq.lag("idle", "x"), "nothing says how the state 'idle' moves"),
+        (lambda self, eq, a: eq.lag("x1", "x"), "called 'x1': the kernel uses that name"),
+        (lambda self, eq, a: eq.lag("omega", "x"), "has a state or quantity 'omega' already"),
+    ],
+)
+def test_what_an_edit_does_wrong_is_a_sentence(stranger, edit, sentence):
+    motor, static = loads.partners()
+    with pytest.raises(UserError, match=sentence):
+        _ = loads.model(motor, static, stranger(Effect, edit=edit)).equations
+
+
+def test_a_static_load_with_a_parameter_of_the_motor_is_refused(stranger):
+    motor, _ = loads.partners()
+    taken = motor.parameters[0]
+    law = eval(f"lambda self, u, {taken.name}: (1, 1)")
+    static = stranger(Static, law=law, **{taken.name: taken})
+    with pytest.raises(
+        UserError, match=f"static load 'stranger' do not compose: .* a parameter '{taken.name}' already"
+    ):
+        _ = loads.model(motor, static).equations
+
+
+def test_a_package_without_plugins_is_refused():
+    with pytest.raises(UserError, match="the package 'json' has no plugin"):
+        tractexp.testing.contract("json")

@@ -1,9 +1,6 @@
 """Every registered effect: what all must satisfy, and for each what physics says it does."""
 
 import functools
-import importlib.util
-import itertools
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +13,6 @@ from tractexp.errors import UserError
 from tractexp.identification.problem import Problem
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
-from tractexp.model.parts import Measurement
-from tractexp.plugin import _registry as registry
 from tractexp.plugin import discover, get
 from tractexp.record import Record, detect
 
@@ -25,7 +20,6 @@ TRUTH = np.array([0.12, 0.25, 0.9, 0.006, 0.55, 1.4, 3.0])  # T', X', C, M, T_m,
 T_PRIME, X_PRIME, C, M, T_M, P_V, Q_V = TRUTH
 P0, Q0, OMEGA_N = 1.0, 0.6, 100 * np.pi
 NAMES = sorted(discover()["effect"])
-CHANNELS = {"f", "U2"}
 
 
 def effect(name):
@@ -86,57 +80,7 @@ def halfway(p):
     return (p.null + max(p.bounds, key=lambda b: abs(b - p.null))) / 2
 
 
-def sizes(name):
-    return [p for p in effect(name).parameters if p.null is not None]
-
-
-SIZES = [(name, p.name) for name in NAMES for p in sizes(name)]
-
-
-# what every effect must satisfy
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_at_its_null_it_is_the_base_model(name):
-    drive = Drive.of([dip(d) for d in (0.3, 0.5, 0.65)])
-    with_it, without = model(name).simulate(drive, values(name)), model().simulate(drive, TRUTH)
-    assert np.abs(with_it.P - without.P).max() < 1e-12
-    assert np.abs(with_it.Q - without.Q).max() < 1e-12
-
-
-@pytest.mark.parametrize("name", [n for n in NAMES if n != "load_drift"])
-def test_flat_input_stays_flat_with_the_effect_on(name):
-    n = 400
-    flat = event(np.full(n, 0.97), omega_s=np.full(n, -1.5), U2=np.full(n, 0.03))
-    P, Q = run(name, flat, values(name, halfway))
-    assert np.abs(P - P0).max() < 1e-9
-    assert np.abs(Q - Q0).max() < 1e-9
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_it_is_finite_in_every_corner_of_its_bounds(name):
-    corners = np.array(list(itertools.product(*(p.bounds for p in effect(name).parameters))))
-    drive = Drive.of([dip(d) for d in (0.3, 0.5, 0.65)])
-    response = model(name).simulate(drive, np.c_[np.tile(TRUTH, (len(corners), 1)), corners], 16)
-    assert (response.miss == 0).all()
-    assert np.isfinite(response.P).all()
-    assert np.isfinite(response.Q).all()
-    assert np.abs([response.P, response.Q]).max() < 30
-
-
-@pytest.mark.parametrize(("name", "parameter"), SIZES)
-def test_it_has_a_derivative_at_its_null_that_a_dip_shows(name, parameter):
-    own = next(p for p in sizes(name) if p.name == parameter)
-    low, high = own.bounds
-    slopes = []
-    for h in (1e-4 * (high - low), 2e-4 * (high - low)):
-        ends = (own.null - h if own.null - h >= low else own.null, own.null + h)
-        chosen = np.array([values(name, **{parameter: end}) for end in ends])
-        response = model(name).simulate(Drive.of([dip(0.6)]), chosen, 4)
-        slopes.append(np.diff([response.P, response.Q], axis=1) / (ends[1] - ends[0]))
-    largest = np.abs(slopes[0]).max()
-    assert largest * effect(name).relevant[parameter] > 1e-5
-    assert np.abs(slopes[1] - slopes[0]).max() < 0.03 * largest
+# what all together must satisfy; what each must is in tractexp.testing
 
 
 def test_all_stack_and_at_their_nulls_are_the_base_model():
@@ -159,22 +103,6 @@ def test_they_stack_in_any_order(seed):
     assert one.names == other.names
     assert np.array_equal(first.P, second.P)
     assert np.abs(first.P - model().simulate(drive, TRUTH).P).max() > 0.01
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_its_declaration_is_complete(name):
-    one, parameters = effect(name), {p.name: p for p in effect(name).parameters}
-    assert sizes(name), "an effect needs a size that vanishes"
-    assert all(p.bounds[0] <= p.null <= p.bounds[1] and p.default == p.null for p in sizes(name))
-    assert set(one.relevant) == {p.name for p in sizes(name)}
-    assert all(parameters[k].bounds[0] <= v <= parameters[k].bounds[1] for k, vs in one.grid.items() for v in vs)
-    assert all(parameters[k].null is None for k in one.grid)
-    assert set(one.reads) <= CHANNELS
-    assert one.confused_with
-    assert set(one.confused_with) <= set(NAMES) - {name}
-    if not isinstance(one, Measurement):
-        text = " ".join(model(name).latex())
-        assert all(p.symbol in text for p in parameters.values())
 
 
 def test_no_two_effects_share_a_parameter():
@@ -506,28 +434,6 @@ def test_a_compensator_settles_at_its_gain_or_its_limit(drop, exponent, given):
     assert extra[-1] == pytest.approx(-0.3 * given, rel=1e-6)
     later = extra[101:151]  # one time constant on
     assert later[-1] == pytest.approx(extra[-1] * (1 - np.exp(-1)), rel=0.02)
-
-
-def test_the_effect_of_the_documentation_does_what_it_says(tmp_path):
-    """The file shown in docs/effects.md, as it stands there: P_s grows with the slope of the voltage, nothing else."""
-    page = (Path(__file__).parent.parent / "docs" / "effects.md").read_text(encoding="utf-8")
-    file = tmp_path / "rate_dependence.py"
-    file.write_text(page.split("```python\n")[1].split("```")[0])
-    spec = importlib.util.spec_from_file_location("rate_dependence", file)
-    sys.modules["rate_dependence"] = module = importlib.util.module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-        own = module.RateDependence()
-        excitation, T_v = dip(), 0.05
-        grown = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")(), [own])
-        response = grown.simulate(Drive.of([excitation]), np.r_[TRUTH, T_v], 4)
-    finally:
-        del sys.modules["rate_dependence"]
-        registry["effect"].pop("rate_dependence")
-    t = np.arange(len(excitation.U)) * excitation.step
-    slope = Akima1DInterpolator(t, excitation.U, method="makima").derivative()(t)
-    assert pytest.approx(static(excitation)[0] * T_v * slope, abs=1e-9) == response.P[0] - base(excitation)[0]
-    assert pytest.approx(base(excitation)[1], abs=1e-12) == response.Q[0]
 
 
 def test_skew_is_a_shift():

@@ -4,15 +4,18 @@ import itertools
 import os
 import subprocess
 import sys
+from types import ModuleType
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import Akima1DInterpolator
 
+import tractexp
 from tractexp.errors import UserError
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
+from tractexp.model.sites import SITES
 from tractexp.plugin import get
 
 OMEGA_S = 2 * np.pi * 50
@@ -108,24 +111,6 @@ def test_a_slow_record_is_as_accurate_as_a_fast_one(model, step):
     assert substeps[0] > 1
     assert np.abs(response.P[0] - P).max() < 1e-7
     assert error[0] < 1e-7
-
-
-def test_halving_the_step_shows_order_four(model):
-    drive = Drive.of([dip(step=20e-3)])
-    fine = model.simulate(drive, TRUTH, 256)
-    counts = np.array([4, 8, 16, 32])
-    errors = [np.abs(model.simulate(drive, TRUTH, n).P - fine.P).max() for n in counts]
-    slope = np.polyfit(np.log2(counts), np.log2(errors), 1)[0]
-    assert slope == pytest.approx(-4, abs=0.15)
-
-
-@pytest.mark.parametrize("U0", [0.93, 1.0, 1.05])
-def test_flat_input_stays_flat(model, U0):
-    t = np.arange(2000) * 1e-3
-    flat = Excitation(1e-3, np.full(len(t), U0), np.ones(len(t)), np.full(len(t), 0.6), U0, 1.0, 0.6)
-    response = model.simulate(Drive.of([flat]), candidates(20, np.random.default_rng(2)))
-    assert np.abs(response.P - 1.0).max() < 1e-12
-    assert np.abs(response.Q - 0.6).max() < 1e-12
 
 
 def test_recorded_frequency_moves_the_synchronous_speed(model):
@@ -233,21 +218,6 @@ def test_good_values_are_not_refused(model):
     assert model.refusal(TRUTH, Drive.of([dip()])) is None
 
 
-@pytest.mark.parametrize("bound", range(14))
-def test_every_parameter_at_each_bound_is_finite_or_refused(model, bound):
-    values = TRUTH.copy()
-    values[bound // 2] = model.parameters[bound // 2].bounds[bound % 2]
-    drive = Drive.of([dip()])
-    errors = model.errors(drive, values, 16)
-    assert errors.refused[0] == (errors.miss[0] > 0)
-
-
-def test_equations_in_latex_name_every_parameter(model):
-    text = " ".join(model.latex())
-    for parameter in model.parameters:
-        assert parameter.symbol in text
-
-
 def test_a_kernel_is_shared_by_processes_that_start_together(tmp_path):
     program = (
         "from tractexp.plugin import get; from tractexp.model.model import compose;"
@@ -290,3 +260,59 @@ def test_a_name_the_kernel_uses_itself_is_refused(name):
 
     with pytest.raises(UserError, match=f"called '{name}'"):
         Equations().declare([Parameter(1.0, (0.0, 2.0), "1", "about", "source", name=name)])
+
+
+def test_a_pair_that_draws_nothing_is_refused():
+    with pytest.raises(UserError, match="draw no power; choose a model/motor or a model/static"):
+        _ = compose(get("model/motor", "none")(), get("model/static", "none")()).source
+
+
+def test_the_sites_of_a_model_are_a_table_of_what_stands_there(model):
+    table = tractexp.sites(model)
+    rows = {row[0]: dict(zip(table.columns, row, strict=True)) for row in table.rows}
+    assert set(rows) == set(SITES)
+    assert rows["coupling"]["expression"] == "C"
+    assert rows["load_torque"]["edited by"] == "speed_dependent_torque"
+    assert rows["P"]["edited by"] == "undervoltage_trip"
+    assert "phasor" in next(line for line in str(table).splitlines() if line.startswith("stator_impedance"))
+    alone = compose(get("model/motor", "none")(), get("model/static", "exponential")())
+    assert [row[0] for row in tractexp.sites(alone).rows] == ["static_voltage", "P_static", "Q_static", "P", "Q"]
+    with pytest.raises(UserError, match="sites\\(\\) takes a model"):
+        tractexp.sites("third_order")
+
+
+def test_whether_an_effect_fits_is_remembered_without_deriving_anything(tmp_path):
+    program = (
+        "import sys; from tractexp.plugin import discover, get; from tractexp.model.model import compose;"
+        "m = compose(get('model/motor', 'voltage')(), get('model/static', 'exponential')());"
+        "names = ('stator_resistance', 'speed_dependent_torque', 'time_skew');"
+        "print([m.acceptance(get('effect', n)()).refusal for n in names], 'sympy' in sys.modules)"
+    )
+    there = os.environ | {"TRACTEXP_CACHE_DIR": str(tmp_path)}
+    run = lambda: subprocess.check_output([sys.executable, "-c", program], env=there, text=True).strip()  # noqa: E731
+    told = "[None, 'its equations have no speed that moves', None]"
+    assert run() == f"{told} True"
+    assert run() == f"{told} False"
+
+
+def test_two_plugins_of_one_class_name_in_one_folder_have_sources_of_their_own(tmp_path, monkeypatch):
+    from tractexp.model import kernel
+
+    monkeypatch.setenv("TRACTEXP_CACHE_DIR", str(tmp_path))
+    made = []
+    for name in ("one", "two"):
+        monkeypatch.setitem(sys.modules, f"load_{name}", module := ModuleType(f"load_{name}"))
+        module.__file__ = str(tmp_path / f"load_{name}.py")
+        exec("class Load:\n    def __repr__(self): return 'Load()'", {"__name__": f"load_{name}"}, namespace := {})
+        made.append(kernel.remembered((namespace["Load"](),), lambda name=name: name))
+    assert made == ["one", "two"]
+
+
+@pytest.mark.parametrize(
+    ("motor", "exact"), [("electromechanical", True), ("stator_flux", True), ("double_cage", False)]
+)
+def test_whether_a_declared_steady_state_is_exact_is_found(motor, exact):
+    from tractexp.model.lowering import lower
+
+    of = compose(get("model/motor", motor)(), get("model/static", "exponential")())
+    assert (lower(of.equations).rest is None) == exact

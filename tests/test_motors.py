@@ -10,7 +10,6 @@ from scipy.interpolate import Akima1DInterpolator
 
 from independent import Machine
 from independent.source import OMEGA
-from tractexp.errors import UserError
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
 from tractexp.plugin import discover, get
@@ -134,16 +133,6 @@ def test_the_kernel_agrees_with_dop853(motor):
 
 
 @pytest.mark.parametrize("motor", MOTORS)
-def test_halving_the_step_shows_order_four(motor):
-    of = model(motor)
-    drive = Drive.of([dip(step=10e-3)])
-    counts = np.array([16, 32, 64, 128]) if motor in ("stator_flux", "double_cage") else np.array([4, 8, 16, 32])
-    fine = of.simulate(drive, values(of), 1024 if motor in ("stator_flux", "double_cage") else 256)
-    errors = [np.abs(of.simulate(drive, values(of), n).Q - fine.Q).max() for n in counts]
-    assert np.polyfit(np.log2(counts), np.log2(errors), 1)[0] == pytest.approx(-4, abs=0.2)
-
-
-@pytest.mark.parametrize("motor", MOTORS)
 @pytest.mark.parametrize("speed", [0.0, -3.0])
 def test_the_state_before_the_event_is_a_zero_of_the_right_hand_side(motor, speed):
     """Of derivatives where states move, and of the torque balance where the speed does not."""
@@ -155,17 +144,6 @@ def test_the_state_before_the_event_is_a_zero_of_the_right_hand_side(motor, spee
         assert abs(number(balance, numbers)) < 1e-9
     torque = number(of.equations.real(of.equations["electrical_torque"]), numbers).real
     assert torque == pytest.approx(VALUES["T_m"], rel=1e-9)
-
-
-@pytest.mark.parametrize("motor", MOTORS)
-@pytest.mark.parametrize(("U0", "speed"), [(0.93, 0.0), (1.05, -3.0)])
-def test_flat_input_stays_flat(motor, U0, speed):
-    of, n = model(motor), 500
-    flat = Excitation(1e-3, np.full(n, U0), np.ones(n), np.full(n, 0.6), U0, 1.0, 0.6, np.full(n, speed), speed)
-    rng = np.random.default_rng(5)
-    response = of.simulate(Drive.of([flat]), values(of) * rng.uniform(0.9, 1.1, (20, len(of.names))), 4)
-    assert np.abs(response.P - 1.0).max() < 1e-9
-    assert np.abs(response.Q - 0.6).max() < 1e-9
 
 
 @pytest.mark.parametrize("motor", MOTORS)
@@ -299,35 +277,9 @@ def test_an_oscillation_at_supply_frequency_follows_a_sudden_dip_in_the_fifth_or
     assert spectra["stator_flux"].max() > 20 * spectra["electromechanical"].max()
 
 
-@pytest.mark.parametrize(("motor", "static"), list(itertools.product((*MOTORS, "none"), STATICS)))
-def test_any_motor_and_static_load_compose(motor, static):
-    """Every pair declares, lowers and prints; the pair of nothing and nothing is refused in a sentence."""
-    of = compose(get("model/motor", motor)(), get("model/static", static)())
-    if motor == static == "none":
-        with pytest.raises(UserError, match="draw no power; choose a model/motor or a model/static"):
-            _ = of.source
-        return
-    assert "def run(" in of.source
-    text = " ".join(of.latex())
-    for parameter in of.parameters:
-        assert parameter.symbol in text
-    assert of.refusal(values(of), Drive.of([dip()])) is None
-
-
 def test_the_lists_above_are_all_there_is():
     assert set(discover()["model/motor"]) == {*MOTORS, "none"}
     assert set(discover()["model/static"]) == set(STATICS)
-
-
-@pytest.mark.parametrize("motor", MOTORS)
-@pytest.mark.parametrize("which", [0, 1])
-def test_parameters_at_their_bounds_are_finite_or_refused(motor, which):
-    of = model(motor)
-    base = values(of)
-    rows = np.tile(base, (len(of.names), 1))
-    np.fill_diagonal(rows, [p.bounds[which] for p in of.parameters])
-    errors = of.errors(Drive.of([dip()]), rows, 64)
-    assert np.array_equal(errors.refused, errors.miss > 0)
 
 
 @pytest.mark.parametrize(

@@ -135,8 +135,8 @@ def test_the_documentation_tells_every_word_of_the_equations_and_every_site():
     told = set(re.findall(r"`eq\.(\w+)", text))
     framework = {
         "parameters", "definitions", "steps", "known_before", "shown", "states", "memories", "requirements", "edits",
-        "latex_names", "write", "declare", "close", "at_rest", "expand", "real_states", "real_balances", "parts", "real",
-        "latex",
+        "latex_names", "write", "declare", "close", "at_rest", "expand", "real_states", "real_balances", "parts",
+        "real", "latex",
     }  # fmt: skip
     assert told == {w for w in (*dir(Equations), *vars(Equations())) if not w.startswith("_")} - framework
     for site in SITES.values():
@@ -211,40 +211,45 @@ PLAIN = Parameter(0.5, (0.0, 1.0), "1", "how fast", "here")
 
 
 def declared(base, methods, **attributes):
-    """Register a plugin class of this base, written in a file `stranger.py`; refused, so nothing stays registered."""
+    """Register a plugin class of this base; it is refused, so nothing stays registered."""
     made = {"__doc__": "Source: here.", "__module__": "elsewhere.stranger", "__annotations__": {}}
     return plugin(type("Stranger", (base,), made | methods | attributes))
 
 
+def load(law, **attributes):
+    return Static, {"law": law}, attributes
+
+
+def effect(edit, **attributes):
+    return Effect, {"edit": edit, "a": replace(SIZE)}, attributes
+
+
 @pytest.mark.parametrize(
-    ("base", "methods", "attributes", "sentence"),
+    ("made", "sentence"),
     [
-        (Static, {"law": lambda self, u, p_w: (1, 1)}, {"p_v": replace(PLAIN)},
+        (load(lambda self, u, p_w: (1, 1), p_v=replace(PLAIN)),
          r"law\(\) asks for 'p_w', which is neither a parameter of it nor offered; did you mean 'p_v'\?.* f, p_v"),
-        (Static, {"law": lambda self, u: (1, 1)}, {"p_v": replace(PLAIN)}, r"law\(\) does not take the parameter 'p_v'"),
-        (Static, {"law": lambda self, p_v: (1, 1)}, {"p_v": replace(PLAIN)}, r"law\(\) must take u first"),
-        (Static, {"law": lambda self, u, *p: (1, 1)}, {"p_v": replace(PLAIN)}, r"by name, so it cannot take \*p"),
-        (Static, {"law": lambda self, u: (1, 1)}, {"reads": ("frequency",)}, "reads names the channel 'frequency'"),
-        (Static, {}, {}, "must do: define law"),
-        (Static, {"law": lambda self, u, c1: (1, 1)}, {"c1": replace(PLAIN)}, "called 'c1': the kernel uses that name"),
-        (Static, {"law": lambda self, u, U0: (1, 1)}, {"U0": replace(PLAIN)}, "called 'U0': the equations give that name"),
-        (Static, {"law": lambda self, u, a, b: (1, 1)}, dict.fromkeys("ab", replace(PLAIN)),
-         "'b' is the parameter 'a' again, and a parameter has one name"),
-        (Static, {"law": lambda self, u, a: (1, 1)}, {"a": replace(PLAIN, unit="")}, "a: the parameter has no unit"),
-        (Static, {"law": lambda self, u, a: (1, 1)}, {"a": replace(PLAIN, default=2.0)}, "default 2 is outside the bounds"),
-        (Motor, {"declare": lambda self, eq, speed: None}, {}, r"declare\(\) asks for 'speed'"),
-        (Effect, {"edit": lambda self, eq, a: None}, {"a": replace(PLAIN)}, "has no size: give the parameter .* a 'null'"),
-        (Effect, {"edit": lambda self, eq: None}, {"a": replace(SIZE)}, r"edit\(\) does not take the parameter 'a'"),
-        (Effect, {"edit": lambda self, eq, a: None}, {"a": replace(SIZE), "grid": {"b": (1.0,)}}, "grid names 'b', no"),
-        (Effect, {"edit": lambda self, eq, a: None}, {"a": replace(SIZE), "grid": {"a": (1.0,)}}, "'a', which is a size"),
-        (Effect, {"edit": lambda self, eq, a, b: None},
-         {"a": replace(SIZE), "b": replace(PLAIN), "relevant": {"b": 0.1}}, "relevant names 'b', which has no null"),
-        (Effect, {"edit": lambda self, eq, a, b: None},
-         {"a": replace(SIZE), "b": replace(PLAIN), "grid": {"b": (3.0,)}}, "grid has b = 3, outside its bounds"),
-        (Measurement, {}, {"a": replace(SIZE)}, "must do: define observe"),
+        (load(lambda self, u: (1, 1), p_v=replace(PLAIN)), r"law\(\) does not take the parameter 'p_v'"),
+        (load(lambda self, p_v: (1, 1), p_v=replace(PLAIN)), r"law\(\) must take u first"),
+        (load(lambda self, u, *p: (1, 1), p_v=replace(PLAIN)), r"by name, so it cannot take \*p"),
+        (load(lambda self, u: (1, 1), reads=("frequency",)), "reads names the channel 'frequency'"),
+        (load(lambda self, u, c1: (1, 1), c1=replace(PLAIN)), "called 'c1': the kernel uses that name"),
+        (load(lambda self, u, U0: (1, 1), U0=replace(PLAIN)), "called 'U0': the equations give that name"),
+        (load(lambda self, u, a, b: (1, 1), **dict.fromkeys("ab", replace(PLAIN))), "'b' is the parameter 'a' again"),
+        (load(lambda self, u, a: (1, 1), a=replace(PLAIN, unit="")), "a: the parameter has no unit"),
+        ((Static, {}, {}), "must do: define law"),
+        ((Motor, {"declare": lambda self, eq, speed: None}, {}), r"declare\(\) asks for 'speed'"),
+        ((Measurement, {"a": replace(SIZE)}, {}), "must do: define observe"),
+        ((Effect, {"edit": lambda self, eq, a: None}, {"a": replace(PLAIN)}), "has no size: give the .* a 'null'"),
+        (effect(lambda self, eq: None), r"edit\(\) does not take the parameter 'a'"),
+        (effect(lambda self, eq, a: None, grid={"b": (1.0,)}), "grid names 'b', no parameter of it"),
+        (effect(lambda self, eq, a: None, grid={"a": (1.0,)}), "grid names 'a', which is a size"),
+        (effect(lambda self, eq, a, b: None, b=replace(PLAIN), relevant={"b": 0.1}), "relevant names 'b', which"),
+        (effect(lambda self, eq, a, b: None, b=replace(PLAIN), grid={"b": (3.0,)}), "grid has b = 3, outside its"),
     ],
 )  # fmt: skip
-def test_what_a_class_forgets_is_refused_when_it_is_registered(base, methods, attributes, sentence):
+def test_what_a_class_forgets_is_refused_when_it_is_registered(made, sentence):
+    base, methods, attributes = made
     with pytest.raises(UserError, match=r"^plugin elsewhere\.stranger\.Stranger.*" + sentence):
         declared(base, methods, **attributes)
 

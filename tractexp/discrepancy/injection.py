@@ -29,7 +29,9 @@ class Injection(Effect):
         Parameter(1.0, (-1e3, 1e3), "s", "end of the window", SOURCE, name="window_off"),
     )
 
-    def edit(self, eq, push_flux_d, push_flux_q, push_speed, push_P, push_Q, window_on, window_off):
+    def edit(  # type: ignore[override]
+        self, eq, push_flux_d, push_flux_q, push_speed, push_P, push_Q, window_on, window_off
+    ):
         from tractexp.model.equations import OWN, I, sympy
 
         ramp = lambda at: sympy.Max(0, sympy.Min(1, (eq.t - at) / EDGE))  # noqa: E731

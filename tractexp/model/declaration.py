@@ -27,8 +27,11 @@ class Refused(UserError):
 def declared(motor: Motor, static: Static, effects: Sequence[Effect], title: str) -> Equations:
     """The equations of a load. Raises `Refused` for an effect that does not fit, `UserError` for parts that do not."""
     eq = Equations()
-    _motor(eq, motor)
-    _static(eq, static)
+    try:
+        _motor(eq, motor)
+        _static(eq, static)
+    except Unfit as why:
+        raise UserError(f"the motor '{motor.name}' and the static load '{static.name}' do not compose: {why}") from why
     for effect in effects:
         try:
             _effect(eq, effect)

@@ -49,4 +49,4 @@ def settled(eq: Equations, start: "Phase", rest: "Phase", starts: Sequence[sympy
 def _numeric(phase: "Phase", symbols: Sequence[sympy.Symbol]) -> Callable[..., list[float]]:
     """The expressions of a phase as a function of numbers."""
     ready = lambda _: (list(phase.temporaries), list(phase.expressions))  # noqa: E731
-    return sympy.lambdify(list(symbols), list(phase.expressions), "math", cse=ready)
+    return sympy.lambdify(list(symbols), list(phase.expressions), "math", cse=ready)  # type: ignore[arg-type]

@@ -59,13 +59,13 @@ def sites(model: "Model") -> "Table":
     Every registered effect is tried on the model, which takes seconds the first time and is remembered then.
     """
     from tractexp.outcome import Table
-    from tractexp.plugin import discover
+    from tractexp.plugin import discover, get
 
     if not hasattr(model, "acceptance"):
         raise UserError(f"sites() takes a model, as compose() makes one, not a {type(model).__name__}")
     eq, effects = model.equations, discover().get("effect", {})
     here = {effect.name for effect in model.effects}
-    edits = {name: model.acceptance(cls()).edits for name, cls in effects.items() if cls.name not in here}
+    edits = {name: model.acceptance(get("effect", name)()).edits for name in effects if name not in here}
     rows = []
     for s in (site for site in SITES.values() if site in eq):
         by = ", ".join(sorted(name for name, edited in edits.items() if s.name in edited))

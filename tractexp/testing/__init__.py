@@ -46,7 +46,7 @@ def plugins_of(package: str) -> list[type[Plugin]]:
     return [cls for cls in known if cls.__module__.startswith(package + ".")]
 
 
-def _test(check: Callable[[Any], None], about: str | None, members: Sequence[type[Plugin]]) -> Callable[..., None]:
+def _test(check: Callable[..., None], about: str | None, members: Sequence[type[Plugin]]) -> Callable[..., None]:
     import pytest
 
     @pytest.mark.parametrize("cls", members, ids=lambda cls: cls.name)

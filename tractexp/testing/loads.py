@@ -93,7 +93,8 @@ def values(of: Model, pick: Callable[[Parameter], float] = lambda p: p.default, 
 
 def on(p: Parameter) -> float:
     """A size halfway to its farther bound; anything else at its default."""
-    return p.default if p.null is None else (p.null + max(p.bounds, key=lambda b: abs(b - p.null))) / 2
+    null = p.null
+    return p.default if null is None else (null + max(p.bounds, key=lambda b: abs(b - null))) / 2
 
 
 def play(of: Model, drive: Drive, chosen: np.ndarray, substeps: int = SUBSTEPS) -> np.ndarray:
@@ -114,12 +115,9 @@ def play(of: Model, drive: Drive, chosen: np.ndarray, substeps: int = SUBSTEPS) 
 def says_what_it_is(cls: type[Part]) -> None:
     """The docstring has equations, their source and what departs from it; every parameter is told and bounded."""
     text = cls.__doc__ or ""
-    for needed, what in (
-        ("=", "equation"),
-        ("Source:", "line 'Source:'"),
-        ("Departures:", "line 'Departures:'"),
-    ):
-        assert needed in text, f"the docstring of '{cls.name}' has no {what}"
+    assert "=" in text or "->" in text, f"the docstring of '{cls.name}' has no equation"
+    for needed in ("Source:", "Departures:"):
+        assert needed in text, f"the docstring of '{cls.name}' has no line '{needed}'"
     for parameter in cls.parameters:
         parameter.check(f"{cls.name}.{parameter.name}")
 
@@ -191,9 +189,9 @@ def composes_with_every_other(cls: type[Part]) -> None:
 
 def takes_or_refuses_every_effect(cls: type[Part]) -> None:
     """Every registered effect is an edit of it, or is refused with a reason."""
-    motor, static = (cls, partners()[1]) if issubclass(cls, Motor) else (partners()[0], cls)
+    of = with_part(cls)
     for effect in _all("effect"):
-        assert _taken(motor, static, effect) != "", f"'{effect.name}' refuses '{cls.name}' without a reason"
+        assert of.acceptance(effect()).refusal != "", f"'{effect.name}' refuses '{cls.name}' without a reason"
 
 
 # Effects
@@ -222,14 +220,15 @@ def is_the_base_model_at_its_null(cls: type[Effect]) -> None:
 def is_seen_in_a_dip(cls: type[Effect]) -> None:
     """Each size has a derivative at its null, and the size that matters changes the response of a dip."""
     of, own, drive = with_part(cls), cls(), drives.drive(0.6)
-    for p in (p for p in cls.parameters if p.null is not None):
+    for p, null in ((p, p.null) for p in cls.parameters if p.null is not None):
+        low, high = p.bounds
         slopes = []
-        for h in (1e-4 * (p.bounds[1] - p.bounds[0]), 2e-4 * (p.bounds[1] - p.bounds[0])):
-            ends = [min(max(p.null + side * h, p.bounds[0]), p.bounds[1]) for side in (-1, 1)]
+        for h in (1e-4 * (high - low), 2e-4 * (high - low)):
+            ends = [min(max(null + side * h, low), high) for side in (-1, 1)]
             rows = np.array([values(of, lambda q, p=p, end=end: end if q is p else q.default, own) for end in ends])
             slopes.append(np.diff(play(of, drive, rows), axis=1) / (ends[1] - ends[0]))
         largest = np.abs(slopes[0]).max()
-        assert largest * cls.relevant.get(p.name, 0.1 * (p.bounds[1] - p.bounds[0])) > SHOWN, f"{p.name} shows nothing"
+        assert largest * cls.relevant.get(p.name, 0.1 * (high - low)) > SHOWN, f"{p.name} shows nothing"
         off = np.abs(slopes[1] - slopes[0]).max()
         assert off < 0.03 * largest, f"{p.name} of '{cls.name}' has no derivative at its null"
 

@@ -1,8 +1,6 @@
 """A shrinking random step from the best point."""
 
-from tractexp.errors import check_range
-from tractexp.identification.optimizer import Optimizer
-from tractexp.plugin import plugin
+from tractexp.extend import Optimizer, check_range, plugin
 
 
 @plugin
@@ -17,6 +15,7 @@ class AcmeDescent(Optimizer):
     iterations: int = 60
 
     def check(self):
+        super().check()
         check_range("optimizer.tries", self.tries, low=1)
 
     def search(self, evaluate, box, rng):
