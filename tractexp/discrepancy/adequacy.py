@@ -57,8 +57,8 @@ def tail(draws: np.ndarray, value: np.ndarray) -> float:
         return max(float(gammaincc(mean**2 / variance, max(value[0], 0.0) * mean / variance)), SMALLEST_P)
     mean, spread, largest = extremes(draws)
     scale = max(largest.std() * np.sqrt(6) / np.pi, 1e-12)
-    found = ((value - mean) / spread).max()
-    return max(float(-np.expm1(-np.exp(-(found - largest.mean()) / scale - np.euler_gamma))), SMALLEST_P)
+    departure = ((value - mean) / spread).max()
+    return max(float(-np.expm1(-np.exp(-(departure - largest.mean()) / scale - np.euler_gamma))), SMALLEST_P)
 
 
 def extremes(draws: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

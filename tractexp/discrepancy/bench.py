@@ -102,12 +102,12 @@ class Bench:
     def residuals_of(self, unit: np.ndarray, sets: Sequence[tuple[Sequence[str], bool]]) -> np.ndarray:
         """As `residuals`, with a set of names for each of the coordinates, and whether a push is in it."""
         keys = [self.kernels.family.key(names, pushed) for names, pushed in sets]
-        made = np.empty((len(unit), 2, self.drive.samples))
+        residuals = np.empty((len(unit), 2, self.drive.samples))
         for key in dict.fromkeys(keys):
             mine = np.array([k == key for k in keys])
             first = sets[keys.index(key)]
-            made[mine] = self.residuals(unit[mine], *first)
-        return made
+            residuals[mine] = self.residuals(unit[mine], *first)
+        return residuals
 
     def whiten(self, noise: Noise, residuals: np.ndarray) -> np.ndarray:
         """Residuals (n, 2, N) as rows (n, 2 N) of independent unit variance."""

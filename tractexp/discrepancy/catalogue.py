@@ -75,22 +75,22 @@ def catalogue(
 
     Raises `UserError` for a name in `only` that no effect has.
     """
-    known = discover().get("effect", {})
+    registered = discover().get("effect", {})
     for name in only:
-        if name not in known:
-            raise UserError(f"task.effects names '{name}', which is no effect{among(name, known)}")
+        if name not in registered:
+            raise UserError(f"task.effects names '{name}', which is no effect{among(name, registered)}")
     here = {effect.name for effect in present}
     base = compose(motor, static, present)
-    found, untestable = [], {}
-    for name in sorted(known):
+    testable, untestable = [], {}
+    for name in sorted(registered):
         effect = get("effect", name)()
         if name in here or (only and name not in only and not isinstance(effect, Measurement)):
             continue
         if why := missing_channel(effect, events, swing) or base.acceptance(effect).refusal:
             untestable[name] = why
         else:
-            found.append(candidate(effect))
-    return Catalogue(tuple(found), untestable)
+            testable.append(candidate(effect))
+    return Catalogue(tuple(testable), untestable)
 
 
 def missing_channel(effect: Effect, events: Sequence[Event], swing: float) -> str:

@@ -31,7 +31,7 @@ class Chance:
 
     def surprises(self, projection: Projection, bench: Bench) -> dict[str, float]:
         """How often chance leaves as much as a fit does, by each test of adequacy."""
-        return {name: tail(self.left[name], found) for name, found in statistics(projection, bench).items()}
+        return {name: tail(self.left[name], value) for name, value in statistics(projection, bench).items()}
 
 
 def chance_at(t: Tangent, noise: Noise, quiet: QuietNoise, seed: int, plain: bool, draws: int = DRAWS) -> Chance:

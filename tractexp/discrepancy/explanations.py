@@ -66,14 +66,14 @@ def explanations(base: BaseFit, first: Disagreement, seed: int) -> Explanations:
         size = len(steps[-1].fit.names) + 1
         fits = searched([ground, *steps[1:]], refits, size, base.bench.effort.say)
         refits |= {f.names: f for f in fits}
-        found = sufficient(base, fits, steps[-1].noise, seed + size)
-        if size == 1 and (found.asks_for_more or not found.adequate):
+        tests = sufficient(base, fits, steps[-1].noise, seed + size)
+        if size == 1 and (tests.asks_for_more or not tests.adequate):
             ground, better = from_other_valleys(base, first, refits)
             if better:
                 refits |= {f.names: f for f in better}
                 fits = best_of(f for f in refits.values() if f.names)
-                found = sufficient(base, fits, first.noise, seed + size)
-        steps.append(found)
+                tests = sufficient(base, fits, first.noise, seed + size)
+        steps.append(tests)
     return Explanations(base, tuple(steps), refits)
 
 
@@ -95,7 +95,7 @@ def from_other_valleys(base: BaseFit, first: Disagreement, refits: Refits) -> tu
     Where an effect is missing, a wrong valley may fit better than the right one.
     """
     bench = base.bench
-    ground, found = first, best_of(refits.values())
+    ground, singles = first, best_of(refits.values())
     for valley in base.valleys_but(first.fit.unit):
         fit = refit(bench, first.noise, [((), valley)])[0]
         if np.linalg.norm((fit.unit - first.fit.unit)[bench.coordinates.base]) < DISTINCT:
@@ -105,10 +105,10 @@ def from_other_valleys(base: BaseFit, first: Disagreement, refits: Refits) -> tu
         there = replace(first, fit=fit, tangent=t, projection=projection, scores=projection.scores())
         say = lambda line: bench.effort.say(f"{line} from another valley of the base model")  # noqa: E731
         fits = searched([there], {(): fit}, 1, say)
-        if fits[0].cost < found[0].cost:
+        if fits[0].cost < singles[0].cost:
             ground = there
-        found = best_of([*found, *fits])
-    return ground, [f for f in found if refits.get(f.names) is not f]
+        singles = best_of([*singles, *fits])
+    return ground, [f for f in singles if refits.get(f.names) is not f]
 
 
 def sufficient(base: BaseFit, ranked: Sequence[Refit], noise: Noise, seed: int) -> Disagreement:
@@ -151,7 +151,7 @@ def _column(at: Disagreement, score: Score) -> np.ndarray:
 
 def starts(steps: Sequence[Disagreement], refits: Refits, names: Names) -> list[Start]:
     """Starts for one set: each subset's fit with the others at their one-step size, at their best two settings."""
-    made: list[Start] = []
+    begin: list[Start] = []
     for left in names:
         rest = tuple(n for n in names if n != left)
         from_fit = refits.get(rest, steps[0].fit)
@@ -161,8 +161,8 @@ def starts(steps: Sequence[Disagreement], refits: Refits, names: Names) -> list[
             point = from_fit.unit.copy()
             for name in missing:
                 _place(at if name in {s.name for s in at.scores} else steps[0], name, rank, point)
-            made.append((names, point))
-    return made
+            begin.append((names, point))
+    return begin
 
 
 def _place(at: Disagreement, name: str, rank: int, point: np.ndarray) -> None:

@@ -61,8 +61,8 @@ def curves(bench: Bench, unit: np.ndarray, noise: Noise, names: Sequence[str] | 
     white = bench.whiten(noise, residual)[0]
     measured = bench.drive.measured
     calculated = residual[0] + measured
-    known = np.where(bench.known, measured, np.nan)
-    errors = [relative_error(known[c], calculated[c]) for c in (0, 1)]
+    counted = np.where(bench.known, measured, np.nan)
+    errors = [relative_error(counted[c], calculated[c]) for c in (0, 1)]
     deviance = float(white @ white)
     return Curves(calculated, *errors, deviance, deviance / max(bench.samples, 1))
 

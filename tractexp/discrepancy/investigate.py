@@ -126,10 +126,10 @@ def investigate(
     )
 
 
-def _gap(bench: Bench, found: HeldOut, said: Verdict) -> Gap:
+def _gap(bench: Bench, weighed: HeldOut, said: Verdict) -> Gap:
     """The gap on the fitted events before and after."""
     at = bench.coordinates
-    after = found.extended[said.chosen.fit.names] if said.names else found.bare
-    noise = (said.chosen.tests or found.survivors.explanations.last).noise
+    after = weighed.extended[said.chosen.fit.names] if said.names else weighed.bare
+    noise = (said.chosen.tests or weighed.survivors.explanations.last).noise
     fitted = [*at.base, *at.before, *at.parameters(said.names)]
-    return gap(bench, found.bare.unit, after.unit, after.names, noise, fitted)
+    return gap(bench, weighed.bare.unit, after.unit, after.names, noise, fitted)

@@ -26,18 +26,18 @@ def judgements(investigation: Investigation) -> list[Judgement]:
     criteria = investigation.bench.criteria
     critical = investigation.first.chance.critical_p(criteria.false_alarms)
     scores = {s.name: s for s in investigation.last.scores}
-    made = [Judgement(name, "not testable", why) for name, why in investigation.catalogue.untestable.items()]
+    judged_effects = [Judgement(name, "not testable", why) for name, why in investigation.catalogue.untestable.items()]
     for candidate in investigation.catalogue.candidates:
         name, score = candidate.name, scores.get(candidate.name)
         if name in investigation.names:
-            made.append(Judgement(name, "relevant", "added"))
+            judged_effects.append(Judgement(name, "relevant", "added"))
         elif name in investigation.last.fit.names:
-            made.append(Judgement(name, "relevant", "in the best explanation, which was not accepted"))
+            judged_effects.append(Judgement(name, "relevant", "in the best explanation, which was not accepted"))
         elif score is None:
-            made.append(Judgement(name, "irrelevant", "in the fit as a nuisance, not above its noise"))
+            judged_effects.append(Judgement(name, "irrelevant", "in the fit as a nuisance, not above its noise"))
         else:
-            made.append(Judgement(name, *judged(candidate, score, critical, criteria.testable), score))
-    return sorted(made, key=lambda j: j.name)
+            judged_effects.append(Judgement(name, *judged(candidate, score, critical, criteria.testable), score))
+    return sorted(judged_effects, key=lambda j: j.name)
 
 
 def judged(candidate: Candidate, score: Score, critical: float, testable: float) -> tuple[str, str]:

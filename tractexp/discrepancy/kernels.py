@@ -39,8 +39,8 @@ class Family:
         """The model with these load effects, every fault of the measurement and, where `pushed`, the pushes."""
         effects = [self.catalogue[n].effect for n in sorted({*names, *self.catalogue.of_measurement})]
         pushes = [Injection()] if pushed else []
-        made = compose(self.model.motor, self.model.static, [*self.model.effects, *effects, *pushes])
-        return made.behind(self.model.recorder)
+        model = compose(self.model.motor, self.model.static, [*self.model.effects, *effects, *pushes])
+        return model.behind(self.model.recorder)
 
     @functools.cached_property
     def whole(self) -> Model:

@@ -65,8 +65,8 @@ def _response(
     points = np.concatenate([truth.fit.unit[None], rival.fit.unit[None], up, down])
     faults = at.parameters(bench.catalogue.of_measurement)
     points[:, faults] = at.null[faults]  # what the recorder does to those events says nothing of the load
-    made = bench.kernels.simulate((*truth.fit.names, *rival.fit.names), points, Drive.of(dips))
-    each = np.moveaxis(made.reshape(len(points), 2, len(dips), -1), 2, 1).reshape(-1, 2, len(dips[0].U))
+    power = bench.kernels.simulate((*truth.fit.names, *rival.fit.names), points, Drive.of(dips))
+    each = np.moveaxis(power.reshape(len(points), 2, len(dips), -1), 2, 1).reshape(-1, 2, len(dips[0].U))
     one = Drive.of(dips[:1])
     assert rival.tests is not None
     noise = rival.tests.noise.on(np.ones(one.samples))

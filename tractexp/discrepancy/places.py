@@ -25,16 +25,16 @@ def places(at: Disagreement) -> list[Place]:
     cells = cells_of(bench)
     mean, spread, highest = extremes(at.chance.left[LOUDEST])
     excess = energies(channels_of(at.projection, bench), bench)[0] - mean
-    found = excess / spread > np.quantile(highest, 1 - at.criteria.false_alarms)
+    loud = excess / spread > np.quantile(highest, 1 - at.criteria.false_alarms)
     total = np.maximum(excess, 0.0).sum()
-    made = [
+    standing_out = [
         Place(
             bench.events[group[0].event].record.name, group[0].channel, group[0].start, group[-1].end,
             float(sum(excess[cells.index(c)] for c in group) / total),
         )
-        for group in _joined([c for c, yes in zip(cells, found, strict=True) if yes])
+        for group in _joined([c for c, yes in zip(cells, loud, strict=True) if yes])
     ]  # fmt: skip
-    return sorted(made, key=lambda p: -p.share)
+    return sorted(standing_out, key=lambda p: -p.share)
 
 
 def _joined(cells: list[Cell]) -> list[list[Cell]]:

@@ -37,12 +37,12 @@ class RecorderWindow(Measurement):
         return f"the recorder averages phasors over {1000 * self.window:.0f} ms"
 
     def observe(self, power: np.ndarray, drive: Drive, values: dict[str, np.ndarray]) -> np.ndarray:
-        made = np.empty_like(power)
+        shown = np.empty_like(power)
         for e in range(drive.events):
             part, samples = drive.part(e), self.window / drive.event[e, -1]
             u = drive.inputs[0, part]
-            made[:, :, part] = averaged(power[:, :, part] / u, samples) * averaged(u, samples)
-        return made
+            shown[:, :, part] = averaged(power[:, :, part] / u, samples) * averaged(u, samples)
+        return shown
 
     def sharpened(self, event: Event) -> Event:
         """The event with the voltage that the load saw."""

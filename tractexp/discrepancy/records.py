@@ -23,10 +23,10 @@ class Records:
     @classmethod
     def of(cls, events: Sequence[Event], window: RecorderWindow | None = None) -> "Records":
         """The events, by a recorder of this window."""
-        made = tuple(smoothed(event) for event in events)
+        driving = tuple(smoothed(event) for event in events)
         if window is not None:
-            made = tuple(replace(s, event=window.sharpened(s.event)) for s in made)
-        return cls(tuple(events), made, window)
+            driving = tuple(replace(s, event=window.sharpened(s.event)) for s in driving)
+        return cls(tuple(events), driving, window)
 
     @functools.cached_property
     def events(self) -> tuple[Event, ...]:

@@ -14,7 +14,7 @@ from tractexp.discrepancy.records import Records
 
 def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[BaseFit, Disagreement]:
     """The base model's fit and tests behind the recorder's window, where there is one; else those given."""
-    bench, noise, found = base.bench, first.noise, None
+    bench, noise, best = base.bench, first.noise, None
     if noise.loudest_blur > bench.criteria.blurred:  # noise of the voltage would pass for a window
         return base, first
     least = bench.criteria.least_window(max((s.drop for s in first.scores), default=0.0))
@@ -27,10 +27,10 @@ def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[Base
         if cycles == 1 and gained <= 0:
             break  # an average over several cycles is one of averages over one
         if gained > least:
-            found, least = (behind, fit), gained
-    if found is None:
+            best, least = (behind, fit), gained
+    if best is None:
         return base, first
-    behind, fit = found
+    behind, fit = best
     assert behind.records.window is not None
     bench.effort.say(f"{behind.records.window.describe()}: taken into account from here on")
     base = fitted_from(behind, [fit.unit], base.valleys)

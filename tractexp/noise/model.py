@@ -121,23 +121,23 @@ class Noise:
 
     def _shapes(self, part: slice) -> np.ndarray:
         """Shapes (k, 2, samples) of the mixed channels in one event, of one standard deviation each."""
-        made = [np.empty((0, 2, part.stop - part.start))]
+        shapes = [np.empty((0, 2, part.stop - part.start))]
         if self.wander is not None:
             for c in (0, 1):
                 modes = self.wander.modes(c, part)
-                made.append(np.zeros((len(modes), *made[0].shape[1:])))
-                made[-1][:, c] = modes
+                shapes.append(np.zeros((len(modes), *shapes[0].shape[1:])))
+                shapes[-1][:, c] = modes
         if self.blur is not None:
-            made.append(self._mixed(self.blur[:, :, part]))
-        return np.concatenate(made)
+            shapes.append(self._mixed(self.blur[:, :, part]))
+        return np.concatenate(shapes)
 
     def _drawn(self, rng: np.random.Generator, count: int, part: slice, event: int) -> np.ndarray:
         """Mixed channels (count, 2, samples) of one event."""
-        made = []
+        colored = []
         size = (count, part.stop - part.start + BURN_IN)
         for c, channel in enumerate(self.pair(event)):
             shocks = rng.standard_normal(size) if self.shocks is None else rng.choice(self.shocks[c], size)
             shocks *= channel.deviation[-1]
-            made.append(channel.recurring(shocks)[:, BURN_IN:])
+            colored.append(channel.recurring(shocks)[:, BURN_IN:])
         shapes = self._shapes(part)
-        return np.stack(made, axis=1) + np.einsum("bk,kct->bct", rng.standard_normal((count, len(shapes))), shapes)
+        return np.stack(colored, axis=1) + np.einsum("bk,kct->bct", rng.standard_normal((count, len(shapes))), shapes)

@@ -53,13 +53,13 @@ def smoothed(event: Event) -> Smoothed:
     rough[[event.start, min(event.end, len(U) - 1)]] = True
     rough = _widened(rough)
     while True:
-        made, errors = U.copy(), []
+        smooth, errors = U.copy(), []
         for part in runs(~rough):
             curve, own = _curve(U[part], deviation)
-            made[part] = curve
+            smooth[part] = curve
             errors.append(np.zeros((len(own), len(U))))
             errors[-1][:, part] = own
-        far = _distance(U - made, deviation) / np.where(_widened(rough), BESIDE, BOUND) * ~rough
+        far = _distance(U - smooth, deviation) / np.where(_widened(rough), BESIDE, BOUND) * ~rough
         if far.max() < 1:
             break
         rough[far.argmax()] = True
@@ -68,7 +68,7 @@ def smoothed(event: Event) -> Smoothed:
     apart = np.maximum(event.start - raw, 0) + np.maximum(raw - event.end, 0)
     raw = raw[np.argsort(apart, kind="stable")[:MOST]]
     errors.append(deviation * (np.arange(len(U)) == raw[:, None]))
-    return Smoothed(replace(event, record=replace(event.record, U=made)), np.concatenate(errors))
+    return Smoothed(replace(event, record=replace(event.record, U=smooth)), np.concatenate(errors))
 
 
 def noise_of(U: np.ndarray) -> float:
