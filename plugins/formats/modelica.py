@@ -18,15 +18,15 @@ class Modelica(Format):
     Not to be confused with a component of a power system library: it has no electrical connector.
 
     Source: Modelica Language Specification 3.6, chapters 4 (models), 8 (equations) and 3 (operators).
-    Departures: none. Models with discrete memories, and effects of the measurement chain, are refused.
+    Departures: none. Models with discrete memories, and effects of the measurement, are refused.
     """
 
     suffix = ".mo"
 
     def text(self, load):
         eq, known = load.model.equations, load.before
-        if eq.memories or load.model.chain:
-            which = next(m.name for m in (*eq.memories, *load.model.chain))
+        if eq.memories or load.model.measurements:
+            which = next(m.name for m in (*eq.memories, *load.model.measurements))
             raise UserError(
                 f"format 'modelica' cannot represent '{which}', which acts on samples;"
                 " export the model without the effect it belongs to"

@@ -56,17 +56,17 @@ class Model:
     def __init__(self, motor: Motor, static: Static, effects: Sequence[Effect] = ()):
         self.motor, self.static = motor, static
         self.effects = tuple(sorted(effects, key=lambda e: (e.order, e.name)))  # the same model in whatever order given
-        self.chain = tuple(e for e in self.effects if isinstance(e, Measurement))
+        self.measurements = tuple(e for e in self.effects if isinstance(e, Measurement))
         self.recorder: Measurement | None = None
         load = f"{motor.name} motor and {static.name} static load"
         self.title = " with ".join([load, *(effect.name for effect in self.effects)])
 
     def behind(self, recorder: Measurement | None) -> "Model":
-        """The same load as a recorder shows it that is known: without parameters, before the measurement chain."""
+        """The same load as a recorder shows it that is known: without parameters, before the faults of the measurement."""
         if recorder is None:
             return self
         made = copy.copy(self)
-        made.recorder, made.chain = recorder, (recorder, *self.chain)
+        made.recorder, made.measurements = recorder, (recorder, *self.measurements)
         return made
 
     @property
@@ -137,21 +137,21 @@ class Model:
         outputs = np.empty((2, n, drive.samples))
         outputs.fill(np.nan)
         _, miss = self._run(drive, candidates, substeps, outputs)
-        for effect in self.chain:
+        for effect in self.measurements:
             columns = {p.name: candidates[:, self.names.index(p.name)] for p in effect.parameters}
             outputs = effect.observe(outputs, drive, columns)
         return Response(outputs[0], outputs[1], miss)
 
     def errors(self, drive: Drive, values: np.ndarray, substeps: Sequence[int] | int = 1) -> Errors:
         """Weighted squared errors of every candidate over every event, in one pass and without storing responses."""
-        if self.chain:
+        if self.measurements:
             return self._errors_of(self.simulate(drive, values, substeps), drive)
         sums, miss = self._run(drive, self._candidates(drive, values), substeps, np.empty((0, 0, 0)))
         return Errors(sums, miss.sum(axis=0))
 
     @staticmethod
     def _errors_of(response: Response, drive: Drive) -> Errors:
-        """Squared errors of stored responses: where the measurement chain stands between kernel and sums."""
+        """Squared errors of stored responses: where the measurement stands between kernel and sums."""
         square = (np.stack([response.P, response.Q]) - drive.measured[:, None]) ** 2 * drive.weights[:, None]
         sums = np.add.reduceat(square, drive.first[:-1], axis=2)
         return Errors(np.moveaxis(sums, 2, 0), response.miss.sum(axis=0))

@@ -145,7 +145,7 @@ class Effect(Part):
 
 
 class Measurement(Effect):
-    """Base of the effects of the measurement chain: they act on the calculated power, not on the equations."""
+    """Base of the effects of the measurement: they act on the calculated power, not on the equations."""
 
     def edit(self, eq: "Equations", **parameters: Any) -> None:
         """A recorder leaves the equations as they are."""
