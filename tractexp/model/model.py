@@ -62,7 +62,7 @@ class Model:
         self.title = " with ".join([load, *(effect.name for effect in self.effects)])
 
     def behind(self, recorder: Measurement | None) -> "Model":
-        """The same load as a recorder shows it that is known: without parameters, before the faults of the measurement."""
+        """The same load as a known recorder shows it: without parameters, before the faults of the measurement."""
         if recorder is None:
             return self
         made = copy.copy(self)
