@@ -24,6 +24,7 @@ def resistive_dips(tmp_path_factory) -> list[Path]:
         frame.to_csv(paths[-1], index=False)
     return paths
 
+
 collect_ignore = ["acme"]  # a package of its own, whose tests run where it is installed
 
 

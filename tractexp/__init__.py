@@ -32,7 +32,7 @@ PUBLIC = {
     "profile": "tractexp.api.profile",
     "read": "tractexp.api.read",
     "simulate": "tractexp.api.simulate",
-    "sites": "tractexp.model.sites",
+    "sites": "tractexp.model.site_table",
 }
 __all__ = ["__version__", *PUBLIC]
 

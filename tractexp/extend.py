@@ -8,7 +8,8 @@ from tractexp.identification.loss import Loss
 from tractexp.identification.optimizer import Optimizer
 from tractexp.model import sites
 from tractexp.model.drive import EVENT, INPUTS
-from tractexp.model.parts import Effect, Measurement, Motor, Static, Unfit
+from tractexp.model.parts import Effect, Measurement, Motor, Static
+from tractexp.model.unfit import Unfit
 from tractexp.parameter import Parameter
 from tractexp.plugin import plugin
 from tractexp.record import Base, Events, Reader, Record

@@ -6,18 +6,25 @@ their prior, M = I - N (N'N)^-1 N', s = M W dy/deta of a candidate. Adding the c
 """
 
 import functools
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import chdtrc
 
+from tractexp.discrepancy.catalogue import Candidate
 from tractexp.noise.span import spanned
 
-if TYPE_CHECKING:
-    from tractexp.discrepancy.tangent import Tangent
-
 DISTINCT = 1e-3  # of the largest singular value: directions weaker than this are rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """A candidate with one setting of its scanned parameters: differences (k, 2, N) per unit of each size."""
+
+    candidate: Candidate
+    setting: dict[str, float]
+    raw: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -36,7 +43,9 @@ class Score:
 class Projection:
     """Whitened and with the nuisances projected out; `r` has one row per residual (one, or the bootstrap's)."""
 
-    tangent: "Tangent"
+    columns: tuple[Column, ...]
+    faults: Mapping[str, list[int]]  # which nuisances belong to which fault of the measurement
+    groups: np.ndarray  # (c,) which balance a push goes into
     Q: np.ndarray
     R: np.ndarray
     r: np.ndarray  # (b, R)
@@ -50,7 +59,7 @@ class Projection:
     def drops(self) -> tuple[np.ndarray, np.ndarray]:
         """Drop of the deviance (columns, b) by adding each column, sizes in their allowed direction, and its p."""
         drops, ps = [], []
-        for column, block in zip(self.tangent.columns, self.blocks, strict=True):
+        for column, block in zip(self.columns, self.blocks, strict=True):
             signs = np.array([column.candidate.sign(p) for p in column.candidate.sizes])
             drop, p = signed_drop(block, self.r, signs)
             drops.append(drop)
@@ -62,7 +71,7 @@ class Projection:
         """The candidates by drop, each at its best setting, for the fit's own residual."""
         best: dict[str, Score] = {}
         drops, ps = self.drops
-        for k, (column, block) in enumerate(zip(self.tangent.columns, self.blocks, strict=True)):
+        for k, (column, block) in enumerate(zip(self.columns, self.blocks, strict=True)):
             name = column.candidate.name
             if name in best and best[name].drop >= drops[k, 0]:
                 continue
@@ -84,7 +93,7 @@ class Projection:
         inverse = np.linalg.pinv(self.R, rcond=1e-12)  # N'N = R'R
         estimate = -self.along @ inverse.T  # departures of the nuisances, (b, k)
         covariance = inverse @ inverse.T
-        for name, members in self.tangent.faults.items():
+        for name, members in self.faults.items():
             whole = estimate[:, members] + self.departure[members]
             inner = np.linalg.pinv(covariance[np.ix_(members, members)], rcond=1e-12, hermitian=True)
             result[name] = chdtrc(len(members), np.einsum("bi,ij,bj->b", whole, inner, whole))
@@ -95,7 +104,7 @@ class Projection:
         power = np.einsum("cr,cr->c", self.cells, self.cells)
         kept = power > 1e-8 * power.max(initial=1e-300)
         z = (self.r @ self.cells[kept].T) ** 2
-        groups = self.tangent.groups[kept]
+        groups = self.groups[kept]
         scale = np.array([power[kept][groups == g].mean() for g in groups])
         return (z / scale).sum(axis=1)
 

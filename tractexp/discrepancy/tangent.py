@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.bench import Bench
-from tractexp.discrepancy.catalogue import Candidate
 from tractexp.discrepancy.fitting import Refit
-from tractexp.discrepancy.projection import Projection
+from tractexp.discrepancy.projection import Column, Projection
 from tractexp.discrepancy.pushes import push_points
 from tractexp.noise import Noise
 from tractexp.noise.span import spanned
@@ -18,15 +17,6 @@ REACH = 0.5  # smallest relevant sizes: the step of a candidate's difference quo
 NUISANCE_STEP = 1e-4  # of a coordinate's range
 WALL, HELD = 1e-3, 1e-6  # of it: how near a wall a parameter rests on it, and how far it may move then
 LEAST_KEPT = 0.2  # of a residual's variance: where columns explain more, it tells nothing of the noise
-
-
-@dataclass(frozen=True, eq=False)
-class Column:
-    """A candidate with one setting of its scanned parameters: differences (k, 2, N) per unit of each size."""
-
-    candidate: Candidate
-    setting: dict[str, float]
-    raw: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +63,10 @@ class Tangent:
         rest -= along @ Q.T
         parts = np.split(rest, ends[1:-1] - ends[0])
         departure = self.estimate if own else np.zeros_like(self.estimate)
-        return Projection(self, Q, R, parts[0], along[: len(parts[0])], departure, parts[1:-2], *parts[-2:])
+        r, *blocks, split, cells = parts
+        return Projection(
+            self.columns, self.faults, self.groups, Q, R, r, along[: len(r)], departure, blocks, split, cells
+        )
 
 
 def tangent(bench: Bench, fit: Refit, noise: Noise) -> Tangent:

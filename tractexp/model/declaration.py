@@ -10,8 +10,9 @@ from sympy import conjugate, im, re
 from tractexp.errors import UserError
 from tractexp.model import sites
 from tractexp.model.equations import Equations
-from tractexp.model.parts import Effect, Measurement, Motor, Static, Unfit
+from tractexp.model.parts import Effect, Measurement, Motor, Static
 from tractexp.model.signature import asked
+from tractexp.model.unfit import Unfit
 
 ROUNDING = 1e-9  # how far from 1 a law may be before the event
 

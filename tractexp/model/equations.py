@@ -16,8 +16,8 @@ from tractexp.errors import UserError, nearest
 from tractexp.model import sites
 from tractexp.model.drive import EVENT, INPUTS
 from tractexp.model.names import check_name
-from tractexp.model.parts import Unfit
 from tractexp.model.sites import Site
+from tractexp.model.unfit import Unfit
 from tractexp.parameter import Parameter
 
 LONG = 300  # nodes of an expression

@@ -22,10 +22,6 @@ if TYPE_CHECKING:
 CHANNELS = ("f", "U2")  # recorded channels that not every record has
 
 
-class Unfit(UserError):
-    """Why an effect makes no sense for a model: what it asks for is not there. Raised by what it asks `eq` for."""
-
-
 class Part(Plugin):
     """A part of a load.
 

@@ -5,13 +5,9 @@ edits them (`eq.edit(sites.P_static, change)`) or reads them (`eq[sites.static_v
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from tractexp.errors import UserError, among
-
-if TYPE_CHECKING:
-    from tractexp.model.model import Model
-    from tractexp.outcome import Table
 
 
 @dataclass(frozen=True)
@@ -51,23 +47,3 @@ def named(what: "Site | str") -> Site:
     if what not in SITES:
         raise UserError(f"there is no site '{what}'{among(what, SITES, 'Sites')}")
     return SITES[what]
-
-
-def sites(model: "Model") -> "Table":
-    """The sites of a model: what stands at each, and the registered effects that edit it.
-
-    Every registered effect is tried on the model, which takes seconds the first time and is remembered then.
-    """
-    from tractexp.outcome import Table
-    from tractexp.plugin import discover, get
-
-    if not hasattr(model, "acceptance"):
-        raise UserError(f"sites() takes a model, as compose() makes one, not a {type(model).__name__}")
-    eq, effects = model.equations, discover().get("effect", {})
-    here = {effect.name for effect in model.effects}
-    edits = {name: model.acceptance(get("effect", name)()).edits for name in effects if name not in here}
-    rows = []
-    for s in (site for site in SITES.values() if site in eq):
-        by = ", ".join(sorted(name for name, edited in edits.items() if s.name in edited))
-        rows.append((s.name, s.owner, s.kind, s.unit, s.about, str(eq.expression(s)), by))
-    return Table(("site", "of", "kind", "unit", "what", "expression", "edited by"), rows, f"Sites of {model.title}")
