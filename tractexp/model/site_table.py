@@ -3,6 +3,7 @@
 from typing import Any
 
 from tractexp.errors import UserError
+from tractexp.model.model import Model
 from tractexp.model.sites import SITES
 from tractexp.outcome import Table
 from tractexp.plugin import discover, get
