@@ -43,11 +43,7 @@ def chance_at(t: Tangent, noise: Noise, quiet: QuietNoise, seed: int, plain: boo
     if plain or bench.criteria.knows_noise(noise.worth(sum(p.stop - p.start for p in bench.quiet))):
         return _collected(t, [t.whitened(noise, drawn)], noise)
     rest = rich_residuals(t, drawn)
-    projections = []
-    for b in range(draws):
-        bench.effort.spend(0)
-        projections.append(t.whitened(quiet.of(rest[b]), drawn[b : b + 1]))
-    return _collected(t, projections, noise)
+    return _collected(t, [t.whitened(quiet.of(rest[b]), drawn[b : b + 1]) for b in range(draws)], noise)
 
 
 def _collected(t: Tangent, projections: list[Projection], noise: Noise) -> Chance:

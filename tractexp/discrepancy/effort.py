@@ -1,42 +1,54 @@
 """What an investigation has spent so far, and the lines that say how far it is."""
 
 import time
-from collections.abc import Callable
-from threading import Lock
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from threading import Event, Lock, Thread
 
-SILENCE = 4.0  # s after which a line says that work goes on
+SILENCE = 4.0  # s after which a line says that a step goes on
 
 
 class Effort:
-    """Counts simulations, passes on what each step says, and breaks long silences. Used by many threads at once."""
+    """Counts simulations and passes on what each step says. Used by many threads at once."""
 
     def __init__(self, tell: Callable[[str], None] = lambda line: None):
-        self._tell, self._lock = tell, Lock()
+        self.simulations, self._lock = 0, Lock()
+        self._tell, self._all = tell, [self]
         self._step, self._begun, self._said = "", time.perf_counter(), time.perf_counter()
-        self.simulations = 0
 
     def anew(self) -> "Effort":
-        """Another count that tells the same listener."""
-        return Effort(self._tell)
+        """A count of its own for a part of the work, which tells the same listener."""
+        part = Effort(self.say)
+        part._all = self._all
+        self._all.append(part)
+        return part
 
     def say(self, line: str) -> None:
         """Name the step that begins."""
-        with self._lock:
-            self._step, self._begun = line, time.perf_counter()
-            self._said = self._begun
+        self._step, self._begun, self._said = line, time.perf_counter(), time.perf_counter()
         self._tell(line)
 
     def spend(self, simulations: int) -> None:
         """Count simulations that are about to run."""
         with self._lock:
             self.simulations += simulations
-        self.still(f"{self.simulations} simulations")
 
-    def still(self, done: str) -> None:
-        """Say what is done so far, if nothing has been said for a while."""
-        with self._lock:
-            now = time.perf_counter()
-            if now - self._said < SILENCE:
-                return
-            self._said, spent = now, now - self._begun
-        self._tell(f"  still {self._step or 'at work'}: {done}, {spent:.0f} s")
+    @contextmanager
+    def audible(self) -> Iterator["Effort"]:
+        """While this is entered no step is silent for long."""
+        ended = Event()
+
+        def watch() -> None:
+            while not ended.wait(SILENCE / 4):
+                now = time.perf_counter()
+                if now - self._said >= SILENCE:
+                    self._said, total = now, sum(effort.simulations for effort in self._all)
+                    self._tell(f"  still {self._step or 'at work'}: {total} simulations, {now - self._begun:.0f} s")
+
+        watcher = Thread(target=watch, name="progress", daemon=True)
+        watcher.start()
+        try:
+            yield self
+        finally:
+            ended.set()
+            watcher.join()

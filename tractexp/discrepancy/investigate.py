@@ -99,31 +99,32 @@ def investigate(
     effects that are tested (none: all), `substeps` the Runge-Kutta steps per sample (None: as many as needed). Raises
     `UserError` for wrong events or names.
     """
-    effort, criteria = Effort(tell), criteria or Criteria()
+    criteria = criteria or Criteria()
     check_events(train, validate)
-    missing = catalogue(model.motor, model.static, model.effects, train, only, criteria.frequency_swing)
-    some, others = len(missing.candidates), len(missing.untestable)
-    effort.say(f"testing {some} effects, {others} more cannot be tested on these events")
-    Family(model, missing).compile(effort)
+    with Effort(tell).audible() as effort:
+        missing = catalogue(model.motor, model.static, model.effects, train, only, criteria.frequency_swing)
+        some, others = len(missing.candidates), len(missing.untestable)
+        effort.say(f"testing {some} effects, {others} more cannot be tested on these events")
+        Family(model, missing).compile(effort.say)
 
-    records = Records.of(train)
-    base = base_fit(Bench.of(model, missing, records, bounds or {}, fixed or {}, criteria, effort, substeps))
-    base, first = behind_recorder(base, disagreement(base, seed), seed)
-    standing_out = places(first)
-    explained = explanations(base, first, seed)
-    left = survivors(explained, seed)
-    weighed = held_out(left, validate, seed)
-    said = verdict(weighed, validate)
-    return Investigation(
-        base=base,
-        first=first,
-        places=() if said.word == NONE else tuple(standing_out),
-        explanations=explained,
-        survivors=left,
-        held_out=weighed,
-        verdict=said,
-        train=_gap(base.bench, weighed, said),
-    )
+        records = Records.of(train)
+        base = base_fit(Bench.of(model, missing, records, bounds or {}, fixed or {}, criteria, effort, substeps))
+        base, first = behind_recorder(base, disagreement(base, seed), seed)
+        standing_out = places(first)
+        explained = explanations(base, first, seed)
+        left = survivors(explained, seed)
+        weighed = held_out(left, validate, seed)
+        said = verdict(weighed, validate)
+        return Investigation(
+            base=base,
+            first=first,
+            places=() if said.word == NONE else tuple(standing_out),
+            explanations=explained,
+            survivors=left,
+            held_out=weighed,
+            verdict=said,
+            train=_gap(base.bench, weighed, said),
+        )
 
 
 def _gap(bench: Bench, weighed: HeldOut, said: Verdict) -> Gap:

@@ -7,14 +7,13 @@ the kernel of everything. All give the same response up to rounding.
 """
 
 import functools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from tractexp.discrepancy.catalogue import Catalogue
 from tractexp.discrepancy.cores import side_by_side
-from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.injection import Injection
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.problem import Problem
@@ -72,16 +71,9 @@ class Family:
                     return group, False
         return (self.short, True) if load <= self.short else None
 
-    def compile(self, effort: Effort) -> None:
+    def compile(self, say: Callable[[str], None]) -> None:
         """Compile what is not in the cache yet, side by side."""
-
-        def tell(done: int) -> None:
-            if done:
-                effort.still(f"{done} kernels compiled")
-            else:
-                effort.say("compiling kernels, once for this base model and these channels")
-
-        compile_missing(self._sources(), tell)
+        compile_missing(self._sources(), lambda: say("compiling kernels, once for this base model and these channels"))
 
     def _sources(self) -> Iterator[str]:
         """Two that are soon derived, so that something compiles while the largest is; then the largest first."""

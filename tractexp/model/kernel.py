@@ -75,22 +75,18 @@ def load(source: str) -> ModuleType:
     return module
 
 
-def compile_missing(sources: Iterable[str], tell: Callable[[int], None] = lambda done: None) -> None:
-    """Compile the kernels that the cache lacks, side by side in processes.
+def compile_missing(sources: Iterable[str], tell: Callable[[], None] = lambda: None) -> None:
+    """Compile the kernels that the cache lacks, side by side in processes; `tell` is called once if there are any.
 
-    `sources` may be a generator: what it derives next is derived while others compile. `tell` is called with 0 before
-    the first of them, if there is any, and with how many are done after each.
+    `sources` may be a generator: what it derives next is derived while others compile.
     """
     missing = (s for s in sources if not any(_compiled(s)))
     first = next(missing, None)
     if first is not None:
         from joblib import Parallel, delayed
 
-        tell(0)
-        jobs = (delayed(_compile)(s) for s in itertools.chain((first,), missing))
-        made = Parallel(n_jobs=os.cpu_count() or 1, return_as="generator_unordered")(jobs)
-        for done, _ in enumerate(made, start=1):
-            tell(done)
+        tell()
+        Parallel(n_jobs=os.cpu_count() or 1)(delayed(_compile)(s) for s in itertools.chain((first,), missing))
 
 
 def _compiled(source: str) -> Iterable[Path]:
