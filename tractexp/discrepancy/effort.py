@@ -33,17 +33,24 @@ class Effort:
         with self._lock:
             self.simulations += simulations
 
+    @property
+    def total(self) -> int:
+        """Simulations of all parts of the work."""
+        return sum(effort.simulations for effort in self._all)
+
     @contextmanager
     def audible(self) -> Iterator["Effort"]:
         """While this is entered no step is silent for long."""
         ended = Event()
 
         def watch() -> None:
+            counted = 0
             while not ended.wait(SILENCE / 4):
                 now = time.perf_counter()
                 if now - self._said >= SILENCE:
-                    self._said, total = now, sum(effort.simulations for effort in self._all)
-                    self._tell(f"  still {self._step or 'at work'}: {total} simulations, {now - self._begun:.0f} s")
+                    more = f"{self.total} simulations, " if self.total > counted else ""
+                    self._said, counted = now, self.total
+                    self._tell(f"  still {self._step or 'at work'}: {more}{now - self._begun:.0f} s")
 
         watcher = Thread(target=watch, name="progress", daemon=True)
         watcher.start()

@@ -81,7 +81,8 @@ def searched(steps: Sequence[Disagreement], refits: Refits, size: int, say: Call
     """The most promising sets of one size refitted, the best first. `steps` begin with one without effects."""
     bench, noise = steps[0].bench, steps[-1].noise
     wanted = shortlist(steps, size)
-    say(f"refitting {len(wanted)} {'effect' if size == 1 else f'sets of {size}'}{'s' * (size == 1)}")
+    one, many = ("effect", "effects") if size == 1 else (f"set of {size}", f"sets of {size}")
+    say(f"refitting {len(wanted)} {one if len(wanted) == 1 else many}")
     fits = rough_refit(bench, noise, [s for n in wanted for s in starts(steps, refits, n)])
     near = [f for f in fits if f.cost < fits[0].cost + CLOSE]
     exact = {f.names: f for f in refit(bench, noise, [(f.names, f.unit) for f in near])}
