@@ -38,8 +38,8 @@ def generalised(dips, model):
 
 @pytest.fixture(scope="module")
 def replicated(dips, model):
-    return tractexp.paper([dips[1]], [dips[0]], model=model, parts=["figure4", "figure6", "table2"], seeds=1, budget=200,
-                          workers=1)  # fmt: skip
+    return tractexp.paper([dips[1]], [dips[0]], model=model, parts=["figure4", "figure6", "table2"], seeds=1,
+                          budget=200, workers=1)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
