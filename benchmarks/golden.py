@@ -153,7 +153,7 @@ def main() -> int:
         said = row.get("refused") or f"{row.get('verdict', row.get('status'))} {' '.join(row.get('effects', []))}"
         found = list(differences(known[row["label"]], row)) if known else []
         moved += bool(found)
-        print(f"{row['label']}: {said}", *found[:12], sep="\n    ", flush=True)
+        print(f"{row['label']}: {said}", *(line[:150] for line in found[:12]), sep="\n    ", flush=True)
     if chosen.write:
         FILE.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
     else:

@@ -85,81 +85,81 @@ def run(group: str, trial: cases.Trial, held: int) -> dict:
         model = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
         row["generated"] = time.perf_counter() - started
         train, validate = events[: len(events) - held], events[len(events) - held :]
-        finding = investigate(model, train, validate, {}, {}, only=only, seed=0)
-        row |= _counted(finding) | _compared(finding, trial)
+        found = investigate(model, train, validate, only=only, seed=0)
+        row |= _counted(found) | _compared(found, trial)
     except (UserError, ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
         row["failed"] = f"{type(error).__name__}: {error}"
     return row | {"seconds": time.perf_counter() - started}
 
 
-def _counted(finding) -> dict:
+def _counted(found) -> dict:
     """What the product said, and what it said it with."""
-    first, study = finding.first, finding.study
+    first = found.first
     return {
-        "verdict": finding.verdict,
-        "names": list(finding.names),
-        "sets": [list(s) for s in finding.sets],
-        "chi2": finding.train.after.chi2_per_sample,
-        "closed": finding.train.closed,
-        "refitted": finding.refitted,
-        "closed_held": None if finding.validate is None else finding.validate.closed,
-        "gain_held": None if finding.validate is None else [finding.validate.gain, finding.validate.expected],
-        "left_of_all": None if finding.held_out is None else finding.held_out.p_left,
+        "verdict": found.verdict.word,
+        "names": list(found.names),
+        "sets": [list(s) for s in found.verdict.sets],
+        "chi2": found.train.after.chi2_per_sample,
+        "closed": found.train.closed,
+        "refitted": found.fitted_to_both,
+        "closed_held": None if found.validate is None else found.validate.closed,
+        "gain_held": None if found.validate is None else [found.validate.gain, found.validate.expected],
+        "left_of_all": None if found.judged is None else found.judged.p_left,
         "p_first": first.scores[0].p if first.scores else 1.0,
         "first": first.scores[0].name if first.scores else "",
-        "stages": [[list(s.fit.names), s.scores[0].name, s.scores[0].p] for s in finding.explanation.stages],
-        "left": [s.p_left for s in finding.explanation.stages],
-        "left_by": finding.last.left,
-        "samples": study.likelihood.samples,
+        "stages": [[list(s.fit.names), s.scores[0].name, s.scores[0].p] for s in found.explanations.steps],
+        "left": [s.p_left for s in found.explanations.steps],
+        "left_by": found.last.left,
+        "samples": found.bench.samples,
         "drops": {s.name: s.drop for s in first.scores},
-        "parameters": {s.name: len(finding.catalogue[s.name].effect.parameters) for s in first.scores},
-        "untestable": sorted(finding.catalogue.untestable),
-        "simulations": study.simulations,
+        "parameters": {s.name: len(found.catalogue[s.name].effect.parameters) for s in first.scores},
+        "untestable": sorted(found.catalogue.untestable),
+        "simulations": found.bench.effort.simulations,
     }
 
 
-def _compared(finding, trial: cases.Trial) -> dict:
+def _compared(found, trial: cases.Trial) -> dict:
     """What the product said, held against what was made: sizes, places, clean curves, and what was to be found."""
-    from tractexp.discrepancy.contract import parameters
+    from tractexp.discrepancy.discrepancy_json import parameters
 
     told = truth(trial.case, trial.seed)
-    row = {"places": len(finding.places), "places_true": sum(_overlaps(p, told["where"]) for p in finding.places)}
+    row = {"places": len(found.places), "places_true": sum(_overlaps(p, told["where"]) for p in found.places)}
     hidden = [e["name"] for e in told["effects"]]
-    if len(hidden) == 1 and list(finding.names) == hidden and hidden[0] in SAME:
-        own = parameters(finding)[SAME[finding.names[0]]]
+    if len(hidden) == 1 and list(found.names) == hidden and hidden[0] in SAME:
+        own = parameters(found)[SAME[found.names[0]]]
         row |= {"estimate": own["value"], "error": own["standard_error"], "amount": told["effects"][0]["amount"]}
     made = scene(trial.case, trial.seed)
     clean = _powers(made.records())
-    if finding.held_out is not None:
-        study, units = finding.held_out.study, finding.held_out.units
-        N = study.problem.drive.samples
-        got = study.residuals(np.array(units)) + study.problem.drive.measured - clean[:, -N:]
+    if found.judged is not None:
+        other = found.judged.bench
+        N = other.drive.samples
+        got = other.residuals(np.array(found.judged.units)) + other.drive.measured - clean[:, -N:]
         before, after = np.sum(got**2, axis=(1, 2))
         row["closed_true"] = 1 - after / before
-    if made.effects and not finding.catalogue.untestable.keys() & {name for name, _ in made.effects}:
+    if made.effects and not found.catalogue.untestable.keys() & {name for name, _ in made.effects}:
         without = _powers(replace(made, effects=()).records())
-        N = finding.study.problem.drive.samples
+        N = found.bench.drive.samples
         change = (clean - without)[:, :N]
-        projection = finding.first.tangent.whitened(finding.first.noise, -change[None])
-        row |= {"lambda": float(projection.r[0] @ projection.r[0]), "lambda_left": _left(finding, clean[:, :N])}
+        projection = found.first.tangent.whitened(found.first.noise, -change[None])
+        row |= {"lambda": float(projection.r[0] @ projection.r[0]), "lambda_left": _left(found, clean[:, :N])}
     return row
 
 
-def _left(finding, clean: np.ndarray) -> float:
+def _left(found, clean: np.ndarray) -> float:
     """Non-centrality that the best single effect leaves of clean curves (2, N), refitted to the noisy ones.
 
     At its fit the problem is linear enough: what its parameters and the nuisances can still take is projected out.
     """
+    from tractexp.discrepancy.explanations import searched
     from tractexp.discrepancy.tangent import tangent
-    from tractexp.discrepancy.which import searched
 
-    study, first, refits = finding.study, finding.first, finding.explanation.refits
+    bench, first, refits = found.bench, found.first, found.explanations.refits
     singles = [fit for names, fit in refits.items() if len(names) == 1]
-    singles = singles or searched(study, [first], {(): first.fit}, 1, lambda line: None)
+    singles = singles or searched([first], {(): first.fit}, 1, lambda line: None)
     left = []
     for fit in sorted(singles, key=lambda f: f.cost)[:BEST]:
-        t = tangent(study, fit, first.noise)
-        off = (t.residual + study.problem.drive.measured - clean) * study.likelihood.known
+        t = tangent(bench, fit, first.noise)
+        off = (t.residual + bench.drive.measured - clean) * bench.known
         rows = t.whitened(first.noise, off[None]).r[0]
         left.append(float(rows @ rows))
     return min(left)

@@ -19,19 +19,18 @@ HERE = "benchmarks/symmetries.py"
 
 
 def third_order(eq, T_prime, X_prime, C, M, T_m):
-    """Eqs. (1)-(3) of the paper in expressions of any parameters; the motor consumes P and Q."""
-    from tractexp.model.equations import I, im, re, sympy
+    """Eqs. (1)-(3) of the paper in expressions of any parameters; returns the stator current."""
+    import sympy
+    from sympy import I, im
 
     U, U0 = eq.U, eq.U0
-    E, omega = eq.phasor("E", "E"), eq.state("omega", r"\omega")
-    P = eq.define("P_motor", -U * im(E) / X_prime, "P_d")
-    Q = eq.define("Q_motor", U * (U - re(E)) / X_prime, "Q_d")
+    E, omega = eq.flux("E", "E"), eq.speed()
     sine = 2 * T_m * X_prime / (C * U0**2)
     cosine = sympy.sqrt(sympy.Max(0, 1 - sine**2))
     eq.moves(E, (C * U - E) / T_prime + I * (omega - eq.omega_s) * E, C * U0 / 2 * (1 + cosine - I * sine))
-    eq.moves(omega, (P - T_m) / M, eq.omega_s0 - sine / (1 + cosine) / T_prime)
+    eq.moves(omega, (-U * im(E) / X_prime - T_m) / M, eq.omega_s0 - sine / (1 + cosine) / T_prime)
     eq.require(1 - sympy.Abs(sine), "no steady state: |2 T_m X'/(C U0²)| is {value:.3g}", sympy.Abs(sine))
-    eq.consume(P, Q)
+    return (eq.V - E) / (I * X_prime)
 
 
 class TCircuit(Motor):
@@ -44,11 +43,10 @@ class TCircuit(Motor):
     M = Parameter(0.006, (0.0005, 0.03), "pu s²/rad", "inertia constant", HERE)
     T_m = Parameter(0.4, (0.05, 1.0), "pu", "load torque", HERE)
 
-    def declare(self, eq):
-        X_s, X_m, X_r, R_r, M, T_m = eq.declare(self.parameters)
+    def declare(self, eq, X_s, X_m, X_r, R_r, M, T_m):
         X, X_prime = X_s + X_m, X_s + X_m * X_r / (X_m + X_r)
         T0_prime = (X_m + X_r) / (OMEGA * R_r)
-        third_order(eq, X_prime / X * T0_prime, X_prime, (X - X_prime) / X, M, T_m)
+        return third_order(eq, X_prime / X * T0_prime, X_prime, (X - X_prime) / X, M, T_m)
 
 
 class Rated(Motor):
@@ -61,9 +59,8 @@ class Rated(Motor):
     T_m = Parameter(0.4, (0.05, 1.0), "pu", "load torque on the record's base", HERE)
     rating = Parameter(0.6, (0.4, 1.0), "pu", "rating", HERE)
 
-    def declare(self, eq):
-        T_prime, x_prime, C, inertia, T_m, rating = eq.declare(self.parameters)
-        third_order(eq, T_prime, x_prime / rating, C, inertia * rating, T_m)
+    def declare(self, eq, T_prime, x_prime, C, inertia, T_m, rating):
+        return third_order(eq, T_prime, x_prime / rating, C, inertia * rating, T_m)
 
 
 @functools.cache

@@ -128,13 +128,13 @@ def bound(load, events, truth: np.ndarray, deviation: float, correlation: float)
     """Cramér-Rao: the information at the truth under the noise that was really added, P0 and Q0 unknown."""
     from tractexp.identification.information import Information
     from tractexp.identification.likelihood import Likelihood
-    from tractexp.identification.noise import Autoregression
     from tractexp.identification.problem import Problem
+    from tractexp.noise import Autoregression, Noise
 
     shock = deviation * np.sqrt(1 - correlation**2)
     true = Autoregression(np.array([[0.0], [correlation]]), np.array([deviation, shock]))
     problem = Problem(load, events)
-    likelihood = Likelihood.of(problem, [(true, true)] * len(events))
+    likelihood = Likelihood.of(problem, Noise(((true, true),)))
     unit = likelihood.to_unit(truth)[0]
     _, J = likelihood.jacobian(unit)
     d = len(truth)

@@ -4,7 +4,27 @@ from pathlib import Path
 
 import pytest
 
-import tractexp  # noqa: F401  before NumPy: it keeps BLAS to one thread, as every command does
+import tractexp  # before NumPy: it keeps BLAS to one thread, as every command does
+
+MOTOR = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p_v": 1.4, "q_v": 3.0}
+
+
+@pytest.fixture(scope="session")
+def resistive_dips(tmp_path_factory) -> list[Path]:
+    """Three dips of a motor with a stator resistance of 0.02 pu and noise of 0.3 %, as CSV files."""
+    import numpy as np
+
+    folder, noise = tmp_path_factory.mktemp("dips"), np.random.default_rng(7)
+    load, paths = tractexp.compose(effects=["stator_resistance"]), []
+    for depth, duration in ((0.3, 0.2), (0.5, 0.15), (0.4, 0.3)):
+        made = tractexp.simulate(load, MOTOR | {"R_s": 0.02}, depth=depth, duration=duration, rate=200, length=2)
+        frame = made.responses[0].to_frame()
+        frame[["P", "Q"]] += 0.003 * noise.standard_normal((len(frame), 2))
+        paths.append(folder / f"dip{len(paths) + 1}.csv")
+        frame.to_csv(paths[-1], index=False)
+    return paths
+
+collect_ignore = ["acme"]  # a package of its own, whose tests run where it is installed
 
 
 @pytest.fixture

@@ -7,8 +7,9 @@ import pytest
 import uncertainty as study
 
 from tractexp.errors import UserError
-from tractexp.identification.problem import Problem, even
+from tractexp.identification.problem import Problem
 from tractexp.identification.search import search
+from tractexp.identification.starts import even
 from tractexp.identification.uncertainty import assess
 from tractexp.plugin import build, get
 

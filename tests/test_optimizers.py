@@ -218,7 +218,7 @@ def test_particles_move_as_computed_by_hand():
 
     settings = {"population": 2, "inertia": 0.8, "cognitive": 0.5, "social": 1.0, "velocity_limit": 0.25}
     evaluate = Evaluate()
-    steps = build("optimizer", {"name": "pso", **settings}).search(evaluate, Box(np.zeros(2), np.ones(2)), Drawn())
+    steps = build("optimizer", {"name": "pso", **settings}).search(evaluate, Box.unit(2), Drawn())
     r = draws[0]
     for _ in range(7):
         next(steps)

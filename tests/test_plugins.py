@@ -3,8 +3,10 @@
 import ast
 import json
 import os
+import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +14,12 @@ import pytest
 
 from tractexp.errors import UserError
 from tractexp.identification.optimizer import Optimizer
-from tractexp.model.parts import Static
-from tractexp.parameter import Parameter, Space
+from tractexp.model.parts import Effect, Measurement, Motor, Static
+from tractexp.parameter import Box, Parameter
 from tractexp.plugin import CONF, Plugin, build, discover, get, plugin, schema
 
 TESTS = Path(__file__).parent
+PAGE = TESTS.parent / "docs" / "plugins.md"
 FRAMEWORK = TESTS.parent / "tractexp"
 
 
@@ -35,6 +38,7 @@ def acme(tmp_path_factory):
     pip = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-build-isolation", "--no-index"]
     done = subprocess.run([*pip, "--target", str(site), str(package)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+    (site / "test_acme.py").write_text((TESTS / "acme" / "test_acme.py").read_text())
     return site
 
 
@@ -58,6 +62,87 @@ def test_a_second_package_is_in_the_help_and_checked_like_ours(acme, tmp_path):
     assert done.stderr == "tractexp: optimizer.tries=0 is out of range: it must be at least 1\n"
 
 
+def test_a_second_package_keeps_the_contracts_by_one_line(acme, tmp_path):
+    passed(acme / "test_acme.py", acme, tmp_path)
+
+
+def passed(file, package, folder):
+    """Run a test file with a package on the path, and the project's own settings."""
+    pytest_there = [sys.executable, "-m", "pytest", "-q", "-W", "error", "-p", "no:cacheprovider", str(file)]
+    done = subprocess.run(
+        pytest_there, cwd=folder, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(package)}
+    )
+    assert done.returncode == 0, done.stdout[-4000:]
+
+
+STRANGERS = """
+import pytest
+
+import tractexp.testing
+from tractexp.discrepancy.injection import PUSHES, Injection
+from tractexp.model.model import compose
+from tractexp.plugin import discover, get
+
+TestDocumented = tractexp.testing.contract("documented", {"tabbed": [{"files": ["dip.tsv"]}]})
+
+
+@pytest.mark.parametrize("name", sorted(discover()["effect"]))
+def test_every_effect_edits_a_load_that_gives_a_law_only(name):
+    model = compose(get("model/motor", "electromechanical")(), get("model/static", "linear_load")())
+    assert model.acceptance(get("effect", name)()).refusal is None
+
+
+def test_a_motor_takes_what_its_sites_allow_and_says_why_not():
+    model = compose(get("model/motor", "acme_motor")(), get("model/static", "exponential")())
+    refusals = {name: model.acceptance(cls()).refusal for name, cls in discover()["effect"].items()}
+    assert {name: why for name, why in refusals.items() if why} == {
+        "magnetic_saturation": "its equations have no C",
+        "negative_sequence_braking": "its equations have no coupling ((X - X')/X, the rotor's share in the reactance)",
+    }
+
+
+@pytest.mark.parametrize("motor", sorted(set(discover()["model/motor"]) - {"none"}))
+def test_every_motor_is_pushed_in_each_flux_and_its_speed(motor):
+    eq = compose(get("model/motor", motor)(), get("model/static", "exponential")(), [Injection()]).equations
+    for state in eq.states.values():
+        pushed = {s.name for s in state.derivative.free_symbols} & set(PUSHES)
+        assert pushed == {"flux": {"push_flux_d", "push_flux_q"}, "speed": {"push_speed"}}[state.role]
+"""
+
+
+def test_the_examples_of_the_documentation_keep_the_contracts(tmp_path):
+    """Each block of docs/plugins.md that is Python, as it stands there, is a plugin of a package."""
+    blocks = re.findall(r"```python\n# (\w+\.py)\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    assert {name for name, _ in blocks} == {
+        "linear_load.py", "rate_dependence.py", "late_load.py", "channel_gain.py", "acme_motor.py",
+        "shrinking_step.py", "tabbed.py",
+    }  # fmt: skip
+    package = tmp_path / "documented"
+    package.mkdir()
+    for name, text in (("__init__.py", ""), *blocks):
+        (package / name).write_text(text, encoding="utf-8")
+    t = np.arange(100) * 0.01
+    np.savetxt(tmp_path / "dip.tsv", np.c_[t, np.ones(100), np.ones(100), np.full(100, 0.5)], delimiter="\t")
+    (tmp_path / "test_strangers.py").write_text(STRANGERS)
+    passed("test_strangers.py", tmp_path, tmp_path)
+
+
+def test_the_documentation_tells_every_word_of_the_equations_and_every_site():
+    from tractexp.model.equations import Equations
+    from tractexp.model.sites import SITES
+
+    text = PAGE.read_text(encoding="utf-8")
+    told = set(re.findall(r"`eq\.(\w+)", text))
+    framework = {
+        "parameters", "definitions", "steps", "known_before", "shown", "states", "memories", "requirements", "edits",
+        "latex_names", "write", "declare", "close", "at_rest", "expand", "real_states", "real_balances", "parts", "real",
+        "latex",
+    }  # fmt: skip
+    assert told == {w for w in (*dir(Equations), *vars(Equations())) if not w.startswith("_")} - framework
+    for site in SITES.values():
+        assert f"| `{site.name}` | {site.owner} | {site.kind} | {site.unit} | {site.about} |" in text
+
+
 def test_without_the_package_its_names_are_unknown(tmp_path):
     done = tractexp("optimizer=acme_descent", cwd=tmp_path)
     assert done.returncode == 2
@@ -70,15 +155,6 @@ def test_every_plugin_has_a_schema_that_says_its_name():
     for classes in groups.values():
         for name, cls in classes.items():
             assert schema(cls)().name == name == cls.__module__.rpartition(".")[2]
-
-
-def test_every_parameter_has_a_unit_a_meaning_and_a_source():
-    for classes in discover().values():
-        for cls in classes.values():
-            for p in cls.parameters:
-                assert p.unit, p.name
-                assert p.about, p.name
-                assert p.source, p.name
 
 
 def test_an_unknown_name_gets_the_nearest_one():
@@ -119,6 +195,7 @@ def test_a_plugin_without_a_base_is_refused():
 
 
 def test_a_taken_name_is_refused_and_both_are_named():
+    discover()
     with pytest.raises(
         UserError, match=r"the name 'ssa' in group 'optimizer' is taken by tractexp_plugins\.optimizers"
     ):
@@ -129,21 +206,66 @@ def test_a_taken_name_is_refused_and_both_are_named():
         )
 
 
+SIZE = Parameter(0.0, (0.0, 1.0), "1", "how large", "here", null=0.0)
+PLAIN = Parameter(0.5, (0.0, 1.0), "1", "how fast", "here")
+
+
+def declared(base, methods, **attributes):
+    """Register a plugin class of this base, written in a file `stranger.py`; refused, so nothing stays registered."""
+    made = {"__doc__": "Source: here.", "__module__": "elsewhere.stranger", "__annotations__": {}}
+    return plugin(type("Stranger", (base,), made | methods | attributes))
+
+
 @pytest.mark.parametrize(
-    ("default", "bounds", "sentence"),
+    ("base", "methods", "attributes", "sentence"),
     [
-        (2.0, (0.0, 1.0), r"the default 2 is outside the bounds \[0, 1\]"),
-        (0.5, (1.0, 0.0), r"bounds \[1, 0\] must be two finite numbers, the lower one first"),
-        (0.5, (0.0, float("inf")), "must be two finite numbers"),
+        (Static, {"law": lambda self, u, p_w: (1, 1)}, {"p_v": replace(PLAIN)},
+         r"law\(\) asks for 'p_w', which is neither a parameter of it nor offered; did you mean 'p_v'\?.* f, p_v"),
+        (Static, {"law": lambda self, u: (1, 1)}, {"p_v": replace(PLAIN)}, r"law\(\) does not take the parameter 'p_v'"),
+        (Static, {"law": lambda self, p_v: (1, 1)}, {"p_v": replace(PLAIN)}, r"law\(\) must take u first"),
+        (Static, {"law": lambda self, u, *p: (1, 1)}, {"p_v": replace(PLAIN)}, r"by name, so it cannot take \*p"),
+        (Static, {"law": lambda self, u: (1, 1)}, {"reads": ("frequency",)}, "reads names the channel 'frequency'"),
+        (Static, {}, {}, "must do: define law"),
+        (Static, {"law": lambda self, u, c1: (1, 1)}, {"c1": replace(PLAIN)}, "called 'c1': the kernel uses that name"),
+        (Static, {"law": lambda self, u, U0: (1, 1)}, {"U0": replace(PLAIN)}, "called 'U0': the equations give that name"),
+        (Static, {"law": lambda self, u, a, b: (1, 1)}, dict.fromkeys("ab", replace(PLAIN)),
+         "'b' is the parameter 'a' again, and a parameter has one name"),
+        (Static, {"law": lambda self, u, a: (1, 1)}, {"a": replace(PLAIN, unit="")}, "a: the parameter has no unit"),
+        (Static, {"law": lambda self, u, a: (1, 1)}, {"a": replace(PLAIN, default=2.0)}, "default 2 is outside the bounds"),
+        (Motor, {"declare": lambda self, eq, speed: None}, {}, r"declare\(\) asks for 'speed'"),
+        (Effect, {"edit": lambda self, eq, a: None}, {"a": replace(PLAIN)}, "has no size: give the parameter .* a 'null'"),
+        (Effect, {"edit": lambda self, eq: None}, {"a": replace(SIZE)}, r"edit\(\) does not take the parameter 'a'"),
+        (Effect, {"edit": lambda self, eq, a: None}, {"a": replace(SIZE), "grid": {"b": (1.0,)}}, "grid names 'b', no"),
+        (Effect, {"edit": lambda self, eq, a: None}, {"a": replace(SIZE), "grid": {"a": (1.0,)}}, "'a', which is a size"),
+        (Effect, {"edit": lambda self, eq, a, b: None},
+         {"a": replace(SIZE), "b": replace(PLAIN), "relevant": {"b": 0.1}}, "relevant names 'b', which has no null"),
+        (Effect, {"edit": lambda self, eq, a, b: None},
+         {"a": replace(SIZE), "b": replace(PLAIN), "grid": {"b": (3.0,)}}, "grid has b = 3, outside its bounds"),
+        (Measurement, {}, {"a": replace(SIZE)}, "must do: define observe"),
+    ],
+)  # fmt: skip
+def test_what_a_class_forgets_is_refused_when_it_is_registered(base, methods, attributes, sentence):
+    with pytest.raises(UserError, match=r"^plugin elsewhere\.stranger\.Stranger.*" + sentence):
+        declared(base, methods, **attributes)
+
+
+@pytest.mark.parametrize(
+    ("settings", "sentence"),
+    [
+        ({"default": 2.0}, r"the default 2 is outside the bounds \[0, 1\]"),
+        ({"bounds": (1.0, 0.0)}, r"bounds \[1, 0\] must be two finite numbers, the lower one first"),
+        ({"bounds": (0.0, float("inf"))}, "must be two finite numbers"),
+        ({"null": -1.0}, r"the null -1 is outside the bounds \[0, 1\]"),
+        ({"source": " "}, "the parameter has no source"),
     ],
 )
-def test_a_parameter_checks_its_bounds(default, bounds, sentence):
+def test_a_parameter_checks_itself(settings, sentence):
     with pytest.raises(UserError, match=sentence):
-        Parameter(default, bounds, "1", "about", "source").check("here")
+        replace(PLAIN, **settings).check("here")
 
 
-def test_the_space_maps_names_to_the_unit_cube_and_back():
-    space = Space(("a", "b"), np.array([0.0, -2.0]), np.array([1.0, 2.0]))
+def test_a_box_maps_names_to_the_unit_cube_and_back():
+    space = Box(np.array([0.0, -2.0]), np.array([1.0, 2.0]), ("a", "b"))
     assert space.from_unit(space.to_unit([[0.25, 1.0]])).tolist() == [[0.25, 1.0]]
     assert space.index("b") == 1
     with pytest.raises(UserError, match="this model has no parameter 'c'"):

@@ -7,9 +7,9 @@ import pytest
 from scipy.integrate import quad
 from test_discrepancy import base, events
 
-from tractexp.discrepancy.contract import contract
+from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.investigate import investigate
-from tractexp.discrepancy.phasors import Phasors, averaged, windows_of
+from tractexp.discrepancy.recorder_window import RecorderWindow, averaged, windows_of
 
 FEW = ("stator_resistance", "exponential_recovery", "second_motor_group")
 
@@ -36,7 +36,7 @@ def test_the_voltage_reckoned_back_is_that_which_was_averaged(cycles):
     (event,) = events(count=1)
     step, window = event.record.step, 0.02 * cycles
     shown = replace(event, record=replace(event.record, U=averaged(event.record.U, window / step)))
-    back = Phasors(window).sharpened(shown).record.U
+    back = RecorderWindow(window).sharpened(shown).record.U
     shows, error = shown.record.U - event.record.U, back - event.record.U
     assert np.abs(shows).max() > 0.01
     # What repeats with the window itself cannot be told: corners lose a little where it is shorter than the edges.
@@ -54,23 +54,23 @@ def test_a_window_of_phasors_is_no_missing_effect():
     """The load is nonlinear, so that a window on voltage and current shows, and no effect is named for it."""
     made = events(count=3, nuisances=(("phasor_window", 3.0),))
     told = []
-    finding = investigate(base(), made[:2], made[2:], {}, {}, only=FEW, tell=told.append)
-    assert finding.names == ()
-    assert finding.verdict == "none"
-    assert contract(finding)["phasor_window"] == pytest.approx(0.06)
+    found = investigate(base(), made[:2], made[2:], {}, {}, only=FEW, tell=told.append)
+    assert found.names == ()
+    assert found.verdict.word == "none"
+    assert content(found)["phasor_window"] == pytest.approx(0.06)
     assert any("60 ms" in line for line in told)
-    assert "60 ms" in finding.reason
+    assert "60 ms" in found.verdict.reason
 
 
 def test_no_window_is_found_where_there_is_none():
     for effect in (None, "stator_resistance"):
         made = events(effect, size=2.0, count=3)
-        finding = investigate(base(), made[:2], made[2:], {}, {}, only=FEW)
-        assert contract(finding)["phasor_window"] is None
-        assert finding.names == ((effect,) if effect else ())
+        found = investigate(base(), made[:2], made[2:], {}, {}, only=FEW)
+        assert content(found)["phasor_window"] is None
+        assert found.names == ((effect,) if effect else ())
 
 
 def test_an_effect_is_found_behind_a_window():
     made = events("stator_resistance", size=3.0, count=3, nuisances=(("phasor_window", 2.0),))
-    finding = investigate(base(), made[:2], made[2:], {}, {}, only=FEW)
-    assert "stator_resistance" in finding.names
+    found = investigate(base(), made[:2], made[2:], {}, {}, only=FEW)
+    assert "stator_resistance" in found.names

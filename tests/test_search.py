@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from tractexp.errors import UserError
+from tractexp.identification.least_squares import APART, Elite, _Residuals, least_squares_from, race
 from tractexp.identification.optimizer import REFUSED, Box, Evaluate, Optimizer
-from tractexp.identification.polish import APART, Elite, _Residuals, descend, race, spread
 from tractexp.identification.search import Limits, search
+from tractexp.identification.starts import best_distinct
 from tractexp.plugin import build
 
 LOWER, UPPER = np.array([-2.0, 0.5, 100.0]), np.array([3.0, 0.75, 900.0])
@@ -142,17 +143,17 @@ def test_residuals_count_and_refuse_like_objectives():
     assert found.values[0] == pytest.approx(2.5)
 
 
-def test_spread_takes_the_best_and_leaves_its_neighbors():
+def test_best_distinct_takes_the_best_and_leaves_its_neighbors():
     unit = np.array([[0.5, 0.5], [0.51, 0.5], [0.9, 0.5], [0.5, 0.05]])
-    assert spread(unit, np.array([2.0, 1.0, 3.0, 4.0]), 10).tolist() == [1, 2, 3]
-    assert spread(unit, np.array([2.0, 1.0, 3.0, 4.0]), 2).tolist() == [1, 2]
+    assert best_distinct(unit, np.array([2.0, 1.0, 3.0, 4.0]), APART, 10).tolist() == [1, 2, 3]
+    assert best_distinct(unit, np.array([2.0, 1.0, 3.0, 4.0]), APART, 2).tolist() == [1, 2]
 
 
 @given(arrays(float, (40, 2), elements=st.floats(0, 1)), st.integers(0, 99))
 @settings(deadline=None)
 def test_the_elite_lies_apart_in_order_and_holds_the_best(unit, seed):
     f = np.random.default_rng(seed).random(40)
-    elite = Elite(Box(np.zeros(2), np.ones(2)))
+    elite = Elite(Box.unit(2))
     for k in range(0, 40, 8):
         elite.add(unit[k : k + 8], f[k : k + 8])
     assert elite.f[0] == f.min()
@@ -162,7 +163,7 @@ def test_the_elite_lies_apart_in_order_and_holds_the_best(unit, seed):
 
 
 def test_the_elite_has_no_refused_points():
-    elite = Elite(Box(np.zeros(2), np.ones(2)))
+    elite = Elite(Box.unit(2))
     elite.add(np.array([[0.1, 0.1], [0.9, 0.9]]), np.array([REFUSED, 3.0]))
     assert elite.f.tolist() == [3.0]
 
@@ -198,7 +199,7 @@ def test_a_difference_that_cannot_be_simulated_is_taken_the_other_way():
         return np.where(x[:, :1] > 0.3, np.nan, 2 * x)
 
     evaluate = Direct(half)
-    residuals = _Residuals(evaluate, Box(np.zeros(2), np.ones(2)), 1.0)
+    residuals = _Residuals(evaluate, Box.unit(2), 1.0)
     unit = np.array([0.3, 0.4])
     residuals(unit)
     np.testing.assert_allclose(residuals.jacobian(unit), 2 * np.eye(2), rtol=1e-8, atol=1e-9)
@@ -207,7 +208,7 @@ def test_a_difference_that_cannot_be_simulated_is_taken_the_other_way():
 
 def test_a_start_that_cannot_be_simulated_costs_one_simulation():
     evaluate = Direct(lambda x: np.full((len(x), 4), np.nan))
-    descend(evaluate, Box(np.zeros(2), np.ones(2)), np.array([0.5, 0.5]), 1.0)
+    least_squares_from(evaluate, Box.unit(2), np.array([0.5, 0.5]), 1.0)
     assert evaluate.sizes == [1]
 
 
@@ -225,7 +226,7 @@ class TwoValleys(Direct):
 
 
 def test_a_descent_returns_where_it_ended():
-    x, f = descend(TwoValleys(), Box(np.zeros(1), np.ones(1)), np.array([0.3]), 1.01)
+    x, f = least_squares_from(TwoValleys(), Box.unit(1), np.array([0.3]), 1.01)
     assert x[0] == pytest.approx(0.2, abs=1e-6)
     assert f == pytest.approx(1.0, abs=1e-12)
 
@@ -233,7 +234,7 @@ def test_a_descent_returns_where_it_ended():
 def test_a_race_finds_the_lower_valley_and_finishes_every_start_in_it():
     starts = [(np.array([v]), 1.0) for v in (0.1, 0.3, 0.9)]
     valleys = TwoValleys()
-    descents = [valleys.lowest for _ in race(valleys, Box(np.zeros(1), np.ones(1)), starts)]
+    descents = [valleys.lowest for _ in race(valleys, Box.unit(1), starts)]
     assert descents[:2] == pytest.approx([1.0, 1.0], abs=1e-9)
     assert descents[2] < 1e-15
     assert 3 < len(descents) <= 2 * len(starts)

@@ -8,10 +8,10 @@ import sys
 import numpy as np
 import pytest
 
+from tractexp.api.simulate import chosen
 from tractexp.errors import UserError
 from tractexp.identification.result import Result, load
 from tractexp.plugin import get
-from tractexp.tasks.simulate import chosen
 
 TRUTH = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p_v": 1.4, "q_v": 3.0}
 MOTORS = ("mechanical", "voltage", "electromechanical", "stator_flux", "double_cage", "none")

@@ -189,7 +189,7 @@ def test_an_iteration_of_ssa_is_the_one_computed_by_hand(step, acceptance, R2, w
         permutation=[watch + [i for i in range(N) if i not in watch]],
     )
     settings = {"population": N, "perceivers": 0.4, "acceptance": acceptance, "step": step}
-    evaluate, box = Recorded(), Box(np.zeros(D), np.ones(D))
+    evaluate, box = Recorded(), Box.unit(D)
     steps = build("optimizer", {"name": "ssa", **settings}).search(evaluate, box, drawn)
     next(steps)
     next(steps)

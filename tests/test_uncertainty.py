@@ -11,14 +11,15 @@ from scipy.linalg import cholesky, toeplitz
 from scipy.signal import lfilter
 
 from tractexp.identification.descent import descend
-from tractexp.identification.diagnosis import jarque_bera, ljung_box, louder
 from tractexp.identification.information import Information
 from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.noise import Autoregression, fit_autoregression, stretches
 from tractexp.identification.problem import Problem
 from tractexp.identification.profile import checked
+from tractexp.identification.residual_tests import jarque_bera, ljung_box, louder
 from tractexp.identification.uncertainty import assess, compare_events
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK
+from tractexp.noise import Noise
+from tractexp.noise.color import Autoregression, fit_autoregression, stretches
 
 
 def ar1(rng, n, a):
@@ -127,8 +128,8 @@ def test_jacobian_agrees_with_the_printed_equations(model):
     """Central differences of an independent solution of Eqs. (1)-(7), not of the model's own kernel."""
     events = [replace(records((0.5,), 0.005)[0], U0=1.0)]  # the mean before a smooth fall is a little lower
     problem = Problem(model, events, substeps=16)
-    white = Autoregression(np.empty((1, 0)), np.array([1.0]))
-    likelihood = Likelihood.of(problem, [(white, white)])
+    white = Noise.white(1.0, 1.0)
+    likelihood = Likelihood.of(problem, white)
     t, U = events[0].record.t, events[0].record.U
     _, J = likelihood.jacobian(likelihood.to_unit(study.TYPICAL)[0])
     for j, name in enumerate(study.NAMES):

@@ -11,6 +11,7 @@ for library in ("OPENBLAS", "OMP", "MKL"):
 from tractexp.errors import UserError  # noqa: E402
 from tractexp.plugin import CONF  # noqa: E402
 
+OPEN = ("model.bounds.", "model.fixed.", "task.values", "task.criteria.")  # settings that take names of their own
 FULL_ERROR = "HYDRA_FULL_ERROR"  # Hydra's own switch: set it to see tracebacks
 
 
@@ -74,7 +75,7 @@ def _run() -> int:
 
 def opened(argument: str) -> str:
     """Let `model.bounds.C=[0.5,0.9]` add the entry it names: Hydra would ask for a plus sign."""
-    return f"++{argument}" if argument.startswith(("model.bounds.", "model.fixed.", "task.values")) else argument
+    return f"++{argument}" if argument.startswith(OPEN) else argument
 
 
 if __name__ == "__main__":

@@ -1,9 +1,6 @@
 """The door through which plugins and schemas enter Hydra's groups."""
 
 import hashlib
-import importlib
-import sys
-from types import ModuleType
 from typing import Any
 
 from hydra.core.config_store import ConfigStore
@@ -12,6 +9,7 @@ from hydra.plugins.search_path_plugin import SearchPathPlugin
 from omegaconf import OmegaConf
 
 from tractexp import plugin
+from tractexp.doors import hydra_config_store, hydra_plugins
 from tractexp.schema import Config
 
 
@@ -25,14 +23,11 @@ class PluginSearchPath(SearchPathPlugin):
 
 def register() -> None:
     """Discover all plugins and give Hydra their schemas. Raises `UserError` for a plugin that cannot be loaded."""
-    Plugins.instance()  # executes Hydra's own sweepers anew: before ours are derived from them
     from tractexp.sweep.launcher import Cores, CoresConfig
     from tractexp.sweep.sweeper import Grid, GridConfig
 
+    hydra_config_store.share()
     store = ConfigStore.instance()
-    # Hydra copies its sources, and the one store with them, for each composition and each group it lists: 40 ms a
-    # time. What it takes out of the store it copies anyway.
-    ConfigStore.__deepcopy__ = lambda self, memo: self  # type: ignore[attr-defined]
     store.store(name="config_schema", node=Config)
     for group, classes in plugin.discover().items():
         for name, cls in classes.items():
@@ -43,27 +38,13 @@ def register() -> None:
     store.store(group="hydra/launcher", name="cores", node=CoresConfig)
     Plugins.instance().register(PluginSearchPath)
     for cls in (Grid, Cores):
-        _admit(cls)
+        hydra_plugins.admit(cls)
     OmegaConf.register_new_resolver("fingerprint", _fingerprint, replace=True)
 
 
 def _configured(group: str, name: str) -> bool:
     """Whether a file gives this plugin its defaults: it begins with the schema, as conf/task/export.yaml does."""
     return any((folder / group / f"{name}.yaml").is_file() for folder in (plugin.CONF, *plugin.configuration_folders()))
-
-
-def _admit(cls: type) -> None:
-    """Make a sweeper or launcher known to Hydra, which takes them from modules below `hydra_plugins` only."""
-    Plugins.instance().register(cls)
-    package, _, name = cls.__module__.partition(".")
-    try:
-        parent = importlib.import_module(package)
-    except ModuleNotFoundError:
-        parent = sys.modules[package] = ModuleType(package)
-        parent.__path__ = []
-    door = sys.modules.setdefault(cls.__module__, ModuleType(cls.__module__))
-    setattr(door, cls.__name__, cls)
-    setattr(parent, name, door)
 
 
 def _fingerprint(overrides: Any) -> str:

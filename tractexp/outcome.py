@@ -35,14 +35,18 @@ class Table:
         return "\n".join([*([self.title] if self.title else []), *ruled, *self.said])
 
     def _repr_html_(self) -> str:
-        def row(cells: Sequence[Any], tag: str) -> str:
-            return "<tr>" + "".join(f"<{tag}>{html.escape(_told(c))}</{tag}>" for c in cells) + "</tr>"
+        def cell(content: Any, tag: str) -> str:
+            side = "left" if isinstance(content, str) else "right"
+            return f'<{tag} style="text-align:{side}">{html.escape(_told(content))}</{tag}>'
 
-        head = f"<caption>{html.escape(self.title)}</caption>" if self.title else ""
-        head += f"<thead>{row(self.columns, 'th')}</thead>"
+        def row(cells: Sequence[Any], tag: str) -> str:
+            return "<tr>" + "".join(cell(content, tag) for content in cells) + "</tr>"
+
+        title = f'<caption style="text-align:left"><b>{html.escape(self.title)}</b></caption>' if self.title else ""
+        head = f"<thead>{row(self.columns, 'th')}</thead>" if self.columns else ""
         body = "".join(row(cells, "td") for cells in self.rows)
-        said = "".join(f"<p>{html.escape(sentence)}</p>" for sentence in self.said)
-        return f"<table>{head}<tbody>{body}</tbody></table>{said}"
+        said = "<br>".join(html.escape(sentence) for sentence in self.said)
+        return f"<table>{title}{head}<tbody>{body}</tbody></table>" + (f"<p>{said}</p>" if said else "")
 
     def to_frame(self) -> Any:
         """A pandas frame of the rows."""
@@ -81,8 +85,17 @@ class Outcome:
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        """The result that `to_dict` told. Raises `UserError` where something is missing."""
+        """The result that `to_dict` told."""
         raise NotImplementedError
+
+    @classmethod
+    def revived(cls, content: Mapping[str, Any]) -> Self:
+        """As `from_dict`; raises `UserError` where something is missing or of the wrong kind."""
+        try:
+            return cls.from_dict(content)
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            told = f"it lacks {error}" if isinstance(error, KeyError) else str(error)
+            raise UserError(f"this is not a whole saved {cls.kind}: {told}; save it again") from error
 
     def to_frame(self) -> Any:
         """The table as a pandas frame."""
@@ -106,7 +119,7 @@ class Outcome:
         content = saved(path)
         if content["kind"] != cls.kind:
             raise UserError(f"{path} holds a result of kind '{content['kind']}', not '{cls.kind}'; read it by load()")
-        return cls.from_dict(content)
+        return cls.revived(content)
 
 
 def saved(path: Path | str) -> dict[str, Any]:

@@ -25,45 +25,72 @@ class Parameter:
     name: str = field(default="", compare=False)
 
     def __set_name__(self, owner: type, name: str) -> None:
-        object.__setattr__(self, "name", name)
-        object.__setattr__(self, "symbol", self.symbol or name)
-        self.check(f"{owner.__name__}.{name}")
+        if not self.name:  # one of several classes' has its name already
+            object.__setattr__(self, "name", name)
+            object.__setattr__(self, "symbol", self.symbol or name)
 
     def check(self, where: str) -> None:
-        """Raise `UserError` unless low <= default <= high, low < high, all finite."""
+        """Raise `UserError` unless low <= default, null <= high, low < high, all finite, and everything is told."""
+        for what in ("unit", "about", "source"):
+            if not getattr(self, what).strip():
+                raise UserError(f"{where}: the parameter has no {what}; say it ('1' where a number has no unit)")
         low, high = self.bounds
         if not (np.isfinite([low, high]).all() and low < high):
             raise UserError(f"{where}: bounds [{low:g}, {high:g}] must be two finite numbers, the lower one first")
         if not low <= self.default <= high:
             raise UserError(f"{where}: the default {self.default:g} is outside the bounds [{low:g}, {high:g}]")
+        if self.null is not None and not low <= self.null <= high:
+            raise UserError(f"{where}: the null {self.null:g} is outside the bounds [{low:g}, {high:g}]")
 
 
 @dataclass(frozen=True)
-class Space:
-    """The box of the free parameters: names <-> columns, physical values <-> the unit cube."""
+class Box:
+    """What a search may try: bounds (d,), and the way to the unit cube and back.
 
-    names: tuple[str, ...]
+    A problem's box has the names of its columns. An optimizer's has none: it is the unit cube, or the problem's
+    bounds where the optimizer asks for `space="raw"`.
+    """
+
     lower: np.ndarray  # (d,)
     upper: np.ndarray  # (d,)
+    names: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, parameters: tuple[Parameter, ...]) -> "Space":
+    def of(cls, parameters: tuple[Parameter, ...]) -> "Box":
+        """The box of some parameters, named as they are."""
         bounds = np.array([p.bounds for p in parameters], dtype=float).reshape(-1, 2)
-        return cls(tuple(p.name for p in parameters), bounds[:, 0].copy(), bounds[:, 1].copy())
+        return cls(bounds[:, 0].copy(), bounds[:, 1].copy(), tuple(p.name for p in parameters))
+
+    @classmethod
+    def unit(cls, dimension: int) -> "Box":
+        """The unit cube."""
+        return cls(np.zeros(dimension), np.ones(dimension))
 
     @property
     def dimension(self) -> int:
-        return len(self.names)
+        return len(self.lower)
 
-    def to_unit(self, values: np.ndarray) -> np.ndarray:
-        """Physical values (..., d) to the unit cube."""
-        return (values - self.lower) / (self.upper - self.lower)
+    @property
+    def width(self) -> np.ndarray:
+        return self.upper - self.lower
+
+    def clip(self, x: np.ndarray) -> np.ndarray:
+        return np.clip(x, self.lower, self.upper)
+
+    def uniform(self, rng: np.random.Generator, n: int) -> np.ndarray:
+        """(n, d) points drawn uniformly."""
+        return self.from_unit(rng.random((n, self.dimension)))
 
     def from_unit(self, unit: np.ndarray) -> np.ndarray:
-        """Points of the unit cube (..., d) to physical values, never outside the bounds by rounding."""
-        return np.clip(self.lower + unit * (self.upper - self.lower), self.lower, self.upper)
+        """Points (..., d) of the unit cube in this box's coordinates, never outside the bounds by rounding."""
+        return self.clip(self.lower + self.width * unit)
+
+    def to_unit(self, x: np.ndarray) -> np.ndarray:
+        """Points (..., d) of this box in the unit cube."""
+        return (x - self.lower) / self.width
 
     def index(self, name: str) -> int:
+        """The column of a name. Raises `UserError` for one there is not."""
         if name not in self.names:
             raise UserError(f"this model has no parameter '{name}'{among(name, self.names, 'Parameters')}")
         return self.names.index(name)

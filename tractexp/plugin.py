@@ -15,6 +15,7 @@ import functools
 import importlib
 import importlib.metadata
 import pkgutil
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar, dataclass_transform, get_type_hints
@@ -39,6 +40,10 @@ class Plugin:
     def check(self) -> None:
         """Raise `UserError` for a setting out of range. Called once, when the plugin is built."""
 
+    @classmethod
+    def check_class(cls, where: str) -> None:
+        """Raise `UserError`, starting with `where`, for what is declared wrongly. Called at registration."""
+
 
 Class = TypeVar("Class", bound=type[Plugin])
 _registry: dict[str, dict[str, type[Plugin]]] = {}
@@ -50,10 +55,13 @@ def plugin(cls: Class) -> Class:
     """Register a plugin class under its module's name, in its base's group.
 
     Raises `UserError` when the name is taken, when the class belongs to no group or lacks a method its base leaves to
-    it, or when its docstring does not say where its equations come from (a line starting with "Source:").
+    it, when its docstring does not say where its equations come from (a line starting with "Source:"), and for what its
+    base and its parameters find declared wrongly.
     """
     name = cls.__module__.rpartition(".")[2]
     where = f"plugin {cls.__module__}.{cls.__qualname__}"
+    if file := getattr(sys.modules.get(cls.__module__), "__file__", None):
+        where += f" ({Path(file).name})"
     group = getattr(cls, "group", None)
     if group is None:
         raise UserError(f"{where} must subclass one of the framework's bases (Motor, Static, Optimizer, Reader, ...)")
@@ -68,9 +76,29 @@ def plugin(cls: Class) -> Class:
         raise UserError(f"{where} lacks what every plugin of group '{group}' must do: define {' and '.join(missing)}")
     made = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
     made.name = name
-    made.parameters = tuple(p for c in reversed(cls.__mro__) for p in vars(c).values() if isinstance(p, Parameter))
+    made.parameters = _parameters(made, where)
+    made.check_class(where)
     known[name] = made
     return made
+
+
+def _parameters(cls: type[Plugin], where: str) -> tuple[Parameter, ...]:
+    """The parameters of a class, inherited ones first, by name: its own replaces an inherited one of that name.
+
+    Raises `UserError` for one that is declared wrongly.
+    """
+    found: dict[str, Parameter] = {}
+    for base in reversed(cls.__mro__):
+        for name, parameter in vars(base).items():
+            if isinstance(parameter, Parameter):
+                if parameter.name != name:
+                    raise UserError(
+                        f"{where}: '{name}' is the parameter '{parameter.name}' again, and a parameter has one name;"
+                        " write it out a second time"
+                    )
+                parameter.check(f"{where}: {name}")
+                found[name] = parameter
+    return tuple(found.values())
 
 
 def schema(cls: type[Plugin]) -> type:

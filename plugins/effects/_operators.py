@@ -3,7 +3,7 @@
 
 def smaller(a, b, width):
     """The smaller of two, rounded where they are closer than `width`; below both, and smooth."""
-    from tractexp.model.equations import sympy
+    import sympy
 
     return (a + b - sympy.sqrt((a - b) ** 2 + width**2)) / 2
 
@@ -15,7 +15,7 @@ def larger(a, b, width):
 
 def gate(x, width):
     """0 well below x = 0, 1 well above: a logistic step."""
-    from tractexp.model.equations import sympy
+    import sympy
 
     return 1 / (1 + sympy.exp(-x / width))
 

@@ -1,8 +1,6 @@
 """Converters that hold their power."""
 
-from tractexp.model.parts import Effect
-from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
+from tractexp.extend import Effect, Parameter, plugin, sites
 from tractexp_plugins.effects._operators import seen_late, smaller
 
 SOURCE = "WECC composite load model (power electronic load); RAMSES vfd_load"
@@ -28,15 +26,13 @@ class ConstantPowerConverter(Effect):
     current_limit = Parameter(0.8, (0.3, 0.98), "1", "voltage over U_0 at which it is reached", SOURCE, "u_{lim}")
     control_delay = Parameter(0.003, (0.0, 0.01), "s", "delay of the voltage it acts on", SOURCE, "T_c")
 
-    needs = ("static_voltage", "P_static")
     grid = {"current_limit": (0.5, 0.7, 0.8, 0.9)}
     relevant = {"converter_share": 0.15}
     confused_with = ("voltage_dependent_power_limit", "dc_link_lag")
 
-    def edit(self, eq):
-        share, limit, delay = eq.declare(self.parameters)
-        held = lambda u: smaller(1, u / limit, WIDTH)  # noqa: E731
-        u = eq.symbol("static_voltage")
-        seen = seen_late(eq, u, delay)
+    def edit(self, eq, converter_share, current_limit, control_delay):
+        held = lambda u: smaller(1, u / current_limit, WIDTH)  # noqa: E731
+        u = eq[sites.static_voltage]
+        seen = seen_late(eq, u, control_delay)
         power = eq.P_s0 * held(seen) / held(1) * u / seen
-        eq.edit("P_static", lambda P: (1 - share) * P + share * power)
+        eq.edit(sites.P_static, lambda P: (1 - converter_share) * P + converter_share * power)

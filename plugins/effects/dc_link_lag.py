@@ -1,8 +1,6 @@
 """Converters whose power follows the voltage through a dc link."""
 
-from tractexp.model.parts import Effect
-from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
+from tractexp.extend import Effect, Parameter, plugin, sites
 
 SOURCE = "small-signal models of four-quadrant converters, Hu et al. 2017, IEEE Trans. Power Electronics"
 
@@ -26,15 +24,13 @@ class DcLinkLag(Effect):
     lag_time = Parameter(0.05, (0.005, 0.5), "s", "time constant of dc link and its control", SOURCE, "T_{dc}")
     held_current = Parameter(1.0, (0.0, 1.0), "1", "how far the control holds current, not power", SOURCE, "a")
 
-    needs = ("P_static",)
     grid = {"lag_time": (0.01, 0.03, 0.1, 0.3), "held_current": (0.0, 1.0)}
     relevant = {"lag_share": 0.1}
     confused_with = ("feeder_impedance", "stator_resistance", "time_skew")
 
-    def edit(self, eq):
-        share, time, held = eq.declare(self.parameters)
-        more = eq.state("link_power", "x_{dc}")
-        drawn = (eq.U / eq.U0) ** held * (eq.P_s0 + more)
-        demand = held * eq.P_s0 + (1 - held) * eq.definitions[eq.symbol("P_static")]
-        eq.moves(more, (demand - drawn) / time, 0)
-        eq.edit("P_static", lambda P: (1 - share) * P + share * drawn)
+    def edit(self, eq, lag_share, lag_time, held_current):
+        more = eq.lag("link_power", "x_{dc}")
+        drawn = (eq.U / eq.U0) ** held_current * (eq.P_s0 + more)
+        demand = held_current * eq.P_s0 + (1 - held_current) * eq.expression(sites.P_static)
+        eq.moves(more, (demand - drawn) / lag_time, 0)
+        eq.edit(sites.P_static, lambda P: (1 - lag_share) * P + lag_share * drawn)

@@ -1,8 +1,6 @@
 """Load that recovers after a voltage step."""
 
-from tractexp.model.parts import Effect
-from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
+from tractexp.extend import Effect, Parameter, plugin, sites
 
 SOURCE = "Karlsson, Hill 1994, IEEE Trans. Power Systems 9(1), Eqs. (1)-(3)"
 
@@ -25,16 +23,13 @@ class ExponentialRecovery(Effect):
     recovery_Q = Parameter(0.0, (-3.0, 3.0), "1", "long-run less immediate exponent of Q", SOURCE, r"D_q", null=0.0)
     recovery_time = Parameter(0.5, (0.05, 60.0), "s", "time constant of the recovery", SOURCE, "T_r")
 
-    needs = ("static_voltage", "P_static", "Q_static")
     grid = {"recovery_time": (0.1, 0.3, 1.0, 3.0, 10.0)}
     relevant = {"recovery_P": 0.2, "recovery_Q": 0.2}
     confused_with = ("undervoltage_trip", "load_drift", "second_motor_group")
 
-    def edit(self, eq):
-        *exponents, time = eq.declare(self.parameters)
-        u = eq.symbol("static_voltage")
-        for letter, exponent in zip("PQ", exponents, strict=True):
-            power = eq.definitions[eq.symbol(f"{letter}_static")]
-            x = eq.state(f"recovered_{letter}", f"x_{letter}")
-            eq.moves(x, (power * (u**exponent - 1) - x) / time, 0)
-            eq.edit(f"{letter}_static", lambda power, x=x: power + x)
+    def edit(self, eq, recovery_P, recovery_Q, recovery_time):
+        u = eq[sites.static_voltage]
+        for letter, site, exponent in (("P", sites.P_static, recovery_P), ("Q", sites.Q_static, recovery_Q)):
+            x = eq.lag(f"recovered_{letter}", f"x_{letter}")
+            eq.moves(x, (eq.expression(site) * (u**exponent - 1) - x) / recovery_time, 0)
+            eq.edit(site, lambda power, x=x: power + x)

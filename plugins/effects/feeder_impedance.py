@@ -1,8 +1,6 @@
 """Impedance between the recorded bus and the load."""
 
-from tractexp.model.parts import Effect
-from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
+from tractexp.extend import Effect, Parameter, plugin, sites
 
 SOURCE = "WECC composite load model 2015 (jXxf, Rfdr + jXfdr)"
 ITERATIONS = 2
@@ -33,23 +31,20 @@ class FeederImpedance(Effect):
     X_f = Parameter(0.0, (-0.05, 0.2), "pu", "feeder reactance on the record's base", SOURCE, null=0.0)
 
     order = 2
-    needs = ("static_voltage", "P_static", "Q_static")
     relevant = {"R_f": 0.01, "X_f": 0.02}
     confused_with = ("stator_resistance", "dc_link_lag", "magnetic_saturation", "speed_dependent_torque")
 
     def refusal(self, eq):
-        if (why := super().refusal(eq)) or not eq.has("P_motor"):
-            return why
-        if not eq.has("motor_voltage") or eq.symbol("motor_voltage").is_real:
-            return "its motor's voltage is no phasor (a quantity motor_voltage) that a feeder could turn"
-        return None if _affine(eq) else "its motor's current is not a + b V in the voltage V"
+        if sites.P_motor not in eq or _affine(eq):
+            return None
+        return "its motor's current is not a + b V in the voltage V"
 
-    def edit(self, eq):
-        from tractexp.model.equations import I, conjugate, im, re, start_symbol, sympy
+    def edit(self, eq, R_f, X_f):
+        import sympy
+        from sympy import I, conjugate, im, re
 
-        R_f, X_f = eq.declare(self.parameters)
-        Z = R_f + I * X_f
-        loads = [eq.symbol(n) for n in ("P_motor", "P_static", "Q_motor", "Q_static") if eq.has(n)]
+        Z, motor = R_f + I * X_f, sites.P_motor in eq
+        loads = [eq[s] for s in (sites.P_motor, sites.P_static, sites.Q_motor, sites.Q_static) if s in eq]
         at_bus = [eq.before(power.xreplace(dict.fromkeys(loads, sympy.Integer(0)))) for power in (eq.P, eq.Q)]
         I_0 = (eq.P0 - at_bus[0] - I * (eq.Q0 - at_bus[1])) / eq.U0
         a, b = (_computed(eq, f"motor_{k}", part, part) for k, part in zip("ab", _motor_current(eq), strict=True))
@@ -57,20 +52,23 @@ class FeederImpedance(Effect):
         x, Y = _solve(eq, Z, b, B, eq.U0 - Z * I_0)
         V = _computed(eq, "load_voltage", B / (1 + Z * (b + Y)), eq.U0 - Z * I_0)
 
-        name = eq.symbol("motor_voltage") if eq.has("motor_voltage") else eq.define("load_voltage", V, "V")
+        name = eq.V if motor else eq.define("load_voltage", V, "V")
         drawn = sum(s * (1 if s.name.startswith("P") else I) for s in loads)
         current = eq.define("feeder_current", _computed(eq, "feeder_current", a + (b + Y) * V, I_0), "I_f")
         eq.shown[current] = conjugate(drawn / name)
-        eq.edit(name.name, lambda _: V, shown=eq.U - Z * current)
-        eq.latex_names[start_symbol(name)] = "V_0"
-        eq.edit("static_voltage", lambda _: sympy.exp(x), shown=sympy.Abs(name) / sympy.Abs(start_symbol(name)))
+        if motor:
+            eq.edit(sites.motor_voltage, lambda _: V)
+        eq.shown[name] = eq.U - Z * current
+        V_0 = sympy.Symbol("V_0")
+        eq.edit(sites.static_voltage, lambda _: sympy.exp(x), shown=sympy.Abs(name) / sympy.Abs(V_0))
         square = re(current) ** 2 + im(current) ** 2
         eq.consume(R_f * square, X_f * square)
 
 
 def _solve(eq, Z, b, B, V_0):
     """ln(v/v_0) by Newton's method, and the static load's admittance there."""
-    from tractexp.model.equations import conjugate, re, sympy
+    import sympy
+    from sympy import conjugate, re
 
     v_0 = eq.compute("load_voltage_0", *[sympy.sqrt(_square(eq, V_0))] * 2)
     square = _square(eq, B)
@@ -89,36 +87,38 @@ def _solve(eq, Z, b, B, V_0):
 
 def _static_admittance(eq, x, v_squared):
     """Y = conj(P_s + j Q_s)/v^2 at x = ln(v/v_0), and dY/dx."""
-    from tractexp.model.equations import I, sympy
+    import sympy
+    from sympy import I
 
-    u = eq.symbol("static_voltage")
+    u = eq[sites.static_voltage]
     Y, slope = [], []
-    for name in ("P_static", "Q_static"):
-        drawn = eq.expand(eq.symbol(name), lambda s: s != u).xreplace({u: sympy.exp(x)})
-        Y.append(eq.compute(f"{x}_{name}", drawn / v_squared))
-        slope.append(eq.compute(f"{x}_{name}_slope", (sympy.diff(drawn, x) - 2 * drawn) / v_squared))
+    for site in (sites.P_static, sites.Q_static):
+        drawn = eq.expand(eq[site], lambda s: s != u).xreplace({u: sympy.exp(x)})
+        Y.append(eq.compute(f"{x}_{site.name}", drawn / v_squared))
+        slope.append(eq.compute(f"{x}_{site.name}_slope", (sympy.diff(drawn, x) - 2 * drawn) / v_squared))
     return Y[0] - I * Y[1], slope[0] - I * slope[1]
 
 
 def _motor_current(eq):
     """a and b of the motor's current a + b V, from its power at V = 1 and V = -1."""
-    if not eq.has("P_motor"):
+    if sites.P_motor not in eq:
         return 0, 0
     plus, minus = (_motor_current_at(eq, V) for V in (1, -1))
     return (plus + minus) / 2, (plus - minus) / 2
 
 
 def _motor_current_at(eq, V):
-    from tractexp.model.equations import I, conjugate, sympy
+    import sympy
+    from sympy import I, conjugate
 
-    name = eq.symbol("motor_voltage")
-    P, Q = (eq.expand(eq.symbol(n), lambda s: s != name) for n in ("P_motor", "Q_motor"))
+    name = eq.V
+    P, Q = (eq.expand(eq[site], lambda s: s != name) for site in (sites.P_motor, sites.Q_motor))
     return (P - I * Q).xreplace({name: sympy.sympify(V)}) / conjugate(sympy.sympify(V))
 
 
 def _affine(eq):
     """Whether the motor's current really is a + b V: tried at V = 2j with every other symbol at some number."""
-    from tractexp.model.equations import I
+    from sympy import I
 
     a, b = _motor_current(eq)
     off = sum(part**2 for part in eq.parts(_motor_current_at(eq, 2 * I) - a - 2 * I * b))
@@ -128,7 +128,7 @@ def _affine(eq):
 
 def _computed(eq, name, value, before):
     """A complex quantity computed once, from its two parts."""
-    from tractexp.model.equations import I
+    from sympy import I
 
     pairs = zip("dq", eq.parts(value), eq.parts(eq.before(before)), strict=True)
     d, q = (eq.compute(f"{name}_{axis}", now, then) for axis, now, then in pairs)

@@ -1,8 +1,6 @@
 """Static load that depends on frequency."""
 
-from tractexp.model.parts import Effect
-from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
+from tractexp.extend import Effect, Parameter, plugin, sites
 
 SOURCE = "IEEE Task Force 1993/1995; Kundur 1994, section 7.1"
 
@@ -23,17 +21,14 @@ class FrequencyDependence(Effect):
     k_pf = Parameter(0.0, (-4.0, 4.0), "1", "relative change of P per relative change of frequency", SOURCE, null=0.0)
     k_qf = Parameter(0.0, (-6.0, 6.0), "1", "relative change of Q per relative change of frequency", SOURCE, null=0.0)
 
-    needs = ("P_static", "Q_static")
     reads = ("f",)
     relevant = {"k_pf": 1.0, "k_qf": 1.0}
     confused_with = ("load_drift",)
 
     def refusal(self, eq):
-        twice = eq.has("static_frequency")
-        return "its static load depends on the frequency already" if twice else super().refusal(eq)
+        return "its static load depends on the frequency already" if "static_frequency" in eq else None
 
-    def edit(self, eq):
-        factors = eq.declare(self.parameters)
+    def edit(self, eq, k_pf, k_qf):
         deviation = (eq.omega_s - eq.omega_s0) / eq.omega_n
-        for name, k in zip(("P_static", "Q_static"), factors, strict=True):
-            eq.edit(name, lambda power, k=k: power * (1 + k * deviation))
+        eq.edit(sites.P_static, lambda P: P * (1 + k_pf * deviation))
+        eq.edit(sites.Q_static, lambda Q: Q * (1 + k_qf * deviation))

@@ -1,9 +1,7 @@
 """Load that drifts by itself during the record."""
 
+from tractexp.extend import Measurement, Parameter, plugin
 from tractexp.model.drive import INPUTS
-from tractexp.model.parts import Measurement
-from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
 
 SOURCE = "ordinary change of load; rates of feeders and trains stay below some percent a second"
 

@@ -1,8 +1,6 @@
 """Low-frequency oscillation of converters and network."""
 
-from tractexp.model.parts import Effect
-from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
+from tractexp.extend import Effect, Parameter, plugin
 
 SOURCE = "Hu et al. 2017, IEEE Trans. Power Electronics; Energies 2022, 15, 7544 (train-network oscillation)"
 
@@ -32,15 +30,13 @@ class LowFrequencyOscillation(Effect):
     relevant = {"oscillation_P": 0.05, "oscillation_Q": 0.05}
     confused_with = ("load_drift", "second_motor_group")
 
-    def edit(self, eq):
-        from tractexp.model.equations import sympy
+    def edit(self, eq, oscillation_P, oscillation_Q, mode_frequency, mode_damping, mode_phase):
+        import sympy
 
-        a_P, a_Q, frequency, damping, phase = eq.declare(self.parameters)
-        x, y = eq.state("mode_x", "x_o"), eq.state("mode_y", "y_o")
-        w = 2 * sympy.pi * frequency
-        power = eq.U / eq.U0 * (1 - x - 2 * damping * y) - 1
+        x, y = eq.lag("mode_x", "x_o"), eq.lag("mode_y", "y_o")
+        w = 2 * sympy.pi * mode_frequency
+        power = eq.U / eq.U0 * (1 - x - 2 * mode_damping * y) - 1
         eq.moves(x, w * y, 0)
         eq.moves(y, w * power, 0)
-        z = eq.define("oscillation", sympy.cos(phase) * y + sympy.sin(phase) * power, "z")
-        eq.consume(a_P * z, a_Q * z)
-        eq.settled = False
+        z = eq.define("oscillation", sympy.cos(mode_phase) * y + sympy.sin(mode_phase) * power, "z")
+        eq.consume(oscillation_P * z, oscillation_Q * z)

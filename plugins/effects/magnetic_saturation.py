@@ -1,8 +1,6 @@
 """Saturation of the motor's main flux path."""
 
-from tractexp.model.parts import Effect
-from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
+from tractexp.extend import Effect, Parameter, plugin, sites
 
 SOURCE = "Milano 2010, ch. 15; PSS/E COMPLOAD and CIM5 (E1, S(E1), E2, S(E2))"
 
@@ -23,17 +21,15 @@ class MagneticSaturation(Effect):
 
     saturation = Parameter(0.0, (0.0, 3.0), "1/pu²", "growth of sigma with flux squared", SOURCE, "k_s", null=0.0)
 
-    needs = ("E", "C", "coupling", "time_constant")
     relevant = {"saturation": 0.2}
     confused_with = ("feeder_impedance", "speed_dependent_torque")
 
-    def edit(self, eq):
-        from tractexp.model.equations import conjugate, re, start_symbol
+    def edit(self, eq, saturation):
+        from sympy import conjugate, re
 
-        (k_s,) = eq.declare(self.parameters)
-        E = eq.symbol("E")
+        E = eq["E"]
         square = lambda x: re(x * conjugate(x))  # noqa: E731
-        rise = eq.define("flux_rise", square(E) - square(start_symbol(E)), r"\Delta E^2")
-        unsaturated = 1 + (1 - eq.symbol("C")) * k_s * rise
-        for name in ("coupling", "time_constant"):
-            eq.edit(name, lambda x: x / unsaturated)
+        rise = eq.define("flux_rise", square(E) - square(eq.before(E)), r"\Delta E^2")
+        unsaturated = 1 + (1 - eq["C"]) * saturation * rise
+        for site in (sites.coupling, sites.time_constant):
+            eq.edit(site, lambda x: x / unsaturated)

@@ -2,9 +2,7 @@
 
 import numpy as np
 
-from tractexp.model.parts import Measurement
-from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
+from tractexp.extend import Measurement, Parameter, plugin
 
 
 @plugin

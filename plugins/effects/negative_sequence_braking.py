@@ -1,8 +1,6 @@
 """Negative-sequence voltage brakes the motor and loads it."""
 
-from tractexp.model.parts import Effect
-from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
+from tractexp.extend import Effect, Parameter, plugin, sites
 
 SOURCE = "Kundur 1994, section 7.2; Boldea, Nasar 2010, The Induction Machine Handbook (unbalanced supply)"
 
@@ -24,18 +22,16 @@ class NegativeSequenceBraking(Effect):
 
     negative_sequence = Parameter(0.0, (0.0, 10.0), "1", "size relative to the theory", SOURCE, "k_2", null=0.0)
 
-    needs = ("electrical_torque", "stator_impedance", "coupling", "time_constant")
     reads = ("U2",)
     relevant = {"negative_sequence": 0.5}
     confused_with = ("second_motor_group", "shunt_capacitor")
 
-    def edit(self, eq):
-        from tractexp.model.equations import im, re
+    def edit(self, eq, negative_sequence):
+        from sympy import im, re
 
-        (k,) = eq.declare(self.parameters)
-        Z = eq.symbol("stator_impedance")
-        rotor = eq.symbol("coupling") * im(Z) / (eq.omega_n * eq.symbol("time_constant"))
+        Z = eq[sites.stator_impedance]
+        rotor = eq[sites.coupling] * im(Z) / (eq.omega_n * eq[sites.time_constant])
         R, X = re(Z) + rotor / 2, im(Z)
-        drawn = k * (eq.U2**2 - eq.U20**2) / (R**2 + X**2)
-        eq.edit("electrical_torque", lambda T: T - drawn * rotor / 2)
+        drawn = negative_sequence * (eq.U2**2 - eq.U20**2) / (R**2 + X**2)
+        eq.edit(sites.electrical_torque, lambda T: T - drawn * rotor / 2)
         eq.consume(drawn * R, drawn * X)

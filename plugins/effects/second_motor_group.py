@@ -1,8 +1,6 @@
 """A second group of motors with another inertia."""
 
-from tractexp.model.parts import Effect
-from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
+from tractexp.extend import Effect, Parameter, plugin, sites
 
 SOURCE = "WECC composite load model: motors A, B, C side by side"
 
@@ -26,33 +24,29 @@ class SecondMotorGroup(Effect):
     inertia_ratio = Parameter(4.0, (0.1, 12.0), "1", "inertia of the second group over the first's", SOURCE, "r")
 
     order = 1
-    needs = ("omega", "M", "P_motor", "Q_motor")
     grid = {"inertia_ratio": (0.25, 0.5, 2.0, 4.0, 8.0)}
     relevant = {"group_share": 0.1}
     confused_with = ("speed_dependent_torque", "undervoltage_trip", "exponential_recovery")
 
-    def edit(self, eq):
-        from tractexp.model.equations import start_symbol
-
-        share, ratio = eq.declare(self.parameters)
-        moving = _moving(eq)
-        twins = {s: (eq.state if s.is_real else eq.phasor)(f"{s.name}_2", rf"{eq.latex_names[s]}_2") for s in moving}
-        twins |= {start_symbol(s): start_symbol(twin) for s, twin in twins.items()}
+    def edit(self, eq, group_share, inertia_ratio):
+        omega, moving = eq.omega, _moving(eq)
+        twins = {s: eq.twin(s, "_2") for s in moving}
+        twins |= {eq.before(s): eq.before(twin) for s, twin in twins.items()}
         touched = [s for s in eq.definitions if eq.expand(s).free_symbols & twins.keys()]
         for symbol in touched:
             twin = eq.definitions[symbol].xreplace(twins)
             twins[symbol] = eq.define(f"{symbol.name}_2", twin, rf"{{{eq.latex_names[symbol]}}}_2")
         for symbol in moving:
-            state, slower = eq.states[symbol], ratio if symbol.name == "omega" else 1
+            state, slower = eq.states[symbol], inertia_ratio if symbol == omega else 1
             eq.moves(twins[symbol], state.derivative.xreplace(twins) / slower, state.initial)
-        for name in ("P_motor", "Q_motor"):
-            second = twins[eq.symbol(name)]
-            eq.edit(name, lambda own, second=second: (1 - share) * own + share * second)
+        for site in (sites.P_motor, sites.Q_motor):
+            second = twins[eq[site]]
+            eq.edit(site, lambda own, second=second: (1 - group_share) * own + group_share * second)
 
 
 def _moving(eq):
     """The states the motor's power depends on, and those that these depend on in turn."""
-    found, read = set(), {eq.symbol("P_motor"), eq.symbol("Q_motor")}
+    found, read = set(), {eq[sites.P_motor], eq[sites.Q_motor]}
     while read:
         new = set().union(*(eq.expand(e).free_symbols for e in read)) & eq.states.keys() - found
         found |= new

@@ -1,8 +1,6 @@
 """Shunt capacitor bank."""
 
-from tractexp.model.parts import Effect
-from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
+from tractexp.extend import Effect, Parameter, plugin
 
 SOURCE = "WECC composite load model (Bss, Bfdr)"
 
@@ -25,7 +23,5 @@ class ShuntCapacitor(Effect):
     relevant = {"capacitor": 0.05}
     confused_with = ("static_var_compensator", "negative_sequence_braking")
 
-    def edit(self, eq):
-        (b,) = eq.declare(self.parameters)
-        eq.consume(0, -b * eq.U**2 * (1 + eq.omega_s / eq.omega_n))
-        eq.settled = False
+    def edit(self, eq, capacitor):
+        eq.consume(0, -capacitor * eq.U**2 * (1 + eq.omega_s / eq.omega_n))

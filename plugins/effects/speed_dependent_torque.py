@@ -1,8 +1,6 @@
 """Load torque that depends on speed."""
 
-from tractexp.model.parts import Effect
-from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
+from tractexp.extend import Effect, Parameter, plugin, sites
 
 SOURCE = "WECC composite load model (Etrq = 2); Milano 2010, ch. 15 (quadratic torque)"
 
@@ -21,14 +19,9 @@ class SpeedDependentTorque(Effect):
 
     quadratic_share = Parameter(0.0, (0.0, 1.0), "1", "share of the torque that is quadratic", SOURCE, "k", null=0.0)
 
-    needs = ("omega", "M", "load_torque")  # a speed that never moves needs no torque
     relevant = {"quadratic_share": 0.25}
     confused_with = ("feeder_impedance", "second_motor_group", "magnetic_saturation")
 
-    def edit(self, eq):
-        from tractexp.model.equations import start_symbol
-
-        (share,) = eq.declare(self.parameters)
-        omega = eq.symbol("omega")
-        speed = (omega + eq.omega_n) / (start_symbol(omega) + eq.omega_n)
-        eq.edit("load_torque", lambda T: T * (1 - share + share * speed**2))
+    def edit(self, eq, quadratic_share):
+        speed = (eq.omega + eq.omega_n) / (eq.before(eq.omega) + eq.omega_n)
+        eq.edit(sites.load_torque, lambda T: T * (1 - quadratic_share + quadratic_share * speed**2))

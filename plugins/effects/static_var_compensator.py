@@ -1,8 +1,6 @@
 """Static var compensator or STATCOM at the bus."""
 
-from tractexp.model.parts import Effect
-from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
+from tractexp.extend import Effect, Parameter, plugin
 
 SOURCE = "Kundur 1994, section 11.2; Milano 2010, ch. 19 (SVC and STATCOM)"
 
@@ -31,12 +29,10 @@ class StaticVarCompensator(Effect):
     relevant = {"compensator": 0.05}
     confused_with = ("shunt_capacitor", "time_skew")
 
-    def edit(self, eq):
-        from tractexp.model.equations import sympy
+    def edit(self, eq, compensator, compensator_gain, compensator_time, compensator_exponent):
+        import sympy
 
-        rating, gain, time, exponent = eq.declare(self.parameters)
-        x = eq.state("compensation", "x_c")
-        asked = gain * (eq.U0 - eq.U)
-        eq.moves(x, (sympy.Max(-1, sympy.Min(1, asked)) - x) / time, 0)
-        eq.consume(0, -rating * x * (eq.U / eq.U0) ** exponent)
-        eq.settled = False
+        x = eq.lag("compensation", "x_c")
+        asked = compensator_gain * (eq.U0 - eq.U)
+        eq.moves(x, (sympy.Max(-1, sympy.Min(1, asked)) - x) / compensator_time, 0)
+        eq.consume(0, -compensator * x * (eq.U / eq.U0) ** compensator_exponent)

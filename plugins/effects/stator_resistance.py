@@ -1,8 +1,6 @@
 """Stator resistance of the motor."""
 
-from tractexp.model.parts import Effect
-from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
+from tractexp.extend import Effect, Parameter, plugin, sites
 
 SOURCE = "Milano 2010, Power System Modelling and Scripting, ch. 15"
 
@@ -21,10 +19,8 @@ class StatorResistance(Effect):
 
     R_s = Parameter(0.0, (-0.02, 0.2), "pu", "stator resistance on the record's base", SOURCE, null=0.0)
 
-    needs = ("stator_impedance",)
     relevant = {"R_s": 0.01}
     confused_with = ("feeder_impedance", "dc_link_lag", "time_skew")
 
-    def edit(self, eq):
-        (R_s,) = eq.declare(self.parameters)
-        eq.edit("stator_impedance", lambda Z: R_s + Z)
+    def edit(self, eq, R_s):
+        eq.edit(sites.stator_impedance, lambda Z: R_s + Z)

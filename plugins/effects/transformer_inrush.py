@@ -1,8 +1,6 @@
 """Inrush of transformers when the voltage recovers."""
 
-from tractexp.model.parts import Effect
-from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
+from tractexp.extend import Effect, Parameter, plugin
 
 SOURCE = "Blume et al. 1951, Transformer Engineering; decay of the flux offset after energization"
 CYCLE = 0.003  # s, or one sample where those are longer: a rise is what the voltage gains on itself so long ago
@@ -37,18 +35,16 @@ class TransformerInrush(Effect):
     relevant = {"inrush": 0.05}
     confused_with = ("exponential_recovery", "magnetic_saturation")
 
-    def edit(self, eq):
-        from tractexp.model.equations import sympy
+    def edit(self, eq, inrush, inrush_time, knee_margin, offset_exponent, inrush_loss):
+        import sympy
 
-        q, time, margin, exponent, loss = eq.declare(self.parameters)
-        x, y = eq.state("inrush_flux", "x"), eq.state("cycle_voltage", "y")
+        x, y = eq.lag("inrush_flux", "x"), eq.lag("cycle_voltage", "y")
         u, lowest = eq.U / eq.U0, eq.memory("lowest_voltage", r"u_{low}")
         eq.renews(lowest, sympy.Min(lowest, u), 1)
-        scale = sympy.exp((exponent - 1) * sympy.log(sympy.Max(SHALLOW, 1 - lowest)))
+        scale = sympy.exp((offset_exponent - 1) * sympy.log(sympy.Max(SHALLOW, 1 - lowest)))
         cycle = sympy.Max(CYCLE, eq.step)
-        eq.moves(x, sympy.Max(0, (u - y) / cycle - STILL) * scale - x / time, 0)
+        eq.moves(x, sympy.Max(0, (u - y) / cycle - STILL) * scale - x / inrush_time, 0)
         eq.moves(y, (u - y) / cycle, 1)
-        excess = sympy.Max(0, 1 - (1 + margin - x) / u)
-        drawn = q * u**2 * excess * sympy.sqrt(excess) * (1 - 0.15 * excess)
-        eq.consume(loss * drawn, drawn)
-        eq.settled = False
+        excess = sympy.Max(0, 1 - (1 + knee_margin - x) / u)
+        drawn = inrush * u**2 * excess * sympy.sqrt(excess) * (1 - 0.15 * excess)
+        eq.consume(inrush_loss * drawn, drawn)

@@ -1,8 +1,6 @@
 """Undervoltage trip of part of the load, and its reconnection."""
 
-from tractexp.model.parts import Effect
-from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
+from tractexp.extend import Effect, Parameter, plugin, sites
 from tractexp_plugins.effects._operators import gate
 
 SOURCE = "NERC 2016, Dynamic Load Modeling, app. A; WECC composite load model (Ftr1, Vtr1, Ttr1, Vrc1, Trc1)"
@@ -38,20 +36,19 @@ class UndervoltageTrip(Effect):
     relevant = {"tripped_share": 0.02}
     confused_with = ("exponential_recovery", "second_motor_group", "load_drift")
 
-    def edit(self, eq):
-        from tractexp.model.equations import sympy
+    def edit(self, eq, tripped_share, trip_level, trip_delay, reconnect_delay, reconnect_margin, reconnect_ramp):
+        import sympy
 
-        share, level, delay, back, margin, ramp = eq.declare(self.parameters)
         u = eq.U / eq.U0
         below, above = eq.memory("time_below", "t_b"), eq.memory("time_above", "t_a")
         tripped = eq.memory("tripped", "g")
-        low = eq.define("voltage_low", gate(level - u, LEVEL), r"\ell")
-        high = eq.define("voltage_back", gate(u - level - margin, LEVEL), "h")
-        goes = eq.define("relay_goes", low * gate(below - delay, TIME * eq.step), "g_+")
-        returns = eq.define("relay_returns", high * gate(above - back, TIME * eq.step), "g_-")
+        low = eq.define("voltage_low", gate(trip_level - u, LEVEL), r"\ell")
+        high = eq.define("voltage_back", gate(u - trip_level - reconnect_margin, LEVEL), "h")
+        goes = eq.define("relay_goes", low * gate(below - trip_delay, TIME * eq.step), "g_+")
+        returns = eq.define("relay_returns", high * gate(above - reconnect_delay, TIME * eq.step), "g_-")
         eq.renews(below, low * (below + eq.step), 0)
         eq.renews(above, high * (above + eq.step), 0)
-        left = sympy.Max(0, tripped - returns * eq.step / (ramp + eq.step))
+        left = sympy.Max(0, tripped - returns * eq.step / (reconnect_ramp + eq.step))
         eq.renews(tripped, left + (1 - left) * goes, 0)
-        eq.P, eq.Q = eq.P * (1 - share * tripped), eq.Q * (1 - share * tripped)
-        eq.settled = False
+        for site in (sites.P, sites.Q):
+            eq.edit(site, lambda power: power * (1 - tripped_share * tripped))

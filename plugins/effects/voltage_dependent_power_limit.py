@@ -1,8 +1,6 @@
 """Traction power limited at low line voltage."""
 
-from tractexp.model.parts import Effect
-from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
+from tractexp.extend import Effect, Parameter, plugin, sites
 from tractexp_plugins.effects._operators import larger, seen_late, smaller
 
 SOURCE = "EN 50388-1, limitation of current or power at low line voltage"
@@ -29,15 +27,13 @@ class VoltageDependentPowerLimit(Effect):
     off_level = Parameter(0.65, (0.3, 0.74), "1", "voltage of no power, over U_0", SOURCE, "u_{off}")
     limit_delay = Parameter(0.003, (0.0, 0.01), "s", "delay of the voltage it acts on", SOURCE, "T_l")
 
-    needs = ("static_voltage", "P_static")
     grid = {"full_level": (0.8, 0.9, 0.97), "off_level": (0.4, 0.55, 0.7)}
     relevant = {"limited_share": 0.1}
     confused_with = ("constant_power_converter", "undervoltage_trip")
 
-    def edit(self, eq):
-        share, full, off, delay = eq.declare(self.parameters)
-        allowed = lambda u: smaller(1, larger(0, (u - off) / (full - off), WIDTH), WIDTH)  # noqa: E731
-        u = eq.symbol("static_voltage")
-        seen = seen_late(eq, u, delay)
+    def edit(self, eq, limited_share, full_level, off_level, limit_delay):
+        allowed = lambda u: smaller(1, larger(0, (u - off_level) / (full_level - off_level), WIDTH), WIDTH)  # noqa: E731
+        u = eq[sites.static_voltage]
+        seen = seen_late(eq, u, limit_delay)
         power = eq.P_s0 * allowed(seen) / allowed(1) * u / seen
-        eq.edit("P_static", lambda P: (1 - share) * P + share * power)
+        eq.edit(sites.P_static, lambda P: (1 - limited_share) * P + limited_share * power)

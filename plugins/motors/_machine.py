@@ -1,6 +1,6 @@
 """What the motors share: parameters by one name and meaning, and the steady state of a single cage, Eq. (3)."""
 
-from tractexp.parameter import Parameter
+from tractexp.extend import Parameter, sites
 
 PAPER = "Wu, Fan, Zou 2022, Energies 15(14) 5034"
 
@@ -14,32 +14,29 @@ T_M = Parameter(0.5, (0.05, 1.0), "pu", "load torque, the motor's power before t
 def single_cage(eq, T_prime, X_prime, C, T_m):
     """Declare what the motors with rotor flux and without stator transients share, Eqs. (1)-(2) but for the speed.
 
-    Returns the speed's symbol, its value relative to synchronous before the event, and the electrical and the load
-    torque.
+    Returns the stator current, the speed's symbol, its value relative to synchronous before the event, and the
+    electrical and the load torque.
     """
-    from tractexp.model.equations import I, conjugate, im, re
+    from sympy import I, conjugate, re
 
-    E, omega = eq.phasor("E", "E"), eq.state("omega", r"\omega")
-    V = eq.define("motor_voltage", eq.U, "V", phasor=True)
-    Z = eq.define("stator_impedance", I * X_prime, "Z'")
-    current = eq.define("stator_current", (V - E) / Z, "I")
-    coupling = eq.define("coupling", C, "c")
-    time_constant = eq.define("time_constant", T_prime, r"\tau'")
-    electrical_torque = eq.define("electrical_torque", re(E * conjugate(current)), "T_e")
-    load_torque = eq.define("load_torque", T_m, "T_L")
-    P = eq.define("P_motor", re(V * conjugate(current)), "P_d")  # Eq. (2)
-    Q = eq.define("Q_motor", im(V * conjugate(current)), "Q_d")
-    eq.consume(P, Q)
+    E, omega = eq.flux("E", "E"), eq.speed(r"\omega")
+    V = eq.V
+    Z = eq.place(sites.stator_impedance, I * X_prime)
+    current = eq.place(sites.stator_current, (V - E) / Z)
+    coupling = eq.place(sites.coupling, C)
+    time_constant = eq.place(sites.time_constant, T_prime)
+    electrical_torque = eq.place(sites.electrical_torque, re(E * conjugate(current)))
+    load_torque = eq.place(sites.load_torque, T_m)
 
     E_0, slower = at_rest(eq, T_prime, X_prime, C, T_m)
     flux = (I * X_prime * coupling * current - (1 - coupling) * E) / time_constant
     eq.moves(E, flux + I * (omega - eq.omega_s) * E, E_0)  # Eq. (1)
-    return omega, slower, electrical_torque, load_torque
+    return current, omega, slower, electrical_torque, load_torque
 
 
 def at_rest(eq, T_prime, X_prime, C, T_m):
     """Internal voltage and speed relative to synchronous before the event, Eq. (3): the stable of two solutions."""
-    from tractexp.model.equations import I
+    from sympy import I
 
     sine, cosine = _angle(eq, X_prime, C, T_m)
     return C * eq.U0 / 2 * (1 + cosine - I * sine), -sine / (1 + cosine) / T_prime  # C U0 cos(delta_0) exp(j delta_0)
@@ -66,7 +63,7 @@ def require_physical(eq, positive, C):
 
 def _angle(eq, X_prime, C, T_m):
     """-sin(2 delta_0) of Eq. (3), and the cosine (0 where there is none)."""
-    from tractexp.model.equations import sympy
+    import sympy
 
     sine = 2 * T_m * X_prime / (C * eq.U0**2)
     return sine, sympy.sqrt(sympy.Max(0, 1 - sine**2))

@@ -1,8 +1,6 @@
 """Fifth-order induction motor: two rotor cages, no stator transients."""
 
-from tractexp.model.parts import Motor
-from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
+from tractexp.extend import Motor, Parameter, plugin, sites
 from tractexp_plugins.motors import _machine
 
 SOURCE = "Milano 2010, Power System Modelling and Scripting, ch. 15"
@@ -36,22 +34,18 @@ class DoubleCage(Motor):
     T_second = Parameter(0.01, (0.001, 0.05), "s", "subtransient time constant X''/X' T0''", SOURCE, "T''")
     X_second = Parameter(0.2, (0.03, 1.2), "pu", "subtransient reactance on the record's base", SOURCE, "X''")
 
-    def declare(self, eq):
-        from tractexp.model.equations import I, conjugate, im, re
+    def declare(self, eq, T_prime, X_prime, C, M, T_m, T_second, X_second):
+        from sympy import I, conjugate, re
 
-        T_prime, X_prime, C, M, T_m, T_second, X_second = eq.declare(self.parameters)
-        E, D, omega = eq.phasor("E", "E"), eq.phasor("D", "D"), eq.state("omega", r"\omega")
-        V = eq.define("motor_voltage", eq.U, "V", phasor=True)
-        Z = eq.define("stator_impedance", I * X_second, "Z''")
+        E, D, omega = eq.flux("E", "E"), eq.flux("D", "D"), eq.speed(r"\omega")
+        V = eq.V
+        Z = eq.place(sites.stator_impedance, I * X_second, "Z''")
         inner = eq.define("internal_voltage", E + D, "E''")
-        current = eq.define("stator_current", (V - inner) / Z, "I")
-        coupling = eq.define("coupling", C, "c")
-        time_constant = eq.define("time_constant", T_prime, r"\tau'")
-        electrical_torque = eq.define("electrical_torque", re(inner * conjugate(current)), "T_e")
-        load_torque = eq.define("load_torque", T_m, "T_L")
-        P = eq.define("P_motor", re(V * conjugate(current)), "P_d")
-        Q = eq.define("Q_motor", im(V * conjugate(current)), "Q_d")
-        eq.consume(P, Q)
+        current = eq.place(sites.stator_current, (V - inner) / Z)
+        coupling = eq.place(sites.coupling, C)
+        time_constant = eq.place(sites.time_constant, T_prime)
+        electrical_torque = eq.place(sites.electrical_torque, re(inner * conjugate(current)))
+        load_torque = eq.place(sites.load_torque, T_m)
 
         open_second = T_second * X_prime / X_second  # T_0''
         E_0, D_0, slip = self._guess(eq, T_prime, X_prime, C, T_m, open_second, X_second)
@@ -60,14 +54,14 @@ class DoubleCage(Motor):
         eq.moves(E, flux + I * (omega - eq.omega_s) * E, E_0)
         eq.moves(D, second + I * (omega - eq.omega_s) * D, D_0)
         eq.moves(omega, (electrical_torque - load_torque) / M, eq.omega_s0 - slip)
-        eq.settled = False
         _machine.require_physical(eq, (T_prime, X_prime, M, T_second, X_second), C)
         eq.require(X_prime - X_second, "X'' must be at most X', of which it exceeds {value:g} pu", X_second - X_prime)
+        return current
 
     @staticmethod
     def _guess(eq, T_prime, X_prime, C, T_m, open_second, X_second):
         """Voltages and slip [rad/s] near the steady state: what both cages carry at a slip just below it."""
-        from tractexp.model.equations import I
+        from sympy import I
 
         first, second = X_prime * C, X_prime - X_second  # X - X' over X/X', and X' - X''
         slip = T_m * X_prime**2 / eq.U0**2 / (first * T_prime + second * open_second * (1 - C) ** 2)

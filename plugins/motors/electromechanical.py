@@ -1,7 +1,6 @@
 """Third-order induction motor."""
 
-from tractexp.model.parts import Motor
-from tractexp.plugin import plugin
+from tractexp.extend import Motor, plugin
 from tractexp_plugins.motors import _machine
 
 
@@ -32,8 +31,8 @@ class Electromechanical(Motor):
 
     T_prime, X_prime, C, M, T_m = _machine.T_PRIME, _machine.X_PRIME, _machine.C, _machine.M, _machine.T_M
 
-    def declare(self, eq):
-        T_prime, X_prime, C, M, T_m = eq.declare(self.parameters)
-        omega, slower, electrical_torque, load_torque = _machine.single_cage(eq, T_prime, X_prime, C, T_m)
+    def declare(self, eq, T_prime, X_prime, C, M, T_m):
+        current, omega, slower, electrical_torque, load_torque = _machine.single_cage(eq, T_prime, X_prime, C, T_m)
         eq.moves(omega, (electrical_torque - load_torque) / M, eq.omega_s0 + slower)  # Eq. (1)
         _machine.require(eq, (T_prime, X_prime, M), X_prime, C, T_m)
+        return current

@@ -1,7 +1,6 @@
 """First-order induction motor."""
 
-from tractexp.model.parts import Motor
-from tractexp.plugin import plugin
+from tractexp.extend import Motor, plugin, sites
 from tractexp_plugins.motors import _machine
 
 
@@ -31,26 +30,22 @@ class Mechanical(Motor):
 
     T_prime, X_prime, C, M, T_m = _machine.T_PRIME, _machine.X_PRIME, _machine.C, _machine.M, _machine.T_M
 
-    def declare(self, eq):
-        from tractexp.model.equations import I, conjugate, im, re
+    def declare(self, eq, T_prime, X_prime, C, M, T_m):
+        from sympy import I, conjugate, re
 
-        T_prime, X_prime, C, M, T_m = eq.declare(self.parameters)
-        omega = eq.state("omega", r"\omega")
-        V = eq.define("motor_voltage", eq.U, "V", phasor=True)
-        Z = eq.define("stator_impedance", I * X_prime, "Z'")
-        coupling = eq.define("coupling", C, "c")
-        time_constant = eq.define("time_constant", T_prime, r"\tau'")
+        omega, V = eq.speed(r"\omega"), eq.V
+        Z = eq.place(sites.stator_impedance, I * X_prime)
+        coupling = eq.place(sites.coupling, C)
+        time_constant = eq.place(sites.time_constant, T_prime)
         source = I * X_prime * coupling
         slip = eq.define("slip", omega - eq.omega_s, "s")
         turning = I * slip * time_constant
         E = eq.define("internal_voltage", source * V / (Z * (1 - coupling - turning) + source), "E")
-        current = eq.define("stator_current", (V - E) / Z, "I")
-        electrical_torque = eq.define("electrical_torque", re(E * conjugate(current)), "T_e")
-        load_torque = eq.define("load_torque", T_m, "T_L")
-        P = eq.define("P_motor", re(V * conjugate(current)), "P_d")  # Eq. (2)
-        Q = eq.define("Q_motor", im(V * conjugate(current)), "Q_d")
-        eq.consume(P, Q)
+        current = eq.place(sites.stator_current, (V - E) / Z)
+        electrical_torque = eq.place(sites.electrical_torque, re(E * conjugate(current)))
+        load_torque = eq.place(sites.load_torque, T_m)
 
         _, slower = _machine.at_rest(eq, T_prime, X_prime, C, T_m)
         eq.moves(omega, (electrical_torque - load_torque) / M, eq.omega_s0 + slower)
         _machine.require(eq, (T_prime, X_prime, M), X_prime, C, T_m)
+        return current

@@ -1,7 +1,6 @@
 """No motor: a static load alone."""
 
-from tractexp.model.parts import Motor
-from tractexp.plugin import plugin
+from tractexp.extend import Motor, plugin
 
 
 @plugin
@@ -18,4 +17,4 @@ class NoMotor(Motor):
     """
 
     def declare(self, eq):
-        pass
+        return None

@@ -1,8 +1,6 @@
 """Fifth-order induction motor: single cage with stator transients."""
 
-from tractexp.model.parts import Motor
-from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
+from tractexp.extend import Motor, Parameter, plugin, sites
 from tractexp_plugins.motors import _machine
 
 SOURCE = "Krause, Wasynczuk, Sudhoff 2002, ch. 4"
@@ -36,21 +34,16 @@ class StatorFlux(Motor):
     T_prime, X_prime, C, M, T_m = _machine.T_PRIME, _machine.X_PRIME, _machine.C, _machine.M, _machine.T_M
     R_s = Parameter(0.02, (0.001, 0.2), "pu", "stator resistance on the record's base", SOURCE)
 
-    def declare(self, eq):
-        from tractexp.model.equations import I, conjugate, im, re
+    def declare(self, eq, T_prime, X_prime, C, M, T_m, R_s):
+        from sympy import I, conjugate, re
 
-        T_prime, X_prime, C, M, T_m, R_s = eq.declare(self.parameters)
-        psi, E, omega = eq.phasor("psi", r"\psi"), eq.phasor("E", "E"), eq.state("omega", r"\omega")
-        V = eq.define("motor_voltage", eq.U, "V", phasor=True)
-        current = eq.define("stator_current", (psi + I * E) / X_prime, "I")
-        coupling = eq.define("coupling", C, "c")
-        time_constant = eq.define("time_constant", T_prime, r"\tau'")
-        electrical_torque = eq.define("electrical_torque", re(E * conjugate(current)), "T_e")
-        load_torque = eq.define("load_torque", T_m, "T_L")
-        eq.consume(
-            eq.define("P_motor", re(V * conjugate(current)), "P_d"),
-            eq.define("Q_motor", im(V * conjugate(current)), "Q_d"),
-        )
+        psi, E, omega = eq.flux("psi", r"\psi"), eq.flux("E", "E"), eq.speed(r"\omega")
+        V = eq.V
+        current = eq.place(sites.stator_current, (psi + I * E) / X_prime)
+        coupling = eq.place(sites.coupling, C)
+        time_constant = eq.place(sites.time_constant, T_prime)
+        electrical_torque = eq.place(sites.electrical_torque, re(E * conjugate(current)))
+        load_torque = eq.place(sites.load_torque, T_m)
 
         E_0, I_0, y = self._at_rest(eq, X_prime, C, R_s, T_m)
         eq.moves(psi, eq.omega_n * (V - R_s * current) - I * (eq.omega_n + eq.omega_s) * psi, X_prime * I_0 - I * E_0)
@@ -58,6 +51,7 @@ class StatorFlux(Motor):
         eq.moves(E, flux + I * (omega - eq.omega_s) * E, E_0)
         eq.moves(omega, (electrical_torque - load_torque) / M, eq.omega_s0 - y / T_prime)
         _machine.require_physical(eq, (T_prime, X_prime, M), C)
+        return current
 
     @staticmethod
     def _at_rest(eq, X_prime, C, R, T_m):
@@ -66,7 +60,8 @@ class StatorFlux(Motor):
         The slip is the smaller root y of T |(R + jX)(1 - C + jy) + jXC|^2 = U_0^2 X C y, with X and T those of the
         frame's speed.
         """
-        from tractexp.model.equations import I, sympy
+        import sympy
+        from sympy import I
 
         speed = 1 + eq.omega_s0 / eq.omega_n
         X, T = X_prime * speed, T_m * speed

@@ -1,7 +1,6 @@
 """Second-order induction motor: flux without speed."""
 
-from tractexp.model.parts import Motor
-from tractexp.plugin import plugin
+from tractexp.extend import Motor, plugin
 from tractexp_plugins.motors import _machine
 
 
@@ -29,8 +28,8 @@ class Voltage(Motor):
 
     T_prime, X_prime, C, T_m = _machine.T_PRIME, _machine.X_PRIME, _machine.C, _machine.T_M
 
-    def declare(self, eq):
-        T_prime, X_prime, C, T_m = eq.declare(self.parameters)
-        omega, slower, electrical_torque, load_torque = _machine.single_cage(eq, T_prime, X_prime, C, T_m)
+    def declare(self, eq, T_prime, X_prime, C, T_m):
+        current, omega, slower, electrical_torque, load_torque = _machine.single_cage(eq, T_prime, X_prime, C, T_m)
         eq.moves(omega, 0, eq.omega_s0 + slower, balance=electrical_torque - load_torque)
         _machine.require(eq, (T_prime, X_prime), X_prime, C, T_m)
+        return current

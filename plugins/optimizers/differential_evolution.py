@@ -1,9 +1,11 @@
 """Differential evolution, SciPy's."""
 
+import itertools
 from collections.abc import Iterator
 
 import numpy as np
 
+from tractexp.doors.scipy_differential_evolution import generations
 from tractexp.errors import check_choice, check_range
 from tractexp.identification.optimizer import Box, Evaluate, Optimizer
 from tractexp.plugin import plugin
@@ -45,23 +47,15 @@ class DifferentialEvolution(Optimizer):
         check_range("optimizer.tolerance", self.tolerance, 0)
 
     def search(self, evaluate: Evaluate, box: Box, rng: np.random.Generator) -> Iterator[None]:
-        from scipy.optimize._differentialevolution import DifferentialEvolutionSolver
-
-        solver = DifferentialEvolutionSolver(
+        evolution = generations(
             lambda x: evaluate(x.T)[1],
             list(zip(box.lower, box.upper, strict=True)),
+            rng,
+            init=box.uniform(rng, self.population),
             strategy=self.strategy,
             tol=self.tolerance,
             mutation=(self.mutation_low, self.mutation_high),
             recombination=self.recombination,
             polish=False,
-            init=box.uniform(rng, self.population),
-            updating="deferred",
-            vectorized=True,
         )
-        solver.random_number_generator = rng  # its argument is `seed` before SciPy 1.15 and `rng` since
-        for _ in range(self.iterations):
-            next(solver)
-            yield
-            if solver.converged():
-                return
+        yield from itertools.islice(evolution, self.iterations)

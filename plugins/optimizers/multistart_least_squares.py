@@ -5,8 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from tractexp.errors import check_range
+from tractexp.identification.least_squares import APART, race
 from tractexp.identification.optimizer import REFUSED, Box, Evaluate, Optimizer
-from tractexp.identification.polish import race, spread
+from tractexp.identification.starts import best_distinct
 from tractexp.plugin import plugin
 
 CLOSER = 10  # scatters drawn ever closer about the least refused point before a search gives up
@@ -62,5 +63,5 @@ class MultistartLeastSquares(Optimizer):
             center, width = box.to_unit(x[f.argmin()]), width / 2
         feasible = f < REFUSED
         x, f = x[feasible], f[feasible]
-        chosen = spread(box.to_unit(x), f, self.starts)
+        chosen = best_distinct(box.to_unit(x), f, APART, self.starts)
         yield from race(evaluate, box, zip(x[chosen], f[chosen], strict=True), self.tolerance, self.trials)

@@ -40,6 +40,8 @@ class COMTRADE(Reader):
     Departures: the time skew of channels is corrected on request only; combined .cff files are not read.
     """
 
+    endings = (".cfg",)
+
     path: str = ""  # the .cfg file
     voltages: list[Any] = field(default_factory=list)  # three channels, phase to ground, in the order a, b, c
     currents: list[Any] = field(default_factory=list)  # three channels, counted positive into the load

@@ -32,11 +32,17 @@ class CSV(Reader):
     Departures: quoted cells are not read.
     """
 
+    endings = (".csv", ".txt", ".tsv")
+
     train: list[str] = field(default_factory=list)  # files to fit
     validate: list[str] = field(default_factory=list)  # files held out
     base_voltage: float | None = None  # kV, line to line
     base_power: float | None = None  # MVA, three-phase
     frequency: float = 50.0  # Hz, nominal
+
+    @staticmethod
+    def of(path: str) -> dict[str, Any]:
+        return {"train": [path]}
 
     def check(self) -> None:
         if not self.train:
@@ -57,11 +63,7 @@ class CSV(Reader):
     def _record(self, path: str) -> Record:
         text, beside = load(path)
         table, spare = parse(text, path)
-        for name, base in (("U", self.base_voltage), ("U2", self.base_voltage)):
-            if base is not None and name in table:
-                table[name] /= base
-        for name in ("P", "Q"):
-            table[name] /= self.base_power or 1.0
+        base = Base(self.base_voltage or 1.0, self.base_power or 1.0, self.frequency)
         stem = Path(path.removeprefix(PACKAGE)).stem
         stems = [Path(p.removeprefix(PACKAGE)).stem for p in (*self.train, *self.validate)]
         notes = [beside["note"]] if "note" in beside else []
@@ -69,10 +71,10 @@ class CSV(Reader):
             notes.append(f"columns not used: {', '.join(spare)}")
         record = Record(
             name=str(beside.get("name", stem)) if stems.count(stem) == 1 else path,
-            base=Base(self.base_voltage or 1.0, self.base_power or 1.0, self.frequency),
+            base=base,
             source=path,
             notes=tuple(notes),
-            **table,
+            **base.per_unit(table),
         )
 
         def place(i: int) -> str:

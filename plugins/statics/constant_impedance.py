@@ -1,7 +1,6 @@
 """Static load of constant impedance."""
 
-from tractexp.model.parts import Static
-from tractexp.plugin import plugin
+from tractexp.extend import Static, plugin
 
 
 @plugin
@@ -17,8 +16,5 @@ class ConstantImpedance(Static):
     Departures: none.
     """
 
-    def declare(self, eq):
-        u = eq.define("static_voltage", eq.U / eq.U0, "u")
-        P = eq.define("P_static", eq.P_s0 * u**2, "P_s")
-        Q = eq.define("Q_static", eq.Q_s0 * u**2, "Q_s")
-        eq.consume(P, Q)
+    def law(self, u):
+        return u**2, u**2

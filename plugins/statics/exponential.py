@@ -1,8 +1,6 @@
 """Exponential static load."""
 
-from tractexp.model.parts import Static
-from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
+from tractexp.extend import Parameter, Static, plugin
 
 PAPER = "Wu, Fan, Zou 2022, Energies 15(14) 5034, Eq. (6)"
 
@@ -22,9 +20,5 @@ class Exponential(Static):
     p_v = Parameter(1.5, (0.0, 4.0), "1", "voltage exponent of active power", PAPER)
     q_v = Parameter(2.5, (0.0, 8.0), "1", "voltage exponent of reactive power", PAPER)
 
-    def declare(self, eq):
-        p_v, q_v = eq.declare(self.parameters)
-        u = eq.define("static_voltage", eq.U / eq.U0, "u")
-        P = eq.define("P_static", eq.P_s0 * u**p_v, "P_s")
-        Q = eq.define("Q_static", eq.Q_s0 * u**q_v, "Q_s")
-        eq.consume(P, Q)
+    def law(self, u, p_v, q_v):
+        return u**p_v, u**q_v

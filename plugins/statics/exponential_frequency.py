@@ -1,8 +1,6 @@
 """Exponential static load that follows voltage and frequency."""
 
-from tractexp.model.parts import Static
-from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
+from tractexp.extend import Parameter, Static, plugin
 
 SOURCE = "Milano 2010, Power System Modelling and Scripting, ch. 14"
 
@@ -30,10 +28,5 @@ class ExponentialFrequency(Static):
 
     reads = ("f",)
 
-    def declare(self, eq):
-        p_v, q_v, p_f, q_f = eq.declare(self.parameters)
-        u = eq.define("static_voltage", eq.U / eq.U0, "u")
-        f = eq.define("static_frequency", (eq.omega_n + eq.omega_s) / (eq.omega_n + eq.omega_s0), "f")
-        P = eq.define("P_static", eq.P_s0 * u**p_v * f**p_f, "P_s")
-        Q = eq.define("Q_static", eq.Q_s0 * u**q_v * f**q_f, "Q_s")
-        eq.consume(P, Q)
+    def law(self, u, f, p_v, q_v, p_f, q_f):
+        return u**p_v * f**p_f, u**q_v * f**q_f

@@ -1,12 +1,11 @@
 """No static load: a motor alone."""
 
-from tractexp.model.parts import Static
-from tractexp.plugin import plugin
+from tractexp.extend import Static, plugin
 
 
 @plugin
 class NoStatic(Static):
-    """The motor draws all of the power before the event, and nothing else takes up what it leaves.
+    """The motor draws all of the power before the event, and nothing else takes up what it leaves: P_s = Q_s = 0.
 
     With a static load P_0 and Q_0 are met exactly, whatever the motor's parameters, because the static load draws
     the remainder. Without one they are met as well as the motor can: T_m is its active power, and X', C and T_m
@@ -19,11 +18,13 @@ class NoStatic(Static):
     Departures: none.
     """
 
-    def declare(self, eq):
-        for power, name in ((eq.P0, "active"), (eq.Q0, "reactive")):
-            eq.require(
-                power,
+    def law(self, u):
+        return None
+
+    def require(self, P0, Q0):
+        for power, name in ((P0, "active"), (Q0, "reactive")):
+            sentence = (
                 f"a motor alone consumes {name} power, and before the event {power.name} is {{value:.3g}} pu;"
-                " choose a static load, such as model/static=exponential",
-                power,
+                " choose a static load, such as model/static=exponential"
             )
+            yield power, sentence

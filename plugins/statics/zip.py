@@ -1,8 +1,6 @@
 """ZIP (polynomial) static load."""
 
-from tractexp.model.parts import Static
-from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
+from tractexp.extend import Parameter, Static, plugin
 
 SOURCE = "IEEE Task Force 1995, Standard load models, IEEE Trans. Power Systems 10(3) 1302"
 
@@ -30,18 +28,15 @@ class Zip(Static):
     b_Z = Parameter(0.7, (0.0, 1.0), "1", "share of constant impedance in Q_s", SOURCE, "b_Z")
     b_I = Parameter(0.2, (0.0, 1.0), "1", "share of constant current in Q_s", SOURCE, "b_I")
 
-    def declare(self, eq):
-        a_Z, a_I, b_Z, b_I = eq.declare(self.parameters)
-        u = eq.define("static_voltage", eq.U / eq.U0, "u")
-        P = eq.define("P_static", eq.P_s0 * (a_Z * u**2 + a_I * u + 1 - a_Z - a_I), "P_s")
-        Q = eq.define("Q_static", eq.Q_s0 * (b_Z * u**2 + b_I * u + 1 - b_Z - b_I), "Q_s")
-        eq.consume(P, Q)
+    def law(self, u, a_Z, a_I, b_Z, b_I):
+        return a_Z * u**2 + a_I * u + 1 - a_Z - a_I, b_Z * u**2 + b_I * u + 1 - b_Z - b_I
+
+    def require(self, a_Z, a_I, b_Z, b_I):
         for power, impedance, current in (("active", a_Z, a_I), ("reactive", b_Z, b_I)):
             for share in (impedance, current):
-                eq.require(share, f"{share.name} is a share and must not be negative: it is {{value:g}}", share)
-            eq.require(
-                1 - impedance - current,
+                yield share, f"{share.name} is a share and must not be negative: it is {{value:g}}"
+            sentence = (
                 f"the shares of the {power} power must add up to 1: {impedance.name} + {current.name} is {{value:g}},"
-                " which leaves a negative share of constant power; lower one of them",
-                impedance + current,
+                " which leaves a negative share of constant power; lower one of them"
             )
+            yield 1 - impedance - current, sentence, impedance + current

@@ -27,7 +27,7 @@ class Candidate:
 
     @property
     def measurement(self) -> bool:
-        """Whether it belongs to the measurement chain, not to the load."""
+        """Whether it is a fault of the measurement, not an effect of the load."""
         return isinstance(self.effect, Measurement)
 
     def sign(self, parameter: Parameter) -> int:
@@ -56,20 +56,22 @@ class Catalogue:
         return [c.effect for c in self.candidates]
 
     @property
-    def load(self) -> tuple[str, ...]:
+    def of_load(self) -> tuple[str, ...]:
         """Names of the effects of the load itself."""
         return tuple(c.name for c in self.candidates if not c.measurement)
 
     @property
-    def chain(self) -> tuple[str, ...]:
-        """Names of the effects of the measurement chain."""
+    def of_measurement(self) -> tuple[str, ...]:
+        """Names of the faults of the measurement."""
         return tuple(c.name for c in self.candidates if c.measurement)
 
 
 def catalogue(
-    motor: Motor, static: Static, present: Sequence[Effect], events: Sequence[Event], only: Sequence[str] = ()
-) -> Catalogue:
-    """The registered effects that the model lacks. `only` restricts it; measurement-chain effects always stay.
+    motor: Motor, static: Static, present: Sequence[Effect], events: Sequence[Event], only: Sequence[str] = (),
+    swing: float = 0.05,
+) -> Catalogue:  # fmt: skip
+    """The registered effects that the model lacks. `only` restricts it; faults of the measurement always stay.
+    `swing` [Hz] is the change of the frequency that shows an effect of it.
 
     Raises `UserError` for a name in `only` that no effect has.
     """
@@ -78,30 +80,31 @@ def catalogue(
         if name not in known:
             raise UserError(f"task.effects names '{name}', which is no effect{among(name, known)}")
     here = {effect.name for effect in present}
-    equations = compose(motor, static, present).equations
+    base = compose(motor, static, present)
     found, untestable = [], {}
     for name in sorted(known):
         effect = get("effect", name)()
         if name in here or (only and name not in only and not isinstance(effect, Measurement)):
             continue
-        if why := missing_channel(effect, events) or effect.refusal(equations):
+        if why := missing_channel(effect, events, swing) or base.acceptance(effect).refusal:
             untestable[name] = why
         else:
-            found.append(_candidate(effect))
+            found.append(candidate(effect))
     return Catalogue(tuple(found), untestable)
 
 
-def missing_channel(effect: Effect, events: Sequence[Event]) -> str:
+def missing_channel(effect: Effect, events: Sequence[Event], swing: float) -> str:
     """The sentence why the recorded channels do not show this effect, "" where they do."""
     for channel in effect.reads:
         if any(getattr(e.record, channel) is None for e in events):
             return f"it is seen through {channel}, which is not recorded"
-        if channel == "f" and all(np.ptp(e.record.f) < 0.05 for e in events):
-            return "it is seen through the frequency, which moves by less than 0.05 Hz"
+        if channel == "f" and all(np.ptp(e.record.f) < swing for e in events):
+            return f"it is seen through the frequency, which moves by less than {swing:g} Hz"
     return ""
 
 
-def _candidate(effect: Effect) -> Candidate:
+def candidate(effect: Effect) -> Candidate:
+    """An effect as it is looked for: its sizes, and the settings of its other parameters."""
     sizes = tuple(p for p in effect.parameters if p.null is not None)
     scanned = [p for p in effect.parameters if p.null is None]
     grid = getattr(effect, "grid", {})

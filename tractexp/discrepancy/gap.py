@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.noise import Noise
-from tractexp.discrepancy.span import spanned
-from tractexp.discrepancy.study import Study
-from tractexp.discrepancy.tangent import injections, resting, two_sided
+from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.pushes import push_points
+from tractexp.discrepancy.tangent import resting, two_sided
 from tractexp.identification.result import relative_error
+from tractexp.noise import Noise
+from tractexp.noise.span import spanned
 
-SHOWN = 10.8  # expected gain at which a true explanation fails to gain anything in 5 % of cases: (2 x 1.645)^2
 SAME = 0.03  # singular values below this share of the largest: pushes that differ from others in noise only
 
 
@@ -42,56 +42,60 @@ class Gap:
     closed: float
     gain: float
     expected: float
+    shown: float  # the criterion
+
+    @property
+    def telling(self) -> bool:
+        """Whether these events could show a true explanation."""
+        return self.expected >= self.shown
 
     @property
     def helps(self) -> bool:
         """Whether the extension helps on these events, or they are too mild to tell."""
-        return self.gain > 0 or self.expected < SHOWN
+        return self.gain > 0 or not self.telling
 
 
-def curves(study: Study, unit: np.ndarray, noise: Noise, names: Sequence[str] | None = None) -> Curves:
+def curves(bench: Bench, unit: np.ndarray, noise: Noise, names: Sequence[str] | None = None) -> Curves:
     """What a fit with the named effects (by default any) leaves."""
-    drive = study.problem.drive
-    residual = study.residuals(unit[None], names)
-    white = noise.whiten(residual, drive, study.likelihood.known)[0]
-    calculated = residual[0] + drive.measured
-    measured = np.where(study.likelihood.known, drive.measured, np.nan)
-    errors = [relative_error(measured[c], calculated[c]) for c in (0, 1)]
+    residual = bench.residuals(unit[None], names)
+    white = bench.whiten(noise, residual)[0]
+    measured = bench.drive.measured
+    calculated = residual[0] + measured
+    known = np.where(bench.known, measured, np.nan)
+    errors = [relative_error(known[c], calculated[c]) for c in (0, 1)]
     deviance = float(white @ white)
-    return Curves(calculated, *errors, deviance, deviance / max(study.likelihood.samples, 1))
+    return Curves(calculated, *errors, deviance, deviance / max(bench.samples, 1))
 
 
 def gap(
-    study: Study, base: np.ndarray, extended: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int]
+    bench: Bench, base: np.ndarray, extended: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int]
 ) -> Gap:  # fmt: skip
-    """Compare the base model's fit and that with the named effects on the events of `study`.
+    """Compare the base model's fit and that with the named effects on the events of `bench`.
 
     Coordinates `fitted` were fitted to these events in the extended model.
     """
-    drive, known = study.problem.drive, study.likelihood.known
-    before, after = curves(study, base, noise, ()), curves(study, extended, noise, names)
+    before, after = curves(bench, base, noise, ()), curves(bench, extended, noise, names)
     gained = before.deviance - after.deviance
-    explainable = gained + max(left_over(study, extended, names, noise, fitted), 0.0)
+    explainable = gained + max(left_over(bench, extended, names, noise, fitted), 0.0)
     closed = gained / explainable if explainable > 0 else float("nan")
-    apart = (after.calculated - before.calculated)[None] * known
-    rows = noise.whiten(apart, drive, known)[0]
-    return Gap(before, after, float(closed), float(gained), float(rows @ rows))
+    apart = (after.calculated - before.calculated)[None] * bench.known
+    rows = bench.whiten(noise, apart)[0]
+    return Gap(before, after, float(closed), float(gained), float(rows @ rows), bench.criteria.shown)
 
 
-def left_over(study: Study, unit: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int]) -> float:
+def left_over(bench: Bench, unit: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int]) -> float:
     """How much more than chance pushes into all balances would still lower the deviance at coordinates (D,).
 
     Unbiased: the energy in the space of the pushes less its dimension, what is `fitted` projected out.
     """
-    pushes, _ = injections(study, unit)
+    pushes, _ = push_points(bench, unit)
     up, down = two_sided(unit, fitted)
     sets = [(names, False)] * (1 + 2 * len(fitted)) + [(names, True)] * len(pushes)
-    raw = study.residuals_of(np.concatenate([unit[None], up, down, pushes]), sets)
-    rows = noise.whiten(raw, study.problem.drive, study.likelihood.known)
-    rows = np.nan_to_num(rows)
+    raw = bench.residuals_of(np.concatenate([unit[None], up, down, pushes]), sets)
+    rows = np.nan_to_num(bench.whiten(noise, raw))
     r, k = rows[0], len(fitted)
     nuisance, cells = rows[1 : 1 + k] - rows[1 + k : 1 + 2 * k], rows[1 + 2 * k :] - r
-    nuisance = nuisance[~resting(study, unit, fitted, nuisance @ r)]
+    nuisance = nuisance[~resting(bench, unit, fitted, nuisance @ r)]
     Q = np.linalg.qr(nuisance.T)[0]
     cells -= (cells @ Q) @ Q.T
     basis = spanned(cells, SAME)

@@ -1,21 +1,24 @@
 """What held-out events say of explanations that were found without them."""
 
+import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tractexp.discrepancy.gap import SHOWN, Gap, gap
-from tractexp.discrepancy.kernels import each_apart
-from tractexp.discrepancy.noise import Noise
-from tractexp.discrepancy.study import Refit, Study
-from tractexp.discrepancy.which import ADEQUATE, stage
-from tractexp.identification.descent import descend
+from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.cores import each_apart
+from tractexp.discrepancy.criteria import Criteria
+from tractexp.discrepancy.disagreement import examined
+from tractexp.discrepancy.fitting import Refit, refit, settled
+from tractexp.discrepancy.gap import Gap, gap
+from tractexp.discrepancy.noise_in_quiet import QuietNoise, white
+from tractexp.discrepancy.records import Records
+from tractexp.discrepancy.survivors import Rival, Survivors
+from tractexp.noise import Noise
 from tractexp.record import Event
 
-CONVINCING = 0.8  # of the explainable gap: an effect that closes as much on held-out events is not doubted
-STANDS = 0.05  # p that it must else leave in a fit to all events: every second wrong name lies below
-QUIETER = 3.0  # of the deviance: so much less may all events say for an explanation that the held-out ones do not show
+Names = tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,141 +29,176 @@ class Judged:
     """
 
     gap: Gap
-    study: Study
-    units: list[np.ndarray]
+    bench: Bench
+    units: tuple[np.ndarray, np.ndarray]
     p_left: float = 1.0
 
     @property
     def helps(self) -> bool:
         """Whether the explanation is worth having beyond the events it was fitted to."""
-        least = STANDS if self.gap.expected >= SHOWN else ADEQUATE  # no event of which little is expected denies it
+        criteria = self.bench.criteria
+        least = criteria.stands if self.gap.telling else criteria.adequate_p  # a mild event denies nothing
         return self.gap.helps and self.p_left >= least
+
+    @property
+    def convincing(self) -> bool:
+        """Whether it closes as much of the gap there as a true explanation does."""
+        return self.gap.closed >= self.bench.criteria.convincing
 
 
 @dataclass(frozen=True, eq=False)
-class Refitted:
+class Together:
     """An explanation fitted to fitted and held-out events together, in coordinates of the fitted ones."""
 
     fit: Refit
     louder: float  # by how much all events speak louder for it than the fitted ones alone, of the deviance
     p_left: float  # how often chance leaves as much as it does
 
+    def confirmed(self, criteria: Criteria, doubted: bool) -> bool:
+        """Whether all events bear it out. Where the base model is `doubted` they need only bear with it."""
+        least = -criteria.quieter if doubted else criteria.shown
+        return self.louder > least and self.p_left >= criteria.adequate_p
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """The explanations that remain, as fitted without the faults of the measurement that do not help.
+
+    `bare` is the base model alone, `extended` each explanation, `judged` what the held-out events say of it. Where none
+    helped as it was fitted, `together` are those that were fitted to all events instead.
+    """
+
+    survivors: Survivors
+    noise: Noise
+    faults: Names  # of the measurement, in every explanation
+    bare: Refit
+    extended: Mapping[Names, Refit]
+    judged: Mapping[Names, Judged] = field(default_factory=dict)
+    together: tuple[Refit, ...] = ()
+
+    @property
+    def kept(self) -> tuple[Rival, ...]:
+        """The adequate explanations that the held-out events do not deny."""
+        return tuple(
+            s for s in self.survivors.adequate if s.fit.names not in self.judged or self.judged[s.fit.names].helps
+        )
+
+
+def held_out(surviving: Survivors, events: Sequence[Event], seed: int) -> HeldOut:
+    """Refit the survivors without needless faults of the measurement, and judge them on held-out events, if any."""
+    explained = surviving.explanations
+    bench, noise, faults = explained.base.bench, explained.last.noise, explained.faults
+    at = bench.coordinates
+    bare = refit(bench, noise, [((), at.without_faults(explained.steps[0].fit.unit, ()))], faults=())[0]
+    wanted = [(s.fit.names, at.without_faults(s.fit.unit, faults)) for s in (surviving.adequate or surviving.kept[:1])]
+    exact = {f.names: f for f in refit(bench, noise, wanted, faults=faults)}
+    as_fitted = HeldOut(surviving, noise, faults, bare, {names: exact[names] for names, _ in wanted})
+    if not events or not any(s.fit.names or faults for s in surviving.adequate):
+        return as_fitted
+    count = len(surviving.adequate)
+    bench.effort.say(f"judging {count} explanation{'s' * (count > 1)} on the held-out events")
+    judged, again = weighed(bench, events, as_fitted, seed, doubted=not explained.steps[0].adequate)
+    extended = {**as_fitted.extended, **{f.names: f for f in again}}
+    return replace(as_fitted, judged=judged, together=tuple(again), extended=extended)
+
 
 def weighed(
-    trained: Study, events: Sequence[Event], bare: Refit, extended: Sequence[Refit], noise: Noise,
-    chain: Sequence[str], seed: int, *, doubted: bool,
-) -> tuple[dict[tuple[str, ...], Judged], list[Refit]]:  # fmt: skip
+    bench: Bench, events: Sequence[Event], as_fitted: HeldOut, seed: int, *, doubted: bool
+) -> tuple[dict[Names, Judged], list[Refit]]:
     """Judge explanations on held-out events; where none helps as it was fitted, also those that all events confirm.
 
     Where the base model is `doubted` all events need only bear with them: the held-out ones may not show them at all.
     Several effects at once, chosen among hundreds of sets, must also leave nothing in a fit to all events, and so must
     a single one that closes less of the gap there than a true one does.
     """
-    found = judged(trained, events, bare, extended)
-    helping = [fit for fit in extended if found[fit.names].gap.helps]
+    extended = list(as_fitted.extended.values())
+    judged = judged_on(bench, events, as_fitted.bare, extended)
+    helping = [fit for fit in extended if judged[fit.names].gap.helps]
     if not helping:
-        all_of_them = together(trained, events, bare, extended, noise, chain, seed, anew=True)
-        least = -QUIETER if doubted else SHOWN
-        again = [refitted.fit for refitted in all_of_them if refitted.louder > least and refitted.p_left >= ADEQUATE]
-        return found | (judged(trained, events, bare, again) if again else {}), again
-    doubtful = [f for f in helping if len(f.names) + len(chain) > 1 or not found[f.names].gap.closed >= CONVINCING]
-    for refitted in together(trained, events, bare, doubtful, noise, chain, seed) if doubtful else ():
-        found[refitted.fit.names] = replace(found[refitted.fit.names], p_left=refitted.p_left)
-    return found, []
+        fits = together(bench, events, as_fitted, extended, seed, anew=True)
+        again = [fitted.fit for fitted in fits if fitted.confirmed(bench.criteria, doubted)]
+        return judged | (judged_on(bench, events, as_fitted.bare, again) if again else {}), again
+    doubtful = [f for f in helping if len(f.names) + len(as_fitted.faults) > 1 or not judged[f.names].convincing]
+    for fitted in together(bench, events, as_fitted, doubtful, seed) if doubtful else ():
+        judged[fitted.fit.names] = replace(judged[fitted.fit.names], p_left=fitted.p_left)
+    return judged, []
 
 
-def judged(
-    trained: Study, events: Sequence[Event], bare: Refit, extended: Sequence[Refit]
-) -> dict[tuple[str, ...], Judged]:  # fmt: skip
+def judged_on(bench: Bench, events: Sequence[Event], bare: Refit, extended: Sequence[Refit]) -> dict[Names, Judged]:
     """Compare the base model and extended ones, as they were fitted, on held-out events."""
-    study, units, noise = carried(trained, events, [bare, *extended])
+    other, units, noise = carried(bench, events, [bare, *extended])
     return {
-        fit.names: Judged(gap(study, units[0], unit, fit.names, noise, study.before), study, [units[0], unit])
-        for fit, unit in zip(extended, units[1:], strict=True)
+        fit.names: Judged(gap(other, units[0], u, fit.names, noise, other.coordinates.before), other, (units[0], u))
+        for fit, u in zip(extended, units[1:], strict=True)
     }
 
 
-def carried(
-    trained: Study, events: Sequence[Event], fits: Sequence[Refit]
-) -> tuple[Study, list[np.ndarray], Noise]:  # fmt: skip
+def carried(bench: Bench, events: Sequence[Event], fits: Sequence[Refit]) -> tuple[Bench, list[np.ndarray], Noise]:
     """Carry fits over to held-out events: everything keeps its trained value but P0 and Q0 of each event.
 
-    Returns the study of those events, the coordinates of each fit there, and the noise of the last one.
+    Returns the bench of those events, the coordinates of each fit there, and the noise of the last one.
     """
-    study = _study_of(trained, events)
+    other, d = bench.on(Records.of(events, bench.records.window)), len(bench.coordinates.names)
     units = []
     for fit in fits:
-        unit = study.null.copy()
-        unit[: trained.problem.space.dimension] = fit.unit[: trained.problem.space.dimension]
-        units.append(_settled(study, unit, study.white(), fit.names))
-    noise = study.noise(units[-1])
-    return study, [_settled(study, u, noise, fit.names) for u, fit in zip(units, fits, strict=True)], noise
+        unit = other.coordinates.null.copy()
+        unit[:d] = fit.unit[:d]
+        units.append(settled(other, unit, white(other), fit.names))
+    noise = QuietNoise.at(other, units[-1]).of_fit(units[-1])
+    return other, [settled(other, u, noise, fit.names) for u, fit in zip(units, fits, strict=True)], noise
 
 
 def together(
-    trained: Study, events: Sequence[Event], bare: Refit, extended: Sequence[Refit], noise: Noise,
-    chain: Sequence[str], seed: int, *, anew: bool = False,
-) -> list[Refitted]:  # fmt: skip
+    bench: Bench,
+    events: Sequence[Event],
+    as_fitted: HeldOut,
+    extended: Sequence[Refit],
+    seed: int,
+    *,
+    anew: bool = False,
+) -> list[Together]:
     """Explanations fitted to fitted and held-out events together, from every setting if `anew`.
 
     What the fitted events leave open, such as the level of a relay between the depths of two dips, may be wrong on
     the held-out ones though the effect is there.
     """
-    study = _study_of(trained, (*trained.recorded, *events))
-    plain = _widened(study, trained, bare.unit)
-    study.see_blur(plain)
-    noise = noise.on(study.profile, study.blur)
-    first = study.refit(noise, [((), plain)], chain=())[0]
+    whole = bench.on(Records.of((*bench.records.recorded, *events), bench.records.window))
+    bare, d, before = as_fitted.bare, len(bench.coordinates.names), len(bench.coordinates.before)
+    plain = _widened(whole, bare.unit)
+    quiet = QuietNoise.at(whole, plain)
+    noise = as_fitted.noise.on(whole.profile, quiet.blur)
+    first = refit(whole, noise, [((), plain)], faults=())[0]
     wanted = [
-        (fit.names, _placed(study, start, setting))
+        (fit.names, _placed(whole, start, setting))
         for fit in extended
-        for start in [_widened(study, trained, fit.unit)]
-        for setting in (_settings(study, fit.names) if anew else [{}])
+        for start in [_widened(whole, fit.unit)]
+        for setting in (_settings(whole, fit.names) if anew else [{}])
     ]
 
-    def told(fit: Refit) -> Refitted:
+    def told(fit: Refit) -> Together:
         alone = next(e for e in extended if e.names == fit.names)
         louder = (first.deviance - fit.deviance) - (bare.deviance - alone.deviance)
-        p_left = stage(study, fit, noise, seed, plain=True).p_left
-        unit = np.r_[fit.unit[: study.problem.space.dimension], fit.unit[study.before][: len(trained.before)]]
-        return Refitted(replace(fit, unit=unit), louder, p_left)
+        p_left = examined(quiet, fit, noise, seed, plain=True).p_left
+        unit = np.r_[fit.unit[:d], fit.unit[whole.coordinates.before][:before]]
+        return Together(replace(fit, unit=unit), louder, p_left)
 
-    return each_apart(told, study.refit(noise, wanted, chain=chain))
-
-
-def _study_of(trained: Study, events: Sequence[Event]) -> Study:
-    """A study of other events in the same terms."""
-    kernels = trained.kernels
-    return Study(trained.model, trained.catalogue, events, kernels.bounds, kernels.fixed, kernels.substeps)
+    return each_apart(told, refit(whole, noise, wanted, faults=as_fitted.faults))
 
 
-def _widened(study: Study, trained: Study, unit: np.ndarray) -> np.ndarray:
-    """Coordinates of the fitted events as those of a study with more events after them."""
-    wide = study.null.copy()
+def _widened(bench: Bench, unit: np.ndarray) -> np.ndarray:
+    """Coordinates of the fitted events as those of a bench with more events after them."""
+    wide = bench.coordinates.null.copy()
     wide[: len(unit)] = unit
     return wide
 
 
-def _settings(study: Study, names: Sequence[str]) -> list[dict[str, float]]:
+def _settings(bench: Bench, names: Sequence[str]) -> list[dict[str, float]]:
     """No change, and every setting of the scanned parameters of one of the effects."""
-    return [{}, *(s for name in names for s in study.catalogue[name].settings)]
+    return [{}, *itertools.chain.from_iterable(bench.catalogue[name].settings for name in names)]
 
 
-def _placed(study: Study, unit: np.ndarray, setting: Mapping[str, float]) -> np.ndarray:
-    moved = unit.copy()
+def _placed(bench: Bench, unit: np.ndarray, setting: Mapping[str, float]) -> np.ndarray:
+    moved, at = unit.copy(), bench.coordinates
     for name, value in setting.items():
-        moved[study.column[name]] = study.to_unit(name, value)
-    return moved
-
-
-def _settled(study: Study, unit: np.ndarray, noise: Noise, names: Sequence[str]) -> np.ndarray:
-    """Fit P0 and Q0 of each event alone."""
-
-    def rows(x: np.ndarray, lanes: np.ndarray) -> np.ndarray:
-        whole = np.tile(unit, (len(x), 1))
-        whole[:, study.before] = x
-        return study.rows(whole, noise, (), [names] * len(x))
-
-    moved = unit.copy()
-    moved[study.before] = descend(rows, unit[study.before][None]).unit[0]
+        moved[at.column[name]] = at.to_unit(name, value)
     return moved

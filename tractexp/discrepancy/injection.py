@@ -29,19 +29,16 @@ class Injection(Effect):
         Parameter(1.0, (-1e3, 1e3), "s", "end of the window", SOURCE, name="window_off"),
     )
 
-    def edit(self, eq):
-        from tractexp.model.equations import I, sympy
+    def edit(self, eq, push_flux_d, push_flux_q, push_speed, push_P, push_Q, window_on, window_off):
+        from tractexp.model.equations import OWN, I, sympy
 
-        flux_d, flux_q, speed, P, Q, on, off = eq.declare(self.parameters)
         ramp = lambda at: sympy.Max(0, sympy.Min(1, (eq.t - at) / EDGE))  # noqa: E731
-        gate = ramp(on) - ramp(off)
-        for symbol, state in eq.states.items():
-            if symbol.name == "E":
-                state.derivative += gate * (flux_d + I * flux_q)
-            elif symbol.name == "omega":
-                state.derivative += gate * speed
-        eq.consume(gate * P, gate * Q)
-        eq.settled = False
+        gate = ramp(window_on) - ramp(window_off)
+        pushes = {"flux": push_flux_d + I * push_flux_q, "speed": push_speed}
+        for state in eq.states.values():  # of the motor itself: a twin that an effect adds follows it
+            if state.writer == OWN and state.role in pushes:
+                state.derivative += gate * pushes[state.role]
+        eq.consume(gate * push_P, gate * push_Q)
 
 
 PUSHES = tuple(p.name for p in Injection.parameters[:5])

@@ -1,208 +1,135 @@
-"""The whole investigation, from records to a verdict: none, named, tied or unexplained."""
+"""The whole investigation, from records to a verdict, in the eight steps of docs/missing-effects.md."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
+from tractexp.discrepancy.base_fit import BaseFit, base_fit
+from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.catalogue import Catalogue, catalogue
-from tractexp.discrepancy.gap import Gap, curves, gap
-from tractexp.discrepancy.held_out import Judged, carried, weighed
+from tractexp.discrepancy.criteria import Criteria
+from tractexp.discrepancy.disagreement import Disagreement, disagreement
+from tractexp.discrepancy.effort import Effort
+from tractexp.discrepancy.explanations import Explanations, explanations
+from tractexp.discrepancy.fitting import Refit
+from tractexp.discrepancy.gap import Gap, gap
+from tractexp.discrepancy.held_out import HeldOut, Judged, held_out
 from tractexp.discrepancy.kernels import Family
-from tractexp.discrepancy.noise import Noise
-from tractexp.discrepancy.recommend import Decider, deciding_event
-from tractexp.discrepancy.recorder import opened
-from tractexp.discrepancy.study import Refit, Study
-from tractexp.discrepancy.sure import Rival, surviving
-from tractexp.discrepancy.where import Place, where
-from tractexp.discrepancy.which import Explanation, Stage, explain
-from tractexp.errors import UserError
+from tractexp.discrepancy.places import Place, places
+from tractexp.discrepancy.records import Records, check_events
+from tractexp.discrepancy.survivors import Survivors, survivors
+from tractexp.discrepancy.verdict import NONE, Verdict, verdict
+from tractexp.discrepancy.window_search import behind_recorder
 from tractexp.model.model import Model
 from tractexp.record import Event
 
 
 @dataclass(frozen=True, eq=False)
-class Nearest:
-    """Where nothing explains the disagreement: the set that comes nearest, and what it leaves.
+class Investigation:
+    """Everything found, step by step."""
 
-    Shares are of the deviance in excess of the noise, on the fitted and on the held-out events (nan without any).
-    """
+    base: BaseFit
+    first: Disagreement  # of the base model
+    places: tuple[Place, ...]  # where it is; none where the verdict is none
+    explanations: Explanations
+    survivors: Survivors
+    held_out: HeldOut
+    verdict: Verdict
+    train: Gap  # on the fitted events
 
-    names: tuple[str, ...]
-    fitted: float
-    held_out: float
-    calculated: np.ndarray  # (2, N) pu, of the fitted events end to end
-    others: list[tuple[tuple[str, ...], float]]  # the next ones, with their shares on the fitted events
+    @property
+    def bench(self) -> Bench:
+        return self.base.bench
 
+    @property
+    def catalogue(self) -> Catalogue:
+        return self.bench.catalogue
 
-@dataclass(frozen=True, eq=False)
-class Finding:
-    """Everything the investigation found. `names` are the effects added, `sets` all sets not rejected."""
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The effects added."""
+        return self.verdict.names
 
-    verdict: str  # none, named, tied, unexplained
-    reason: str
-    names: tuple[str, ...]
-    sets: list[tuple[str, ...]]
-    places: list[Place]
-    catalogue: Catalogue
-    study: Study
-    explanation: Explanation
-    rivals: list[Rival]
-    bare: Refit  # the base model alone
-    extended: Refit  # with the names added
-    train: Gap
-    held_out: Judged | None
-    refitted: bool  # whether the extended model was fitted to the held-out events, too
-    decider: Decider | None
-    nearest: Nearest | None  # where the verdict is "unexplained"
-    alpha: float
+    @property
+    def last(self) -> Disagreement:
+        """The tests once the chosen effects are in."""
+        return self.explanations.last
+
+    @property
+    def bare(self) -> Refit:
+        """The base model alone."""
+        return self.held_out.bare
+
+    @property
+    def extended(self) -> Refit:
+        """The model with the names of the verdict added; the base model where there are none."""
+        return self.held_out.extended[self.verdict.chosen.fit.names] if self.names else self.bare
+
+    @property
+    def judged(self) -> Judged | None:
+        """What the held-out events say of the names."""
+        return self.held_out.judged.get(self.verdict.chosen.fit.names) if self.names else None
 
     @property
     def validate(self) -> Gap | None:
         """The gap on the held-out events."""
-        return None if self.held_out is None else self.held_out.gap
+        return None if self.judged is None else self.judged.gap
 
     @property
-    def first(self) -> Stage:
-        """The tests of the base model."""
-        return self.explanation.stages[0]
-
-    @property
-    def last(self) -> Stage:
-        """The tests once the chosen effects are in."""
-        return self.explanation.stages[-1]
-
-
-def check_events(train: Sequence[Event], validate: Sequence[Event]) -> None:
-    """Raise `UserError` for events that do not belong together."""
-    held = [e.record.where for e in validate]
-    for event in train:
-        if event.record.where in held:
-            raise UserError(f"{event.record.where} is both in data.train and in data.validate; hold out another event")
-    for event in (*train, *validate):
-        for channel in ("f", "U2"):
-            has, first = getattr(event.record, channel) is not None, train[0]
-            if has != (getattr(first.record, channel) is not None):
-                one, other = (event, first) if has else (first, event)
-                raise UserError(
-                    f"{one.record.where} has the channel {channel} and {other.record.where} has not: events of one"
-                    " investigation need the same channels; remove the column or add it"
-                )
+    def fitted_to_both(self) -> bool:
+        """Whether the extended model was fitted to the held-out events, too."""
+        return bool(self.held_out.together and self.held_out.kept)
 
 
 def investigate(
     model: Model,
     train: Sequence[Event],
-    validate: Sequence[Event],
-    bounds: Mapping[str, Sequence[float]],
-    fixed: Mapping[str, float],
+    validate: Sequence[Event] = (),
+    bounds: Mapping[str, Sequence[float]] | None = None,
+    fixed: Mapping[str, float] | None = None,
     *,
     only: Sequence[str] = (),
-    alpha: float = 0.05,
+    substeps: int | None = None,
+    criteria: Criteria | None = None,
     seed: int = 0,
     tell: Callable[[str], None] = lambda line: None,
-) -> Finding:
+) -> Investigation:
     """Find where model and records disagree, name what is missing, add it, and measure how the gap shrinks.
 
-    `alpha` is the probability of naming anything where nothing is missing. Raises `UserError` for wrong events or
-    names.
+    `bounds` {name: (lower, upper)} and `fixed` {name: value} are of the base model's parameters, `only` names the
+    effects that are tested (none: all), `substeps` the Runge-Kutta steps per sample (None: as many as needed). Raises
+    `UserError` for wrong events or names.
     """
+    effort, criteria = Effort(tell), criteria or Criteria()
     check_events(train, validate)
-    known = catalogue(model.motor, model.static, model.effects, train, only)
-    tell(f"testing {len(known.candidates)} effects, {len(known.untestable)} more cannot be tested on these events")
-    Family(model, known).compile(tell)
-    study, first = opened(model, known, train, bounds, fixed, seed, tell)
-    naming = 0.8 * alpha  # the rest is spent on the adequacy test
-    explanation = explain(study, first, naming, seed, tell)
-    survivors, rivals = surviving(study, explanation, seed)
-    chain = tuple(explanation.stages[-1].chain(naming))
-    noise = explanation.stages[-1].noise
-    bare = study.refit(noise, [((), _unchained(study, explanation.stages[0].fit, ()))], chain=())[0]
-    adequate = [s for s in survivors if s.adequate] if survivors[0].adequate else []
-    wanted = [(s.fit.names, _unchained(study, s.fit, chain)) for s in (adequate or survivors[:1])]
-    exact = {f.names: f for f in study.refit(noise, wanted, chain=chain)}
-    extended = {names: exact[names] for names, _ in wanted}
-    found, together = {}, []
-    if validate and any(s.fit.names or chain for s in adequate):
-        tell(f"judging {len(adequate)} explanation{'s' * (len(adequate) > 1)} on the held-out events")
-        found, together = weighed(
-            study, validate, bare, list(extended.values()), noise, chain, seed, doubted=not first.adequate
-        )
-        extended |= {f.names: f for f in together}
-    kept = [s for s in adequate if s.fit.names not in found or found[s.fit.names].helps]
-    verdict, reason = _verdict(explanation, survivors, adequate, kept, chain, alpha)
-    if together and kept:
-        reason += "; what the fitted events leave open of it was fitted to the held-out ones, too"
-    if study.phasors is not None:
-        reason += f"; {study.phasors.describe()}, which is taken into account"
-    chosen = (kept or adequate or survivors)[0]
-    sets = [tuple(sorted((*s.fit.names, *chain))) for s in kept] if verdict in ("named", "tied") else []
-    names = sets[0] if sets else ()
-    after = extended[chosen.fit.names] if names else bare
-    last = chosen.stage or explanation.stages[-1]
-    if resting := (last if names else first).resting:
-        reason += f"; on a bound: {', '.join(resting)}"
-    fitted = [*study.base, *study.before, *study.parameters(names)]
-    return Finding(
-        verdict, reason, names, sets,
-        where(first.projection, first.null, alpha) if verdict != "none" else [],
-        known, study, explanation, rivals, bare, after,
-        gap(study, bare.unit, after.unit, after.names, last.noise, fitted),
-        found.get(chosen.fit.names) if names else None, bool(together and kept),
-        deciding_event(study, kept) if verdict == "tied" else None,
-        _nearest(study, bare, rivals, noise, validate) if verdict == "unexplained" else None, alpha,
-    )  # fmt: skip
+    missing = catalogue(model.motor, model.static, model.effects, train, only, criteria.frequency_swing)
+    some, others = len(missing.candidates), len(missing.untestable)
+    effort.say(f"testing {some} effects, {others} more cannot be tested on these events")
+    Family(model, missing).compile(effort.say)
+
+    records = Records.of(train)
+    base = base_fit(Bench.of(model, missing, records, bounds or {}, fixed or {}, criteria, effort, substeps))
+    base, first = behind_recorder(base, disagreement(base, seed), seed)
+    standing_out = places(first)
+    explained = explanations(base, first, seed)
+    left = survivors(explained, seed)
+    weighed = held_out(left, validate, seed)
+    said = verdict(weighed, validate)
+    return Investigation(
+        base=base,
+        first=first,
+        places=() if said.word == NONE else tuple(standing_out),
+        explanations=explained,
+        survivors=left,
+        held_out=weighed,
+        verdict=said,
+        train=_gap(base.bench, weighed, said),
+    )
 
 
-def _nearest(
-    study: Study, bare: Refit, rivals: list[Rival], noise: Noise, validate: Sequence[Event]
-) -> Nearest | None:  # fmt: skip
-    if not rivals[0].fit.names:
-        return None
-    before, after = curves(study, bare.unit, noise), curves(study, rivals[0].fit.unit, noise)
-    excess = max(before.deviance - study.likelihood.samples, 1e-300)
-    held = float("nan")
-    if validate:
-        other, units, level = carried(study, validate, [bare, rivals[0].fit])
-        there = [curves(other, u, level).deviance for u in units]
-        held = (there[0] - there[1]) / max(there[0] - other.likelihood.samples, 1e-300)
-    others = [(r.fit.names, (before.deviance - r.fit.deviance) / excess) for r in rivals[1:4]]
-    share = (before.deviance - after.deviance) / excess
-    return Nearest(rivals[0].fit.names, float(share), float(held), after.calculated, others)
-
-
-def _unchained(study: Study, fit: Refit, chain: Sequence[str]) -> np.ndarray:
-    """A fit's coordinates with the insignificant part of the measurement chain back at its null."""
-    unit = fit.unit.copy()
-    for name in study.catalogue.chain:
-        if name not in chain:
-            unit[study.parameters([name])] = study.null[study.parameters([name])]
-    return unit
-
-
-def _verdict(
-    explanation: Explanation, survivors: list[Rival], adequate: list[Rival], kept: list[Rival],
-    chain: tuple[str, ...], alpha: float,
-) -> tuple[str, str]:  # fmt: skip
-    """The verdict and the sentence behind it."""
-    base = explanation.stages[0]
-    nothing = not explanation.chosen.names and not chain
-    if nothing and base.adequate:
-        return "none", f"no disagreement above the noise, at a false-alarm rate of {alpha:.0%}"
-    if not adequate:
-        return "unexplained", (
-            "the model and the records disagree, and nothing in the catalogue explains it: what is left after the best"
-            f" explanation would come about by chance with p = {survivors[0].stage.p_left:.2g}; what stands out most:"
-            f" {survivors[0].stage.loudest}"
-        )
-    if not kept and base.adequate:
-        return "none", (
-            "what seemed to help on the fitted events does not help on the held-out ones, and what the base model"
-            " leaves is no more than chance leaves"
-        )
-    if not kept:
-        return "unexplained", "what explains the fitted events does not hold on the held-out ones"
-    names = " and ".join(sorted((*kept[0].fit.names, *chain)))
-    if len(kept) == 1:
-        return "named", f"{names} explains the disagreement, and no other set of this size does"
-    return "tied", f"{len(kept)} explanations fit equally well on these events and cannot be told apart"
+def _gap(bench: Bench, found: HeldOut, said: Verdict) -> Gap:
+    """The gap on the fitted events before and after."""
+    at = bench.coordinates
+    after = found.extended[said.chosen.fit.names] if said.names else found.bare
+    noise = (said.chosen.tests or found.survivors.explanations.last).noise
+    fitted = [*at.base, *at.before, *at.parameters(said.names)]
+    return gap(bench, found.bare.unit, after.unit, after.names, noise, fitted)

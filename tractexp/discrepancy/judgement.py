@@ -6,11 +6,9 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from tractexp.discrepancy.catalogue import Candidate
-from tractexp.discrepancy.investigate import Finding
-from tractexp.discrepancy.sure import ONE_SIDED
-from tractexp.discrepancy.tangent import Score
-
-TESTABLE = 0.8  # power at the smallest relevant size below which an effect cannot be tested on the data
+from tractexp.discrepancy.investigate import Investigation
+from tractexp.discrepancy.next_dip import ONE_SIDED
+from tractexp.discrepancy.projection import Score
 
 
 @dataclass(frozen=True)
@@ -23,25 +21,26 @@ class Judgement:
     score: Score | None = None
 
 
-def judge(finding: Finding) -> list[Judgement]:
+def judgements(investigation: Investigation) -> list[Judgement]:
     """Every effect of the catalogue classified (Saris, Satorra and van der Veld 2009), at the chosen model."""
-    critical = finding.first.null.critical_p(finding.alpha)
-    scores = {s.name: s for s in finding.last.scores}
-    made = [Judgement(name, "not testable", why) for name, why in finding.catalogue.untestable.items()]
-    for candidate in finding.catalogue.candidates:
+    criteria = investigation.bench.criteria
+    critical = investigation.first.chance.critical_p(criteria.false_alarms)
+    scores = {s.name: s for s in investigation.last.scores}
+    made = [Judgement(name, "not testable", why) for name, why in investigation.catalogue.untestable.items()]
+    for candidate in investigation.catalogue.candidates:
         name, score = candidate.name, scores.get(candidate.name)
-        if name in finding.names:
+        if name in investigation.names:
             made.append(Judgement(name, "relevant", "added"))
-        elif name in finding.last.fit.names:
+        elif name in investigation.last.fit.names:
             made.append(Judgement(name, "relevant", "in the best explanation, which was not accepted"))
         elif score is None:
             made.append(Judgement(name, "irrelevant", "in the fit as a nuisance, not above its noise"))
         else:
-            made.append(Judgement(name, *_judged(candidate, score, critical), score))
+            made.append(Judgement(name, *judged(candidate, score, critical, criteria.testable), score))
     return sorted(made, key=lambda j: j.name)
 
 
-def _judged(candidate: Candidate, score: Score, critical: float) -> tuple[str, str]:
+def judged(candidate: Candidate, score: Score, critical: float, testable: float) -> tuple[str, str]:
     """Status and reason of an effect outside the chosen model."""
     main = candidate.sizes[0]
     unit = "" if main.unit == "1" else f" {main.unit}"
@@ -52,6 +51,6 @@ def _judged(candidate: Candidate, score: Score, critical: float) -> tuple[str, s
         return "not testable", "these events cannot show it"
     limit = abs(size) + ONE_SIDED * deviation
     below = f"{main.name} within {limit:.2g}{unit} of its null"
-    if ndtr(relevant / max(deviation, 1e-300) + ndtri(critical)) < TESTABLE:
+    if ndtr(relevant / max(deviation, 1e-300) + ndtri(critical)) < testable:
         return "not testable", f"a size of {relevant:g}{unit} would stay in the noise on these events ({below})"
     return ("ruled out" if limit < relevant else "irrelevant"), below

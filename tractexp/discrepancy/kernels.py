@@ -8,17 +8,15 @@ the kernel of everything. All give the same response up to rounding.
 
 import functools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 
 from tractexp.discrepancy.catalogue import Catalogue
+from tractexp.discrepancy.cores import side_by_side
 from tractexp.discrepancy.injection import Injection
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.problem import Problem
-from tractexp.model.codegen import LANES
 from tractexp.model.drive import Drive
 from tractexp.model.kernel import compile_missing
 from tractexp.model.model import Model, compose
@@ -26,34 +24,7 @@ from tractexp.record import Event
 
 LONG = 2.0  # times the source of the base model
 SHARED = 2  # effects of one kernel: one each would take longer to compile, more would be slower
-Item = TypeVar("Item")
-Result = TypeVar("Result")
 Key = tuple[frozenset[str], bool] | None  # load effects and whether pushes are in; None: everything is
-
-
-def side_by_side(function: Callable[[np.ndarray], np.ndarray], lanes: np.ndarray) -> np.ndarray:
-    """`function` of lanes (n, ...), on all cores: they do not know of each other, so the bits are the same."""
-    from numba import get_num_threads
-
-    parts = min(get_num_threads(), -(-len(lanes) // LANES))
-    if parts < 2:
-        return function(lanes)
-    return np.concatenate(list(_threads().map(function, np.array_split(lanes, parts))))
-
-
-def each_apart(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
-    """`function` of each item, on all cores. It may itself work `side_by_side`, whose threads are others."""
-    from numba import get_num_threads
-
-    if min(get_num_threads(), len(items)) < 2:
-        return [function(item) for item in items]
-    with ThreadPoolExecutor(get_num_threads()) as pool:
-        return list(pool.map(function, items))
-
-
-@functools.cache
-def _threads() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor()
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +35,8 @@ class Family:
     catalogue: Catalogue
 
     def with_effects(self, names: Iterable[str], pushed: bool = False) -> Model:
-        """The model with these load effects, the whole measurement chain and, where `pushed`, the pushes."""
-        effects = [self.catalogue[n].effect for n in sorted({*names, *self.catalogue.chain})]
+        """The model with these load effects, every fault of the measurement and, where `pushed`, the pushes."""
+        effects = [self.catalogue[n].effect for n in sorted({*names, *self.catalogue.of_measurement})]
         pushes = [Injection()] if pushed else []
         made = compose(self.model.motor, self.model.static, [*self.model.effects, *effects, *pushes])
         return made.behind(self.model.recorder)
@@ -73,27 +44,27 @@ class Family:
     @functools.cached_property
     def whole(self) -> Model:
         """The model with everything."""
-        return self.with_effects(self.catalogue.load, True)
+        return self.with_effects(self.catalogue.of_load, True)
 
     @functools.cached_property
     def short(self) -> frozenset[str]:
         """The load effects whose kernels are not much longer than the base model's."""
         most = LONG * self._length(())
-        return frozenset(n for n in self.catalogue.load if self._length((n,)) <= most)
+        return frozenset(n for n in self.catalogue.of_load if self._length((n,)) <= most)
 
     @functools.cached_property
     def groups(self) -> tuple[frozenset[str], ...]:
         """Load effects that share a kernel: short ones of nearly the same length, long ones by themselves."""
         ranked = sorted(self.short, key=lambda n: (self._length((n,)), n))
         together = [frozenset(ranked[k : k + SHARED]) for k in range(0, len(ranked), SHARED)]
-        return *together, *(frozenset((n,)) for n in self.catalogue.load if n not in self.short)
+        return *together, *(frozenset((n,)) for n in self.catalogue.of_load if n not in self.short)
 
     def _length(self, names: Iterable[str]) -> int:
         return len(self.with_effects(names).source)
 
     def key(self, names: Iterable[str], pushed: bool = False) -> Key:
         """The kernel that serves a set of names, with pushes or without."""
-        load = frozenset(names) - set(self.catalogue.chain)
+        load = frozenset(names) - set(self.catalogue.of_measurement)
         if not pushed:
             for group in (frozenset(), *self.groups):
                 if load <= group:
@@ -115,7 +86,7 @@ class Family:
 
 
 class Kernels:
-    """Simulates coordinates (n, D) of a study by the kernel of a set of effects."""
+    """Simulates coordinates (n, D) by the kernel of a set of effects."""
 
     def __init__(
         self,
@@ -133,12 +104,12 @@ class Kernels:
         self._made: dict[Key, tuple[Likelihood, np.ndarray]] = {None: self._simulator(self.whole)}
 
     def residuals(self, key: Key, unit: np.ndarray) -> np.ndarray:
-        """Calculated minus measured (n, 2, N) [pu] at coordinates (n, D) of the study."""
+        """Calculated minus measured (n, 2, N) [pu] at coordinates (n, D)."""
         likelihood, columns = self._of(key)
         return likelihood.residuals(unit[:, columns])
 
     def simulate(self, names: Iterable[str], unit: np.ndarray, drive: Drive) -> np.ndarray:
-        """P and Q (n, 2, N) [pu] under other voltages, with these effects at coordinates (n, D) of the study."""
+        """P and Q (n, 2, N) [pu] under other voltages, with these effects at coordinates (n, D)."""
         likelihood, columns = self._of(self.family.key(names))
         problem = likelihood.problem
         values = problem.full(likelihood.values(unit[:, columns]))
@@ -150,7 +121,7 @@ class Kernels:
         return side_by_side(simulated, values)
 
     def _of(self, key: Key) -> tuple[Likelihood, np.ndarray]:
-        """The likelihood by one kernel, and where its coordinates stand among the study's."""
+        """The likelihood by one kernel, and where its coordinates stand among all."""
         if key not in self._made:
             assert key is not None
             model = self.family.with_effects(*key)

@@ -1,30 +1,23 @@
-"""The linearised problem around a fit: what each candidate would change, with all nuisances projected out.
-
-Notation of the score test with nuisances (Rao 1948; Neyman 1959): r whitened residuals, N nuisance columns with
-their prior, M = I - N (N'N)^-1 N', s = M W dy/deta of a candidate. Adding the candidate lowers the deviance by
-(s'r)^2/s's; the one-step estimate of its size is -s'r/s's with standard deviation 1/|s|.
-"""
+"""The linearised problem around a fit: what each parameter, candidate and push would change, in one batch."""
 
 import functools
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtrc
 
+from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.catalogue import Candidate
-from tractexp.discrepancy.injection import PUSHES
-from tractexp.discrepancy.noise import Noise
-from tractexp.discrepancy.span import spanned
-from tractexp.discrepancy.study import Refit, Study
+from tractexp.discrepancy.fitting import Refit
+from tractexp.discrepancy.projection import Projection
+from tractexp.discrepancy.pushes import push_points
+from tractexp.noise import Noise
+from tractexp.noise.span import spanned
 
 REACH = 0.5  # smallest relevant sizes: the step of a candidate's difference quotient
 NUISANCE_STEP = 1e-4  # of a coordinate's range
 WALL, HELD = 1e-3, 1e-6  # of it: how near a wall a parameter rests on it, and how far it may move then
 LEAST_KEPT = 0.2  # of a residual's variance: where columns explain more, it tells nothing of the noise
-DISTINCT = 1e-3  # of the largest singular value: directions weaker than this are rounding
-WINDOWS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)  # s after the end of the dip
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,28 +29,16 @@ class Column:
     raw: np.ndarray
 
 
-@dataclass(frozen=True)
-class Score:
-    """What the score test says of one candidate, at its best setting."""
-
-    name: str
-    drop: float  # of the deviance
-    p: float  # of this drop alone, not corrected for the others
-    size: dict[str, float]  # one-step estimates
-    deviation: dict[str, float]
-    setting: dict[str, float]
-
-
 @dataclass(frozen=True, eq=False)
 class Tangent:
     """Raw residuals and differences at a fit; `whitened` turns them into a `Projection` under a noise model."""
 
-    study: Study
+    bench: Bench
     residual: np.ndarray  # (2, N)
     nuisance: np.ndarray  # (k, 2, N)
     prior: np.ndarray  # (k, k) prior rows of the nuisances, whitened
     estimate: np.ndarray  # (k,) the nuisances' departure from their prior mean, in its standard deviations (or 0)
-    chain: dict[str, list[int]]  # which nuisances belong to which effect of the measurement chain
+    faults: dict[str, list[int]]  # which nuisances belong to which fault of the measurement
     columns: tuple[Column, ...]
     split: np.ndarray  # (e, 2, N) differences of the fitted parameters, each in one event only
     cells: np.ndarray  # (c, 2, N) responses to injections
@@ -69,7 +50,7 @@ class Tangent:
         """All that the fit or any candidate could change, (k, 2, N)."""
         return np.concatenate([self.nuisance, *(c.raw for c in self.columns)])
 
-    def whitened(self, noise: Noise, residuals: np.ndarray | None = None) -> "Projection":
+    def whitened(self, noise: Noise, residuals: np.ndarray | None = None) -> Projection:
         """Project under this noise; `residuals` (b, 2, N) replace the fit's own (for the bootstrap)."""
         own = residuals is None
         raw = [
@@ -80,7 +61,7 @@ class Tangent:
             self.cells,
         ]
         ends = np.cumsum([len(part) for part in raw])
-        white = noise.whiten(np.concatenate(raw), self.study.problem.drive, self.study.likelihood.known)
+        white = self.bench.whiten(noise, np.concatenate(raw))
         rows = np.concatenate([white, np.zeros((len(white), len(self.prior)))], axis=1)
         size = white.shape[1]
         rows[: ends[0], size:] = self.prior.T
@@ -95,120 +76,24 @@ class Tangent:
         return Projection(self, Q, R, parts[0], along[: len(parts[0])], departure, parts[1:-2], *parts[-2:])
 
 
-@dataclass(frozen=True, eq=False)
-class Projection:
-    """Whitened and with the nuisances projected out; `r` has one row per residual (one, or the bootstrap's)."""
-
-    tangent: Tangent
-    Q: np.ndarray
-    R: np.ndarray
-    r: np.ndarray  # (b, R)
-    along: np.ndarray  # (b, k) the residuals' part along the nuisances
-    departure: np.ndarray  # (k,) where the nuisances stand, off their prior mean
-    blocks: list[np.ndarray]  # per column (k, R)
-    split: np.ndarray  # (e, R)
-    cells: np.ndarray  # (c, R)
-
-    @functools.cached_property
-    def drops(self) -> tuple[np.ndarray, np.ndarray]:
-        """Drop of the deviance (columns, b) by adding each column, sizes in their allowed direction, and its p."""
-        drops, ps = [], []
-        for column, block in zip(self.tangent.columns, self.blocks, strict=True):
-            signs = np.array([column.candidate.sign(p) for p in column.candidate.sizes])
-            drop, p = _signed_drop(block, self.r, signs)
-            drops.append(drop)
-            ps.append(p)
-        shape = (len(self.blocks), len(self.r))
-        return np.array(drops).reshape(shape), np.array(ps).reshape(shape)
-
-    def scores(self) -> list[Score]:
-        """The candidates by drop, each at its best setting, for the fit's own residual."""
-        best: dict[str, Score] = {}
-        drops, ps = self.drops
-        for k, (column, block) in enumerate(zip(self.tangent.columns, self.blocks, strict=True)):
-            name = column.candidate.name
-            if name in best and best[name].drop >= drops[k, 0]:
-                continue
-            gram = block @ block.T
-            inverse = np.linalg.pinv(gram, rcond=1e-10, hermitian=True)
-            size = -inverse @ (block @ self.r[0])
-            labels = [p.name for p in column.candidate.sizes]
-            spread = np.sqrt(np.maximum(np.diag(inverse), 0.0))
-            spread = np.where(np.diag(gram) > 0, spread, np.inf)
-            best[name] = Score(
-                name, float(drops[k, 0]), float(ps[k, 0]), dict(zip(labels, size.tolist(), strict=True)),
-                dict(zip(labels, spread.tolist(), strict=True)), column.setting,
-            )  # fmt: skip
-        return sorted(best.values(), key=lambda s: (s.p, -s.drop))
-
-    def chain_p(self) -> dict[str, np.ndarray]:
-        """p of each measurement-chain effect, (b,): its estimate over its standard deviation, prior included."""
-        result = {}
-        inverse = np.linalg.pinv(self.R, rcond=1e-12)  # N'N = R'R
-        estimate = -self.along @ inverse.T  # departures of the nuisances, (b, k)
-        covariance = inverse @ inverse.T
-        for name, members in self.tangent.chain.items():
-            whole = estimate[:, members] + self.departure[members]
-            inner = np.linalg.pinv(covariance[np.ix_(members, members)], rcond=1e-12, hermitian=True)
-            result[name] = chdtrc(len(members), np.einsum("bi,ij,bj->b", whole, inner, whole))
-        return result
-
-    def unrest(self) -> np.ndarray:
-        """How much injections of all balances and windows still find, (b,): the structured test of adequacy."""
-        power = np.einsum("cr,cr->c", self.cells, self.cells)
-        kept = power > 1e-8 * power.max(initial=1e-300)
-        z = (self.r @ self.cells[kept].T) ** 2
-        groups = self.tangent.groups[kept]
-        scale = np.array([power[kept][groups == g].mean() for g in groups])
-        return (z / scale).sum(axis=1)
-
-    def unsteadiness(self) -> np.ndarray:
-        """How much parameters of their own for each event would lower the deviance, (b,)."""
-        return ((self.r @ spanned(self.split, DISTINCT, least=1e-12).T) ** 2).sum(axis=1)
-
-
-def _signed_drop(block: np.ndarray, r: np.ndarray, signs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Drop (b,) of |r|^2 by a least-squares multiple of the rows of `block` that keeps the signs, and its p.
-
-    A size on its bound loses half of its chi-square: p is that of a chi-bar-square (Self and Liang 1987).
-    """
-    gram = block @ block.T
-    top = np.diag(gram).max(initial=0.0)
-    if not top > 1e-12:
-        return np.zeros(len(r)), np.ones(len(r))
-    side = r @ block.T  # (b, k)
-    inverse = np.linalg.pinv(gram, rcond=1e-10, hermitian=True)
-    size = -side @ inverse
-    drop = np.einsum("bi,ij,bj->b", side, inverse, side)
-    if len(signs) == 1:
-        if signs[0]:
-            drop = np.where(size[:, 0] * signs[0] > 0, drop, 0.0)
-            return drop, np.where(drop > 0, 0.5 * chdtrc(1, drop), 1.0)
-        return drop, chdtrc(1, drop)
-    wrong = ((size * signs) < 0).any(axis=1)
-    if wrong.any():
-        single = np.where((-side * signs >= 0) | (signs == 0), side**2 / np.maximum(np.diag(gram), 1e-300), 0.0)
-        drop = np.where(wrong, single.max(axis=1), drop)
-    return drop, chdtrc(len(signs), drop)
-
-
-def tangent(study: Study, fit: Refit, noise: Noise) -> Tangent:
-    """Differences of everything at a fit, in one batch. What is in the fit, and the chain, are nuisances.
+def tangent(bench: Bench, fit: Refit, noise: Noise) -> Tangent:
+    """Differences of everything at a fit, in one batch. What is fitted, and faults of the measurement, are nuisances.
 
     A parameter of the base model on a wall that would leave the box is held there: what only values beyond its bounds
     explain is left. Those of effects are not: they belong to a formula, not to the load.
     """
-    inside = [*study.base, *study.before, *study.parameters(fit.names)]
-    chain = {name: study.sizes([name]) for name in study.catalogue.chain}
-    nuisances = [*inside, *(k for members in chain.values() for k in members)]
+    at = bench.coordinates
+    inside = [*at.base, *at.before, *at.parameters(fit.names)]
+    faults = {name: at.sizes([name]) for name in bench.catalogue.of_measurement}
+    nuisances = [*inside, *(k for members in faults.values() for k in members)]
     up, down = two_sided(fit.unit, nuisances)
-    points, spans, labels = _candidate_points(study, fit)
-    injected, groups = injections(study, fit.unit)
+    points, spans, labels = _candidate_points(bench, fit)
+    injected, groups = push_points(bench, fit.unit)
     k, m = len(nuisances), len(points)
     sets = [(fit.names, False)] * (1 + 2 * k)
     sets += [((*fit.names, c.name), False) for c, _, first, last in labels for _ in range(first, last)]
     sets += [(fit.names, True)] * len(injected)
-    raw = study.residuals_of(np.concatenate([fit.unit[None], up, down, points, injected]), sets)
+    raw = bench.residuals_of(np.concatenate([fit.unit[None], up, down, points, injected]), sets)
     base = raw[0]
     up_rows, down_rows = raw[1 : 1 + k], raw[1 + k : 1 + 2 * k]
     width = np.array([u[c] - d[c] for u, d, c in zip(up, down, nuisances, strict=True)])
@@ -216,36 +101,36 @@ def tangent(study: Study, fit: Refit, noise: Noise) -> Tangent:
     moved = np.nan_to_num((raw[1 + 2 * k : 1 + 2 * k + m] - base) / spans[:, None, None])
     cells = np.nan_to_num(raw[1 + 2 * k + m :] - base)
     columns = [Column(c, s, moved[a:b]) for c, s, a, b in labels]
-    members = {name: [nuisances.index(c) for c in cols] for name, cols in chain.items()}
-    white = noise.whiten(np.concatenate([nuisance, base[None]]), study.problem.drive, study.likelihood.known)
-    held = set(np.flatnonzero(resting(study, fit.unit, nuisances, white[:k] @ white[k])).tolist())
+    members = {name: [nuisances.index(c) for c in cols] for name, cols in faults.items()}
+    white = bench.whiten(noise, np.concatenate([nuisance, base[None]]))
+    held = set(np.flatnonzero(resting(bench, fit.unit, nuisances, white[:k] @ white[k])).tolist())
     rows = sorted({*held, *(i for group in members.values() for i in group)})
     prior = np.zeros((len(rows), k))
     departure = np.zeros(k)
     for row, i in enumerate(rows):
-        prior[row, i] = 1 / (HELD if i in held else study.prior_deviation(nuisances[i]))
-        departure[i] = 0.0 if i in held else fit.unit[nuisances[i]] - study.null[nuisances[i]]
-    fitted = {*study.base, *study.parameters(fit.names)}
-    split = _by_event(study, nuisance[[i for i, c in enumerate(nuisances) if c in fitted and i not in held]])
+        prior[row, i] = 1 / (HELD if i in held else at.prior_deviation[nuisances[i]])
+        departure[i] = 0.0 if i in held else fit.unit[nuisances[i]] - at.null[nuisances[i]]
+    fitted = {*at.base, *at.parameters(fit.names)}
+    split = _by_event(bench, nuisance[[i for i, c in enumerate(nuisances) if c in fitted and i not in held]])
     walls = tuple(nuisances[i] for i in sorted(held))
-    return Tangent(study, base, nuisance, prior, departure, members, tuple(columns), split, cells, groups, walls)
+    return Tangent(bench, base, nuisance, prior, departure, members, tuple(columns), split, cells, groups, walls)
 
 
-def resting(study: Study, unit: np.ndarray, columns: Sequence[int], gradient: np.ndarray) -> np.ndarray:
+def resting(bench: Bench, unit: np.ndarray, columns: Sequence[int], gradient: np.ndarray) -> np.ndarray:
     """Which of the columns are parameters of the base model on a wall beyond which the deviance falls.
 
     `gradient` of the deviance is needed for its sign only.
     """
     x = unit[list(columns)]
     leaving = ((x <= WALL) & (gradient > 0)) | ((x >= 1 - WALL) & (gradient < 0))
-    return leaving & np.isin(columns, study.base)
+    return leaving & np.isin(columns, bench.coordinates.base)
 
 
-def _by_event(study: Study, columns: np.ndarray) -> np.ndarray:
+def _by_event(bench: Bench, columns: np.ndarray) -> np.ndarray:
     """Columns (k, 2, N) cut into one for each event, (k E, 2, N)."""
-    split = np.zeros((len(study.events), *columns.shape))
+    split = np.zeros((len(bench.events), *columns.shape))
     for e, rows in enumerate(split):
-        part = study.problem.drive.part(e)
+        part = bench.drive.part(e)
         rows[..., part] = columns[..., part]
     return split.reshape(-1, *columns.shape[1:])
 
@@ -259,10 +144,11 @@ def two_sided(unit: np.ndarray, columns: Sequence[int]) -> tuple[np.ndarray, np.
     return up, down
 
 
-def _candidate_points(study: Study, fit: Refit) -> tuple[np.ndarray, np.ndarray, list]:
+def _candidate_points(bench: Bench, fit: Refit) -> tuple[np.ndarray, np.ndarray, list]:
     """One point per size and setting of each candidate outside the fit, and how far it steps [unit of the size]."""
+    at = bench.coordinates
     points, spans, labels = [], [], []
-    for candidate in study.catalogue.candidates:
+    for candidate in bench.catalogue.candidates:
         if candidate.measurement or candidate.name in fit.names:
             continue
         for setting in candidate.settings:
@@ -271,36 +157,12 @@ def _candidate_points(study: Study, fit: Refit) -> tuple[np.ndarray, np.ndarray,
                 step = REACH * candidate.relevant(p) * (candidate.sign(p) or 1)
                 point = fit.unit.copy()
                 for name, value in setting.items():
-                    point[study.column[name]] = study.to_unit(name, value)
-                point[study.column[p.name]] = study.to_unit(p.name, p.null + step)
+                    point[at.column[name]] = at.to_unit(name, value)
+                point[at.column[p.name]] = at.to_unit(p.name, p.null + step)
                 points.append(point)
                 spans.append(step)
             labels.append((candidate, setting, first, len(points)))
-    return np.array(points).reshape(-1, study.dimension), np.array(spans), labels
-
-
-def windows(study: Study, event: int) -> list[tuple[float, float]]:
-    """The windows [s since the first sample] of one event: before, both halves of the dip, then ever longer ones."""
-    e = study.events[event]
-    start, end = e.t_start - e.record.t[0], e.t_end - e.record.t[0]
-    last = e.record.t[-1] - e.record.t[0]
-    edges = [0.0, start, (start + end) / 2, *(end + w for w in WINDOWS if end + w < last), last]
-    return [(a, b) for a, b in itertools.pairwise(edges) if b > a]
-
-
-def injections(study: Study, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points (c, D) with a push into one balance in one window of the union of the events', and which balance."""
-    spans = sorted({w for e in range(len(study.events)) for w in windows(study, e)})
-    points, groups = [], []
-    for g, push in enumerate(PUSHES):
-        for a, b in spans:
-            point = unit.copy()
-            point[study.column[push]] += 1e-3 / study.width(push)
-            point[study.column["window_on"]] = study.to_unit("window_on", a)
-            point[study.column["window_off"]] = study.to_unit("window_off", b)
-            points.append(point)
-            groups.append(g)
-    return np.array(points), np.array(groups)
+    return np.array(points).reshape(-1, at.dimension), np.array(spans), labels
 
 
 def rich_residuals(t: Tangent, residuals: np.ndarray) -> np.ndarray:

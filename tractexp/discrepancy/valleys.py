@@ -9,7 +9,8 @@ import numpy as np
 
 from tractexp.identification.descent import Apart, descend
 from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.problem import Problem, even
+from tractexp.identification.problem import Problem
+from tractexp.identification.starts import best_distinct, even
 
 SCREENED = 4096  # points of the box that are simulated
 STARTS, APART = 24, 0.5  # the best of them that are so far apart in the unit cube
@@ -24,22 +25,11 @@ def best_fits(problem: Problem, apart: Sequence[Apart]) -> np.ndarray:
     The best of them may not stay so once what the recorder did is free.
     """
     likelihood, points = Likelihood.of(problem), even(SCREENED, problem.space.dimension)
-    points = points[_distinct(points, problem.objective(problem.space.from_unit(points)), APART, STARTS)]
+    points = points[best_distinct(points, problem.objective(problem.space.from_unit(points)), APART, STARTS, norm=2)]
     begin = np.full((len(points), points.shape[1] + 2 * problem.drive.events), 0.5)
     begin[:, : points.shape[1]] = points
     begun = descend(likelihood.rows, begin, None, FEW, TOLERANCE, apart)
     free = slice(points.shape[1])
-    promising = begun.unit[_distinct(begun.unit[:, free], begun.deviance, SAME, PROMISING)]
+    promising = begun.unit[best_distinct(begun.unit[:, free], begun.deviance, SAME, PROMISING, norm=2)]
     done = descend(likelihood.rows, promising, None, MORE, TOLERANCE, apart)
-    return done.unit[_distinct(done.unit[:, free], done.deviance, DISTINCT, KEPT)]
-
-
-def _distinct(points: np.ndarray, values: np.ndarray, distance: float, count: int) -> list[int]:
-    """Which points (n, d) have the lowest values (n,), at most `count`, none nearer than `distance` to another."""
-    chosen: list[int] = []
-    for k in np.argsort(values, kind="stable"):
-        if all(np.linalg.norm(points[k] - points[c]) > distance for c in chosen):
-            chosen.append(int(k))
-        if len(chosen) == count:
-            break
-    return chosen
+    return done.unit[best_distinct(done.unit[:, free], done.deviance, DISTINCT, KEPT, norm=2)]

@@ -6,10 +6,10 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.identification.information import SHARE
-from tractexp.identification.noise import runs
 from tractexp.identification.plan import Forecast, Shape, over_depth
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import BOUND, EDGE, UNIDENTIFIED, WEAK, WITHIN, shown, size
+from tractexp.noise.color import runs
 
 
 def advise(known: Uncertainty, odd: Sequence[str] = ()) -> list[str]:
@@ -43,7 +43,7 @@ def _deeper(known: Uncertainty) -> list[str]:
     if not poor or not identifiable.all():
         return []
     deepest = int(np.argmax([e.depth for e in problem.events]))
-    shape, noise = Shape.of(problem.events[deepest]), [known.likelihood.noise[deepest]]
+    shape, noise = Shape.of(problem.events[deepest]), known.likelihood.noise.of(deepest)
     named = ", ".join(poor)
     without_figures = (
         f"for {named}: record a dip of another depth and fit it together, or fix what stays open by model.fixed"

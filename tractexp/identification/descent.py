@@ -86,6 +86,8 @@ def descend(
     A lane ends when a step lowers its deviance by less than `tolerance` (absolute: rows are whitened, so that
     1 is one squared standard deviation) or when no damping helps. A coordinate on a wall that would leave the
     box rests for that step. Source: Marquardt 1963, with several dampings per step.
+
+    Not `least_squares.least_squares_from`: that is SciPy's, from one start, counted and stopped by the search loop.
     """
     unit = np.clip(start, 0.0, 1.0)
     n = len(unit)

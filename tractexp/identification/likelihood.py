@@ -5,23 +5,21 @@ The likelihood does neither: its least squares are the most precise estimate the
 precise. Coordinates are the free parameters followed by P0 and Q0 of each event, in the unit cube.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.identification.noise import SMALLEST, Autoregression, fit_autoregression, stretches
 from tractexp.identification.problem import Problem
+from tractexp.noise.color import SMALLEST, fit_autoregression, stretches
+from tractexp.noise.model import Noise, Pair
 from tractexp.record import Event
 
 POWER_RANGE = 0.2  # of the apparent power before the event: how far P0 and Q0 may move
 QUIET_ORDER = 4  # of an autoregression of the few samples before a dip
 CENTRAL = 1e-5  # of a parameter's range: truncation and rounding both stay below 1e-7 of a column
 
-Noise = Sequence[tuple[Autoregression, Autoregression]]  # of P and of Q, one pair per event
 
-
-def before_the_event(event: Event) -> tuple[Autoregression, Autoregression]:
+def before_the_event(event: Event) -> Pair:
     """Level and color of the noise of P and Q before the dip: what is known of it before anything is fitted."""
     pair = []
     for values, level in ((event.record.P, event.noise_P), (event.record.Q, event.noise_Q)):
@@ -43,7 +41,8 @@ class Likelihood:
     @classmethod
     def of(cls, problem: Problem, noise: Noise | None = None) -> "Likelihood":
         """The likelihood under `noise`, by default that of the samples before each dip; gaps do not count."""
-        return cls(problem, noise or [before_the_event(e) for e in problem.events], problem.drive.weights > 0)
+        found = noise or Noise(tuple(before_the_event(e) for e in problem.events))
+        return cls(problem, found, problem.drive.weights > 0)
 
     @property
     def free(self) -> int:
@@ -93,12 +92,7 @@ class Likelihood:
 
     def whiten(self, residuals: np.ndarray) -> np.ndarray:
         """Residuals (n, 2, N) as rows (n, 2 N) of independent unit variance; samples that do not count are 0."""
-        rows = np.empty_like(residuals)
-        for e, pair in enumerate(self.noise):
-            part = self.problem.drive.part(e)
-            for c, noise in enumerate(pair):
-                rows[:, c, part] = noise.whiten(residuals[:, c, part], self.known[c, part])
-        return rows.reshape(len(rows), -1)
+        return self.noise.whiten(residuals, self.problem.drive, self.known)
 
     def rows(self, unit: np.ndarray, lanes: np.ndarray | None = None) -> np.ndarray:
         """Whitened residuals (n, 2 N); their sum of squares is the deviance. Does not depend on the lane."""

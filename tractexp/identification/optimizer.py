@@ -8,40 +8,12 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from tractexp.errors import check_choice
+from tractexp.parameter import Box
 from tractexp.plugin import Plugin
 
+__all__ = ["REFUSED", "Box", "Evaluate", "Optimizer"]
+
 REFUSED = 1e12  # objectives from here up mark candidates that could not be simulated, ranked by how far they miss
-
-
-@dataclass(frozen=True)
-class Box:
-    """The search box: the unit cube, or the raw bounds where an optimizer asks for `space="raw"`."""
-
-    lower: np.ndarray  # (d,)
-    upper: np.ndarray  # (d,)
-
-    @property
-    def dimension(self) -> int:
-        return len(self.lower)
-
-    @property
-    def width(self) -> np.ndarray:
-        return self.upper - self.lower
-
-    def clip(self, x: np.ndarray) -> np.ndarray:
-        return np.clip(x, self.lower, self.upper)
-
-    def uniform(self, rng: np.random.Generator, n: int) -> np.ndarray:
-        """(n, d) points drawn uniformly."""
-        return self.from_unit(rng.random((n, self.dimension)))
-
-    def from_unit(self, unit: np.ndarray) -> np.ndarray:
-        """Points (..., d) of the unit cube in this box's coordinates."""
-        return self.lower + self.width * unit
-
-    def to_unit(self, x: np.ndarray) -> np.ndarray:
-        """Points (..., d) of this box in the unit cube."""
-        return (x - self.lower) / self.width
 
 
 class Evaluate(Protocol):

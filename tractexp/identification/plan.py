@@ -12,10 +12,11 @@ import numpy as np
 from tractexp.errors import UserError, among, check_range
 from tractexp.identification.descent import descend
 from tractexp.identification.information import Information
-from tractexp.identification.likelihood import Likelihood, Noise, before_the_event
-from tractexp.identification.noise import Autoregression
-from tractexp.identification.problem import Problem, even
+from tractexp.identification.likelihood import Likelihood, before_the_event
+from tractexp.identification.problem import Problem
+from tractexp.identification.starts import even
 from tractexp.identification.uncertainty import LEVEL
+from tractexp.noise import Autoregression, Noise
 from tractexp.record import Base, Event, Record
 
 BEFORE, AFTER = 0.3, 1.5  # s recorded before and after a planned dip
@@ -51,12 +52,12 @@ class Shape:
         )  # fmt: skip
 
     @property
-    def noise(self) -> tuple[Autoregression, Autoregression]:
+    def noise(self) -> Noise:
         """Noise of P and Q at this rate: a first-order autoregression."""
         a = math.exp(-1 / (self.rate * self.memory)) if self.memory > 0 else 0.0
         color, shock = np.array([[0.0], [a]]), math.sqrt(1 - a * a)
         P, Q = (Autoregression(color, level * np.array([1.0, shock])) for level in (self.noise_P, self.noise_Q))
-        return P, Q
+        return Noise(((P, Q),))
 
     def check(self, where: str = "task") -> None:
         """Raise `UserError` for what cannot be recorded."""
@@ -128,7 +129,7 @@ def forecast(
             f"a planned dip is a voltage alone, but of this model the {told}: nothing can be planned with it"
         )
     planned = like(problem, [shape.event()])
-    informations = each(planned, values, noise or [shape.noise])
+    informations = each(planned, values, noise or shape.noise)
     total = combined([*([known] if known else []), *informations])
     return Forecast(shape, total.names, total.values, normal_quantile() * total.standard_errors)
 

@@ -9,10 +9,11 @@ import numpy as np
 from tractexp.errors import UserError, among
 from tractexp.identification.loss import Loss
 from tractexp.identification.search import REFUSED
+from tractexp.identification.starts import even
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import MOST_SUBSTEPS, Model
 from tractexp.model.parts import Effect
-from tractexp.parameter import Parameter, Space
+from tractexp.parameter import Box, Parameter
 from tractexp.record import Event
 
 PROBES = 64  # candidates across the box on which the Runge-Kutta step is judged
@@ -89,14 +90,6 @@ class Step:
         return f"{text} per sample" + (" (given)" if np.isnan(worst) else f" (largest error {worst:.1e} pu)")
 
 
-def even(n: int, d: int) -> np.ndarray:
-    """(n, d) points that fill the unit cube evenly. Source: Roberts 2018, the additive sequence R_d."""
-    ratio = 2.0
-    for _ in range(60):  # the root above 1 of x^(d + 1) = x + 1
-        ratio = (1 + ratio) ** (1 / (d + 1))
-    return (0.5 + np.outer(np.arange(1, n + 1), ratio ** -np.arange(1.0, d + 1))) % 1
-
-
 class Problem:
     """Free parameters (columns of `values`) of a model, fitted to events. What the search loop works on."""
 
@@ -135,7 +128,7 @@ class Problem:
         if not free:
             why = "model.fixed fixes every parameter" if self.fixed else f"a {model.title} has no parameters"
             raise UserError(f"{why}; leave at least one free to identify")
-        self.space = Space.of(tuple(free))
+        self.space = Box.of(tuple(free))
         self.lower, self.upper = self.space.lower, self.space.upper
         self.per_event = tuple(name for name in model.names if name in own)
         self.loss = loss or Loss()

@@ -11,8 +11,8 @@ from typing import Protocol
 import numpy as np
 
 from tractexp.errors import UserError
+from tractexp.identification.least_squares import Elite, polish
 from tractexp.identification.optimizer import REFUSED, Box, Optimizer
-from tractexp.identification.polish import Elite, polish
 
 UNKNOWN = 1e30  # stands for an objective that is not a finite number: worse than any miss
 POLISH_STEPS = 450  # least-squares steps, of d + 2 simulations, that a budget keeps back for the polish,
@@ -80,9 +80,9 @@ class _Counter:
 
     def __init__(self, problem: Objective, unit: bool, limits: Limits):
         self.problem, self.unit, self.limits = problem, unit, limits
-        self.width = problem.upper - problem.lower
         d = len(problem.lower)
-        self.box = Box(np.zeros(d), np.ones(d)) if unit else Box(problem.lower, problem.upper)
+        self.raw = Box(problem.lower, problem.upper)
+        self.box = Box.unit(d) if unit else self.raw
         self.simulations = self.refused = 0
         self.best, self.best_values = np.inf, np.full(d, np.nan)
         self.elite: Elite | None = None
@@ -93,9 +93,7 @@ class _Counter:
         return time.perf_counter() - self.started
 
     def _raw(self, x: np.ndarray) -> np.ndarray:
-        if not self.unit:
-            return x
-        return np.clip(self.problem.lower + x * self.width, self.problem.lower, self.problem.upper)
+        return self.raw.from_unit(x) if self.unit else x
 
     def _admit(self, x: np.ndarray) -> np.ndarray:
         """The points a limit still allows, clipped; raises when there is none."""

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from tractexp.identification.descent import Rows, descend
-from tractexp.identification.diagnosis import Test, jarque_bera, ljung_box, louder
 from tractexp.identification.information import Information
 from tractexp.identification.likelihood import QUIET_ORDER, Likelihood
-from tractexp.identification.noise import FEWEST, fit_autoregression, stretches, white_noise
 from tractexp.identification.problem import Problem
+from tractexp.identification.residual_tests import Test, jarque_bera, ljung_box, louder
 from tractexp.identification.verdict import Verdict, judge
+from tractexp.noise.color import FEWEST, fit_autoregression, stretches, white_noise
+from tractexp.noise.model import Noise, Pair
 
 LEVEL = 0.95
 ALONG = (0.3, 0.6, 0.9)  # of the way to the wall: where other valleys are looked for
@@ -161,20 +162,20 @@ def cleaned(likelihood: Likelihood, unit: np.ndarray) -> Likelihood:
     return replace(likelihood, known=known)
 
 
-def noise_of(likelihood: Likelihood, residuals: np.ndarray) -> list[Any]:
+def noise_of(likelihood: Likelihood, residuals: np.ndarray) -> Noise:
     """An autoregression of each event's and channel's residual (2, N); what the fit has absorbed is given back."""
     drive = likelihood.problem.drive
     absorbed = likelihood.free + 2 * drive.events
     back = np.sqrt(likelihood.samples / max(likelihood.samples - absorbed, 1))
-    pairs = []
+    pairs: list[Pair] = []
     for e in range(drive.events):
         part, pair = drive.part(e), []
         for c in range(2):
             pieces = stretches(residuals[c, part], likelihood.known[c, part])
             enough = sum(map(len, pieces)) >= FEWEST
             pair.append(fit_autoregression(pieces).scaled(back) if enough else white_noise(1.0))
-        pairs.append(tuple(pair))
-    return pairs
+        pairs.append((pair[0], pair[1]))
+    return Noise(tuple(pairs))
 
 
 def widened(likelihood: Likelihood, residuals: np.ndarray) -> tuple[Likelihood, list[str]]:
@@ -183,11 +184,12 @@ def widened(likelihood: Likelihood, residuals: np.ndarray) -> tuple[Likelihood, 
     A residual in the dip that cannot come from the noise before it is no noise. Then its level there, rather than
     its mean, sets the intervals: wider, though still blind to a bias.
     """
-    notes, pairs = [], []
+    notes: list[str] = []
+    pairs: list[Pair] = []
     for e, event in enumerate(likelihood.problem.events):
         pair = []
         for c, channel in enumerate("PQ"):
-            noise = likelihood.noise[e][c]
+            noise = likelihood.noise.pair(e)[c]
             ratio, level = misfit(likelihood, residuals[c], e, c)
             if ratio is not None:
                 noise = noise.scaled(max(1.0, level))
@@ -197,8 +199,8 @@ def widened(likelihood: Likelihood, residuals: np.ndarray) -> tuple[Likelihood, 
                     " the truth"
                 )
             pair.append(noise)
-        pairs.append(tuple(pair))
-    return replace(likelihood, noise=pairs), notes
+        pairs.append((pair[0], pair[1]))
+    return replace(likelihood, noise=Noise(tuple(pairs))), notes
 
 
 def misfit(likelihood: Likelihood, residual: np.ndarray, e: int, c: int) -> tuple[float | None, float]:
@@ -213,7 +215,7 @@ def misfit(likelihood: Likelihood, residual: np.ndarray, e: int, c: int) -> tupl
     if min(np.count_nonzero(known[before]), np.count_nonzero(known[dip])) < FEWEST:
         return None, 1.0
     quiet = fit_autoregression(stretches(residual[before], known[before]), QUIET_ORDER).whiten(residual, known)
-    own = likelihood.noise[e][c].whiten(residual, known)[dip][known[dip]]
+    own = likelihood.noise.pair(e)[c].whiten(residual, known)[dip][known[dip]]
     inside, outside = quiet[dip][known[dip]], quiet[before][known[before]]
     ratio = float(np.sqrt(np.mean(inside**2) / np.mean(outside**2))) if louder(inside, outside) else None
     return ratio, float(np.sqrt(np.mean(own**2)))
@@ -229,7 +231,7 @@ def test(likelihood: Likelihood, rows: np.ndarray) -> list[dict[str, Any]]:
             seen = white[c, part][likelihood.known[c, part]]
             if len(seen) < FEWEST:
                 continue
-            order = likelihood.noise[e][c].order
+            order = likelihood.noise.pair(e)[c].order
             tests: list[Test] = [ljung_box(seen, order), jarque_bera(seen)]
             results += [{"event": event.record.name, "channel": channel, **vars(t)} for t in tests]
     return results
@@ -238,8 +240,8 @@ def test(likelihood: Likelihood, rows: np.ndarray) -> list[dict[str, Any]]:
 def describe_noise(likelihood: Likelihood) -> list[dict[str, Any]]:
     """Level [pu] and color of the noise of each event and channel, with the level before the dip beside it."""
     rows = []
-    for event, pair in zip(likelihood.problem.events, likelihood.noise, strict=True):
-        for channel, noise, before in zip("PQ", pair, (event.noise_P, event.noise_Q), strict=True):
+    for e, event in enumerate(likelihood.problem.events):
+        for channel, noise, before in zip("PQ", likelihood.noise.pair(e), (event.noise_P, event.noise_Q), strict=True):
             rows.append(
                 {
                     "event": event.record.name,

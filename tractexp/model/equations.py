@@ -1,32 +1,42 @@
 """A load model's equations, declared once as symbols.
 
-Motor, static and effect plugins write into one `Equations`: parameters, named quantities, states with their
-derivatives and steady state, and the power they draw. Kernel, steady state, parameter table and LaTeX are
-derived from it. A named quantity can be edited after it was declared: that is what a missing effect does.
+The parts of a load write into one `Equations`: parameters, sites and other named quantities, states with their
+derivatives and steady state, and the power they draw. Kernel, steady state, parameter table and LaTeX are derived from
+it. What stands at a site can be edited after it was placed: that is what a missing effect does.
 """
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Any, Literal, NoReturn
 
 import sympy
 from sympy import I, Symbol, conjugate, im, re
 
+from tractexp.errors import UserError, nearest
+from tractexp.model import sites
 from tractexp.model.drive import EVENT, INPUTS
+from tractexp.model.names import check_name
+from tractexp.model.parts import Unfit
+from tractexp.model.sites import Site
 from tractexp.parameter import Parameter
 
 LONG = 300  # nodes of an expression
 LONG_AGO = -(10**6)  # s: the time at which a load rests before the event
+OWN = "motor"  # who writes the states that are pushed, and the speed that effects ask for
 
 
 @dataclass
 class State:
     """A continuous state: d(symbol)/dt = derivative, and its value in the steady state before the event.
 
-    `balance` is what vanishes in that steady state, where it is not the derivative.
+    `role` says what it is, `writer` which part declared it (`motor`, or an effect's name). `balance` is what vanishes
+    in that steady state, where it is not the derivative.
     """
 
     symbol: Symbol
     latex: str
+    role: Literal["flux", "speed", "lag"]
+    writer: str
     derivative: sympy.Expr | None = None
     initial: sympy.Expr | None = None
     balance: sympy.Expr | None = None
@@ -51,21 +61,29 @@ class Memory:
     initial: sympy.Expr | None = None
 
 
+class Unknown(UserError, AttributeError):
+    """A plugin asked the equations for a word they do not have, or assigned one."""
+
+
 class Equations:
     """The declaration of one composite load, Eq. (7) of Wu et al. 2022.
 
     Symbols given, all per unit of the record's base except angular speeds [rad/s], which are relative to the
     nominal synchronous speed `omega_n`:
 
-    - inputs, recorded: `U` voltage, `omega_s` synchronous speed (0 where the frequency is not recorded), `U2`
-      negative-sequence voltage; and `U_rate`, the slope of U [pu/s], `t`, the time since the first sample [s];
+    - inputs, recorded: `U` voltage, `omega_s` synchronous speed (relative to nominal: 0 at nominal frequency and where
+      the frequency is not recorded), `U2` negative-sequence voltage; and `U_rate`, the slope of U [pu/s], `t`, the time
+      since the first sample [s];
     - before the event: `U0`, `omega_s0`, `U20`, `P0`, `Q0`;
     - `omega_n`, the nominal synchronous speed; `step`, the time between samples [s];
-    - `P_s0`, `Q_s0`, what all other parts leave to the static load before the event.
+    - `P_s0`, `Q_s0`, what all other parts leave to the static load before the event;
+    - `V`, the voltage at the motor's terminals; `omega`, the motor's speed [rad/s, relative to nominal];
+    - `P`, `Q`, what all parts draw together.
 
-    A phasor state is one complex symbol; its real and imaginary part become two real states of the kernel.
-    `settled` says whether the states' `initial` values are exact; where an effect has edited the equations they
-    are only a first guess, and the kernel solves for the steady state.
+    `eq[what]` is the symbol of a site, or of a state, parameter or quantity by its name, `what in eq` whether there is
+    one. Asking for what a model lacks raises `Unfit`, which refuses the effect that asks.
+
+    A flux is one complex symbol; its real and imaginary part become two real states of the kernel.
     """
 
     def __init__(self) -> None:
@@ -73,7 +91,6 @@ class Equations:
         self.U0, self.omega_s0, self.U20, self.omega_n, self.step = map(_real, EVENT)
         self.P0, self.Q0 = _real("P0"), _real("Q0")
         self.P_s0, self.Q_s0 = _real("P_s0"), _real("Q_s0")
-        self.settled = True
         self.parameters: dict[str, Parameter] = {}
         self.definitions: dict[Symbol, sympy.Expr] = {}
         self.steps: dict[Symbol, sympy.Expr] = {}
@@ -82,36 +99,125 @@ class Equations:
         self.states: dict[Symbol, State] = {}
         self.memories: dict[Symbol, Memory] = {}
         self.requirements: list[Requirement] = []
+        self.edits: dict[str, list[str]] = {}  # names of the sites that each effect edits; of the load's effects only
         self.latex_names: dict[Symbol, str] = {
             self.omega_s: r"\omega_s", self.U0: "U_0", self.omega_s0: r"\omega_{s0}",
             self.P0: "P_0", self.Q0: "Q_0", self.omega_n: r"\omega_n", self.U2: "U_2", self.U20: "U_{20}",
             self.P_s0: "P_{s0}", self.Q_s0: "Q_{s0}", self.U_rate: r"\dot U", self.step: r"\Delta t",
         }  # fmt: skip
-        self.P: sympy.Expr = sympy.Integer(0)
-        self.Q: sympy.Expr = sympy.Integer(0)
+        self._power: dict[Site, sympy.Expr] = {sites.P: sympy.Integer(0), sites.Q: sympy.Integer(0)}
+        self._writer = OWN
 
-    def declare(self, parameters: Iterable[Parameter]) -> list[Symbol]:
-        """The symbols of a plugin's parameters, in their order."""
-        symbols = []
+    def __getattr__(self, name: str) -> NoReturn:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        words = [*(w for w in dir(self) if not w.startswith("_")), *sites.SITES]
+        raise Unknown(
+            f"the equations offer no 'eq.{name}'{nearest(name, words) or '; docs/plugins.md lists all words'}"
+        )
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if "_writer" in vars(self) and not name.startswith("_"):
+            raise Unknown(f"eq.{name} cannot be assigned; eq.edit(site, change) changes what stands at a site")
+        object.__setattr__(self, name, value)
+
+    # What is there
+
+    def __contains__(self, what: Site | str) -> bool:
+        name = what.name if isinstance(what, Site) else what
+        return any(s.name == name for s in (*self._power, *self._symbols()))
+
+    def __getitem__(self, what: Site | str) -> Symbol:
+        """The symbol of a site, or of the state, parameter or quantity of that name; `Unfit` where there is none."""
+        name = what.name if isinstance(what, Site) else what
+        for symbol in self._symbols():
+            if symbol.name == name:
+                return symbol
+        about = f" ({what.about})" if isinstance(what, Site) else nearest(name, (s.name for s in self._symbols()))
+        raise Unfit(f"its equations have no {name}{about}")
+
+    def _symbols(self) -> list[Symbol]:
+        return [*self.definitions, *self.states, *self.memories, *map(_real, self.parameters)]
+
+    def expression(self, site: Site | str) -> sympy.Expr:
+        """What stands at a site now, before any later edit."""
+        site = sites.named(site)
+        return self._power[site] if site in self._power else self.definitions[self[site]]
+
+    @property
+    def V(self) -> Symbol:
+        """The voltage at the motor's terminals [pu], a phasor: the recorded voltage unless an effect edits it."""
+        if self._writer == OWN and sites.motor_voltage not in self:
+            self.place(sites.motor_voltage, self.U)
+        return self[sites.motor_voltage]
+
+    @property
+    def omega(self) -> Symbol:
+        """The motor's speed [rad/s, relative to nominal]. Raises `Unfit` where it has none or it cannot move."""
+        for state in self.states.values():
+            if state.role == "speed" and state.writer == OWN and state.derivative != 0:
+                return state.symbol
+        raise Unfit("its equations have no speed that moves")
+
+    @property
+    def P(self) -> sympy.Expr:
+        """The active power of all parts together [pu]."""
+        return self._power[sites.P]
+
+    @property
+    def Q(self) -> sympy.Expr:
+        """The reactive power of all parts together [pu]."""
+        return self._power[sites.Q]
+
+    # What parts write
+
+    def write(self, name: str) -> None:
+        """What follows is written by the part of this name."""
+        self._writer = name
+
+    def declare(self, parameters: Iterable[Parameter]) -> dict[str, Symbol]:
+        """The symbols of a part's parameters by name. Raises `Unfit` where the model has one of that name."""
+        symbols = {}
         for parameter in parameters:
             if parameter.name in self.parameters:
-                raise ValueError(f"two plugins of this model declare a parameter '{parameter.name}'")
+                raise Unfit(f"the model has a parameter '{parameter.name}' already")
             self.parameters[parameter.name] = parameter
-            symbol = _real(parameter.name)
+            symbol = symbols[parameter.name] = self._new(_real(parameter.name))
             self.latex_names[symbol] = parameter.symbol
-            symbols.append(symbol)
         return symbols
 
-    def define(self, name: str, expression: sympy.Expr, latex: str, phasor: bool = False) -> Symbol:
-        """Name a quantity (real or complex), so that later expressions use it and effects can edit it.
-
-        `phasor` makes one complex that is real as it stands, so that an effect may turn it.
-        """
+    def define(self, name: str, expression: sympy.Expr, latex: str) -> Symbol:
+        """Name a quantity (real or complex), so that later expressions and the printed equations use it."""
         expression = sympy.sympify(expression)
-        symbol = Symbol(name, complex=True) if phasor or not _is_real(expression) else _real(name)
+        return self._define(_real(name) if _is_real(expression) else _complex(name), expression, latex)
+
+    def place(self, site: Site, expression: sympy.Expr, latex: str | None = None) -> Symbol:
+        """Put an expression at a site, where effects may edit it. Raises `UserError` for a site that is taken."""
+        expression = sympy.sympify(expression)
+        if site.owner != self._writer or site in self:
+            taken = "is taken already" if site in self else f"belongs to the {site.owner}"
+            raise UserError(f"the site {site.name} {taken}, so the {self._writer} cannot place it; edit it instead")
+        self._check_kind(site, expression)
+        made = _real if site.kind == "real" and _is_real(expression) else _complex  # what is real keeps its name
+        return self._define(made(site.name), expression, latex or site.latex)
+
+    def _define(self, symbol: Symbol, expression: sympy.Expr, latex: str) -> Symbol:
+        if symbol.name in self:
+            raise UserError(f"'{symbol.name}' is defined twice in this model; {self._writer} must name it otherwise")
         self.latex_names[symbol] = latex
         self.definitions[symbol] = expression
         return symbol
+
+    def _check_kind(self, site: Site, expression: sympy.Expr) -> None:
+        """Raise `UserError` where a real site would get what is not made of real symbols and real parts."""
+        whole = self.expand(expression, lambda s: s.name not in sites.SITES)
+        real = {s for s in whole.free_symbols if s.name in sites.SITES and sites.SITES[s.name].kind == "real"}
+        left = whole.xreplace(dict.fromkeys({*whole.atoms(re, im, sympy.Abs), *real}, _real("part")))
+        if site.kind == "real" and not _is_real(left):
+            raise UserError(
+                f"the site {site.name} is real, and what the {self._writer} puts there is not: {expression}; take its"
+                " real part by sympy.re"
+            )
 
     def compute(self, name: str, expression: sympy.Expr, before: sympy.Expr | None = None) -> Symbol:
         """A real quantity that is computed once and then referred to, such as a step of an unrolled iteration.
@@ -126,43 +232,55 @@ class Equations:
         self.latex_names[symbol] = name
         return symbol
 
-    def has(self, name: str) -> bool:
-        """Whether this model has a quantity, state or parameter called `name`."""
-        return any(s.name == name for s in self._symbols())
+    def edit(
+        self, site: Site | str, change: Callable[[sympy.Expr], sympy.Expr], shown: sympy.Expr | None = None
+    ) -> None:
+        """Replace what stands at a site by `change` of it: what a missing effect does.
 
-    def symbol(self, name: str) -> Symbol:
-        """The quantity, state or parameter called `name`; KeyError where this model has none."""
-        for symbol in self._symbols():
-            if symbol.name == name:
-                return symbol
-        raise KeyError(name)
-
-    def _symbols(self) -> list[Symbol]:
-        return [*self.definitions, *self.states, *self.memories, *map(_real, self.parameters)]
-
-    def edit(self, name: str, change: Callable[[sympy.Expr], sympy.Expr], shown: sympy.Expr | None = None) -> None:
-        """Replace the expression behind a named quantity by `change` of it: what a missing effect does.
-
-        The quantity keeps its name, so effects stack in any order. A quantity that was real must stay real. `shown`
-        is what LaTeX prints where the change is the solution of an equation.
+        The site keeps its name, so effects stack in any order. A real site must stay real. `shown` is what LaTeX
+        prints where the change is the solution of an equation. Raises `Unfit` where the model lacks the site.
         """
-        symbol = self.symbol(name)
+        site = sites.named(site)
+        expression = sympy.sympify(change(self.expression(site)))
+        self._check_kind(site, expression)
+        self.edits.setdefault(self._writer, []).append(site.name)
+        if site in self._power:
+            self._power[site] = expression
+            return
         if shown is not None:
-            self.shown[symbol] = shown
-        self.definitions[symbol] = sympy.sympify(change(self.definitions[symbol]))
-        self.settled = False
+            self.shown[self[site]] = shown
+        self.definitions[self[site]] = expression
 
-    def state(self, name: str, latex: str) -> Symbol:
-        """A real state."""
-        return self._state(_real(name), latex)
+    def flux(self, name: str, latex: str) -> Symbol:
+        """A complex state [pu]: a rotor or stator flux, or the voltage behind a reactance that stands for it.
 
-    def phasor(self, name: str, latex: str) -> Symbol:
-        """A complex state in the synchronous frame of the terminal voltage."""
-        return self._state(Symbol(name, complex=True), latex)
+        Call the voltage behind the transient reactance `E`: magnetic saturation asks for it by that name.
+        """
+        return self._state(_complex(name), latex, "flux")
 
-    def _state(self, symbol: Symbol, latex: str) -> Symbol:
-        self.states[symbol] = State(symbol, latex)
+    def speed(self, latex: str = r"\omega") -> Symbol:
+        """The speed of the motor [electrical rad/s, relative to nominal synchronous]; its name is `omega`."""
+        return self._state(_real("omega"), latex, "speed")
+
+    def lag(self, name: str, latex: str) -> Symbol:
+        """Any other real state, such as those that effects add."""
+        return self._state(_real(name), latex, "lag")
+
+    def twin(self, state: Symbol, suffix: str) -> Symbol:
+        """A state of the same role, as a second machine of the same equations has one."""
+        first = self.states[state]
+        symbol = _real(state.name + suffix) if state.is_real else _complex(state.name + suffix)
+        return self._state(symbol, f"{first.latex}{suffix}", first.role)
+
+    def _state(self, symbol: Symbol, latex: str, role: Literal["flux", "speed", "lag"]) -> Symbol:
+        self.states[self._new(symbol)] = State(symbol, latex, role, self._writer)
         self.latex_names[symbol] = latex
+        return symbol
+
+    def _new(self, symbol: Symbol) -> Symbol:
+        check_name(symbol.name)
+        if any(s.name == symbol.name for s in (*self.definitions, *self.states, *self.memories)):
+            raise Unfit(f"the model has a state or quantity '{symbol.name}' already")
         return symbol
 
     def moves(
@@ -172,39 +290,53 @@ class Equations:
 
         `balance` vanishes there where the derivative does not tell it: for a state that stays where it was.
         """
+        if state not in self.states:
+            raise UserError(
+                f"eq.moves() was given '{state}', which is no state; make one by eq.flux, eq.speed or eq.lag"
+            )
         moved = self.states[state]
         moved.derivative, moved.initial = sympy.sympify(derivative), sympy.sympify(initial)
         moved.balance = None if balance is None else sympy.sympify(balance)
 
     def memory(self, name: str, latex: str) -> Symbol:
-        """A discrete memory (real)."""
-        symbol = _real(name)
+        """A real state that changes once a sample, such as a relay's."""
+        symbol = self._new(_real(name))
         self.memories[symbol] = Memory(symbol, latex)
         self.latex_names[symbol] = latex
         return symbol
 
     def renews(self, memory: Symbol, renewal: sympy.Expr, initial: sympy.Expr) -> None:
         """Give a memory its value at a sample, from itself, inputs and states there, and its value before."""
+        if memory not in self.memories:
+            raise UserError(f"eq.renews() was given '{memory}', which is no memory; make one by eq.memory")
         self.memories[memory].renewal = sympy.sympify(renewal)
         self.memories[memory].initial = sympy.sympify(initial)
 
-    def require(self, slack: sympy.Expr, sentence: str, shown: sympy.Expr) -> None:
-        """A steady state exists only where `slack` >= 0. `{value}` in the sentence prints `shown`."""
+    def require(self, slack: sympy.Expr, sentence: str, shown: sympy.Expr | None = None) -> None:
+        """A steady state exists only where `slack` >= 0. `{value}` in the sentence prints `shown`, else the slack."""
+        shown = slack if shown is None else shown
         self.requirements.append(Requirement(sympy.sympify(slack), sentence, sympy.sympify(shown)))
 
     def consume(self, P: sympy.Expr, Q: sympy.Expr) -> None:
-        """Add a part that draws P and Q (positive when consumed); before the event the static load gives way."""
-        self.P, self.Q = self.P + P, self.Q + Q
+        """Add power drawn at the bus (positive when consumed); before the event the static load gives way."""
+        for site, power in ((sites.P, P), (sites.Q, Q)):
+            self._power[site] += sympy.sympify(power)
 
     def close(self) -> None:
         """Give the static load what the other parts leave before the event. Called once all parts have declared."""
+        for symbol, state in self.states.items():
+            if state.derivative is None:
+                raise UserError(f"nothing says how the state '{symbol}' moves; call eq.moves once for each state")
+        for symbol, memory in self.memories.items():
+            if memory.renewal is None:
+                raise UserError(f"nothing renews the memory '{symbol}'; call eq.renews once for each memory")
         without_static = {self.P_s0: sympy.Integer(0), self.Q_s0: sympy.Integer(0)}
         others = [self.real(self.before(self.expand(power).xreplace(without_static))) for power in (self.P, self.Q)]
         self.definitions[self.P_s0] = self.P0 - others[0]
         self.definitions[self.Q_s0] = self.Q0 - others[1]
 
     def before(self, expression: sympy.Expr) -> sympy.Expr:
-        """An expression's value in the steady state before the event, as an expression of constants."""
+        """An expression's value before the event, of constants: `eq.before(eq.omega)` is the speed there."""
         at_start = {symbol: start_symbol(symbol) for symbol in (*self.states, *self.memories)}
         for symbol, start in list(at_start.items()):
             if not symbol.is_real:
@@ -295,7 +427,7 @@ def _shorter(expression: sympy.Expr) -> sympy.Expr:
 
 
 def _is_real(expression: sympy.Expr) -> bool:
-    """Whether an expression is real wherever it is finite."""
+    """Whether an expression is made of real symbols, or SymPy knows it to be real wherever it is finite."""
     return bool(expression.is_real) or not (expression.has(I) or any(not s.is_real for s in expression.free_symbols))
 
 
@@ -303,9 +435,13 @@ def _real(name: str) -> Symbol:
     return Symbol(name, real=True)
 
 
+def _complex(name: str) -> Symbol:
+    return Symbol(name, complex=True)
+
+
 def start_symbol(state: Symbol) -> Symbol:
     """The symbol of a state's value before the event."""
-    return Symbol(f"{state.name}_before", **({"real": True} if state.is_real else {"complex": True}))
+    return (_real if state.is_real else _complex)(f"{state.name}_before")
 
 
 def phasor_parts(state: Symbol) -> tuple[Symbol, Symbol]:

@@ -30,18 +30,22 @@ def cache_folder() -> Path:
     raise OSError(f"no kernel cache can be written; tried {', '.join(map(str, candidates))}; set TRACTEXP_CACHE_DIR")
 
 
-def remembered(parts: Iterable[object], generate: Callable[[], str]) -> str:
-    """The source generated for these parts, from the cache where their code and settings are unchanged.
+def remembered(parts: Iterable[object], generate: Callable[[], str], what: str = "source") -> str:
+    """The text generated for these parts, from the cache where their code and settings are unchanged.
 
-    Deriving a large model takes seconds, reading it back milliseconds. What a source depends on is the settings of
-    its parts (their `repr`), every file beside their plugins, this package's own code, and SymPy's version.
+    Deriving a large model takes seconds, reading it back milliseconds. What a text depends on is the settings of
+    its parts (their `repr`), every file beside their plugins, this package's own code, and SymPy's version. Of a part
+    that stands in no file, such as one typed into a notebook, nothing is remembered.
     """
     parts = tuple(parts)
-    folders = {Path(sys.modules[type(part).__module__].__file__ or "").parent for part in parts}
-    digest = hashlib.sha256(f"{importlib.metadata.version('sympy')} {parts!r}".encode())
-    for folder in sorted({Path(__file__).parent, *folders}):
+    modules = [type(part).__module__ for part in parts]
+    files = [getattr(sys.modules.get(module), "__file__", None) for module in modules]
+    if None in files:
+        return generate()
+    digest = hashlib.sha256(f"{importlib.metadata.version('sympy')} {modules} {parts!r}".encode())
+    for folder in sorted({Path(__file__).parent, *(Path(file or "").parent for file in files)}):
         digest.update(_code(folder))
-    path = cache_folder() / f"source_{digest.hexdigest()[:20]}.txt"
+    path = cache_folder() / f"{what}_{digest.hexdigest()[:20]}.txt"
     if path.exists():
         return path.read_text()
     text = generate()

@@ -5,10 +5,8 @@ input only once per sample (a *signal*); the rest is left for the inner loop. A 
 becomes exp(exponent * log(base)), whose logarithm is then a signal.
 """
 
-import keyword
-import re
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import sympy
 from sympy import Symbol
@@ -16,6 +14,7 @@ from sympy import Symbol
 from tractexp.errors import UserError
 from tractexp.model.drive import EVENT, INPUTS
 from tractexp.model.equations import Equations, phasor_parts, start_symbol
+from tractexp.model.rest import settled
 
 
 @dataclass(frozen=True)
@@ -38,7 +37,7 @@ class Lowered:
     memories: tuple[Symbol, ...]
     starts: tuple[Symbol, ...]  # states and memories before the event
     start: Phase  # states and memories before the event, then the slack of each requirement
-    rest: Phase | None  # what vanishes before the event, where the start is only a guess to be solved
+    rest: Phase | None  # what vanishes before the event, where the start is only a guess: always with an effect
     constants: tuple[Symbol, ...]
     constant: Phase  # their values, which hold for a whole event
     derivative: Phase
@@ -95,9 +94,8 @@ class _Hoister:
 
 
 def lower(eq: Equations) -> Lowered:
-    """Lower a complete declaration. Raises ValueError where a symbol is used that nothing declares."""
+    """Lower a complete declaration. Raises `UserError` where a symbol is used that nothing declares."""
     rows = eq.real_states()
-    _check_names([*eq.parameters, *(s.name for s in (*eq.states, *eq.memories, *eq.steps))])
     states, memories = tuple(symbol for symbol, _, _ in rows), tuple(eq.memories)
     starts = tuple(p for s in (*eq.states, *eq.memories) for p in _real_parts(start_symbol(s)))
     parameters = tuple(map(_symbol, eq.parameters))
@@ -114,15 +112,15 @@ def lower(eq: Equations) -> Lowered:
     remembered = [eq.real(m.initial) for m in eq.memories.values()]
     start = _phase(None, [i for _, _, i in rows] + remembered + slack)
     at_rest = eq.at_rest() | dict(zip((*states, *memories), starts, strict=True))
-    rest = None if eq.settled else _phase(None, [b.xreplace(at_rest) for b in eq.real_balances()])
+    balances = _phase(None, [b.xreplace(at_rest) for b in eq.real_balances()])
     phases = (derivative, renewal, output)
     used = tuple(s for s in inputs if s == eq.U or any(s in symbols(p) for p in phases))
     lowered = Lowered(
-        parameters, used, event, states, memories, starts, start, rest,
+        parameters, used, event, states, memories, starts, start, balances,
         tuple(hoist.constants.values()), _phase(None, list(hoist.constants)), *phases,
     )  # fmt: skip
     _check_closed(lowered, lane)
-    return lowered
+    return replace(lowered, rest=None) if not eq.edits and settled(eq, start, balances, starts) else lowered
 
 
 def symbols(phase: Phase) -> set[Symbol]:
@@ -167,26 +165,6 @@ def _in_order(assignments: list[tuple[Symbol, sympy.Expr]]) -> tuple[tuple[Symbo
     return tuple(ordered)
 
 
-# Names the generated kernel uses itself: its own variables, and the patterns of constants, signals and stages.
-TAKEN = frozenset(
-    """
-    n e h k l m i j p q P Q W x f g d r c J w_p w_q math np njit candidates event first inputs measured weights
-    substeps sums miss outputs store signals block reachable unsettled moved factor shorter off settled keep
-    """.split()  # noqa: SIM905
-)
-PATTERN = re.compile(r"[csx]\d+|k[1-4]_.*|_.*")
-
-
-def _check_names(names: Iterable[str]) -> None:
-    """Raise `UserError` for a name that the kernel could not tell from its own."""
-    for name in names:
-        if name in TAKEN or PATTERN.fullmatch(name) or not name.isidentifier() or keyword.iskeyword(name):
-            raise UserError(
-                f"a model cannot have a parameter, state or memory called '{name}': the kernel uses that name itself,"
-                " or it is no Python name; choose a longer one"
-            )
-
-
 def _check_closed(lowered: Lowered, lane: set[Symbol]) -> None:
     known = lane | {*lowered.inputs, *lowered.event, *lowered.states, *lowered.memories}
     for phase in (lowered.start, lowered.rest, lowered.constant, lowered.derivative, lowered.renewal, lowered.output):
@@ -194,7 +172,9 @@ def _check_closed(lowered: Lowered, lane: set[Symbol]) -> None:
             continue
         own = {*lowered.constants, *(s for s, _ in (*phase.temporaries, *phase.signals))}
         if stray := symbols(phase) - known - own:
-            raise ValueError(f"the equations use {sorted(map(str, stray))}, which nothing declares")
+            raise UserError(
+                f"the equations use {', '.join(sorted(map(str, stray)))}, which no part of the model declares"
+            )
 
 
 def _symbol(name: str) -> Symbol:

@@ -2,6 +2,7 @@
 
 import copy
 import functools
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -36,6 +37,14 @@ class Errors:
     @property
     def refused(self) -> np.ndarray:
         return (self.miss > 0) | ~np.isfinite(self.sums).all(axis=(0, 1))
+
+
+@dataclass(frozen=True)
+class Acceptance:
+    """Whether a model takes an effect. `refusal` is the sentence why it makes no sense, None where it does."""
+
+    refusal: str | None
+    edits: Sequence[str] = ()  # names of the sites it edits
 
 
 class Model:
@@ -76,19 +85,25 @@ class Model:
     @functools.cached_property
     def equations(self) -> Any:
         """The declaration all parts wrote into (an `Equations`). Raises `UserError` for parts that do not fit."""
-        from tractexp.model.equations import Equations
+        from tractexp.model.declaration import declared
 
-        eq = Equations()
-        self.motor.declare(eq)
-        self.static.declare(eq)
-        for effect in self.effects:
-            if why := effect.refusal(eq):
-                raise UserError(f"the effect '{effect.name}' cannot be added to this model: {why}")
-            effect.edit(eq)
-        if eq.P == 0 and eq.Q == 0:
-            raise UserError(f"the {self.title} draw no power; choose a model/motor or a model/static other than 'none'")
-        eq.close()
-        return eq
+        return declared(self.motor, self.static, self.effects, self.title)
+
+    def acceptance(self, effect: Effect) -> "Acceptance":
+        """Whether one more effect makes sense for this model, and what it would edit; remembered beside the kernels."""
+        from tractexp.model.kernel import remembered
+
+        parts = (self.motor, self.static, *self.effects, effect)
+        return Acceptance(**json.loads(remembered(parts, lambda: self._tried(effect), "acceptance")))
+
+    def _tried(self, effect: Effect) -> str:
+        from tractexp.model.declaration import Refused
+
+        try:
+            eq = compose(self.motor, self.static, [*self.effects, effect]).equations
+        except Refused as refused:
+            return json.dumps({"refusal": refused.reason if refused.effect == effect.name else str(refused)})
+        return json.dumps({"refusal": None, "edits": eq.edits.get(effect.name, [])})
 
     @functools.cached_property
     def source(self) -> str:

@@ -1,26 +1,46 @@
-"""The bases a load is composed of. A part writes its equations into the declaration; nothing else."""
+"""The bases a load is composed of. A part returns what it is asked for; the framework does the rest.
 
-from typing import TYPE_CHECKING, ClassVar
+A method gets the part's own parameters by name, as SymPy symbols; which names it asks for is checked when the plugin
+is registered. What `eq` offers is told in docs/plugins.md.
+"""
+
+from abc import abstractmethod
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from tractexp.errors import UserError, among
+from tractexp.model.names import check_name
+from tractexp.model.signature import check_signature
 from tractexp.plugin import Plugin
 
 if TYPE_CHECKING:
     from tractexp.model.drive import Drive
     from tractexp.model.equations import Equations
 
+CHANNELS = ("f", "U2")  # recorded channels that not every record has
+
+
+class Unfit(UserError):
+    """Why an effect makes no sense for a model: what it asks for is not there. Raised by what it asks `eq` for."""
+
 
 class Part(Plugin):
-    """A part of a load that draws power of its own.
+    """A part of a load.
 
     `reads` names the recorded channels (`f`, `U2`) without which its parameters cannot be identified.
     """
 
     reads: ClassVar[tuple[str, ...]] = ()
 
-    def declare(self, eq: "Equations") -> None:
-        """Declare parameters, states and named quantities in `eq`, and what the part draws (`eq.consume`)."""
+    @classmethod
+    def check_class(cls, where: str) -> None:
+        for parameter in cls.parameters:
+            check_name(parameter.name, where)
+        for channel in cls.reads:
+            if channel not in CHANNELS:
+                raise UserError(f"{where}: reads names the channel '{channel}'{among(channel, CHANNELS, 'Channels')}")
 
 
 class Motor(Part):
@@ -28,50 +48,108 @@ class Motor(Part):
 
     group: ClassVar[str] = "model/motor"
 
+    @abstractmethod
+    def declare(self, eq: "Equations", **parameters: Any) -> Any:
+        """Declare states and sites in `eq` and return the phasor of the stator current [pu]; None: no motor.
+
+        The motor draws V conj(I), V = `eq.V`; the framework declares that.
+        """
+
+    @classmethod
+    def check_class(cls, where: str) -> None:
+        super().check_class(where)
+        check_signature(cls, "declare", "eq", where)
+
 
 class Static(Part):
     """Base of the static load plugins, chosen by `model/static=NAME`.
 
-    A static load draws `eq.P_s0` and `eq.Q_s0` before the event: what the other parts leave.
+    Before the event it draws P_s0 and Q_s0: what the other parts leave.
     """
 
     group: ClassVar[str] = "model/static"
 
+    @abstractmethod
+    def law(self, u: Any, **parameters: Any) -> tuple[Any, Any] | None:
+        """P/P_s0 and Q/Q_s0 at the voltage u = U/U_0, both 1 at u = 1; None: no static load.
 
-class Effect(Plugin):
+        A law that names an argument `f` gets the frequency over that before the event.
+        """
+
+    def require(self, **parameters: Any) -> Iterable[tuple]:
+        """What must hold for a steady state: (slack, sentence) or (slack, sentence, shown), slack >= 0 where it does.
+
+        `{value}` in the sentence prints `shown`, by default the slack. May ask for `P0`, `Q0` and `U0` by name.
+        """
+        return ()
+
+    @classmethod
+    def check_class(cls, where: str) -> None:
+        super().check_class(where)
+        check_signature(cls, "law", "u", where, offered=("f",))
+        check_signature(cls, "require", None, where, offered=("P0", "Q0", "U0"), all_taken=False)
+
+
+class Effect(Part):
     """Base of the effects a model may lack, named in `model.effects=[...]`: an edit of the equations.
 
     The parameters that say how large the effect is have a `null` at which the edited equations are the unedited
     ones; `relevant` is the smallest departure from it that matters. The others vanish there, and `grid` names the
-    values of each at which to look for the effect. `needs` names the quantities it edits or uses, `reads` the
-    recorded channels without which it cannot be seen (`f`, `U2`), `confused_with` the effects that look alike on
-    ordinary dips.
+    values of each at which to look for the effect. `reads` names the recorded channels without which it cannot be
+    seen, `confused_with` the effects that look alike on ordinary dips.
     """
 
     group: ClassVar[str] = "effect"
     chosen: ClassVar[bool] = False
     order: ClassVar[int] = 0  # edits of a higher order come later: those that copy what others have edited
-    needs: ClassVar[tuple[str, ...]] = ()
-    reads: ClassVar[tuple[str, ...]] = ()
     grid: ClassVar[dict[str, tuple[float, ...]]] = {}
     relevant: ClassVar[dict[str, float]] = {}
     confused_with: ClassVar[tuple[str, ...]] = ()
 
-    def refusal(self, eq: "Equations") -> str | None:
-        """Why this effect makes no sense for the equations in `eq`, as a sentence; None where it does."""
-        missing = [name for name in self.needs if not eq.has(name)]
-        return f"its equations have no {' and no '.join(missing)}" if missing else None
+    @abstractmethod
+    def edit(self, eq: "Equations", **parameters: Any) -> None:
+        """Edit the declared equations: call `eq.edit` on a site, add what is new.
 
-    def edit(self, eq: "Equations") -> None:
-        """Edit the declared equations: rename nothing, add what is new, call `eq.edit` on what changes."""
+        Asking `eq` for what a model lacks refuses the effect for that model.
+        """
+
+    def refusal(self, eq: "Equations") -> str | None:
+        """A reason, as a sentence, that only this effect knows why it makes no sense for the equations in `eq`.
+
+        That a site, a speed or a quantity is not there needs no saying: asking `eq` for it refuses the effect.
+        """
+        return None
+
+    @classmethod
+    def check_class(cls, where: str) -> None:
+        super().check_class(where)
+        check_signature(cls, "edit", "eq", where)
+        own = {p.name: p for p in cls.parameters}
+        sizes = [p.name for p in cls.parameters if p.null is not None]
+        if not sizes:
+            raise UserError(
+                f"{where} has no size: give the parameter that says how large the effect is a 'null', the value at"
+                " which the equations are as if it were absent"
+            )
+        for label, table in (("grid", cls.grid), ("relevant", cls.relevant)):
+            for name in table:
+                if name not in own:
+                    raise UserError(f"{where}: {label} names '{name}', no parameter of it{among(name, own, 'It has')}")
+                if (name in sizes) == (label == "grid"):
+                    kind = "is a size, looked for from its null" if label == "grid" else "has no null and is no size"
+                    raise UserError(f"{where}: {label} names '{name}', which {kind}; take it out")
+        for name, values in cls.grid.items():
+            low, high = own[name].bounds
+            if outside := [v for v in values if not low <= v <= high]:
+                raise UserError(f"{where}: grid has {name} = {outside[0]:g}, outside its bounds [{low:g}, {high:g}]")
 
 
 class Measurement(Effect):
     """Base of the effects of the measurement chain: they act on the calculated power, not on the equations."""
 
-    def edit(self, eq: "Equations") -> None:
-        eq.declare(self.parameters)
+    def edit(self, eq: "Equations", **parameters: Any) -> None:
+        """A recorder leaves the equations as they are."""
 
+    @abstractmethod
     def observe(self, power: np.ndarray, drive: "Drive", values: dict[str, np.ndarray]) -> np.ndarray:
         """P and Q (2, n, N) as the recorder would show them; `values` {parameter: (E, n)}."""
-        return power

@@ -37,6 +37,9 @@ class Event:
     steady: slice
     dips: int  # in the whole record
 
+    def __repr__(self) -> str:
+        return describe(self)
+
     @property
     def t_start(self) -> float:
         return float(self.record.t[self.start])

@@ -20,6 +20,12 @@ class Reader(Plugin):
     """Base of the reader plugins, chosen by `data=NAME`."""
 
     group: ClassVar[str] = "data"
+    endings: ClassVar[tuple[str, ...]] = ()  # of the files that `tractexp.read` gives it, in lower case
+
+    @staticmethod
+    def of(path: str) -> dict[str, Any]:
+        """The settings that make it read all of one file; for a reader with `endings`."""
+        return {"path": path}
 
     @abstractmethod
     def read(self) -> Events:

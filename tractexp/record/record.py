@@ -1,6 +1,6 @@
 """A recorded event: the measured voltage and the power the load drew from it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,6 +22,11 @@ class Base:
     power: float = 1.0  # MVA
     frequency: float = 50.0  # Hz, nominal
 
+    def per_unit(self, columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Columns by name, U and U2 [kV], P [MW] and Q [Mvar] made per unit."""
+        units = {"U": self.voltage, "U2": self.voltage, "P": self.power, "Q": self.power}
+        return {name: values / units.get(name, 1.0) for name, values in columns.items()}
+
 
 @dataclass(frozen=True, eq=False)
 class Record:
@@ -42,6 +47,10 @@ class Record:
     base: Base = Base()
     source: str = ""
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        span = f"{self.samples} samples of {', '.join(self.channels)}"
+        return f"{self.name}: {span}, {self.t[0]:.3f} to {self.t[-1]:.3f} s, {self.rate:.0f} Hz"
 
     @property
     def samples(self) -> int:

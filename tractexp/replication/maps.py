@@ -22,13 +22,9 @@ def issa(**settings: Any) -> Any:
     return build("optimizer", {"name": "issa", **settings})
 
 
-def unit_cube(d: int) -> Box:
-    return Box(np.zeros(d), np.ones(d))
-
-
 def tent_orbit(alpha: float, n: int, d: int, rng: np.random.Generator) -> np.ndarray:
     """(n, d) iterates of the tent map, Eq. (14), one orbit in each column."""
-    return issa(tent_alpha=alpha, population=n).initial(unit_cube(d), rng)
+    return issa(tent_alpha=alpha, population=n).initial(Box.unit(d), rng)
 
 
 def logistic_orbit(n: int, d: int, rng: np.random.Generator) -> np.ndarray:

@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.discrepancy.contract import parameters, recommendation
-from tractexp.discrepancy.investigate import Finding
-from tractexp.discrepancy.judgement import judge
-from tractexp.discrepancy.left import SMALLEST_P
+from tractexp.discrepancy.adequacy import SMALLEST_P
+from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.discrepancy_json import parameters, recommendation
+from tractexp.discrepancy.investigate import Investigation
+from tractexp.discrepancy.judgement import judgements
 from tractexp.report import style
 from tractexp.report.page import Page
 
@@ -21,72 +22,72 @@ CAPTIONS = {
 }
 
 
-def report(folder: Path, finding: Finding, title: str) -> list[Path]:
+def report(folder: Path, found: Investigation, title: str) -> list[Path]:
     """Write the figures and discrepancy.html into `folder`; returns their paths."""
-    figures = [residuals(folder / "residuals.svg", finding), smaller(folder / "gap.svg", finding, held=False)]
-    if finding.held_out is not None:
-        figures.append(smaller(folder / "gap_held_out.svg", finding, held=True))
-    if finding.nearest is not None:
-        figures.append(left(folder / "unexplained.svg", finding))
-    return [*figures, page(folder / "discrepancy.html", finding, figures, title)]
+    figures = [residuals(folder / "residuals.svg", found), smaller(folder / "gap.svg", found, held=False)]
+    if found.judged is not None:
+        figures.append(smaller(folder / "gap_held_out.svg", found, held=True))
+    if found.verdict.nearest is not None:
+        figures.append(left(folder / "unexplained.svg", found))
+    return [*figures, page(folder / "discrepancy.html", found, figures, title)]
 
 
-def page(path: Path, finding: Finding, figures: list[Path], title: str) -> Path:
+def page(path: Path, found: Investigation, figures: list[Path], title: str) -> Path:
     """Tell the investigation to a reader who was not there."""
-    names = " and ".join(finding.names)
-    made = Page(f"Missing effect: {title}", f"{finding.study.model.title}, {len(finding.study.events)} events fitted")
-    made.verdict(f"{finding.verdict.upper()} {names}".strip(), finding.reason, kind=KIND[finding.verdict])
+    names = " and ".join(found.names)
+    made = Page(f"Missing effect: {title}", f"{found.bench.model.title}, {len(found.bench.events)} events fitted")
+    made.verdict(f"{found.verdict.word.upper()} {names}".strip(), found.verdict.reason, kind=KIND[found.verdict.word])
     made.heading("1 Noise").text(
-        f"{finding.last.noise.describe()}. It is estimated where nothing happens, from what the fit leaves there, and"
+        f"{found.last.noise.describe()}. It is estimated where nothing happens, from what the fit leaves there, and"
         " so contains what smoothing leaves of the voltage's noise. Time skew, measurement window and load drift are"
         " free in every fit, each held by what is physically likely."
     )
-    if finding.study.phasors is not None:
+    if (window := found.bench.records.window) is not None:
         made.text(
-            f"{finding.study.phasors.describe().capitalize()}, of voltage and current alike: any other window would"
+            f"{window.describe().capitalize()}, of voltage and current alike: any other window would"
             " make the voltage bend where the power does not. The voltage that the load saw is reckoned back from the"
             " record, and the current of the model is averaged as the recorder does. The extended configuration does"
             " not do so."
         )
-    made.heading("2 Is there a disagreement?").text(_gate(finding))
+    made.heading("2 Is there a disagreement?").text(_gate(found))
     made.heading("3 Where")
-    if finding.places:
-        rows = [[p.event, p.channel, f"{p.start:.3f}", f"{p.end:.3f}", f"{p.share:.0%}"] for p in finding.places]
+    if found.places:
+        rows = [[p.event, p.channel, f"{p.start:.3f}", f"{p.end:.3f}", f"{p.share:.0%}"] for p in found.places]
         made.table(["event", "channel", "from [s]", "to [s]", "share of the excess"], rows)
     else:
         made.text("No interval holds more energy than chance leaves there.")
     made.figure(figures[0], "What the base model leaves; shaded: more than chance, at a family-wise error of "
-                            f"{finding.alpha:.0%}.")  # fmt: skip
-    _which(made, finding)
-    _sure(made, finding)
-    _added(made, finding)
+                            f"{found.bench.criteria.false_alarms:.0%}.")  # fmt: skip
+    _which(made, found)
+    _sure(made, found)
+    _added(made, found)
     made.heading("7 Smaller")
-    made.table(["events", "", "epsilon_p", "epsilon_q", "chi2 per sample", "gap closed"], _gap_rows(finding))
+    made.table(["events", "", "epsilon_p", "epsilon_q", "chi2 per sample", "gap closed"], _gap_rows(found))
     for figure in figures[1:]:
         made.figure(figure, CAPTIONS[figure.stem])
-    made.heading("Next").text(recommendation(finding))
+    made.heading("Next").text(recommendation(found))
     return made.write(path)
 
 
-def _gate(finding: Finding) -> str:
-    first = finding.first
+def _gate(found: Investigation) -> str:
+    first = found.first
     best = first.scores[0] if first.scores else None
-    critical = first.null.critical_p(finding.alpha)
+    critical = first.chance.critical_p(found.bench.criteria.false_alarms)
     text = f"What the base fit leaves would come about by chance with p = {first.p_left:.2g}"
     text += f"; {first.loudest} stands out." if not first.adequate else "."
     if best is None:
         return text
-    p = max(best.p, SMALLEST_P)
+    p, alpha = max(best.p, SMALLEST_P), found.bench.criteria.false_alarms
     return (
         f"The most helpful single effect, {best.name}, lowers the deviance by {best.drop:.1f} (p = {p:.2g}; chance"
-        f" gives less than {critical:.2g} to the best of all candidates in {finding.alpha:.0%} of cases). {text}"
+        f" gives less than {critical:.2g} to the best of all candidates in {alpha:.0%} of cases). {text}"
     )
 
 
-def _which(made: Page, finding: Finding) -> None:
+def _which(made: Page, found: Investigation) -> None:
     made.heading("4 Which")
     rows = []
-    for j in judge(finding):
+    for j in judgements(found):
         size = ""
         if j.score is not None:
             size = ", ".join(f"{n} {v:.3g} ± {j.score.deviation[n]:.2g}" for n, v in j.score.size.items())
@@ -97,39 +98,41 @@ def _which(made: Page, finding: Finding) -> None:
     )  # fmt: skip
 
 
-def _sure(made: Page, finding: Finding) -> None:
+def _sure(made: Page, found: Investigation) -> None:
     made.heading("5 How sure")
     rows = [
         [" and ".join(r.fit.names) or "the base model", f"{r.fit.deviance:.1f}", f"{r.behind:.1f}", f"{r.distance:.1f}",
          "rejected" if r.rejected else "adequate" if r.adequate else "not adequate",
-         "" if r.stage is None else f"{r.stage.p_left:.2g}"]
-        for r in finding.rivals[:12]
+         "" if r.tests is None else f"{r.tests.p_left:.2g}"]
+        for r in found.survivors.rivals[:12]
     ]  # fmt: skip
     made.table(
         ["set", "deviance", "behind", "distance of the curves", "verdict", "p of adequacy"], rows,
         "Every set of this size that was refitted. A set is rejected when, were it true, the best would not fit so"
         " well.", words=(4,),
     )  # fmt: skip
-    if finding.nearest is not None:
-        near = finding.nearest
+    if found.verdict.nearest is not None:
+        near = found.verdict.nearest
         held = f"{near.held_out:.0%}" if np.isfinite(near.held_out) else ""
         rows = [[" and ".join(near.names), f"{near.fitted:.0%}", held]]
         rows += [[" and ".join(names), f"{share:.0%}", ""] for names, share in near.others]
         made.table(["nearest candidates", "explains on the fitted events", "on the held-out events"], rows,
                    "None of them is adequate. Shares of the deviance in excess of the noise.")  # fmt: skip
-    if len(finding.sets) > 1:
-        made.text("These cannot be told apart on these events: " + "; ".join(" and ".join(s) for s in finding.sets))
+    if len(found.verdict.sets) > 1:
+        made.text(
+            "These cannot be told apart on these events: " + "; ".join(" and ".join(s) for s in found.verdict.sets)
+        )
 
 
-def _added(made: Page, finding: Finding) -> None:
+def _added(made: Page, found: Investigation) -> None:
     made.heading("6 Added")
-    if not finding.names:
+    if not found.names:
         made.text("Nothing was added.")
         return
     from tractexp.model.model import compose
 
-    base = finding.study.model
-    effects = [finding.catalogue[n].effect for n in finding.names]
+    base = found.bench.load
+    effects = [found.catalogue[n].effect for n in found.names]
     before, after = base.latex(), compose(base.motor, base.static, [*base.effects, *effects]).latex()
     made.text("Equations that changed or came in:")
     old = {line.split("=")[0]: line for line in before}
@@ -143,15 +146,15 @@ def _added(made: Page, finding: Finding) -> None:
         for line in after:
             made.equation(line)
     rows = []
-    for name, at in parameters(finding).items():
+    for name, at in parameters(found).items():
         error = at["standard_error"]
         rows.append([name, f"{at['value']:.5g}", f"{error:.2g}" if np.isfinite(error) else "at its bound"])
     made.table(["parameter", "value", "standard error"], rows)
 
 
-def _gap_rows(finding: Finding) -> list[list[str]]:
+def _gap_rows(found: Investigation) -> list[list[str]]:
     rows = []
-    for label, gap in (("fitted", finding.train), ("held out", finding.validate)):
+    for label, gap in (("fitted", found.train), ("held out", found.validate)):
         if gap is None:
             continue
         for stage, c in (("before", gap.before), ("after", gap.after)):
@@ -160,38 +163,40 @@ def _gap_rows(finding: Finding) -> list[list[str]]:
     return rows
 
 
-def residuals(path: Path, finding: Finding) -> Path:
+def residuals(path: Path, found: Investigation) -> Path:
     """The base model's residuals of every event, with the intervals that stand out shaded."""
-    study, calculated = finding.study, finding.train.before.calculated
-    return _panels(path, study, [("base model", calculated, None)], finding.places)
+    calculated = found.train.before.calculated
+    return _panels(path, found.bench, [("base model", calculated, None)], found.places)
 
 
-def left(path: Path, finding: Finding) -> Path:
+def left(path: Path, found: Investigation) -> Path:
     """What the nearest candidates leave of the base model's residuals."""
-    assert finding.nearest is not None
-    before = ("base model", finding.train.before.calculated, style.BEHIND)
-    return _panels(path, finding.study, [before, ("nearest candidates", finding.nearest.calculated, None)], ())
+    assert found.verdict.nearest is not None
+    before = ("base model", found.train.before.calculated, style.BEHIND)
+    return _panels(path, found.bench, [before, ("nearest candidates", found.verdict.nearest.calculated, None)], ())
 
 
-def smaller(path: Path, finding: Finding, held: bool) -> Path:
+def smaller(path: Path, found: Investigation, held: bool) -> Path:
     """Residuals before and after, on the fitted or the held-out events."""
-    study = finding.held_out.study if held else finding.study
-    gap = finding.validate if held else finding.train
+    bench, gap = found.bench, found.train
+    if held:
+        assert found.judged is not None
+        bench, gap = found.judged.bench, found.judged.gap
     pairs = [("before", gap.before.calculated, style.MEASURED), ("after", gap.after.calculated, None)]
-    return _panels(path, study, pairs if finding.names else pairs[:1], ())
+    return _panels(path, bench, pairs if found.names else pairs[:1], ())
 
 
-def _panels(path: Path, study: Any, curves: list[tuple[str, np.ndarray, str | None]], places: Any) -> Path:
+def _panels(path: Path, bench: Bench, curves: list[tuple[str, np.ndarray, str | None]], places: Any) -> Path:
     """One column per event (at most four), P above Q."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    events = study.events[:4]
+    events = bench.events[:4]
     with rc_context(style.SETTINGS):
         figure = Figure(figsize=(max(4.2, 2.9 * len(events)) + 1, 4.4))
         panels = figure.subplots(2, len(events), sharex="col", sharey="row", squeeze=False)
         for e, event in enumerate(events):
-            part = study.problem.drive.part(e)
+            part = bench.drive.part(e)
             for c, (name, color) in enumerate((("P", style.ACTIVE), ("Q", style.REACTIVE))):
                 panel, measured = panels[c, e], getattr(event.record, name)
                 for place in places:

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from tractexp.identification.diagnosis import LAGS, autocorrelation
 from tractexp.identification.plan import Forecast
 from tractexp.identification.profile import Profiles
+from tractexp.identification.residual_tests import LAGS, autocorrelation
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.report import style
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from tractexp import files
 from tractexp.errors import UserError
 from tractexp.sweep import identity
 from tractexp.sweep.parent import parent_of
@@ -85,7 +86,7 @@ def _run(job: SweepJob) -> str:
     except UserError as error:
         return str(error)
     except (Exception, SystemExit) as error:
-        (job.folder / TRACEBACK).write_text(traceback.format_exc(), encoding="utf-8")
+        files.write(job.folder / TRACEBACK, traceback.format_exc())
         return traceback.format_exception_only(error)[-1].strip() or type(error).__name__
     return ""
 
@@ -97,11 +98,9 @@ def _prepare(job: SweepJob) -> None:
     if job.folder.exists():
         shutil.rmtree(job.folder)
     hydra = job.folder / ".hydra"
-    hydra.mkdir(parents=True)
     runtime = {"cwd": str(Path.cwd()), "output_dir": str(job.folder), "choices": dict(job.choices)}
     around = {"hydra": {"mode": "MULTIRUN", "overrides": {"task": list(job.overrides)}, "runtime": runtime}}
     contents = {"config": dict(job.config), "overrides": list(job.overrides), "hydra": around}
     dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)  # ten times as fast, where PyYAML was built with it
     for name, content in contents.items():
-        text = yaml.dump(content, Dumper=dumper, sort_keys=False, allow_unicode=True)
-        (hydra / f"{name}.yaml").write_text(text, encoding="utf-8")
+        files.write(hydra / f"{name}.yaml", yaml.dump(content, Dumper=dumper, sort_keys=False, allow_unicode=True))

@@ -1,9 +1,9 @@
 """`hydra/launcher=cores`: the jobs of a sweep on worker processes that start once, here or on a Dask cluster."""
 
 import contextlib
-import logging
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, as_completed
+from collections.abc import Callable, Sequence
+from concurrent.futures import BrokenExecutor, Executor, as_completed
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -11,23 +11,24 @@ from typing import Any
 from hydra.core.utils import JobReturn, JobStatus
 from hydra.plugins.launcher import Launcher
 
+from tractexp.doors.hydra_plugins import NAMESPACE
 from tractexp.errors import UserError, check_choice, check_range
 from tractexp.sweep import status
 from tractexp.sweep.compose import Composer
 from tractexp.sweep.job import SweepJob, work
 from tractexp.sweep.progress import progress
 from tractexp.sweep.status import FAILED, RUNNING, Status
+from tractexp.sweep.workers import dask_cluster, processes
 
 BARREN = 3  # times a pool may break before any job of it has started
-IDLE = 60  # s after which a worker without work ends, as it must where the parent has been killed
 
 
 @dataclass
 class CoresConfig:
     """Schema of `hydra.launcher`."""
 
-    _target_: str = "hydra_plugins.tractexp.Cores"
-    backend: str = "loky"  # "loky": processes on this computer; "dask": workers of a Dask cluster
+    _target_: str = f"{NAMESPACE}.Cores"
+    backend: str = "processes"  # on this computer; "dask": workers of a Dask cluster
     n_jobs: int = -1  # workers; -1: one for each core this process may use
     address: str | None = None  # of a Dask scheduler, such as tcp://host:8786; null: a cluster of our own, here
     tries: int = 3  # how often a job is run whose worker is killed
@@ -39,14 +40,12 @@ class Cores(Launcher):
     Raises `UserError` for settings out of range, and where workers cannot be started.
     """
 
-    __module__ = "hydra_plugins.tractexp"  # Hydra makes no plugin from elsewhere
-
     def __init__(self, backend: str, n_jobs: int, address: str | None, tries: int):
         self.backend, self.n_jobs, self.address, self.tries = backend, n_jobs, address, tries
 
     def setup(self, *, hydra_context: Any, task_function: Any, config: Any) -> None:
         self.hydra_context, self.config = hydra_context, config
-        check_choice("hydra.launcher.backend", self.backend, ("loky", "dask"))
+        check_choice("hydra.launcher.backend", self.backend, ("processes", "dask"))
         if self.n_jobs != -1:
             check_range("hydra.launcher.n_jobs", self.n_jobs, 1)
         check_range("hydra.launcher.tries", self.tries, 1)
@@ -108,29 +107,16 @@ class Cores(Launcher):
         end.write(job.folder)
         note(end, job)
 
-    @contextlib.contextmanager
-    def _executor(self, n_jobs: int) -> Iterator[Any]:
-        if self.backend == "dask":
-            with _dask(n_jobs, self.address) as executor:
-                yield executor
-            return
-        from joblib.externals.loky import get_reusable_executor
-
-        executor = get_reusable_executor(max_workers=n_jobs, timeout=IDLE)
-        try:
-            yield executor
-        except BaseException:  # loky's own way to kill them fails in a thread where jobs are still queued
-            for process in list(executor._processes.values()):
-                process.terminate()
-            executor.shutdown(wait=True)
-            raise
-        executor.shutdown(wait=True, kill_workers=True)  # the jobs' ends are on disk: there is nothing to wait for
+    def _executor(self, n_jobs: int) -> AbstractContextManager[Executor]:
+        return processes(n_jobs) if self.backend == "processes" else dask_cluster(n_jobs, self.address)
 
 
-def _collect(executor: Any, jobs: Sequence[SweepJob], note: Callable[[Status, SweepJob], None]) -> bool:
+def _collect(executor: Executor, jobs: Sequence[SweepJob], note: Callable[[Status, SweepJob], None]) -> bool:
     """Note the ends of jobs as they come; False where a worker was killed."""
-    whole = True
-    futures = {executor.submit(work, job): job for job in jobs}
+    whole, futures = True, {}
+    with contextlib.suppress(BrokenExecutor):  # a worker was killed already: the futures tell
+        for job in jobs:
+            futures[executor.submit(work, job)] = job
     for future in as_completed(futures):
         try:
             note(future.result(), futures[future])
@@ -148,30 +134,6 @@ def _end(job: SweepJob, note: Callable[[Status, SweepJob], None]) -> str | None:
         return end and end.status
     note(end, job)
     return end.status
-
-
-@contextlib.contextmanager
-def _dask(n_jobs: int, address: str | None) -> Iterator[Any]:
-    """An executor on the Dask cluster at `address`, or on one of our own."""
-    try:
-        import dask
-        from distributed import Client, LocalCluster
-    except ImportError:
-        raise UserError(
-            "hydra.launcher.backend=dask needs Dask, which is not installed: pip install 'tractexp[dask]'"
-        ) from None
-    loud = logging.getLogger("distributed")  # its remarks on every worker that comes or goes would tear the bar
-    loud.propagate, loud.handlers = False, [logging.NullHandler()]
-    with contextlib.ExitStack() as stack:
-        stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 0}))  # we count ourselves
-        if address is None:
-            cluster = LocalCluster(n_workers=n_jobs, threads_per_worker=1, dashboard_address=None, silence_logs=50)
-            address = stack.enter_context(cluster).scheduler_address
-        try:
-            client = stack.enter_context(Client(address, timeout="10s"))
-        except (OSError, ValueError) as error:
-            raise UserError(f"hydra.launcher.address={address}: no Dask scheduler answers there ({error})") from error
-        yield client.get_executor(pure=False)
 
 
 def _cores() -> int:

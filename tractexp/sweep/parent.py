@@ -6,7 +6,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from tractexp.sweep.status import FAILED, FINISHED, objective, read, write
+from tractexp.files import write_json
+from tractexp.sweep.status import FAILED, FINISHED, objective, read
 
 FILE = "sweep.json"
 
@@ -37,7 +38,7 @@ def parent_run(folder: Path, jobs: list[Any], overrides: list[str], afresh: bool
     run_id = parent_of(folder)
     if afresh or run_id is None or not tracking.reopen_parent(run_id, uri):
         run_id = tracking.start_parent(_described(folder, jobs, overrides), uri)
-    write(folder / FILE, {"run": run_id, "uri": uri, "jobs": len(jobs), "overrides": overrides})
+    write_json(folder / FILE, {"run": run_id, "uri": uri, "jobs": len(jobs), "overrides": overrides})
     status = "FAILED"
     try:
         yield

@@ -4,7 +4,8 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+
+from tractexp.files import write_json
 
 FILE = "status.json"
 RUNNING, FINISHED, FAILED = "running", "finished", "failed"
@@ -23,15 +24,7 @@ class Status:
     seed: int | None = None
 
     def write(self, folder: Path) -> None:
-        """Write the file in one move, so that no half-written one is ever read."""
-        write(folder / FILE, asdict(self))
-
-
-def write(path: Path, content: Mapping[str, Any]) -> None:
-    """Write a JSON file in one move."""
-    part = path.with_suffix(".part")
-    part.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    part.replace(path)
+        write_json(folder / FILE, asdict(self))
 
 
 def read(folder: Path) -> Status | None:

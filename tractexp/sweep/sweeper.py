@@ -1,6 +1,7 @@
 """`hydra/sweeper=grid`: every combination once, whatever launcher runs it."""
 
 import contextlib
+import itertools
 import shutil
 import signal
 from collections.abc import Iterator, Mapping, Sequence
@@ -9,10 +10,13 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from hydra._internal.core_plugins.basic_sweeper import BasicSweeper
 from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.override_parser.types import Override
+from hydra.core.plugins import Plugins
+from hydra.plugins.sweeper import Sweeper
 from omegaconf import OmegaConf
 
+from tractexp.doors.hydra_plugins import NAMESPACE
 from tractexp.errors import UserError
 from tractexp.plugin import get
 from tractexp.sweep import status
@@ -32,27 +36,29 @@ REPEAT = "repeat the command to go on with the jobs that are left"
 class GridConfig:
     """Schema of `hydra.sweeper`."""
 
-    _target_: str = "hydra_plugins.tractexp.Grid"
+    _target_: str = f"{NAMESPACE}.Grid"
     params: dict[str, str] | None = None  # as on the command line: {"seed": "range(0,30)"}
     redo: bool = False  # run finished jobs again
 
 
-class Grid(BasicSweeper):
+class Grid(Sweeper):
     """Runs every combination of the swept values that is not finished yet, and says what became of them.
 
     Raises `UserError` for a sweep without jobs, and at its end where jobs have failed.
     """
 
-    __module__ = "hydra_plugins.tractexp"  # Hydra makes no plugin from elsewhere
-
     def __init__(self, params: Mapping[str, str] | None, redo: bool):
-        super().__init__(None, dict(params or {}))
-        self.redo = redo
+        self.params, self.redo = params or {}, redo
+
+    def setup(self, *, hydra_context: Any, task_function: Any, config: Any) -> None:
+        self.loader = hydra_context.config_loader
+        self.config: Any = config
+        self.launcher: Any = Plugins.instance().instantiate_launcher(
+            hydra_context=hydra_context, task_function=task_function, config=config
+        )
 
     def sweep(self, arguments: list[str]) -> None:
-        assert self.config is not None
-        assert self.hydra_context is not None
-        told = [*self._parse_config(), *arguments]
+        told = [*(f"{key}={values}" for key, values in self.params.items()), *arguments]
         folder = Path(self.config.hydra.sweep.dir).absolute()
         jobs = place(self._composed(told), folder)
         left = [job for job in jobs if self.redo or not finished(job)]
@@ -68,17 +74,11 @@ class Grid(BasicSweeper):
 
     def _composed(self, told: list[str]) -> list[SweepJob]:
         """The jobs of the sweep, composed and without duplicates, not yet placed."""
-        loader = self.hydra_context.config_loader  # type: ignore[union-attr]
-        parsed = OverridesParser.create(config_loader=loader).parse_overrides(told)
-        for override in parsed:
-            if override.is_discrete_sweep() and not [*override.sweep_string_iterator()]:
-                raise UserError(
-                    f"the sweep has no jobs: {override.input_line} is empty; a range ends before its second number, "
-                    "as range(0,30) is 0 to 29, and a glob needs a name that matches"
-                )
-        compose = Composer(loader, self.config)  # type: ignore[arg-type]
+        compose = Composer(self.loader, self.config)
+        choices = {o.get_key_element(): swept(o) for o in OverridesParser.create(self.loader).parse_overrides(told)}
         made: dict[str, SweepJob] = {}
-        for overrides in self.split_arguments(parsed, None)[0]:
+        for combination in itertools.product(*choices.values()):
+            overrides = [f"{key}={value}" for key, value in zip(choices, combination, strict=True)]
             job = SweepJob.of(*compose(overrides), overrides, Path())
             refuse_unread(get("task", job.config["task"]["name"]), job.given)
             made.setdefault(job.configuration, job)
@@ -94,7 +94,7 @@ class Grid(BasicSweeper):
                 self.launcher.run(jobs)
             else:
                 batch = [[*job.overrides, *placement(job)] for job in jobs]
-                self.launcher.launch(batch, initial_job_idx=0)  # type: ignore[union-attr]
+                self.launcher.launch(batch, initial_job_idx=0)
         except KeyboardInterrupt:
             problem = INTERRUPTED
             raise KeyboardInterrupt(f"the sweep is interrupted; {REPEAT}") from None
@@ -106,6 +106,23 @@ class Grid(BasicSweeper):
             for job in jobs:
                 if problem != INTERRUPTED or job.folder.exists():  # a job not begun has nothing to tell
                     settle(job, problem)
+
+
+def swept(override: Override) -> list[str]:
+    """The values an override asks for: one, or those it sweeps over. Raises `UserError` where they cannot be listed."""
+    if not override.is_sweep_override():
+        return [override.get_value_element_as_str()]
+    if not override.is_discrete_sweep():
+        raise UserError(
+            f"{override.input_line}: a sweep over a grid needs values to count, such as 0.1,0.2,0.5 or range(0,1,0.1)"
+        )
+    found = [*override.sweep_string_iterator()]
+    if not found:
+        raise UserError(
+            f"the sweep has no jobs: {override.input_line} is empty; a range ends before its second number, "
+            "as range(0,30) is 0 to 29, and a glob needs a name that matches"
+        )
+    return found
 
 
 def place(jobs: Sequence[SweepJob], folder: Path) -> list[SweepJob]:

@@ -1,15 +1,22 @@
 """What a task is, and what it is given: the configuration turned into records, a model and an optimizer."""
 
 import functools
-from collections.abc import Mapping
+import inspect
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 from tractexp.plugin import Plugin, build
 
 SEARCH = ("objective", "optimizer", "budget", "time_limit", "target")  # the settings of a search
 LOAD = ("model.motor", "model.static", "model.effects")  # the parts of a model, without what is known of its parameters
+R = TypeVar("R")
+
+
+def call(function: Callable[..., R], *arguments: Any, **keywords: Any) -> R:
+    """A public call past the door for people, whose sentences name arguments: here they name keys."""
+    return inspect.unwrap(function)(*arguments, **keywords)
 
 
 class Task(Plugin):
@@ -66,6 +73,28 @@ class Job:
         node, loss = self.config["model"], build("objective", self.config["objective"])
         return Problem(
             self.model, events, node["bounds"], node["fixed"], node["substeps"], node["per_event"], loss=loss
+        )
+
+    def identified(self, progress: Callable[[str], None]) -> Any:
+        """The identification that model, objective, optimizer and limits describe (an `Identification`)."""
+        from tractexp.api.arguments import Choice
+        from tractexp.api.identify import identify
+
+        def told(line: str) -> None:
+            self.prepare_log()  # the first line is told once the input is found right
+            progress(line)
+
+        config, events = self.config, self.events()
+        return call(
+            identify,
+            events.train,
+            config["model"],
+            validate=events.validate,
+            objective=config["objective"],
+            optimizer=Choice(self.choices["optimizer"], config["optimizer"]),
+            **{key: config[key] for key in ("budget", "time_limit", "target", "seed")},
+            check_intervals=not self.in_sweep,  # of many jobs nobody reads each profile; task=profile makes them
+            progress=told,
         )
 
     @property

@@ -1,8 +1,6 @@
 """A static load linear in the voltage."""
 
-from tractexp.model.parts import Static
-from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
+from tractexp.extend import Parameter, Static, plugin
 
 
 @plugin
@@ -16,7 +14,5 @@ class AcmeLinear(Static):
     slope_p = Parameter(1.0, (0.0, 3.0), "1", "slope of active power", "ACME handbook 2026")
     slope_q = Parameter(2.0, (0.0, 6.0), "1", "slope of reactive power", "ACME handbook 2026")
 
-    def declare(self, eq):
-        a, b = eq.declare(self.parameters)
-        u = eq.U / eq.U0
-        eq.consume(eq.P_s0 * (1 + a * (u - 1)), eq.Q_s0 * (1 + b * (u - 1)))
+    def law(self, u, slope_p, slope_q):
+        return 1 + slope_p * (u - 1), 1 + slope_q * (u - 1)

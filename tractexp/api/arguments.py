@@ -1,0 +1,189 @@
+"""What a person may give: arguments checked against a signature, and choices found by name as Hydra finds them."""
+
+import dataclasses
+import functools
+import inspect
+import re
+import types
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from numbers import Integral, Real
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar, Union, get_args, get_origin, get_type_hints
+
+from tractexp import plugin
+from tractexp.errors import UserError, among
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+PACKAGE = Path(__file__).resolve().parents[1]
+CONF = next(p for p in (PACKAGE / "conf", PACKAGE.parent / "conf") if (p / "config.yaml").is_file())
+SECTIONS = "task|model|data"  # of the configuration, whose keys the arguments of a call are
+WORDS = {
+    int: "a whole number", float: "a number", bool: "True or False", str: "a text", type(None): "None", Any: "anything",
+}  # fmt: skip
+
+
+def public(function: Callable[P, R]) -> Callable[P, R]:
+    """A call whose arguments are checked: an unknown name or a wrong type is a `UserError` in one sentence.
+
+    Sentences from below name keys of the configuration (`model.bounds.C`); here they name the arguments (`bounds.C`).
+    The command line, whose keys they are, calls the function without this door (`inspect.unwrap`).
+    """
+    signature = inspect.signature(function)
+    named = [p.name for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
+    where, open_ended = f"{function.__name__}()", len(named) < len(signature.parameters)
+
+    @functools.wraps(function)
+    def called(*args: P.args, **keywords: P.kwargs) -> R:
+        for name in keywords:
+            if name not in named and not open_ended:
+                raise UserError(f"{where} has no argument '{name}'{among(name, named, 'Arguments')}")
+        try:
+            given = signature.bind(*args, **keywords).arguments
+        except TypeError as error:
+            raise UserError(f"{where}: {error}; Arguments: {', '.join(named)}") from None
+        for name, value in given.items():
+            parameter = signature.parameters[name]
+            if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
+                check_kind(name, value, parameter.annotation)
+        try:
+            return function(*args, **keywords)
+        except UserError as error:
+            keys = "|".join([*named, *keywords, *(_settings("data") if open_ended else ())])
+            sentence = str(error).replace("data.train", "records") if "records" in named else str(error)
+            sentence = re.sub(rf"\b(?:{SECTIONS})\.(?=(?:{keys})\b)", "", sentence)
+            raise UserError(sentence) from error.__cause__
+
+    return called
+
+
+def check_kind(name: str, value: Any, annotation: Any) -> None:
+    """Raise `UserError` where a value is not of the kind an annotation says."""
+    if not _is(value, annotation):
+        kinds = get_args(annotation) if get_origin(annotation) in (Union, types.UnionType) else (annotation,)
+        allowed = " or ".join(dict.fromkeys(_word(kind) for kind in kinds))
+        raise UserError(f"{name}={value!r:.60} is {_article(type(value).__name__)}, but it must be {allowed}")
+
+
+def _is(value: Any, kind: Any) -> bool:
+    origin, inner = get_origin(kind), get_args(kind)
+    if origin in (Union, types.UnionType):
+        return any(_is(value, one) for one in inner)
+    if kind in (int, float):
+        return isinstance(value, Integral if kind is int else Real) and not isinstance(value, bool)
+    if origin in (Sequence, list, tuple) and not isinstance(value, str | bytes):
+        return isinstance(value, Sequence) and all(_is(one, inner[0]) for one in value)
+    if origin is Mapping or origin is dict:
+        return isinstance(value, Mapping) and all(_is(one, inner[1]) for one in value.values())
+    kind = origin or kind
+    return not isinstance(kind, type) or kind in (Any, inspect.Parameter.empty) or isinstance(value, kind)
+
+
+def _word(kind: Any) -> str:
+    origin = get_origin(kind)
+    if origin in (Sequence, list, tuple):
+        return f"a list, each {_word(get_args(kind)[0])}"
+    if origin is Mapping or origin is dict:
+        return f"a mapping, each value {_word(get_args(kind)[1])}"
+    return WORDS.get(kind) or _article(getattr(kind, "__name__", str(kind)))
+
+
+def _article(name: str) -> str:
+    return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What is chosen in a group: the name of the choice, and the plugin's name and settings it stands for."""
+
+    name: str
+    node: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, group: str, chosen: "str | Mapping[str, Any] | Choice | None") -> "Choice":
+        """The choice of a name, or of a mapping of `name` and settings that replace the choice's own.
+
+        None is the default of `conf/config.yaml`.
+        """
+        if isinstance(chosen, Choice):
+            return chosen
+        chosen = default(group) if chosen is None else chosen
+        check_kind(group, chosen, str | Mapping[str, Any])
+        asked = {"name": chosen} if isinstance(chosen, str) else dict(chosen)
+        if "name" not in asked:
+            raise UserError(f"{group}={asked} lacks 'name'; give a name, or a mapping of 'name' and settings")
+        name = str(asked.pop("name"))
+        node = {**read_choice(group, name), **asked}
+        return cls(name, completed(group, node))
+
+    def build(self, group: str) -> Any:
+        return plugin.build(group, self.node)
+
+
+def completed(group: str, node: Mapping[str, Any]) -> dict[str, Any]:
+    """A plugin's node with every setting, checked; what was left out has its default."""
+    kinds = get_type_hints(plugin.get(group, node["name"]))
+    for key, value in node.items():
+        if key != "name" and key in kinds:
+            check_kind(f"{group}.{key}", value, kinds[key])
+    return {"name": node["name"], **dataclasses.asdict(plugin.build(group, node))}
+
+
+def read_choice(group: str, name: str) -> dict[str, Any]:
+    """The content of a choice of a group: of `conf/GROUP/NAME.yaml`, ours or a plugin package's, else of a plugin.
+
+    Without Hydra, which takes half a second: a `defaults` list of such files names other choices of the same group or
+    of a group below it, and what the file says itself comes last.
+    """
+    file = Path(name) if name.endswith((".yaml", ".yml")) else _file(group, name)
+    if file is None:
+        if name in plugin.discover().get(group, {}):
+            return {"name": name}
+        raise UserError(f"{group}={name}: there is no such choice{among(name, choices(group))}")
+    import yaml
+
+    try:
+        content = yaml.safe_load(file.read_text(encoding="utf-8")) or {}
+    except (OSError, yaml.YAMLError) as error:
+        raise UserError(f"{group}={file} cannot be read: {error}") from error
+    if not isinstance(content, dict):
+        raise UserError(f"{group}={file} must hold keys and values")
+    made: dict[str, Any] = {}
+    for item in content.pop("defaults", []):
+        if isinstance(item, dict):
+            ((part, chosen),) = item.items()
+            made[part] = read_choice(f"{group}/{part}", chosen)
+        elif item != "_self_":
+            place, _, chosen = item.partition("@")[0].rpartition("/")
+            made |= read_choice(place.removeprefix("/").removeprefix("schema/") or group, chosen)
+    for key, value in content.items():
+        made[key] = {**made[key], **value} if isinstance(value, dict) and isinstance(made.get(key), dict) else value
+    return made
+
+
+def default(group: str) -> str:
+    """What is chosen in a group where nothing else is: that of `conf/config.yaml`, as on the command line."""
+    import yaml
+
+    content = yaml.safe_load((CONF / "config.yaml").read_text(encoding="utf-8"))
+    return next(item[group] for item in content["defaults"] if isinstance(item, dict) and group in item)
+
+
+def choices(group: str, *, files: bool = False) -> list[str]:
+    """The names one may choose in a group, or those among them that have a file."""
+    named = {file.stem for folder in _folders() for file in (folder / group).glob("*.yaml")}
+    return sorted(named if files else {*named, *plugin.discover().get(group, {})})
+
+
+def _folders() -> list[Path]:
+    return [*plugin.configuration_folders(), CONF]
+
+
+def _file(group: str, name: str) -> Path | None:
+    return next((f for folder in _folders() if (f := folder / group / f"{name}.yaml").is_file()), None)
+
+
+def _settings(group: str) -> list[str]:
+    return [f.name for cls in plugin.discover().get(group, {}).values() for f in dataclasses.fields(cls)]  # type: ignore[arg-type]

@@ -1,0 +1,146 @@
+"""A load model by name or put together from parts, and what is known of its parameters beforehand."""
+
+import dataclasses
+import functools
+import html
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tractexp.api.arguments import Choice, check_kind, default, public, read_choice
+from tractexp.errors import UserError, among
+from tractexp.outcome import Table
+
+if TYPE_CHECKING:
+    from tractexp.model.model import Model
+
+GROUP, PARTS = "model", ("motor", "static")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LoadModel:
+    """A load model as a call takes it. Prints its parameters; in a notebook its equations, too."""
+
+    motor: Mapping[str, Any]  # name and settings of the plugin
+    static: Mapping[str, Any]
+    effects: Sequence[str] = ()
+    bounds: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    substeps: int | None = None
+    per_event: Sequence[str] = ()
+
+    @property
+    def node(self) -> dict[str, Any]:
+        """The parts, as `result.json` keeps them."""
+        return {"motor": dict(self.motor), "static": dict(self.static), "effects": list(self.effects)}
+
+    @functools.cached_property
+    def model(self) -> "Model":
+        """What simulates."""
+        from tractexp.identification.result import parts
+        from tractexp.model.model import compose
+
+        return compose(*parts(self.node))
+
+    @functools.cached_property
+    def parameters(self) -> Mapping[str, Any]:
+        """The parameters by name, with bounds as set here (`Parameter`: default, bounds, unit, about, symbol)."""
+        from tractexp.identification.problem import narrowed
+
+        return {p.name: p for p in narrowed(self.model.parameters, self.bounds)}
+
+    def with_(self, **changes: Any) -> "LoadModel":
+        """The model with what is given (not None) in place; bounds and fixed values are added to those there are."""
+        given = {key: value for key, value in changes.items() if value is not None}
+        for key in ("bounds", "fixed"):
+            if key in given:
+                given[key] = {**getattr(self, key), **given[key]}
+        return replace(self, **given)
+
+    def table(self) -> Table:
+        rows = [
+            [p.name, self.fixed.get(p.name, p.default), p.unit,
+             "fixed" if p.name in self.fixed else f"{p.bounds[0]:g} .. {p.bounds[1]:g}", p.about]
+            for p in self.parameters.values()
+        ]  # fmt: skip
+        return Table(["parameter", "default", "unit", "bounds", "meaning"], rows, self.model.title)
+
+    def to_frame(self) -> Any:
+        """The table as a pandas frame."""
+        return self.table().to_frame()
+
+    def __repr__(self) -> str:
+        return str(self.table())
+
+    def _repr_html_(self) -> str:
+        return self.table()._repr_html_() + "".join(f"<p>$${html.escape(line)}$$</p>" for line in self.model.latex())
+
+    def _repr_latex_(self) -> str:
+        return "\n\n".join(f"$${line}$$" for line in self.model.latex())
+
+
+@public
+def compose(
+    model: Any = None,
+    *,
+    motor: str | Mapping[str, Any] | None = None,
+    static: str | Mapping[str, Any] | None = None,
+    effects: Sequence[str] | None = None,
+    bounds: Mapping[str, Sequence[float]] | None = None,
+    fixed: Mapping[str, float] | None = None,
+    substeps: int | None = None,
+    per_event: Sequence[str] | None = None,
+) -> LoadModel:
+    """A load model: a choice of `conf/model` (by name, or the path of a YAML file), or a motor beside a static load.
+
+    `motor` and `static` are names ("double_cage"; "none" for without), or mappings of `name` and the plugin's settings;
+    they replace those of `model`, and one left out is that of the paper's model. `effects` names what is added to the
+    equations. `bounds` {name: [lower, upper]} and `fixed` {name: value}, in the parameters' own units, are added to the
+    choice's; `per_event` names parameters with a value of their own in each event; `substeps` are Runge-Kutta steps per
+    sample, as many as needed by default.
+
+    Raises `UserError` for an unknown name or an effect that does not fit the equations; the values are checked where
+    the model is used.
+    """
+    made = model_of(model)
+    given = {"motor": motor, "static": static}
+    parts = {part: Choice.of(f"model/{part}", chosen).node for part, chosen in given.items() if chosen is not None}
+    made = made.with_(effects=effects, bounds=bounds, fixed=fixed, substeps=substeps, per_event=per_event, **parts)
+    _ = made.parameters
+    for key in made.fixed:
+        if key not in made.parameters:
+            known = among(key, made.parameters, "Parameters")
+            raise UserError(f"fixed.{key}: this model has no parameter '{key}'{known}")
+    return made
+
+
+def model_of(given: Any) -> LoadModel:
+    """What a call takes as `model`: a name, a path, a mapping of parts, a `LoadModel` or a composed `Model`."""
+    if isinstance(given, LoadModel):
+        return given
+    if given is None or isinstance(given, str | Path):
+        given = read_choice(GROUP, str(given or default(GROUP)))
+    elif not isinstance(given, Mapping):
+        given = _node(given)
+    known = [f.name for f in dataclasses.fields(LoadModel)]
+    for key in given:
+        if key not in known:
+            raise UserError(f"model.{key}: there is no such key{among(key, known, 'Keys')}")
+    if missing := [part for part in PARTS if not given.get(part)]:
+        raise UserError(f"model lacks {' and '.join(missing)}; name a motor and a static load ('none' for without)")
+    made: dict[str, Any] = dict(given) | {part: Choice.of(f"model/{part}", given[part]).node for part in PARTS}
+    for item in dataclasses.fields(LoadModel):
+        if item.name in made:
+            check_kind(f"model.{item.name}", made[item.name], item.type)
+    return LoadModel(**made)
+
+
+def _node(model: Any) -> dict[str, Any]:
+    """The parts of a model composed of plugins."""
+    try:
+        motor, static = ({"name": p.name, **dataclasses.asdict(p)} for p in (model.motor, model.static))
+        return {"motor": motor, "static": static, "effects": [effect.name for effect in model.effects]}
+    except AttributeError:
+        kind = type(model).__name__
+        raise UserError(f"model is of type {kind}; give a name, or what tractexp.compose makes") from None

@@ -1,0 +1,374 @@
+"""Identify a load model's parameters from recorded dips, and what such an identification says."""
+
+import functools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
+
+import numpy as np
+
+from tractexp.api.arguments import Choice, public
+from tractexp.api.compose import LoadModel, model_of
+from tractexp.api.pages import Shown, shown
+from tractexp.api.read import Dips, again, dips_of, kept
+from tractexp.api.response import Response, respond_to
+from tractexp.errors import UserError, check_range
+from tractexp.identification.result import Result
+from tractexp.outcome import Outcome, Table
+from tractexp.progress import Progress, searching
+from tractexp.record import Event, describe
+
+if TYPE_CHECKING:
+    from tractexp.identification.problem import Problem
+    from tractexp.identification.result import Fit
+    from tractexp.identification.search import Found
+    from tractexp.identification.uncertainty import Together, Uncertainty
+
+ASTRAY = 0.99  # of the search's objective: least squares that get below it have left its valley or finished its work
+FIXED = "fixed"
+LEAST = {"seed": 0, "budget": 1, "time_limit": 0, "target": 0}
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """What an identification was asked: events, model, and how it was searched."""
+
+    train: Dips
+    validate: Dips
+    model: LoadModel
+    objective: Choice
+    optimizer: Choice
+    seed: int = 0
+    budget: int | None = None
+    time_limit: float | None = None
+    target: float | None = None
+    check_intervals: bool = True
+
+    @classmethod
+    def of(cls, records: Any, model: Any, validate: Any, objective: Any, optimizer: Any, known: Mapping[str, Any],
+           **search: Any) -> "Setup":  # fmt: skip
+        for key, least in LEAST.items():
+            if search.get(key) is not None:
+                check_range(key, search[key], least)
+        return cls(
+            dips_of("records", records, least=1),
+            dips_of("validate", validate),
+            model_of(model).with_(**known),
+            Choice.of("objective", objective),
+            Choice.of("optimizer", optimizer),
+            **search,
+        )
+
+    @functools.cached_property
+    def problem(self) -> "Problem":
+        return self.problem_of(self.train)
+
+    def problem_of(self, train: Sequence[Event]) -> "Problem":
+        """The identification problem of some events."""
+        from tractexp.identification.problem import Problem
+
+        m, loss = self.model, self.objective.build("objective")
+        return Problem(m.model, train, m.bounds, m.fixed, m.substeps, m.per_event, loss=loss)
+
+    def search(self, progress: Progress) -> "Found":
+        """Search; raises `UserError` where the input is wrong, before anything is told."""
+        from tractexp.identification.search import Limits, search
+
+        optimizer, limits = self.optimizer.build("optimizer"), Limits(self.budget, self.time_limit, self.target)
+        problem = self.problem
+        for line in lines(self.train, self.validate, problem, self.optimizer.name, self.seed):
+            if callable(progress):
+                progress(line)
+        with searching(getattr(optimizer, "iterations", None), limits.simulations, progress) as callback:
+            return search(problem, optimizer, self.seed, limits, callback)
+
+    def to_dict(self) -> dict[str, Any]:
+        plain = {key: getattr(self, key) for key in (*LEAST, "check_intervals")}
+        groups = {key: asdict(getattr(self, key)) for key in ("model", "objective", "optimizer")}
+        return {key: [kept(e) for e in getattr(self, key)] for key in ("train", "validate")} | groups | plain
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> "Setup":
+        made: dict[str, Any] = {**content, "model": LoadModel(**content["model"])}
+        made |= {key: Dips(map(again, content[key])) for key in ("train", "validate")}
+        made |= {key: Choice(**content[key]) for key in ("objective", "optimizer")}
+        return cls(**made)
+
+
+def lines(
+    train: Sequence[Event], validate: Sequence[Event], problem: "Problem", optimizer: str, seed: int
+) -> Iterator[str]:
+    """What is read and what will be done, a sentence each."""
+    for role, group in (("fit", train), ("validate", validate)):
+        for event in group:
+            yield f"{role}: {describe(event)}"
+            yield from (f"  note: {note}" for note in event.record.notes)
+    free = f"{problem.space.dimension} parameters"
+    yield f"model: {problem.model.title}, {free}; Runge-Kutta steps: {problem.step.describe(problem.events)}"
+    yield f"optimizer: {optimizer}, seed {seed}"
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter: its value and how sure it is. Interval (95 %) and standard error are None where there is none."""
+
+    name: str
+    value: float  # where the search ended: least objective
+    most_likely: float  # what interval, error and verdict are about
+    unit: str
+    interval: tuple[float, float] | None
+    standard_error: float | None
+    verdict: str
+    bounds: tuple[float, float]
+    about: str
+
+    def __repr__(self) -> str:
+        span = f", 95 % interval {self.interval[0]:.4g} .. {self.interval[1]:.4g}" if self.interval else ""
+        return f"{self.name} = {self.value:.5g} {self.unit}{span}: {self.verdict}"
+
+
+class Estimates(dict[str, Estimate]):
+    """Estimates by name, printed one a line."""
+
+    def __repr__(self) -> str:
+        return "\n".join(map(repr, self.values()))
+
+
+class Judged(NamedTuple):
+    """What stands behind a result: heavy, and reckoned again from a loaded one."""
+
+    fits: "list[Fit]"
+    known: "Uncertainty"
+    together: "Together | None"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Identification(Outcome):
+    """Identified parameters, how sure they are, and how well they fit. `result` is the content of `result.json`."""
+
+    kind = "identification"
+
+    result: Result
+    setup: Setup | None = None  # None where only a result.json is known
+    found: "Found | None" = None
+
+    @classmethod
+    def of(cls, setup: Setup, found: "Found") -> "Identification":
+        """Judge what a search found."""
+        result, judged = _judge(setup, found)
+        made = cls(result, setup, found)
+        made.__dict__["judged"] = judged
+        return made
+
+    @functools.cached_property
+    def judged(self) -> Judged:
+        return _judge(self.asked, self.ended)[1]
+
+    @property
+    def asked(self) -> Setup:
+        """The call. Raises `UserError` where only a `result.json` was read."""
+        if self.setup is None:
+            raise UserError(
+                "a result.json holds no records, so that this can predict but not be judged again; call"
+                " tractexp.identify and save() its result"
+            )
+        return self.setup
+
+    @property
+    def ended(self) -> "Found":
+        """Where the search ended."""
+        _ = self.asked
+        assert self.found is not None
+        return self.found
+
+    @functools.cached_property
+    def model(self) -> LoadModel:
+        return LoadModel(**self.result.model) if self.setup is None else self.setup.model
+
+    @functools.cached_property
+    def parameters(self) -> Estimates:
+        """The estimates by name; a parameter with a value of its own in each event is there as T_m[1], T_m[2], too."""
+        r, about = self.result, {p.name: p.about for p in self.model.model.parameters}
+        values = dict(r.parameters)
+        for name, own in r.per_event.items():
+            values |= {f"{name}[{k}]": value for k, value in enumerate(own, start=1)}
+        likely, made = r.uncertainty.get("most_likely", {}), Estimates()
+        for name, value in values.items():
+            of, interval = name.partition("[")[0], r.intervals.get(name)
+            without = "mean of its events" if name in r.per_event else FIXED if r.verdicts else ""
+            verdict = r.verdicts.get(name, without)
+            bounds = tuple(r.bounds.get(of, (float("nan"),) * 2))
+            made[name] = Estimate(
+                name, value, likely.get(name, value), r.units.get(of, ""), tuple(interval) if interval else None,  # type: ignore[arg-type]
+                r.standard_errors.get(name), verdict, bounds, about.get(of, ""),  # type: ignore[arg-type]
+            )  # fmt: skip
+        return made
+
+    @functools.cached_property
+    def advice(self) -> list[str]:
+        """What to do next, the most pressing first."""
+        from tractexp.identification.advice import advise
+
+        return advise(self.judged.known, self.judged.together.odd if self.judged.together else ())
+
+    def predict(
+        self, event: Any = None, *, t: Any = None, U: Any = None, f: Any = None, P0: float | None = None,
+        Q0: float | None = None,
+    ) -> Response:  # fmt: skip
+        """P and Q [pu] (N,) that the identified load draws in an event, or from a voltage.
+
+        `event` is one that `tractexp.read` gave (or what it reads, holding one dip): its voltage, and the power before
+        it. Otherwise `U` [pu] at uniform times `t` [s], (N,) each, with `f` [Hz] where known; `P0` and `Q0` are by
+        default those of the event identified on. Raises `UserError` where the load has no steady state there.
+        """
+        if (event is None) == (t is None or U is None):
+            raise UserError("predict() needs either an event, or both t= and U=")
+        if event is not None:
+            values = np.array([self.result.parameters[name] for name in self.model.model.names])
+            (one,) = dips_of("event", event, least=1)[:1]
+            return respond_to(self.model.model, values, one)
+        time, voltage = (np.asarray(values, dtype=float) for values in (t, U))
+        return Response("prediction", time, voltage, *self.result.predict(time, voltage, f, P0, Q0))
+
+    def report(self) -> Shown:
+        """The page an engineer reads, as a notebook shows it; `save(path)` writes it."""
+        return shown(lambda folder: self.write_page(folder, self.write_fits(folder)))
+
+    def table(self) -> Table:
+        span = "{:.4g} .. {:.4g}".format
+        rows = [
+            [e.name, e.value, e.most_likely, e.unit, span(*e.interval) if e.interval else "", e.standard_error,
+             e.verdict]
+            for e in self.parameters.values()
+        ]  # fmt: skip
+        r, holds = self.result, "holds" if self.result.acceptable else "does NOT hold"
+        said = [
+            f"{e['name']} ({e['role']}): epsilon_p {e['epsilon_p']:.3%}, epsilon_q {e['epsilon_q']:.3%}"
+            for e in r.events
+        ]
+        said.append(f"acceptance of Eq. (20), epsilon_p and epsilon_q below 5 %: {holds}; the search {r.status}")
+        said += [f"note: {note}" for note in r.uncertainty.get("notes", ())]
+        said += [f"next: {sentence}" for sentence in (self.advice if "judged" in self.__dict__ else ())]
+        columns = ["parameter", "value", "most likely", "unit", "95 % interval", "standard error", "verdict"]
+        return Table(columns, rows, self.model.model.title, said)
+
+    def to_dict(self) -> dict[str, Any]:
+        found = None if self.found is None else asdict(self.found)
+        return {"setup": self.setup and self.setup.to_dict(), "result": asdict(self.result), "found": found}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        from tractexp.identification.search import Found, History
+
+        setup, found = content["setup"], content["found"]
+        if found is not None:
+            history = History(**{key: np.array(v, dtype=float) for key, v in found["history"].items()})
+            found = Found(**found | {"values": np.array(found["values"], dtype=float), "history": history})
+        return cls(Result(**content["result"]), setup and Setup.from_dict(setup), found)
+
+    def write_fits(self, folder: Path) -> list[Path]:
+        """Write fit.svg (fit_2.svg and so on for further events) and fitness.svg."""
+        from tractexp.report import figures
+
+        setup, paths = self.asked, []
+        for k, fit in enumerate(self.judged.fits, start=1):
+            record, role = fit.event.record, "fitted" if fit.role == "train" else "held out"
+            path = figures.fit(
+                folder / ("fit.svg" if k == 1 else f"fit_{k}.svg"), record.t, record.U, (record.P, record.Q),
+                (fit.P, fit.Q), title=f"{record.name} ({role}), {setup.optimizer.name}",
+                epsilon=(fit.epsilon_p, fit.epsilon_q), notes=record.notes,
+            )  # fmt: skip
+            paths.append(path)
+        history, name = self.ended.history, setup.optimizer.name
+        by_iteration = {name: (np.arange(len(history.objective)), history.objective)}
+        by_simulations = {name: (history.simulations, history.objective)}
+        title = f"search of {name}, seed {setup.seed}, on {', '.join(e.record.name for e in setup.train)}"
+        return [*paths, figures.fitness(folder / "fitness.svg", by_iteration, by_simulations, title=title)]
+
+    def write_page(self, folder: Path, fits: Sequence[Path]) -> list[Path]:
+        """Write the figures of the uncertainty and report.html, with the figures `fits` (but fitness.svg) in it."""
+        from tractexp.report import identify, uncertainty
+
+        known = self.judged.known
+        correlation = uncertainty.correlation(folder / "correlation.svg", known)
+        residuals = uncertainty.residuals(folder / "residuals.svg", known)
+        page = identify.page(
+            self.result, known, self.judged.together, self.advice, fits[:-1], correlation, residuals
+        )  # fmt: skip
+        return [correlation, residuals, page.write(folder / "report.html")]
+
+    def write_result(self, folder: Path) -> list[Path]:
+        """Write history.csv and result.json."""
+        from tractexp.identification.result import write_history
+
+        return [
+            write_history(folder / "history.csv", self.ended.history), self.result.write(folder / "result.json"),
+        ]  # fmt: skip
+
+
+@public
+def identify(
+    records: Any,
+    model: Any = None,
+    *,
+    validate: Any = (),
+    bounds: Mapping[str, Sequence[float]] | None = None,
+    fixed: Mapping[str, float] | None = None,
+    per_event: Sequence[str] | None = None,
+    substeps: int | None = None,
+    objective: Any = None,
+    optimizer: Any = None,
+    budget: int | None = None,
+    time_limit: float | None = None,
+    target: float | None = None,
+    seed: int = 0,
+    check_intervals: bool = True,
+    progress: Any = None,
+) -> Identification:
+    """Fit the free parameters of a load model to recorded dips, and judge the fit on these and on others held out.
+
+    `records` are events of `tractexp.read`, or what it reads; several are fitted together. Those of `validate` are only
+    judged. `model` is a choice of `conf/model`, the path of such a YAML file, or what `tractexp.compose` or an
+    investigation (`found.extended`) made; `bounds`, `fixed`, `per_event` and `substeps` are as in `tractexp.compose`.
+
+    `objective` and `optimizer` are names, or mappings of `name` and settings: `{"name": "pso", "population": 100}`. A
+    model, an objective or an optimizer left out is that of `conf/config.yaml`, as on the command line. The search ends
+    after `budget` simulations, `time_limit` [s], at the objective `target` [pu²], or by itself. The same `seed` gives
+    the same bits. `check_intervals` confirms wide intervals by profile likelihood. `progress`: None shows how far the
+    search is, False does not; a callable is told what is read and done, a sentence at a time.
+
+    Raises `UserError` for wrong names or values, records that lack what the model reads, and where nothing tried can be
+    simulated.
+    """
+    known = {"bounds": bounds, "fixed": fixed, "per_event": per_event, "substeps": substeps}
+    setup = Setup.of(
+        records, model, validate, objective, optimizer, known, seed=seed, budget=budget, time_limit=time_limit,
+        target=target, check_intervals=check_intervals,
+    )  # fmt: skip
+    return Identification.of(setup, setup.search(progress))
+
+
+def _judge(setup: Setup, found: "Found") -> tuple[Result, Judged]:
+    """The result of a search and what stands behind it."""
+    from tractexp.identification.profile import checked
+    from tractexp.identification.result import conclude
+    from tractexp.identification.uncertainty import assess, compare_events
+
+    problem = setup.problem
+    result, fits = conclude(problem, found, setup.validate, setup.seed, setup.model.node, setup.optimizer.name)
+    known = assess(problem, found.values, robust=not problem.loss.quadratic)
+    known = checked(known) if setup.check_intervals else known
+    together = compare_events(known) if len(problem.events) > 1 else None
+    return replace(result, **known.fields(together, _astray(problem, found, known))), Judged(fits, known, together)
+
+
+def _astray(problem: "Problem", found: "Found", known: "Uncertainty") -> list[str]:
+    """A sentence where the search's own values lie far from the most likely ones: it ended in another valley."""
+    better = float(problem.objective(known.values[None])[0])
+    if better >= ASTRAY * found.objective:
+        return []
+    return [
+        f"the search stopped short: least squares from where it ended lower the objective from {found.objective:.4g} to"
+        f" {better:.4g}; take the most likely values, or optimizer.polish=true"
+    ]

@@ -1,0 +1,288 @@
+"""Find where simulation and measurement disagree, name the missing effect, add it, show the gap shrink.
+
+The investigation itself is `tractexp.discrepancy`; everything this file asks of it stands in `_made`, `_estimated`
+and `Investigation.write`.
+"""
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from tractexp import files
+from tractexp.api.arguments import public
+from tractexp.api.compose import LoadModel, model_of
+from tractexp.api.identify import Identification
+from tractexp.api.pages import Shown, shown
+from tractexp.api.read import Dips, again, dips_of, kept
+from tractexp.api.response import Response
+from tractexp.errors import UserError, check_range
+from tractexp.identification.result import Result
+from tractexp.outcome import Outcome, Table
+from tractexp.progress import Progress, telling
+
+if TYPE_CHECKING:
+    from tractexp.discrepancy.criteria import Criteria
+    from tractexp.discrepancy.investigate import Investigation as Steps
+
+
+@dataclass(frozen=True)
+class Question:
+    """What an investigation was asked."""
+
+    train: Dips
+    validate: Dips
+    model: LoadModel
+    effects: Sequence[str]  # none: the whole catalogue
+    false_alarms: float
+    criteria: Mapping[str, float]
+    seed: int
+
+    def to_dict(self) -> dict[str, Any]:
+        records = {key: [kept(e) for e in getattr(self, key)] for key in ("train", "validate")}
+        plain = {key: getattr(self, key) for key in ("effects", "false_alarms", "criteria", "seed")}
+        return {**records, "model": asdict(self.model), **plain}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> "Question":
+        made: dict[str, Any] = {**content, "model": LoadModel(**content["model"])}
+        made |= {key: Dips(map(again, content[key])) for key in ("train", "validate")}
+        return cls(**made)
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """How far a model is from some events: relative errors of Eq. (20), and chi-squared per sample."""
+
+    epsilon_p: float
+    epsilon_q: float
+    chi2_per_sample: float
+
+
+@dataclass(frozen=True)
+class Gap:
+    """The misfit of the base model and of the extended one; `closed` is the explainable share that went, or None."""
+
+    before: Misfit
+    after: Misfit
+    closed: float | None
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """On the fitted and on the held-out events, None without any."""
+
+    train: Gap
+    validate: Gap | None
+    fitted_to_both: bool
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Investigation(Outcome):
+    """What is missing in a model, how sure that is, and the model with it. `content` is that of `discrepancy.json`."""
+
+    kind = "investigation"
+
+    question: Question
+    content: Mapping[str, Any]
+    result: Result  # the extended model's parameters, as `result.json` holds them
+
+    @property
+    def verdict(self) -> str:
+        """`none`, `named`, `tied` or `unexplained`."""
+        return self.content["verdict"]
+
+    @property
+    def reason(self) -> str:
+        """Why, in one sentence."""
+        return self.content["reason"]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The effects added to the model."""
+        return tuple(self.content["effects"])
+
+    @property
+    def recommendation(self) -> str:
+        """What to do next."""
+        return self.content["recommendation"]
+
+    @property
+    def where(self) -> Table:
+        """The intervals in which the base model disagrees with the records, the loudest first."""
+        places = self.content["where"]
+        return Table([*places[0]] if places else [], [[*place.values()] for place in places], "where they disagree")
+
+    @property
+    def candidates(self) -> Table:
+        """Every set of effects that was fitted and every single one that was tested, with what became of it."""
+        rows = [[" and ".join(c["effects"]), c["status"], c["likelihood_ratio"]] for c in self.content["candidates"]]
+        return Table(["effects", "status", "deviance lowered by"], rows, "candidates")
+
+    @property
+    def sets(self) -> list[Mapping[str, Any]]:
+        """The sets of effects that were refitted: `effects`, `status`, `likelihood_ratio`, `parameters`."""
+        return [row for row in self.content["candidates"] if "why" not in row]  # single tests say why
+
+    @property
+    def gap(self) -> Gaps:
+        """How far off the model is before and after."""
+
+        def gap(told: Mapping[str, Any]) -> Gap:
+            return Gap(Misfit(**told["before"]), Misfit(**told["after"]), told["closed"])
+
+        told = self.content["gap"]
+        held = told["validate"] and gap(told["validate"])
+        return Gaps(gap(told["train"]), held, told["fitted_to_both"])
+
+    @functools.cached_property
+    def extended(self) -> LoadModel:
+        """The model with the effects named: a model again, for any call."""
+        model = self.question.model
+        return model.with_(effects=sorted({*model.effects, *self.names}))
+
+    @functools.cached_property
+    def fit(self) -> Identification:
+        """The extended model with the parameters that the investigation found; it predicts, simulates and exports."""
+        errors = {name: at["standard_error"] for name, at in self.content["parameters"].items()}
+        return Identification(replace(self.result, standard_errors=errors))
+
+    def predict(self, event: Any = None, **voltage: Any) -> Response:
+        """What the extended model draws in an event, or from a voltage: see `Identification.predict`."""
+        return self.fit.predict(event, **voltage)
+
+    @functools.cached_property
+    def steps(self) -> "Steps":
+        """The chain of results, from the records to the verdict; of a loaded result it is investigated again."""
+        return _made(self.question, False)
+
+    def report(self) -> Shown:
+        """The page that tells the investigation, as a notebook shows it; `save(path)` writes it."""
+        return shown(self.write_pages)
+
+    def table(self) -> Table:
+        rows = []
+        for label, gap in (("fitted", self.gap.train), ("held out", self.gap.validate)):
+            for stage, misfit in (("before", gap.before), ("after", gap.after)) if gap else ():
+                errors = [f"{misfit.epsilon_p:.3%}", f"{misfit.epsilon_q:.3%}", f"{misfit.chi2_per_sample:.3f}"]
+                closed = f"{gap.closed:.0%}" if gap and stage == "after" and gap.closed is not None else ""
+                rows.append([label, stage, *errors, closed])
+        said = [self.reason, f"noise: {self.content['noise']}", f"next: {self.recommendation}"]
+        columns = ["events", "", "epsilon_p", "epsilon_q", "chi2 per sample", "gap closed"]
+        return Table(columns, rows, f"{self.verdict.upper()} {' and '.join(self.names)}".strip(), said)
+
+    def to_dict(self) -> dict[str, Any]:
+        return {"question": self.question.to_dict(), "content": dict(self.content), "result": asdict(self.result)}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        return cls(Question.from_dict(content["question"]), content["content"], Result(**content["result"]))
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write discrepancy.json, conf/model/extended.yaml, result.json and, where unexplained, what is left as CSV."""
+        from tractexp.discrepancy import discrepancy_json
+
+        base = {**self.question.model.node, "bounds": self.question.model.bounds, "fixed": self.question.model.fixed}
+        paths = [
+            files.write_json(folder / "discrepancy.json", self.content),
+            discrepancy_json.write_model(self.steps, base, folder / "conf" / "model" / "extended.yaml"),
+            self.result.write(folder / "result.json"),
+        ]
+        if self.verdict == "unexplained":
+            paths.append(discrepancy_json.write_left(self.steps, folder / "unexplained.csv"))
+        return paths
+
+    def write_pages(self, folder: Path) -> list[Path]:
+        """Write the figures and discrepancy.html."""
+        from tractexp.report import discrepancy
+
+        return discrepancy.report(folder, self.steps, ", ".join(e.record.name for e in self.question.train))
+
+
+@public
+def investigate(
+    records: Any,
+    model: Any = None,
+    *,
+    validate: Any = (),
+    effects: Sequence[str] = (),
+    false_alarms: float = 0.05,
+    criteria: Mapping[str, float] | None = None,
+    bounds: Mapping[str, Sequence[float]] | None = None,
+    fixed: Mapping[str, float] | None = None,
+    substeps: int | None = None,
+    seed: int = 0,
+    progress: Any = None,
+) -> Investigation:
+    """Find what a load model lacks: where it disagrees with the records, which effect explains that, and how sure.
+
+    `records` are events of `tractexp.read`, or what it reads; all are fitted together. What is found is judged on those
+    of `validate`. `model` is the base model, as in `tractexp.identify`, with `bounds`, `fixed` and `substeps`. Only
+    `effects` are tested, by default the whole catalogue. `false_alarms` (0.001 to 0.5) is the probability of naming
+    anything where nothing is missing; `criteria` {name: value} are the other thresholds of the decisions, listed in
+    `tractexp.discrepancy.criteria`. The same `seed` gives the same bits. `progress`: None shows the stage, False does
+    not; a callable is told each stage.
+
+    Nothing is searched, so that there is no objective, optimizer or budget. Raises `UserError` for wrong names or
+    values, for events that do not belong together, and for a model with `per_event`: the events share its parameters.
+    """
+    check_range("seed", seed, 0)
+    chosen = {"false_alarms": false_alarms, **(criteria or {})}
+    _criteria(chosen)
+    base = model_of(model).with_(bounds=bounds, fixed=fixed, substeps=substeps)
+    if base.per_event:
+        raise UserError(f"model.per_event={list(base.per_event)} has no meaning in an investigation; leave it out")
+    train, held = dips_of("records", records, least=1), dips_of("validate", validate)
+    question = Question(train, held, base, tuple(effects), chosen["false_alarms"], dict(criteria or {}), seed)
+    return _concluded(question, _made(question, progress))
+
+
+def _made(question: Question, progress: Progress) -> "Steps":
+    """The investigation."""
+    from tractexp.discrepancy.investigate import investigate as found
+
+    q, base = question, question.model
+    with telling(progress) as tell:
+        return found(
+            base.model, q.train, q.validate, base.bounds, base.fixed, only=q.effects, substeps=base.substeps,
+            criteria=_criteria({"false_alarms": q.false_alarms, **q.criteria}), seed=q.seed, tell=tell,
+        )  # fmt: skip
+
+
+def _criteria(chosen: Mapping[str, float]) -> "Criteria":
+    """The thresholds. Raises `UserError`, as the command line names them, for an unknown one or one out of range."""
+    from tractexp.discrepancy.criteria import Criteria
+
+    try:
+        return Criteria.of(chosen)
+    except UserError as error:
+        whole = str(error).replace("criteria.false_alarms", "task.false_alarms")
+        raise UserError(whole if whole.startswith("task.") else f"task.{whole}") from None
+
+
+def _concluded(question: Question, steps: "Steps") -> Investigation:
+    from tractexp.discrepancy.discrepancy_json import content
+
+    made = Investigation(question, files.plain(content(steps)), _estimated(question, steps))
+    made.__dict__["steps"] = steps
+    return made
+
+
+def _estimated(question: Question, steps: "Steps") -> Result:
+    """The extended model's parameters as a result, which predicts and is logged as a model."""
+    from tractexp.identification.problem import Problem
+    from tractexp.identification.result import conclude
+    from tractexp.identification.search import Found, History
+
+    base, bench, unit = question.model, steps.bench, steps.extended.unit
+    model = base.with_(effects=sorted({*base.effects, *steps.names}))
+    problem = Problem(model.model, question.train, base.bounds, base.fixed, int(bench.problem.step.substeps.max()))
+    values = np.array([bench.coordinates.value(name, unit) for name in problem.space.names])
+    objective = float(problem.objective(values[None])[0])
+    history = History(np.array([bench.effort.simulations]), np.array([objective]), values[None], np.zeros(1))
+    status = f"ended with the verdict {steps.verdict.word}"
+    found = Found(values, objective, bench.effort.simulations, 0, 0, 0.0, status, history)
+    return conclude(problem, found, question.validate, question.seed, model.node, "descent")[0]

@@ -1,0 +1,48 @@
+"""Read a saved result back."""
+
+import importlib.util
+import json
+from pathlib import Path
+
+from tractexp.api.arguments import public
+from tractexp.errors import UserError, among
+from tractexp.outcome import MARK, Outcome, saved
+
+
+@public
+def load(path: str | Path) -> Outcome:
+    """The result that `save` wrote, or the `Identification` of a `result.json` of the command line.
+
+    The latter holds no records: it predicts, simulates and exports, but cannot be judged again. Raises `UserError`
+    where the file is missing, damaged or of no kind known.
+    """
+    if _bare(Path(path)):
+        from tractexp.api.identify import Identification
+        from tractexp.identification.result import load as read_result
+
+        return Identification(read_result(Path(path)))
+    content = saved(path)
+    known = known_kinds()
+    if content["kind"] not in known:
+        why = among(content["kind"], known, "Kinds")
+        raise UserError(f"{path} holds a result of kind '{content['kind']}', which is not known{why}")
+    return known[content["kind"]].revived(content)
+
+
+def _bare(path: Path) -> bool:
+    """Whether a file is a result.json rather than a saved result."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return isinstance(content, dict) and MARK not in content and "parameters" in content
+
+
+def known_kinds() -> dict[str, type[Outcome]]:
+    """The kinds of results, by name; each is known once its module is imported."""
+    from tractexp import PUBLIC
+
+    for module in dict.fromkeys(PUBLIC.values()):
+        if module.startswith("tractexp.api.") and importlib.util.find_spec(module):
+            importlib.import_module(module)
+    return Outcome.kinds

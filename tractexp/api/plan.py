@@ -1,0 +1,225 @@
+"""Before the recording: which dips tell what, how deep one must be, and which events of an archive to fit."""
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from tractexp import files
+from tractexp.api.arguments import Choice, public
+from tractexp.api.identify import Identification, Setup
+from tractexp.api.pages import Shown, shown
+from tractexp.errors import UserError, check_range
+from tractexp.outcome import Outcome, Table
+from tractexp.record import Event
+
+if TYPE_CHECKING:
+    from tractexp.identification.plan import Shape
+    from tractexp.report.plan import Planned
+
+DURATIONS = (0.06, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8)  # s
+RATES = (25.0, 50.0, 100.0, 200.0, 500.0, 1000.0)  # Hz
+NOISES = (0.001, 0.002, 0.005, 0.01, 0.02)  # of P before the event
+DEPTH, DURATION, RATE, NOISE = "depth", "duration [s]", "samples per second", "noise, of P before the dip"
+FIT, DEFAULT = "fit", "default"
+SHAPE = ("depth", "duration", "rate")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Forecasts(Outcome):
+    """A plan: what dips of other depths, lengths, rates and noises would tell. `content` is that of `plan.json`."""
+
+    kind = "plan"
+
+    setup: Setup
+    asked: Mapping[str, Any]  # parameter, within, depth, duration, rate, noise, values, least, events
+    content: Mapping[str, Any]
+
+    @functools.cached_property
+    def planned(self) -> "Planned":
+        """What stands behind the page; of a loaded result it is reckoned again."""
+        return _planned(self.setup, **self.asked)
+
+    @property
+    def depth_needed(self) -> float | None:
+        """Depth from which a dip gives what was asked for; None where no dip does."""
+        return self.content["depth_needed"]
+
+    @property
+    def best_events(self) -> list[str]:
+        """Names of the events that tell most together, the best first; none of a single event."""
+        return [event["name"] for event in self.content["best_events"]]
+
+    def report(self) -> Shown:
+        """The page, as a notebook shows it; `save(path)` writes it."""
+        return shown(self.write)
+
+    def table(self) -> Table:
+        """Half of the 95 % interval over the value, by depth."""
+        names, rows = [*self.content["parameters"]], self.content["half_intervals"][DEPTH]
+        told = [[row["at"], *("" if row[n] is None else f"{row[n]:.2%}" for n in names)] for row in rows]
+        best = [f"best events: {', '.join(self.best_events)}"] if self.best_events else []
+        return Table([DEPTH, *names], told, "half of the 95 % interval, of the value", [self.content["answer"], *best])
+
+    def to_dict(self) -> dict[str, Any]:
+        return {"setup": self.setup.to_dict(), "asked": dict(self.asked), "content": dict(self.content)}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        return cls(Setup.from_dict(content["setup"]), content["asked"], content["content"])
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write plan.json, plan.svg and plan.html."""
+        from tractexp.report import plan, uncertainty
+
+        path = files.write_json(folder / "plan.json", self.content)
+        figure = uncertainty.plan(folder / "plan.svg", self.planned.scans, self.planned.needed.within)
+        return [path, figure, plan.page(folder / "plan.html", self.planned, figure)]
+
+
+@public
+def plan(
+    records: Any,
+    model: Any = None,
+    *,
+    parameter: str = "H",
+    within: float = 0.05,
+    depth: float | None = None,
+    duration: float | None = None,
+    rate: float | None = None,
+    noise: float | None = None,
+    values: Any = FIT,
+    least: float = 0.05,
+    events: int | None = None,
+    bounds: Mapping[str, Sequence[float]] | None = None,
+    fixed: Mapping[str, float] | None = None,
+    substeps: int | None = None,
+) -> Forecasts:
+    """Forecast the intervals that a recording would give, without fitting it.
+
+    How deep must a dip be for `parameter` (H stands for M) to be known with half of its 95 % interval `within` a share
+    of the value? The dip is that of the deepest of `records`, unless `depth` (of the voltage before), `duration` [s],
+    `rate` [1/s] or `noise` (standard deviation, as a share of P before the event; white) are given. `values` are what
+    is planned at: "fit", a quick fit to that record; "default", the model's; an identification; or the path of a
+    `result.json`. Of several records those that tell most together are chosen, until another one narrows the intervals
+    by less than the share `least`, at most `events` of them. The model is as in `tractexp.identify`.
+
+    Raises `UserError` for wrong names or values, and for a model with `per_event`.
+    """
+    check_range("task.within", within, 1e-6, 10.0)
+    check_range("task.least", least, 0.0, 1.0)
+    if events is not None:
+        check_range("task.events", events, 1)
+    if noise is not None:
+        check_range("task.noise", noise, 1e-9, 1.0)
+    known = {"bounds": bounds, "fixed": fixed, "substeps": substeps}
+    setup = Setup.of(records, model, (), None, Choice("", {}), known)
+    if isinstance(values, Identification):
+        values = values.result.parameters
+    asked = {
+        "parameter": parameter, "within": within, "depth": depth, "duration": duration, "rate": rate, "noise": noise,
+        "values": values, "least": least, "events": events,
+    }  # fmt: skip
+    planned = _planned(setup, **asked)
+    made = Forecasts(setup, asked, files.plain(_content(planned)))
+    made.__dict__["planned"] = planned
+    return made
+
+
+def _planned(setup: Setup, parameter: str, within: float, values: Any, least: float, events: int | None,
+             **given: Any) -> "Planned":  # fmt: skip
+    """Everything forecast: how deep, over what, and the best events."""
+    from tractexp.identification.plan import best_events, column, depth_needed
+    from tractexp.report.plan import Planned
+
+    problem, recorded = setup.problem, setup.train
+    column(problem.space.names, parameter)
+    if problem.per_event:
+        raise UserError("task=plan plans for shared parameters; leave model.per_event empty")
+    deepest = max(recorded, key=lambda e: e.depth)
+    shape = _shape(deepest, **given)
+    shape.check()
+    at, origin = _guess(setup, deepest, values)
+    scans = _scans(problem, at, shape)
+    needed = depth_needed(scans[DEPTH][1], parameter, within)
+    best = best_events(problem, at, least, events) if len(recorded) > 1 else []
+    return Planned(problem, at, origin, _described(shape), needed, scans, best, least, events)
+
+
+def _shape(event: Event, noise: float | None, **given: float | None) -> "Shape":
+    """The dip to plan for: the recorded one with what is given replaced."""
+    from tractexp.identification.plan import Shape
+
+    shape = replace(Shape.of(event), **{key: value for key, value in given.items() if value is not None})  # type: ignore[arg-type]
+    if noise is not None:
+        shape = replace(shape, noise_P=noise * abs(event.P0), noise_Q=noise * abs(event.P0), memory=0.0)
+    return shape
+
+
+def _guess(setup: Setup, event: Event, values: Any) -> tuple[np.ndarray, str]:
+    """Free values (d,) to plan at, and where they are from."""
+    from tractexp.identification.plan import guess
+    from tractexp.identification.result import load
+
+    problem = setup.problem_of([event])
+    if values == FIT:
+        return guess(problem), f"the values of a quick fit to {event.record.name}"
+    if values == DEFAULT:
+        defaults = [p.default for p in problem.parameters if p.name in problem.space.names]
+        return np.array(defaults), "the model's default values"
+    given = isinstance(values, Mapping)
+    known = values if given else load(Path(values)).parameters
+    if missing := [name for name in problem.space.names if name not in known]:
+        raise UserError(f"task.values={values}: that result has no {', '.join(missing)}; it is of another model")
+    return np.array(
+        [known[n] for n in problem.space.names]
+    ), f"the values of {'an identification' if given else values}"
+
+
+def _scans(problem: Any, values: np.ndarray, shape: "Shape") -> dict[str, Any]:
+    """{label: (x, forecasts)}: one property of the dip varied at a time."""
+    from tractexp.identification.plan import forecast, over_depth
+
+    def over(key: str, grid: tuple[float, ...]) -> Any:
+        shapes = [replace(shape, **{key: x}) for x in grid]
+        return grid, [forecast(problem, values, s) for s in shapes]
+
+    by_depth = over_depth(problem, values, shape)
+    P = abs(shape.P0)
+    loud = [replace(shape, noise_P=x * P, noise_Q=x * P) for x in NOISES]
+    return {
+        DEPTH: (tuple(f.shape.depth for f in by_depth), by_depth),
+        DURATION: over("duration", DURATIONS),
+        RATE: over("rate", RATES),
+        NOISE: (NOISES, [forecast(problem, values, s) for s in loud]),
+    }
+
+
+def _described(shape: "Shape") -> str:
+    memory = f"forgotten within {1000 * shape.memory:.0f} ms" if shape.memory > 0 else "white"
+    P, Q = (f"{100 * level / abs(shape.P0):.2g} %" for level in (shape.noise_P, shape.noise_Q))
+    dip = f"a dip of {100 * shape.depth:.0f} % for {1000 * shape.duration:.0f} ms at {shape.rate:.0f} Hz"
+    return f"planned: {dip}, noise {P} in P and {Q} in Q, of P, {memory}"
+
+
+def _content(planned: "Planned") -> dict[str, Any]:
+    """What `plan.json` holds; half intervals are shares of the value, null where there is none."""
+    names = planned.problem.space.names
+    return {
+        "answer": str(planned.needed),
+        "depth_needed": planned.needed.depth,
+        "parameters": dict(zip(names, planned.values, strict=True)),
+        "half_intervals": {
+            label: [
+                {"at": float(x), **dict(zip(names, f.relative, strict=True))}
+                for x, f in zip(grid, forecasts, strict=True)
+            ]
+            for label, (grid, forecasts) in planned.scans.items()
+        },
+        "best_events": [
+            {"name": c.name, "gain": c.gain, "half": dict(zip(names, c.half, strict=True))} for c in planned.chosen
+        ],
+    }

@@ -1,0 +1,97 @@
+"""A Bayesian check of the intervals."""
+
+import functools
+import io
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from tractexp import files
+from tractexp.api.arguments import public
+from tractexp.api.identify import Identification
+from tractexp.errors import check_range
+from tractexp.outcome import Outcome, Table
+
+if TYPE_CHECKING:
+    from tractexp.identification.posterior import Posterior
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Sampled(Outcome):
+    """A sample of the posterior under a flat prior within the bounds. `content` is that of `posterior.json`."""
+
+    kind = "posterior"
+
+    fit: Identification
+    settings: Mapping[str, int]  # walkers, steps, seed
+    content: Mapping[str, Any]
+
+    @functools.cached_property
+    def drawn(self) -> "Posterior":
+        """The sample; of a loaded result it is drawn again, from the same seed."""
+        from tractexp.identification.posterior import sample
+
+        return sample(self.fit.judged.known, **self.settings)
+
+    @property
+    def draws(self) -> dict[str, np.ndarray]:
+        """Draws (n,) of each free parameter, by name."""
+        return dict(zip(self.drawn.names, self.drawn.draws.T, strict=True))
+
+    def table(self) -> Table:
+        span, r = "{:.4g} .. {:.4g}".format, self.fit.result
+        rows = [
+            [name, f"{r.uncertainty['most_likely'][name]:.4g}", span(*r.intervals[name]), span(*interval)]
+            for name, interval in self.content["intervals"].items()
+        ]
+        said = f"autocorrelation time {self.content['autocorrelation']:.0f} of {self.settings['steps']} steps"
+        short = [] if self.content["converged"] else ["note: the chain is shorter than 50 of them; raise steps"]
+        columns = ["parameter", "most likely", "by curvature", "by posterior"]
+        return Table(columns, rows, "95 % intervals", [said, *short])
+
+    def to_dict(self) -> dict[str, Any]:
+        return {"fit": self.fit.to_dict(), "settings": dict(self.settings), "content": dict(self.content)}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        return cls(Identification.from_dict(content["fit"]), content["settings"], content["content"])
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write posterior.json, posterior.npz, history.csv and result.json."""
+        packed = io.BytesIO()
+        np.savez_compressed(packed, **self.draws)  # type: ignore[arg-type]
+        path = files.write_json(folder / "posterior.json", self.content)
+        draws = files.write(folder / "posterior.npz", packed.getvalue())
+        result = replace(self.fit.result, **self.fit.judged.known.fields())
+        return [path, draws, *replace(self.fit, result=result).write_result(folder)]
+
+
+@public
+def posterior(fit: Identification, *, walkers: int = 48, steps: int = 2000, seed: int | None = None) -> Sampled:
+    """Sample the posterior of an identification's free parameters under a flat prior within their bounds.
+
+    `walkers` go `steps` steps each (at least 4 and 100), of which the first 30 % are thrown away; `seed` is by default
+    that of the identification. Raises `UserError` without the extra [posterior], for fewer walkers than twice the
+    coordinates, and for an identification of which only a `result.json` is known.
+    """
+    from tractexp.identification.posterior import sample
+
+    check_range("task.walkers", walkers, 4)
+    check_range("task.steps", steps, 100)
+    settings = {"walkers": walkers, "steps": steps, "seed": fit.asked.seed if seed is None else seed}
+    known = fit.judged.known
+    started = time.perf_counter()
+    drawn = sample(known, **settings)
+    content = {
+        "intervals": dict(zip(drawn.names, drawn.intervals.tolist(), strict=True)),
+        "autocorrelation": drawn.autocorrelation,
+        "converged": drawn.converged,
+        "seconds": time.perf_counter() - started,
+    }
+    made = Sampled(fit, settings, files.plain(content))
+    made.__dict__["drawn"] = drawn
+    return made

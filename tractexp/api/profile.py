@@ -1,0 +1,124 @@
+"""Profile likelihood of every parameter: intervals that need no parabola."""
+
+import functools
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+from tractexp import files
+from tractexp.api.arguments import public
+from tractexp.api.identify import Identification
+from tractexp.errors import check_range
+from tractexp.identification.result import Result
+from tractexp.outcome import Outcome, Table
+
+if TYPE_CHECKING:
+    from tractexp.identification.profile import Profiles
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Profiled(Outcome):
+    """Profiles of the free parameters of an identification. `content` is that of `profile.json`."""
+
+    kind = "profile"
+
+    fit: Identification
+    points: int
+    content: Mapping[str, Any]
+    result: Result  # of the identification, with the intervals and verdicts that the profiles give
+    curvature: Mapping[str, tuple[float, float]]  # the intervals by curvature, about where the profiles start
+
+    @functools.cached_property
+    def made(self) -> "Profiles":
+        """What stands behind the figure; of a loaded result it is reckoned again."""
+        from tractexp.identification.profile import profiles
+
+        return profiles(self.fit.judged.known, self.points)
+
+    @property
+    def identification(self) -> Identification:
+        """The identification with the intervals and verdicts that the profiles give."""
+        made = replace(self.fit, result=self.result)
+        made.__dict__["judged"] = self.fit.judged
+        return made
+
+    @property
+    def profiles(self) -> Mapping[str, Mapping[str, Any]]:
+        """By name: `values` and the `deviance` there (n,), `interval` (95 %), `ends`, `minima` and `verdict`."""
+        return self.content["profiles"]
+
+    def table(self) -> Table:
+        span = "{:.4g} .. {:.4g}".format
+        likely = self.result.uncertainty["most_likely"]
+        rows = [
+            [name, f"{likely[name]:.4g}", span(*self.curvature[name]), span(*p["interval"])]
+            for name, p in self.profiles.items()
+        ]
+        said = [f"{name}: {p['verdict']}" for name, p in self.profiles.items()]
+        return Table(["parameter", "most likely", "by curvature", "by profile"], rows, "95 % intervals", said)
+
+    def to_dict(self) -> dict[str, Any]:
+        plain = {"points": self.points, "content": dict(self.content), "curvature": dict(self.curvature)}
+        return {"fit": self.fit.to_dict(), "result": asdict(self.result), **plain}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        fit, result = Identification.from_dict(content["fit"]), Result(**content["result"])
+        return cls(fit, content["points"], content["content"], result, content["curvature"])
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write profiles.svg, profile.json, history.csv and result.json."""
+        from tractexp.report import uncertainty
+
+        figure = uncertainty.profiles(folder / "profiles.svg", self.made)
+        path = files.write_json(folder / "profile.json", self.content)
+        return [figure, path, *self.identification.write_result(folder)]
+
+
+@public
+def profile(fit: Identification, *, points: int = 24) -> Profiled:
+    """Find the best fit for each value of each free parameter of an identification in turn.
+
+    `points` (3 to 1000) is how many values are tried on either side of the optimum at most. Raises `UserError` for an
+    identification of which only a `result.json` is known.
+    """
+    from tractexp.identification.profile import profiles
+
+    check_range("task.points", points, 3, 1000)
+    known = fit.judged.known
+    started = time.perf_counter()
+    made = profiles(known, points)
+    content = _content(made, time.perf_counter() - started)
+    verdicts = {name: str(verdict) for name, verdict in made.verdicts.items()}
+    intervals = {p.name: list(p.interval) for p in made.profiles}
+    fields = made.known.fields(notes=made.notes) | {"verdicts": verdicts, "intervals": intervals}
+    ends = zip(made.known.names, made.known.values, made.known.half, strict=True)
+    curvature = {name: (float(value - half), float(value + half)) for name, value, half in ends}
+    done = Profiled(fit, points, content, replace(fit.result, **fields), curvature)
+    done.__dict__["made"] = made
+    return done
+
+
+def _content(made: "Profiles", seconds: float) -> dict[str, Any]:
+    """What `profile.json` holds."""
+    return files.plain(
+        {
+            "threshold": made.threshold,
+            "simulations": made.simulations,
+            "seconds": seconds,
+            "restarts": made.restarts,
+            "profiles": {
+                p.name: {
+                    "values": p.values,
+                    "deviance": p.deviance,
+                    "interval": p.interval,
+                    "ends": [str(end) for end in p.ends],
+                    "minima": p.minima,
+                    "verdict": str(made.verdicts[p.name]),
+                }
+                for p in made.profiles
+            },
+        }
+    )

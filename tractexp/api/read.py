@@ -1,0 +1,168 @@
+"""Events from files, frames and arrays, with their dips found."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tractexp import plugin
+from tractexp.api.arguments import Choice, check_kind, choices, public
+from tractexp.errors import UserError, among
+from tractexp.outcome import Table
+from tractexp.record import Base, Event, Record, describe, detect
+
+REQUIRED, OPTIONAL = ("t", "U", "P", "Q"), ("f", "U2")
+GROUP = "data"
+
+
+class Dips(list[Event]):
+    """Events in a list that prints as a table."""
+
+    def __getitem__(self, k: Any) -> Any:
+        return Dips(super().__getitem__(k)) if isinstance(k, slice) else super().__getitem__(k)
+
+    def table(self) -> Table:
+        """One row for each event; below it what a reader or the detection found odd."""
+        rows = [
+            [e.record.name, e.t_start, f"{e.depth:.0%}", round(1000 * e.duration), round(e.rate), e.P0, e.Q0,
+             f"{e.noise_P / max(abs(e.P0), 1e-9):.2%}", " ".join(e.record.channels)]
+            for e in self
+        ]  # fmt: skip
+        odd = [said.partition(". Note: ") for said in map(describe, self)]
+        notes = [f"{e.record.name}: {o[2]}" for e, o in zip(self, odd, strict=True) if o[2]]
+        notes += [f"{e.record.name}: {note}" for e in self for note in e.record.notes]
+        columns = ["event", "starts [s]", "depth", "lasts [ms]", "rate [Hz]", "P0 [pu]", "Q0 [pu]", "noise of P",
+                   "channels"]  # fmt: skip
+        return Table(columns, rows, f"{len(self)} dip{'s' * (len(self) != 1)}", notes)
+
+    def to_frame(self) -> Any:
+        """The table as a pandas frame."""
+        return self.table().to_frame()
+
+    def __repr__(self) -> str:
+        return str(self.table())
+
+    def _repr_html_(self) -> str:
+        return self.table()._repr_html_()
+
+
+@public
+def read(
+    *sources: Any,
+    t: Any = None,
+    U: Any = None,
+    P: Any = None,
+    Q: Any = None,
+    f: Any = None,
+    U2: Any = None,
+    name: str | None = None,
+    **settings: Any,
+) -> Dips:
+    """Read records of voltage dips, check them and find the dip in each.
+
+    A source is the path of a CSV file (columns t, U, P, Q and, where recorded, f, U2) or of a COMTRADE file (.cfg), a
+    pandas or polars frame or a mapping with those columns, a shipped name ("tibet_50pct"), or a `Record`. Arrays (N,)
+    can be given directly as `t` [s], `U`, `P`, `Q`, `U2` [pu] and `f` [Hz], and are called `name`. Loads count P and Q
+    as positive when consumed. P and Q may have gaps (nan).
+
+    `settings` are those of the reader: `base_voltage` [kV, line to line] and `base_power` [MVA] where a table is not
+    per unit, `frequency` [Hz, nominal]; for COMTRADE `voltages` and `currents` (three channels each, names or numbers
+    from 0), `train` (dips by number from 1), `reverse_current`, `skew`, `encoding`, `pre` and `post` [s].
+
+    All dips of a COMTRADE file that can be used are given, in order of time. Raises `UserError`, naming the file, the
+    place and the value, for what is no record, holds no dip or has settings that its reader does not know.
+    """
+    arrays = {"t": t, "U": U, "P": P, "Q": Q, "f": f, "U2": U2}
+    given = {key: values for key, values in arrays.items() if values is not None}
+    if name is not None and not given:
+        raise UserError(f"name={name} names arrays (t=, U=, P=, Q=), and none are given")
+    if not (sources or given):
+        raise UserError("nothing to read: give a file, a frame, or the arrays t=, U=, P= and Q=")
+    records = [record for source in sources for record in _records(source, settings)]
+    records += [table(given, name or "arrays", settings)] if given else []
+    names = [record.name for record in records]
+    return Dips(detect(replace(r, name=r.where) if names.count(r.name) > 1 else r) for r in records)
+
+
+def dips_of(argument: str, given: Any, least: int = 0) -> Dips:
+    """What a call takes as its records: events, or whatever `read` reads, one or a list of them."""
+    listed = given if isinstance(given, Sequence) and not isinstance(given, str) else [given]
+    made = Dips(e for one in listed for e in ([one] if isinstance(one, Event) else read(one)))
+    if len(made) < least:
+        raise UserError(f"{argument} is empty; give at least one event, as tractexp.read gives them")
+    return made
+
+
+def table(columns: Mapping[str, Any], name: str, settings: Mapping[str, Any]) -> Record:
+    """The checked record of columns (N,) each; further columns are left out with a note."""
+    known = {"base_voltage": None, "base_power": None, "frequency": None}
+    for key, value in settings.items():
+        if key not in known:
+            raise UserError(f"{key} is no setting of arrays and frames{among(key, known, 'Settings')}")
+        check_kind(key, value, float | None)
+        known[key] = value
+    if missing := [key for key in REQUIRED if key not in columns]:
+        lack = f"{name}: {', '.join(missing)} missing; {', '.join(REQUIRED)} are needed"
+        raise UserError(f"{lack}{among(missing[0], columns, 'Columns')}")
+    spare = [str(key) for key in columns if key not in (*REQUIRED, *OPTIONAL)]
+    notes = (f"columns not used: {', '.join(spare)}",) if spare else ()
+    values = {key: _array(columns[key], f"{name}: {key}") for key in (*REQUIRED, *OPTIONAL) if key in columns}
+    base = Base(known["base_voltage"] or 1.0, known["base_power"] or 1.0, known["frequency"] or 50.0)
+    made: Any = base.per_unit(values)
+    return Record(name, base=base, notes=notes, **made).uniform().check()
+
+
+def _array(values: Any, where: str) -> np.ndarray:
+    try:
+        return np.array(values, dtype=float).reshape(len(values))
+    except (TypeError, ValueError) as error:
+        raise UserError(f"{where} is no column of numbers: {error}") from error
+
+
+def _records(source: Any, settings: Mapping[str, Any]) -> Iterator[Record]:
+    if isinstance(source, str | Path):
+        yield from _file(str(source), settings)
+    elif isinstance(source, Record | Event):
+        if settings:
+            raise UserError(f"{', '.join(settings)}: a record is taken as it is; leave the settings out")
+        yield source.record if isinstance(source, Event) else source
+    elif isinstance(source, Mapping) or hasattr(source, "columns"):
+        columns = {str(key): source[key] for key in (source if isinstance(source, Mapping) else source.columns)}
+        yield table(columns, "frame", settings)
+    else:
+        kind = type(source).__name__
+        raise UserError(f"a {kind} cannot be read; give a path, a frame, a mapping of columns, or t=, U=, P= and Q=")
+
+
+def _file(path: str, settings: Mapping[str, Any]) -> list[Record]:
+    """The records of a file, by the reader its ending names, or of a choice of `conf/data`."""
+    readers = {ending: cls for cls in _readers() for ending in cls.endings}
+    ending = Path(path).suffix.lower()
+    if ending in readers:
+        node = {"name": readers[ending].name, **readers[ending].of(path), **settings}
+    elif ending or Path(path).exists():
+        raise UserError(f"{path}: no reader takes files ending in '{ending}'; Endings: {', '.join(sorted(readers))}")
+    elif path in (shipped := choices(GROUP, files=True)):
+        node = {**Choice.of(GROUP, path).node, **settings}
+    else:
+        raise UserError(f"{path} is neither a file with an ending nor a shipped record{among(path, shipped)}")
+    read = plugin.build(GROUP, node).read()
+    return [*read.train, *read.validate]
+
+
+def _readers() -> list[Any]:
+    return [*plugin.discover()[GROUP].values()]
+
+
+def kept(event: Event) -> dict[str, Any]:
+    """A record as plain data, as a saved result holds it."""
+    return {f.name: getattr(event.record, f.name) for f in fields(Record)} | {"base": asdict(event.record.base)}
+
+
+def again(content: Mapping[str, Any]) -> Event:
+    """The event of what `kept` told; its dip is found again."""
+    arrays: Any = {k: np.array(content[k], dtype=float) for k in (*REQUIRED, *OPTIONAL) if content[k] is not None}
+    base, notes = Base(**content["base"]), tuple(content["notes"])
+    return detect(Record(content["name"], base=base, source=content["source"], notes=notes, **arrays))

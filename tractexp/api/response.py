@@ -1,0 +1,84 @@
+"""The power a load draws in one event, calculated and, where it was recorded, measured."""
+
+import io
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tractexp import files
+from tractexp.record import Event
+
+if TYPE_CHECKING:
+    from tractexp.model.model import Model
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Response:
+    """Voltage and calculated power, (N,) each, in pu; `measured` P and Q, and `epsilon` of Eq. (20), where recorded."""
+
+    title: str
+    t: np.ndarray  # s
+    U: np.ndarray
+    P: np.ndarray
+    Q: np.ndarray
+    measured: tuple[np.ndarray, np.ndarray] | None = None
+    epsilon: tuple[float, float] | None = None  # of P and Q, fractions
+    notes: tuple[str, ...] = ()
+
+    @property
+    def columns(self) -> dict[str, np.ndarray]:
+        """What response.csv holds, by name."""
+        made = {"t": self.t, "U": self.U, "P": self.P, "Q": self.Q}
+        return made | ({"P_measured": self.measured[0], "Q_measured": self.measured[1]} if self.measured else {})
+
+    @property
+    def row(self) -> list[str]:
+        """Title, lowest U, lowest and highest P and Q, and both errors, as a table shows them."""
+        errors = [f"{e:.3%}" for e in self.epsilon] if self.epsilon else ["", ""]
+        ends = self.U.min(), self.P.min(), self.P.max(), self.Q.min(), self.Q.max()
+        return [self.title, *(f"{v:.4f}" for v in ends), *errors]
+
+    def __repr__(self) -> str:
+        errors = ", epsilon_p {:.3%}, epsilon_q {:.3%}".format(*self.epsilon) if self.epsilon else ""
+        return f"{self.title}: t, U, P, Q of {len(self.t)} samples{errors}"
+
+    def _repr_svg_(self) -> str:
+        with tempfile.TemporaryDirectory() as folder:
+            return self.draw(Path(folder) / "response.svg").read_text(encoding="utf-8")
+
+    def to_frame(self) -> Any:
+        """A pandas frame of the columns."""
+        import pandas
+
+        return pandas.DataFrame(self.columns)
+
+    def write(self, folder: Path, number: int) -> list[Path]:
+        """Write response.csv and response.svg, with a number from the second event on."""
+        stem = folder / ("response" if number == 1 else f"response_{number}")
+        text, columns = io.StringIO(), self.columns
+        rows = np.column_stack(list(columns.values()))
+        np.savetxt(text, rows, fmt="%.9g", delimiter=",", header=",".join(columns), comments="")
+        return [files.write(stem.with_suffix(".csv"), text.getvalue()), self.draw(stem.with_suffix(".svg"))]
+
+    def draw(self, path: Path) -> Path:
+        """Draw the response, against the measurement where there is one."""
+        from tractexp.report import figures
+
+        made = self.P, self.Q
+        if self.measured and self.epsilon:
+            return figures.fit(
+                path, self.t, self.U, self.measured, made, title=self.title, epsilon=self.epsilon, notes=self.notes
+            )
+        return figures.response(path, self.t, self.U, made, title=self.title, notes=self.notes)
+
+
+def respond_to(model: "Model", values: np.ndarray, event: Event) -> Response:
+    """A recorded event played through a model. Raises `UserError` where it has no steady state there."""
+    from tractexp.identification.result import respond
+
+    fit, record = respond(model, values, event, "validate"), event.record
+    measured, epsilon = (record.P, record.Q), (fit.epsilon_p, fit.epsilon_q)
+    return Response(record.name, record.t, record.U, fit.P, fit.Q, measured, epsilon, tuple(record.notes))

@@ -1,0 +1,172 @@
+"""Play a voltage through a load model with given parameters."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from tractexp.api.arguments import public
+from tractexp.api.compose import LoadModel, model_of
+from tractexp.api.identify import Identification
+from tractexp.api.read import dips_of
+from tractexp.api.response import Response, respond_to
+from tractexp.errors import UserError, among, check_range
+from tractexp.outcome import Outcome, Table
+
+BEFORE = {"U0": 1.0, "P0": 1.0, "Q0": 0.5, "frequency": 50.0}  # a dip by hand, where nothing else is known
+
+
+@dataclass(frozen=True)
+class Dip:
+    """A dip made by hand. Times in s."""
+
+    depth: float
+    duration: float = 0.15  # from the start of the fall to the start of the recovery
+    fall: float = 0.02
+    recovery: float = 0.05
+    start: float = 0.5
+    length: float = 3.0
+    rate: float = 1000.0  # samples per second
+
+    def check(self) -> None:
+        """Raise `UserError` for a setting out of range."""
+        check_range("task.depth", self.depth, 0.0, 1.0)
+        for name in ("duration", "fall", "recovery", "start"):
+            check_range(f"task.{name}", getattr(self, name), 0.0)
+        check_range("task.rate", self.rate, 1.0, 1e5)
+        check_range("task.length", self.length, max(20 / self.rate, self.start + self.duration), 3600.0)
+
+    def voltage(self) -> tuple[np.ndarray, np.ndarray]:
+        """Times (N,) [s] and the voltage (N,) as a share of that before."""
+        t = np.arange(round(self.length * self.rate) + 1) / self.rate
+        fallen = smooth((t - self.start) / max(self.fall, 1e-9))
+        back = smooth((t - self.start - self.duration) / max(self.recovery, 1e-9))
+        return t, 1 - self.depth * fallen * (1 - back)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Simulation(Outcome):
+    """Responses, one for each event; a simulation of one event has its arrays `t`, `U`, `P`, `Q` itself."""
+
+    kind = "simulation"
+
+    model: LoadModel
+    values: Mapping[str, float]
+    responses: tuple[Response, ...]
+
+    def __getattr__(self, name: str) -> Any:
+        if name in ("t", "U", "P", "Q") and len(self.responses) == 1:
+            return getattr(self.responses[0], name)
+        raise AttributeError(f"a simulation of {len(self.responses)} events has no '{name}'; see .responses")
+
+    def table(self) -> Table:
+        columns = ["event", "U min", "P min", "P max", "Q min", "Q max", "epsilon_p", "epsilon_q"]
+        return Table(columns, [one.row for one in self.responses], self.model.model.title)
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "model": asdict(self.model),
+            "values": dict(self.values),
+            "responses": [dict(vars(one)) for one in self.responses],
+        }
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        def response(told: Mapping[str, Any]) -> Response:
+            arrays: Any = {key: np.array(told[key], dtype=float) for key in ("t", "U", "P", "Q")}
+            notes = tuple(told["notes"])
+            if told["measured"]:
+                P, Q = (np.array(values, dtype=float) for values in told["measured"])
+                return Response(told["title"], **arrays, measured=(P, Q), epsilon=tuple(told["epsilon"]), notes=notes)
+            return Response(told["title"], **arrays, notes=notes)
+
+        responses = tuple(map(response, content["responses"]))
+        return cls(LoadModel(**content["model"]), content["values"], responses)
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write response.csv and response.svg, with a number from the second event on."""
+        return [path for k, one in enumerate(self.responses, start=1) for path in one.write(folder, k)]
+
+
+@public
+def simulate(
+    model: Any = None,
+    values: Mapping[str, float] | None = None,
+    *,
+    records: Any = (),
+    depth: float | None = None,
+    duration: float = 0.15,
+    fall: float = 0.02,
+    recovery: float = 0.05,
+    start: float = 0.5,
+    length: float = 3.0,
+    rate: float = 1000.0,
+    U0: float | None = None,
+    P0: float | None = None,
+    Q0: float | None = None,
+) -> Simulation:
+    """Calculate the power a load draws in recorded events, or in a dip made by hand.
+
+    `model` is an identification, whose values are taken, or a model as `tractexp.identify` takes it, for which
+    `values` {name: value} gives all; they also replace single values of an identification. Either `records`, events of
+    `tractexp.read` or what it reads, or a dip to `depth` (0 to 1) of the voltage before: from `start` [s] it falls
+    within `fall` [s], and `duration` [s] later it recovers within `recovery` [s]; `length` [s] at `rate` [1/s].
+    `U0`, `P0`, `Q0` [pu] stand before such a dip: by default those of the identification, else 1, 1 and 0.5.
+
+    Raises `UserError` for unknown names, values that are missing, and where there is no steady state.
+    """
+    dip = Dip(0.0 if depth is None else depth, duration, fall, recovery, start, length, rate)
+    dip.check()
+    given = {key: value for key, value in {"U0": U0, "P0": P0, "Q0": Q0}.items() if value is not None}
+    if depth is None and (
+        needless := [*given, *(f.name for f in fields(Dip)[1:] if getattr(dip, f.name) != f.default)]
+    ):
+        raise UserError(f"task.{needless[0]} describes a dip made by hand; give its depth, too, or leave it out")
+    fit = model if isinstance(model, Identification) else None
+    load = fit.model if fit else model_of(model)
+    at = chosen(load.model.names, fit.result.parameters if fit else {}, values or {})
+    events = dips_of("records", records)
+    if bool(events) == (depth is not None):
+        raise UserError("give either records to play, or the depth of a dip")
+    before = BEFORE | (fit.result.before if fit else {}) | given
+    played = [respond_to(load.model, at, event) for event in events] or [_played(load, at, dip, before)]
+    return Simulation(load, dict(zip(load.model.names, at.tolist(), strict=True)), tuple(played))
+
+
+def _played(load: LoadModel, values: np.ndarray, dip: Dip, before: Mapping[str, float]) -> Response:
+    """The response to a dip made by hand."""
+    from tractexp.model.drive import Drive, Excitation
+
+    t, shape = dip.voltage()
+    U, unknown = before["U0"] * shape, np.full(len(t), np.nan)
+    nominal = 2 * np.pi * before["frequency"]
+    event = Excitation(1 / dip.rate, U, unknown, unknown, before["U0"], before["P0"], before["Q0"], omega_n=nominal)
+    drive = Drive.of([event])
+    if refusal := load.model.refusal(values, drive):
+        raise UserError(refusal)
+    substeps: Any = load.model.substeps(drive, values)[0]
+    response = load.model.simulate(drive, values, substeps)
+    return Response(f"dip of {dip.depth:.0%} for {dip.duration:g} s", t, U, response.P[0], response.Q[0])
+
+
+def smooth(x: np.ndarray) -> np.ndarray:
+    """Raised cosine from 0 (x <= 0) to 1 (x >= 1)."""
+    return 0.5 - 0.5 * np.cos(np.pi * np.clip(x, 0.0, 1.0))
+
+
+def chosen(names: Sequence[str], found: Mapping[str, float], given: Mapping[str, float]) -> np.ndarray:
+    """Values (d,) in the model's order. Raises `UserError` for unknown names and for what is missing."""
+    for name in given:
+        if name not in names:
+            raise UserError(
+                f"task.values.{name}: this model has no parameter '{name}'{among(name, names, 'Parameters')}"
+            )
+    values = {**found, **given}
+    if missing := [name for name in names if name not in values]:
+        raise UserError(
+            f"no value for {', '.join(missing)}: give task.parameters=result.json of an identification,"
+            f" or task.values={{{', '.join(f'{name}: ...' for name in missing)}}}"
+        )
+    return np.array([values[name] for name in names], dtype=float)

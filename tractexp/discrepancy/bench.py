@@ -1,0 +1,131 @@
+"""What every step of an investigation works with: records, coordinates and the kernels that simulate them."""
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.discrepancy.catalogue import Catalogue
+from tractexp.discrepancy.coordinates import Coordinates
+from tractexp.discrepancy.cores import side_by_side
+from tractexp.discrepancy.criteria import Criteria
+from tractexp.discrepancy.effort import Effort
+from tractexp.discrepancy.kernels import Family, Kernels
+from tractexp.discrepancy.records import Records, power_profile
+from tractexp.identification.descent import Apart
+from tractexp.identification.likelihood import Likelihood
+from tractexp.identification.problem import Problem
+from tractexp.model.drive import Drive
+from tractexp.model.model import Model
+from tractexp.noise import Noise
+from tractexp.noise.quiet import quiet_stretches
+from tractexp.record import Event
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """A base model with its catalogue on the events of `records`. Nothing of it changes but what `effort` counts."""
+
+    load: Model
+    catalogue: Catalogue
+    records: Records
+    kernels: Kernels
+    coordinates: Coordinates
+    criteria: Criteria
+    effort: Effort
+
+    @classmethod
+    def of(
+        cls, load: Model, catalogue: Catalogue, records: Records, bounds: Mapping[str, Sequence[float]],
+        fixed: Mapping[str, float], criteria: Criteria, effort: Effort, substeps: int | None = None,
+    ) -> "Bench":  # fmt: skip
+        """A bench for these records; the load is simulated behind the recorder's window, where there is one."""
+        kernels = Kernels(Family(load.behind(records.window), catalogue), records.events, bounds, fixed, substeps)
+        coordinates = Coordinates.of(kernels.bare, kernels.whole, catalogue, criteria.measurement_prior)
+        return cls(load, catalogue, records, kernels, coordinates, criteria, effort)
+
+    def on(self, records: Records) -> "Bench":
+        """The same model and catalogue on other records, with the same Runge-Kutta steps and a count of its own."""
+        kernels, criteria, effort = self.kernels, self.criteria, self.effort.anew()
+        return Bench.of(
+            self.load, self.catalogue, records, kernels.bounds, kernels.fixed, criteria, effort, kernels.substeps
+        )
+
+    @property
+    def model(self) -> Model:
+        """The base model, behind the recorder's window."""
+        return self.kernels.family.model
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        return self.records.events
+
+    @property
+    def problem(self) -> Problem:
+        """The problem of everything: base model, all candidates, pushes."""
+        return self.kernels.whole
+
+    @property
+    def drive(self) -> Drive:
+        return self.problem.drive
+
+    @functools.cached_property
+    def known(self) -> np.ndarray:
+        """Which samples of P and Q count, (2, N)."""
+        return Likelihood.of(self.problem).known
+
+    @property
+    def samples(self) -> int:
+        """Values of P and Q that count."""
+        return int(np.count_nonzero(self.known))
+
+    @functools.cached_property
+    def profile(self) -> np.ndarray:
+        """Apparent power over that before each event, (N,)."""
+        return power_profile(self.drive.measured, self.drive.before, self.drive.first)
+
+    @functools.cached_property
+    def quiet(self) -> list[slice]:
+        """The samples in which little happens."""
+        return quiet_stretches(self.events, self.drive)
+
+    def residuals(self, unit: np.ndarray, names: Sequence[str] | None = None, pushed: bool = False) -> np.ndarray:
+        """Calculated minus measured (n, 2, N) [pu] at coordinates (n, D) where effects but `names` are at their null.
+
+        By default any effect and any push may be there, at the price of the largest kernel.
+        """
+        self.effort.spend(len(unit))
+        key = None if names is None else self.kernels.family.key(names, pushed)
+        return side_by_side(lambda part: self.kernels.residuals(key, part), unit)
+
+    def residuals_of(self, unit: np.ndarray, sets: Sequence[tuple[Sequence[str], bool]]) -> np.ndarray:
+        """As `residuals`, with a set of names for each of the coordinates, and whether a push is in it."""
+        keys = [self.kernels.family.key(names, pushed) for names, pushed in sets]
+        made = np.empty((len(unit), 2, self.drive.samples))
+        for key in dict.fromkeys(keys):
+            mine = np.array([k == key for k in keys])
+            first = sets[keys.index(key)]
+            made[mine] = self.residuals(unit[mine], *first)
+        return made
+
+    def whiten(self, noise: Noise, residuals: np.ndarray) -> np.ndarray:
+        """Residuals (n, 2, N) as rows (n, 2 N) of independent unit variance."""
+        return noise.whiten(residuals, self.drive, self.known)
+
+    def rows(self, unit: np.ndarray, noise: Noise, faults: Sequence[int], sets: Sequence[Sequence[str]]) -> np.ndarray:
+        """Whitened residuals (n, 2 N) of coordinates with a set of names each, then the prior of the free faults."""
+        raw = self.residuals_of(unit, [(names, False) for names in sets])
+        white = side_by_side(lambda part: self.whiten(noise, part), raw)
+        at = self.coordinates
+        prior = [(unit[:, k] - at.null[k]) / at.prior_deviation[k] for k in faults]
+        return np.concatenate([white, *(p[:, None] for p in prior)], axis=1)
+
+    def apart(self, further_rows: int) -> list[Apart]:
+        """P0 and Q0 act on the rows of their own event only; `further_rows` follow those of the records."""
+        events, N = len(self.events), self.drive.samples
+        rows = np.zeros((events, 2 * N + further_rows), dtype=bool)
+        for e in range(events):
+            part = self.drive.part(e)
+            rows[e, part] = rows[e, N + part.start : N + part.stop] = True
+        return [Apart(len(self.coordinates.base) + np.arange(events) * 2 + c, rows) for c in (0, 1)]

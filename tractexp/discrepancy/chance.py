@@ -1,0 +1,62 @@
+"""What chance alone does to the tests: the fit's own noise drawn again and put through the same projection.
+
+Thresholds hold for the largest of all candidates at once, for the noise as it was estimated, and, where the quiet
+samples are few, for the error of that estimate too: each draw then estimates its noise anew.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.discrepancy.adequacy import SMALLEST_P, least_p, statistics, tail
+from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.noise_in_quiet import QuietNoise
+from tractexp.discrepancy.projection import Projection
+from tractexp.discrepancy.tangent import Tangent, rich_residuals
+from tractexp.noise import Noise
+
+DRAWS = 199
+
+
+@dataclass(frozen=True, eq=False)
+class Chance:
+    """Draws of the smallest p (b,) of any candidate or fault of the measurement, and of what is left."""
+
+    least_p: np.ndarray
+    left: dict[str, np.ndarray]
+
+    def critical_p(self, alpha: float) -> float:
+        """The p a single candidate must undercut so that chance names any with probability `alpha`."""
+        return float(np.quantile(self.least_p, alpha, method="lower"))
+
+    def surprises(self, projection: Projection, bench: Bench) -> dict[str, float]:
+        """How often chance leaves as much as a fit does, by each test of adequacy."""
+        return {name: tail(self.left[name], found) for name, found in statistics(projection, bench).items()}
+
+
+def chance_at(t: Tangent, noise: Noise, quiet: QuietNoise, seed: int, plain: bool, draws: int = DRAWS) -> Chance:
+    """Draw every statistic at a fit as chance makes it; where the case is `plain`, with the noise taken as known."""
+    bench = t.bench
+    rng = np.random.default_rng(seed)
+    drawn = noise.draw(rng, draws, np.diff(bench.drive.first).tolist())
+    drawn *= bench.known
+    if plain or bench.criteria.knows_noise(noise.worth(sum(p.stop - p.start for p in bench.quiet))):
+        return _collected(t, [t.whitened(noise, drawn)], noise)
+    rest = rich_residuals(t, drawn)
+    projections = []
+    for b in range(draws):
+        bench.effort.spend(0)
+        projections.append(t.whitened(quiet.of(rest[b]), drawn[b : b + 1]))
+    return _collected(t, projections, noise)
+
+
+def _collected(t: Tangent, projections: list[Projection], noise: Noise) -> Chance:
+    least, by_test = [], []
+    for projection in projections:
+        p = least_p(projection)
+        if noise.loudest_blur <= t.bench.criteria.blurred:
+            faults = np.array(list(projection.fault_p().values())).reshape(-1, len(p))
+            p = np.maximum(np.minimum(p, faults.min(axis=0, initial=1.0)), SMALLEST_P)
+        least.append(p)
+        by_test.append(statistics(projection, t.bench))
+    return Chance(np.concatenate(least), {name: np.concatenate([f[name] for f in by_test]) for name in by_test[0]})

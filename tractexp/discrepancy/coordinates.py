@@ -1,0 +1,97 @@
+"""One set of coordinates for the base model and every candidate.
+
+Base and extended models are points of the same coordinates with the other candidates at their nulls, nested by
+construction.
+"""
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.discrepancy.catalogue import Catalogue
+from tractexp.identification.problem import Problem
+
+
+@dataclass(frozen=True, eq=False)
+class Coordinates:
+    """Coordinates (D,) lie in the unit cube: parameters `names` with these bounds, then P0 and Q0 of each event.
+
+    The parameters are the base model's free ones, in columns `base`, those of all candidates, and the pushes'.
+    """
+
+    names: tuple[str, ...]  # (d,)
+    lower: np.ndarray  # (d,)
+    upper: np.ndarray  # (d,)
+    catalogue: Catalogue
+    base: np.ndarray  # columns
+    before: np.ndarray  # (2 E,) columns
+    null: np.ndarray  # (D,) every candidate at its null, the base parameters at their defaults
+    prior: float  # standard deviation of a fault of the measurement, in its relevant sizes
+
+    @classmethod
+    def of(cls, bare: Problem, whole: Problem, catalogue: Catalogue, prior: float) -> "Coordinates":
+        """Those of the problem of everything, `whole`, in which the problem of the base model is `bare`."""
+        names, d, events = whole.space.names, whole.space.dimension, whole.drive.events
+        chosen = {p.name: p.default if p.null is None else p.null for p in whole.parameters}
+        values = np.array([chosen[name] for name in names])
+        return cls(
+            names=names,
+            lower=whole.lower,
+            upper=whole.upper,
+            catalogue=catalogue,
+            base=np.array([names.index(name) for name in bare.space.names]),
+            before=np.arange(d, d + 2 * events),
+            null=np.r_[whole.space.to_unit(values), np.full(2 * events, 0.5)],
+            prior=prior,
+        )
+
+    @property
+    def dimension(self) -> int:
+        return len(self.null)
+
+    @functools.cached_property
+    def column(self) -> dict[str, int]:
+        """Where each parameter stands."""
+        return {name: k for k, name in enumerate(self.names)}
+
+    def width(self, name: str) -> float:
+        """Range of a parameter."""
+        k = self.column[name]
+        return float(self.upper[k] - self.lower[k])
+
+    def to_unit(self, name: str, value: float) -> float:
+        k = self.column[name]
+        return float((value - self.lower[k]) / (self.upper[k] - self.lower[k]))
+
+    def value(self, name: str, unit: np.ndarray) -> float:
+        """A parameter's value at coordinates (D,), never outside its bounds by rounding."""
+        k = self.column[name]
+        inside = self.lower[k] + unit[k] * (self.upper[k] - self.lower[k])
+        return float(np.clip(inside, self.lower[k], self.upper[k]))
+
+    def sizes(self, effects: Sequence[str]) -> list[int]:
+        """Columns of the effects' sizes."""
+        return [self.column[p.name] for n in effects for p in self.catalogue[n].sizes]
+
+    def parameters(self, effects: Sequence[str]) -> list[int]:
+        """Columns of all the effects' parameters."""
+        return [self.column[p.name] for n in effects for p in self.catalogue[n].effect.parameters]
+
+    @functools.cached_property
+    def prior_deviation(self) -> dict[int, float]:
+        """Prior standard deviation of each size of a fault of the measurement, in the unit cube."""
+        return {
+            self.column[p.name]: self.prior * self.catalogue[name].relevant(p) / self.width(p.name)
+            for name in self.catalogue.of_measurement
+            for p in self.catalogue[name].sizes
+        }
+
+    def without_faults(self, unit: np.ndarray, kept: Sequence[str]) -> np.ndarray:
+        """Coordinates (D,) with the faults of the measurement that are not `kept` back at their nulls."""
+        moved = unit.copy()
+        for name in self.catalogue.of_measurement:
+            if name not in kept:
+                moved[self.parameters([name])] = self.null[self.parameters([name])]
+        return moved

@@ -1,0 +1,103 @@
+"""Where a model and the records disagree, if they do: all tests at one fit."""
+
+import functools
+from dataclasses import dataclass
+
+from tractexp.discrepancy.base_fit import BaseFit
+from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.chance import Chance, chance_at
+from tractexp.discrepancy.criteria import Criteria
+from tractexp.discrepancy.fitting import Refit, refit
+from tractexp.discrepancy.noise_in_quiet import QuietNoise
+from tractexp.discrepancy.projection import Projection, Score
+from tractexp.discrepancy.tangent import Tangent, rich_residuals, tangent
+from tractexp.noise import Noise
+
+PLAIN = 1e-10  # a score of this p needs no exact threshold
+
+
+@dataclass(frozen=True, eq=False)
+class Disagreement:
+    """The tests at one fit: what each further effect would gain, what is left, and how often chance does as much."""
+
+    fit: Refit
+    noise: Noise
+    tangent: Tangent
+    projection: Projection
+    chance: Chance
+    scores: list[Score]  # of the candidates outside the fit, the rarest by chance first
+
+    @property
+    def bench(self) -> Bench:
+        return self.tangent.bench
+
+    @property
+    def criteria(self) -> Criteria:
+        return self.bench.criteria
+
+    @functools.cached_property
+    def left(self) -> dict[str, float]:
+        """How often chance leaves as much as this fit does, by each test."""
+        return self.chance.surprises(self.projection, self.bench)
+
+    @property
+    def p_left(self) -> float:
+        """The same by the most surprised test, corrected for their number."""
+        return min(1.0, len(self.left) * min(self.left.values()))
+
+    @property
+    def adequate(self) -> bool:
+        """Whether chance alone may leave as much."""
+        return self.p_left >= self.criteria.adequate_p
+
+    @property
+    def loudest(self) -> str:
+        """What stands out most of that which this fit leaves."""
+        return min(self.left, key=self.left.__getitem__)
+
+    @property
+    def resting(self) -> list[str]:
+        """Parameters that rest on a bound: better values lie beyond it."""
+        names = {k: name for name, k in self.bench.coordinates.column.items()}
+        return [names[k] for k in self.tangent.held]
+
+    @property
+    def asks_for_more(self) -> bool:
+        """Whether any further effect of the load helps more than chance does."""
+        level = self.chance.critical_p(self.criteria.naming)
+        if self.fit.names:
+            level = min(level, self.criteria.further_name(len(self.fit.names)))
+        elif self.faults:
+            level *= self.criteria.beside_measurement  # small p are uniform where nothing is missing
+        return bool(self.scores) and self.scores[0].p < level
+
+    @functools.cached_property
+    def faults(self) -> tuple[str, ...]:
+        """The faults of the measurement that are not at their null.
+
+        None where the voltage is noisy: whatever smooths the calculated power would seem to be there.
+        """
+        if self.noise.loudest_blur > self.criteria.blurred:
+            return ()
+        level = self.chance.critical_p(self.criteria.naming)
+        if self.fit.names:
+            level = min(level, self.criteria.further_name(len(self.fit.names)))
+        return tuple(sorted(name for name, p in self.projection.fault_p().items() if p[0] < level))
+
+
+def disagreement(base: BaseFit, seed: int) -> Disagreement:
+    """The tests of the base model."""
+    return examined(base.quiet, base.fit, base.noise, seed)
+
+
+def examined(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int, plain: bool = False) -> Disagreement:
+    """All tests at one fit, under the noise of what no candidate explains there; `plain` takes it as known."""
+    bench = quiet.bench
+    t = tangent(bench, fit, noise)
+    noise = quiet.of(rich_residuals(t, t.residual[None])[0], t.residual, t.explaining)
+    fit = refit(bench, noise, [(fit.names, fit.unit)])[0]
+    t = tangent(bench, fit, noise)
+    projection = t.whitened(noise)
+    scores = projection.scores()
+    plain = plain or (bool(scores) and scores[0].p < PLAIN)
+    return Disagreement(fit, noise, t, projection, chance_at(t, noise, quiet, seed, plain), scores)

@@ -1,0 +1,189 @@
+"""Which effects: candidates scored, the best refitted, and one more added as long as chance cannot explain the gain.
+
+Subsets are ranked exhaustively on the linearised problem, because forward selection alone stalls where effects
+look alike; the shortlist is refitted nonlinearly from several starts, side by side.
+"""
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tractexp.discrepancy.base_fit import BaseFit
+from tractexp.discrepancy.disagreement import Disagreement, examined
+from tractexp.discrepancy.fitting import Refit, Start, best_of, no_worse_than_subsets, refit, rough_refit
+from tractexp.discrepancy.projection import Score
+from tractexp.discrepancy.tangent import Column, tangent
+from tractexp.discrepancy.valleys import DISTINCT
+from tractexp.noise import Noise
+
+MOST_EFFECTS = 3
+SHORTLIST = {1: 10, 2: 8, 3: 6}  # sets of each size that are refitted
+COMBINED = 14  # effects whose sets are ranked exhaustively
+CLOSE = 12.0  # of the deviance: a rough refit this near the best is made exact
+PATCHED = 4  # sets of one size that are tried before a further effect is added
+RANKS = 2  # settings of a candidate to start from
+LEAST_START = 0.1  # smallest relevant sizes that a start moves at least
+
+Names = tuple[str, ...]
+Refits = Mapping[Names, Refit]
+
+
+@dataclass(frozen=True, eq=False)
+class Explanations:
+    """The tests before the first effect, after the first, and so on, and the best fit of every set that was tried."""
+
+    base: BaseFit
+    steps: tuple[Disagreement, ...]
+    refits: Refits
+
+    @property
+    def last(self) -> Disagreement:
+        """The tests at the chosen set."""
+        return self.steps[-1]
+
+    @property
+    def chosen(self) -> Refit:
+        return self.last.fit
+
+    @property
+    def faults(self) -> Names:
+        """The faults of the measurement beside the chosen set."""
+        return self.last.faults
+
+    @property
+    def empty(self) -> bool:
+        """Whether neither an effect of the load nor a fault of the measurement helps more than chance."""
+        return not self.chosen.names and not self.faults
+
+
+def explanations(base: BaseFit, first: Disagreement, seed: int) -> Explanations:
+    """Add effects one by one as long as the best one helps more than chance, searching all sets of each size."""
+    steps, ground = [first], first
+    refits: dict[Names, Refit] = {(): first.fit}
+    while steps[-1].asks_for_more and len(steps[-1].fit.names) < MOST_EFFECTS:
+        size = len(steps[-1].fit.names) + 1
+        fits = searched([ground, *steps[1:]], refits, size, base.bench.effort.say)
+        refits |= {f.names: f for f in fits}
+        found = sufficient(base, fits, steps[-1].noise, seed + size)
+        if size == 1 and (found.asks_for_more or not found.adequate):
+            ground, better = from_other_valleys(base, first, refits)
+            if better:
+                refits |= {f.names: f for f in better}
+                fits = best_of(f for f in refits.values() if f.names)
+                found = sufficient(base, fits, first.noise, seed + size)
+        steps.append(found)
+    return Explanations(base, tuple(steps), refits)
+
+
+def searched(steps: Sequence[Disagreement], refits: Refits, size: int, say: Callable[[str], None]) -> list[Refit]:
+    """The most promising sets of one size refitted, the best first. `steps` begin with one without effects."""
+    bench, noise = steps[0].bench, steps[-1].noise
+    wanted = shortlist(steps, size)
+    say(f"refitting {len(wanted)} {'effect' if size == 1 else f'sets of {size}'}{'s' * (size == 1)}")
+    fits = rough_refit(bench, noise, [s for n in wanted for s in starts(steps, refits, n)])
+    near = [f for f in fits if f.cost < fits[0].cost + CLOSE]
+    exact = {f.names: f for f in refit(bench, noise, [(f.names, f.unit) for f in near])}
+    fits = [exact.get(f.names, f) for f in fits]
+    return best_of(no_worse_than_subsets(bench, noise, {**refits, **{f.names: f for f in fits}}, fits))
+
+
+def from_other_valleys(base: BaseFit, first: Disagreement, refits: Refits) -> tuple[Disagreement, list[Refit]]:
+    """Single effects that explain more from another valley of the base model, and the base model there.
+
+    Where an effect is missing, a wrong valley may fit better than the right one.
+    """
+    bench = base.bench
+    ground, found = first, best_of(refits.values())
+    for valley in base.valleys_but(first.fit.unit):
+        fit = refit(bench, first.noise, [((), valley)])[0]
+        if np.linalg.norm((fit.unit - first.fit.unit)[bench.coordinates.base]) < DISTINCT:
+            continue
+        t = tangent(bench, fit, first.noise)
+        projection = t.whitened(first.noise)
+        there = replace(first, fit=fit, tangent=t, projection=projection, scores=projection.scores())
+        say = lambda line: bench.effort.say(f"{line} from another valley of the base model")  # noqa: E731
+        fits = searched([there], {(): fit}, 1, say)
+        if fits[0].cost < found[0].cost:
+            ground = there
+        found = best_of([*found, *fits])
+    return ground, [f for f in found if refits.get(f.names) is not f]
+
+
+def sufficient(base: BaseFit, ranked: Sequence[Refit], noise: Noise, seed: int) -> Disagreement:
+    """The tests at the best fit, or at the first of those close to it that asks for no further effect where it does.
+
+    Formulas are not the physics: of two that fit nearly alike, the one that needs no patch is the better.
+    """
+    best = examined(base.quiet, ranked[0], noise, seed)
+    if not best.asks_for_more:
+        return best
+    for other in [f for f in ranked[1:PATCHED] if f.cost < ranked[0].cost + CLOSE]:
+        there = examined(base.quiet, other, noise, seed)
+        if not there.asks_for_more and there.p_left > best.p_left:
+            return there
+    return best
+
+
+def shortlist(steps: Sequence[Disagreement], size: int) -> list[Names]:
+    """The sets of `size` effects that lower the linearised deviance most: from the base fit, and by adding one."""
+    first, last = steps[0], steps[-1]
+    sets: dict[Names, float] = {}
+    for score in last.scores[: SHORTLIST[size]]:
+        sets[tuple(sorted((*last.fit.names, score.name)))] = last.fit.deviance - score.drop
+    if size > 1:
+        names = [s.name for s in first.scores if s.drop > 0][:COMBINED]
+        columns = {s.name: _column(first, s) for s in first.scores}
+        for subset in itertools.combinations(sorted(names), size):
+            block = np.concatenate([columns[n] for n in subset])
+            side = block @ first.projection.r[0]
+            drop = side @ np.linalg.pinv(block @ block.T, rcond=1e-9, hermitian=True) @ side
+            sets[subset] = min(sets.get(subset, np.inf), first.fit.deviance - float(drop))
+    return sorted(sets, key=lambda s: (sets[s], s))[: SHORTLIST[size]]
+
+
+def _column(at: Disagreement, score: Score) -> np.ndarray:
+    """The projected column of a candidate at its best setting."""
+    pairs = zip(at.tangent.columns, at.projection.blocks, strict=True)
+    return next(b for c, b in pairs if c.candidate.name == score.name and c.setting == score.setting)
+
+
+def starts(steps: Sequence[Disagreement], refits: Refits, names: Names) -> list[Start]:
+    """Starts for one set: each subset's fit with the others at their one-step size, at their best two settings."""
+    made: list[Start] = []
+    for left in names:
+        rest = tuple(n for n in names if n != left)
+        from_fit = refits.get(rest, steps[0].fit)
+        at = next((s for s in reversed(steps) if s.fit.names == rest), steps[0])
+        missing = [n for n in names if n not in from_fit.names]
+        for rank in range(RANKS):
+            point = from_fit.unit.copy()
+            for name in missing:
+                _place(at if name in {s.name for s in at.scores} else steps[0], name, rank, point)
+            made.append((names, point))
+    return made
+
+
+def _place(at: Disagreement, name: str, rank: int, point: np.ndarray) -> None:
+    """Put a candidate at its one-step size, with its `rank`-th best setting, into coordinates (D,)."""
+    ranked, to = ranked_settings(at, name), at.bench.coordinates
+    column, sizes = ranked[min(rank, len(ranked) - 1)]
+    for label, value in column.setting.items():
+        point[to.column[label]] = to.to_unit(label, value)
+    for p, size in zip(column.candidate.sizes, sizes, strict=True):
+        sign = column.candidate.sign(p)
+        moved = max(size * sign, column.candidate.relevant(p) * LEAST_START) * sign if sign else size
+        low, high = p.bounds
+        point[to.column[p.name]] = to.to_unit(p.name, float(np.clip(p.null + moved, low, high)))
+
+
+def ranked_settings(at: Disagreement, name: str) -> list[tuple[Column, np.ndarray]]:
+    """A candidate's settings by how much they lower the deviance, each with its one-step sizes."""
+    drops, _ = at.projection.drops
+    rows = []
+    for k, (column, block) in enumerate(zip(at.tangent.columns, at.projection.blocks, strict=True)):
+        if column.candidate.name == name:
+            size = -np.linalg.pinv(block @ block.T, rcond=1e-10, hermitian=True) @ (block @ at.projection.r[0])
+            rows.append((float(drops[k, 0]), column, size))
+    return [(c, s) for _, c, s in sorted(rows, key=lambda row: -row[0])]

@@ -1,0 +1,118 @@
+"""Fits of sets of effects side by side: each is a lane of the batched descent with its own free columns."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.discrepancy.bench import Bench
+from tractexp.identification.descent import descend
+from tractexp.noise import Noise
+
+ROUGH, EXACT = (12, 0.3), (40, 0.02)  # iterations and tolerance of the deviance
+FIRST = 4  # iterations after which the worse half of a set's starts is given up
+HOPELESS, SLOW = 60.0, 0.3  # of the deviance, and of what it spans: a set this far behind then is not refined
+NESTED = 0.1  # of the deviance: a set that is worse than its own subset by more has not converged
+
+Start = tuple[Sequence[str], np.ndarray]  # names of effects, and coordinates (D,) to start from
+
+
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """The best fit of one set of effects: coordinates (D,) of the whole bench and deviance."""
+
+    names: tuple[str, ...]
+    unit: np.ndarray
+    deviance: float
+    parameters: int  # of the effects
+
+    @property
+    def cost(self) -> float:
+        """Akaike's criterion, by which sets of the same number of effects are compared: a parameter costs 2."""
+        return self.deviance + 2 * self.parameters
+
+
+def best_of(fits: Iterable[Refit]) -> list[Refit]:
+    """The best fit of each set, in order of cost."""
+    best: dict[tuple[str, ...], Refit] = {}
+    for fit in sorted(fits, key=lambda r: (r.cost, r.names)):
+        best.setdefault(fit.names, fit)
+    return list(best.values())
+
+
+def refit(bench: Bench, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None = None) -> list[Refit]:
+    """Fit sets of effects side by side, with the named faults of the measurement free beside each (by default all).
+
+    Of several starts of one set the best is returned; the result is in order of cost.
+    """
+    return best_of(_descended(bench, noise, wanted, faults, EXACT))
+
+
+def rough_refit(bench: Bench, noise: Noise, wanted: Sequence[Start]) -> list[Refit]:
+    """As `refit`, good enough to rank sets that are far apart; what falls behind early is given up."""
+    begun = _descended(bench, noise, wanted, None, (FIRST, ROUGH[1]))
+    best = best_of(begun)
+    far = max(HOPELESS, SLOW * (best[-1].cost - best[0].cost))
+    promising = [r.names for r in best if r.cost <= best[0].cost + far]
+    again = []
+    for names in promising:
+        starts = sorted((r for r in begun if r.names == names), key=lambda r: r.deviance)
+        again += [(names, r.unit) for r in starts[: -(-len(starts) // 2)]]
+    return best_of([*best, *_descended(bench, noise, again, None, (ROUGH[0] - FIRST, ROUGH[1]))])
+
+
+def no_worse_than_subsets(
+    bench: Bench, noise: Noise, refits: Mapping[tuple[str, ...], Refit], fits: Sequence[Refit]
+) -> list[Refit]:  # fmt: skip
+    """Refit from its best subset any set that came out worse than that subset."""
+    again = []
+    for fit in fits:
+        subsets = [refits[s] for s in refits if set(s) < set(fit.names)]
+        best = min(subsets, key=lambda r: r.deviance, default=None)
+        if best is not None and fit.deviance > best.deviance + NESTED:
+            again.append((fit.names, best.unit))
+    if not again:
+        return list(fits)
+    redone = {f.names: f for f in refit(bench, noise, again)}
+    return [min(f, redone.get(f.names, f), key=lambda r: r.deviance) for f in fits]
+
+
+def _descended(
+    bench: Bench, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None, effort: tuple[int, float]
+) -> list[Refit]:
+    """The end of a descent from each start."""
+    at = bench.coordinates
+    prior = at.parameters(at.catalogue.of_measurement if faults is None else tuple(faults))
+    always = [*at.base, *at.before, *prior]
+    columns = [[*always, *(k for k in at.parameters(names) if k not in always)] for names, _ in wanted]
+    table = np.full((len(wanted), max(map(len, columns))), at.dimension)
+    for lane, free in enumerate(columns):
+        table[lane, : len(free)] = free
+    starts = np.array([np.r_[start, 0.0] for _, start in wanted])  # the last column takes what no lane has
+
+    def rows(x: np.ndarray, lanes: np.ndarray) -> np.ndarray:
+        whole = starts[lanes]
+        np.put_along_axis(whole, table[lanes], x, axis=1)
+        return bench.rows(whole[:, :-1], noise, prior, [wanted[lane][0] for lane in lanes])
+
+    begin = np.take_along_axis(starts, table, axis=1)
+    done = descend(rows, begin, table == at.dimension, *effort, bench.apart(len(prior)))
+    np.put_along_axis(starts, table, done.unit, axis=1)
+    return [
+        Refit(tuple(sorted(names)), starts[lane, :-1].copy(), float(done.deviance[lane]), len(at.parameters(names)))
+        for lane, (names, _) in enumerate(wanted)
+    ]
+
+
+def settled(bench: Bench, unit: np.ndarray, noise: Noise, names: Sequence[str]) -> np.ndarray:
+    """Coordinates (D,) with P0 and Q0 of each event fitted, and nothing else."""
+    before = bench.coordinates.before
+
+    def rows(x: np.ndarray, lanes: np.ndarray) -> np.ndarray:
+        whole = np.tile(unit, (len(x), 1))
+        whole[:, before] = x
+        return bench.rows(whole, noise, (), [names] * len(x))
+
+    moved = unit.copy()
+    moved[before] = descend(rows, unit[before][None]).unit[0]
+    return moved

@@ -1,0 +1,72 @@
+"""The noise of one bench, estimated from what its fits leave where little happens."""
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.discrepancy.bench import Bench
+from tractexp.identification.likelihood import Likelihood
+from tractexp.identification.problem import Problem
+from tractexp.noise import Noise
+from tractexp.noise.quiet import estimate
+from tractexp.noise.wander import Rest, Wander, find
+from tractexp.record import Event
+
+
+@dataclass(frozen=True, eq=False)
+class QuietNoise:
+    """Estimates noise on a bench. `blur` (k, 2, N) [pu] is what errors of the voltage do to the power there."""
+
+    bench: Bench
+    blur: np.ndarray | None  # None where the voltage has no noise
+
+    @classmethod
+    def at(cls, bench: Bench, unit: np.ndarray) -> "QuietNoise":
+        """Where errors of the voltage act as they do on the base model at coordinates (D,)."""
+        most = bench.records.voltage_errors
+        if not most:
+            return cls(bench, None)
+        calm = _at_voltage(bench, bench.events, unit)
+        off = [_at_voltage(bench, bench.records.off_by(k), unit) - calm for k in range(most)]
+        return cls(bench, np.nan_to_num(np.array(off)))
+
+    def of_fit(self, unit: np.ndarray) -> Noise:
+        """The noise of the quiet residuals at coordinates (D,)."""
+        return self.of(self.bench.residuals(unit[None])[0])
+
+    def of(self, residual: np.ndarray, left: np.ndarray | None = None, columns: np.ndarray | None = None) -> Noise:
+        """The noise of one residual (2, N) in quiet stretches.
+
+        What a fit leaves (2, N), and columns of all that could explain it (k, 2, N), tell more of how the load wanders.
+        """
+        wander = functools.partial(self._wander, left, columns)
+        return estimate(residual, self.bench.known, self.bench.quiet, wander, self.blur)
+
+    def _wander(self, left: np.ndarray | None, columns: np.ndarray | None, mix: np.ndarray) -> Wander | None:
+        """How the load wanders before the events and during them, in mixed channels."""
+        bench, drive, criteria = self.bench, self.bench.drive, self.bench.criteria
+        before = [drive.measured[:, drive.part(e)][:, event.steady] for e, event in enumerate(bench.events)]
+        rests = []
+        if left is not None and columns is not None and bench.known.all():
+            rests = [
+                Rest(mix @ left[:, part], np.einsum("ij,kjt->kit", mix, columns[:, :, part]), bench.profile[part])
+                for part in map(drive.part, range(drive.events))
+            ]
+        return find(
+            [mix @ b for b in before if np.isfinite(b).all()], bench.events[0].record.step, bench.profile, rests,
+            seen=criteria.wandering_seen, within=criteria.wandering_within, less=criteria.wandering_likely,
+        )  # fmt: skip
+
+
+def white(bench: Bench) -> Noise:
+    """White noise of the level before the dips: what is known before the first fit."""
+    P, Q = (float(np.sqrt(np.mean([getattr(e, f"noise_{c}") ** 2 for e in bench.events]))) for c in "PQ")
+    return Noise(Noise.white(P, Q).pairs, np.eye(2))
+
+
+def _at_voltage(bench: Bench, events: tuple[Event, ...] | list[Event], unit: np.ndarray) -> np.ndarray:
+    """Residuals (2, N) of the base model at coordinates (D,), driven by the voltages of other events."""
+    kernels, at = bench.kernels, bench.coordinates
+    problem = Problem(bench.model, events, kernels.bounds, kernels.fixed, kernels.substeps)
+    return Likelihood.of(problem).residuals(np.r_[unit[at.base], unit[at.before]][None])[0]

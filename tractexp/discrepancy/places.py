@@ -1,0 +1,49 @@
+"""Where the disagreement is: intervals of time and channel with more residual energy than chance leaves there."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.discrepancy.adequacy import LOUDEST, Cell, cells_of, channels_of, energies, extremes
+from tractexp.discrepancy.disagreement import Disagreement
+
+
+@dataclass(frozen=True)
+class Place:
+    """One interval of one channel; `share` is its part of all the excess energy."""
+
+    event: str
+    channel: str
+    start: float  # s, time of the record
+    end: float
+    share: float
+
+
+def places(at: Disagreement) -> list[Place]:
+    """Intervals that stand out at the family-wise error of `false_alarms`, adjacent ones joined, the largest first."""
+    bench = at.bench
+    cells = cells_of(bench)
+    mean, spread, highest = extremes(at.chance.left[LOUDEST])
+    excess = energies(channels_of(at.projection, bench), bench)[0] - mean
+    found = excess / spread > np.quantile(highest, 1 - at.criteria.false_alarms)
+    total = np.maximum(excess, 0.0).sum()
+    made = [
+        Place(
+            bench.events[group[0].event].record.name, group[0].channel, group[0].start, group[-1].end,
+            float(sum(excess[cells.index(c)] for c in group) / total),
+        )
+        for group in _joined([c for c, yes in zip(cells, found, strict=True) if yes])
+    ]  # fmt: skip
+    return sorted(made, key=lambda p: -p.share)
+
+
+def _joined(cells: list[Cell]) -> list[list[Cell]]:
+    """Cells of one channel that follow each other, together."""
+    groups: list[list[Cell]] = []
+    for cell in sorted(cells, key=lambda c: (c.event, c.channel, c.part.start)):
+        last = groups[-1][-1] if groups else None
+        if last and (last.event, last.channel, last.part.stop) == (cell.event, cell.channel, cell.part.start):
+            groups[-1].append(cell)
+        else:
+            groups.append([cell])
+    return groups

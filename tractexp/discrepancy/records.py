@@ -1,0 +1,66 @@
+"""The events of an investigation as the load saw them: the voltage's noise smoothed out, a recorder's window undone."""
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tractexp.discrepancy.recorder_window import RecorderWindow
+from tractexp.errors import UserError
+from tractexp.noise.voltage import Smoothed, smoothed
+from tractexp.record import Event
+
+
+@dataclass(frozen=True, eq=False)
+class Records:
+    """Events as recorded, and as a simulation is driven by them."""
+
+    recorded: tuple[Event, ...]
+    smoothed: tuple[Smoothed, ...]
+    window: RecorderWindow | None = None  # over which the recorder forms phasors, where that is known
+
+    @classmethod
+    def of(cls, events: Sequence[Event], window: RecorderWindow | None = None) -> "Records":
+        """The events, by a recorder of this window."""
+        made = tuple(smoothed(event) for event in events)
+        if window is not None:
+            made = tuple(replace(s, event=window.sharpened(s.event)) for s in made)
+        return cls(tuple(events), made, window)
+
+    @functools.cached_property
+    def events(self) -> tuple[Event, ...]:
+        """What drives the simulation."""
+        return tuple(s.event for s in self.smoothed)
+
+    @property
+    def voltage_errors(self) -> int:
+        """How many shapes of error the voltage of some event may still have."""
+        return max(len(s.errors) for s in self.smoothed)
+
+    def off_by(self, shape: int) -> list[Event]:
+        """The events with one of the errors of their voltage each."""
+        return [s.off_by(shape) for s in self.smoothed]
+
+
+def check_events(train: Sequence[Event], validate: Sequence[Event]) -> None:
+    """Raise `UserError` for events that do not belong together."""
+    held = [e.record.where for e in validate]
+    for event in train:
+        if event.record.where in held:
+            raise UserError(f"{event.record.where} is both in data.train and in data.validate; hold out another event")
+    for event in (*train, *validate):
+        for channel in ("f", "U2"):
+            has, first = getattr(event.record, channel) is not None, train[0]
+            if has != (getattr(first.record, channel) is not None):
+                one, other = (event, first) if has else (first, event)
+                raise UserError(
+                    f"{one.record.where} has the channel {channel} and {other.record.where} has not: events of one"
+                    " investigation need the same channels; remove the column or add it"
+                )
+
+
+def power_profile(measured: np.ndarray, before: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """Apparent power (N,) over that before each event, of P and Q (2, N) with means `before` (E, 2)."""
+    level = np.repeat(np.linalg.norm(before, axis=1), np.diff(first))
+    return np.linalg.norm(measured, axis=0) / np.maximum(level, 1e-9)

@@ -1,0 +1,83 @@
+"""How sure: the sets of names that the data do not reject, and whether any of them is an adequate explanation.
+
+A rival is rejected when, were it the truth, the chosen set would not fit as well as it does (a test of separate
+hypotheses, Cox 1961): with lambda the squared distance between the two fitted curves in standard deviations, the
+rival's advantage would be normal with mean lambda and variance 4 lambda. Curves closer than the test's own quantile,
+and rivals that explain nearly as much, are never told apart: effects are formulas, not the physics. Adequacy is
+tested at each survivor: what is named must leave nothing that a push into some balance, or other parameters in each
+event, would still explain.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tractexp.discrepancy.cores import each_apart
+from tractexp.discrepancy.disagreement import Disagreement, examined
+from tractexp.discrepancy.explanations import Explanations
+from tractexp.discrepancy.fitting import Refit, refit
+
+MOST = 6  # survivors whose adequacy is tested
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """A set of names of the chosen size: how far behind, how far apart, and whether the data reject it."""
+
+    fit: Refit
+    lowered: float  # by how much its deviance is below that of the base model
+    behind: float  # of Akaike's criterion
+    distance: float  # lambda, squared standard deviations
+    rejected: bool
+    tests: Disagreement | None = None  # at its fit, where they were made
+
+    @property
+    def adequate(self) -> bool:
+        """Whether nothing is left that a push into some balance explains."""
+        return self.tests is not None and self.tests.adequate
+
+
+@dataclass(frozen=True, eq=False)
+class Survivors:
+    """The sets that are not rejected, their adequacy tested, and all rivals; the best first."""
+
+    explanations: Explanations
+    kept: tuple[Rival, ...]
+    rivals: tuple[Rival, ...]
+
+    @property
+    def adequate(self) -> tuple[Rival, ...]:
+        """Those that leave nothing; none where the best does not."""
+        return tuple(s for s in self.kept if s.adequate) if self.kept[0].adequate else ()
+
+
+def survivors(explained: Explanations, seed: int) -> Survivors:
+    """Test every refitted set of the chosen size against the best one."""
+    everyone, last, quiet = rivals(explained), explained.last, explained.base.quiet
+
+    def tested(k: int, rival: Rival) -> Rival:
+        tests = last if k == 0 else examined(quiet, rival.fit, last.noise, seed + 100 + k, plain=True)
+        return replace(rival, tests=tests)
+
+    left = [r for r in everyone if not r.rejected][:MOST]
+    kept = each_apart(lambda k: tested(k, left[k]), range(len(left)))
+    by_name = {r.fit.names: r for r in kept}
+    return Survivors(explained, tuple(kept), tuple(by_name.get(r.fit.names, r) for r in everyone))
+
+
+def rivals(explained: Explanations) -> list[Rival]:
+    """Every refitted set of the chosen size under the noise of the last tests, the best first."""
+    bench, noise = explained.base.bench, explained.last.noise
+    wanted = [(f.names, f.unit) for f in explained.refits.values() if len(f.names) == len(explained.chosen.names)]
+    fits = refit(bench, noise, wanted)
+    base = refit(bench, noise, [((), explained.steps[0].fit.unit)])[0]
+    best = fits[0]
+    faults = bench.coordinates.parameters(bench.catalogue.of_measurement)
+    rows = bench.rows(np.array([f.unit for f in fits]), noise, faults, [f.names for f in fits])
+    distances = ((rows - rows[0]) ** 2).sum(axis=1)
+    ranked = []
+    for fit, distance in zip(fits, distances.tolist(), strict=True):
+        behind, parameters = fit.cost - best.cost, fit.parameters + best.parameters
+        rejected = fit is not best and bench.criteria.rejects(behind, distance, parameters, base.cost - best.cost)
+        ranked.append(Rival(fit, base.deviance - fit.deviance, behind, distance, rejected))
+    return ranked

@@ -1,0 +1,37 @@
+"""Whether what the base model leaves is the work of the recorder: phasors averaged over whole cycles.
+
+It is looked for before any effect is. A window that the recorder does not have makes the voltage bend where the power
+does not: that costs much, with effects in the load or without. So one is believed that helps clearly, or at least as
+much as the best effect does.
+"""
+
+from tractexp.discrepancy.base_fit import BaseFit, fitted_from
+from tractexp.discrepancy.disagreement import Disagreement, disagreement
+from tractexp.discrepancy.fitting import refit, rough_refit
+from tractexp.discrepancy.recorder_window import RecorderWindow, windows_of
+from tractexp.discrepancy.records import Records
+
+
+def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[BaseFit, Disagreement]:
+    """The base model's fit and tests behind the recorder's window, where there is one; else those given."""
+    bench, noise, found = base.bench, first.noise, None
+    if noise.loudest_blur > bench.criteria.blurred:  # noise of the voltage would pass for a window
+        return base, first
+    least = bench.criteria.least_window(max((s.drop for s in first.scores), default=0.0))
+    for cycles, length in windows_of(bench.events).items():
+        behind = bench.on(Records.of(bench.records.recorded, RecorderWindow(length)))
+        starts = (first.fit.unit, *base.valleys)  # the load's valleys: no window moves them far
+        begun = rough_refit(behind, noise, [((), start) for start in starts])[0]
+        fit = refit(behind, noise, [((), begun.unit)])[0]
+        gained = first.fit.deviance - fit.deviance
+        if cycles == 1 and gained <= 0:
+            break  # an average over several cycles is one of averages over one
+        if gained > least:
+            found, least = (behind, fit), gained
+    if found is None:
+        return base, first
+    behind, fit = found
+    assert behind.records.window is not None
+    bench.effort.say(f"{behind.records.window.describe()}: taken into account from here on")
+    base = fitted_from(behind, [fit.unit], base.valleys)
+    return base, disagreement(base, seed)

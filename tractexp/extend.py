@@ -1,0 +1,36 @@
+"""Everything a plugin imports, in one place; docs/plugins.md tells what each is for.
+
+from tractexp.extend import Effect, Parameter, plugin, sites
+"""
+
+from tractexp.errors import UserError, check_choice, check_range
+from tractexp.identification.loss import Loss
+from tractexp.identification.optimizer import Optimizer
+from tractexp.model import sites
+from tractexp.model.drive import EVENT, INPUTS
+from tractexp.model.parts import Effect, Measurement, Motor, Static, Unfit
+from tractexp.parameter import Parameter
+from tractexp.plugin import plugin
+from tractexp.record import Base, Events, Reader, Record
+
+__all__ = [
+    "EVENT",
+    "INPUTS",
+    "Base",
+    "Effect",
+    "Events",
+    "Loss",
+    "Measurement",
+    "Motor",
+    "Optimizer",
+    "Parameter",
+    "Reader",
+    "Record",
+    "Static",
+    "Unfit",
+    "UserError",
+    "check_choice",
+    "check_range",
+    "plugin",
+    "sites",
+]

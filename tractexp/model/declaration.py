@@ -1,0 +1,107 @@
+"""What the parts of a load return, written into one declaration: the framework's half of every part."""
+
+import inspect
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import sympy
+from sympy import conjugate, im, re
+
+from tractexp.errors import UserError
+from tractexp.model import sites
+from tractexp.model.equations import Equations
+from tractexp.model.parts import Effect, Measurement, Motor, Static, Unfit
+from tractexp.model.signature import asked
+
+ROUNDING = 1e-9  # how far from 1 a law may be before the event
+
+
+class Refused(UserError):
+    """An effect does not fit a model, and why."""
+
+    def __init__(self, effect: str, reason: str):
+        super().__init__(f"the effect '{effect}' cannot be added to this model: {reason}")
+        self.effect, self.reason = effect, reason
+
+
+def declared(motor: Motor, static: Static, effects: Sequence[Effect], title: str) -> Equations:
+    """The equations of a load. Raises `Refused` for an effect that does not fit, `UserError` for parts that do not."""
+    eq = Equations()
+    _motor(eq, motor)
+    _static(eq, static)
+    for effect in effects:
+        try:
+            _effect(eq, effect)
+        except Unfit as why:
+            raise Refused(effect.name, str(why)) from why
+    if eq.P == 0 and eq.Q == 0:
+        raise UserError(f"the {title} draw no power; choose a model/motor or a model/static other than 'none'")
+    eq.close()
+    return eq
+
+
+def motor_alone(motor: Motor) -> Equations:
+    """What a motor declares by itself."""
+    eq = Equations()
+    _motor(eq, motor)
+    return eq
+
+
+def _motor(eq: Equations, motor: Motor) -> None:
+    """The motor draws V conj(I)."""
+    eq.write("motor")
+    current = motor.declare(eq, **eq.declare(motor.parameters))
+    if current is None:
+        if eq.states or eq.definitions:
+            raise UserError(f"declare() of the motor '{motor.name}' returns nothing; it must return the stator current")
+        return
+    V = eq.V
+    if sites.stator_current not in eq:
+        current = eq.place(sites.stator_current, current)
+    drawn = V * conjugate(current)
+    eq.consume(eq.place(sites.P_motor, re(drawn)), eq.place(sites.Q_motor, im(drawn)))
+
+
+def _static(eq: Equations, static: Static) -> None:
+    """The static load draws its law times what the other parts leave."""
+    eq.write("static")
+    own = eq.declare(static.parameters)
+    u = sympy.Symbol(sites.static_voltage.name, real=True)
+    f = sympy.Symbol("static_frequency", real=True)
+    given = own | ({"f": f} if "f" in inspect.signature(static.law).parameters else {})
+    law = static.law(u, **given)
+    for requirement in static.require(**asked(static.require, own | {"P0": eq.P0, "Q0": eq.Q0, "U0": eq.U0})):
+        eq.require(*requirement)
+    if law is None:
+        return
+    _check_law(static, law, {u: 1, f: 1, **{own[p.name]: p.default for p in static.parameters}})
+    eq.place(sites.static_voltage, eq.U / eq.U0)
+    if "f" in given:
+        eq.define(f.name, (eq.omega_n + eq.omega_s) / (eq.omega_n + eq.omega_s0), "f")
+    P, Q = law
+    eq.consume(eq.place(sites.P_static, eq.P_s0 * P), eq.place(sites.Q_static, eq.Q_s0 * Q))
+
+
+def _check_law(static: Static, law: Any, before: Mapping[sympy.Symbol, float]) -> None:
+    """Raise `UserError` unless the law is a pair that is 1 at the voltage and frequency before the event."""
+    where = f"law() of the static load '{static.name}'"
+    if not (isinstance(law, tuple | list) and len(law) == 2):
+        raise UserError(f"{where} returns {law!r}; it must return two expressions, P/P_s0 and Q/Q_s0, or None")
+    for what, share in zip(("P/P_s0", "Q/Q_s0"), law, strict=True):
+        value = sympy.sympify(share).subs(before)
+        if value.free_symbols:
+            raise UserError(
+                f"{where}: {what} reads {', '.join(sorted(map(str, value.free_symbols)))}, which it does not have"
+            )
+        if not abs(float(value) - 1) < ROUNDING:
+            raise UserError(f"{where}: {what} is {float(value):.6g} before the event (u = 1), and must be 1 there")
+
+
+def _effect(eq: Equations, effect: Effect) -> None:
+    """Raises `Unfit` with the reason where the effect makes no sense for the equations."""
+    if why := effect.refusal(eq):
+        raise Unfit(why)
+    eq.write(effect.name)
+    if not isinstance(effect, Measurement):
+        eq.edits[effect.name] = []
+    effect.edit(eq, **eq.declare(effect.parameters))

@@ -1,0 +1,73 @@
+"""The sites of a load: the places in its equations that an effect may edit, each with its type and its owner.
+
+A motor places its own (`eq.place(sites.coupling, C)`), the framework those of the static load and of the bus. An effect
+edits them (`eq.edit(sites.P_static, change)`) or reads them (`eq[sites.static_voltage]`). A real site stays real.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from tractexp.errors import UserError, among
+
+if TYPE_CHECKING:
+    from tractexp.model.model import Model
+    from tractexp.outcome import Table
+
+
+@dataclass(frozen=True)
+class Site:
+    """A place in the equations. `latex` is its usual symbol, which a part may replace where it places it."""
+
+    name: str
+    latex: str
+    kind: Literal["real", "phasor"]
+    unit: str
+    owner: Literal["motor", "static", "bus"]
+    about: str
+
+
+motor_voltage = Site("motor_voltage", "V", "phasor", "pu", "motor", "voltage at the motor's terminals")
+stator_impedance = Site("stator_impedance", "Z'", "phasor", "pu", "motor", "impedance from the terminals to the flux")
+stator_current = Site("stator_current", "I", "phasor", "pu", "motor", "current into the motor's terminals")
+coupling = Site("coupling", "c", "real", "1", "motor", "(X - X')/X, the rotor's share in the reactance")
+time_constant = Site("time_constant", r"\tau'", "real", "s", "motor", "transient time constant X'/X T0'")
+electrical_torque = Site("electrical_torque", "T_e", "real", "pu", "motor", "torque the field exerts on the rotor")
+load_torque = Site("load_torque", "T_L", "real", "pu", "motor", "torque of what the motor drives")
+P_motor = Site("P_motor", "P_d", "real", "pu", "motor", "active power of the motor")
+Q_motor = Site("Q_motor", "Q_d", "real", "pu", "motor", "reactive power of the motor")
+static_voltage = Site("static_voltage", "u", "real", "1", "static", "voltage over that before the event, where it acts")
+P_static = Site("P_static", "P_s", "real", "pu", "static", "active power of the static load")
+Q_static = Site("Q_static", "Q_s", "real", "pu", "static", "reactive power of the static load")
+P = Site("P", "P", "real", "pu", "bus", "active power of all parts together")
+Q = Site("Q", "Q", "real", "pu", "bus", "reactive power of all parts together")
+
+SITES = {site.name: site for site in list(globals().values()) if isinstance(site, Site)}
+
+
+def named(what: "Site | str") -> Site:
+    """The site itself, or the one of that name. Raises `UserError` with the nearest name where there is none."""
+    if isinstance(what, Site):
+        return what
+    if what not in SITES:
+        raise UserError(f"there is no site '{what}'{among(what, SITES, 'Sites')}")
+    return SITES[what]
+
+
+def sites(model: "Model") -> "Table":
+    """The sites of a model: what stands at each, and the registered effects that edit it.
+
+    Every registered effect is tried on the model, which takes seconds the first time and is remembered then.
+    """
+    from tractexp.outcome import Table
+    from tractexp.plugin import discover
+
+    if not hasattr(model, "acceptance"):
+        raise UserError(f"sites() takes a model, as compose() makes one, not a {type(model).__name__}")
+    eq, effects = model.equations, discover().get("effect", {})
+    here = {effect.name for effect in model.effects}
+    edits = {name: model.acceptance(cls()).edits for name, cls in effects.items() if cls.name not in here}
+    rows = []
+    for s in (site for site in SITES.values() if site in eq):
+        by = ", ".join(sorted(name for name, edited in edits.items() if s.name in edited))
+        rows.append((s.name, s.owner, s.kind, s.unit, s.about, str(eq.expression(s)), by))
+    return Table(("site", "of", "kind", "unit", "what", "expression", "edited by"), rows, f"Sites of {model.title}")

@@ -1,0 +1,143 @@
+"""The noise of P and Q together: correlated with each other and in time, and how residuals are whitened by it.
+
+Beside fast noise there may be shapes of known variance, slow or local: the wandering of the load, and what is left of
+the voltage's noise, which enters the model and leaves it in P and Q at once.
+"""
+
+import functools
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tractexp.model.drive import Drive
+from tractexp.noise.color import Autoregression, white_noise
+from tractexp.noise.wander import Wander
+
+BURN_IN = 500  # samples
+UNSEEN = 0.05  # standard deviations of the fast noise: shapes that do less are left out
+
+Pair = tuple[Autoregression, Autoregression]  # of P and of Q
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """Residuals (P, Q) of each event, times `mix`, are two independent autoregressions.
+
+    `pairs` has one for each event, or a single one that holds for every event. Without `mix` P and Q are independent
+    as they stand, and a sample of one counts where the other is missing.
+    """
+
+    pairs: tuple[Pair, ...]
+    mix: np.ndarray | None = None  # (2, 2)
+    shocks: tuple[np.ndarray, np.ndarray] | None = None  # of unit variance, as they were seen; None: normal
+    wander: Wander | None = None  # of the mixed channels
+    blur: np.ndarray | None = None  # (k, 2, N) pu: what errors of the voltage do, each of one standard deviation
+    _shrunk: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict, init=False)
+
+    @classmethod
+    def white(cls, P: float, Q: float) -> "Noise":
+        """Independent samples of these standard deviations [pu]."""
+        return cls(((white_noise(P), white_noise(Q)),))
+
+    def pair(self, event: int) -> Pair:
+        """The autoregressions of P and Q in one event."""
+        return self.pairs[event if len(self.pairs) > 1 else 0]
+
+    def of(self, event: int) -> "Noise":
+        """The noise of one event by itself, without its shapes."""
+        return Noise((self.pair(event),), self.mix)
+
+    @functools.cached_property
+    def loudest_blur(self) -> float:
+        """The largest variance that noise of the voltage causes at any sample, over that of the power."""
+        return 0.0 if self.blur is None else float((self._mixed(self.blur) ** 2).sum(axis=0).max())
+
+    def on(self, profile: np.ndarray, blur: np.ndarray | None = None) -> "Noise":
+        """The same noise on other events: their power over that before (N,), what errors of their voltage do."""
+        wander = None if self.wander is None else replace(self.wander, profile=profile)
+        return replace(self, wander=wander, blur=blur)
+
+    def whiten(self, residuals: np.ndarray, drive: Drive, known: np.ndarray) -> np.ndarray:
+        """(n, 2, N) to rows (n, 2 N) of independent unit variance; samples that are not `known` (2, N) are 0."""
+        if self.mix is not None:
+            known = np.broadcast_to(known.all(axis=0), known.shape)
+        rows = np.empty_like(residuals)
+        with np.errstate(over="ignore", invalid="ignore"):  # what diverges has a deviance that is not finite
+            mixed = self._mixed(residuals)
+            for e in range(drive.events):
+                part = drive.part(e)
+                white = self._fast(mixed[:, :, part], known[:, part], e)
+                rows[:, :, part] = self._without_shapes(white, known[:, part], part, e)
+        return rows.reshape(len(rows), -1)
+
+    def draw(self, rng: np.random.Generator, count: int, lengths: Sequence[int]) -> np.ndarray:
+        """Noise of events of these lengths end to end, (count, 2, N) [pu]."""
+        ends = np.cumsum([0, *lengths]).tolist()
+        drawn = [self._drawn(rng, count, slice(a, b), e) for e, (a, b) in enumerate(itertools.pairwise(ends))]
+        joined = np.concatenate(drawn, axis=2)
+        return joined if self.mix is None else np.linalg.solve(self.mix, joined)
+
+    def worth(self, samples: int) -> float:
+        """How many independent samples tell as much of the slowest of this noise, by the color's gain at rest."""
+        channels = [channel for pair in self.pairs for channel in pair]
+        gains = [1 / max(1 - float(a.coefficients[-1].sum()), 1e-3) for a in channels]
+        spreads = [a.deviation[0] / a.deviation[-1] for a in channels]
+        return samples / max(1.0, *((g / s) ** 2 for g, s in zip(gains, spreads, strict=True)))
+
+    def describe(self) -> str:
+        """Level and color, as a run prints them."""
+        pair = self.pairs[0]
+        back = np.eye(2) if self.mix is None else np.linalg.inv(self.mix)
+        level = [np.sqrt(back[c] ** 2 @ [a.deviation[0] ** 2 for a in pair]) for c in (0, 1)]
+        color = "white" if all(a.white for a in pair) else f"colored (order {max(a.order for a in pair)})"
+        return f"P {level[0]:.2g} pu, Q {level[1]:.2g} pu, {color}"
+
+    def _mixed(self, rows: np.ndarray) -> np.ndarray:
+        """Channels (n, 2, N) mixed so that their noise is independent."""
+        return rows if self.mix is None else self.mix @ rows
+
+    def _fast(self, mixed: np.ndarray, known: np.ndarray, event: int) -> np.ndarray:
+        """Mixed channels (n, 2, samples) of one event without the color of the fast noise."""
+        rows = [channel.whiten(mixed[:, c], known[c]) for c, channel in enumerate(self.pair(event))]
+        return np.stack(rows, axis=1)
+
+    def _without_shapes(self, white: np.ndarray, known: np.ndarray, part: slice, event: int) -> np.ndarray:
+        """Whitened rows (n, 2, samples) of an event without the excess variance of its shapes.
+
+        With B the whitened shapes, (I + B'B)^(-1/2) by their singular vectors.
+        """
+        if self.wander is None and self.blur is None:
+            return white
+        flat = white.reshape(len(white), -1)
+        if event not in self._shrunk:
+            shapes = self._fast(self._shapes(part), known, event)
+            _, values, basis = np.linalg.svd(shapes.reshape(len(shapes), -1), full_matrices=False)
+            seen = values > UNSEEN
+            self._shrunk[event] = basis[seen], 1 - 1 / np.sqrt(1 + values[seen] ** 2)
+        basis, share = self._shrunk[event]
+        return (flat - ((flat @ basis.T) * share) @ basis).reshape(white.shape)
+
+    def _shapes(self, part: slice) -> np.ndarray:
+        """Shapes (k, 2, samples) of the mixed channels in one event, of one standard deviation each."""
+        made = [np.empty((0, 2, part.stop - part.start))]
+        if self.wander is not None:
+            for c in (0, 1):
+                modes = self.wander.modes(c, part)
+                made.append(np.zeros((len(modes), *made[0].shape[1:])))
+                made[-1][:, c] = modes
+        if self.blur is not None:
+            made.append(self._mixed(self.blur[:, :, part]))
+        return np.concatenate(made)
+
+    def _drawn(self, rng: np.random.Generator, count: int, part: slice, event: int) -> np.ndarray:
+        """Mixed channels (count, 2, samples) of one event."""
+        made = []
+        size = (count, part.stop - part.start + BURN_IN)
+        for c, channel in enumerate(self.pair(event)):
+            shocks = rng.standard_normal(size) if self.shocks is None else rng.choice(self.shocks[c], size)
+            shocks *= channel.deviation[-1]
+            made.append(channel.recurring(shocks)[:, BURN_IN:])
+        shapes = self._shapes(part)
+        return np.stack(made, axis=1) + np.einsum("bk,kct->bct", rng.standard_normal((count, len(shapes))), shapes)

@@ -1,0 +1,68 @@
+"""Noise where little happens: estimated from what a fit leaves before the dips and at the end of the records."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.model.drive import Drive
+from tractexp.noise.color import FEWEST, Autoregression, fit_autoregression
+from tractexp.noise.model import Noise
+from tractexp.noise.wander import Wander, without_slow
+from tractexp.record import Event
+
+HIGHEST = 8  # order of the autoregressions
+TAIL = 0.35  # share of the record after the dip that counts as quiet
+SHORTEST = 8  # samples of a stretch
+MANY = 200  # quiet samples from which shocks are drawn as they were seen, with their tails and steps
+
+
+def quiet_stretches(events: Sequence[Event], drive: Drive) -> list[slice]:
+    """The samples before each dip and those at the end of the record, where little happens."""
+    parts = []
+    for e, event in enumerate(events):
+        first, n = int(drive.first[e]), event.record.samples
+        tail = round(n - TAIL * (n - event.end))
+        parts += [slice(first, first + event.start), slice(first + tail, first + n)]
+    return [p for p in parts if p.stop - p.start >= SHORTEST]
+
+
+def estimate(
+    residuals: np.ndarray,
+    known: np.ndarray,
+    quiet: Sequence[slice],
+    wander: Callable[[np.ndarray], Wander | None] = lambda mix: None,
+    blur: np.ndarray | None = None,
+) -> Noise:
+    """Noise from residuals (2, N) in quiet stretches; `wander` tells how the load wanders in channels mixed by `mix`.
+
+    Raises `UserError` where too few samples are quiet.
+    """
+    both = known.all(axis=0)
+    pieces = [residuals[:, part][:, both[part]] for part in quiet]
+    count = sum(p.shape[1] for p in pieces)
+    if count < FEWEST:
+        raise UserError(
+            f"the noise cannot be told from {count} quiet samples before and after the dips: at least {FEWEST} are"
+            " needed; give records that start earlier"
+        )
+    together = np.concatenate(pieces, axis=1)
+    covariance = together @ together.T / count
+    covariance += 1e-18 * np.eye(2)
+    mix = np.linalg.inv(np.linalg.cholesky(covariance))
+    slow = wander(mix)
+    fast = [[(mix @ p)[c] for p in pieces] for c in (0, 1)]
+    if slow is not None:
+        fast = [[without_slow(p) for p in channel] for channel in fast]
+    # Sparing, because a color that is not there changes the weight of slow differences, which every effect makes.
+    P, Q = (fit_autoregression(channel, HIGHEST, sparing=True) for channel in fast)
+    shocks = None
+    if count >= MANY:
+        shocks = _shocks(P, fast[0]), _shocks(Q, fast[1])
+    return Noise(((P, Q),), mix, shocks, slow, blur)
+
+
+def _shocks(channel: Autoregression, pieces: Sequence[np.ndarray]) -> np.ndarray:
+    """What the past of a channel does not predict, centered and scaled to unit variance."""
+    white = np.concatenate([channel.whiten(p, np.ones(len(p), dtype=bool))[channel.order :] for p in pieces])
+    return (white - white.mean()) / max(float(white.std()), 1e-300)

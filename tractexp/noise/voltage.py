@@ -1,0 +1,119 @@
+"""The voltage channel's own noise. The load never saw it, but a simulation driven by the record does.
+
+Where the voltage is smooth it is replaced by a cubic and cosines whose amplitudes fall with the square of the
+frequency: a smoothing spline in other words, its stiffness the likeliest (Wahba 1990). Near the edges of a dip it is
+left as recorded. Either way something of the noise remains; how much, and in which shapes, is known, and what they do
+to the calculated power is part of the noise of a study. Left out of account they would do harm: whatever smooths the
+calculated power, or wanders slowly, would seem to be there.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tractexp.noise.color import runs
+from tractexp.noise.wander import Walk, cosines
+from tractexp.record import Event
+
+HALF_WIDTHS = (1, 2, 3, 5, 8)  # samples of the averages that must agree where the voltage is smooth
+AGREE = 2.5  # standard deviations within which they do
+MARGIN = 3  # samples beside an edge that are not smooth
+BOUND, BESIDE = 4.0, 2.0  # standard deviations of an average that smoothing may leave, and beside an edge
+SHORTEST = 24  # samples of a stretch worth smoothing
+DEGREE, COSINES = 3, 32  # of the curve through a smooth stretch
+MOST = 400  # samples as recorded whose errors are followed up, the nearest to the dip: each costs a simulation
+UNSEEN = 0.01  # share of a direction's noise: less of it is left out
+SILENT = 1e-5  # pu: less noise than this is none
+
+
+@dataclass(frozen=True, eq=False)
+class Smoothed:
+    """An event with a smooth voltage, and what may still be wrong with it.
+
+    `errors` (k, N) [pu] are shapes of it, independent, each of the size of one standard deviation.
+    """
+
+    event: Event
+    errors: np.ndarray
+
+    def off_by(self, shape: int) -> Event:
+        """The event with one of the errors, or without where there are fewer."""
+        if shape >= len(self.errors):
+            return self.event
+        record = self.event.record
+        return replace(self.event, record=replace(record, U=record.U + self.errors[shape]))
+
+
+def smoothed(event: Event) -> Smoothed:
+    """Take the noise of the voltage out of one event."""
+    U, deviation = event.record.U, noise_of(event.record.U[event.steady])
+    if deviation < SILENT:
+        return Smoothed(event, np.empty((0, len(U))))
+    rough = _edges(U, deviation)
+    rough[[event.start, min(event.end, len(U) - 1)]] = True
+    rough = _widened(rough)
+    while True:
+        made, errors = U.copy(), []
+        for part in runs(~rough):
+            curve, own = _curve(U[part], deviation)
+            made[part] = curve
+            errors.append(np.zeros((len(own), len(U))))
+            errors[-1][:, part] = own
+        far = _distance(U - made, deviation) / np.where(_widened(rough), BESIDE, BOUND) * ~rough
+        if far.max() < 1:
+            break
+        rough[far.argmax()] = True
+        rough = _widened(rough)
+    raw = np.flatnonzero(rough)
+    apart = np.maximum(event.start - raw, 0) + np.maximum(raw - event.end, 0)
+    raw = raw[np.argsort(apart, kind="stable")[:MOST]]
+    errors.append(deviation * (np.arange(len(U)) == raw[:, None]))
+    return Smoothed(replace(event, record=replace(event.record, U=made)), np.concatenate(errors))
+
+
+def noise_of(U: np.ndarray) -> float:
+    """Standard deviation of white noise on a smooth voltage (n,), from its third differences."""
+    third = np.diff(U, 3)
+    return float(np.median(np.abs(third)) / 0.6745 / np.sqrt(20)) if len(third) else 0.0
+
+
+def _edges(U: np.ndarray, deviation: float) -> np.ndarray:
+    """Where the voltage (N,) moves faster than averages can follow."""
+    index, sums = np.arange(len(U)), np.concatenate(([0.0], np.cumsum(U)))
+    low, high = U - AGREE * deviation, U + AGREE * deviation
+    for half in HALF_WIDTHS:
+        h = np.minimum(half, np.minimum(index, index[::-1]))  # symmetric at the ends too, or a slope would bend
+        mean = (sums[index + h + 1] - sums[index - h]) / (2 * h + 1)
+        reach = AGREE * deviation / np.sqrt(2 * h + 1)
+        low, high = np.maximum(low, mean - reach), np.minimum(high, mean + reach)
+    return low > high
+
+
+def _widened(rough: np.ndarray) -> np.ndarray:
+    """Rough samples with those beside them, and the stretches between them that are too short to be smoothed."""
+    wide = np.convolve(rough, np.ones(2 * MARGIN + 1), "same") > 0.5
+    for part in runs(~wide):
+        if part.stop - part.start < SHORTEST:
+            wide[part] = True
+    return wide
+
+
+def _distance(left: np.ndarray, deviation: float) -> np.ndarray:
+    """How far the worst average around each sample of what is left (N,) is from zero, in standard deviations."""
+    far = np.abs(left)
+    for half in HALF_WIDTHS:
+        window = np.ones(2 * half + 1) / np.sqrt(2 * half + 1)
+        far = np.maximum(far, np.abs(np.convolve(left, window, "same")))
+    return far / deviation
+
+
+def _curve(U: np.ndarray, deviation: float) -> tuple[np.ndarray, np.ndarray]:
+    """The likeliest curve through a stretch (n,), and its errors (k, n) of one standard deviation each."""
+    n = len(U)
+    fixed = np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1, 1, n), DEGREE))[0].T
+    count = min(COSINES, n // 8)
+    walk = Walk.of(U / deviation, fixed, cosines(n, count) / np.arange(1, count + 1)[:, None] ** 2)
+    share = walk.share(walk.likeliest)
+    curve = (U @ fixed.T) @ fixed + deviation * ((walk.along * share) @ walk.basis)
+    seen = share > UNSEEN
+    return curve, deviation * np.concatenate([fixed, np.sqrt(share[seen, None]) * walk.basis[seen]])

@@ -1,0 +1,156 @@
+"""What a person sees while a call runs: lines, and one progress line, on a terminal, in a notebook or in a log file.
+
+All by rich. In a notebook its own live display asks for ipywidgets; the same bar is shown by IPython's display
+instead, which every notebook has.
+"""
+
+import functools
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+LOG_WIDTH = 120  # characters a table may take in a log file
+FIRST_LINE, NEXT_LINES = 2.0, 10.0  # s: a log file gets a progress line after so long, then every so often
+BLINK = 0.15  # s between two pictures of a bar in a notebook
+
+Progress = Callable[[str], None] | bool | None  # of a call: None shows it, False does not, a callable is told each line
+
+
+@functools.cache
+def console() -> Any:
+    from rich.console import Console
+
+    made = Console(highlight=False, soft_wrap=True)
+    return made if made.is_terminal or made.is_jupyter else Console(highlight=False, soft_wrap=True, width=LOG_WIDTH)
+
+
+def say(text: str = "") -> None:
+    """Print one line."""
+    console().print(text, markup=False)
+
+
+@contextmanager
+def searching(iterations: int | None, budget: int | None, progress: Progress = None) -> Iterator[Any]:
+    """Yield the search loop's progress callback: a live line, or a line now and then in a log file; None for False."""
+    from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+
+    if progress is False:
+        yield None
+        return
+    if not _lively():
+        yield _Lines(iterations, budget)
+        return
+    columns = [
+        TextColumn("  searching"),
+        BarColumn(bar_width=24),
+        TextColumn("{task.fields[simulations]} simulations, best objective {task.fields[best]:.4g},"),
+        TimeRemainingColumn(compact=True),
+        TextColumn("left"),
+    ]
+    with _live(columns, 1.0 if iterations or budget else None, simulations=0, best=float("nan")) as update:
+
+        def callback(iteration: int, best: float, simulations: int) -> None:
+            done = share(iteration, simulations, iterations, budget)
+            update(completed=done or 0.0, simulations=simulations, best=best)
+
+        yield callback
+
+
+@contextmanager
+def counting(what: str, total: int, progress: Progress = None) -> Iterator[Callable[[], None]]:
+    """Yield what is to be called at the end of each of `total` parts: a bar, or a line now and then in a log file."""
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+
+    if progress is False:
+        yield lambda: None
+        return
+    if _lively():
+        columns = [TextColumn(f"  {what}"), BarColumn(bar_width=30), MofNCompleteColumn(), TimeRemainingColumn()]
+        with _live(columns, total) as update:
+            yield lambda: update(advance=1)
+        return
+    started, due, done = time.perf_counter(), FIRST_LINE, 0
+
+    def count() -> None:
+        nonlocal due, done
+        done += 1
+        spent = time.perf_counter() - started
+        if spent >= due and done < total:
+            due = spent + NEXT_LINES
+            say(f"  {done} of {total} {what}, about {spent * (total - done) / done:.0f} s left")
+            sys.stdout.flush()
+
+    yield count
+
+
+@contextmanager
+def telling(progress: Progress) -> Iterator[Callable[[str], None]]:
+    """Yield what is to be told each stage: the newest stands on a live line; in a log file each has its own."""
+    from rich.progress import TextColumn, TimeElapsedColumn
+
+    if callable(progress) or progress is False:
+        yield progress or (lambda line: None)
+    elif _lively():
+        with _live([TimeElapsedColumn(), TextColumn("{task.fields[stage]}")], None, stage="") as update:
+            yield lambda line: update(stage=line)
+    else:
+        yield lambda line: say(f"  {line}")
+
+
+def share(iteration: int, simulations: int, iterations: int | None, budget: int | None) -> float | None:
+    """How much of the search is done, in [0, 1], by whichever end comes first; None where neither is known."""
+    parts = [done / end for done, end in ((iteration, iterations), (simulations, budget)) if end]
+    return min(max(parts), 1.0) if parts else None
+
+
+class _Lines:
+    def __init__(self, iterations: int | None, budget: int | None):
+        self.iterations, self.budget = iterations, budget
+        self.started = time.perf_counter()
+        self.due = FIRST_LINE
+
+    def __call__(self, iteration: int, best: float, simulations: int) -> None:
+        spent = time.perf_counter() - self.started
+        if spent < self.due:
+            return
+        self.due = spent + NEXT_LINES
+        done = share(iteration, simulations, self.iterations, self.budget)
+        left = f", about {spent / done - spent:.0f} s left" if done else ""
+        say(f"  iteration {iteration}: {simulations} simulations, best objective {best:.4g}{left}")
+        sys.stdout.flush()
+
+
+def _lively() -> bool:
+    return console().is_terminal or console().is_jupyter
+
+
+@contextmanager
+def _live(columns: list[Any], total: float | None, **fields: Any) -> Iterator[Callable[..., None]]:
+    """Yield `update(completed=..., **fields)` of one bar, which vanishes at the end."""
+    from rich.progress import Progress as Bar
+
+    if not console().is_jupyter:
+        with Bar(*columns, console=console(), transient=True, refresh_per_second=8) as bar:
+            line = bar.add_task("", total=total, **fields)
+            yield lambda **news: bar.update(line, **news)
+        return
+    from IPython.display import HTML, display
+
+    bar = Bar(*columns, console=console(), auto_refresh=False)
+    line = bar.add_task("", total=total, **fields)
+    shown: Any = display(bar, display_id=True)
+    due = time.perf_counter() + BLINK
+
+    def update(**news: Any) -> None:
+        nonlocal due
+        bar.update(line, **news)
+        if time.perf_counter() >= due:
+            due = time.perf_counter() + BLINK
+            shown.update(bar)
+
+    try:
+        yield update
+    finally:
+        shown.update(HTML(""))

@@ -1,0 +1,271 @@
+"""What motors, static loads, effects of the load and effects of the measurement must satisfy."""
+
+import functools
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.model.drive import Drive
+from tractexp.model.model import Model, compose
+from tractexp.model.parts import Effect, Measurement, Motor, Part, Static
+from tractexp.parameter import Parameter
+from tractexp.plugin import discover
+from tractexp.testing import drives
+
+SAME = 1e-12  # pu: what rounding leaves between equal equations
+STILL = 1e-9  # pu: what a steady state solved to rounding drifts by
+SHOWN = 1e-5  # pu: what a record can show at all
+LARGEST = 30.0  # pu: no load draws more
+SUBSTEPS = 4
+COUNTS = (2, 4, 8, 16, 32, 64, 128, 256)  # Runge-Kutta steps a sample, of which those in the asymptotic range count
+ASYMPTOTIC = (1e-11, 1e-6)  # pu: errors of the fourth order, above rounding
+
+
+# Models to put a part into
+
+
+@functools.cache
+def partners() -> tuple[type[Motor], type[Static]]:
+    """The registered motor and static load a contract is played with: few parameters, a flux and a speed that move."""
+    motors = [cls for cls in _all("model/motor") if _moves(cls)]
+    statics = [cls for cls in _all("model/static") if cls.parameters and not cls.reads]
+    if not (motors and statics):
+        raise UserError("contracts need a registered motor with flux and speed and a static load with parameters")
+    return tuple(min(classes, key=lambda cls: (len(cls.parameters), cls.name)) for classes in (motors, statics))  # type: ignore[return-value]
+
+
+def _moves(cls: type[Motor]) -> bool:
+    """Whether a motor has a flux and a speed that move."""
+    from tractexp.model.declaration import motor_alone
+
+    return {"flux", "speed"} <= {s.role for s in motor_alone(cls()).states.values() if s.derivative != 0}
+
+
+def _all(group: str) -> list[type]:
+    return [cls for _, cls in sorted(discover().get(group, {}).items())]
+
+
+@functools.cache
+def model(motor: type[Motor], static: type[Static], *effects: type[Effect]) -> Model:
+    """A load of these parts with default settings."""
+    return compose(motor(), static(), [cls() for cls in effects])
+
+
+def with_part(cls: type[Part]) -> Model:
+    """The model a motor, a static load or an effect is tried in."""
+    motor, static = partners()
+    if issubclass(cls, Motor):
+        return model(cls, static)
+    if issubclass(cls, Static):
+        return model(motor, cls)
+    return model(*_base(cls), cls)
+
+
+@functools.cache
+def _base(cls: type[Effect]) -> tuple[type[Motor], type[Static]]:
+    """The parts of the base model of an effect: the usual partners, or the first pair that takes it."""
+    for motor, static in _bases():
+        if _taken(motor, static, cls) is None:
+            return motor, static
+    raise AssertionError(f"no registered motor and static load take the effect '{cls.name}'")
+
+
+def _bases() -> Iterator[tuple[type[Motor], type[Static]]]:
+    """The usual partners, then each registered part beside the other of them."""
+    motor, static = partners()
+    yield motor, static
+    yield from ((other, static) for other in _all("model/motor") if other is not motor)
+    yield from ((motor, other) for other in _all("model/static") if other is not static)
+
+
+def _taken(motor: type[Motor], static: type[Static], cls: type[Effect]) -> str | None:
+    """Why a base model refuses an effect, None where it takes it. Anything but a sentence is raised."""
+    return model(motor, static).acceptance(cls()).refusal
+
+
+def values(of: Model, pick: Callable[[Parameter], float] = lambda p: p.default, only: Part | None = None) -> np.ndarray:
+    """The defaults (d,), but `pick` for the parameters of `only`, or of all."""
+    chosen = of.parameters if only is None else only.parameters
+    return np.array([pick(p) if p in chosen else p.default for p in of.parameters])
+
+
+def on(p: Parameter) -> float:
+    """A size halfway to its farther bound; anything else at its default."""
+    return p.default if p.null is None else (p.null + max(p.bounds, key=lambda b: abs(b - p.null))) / 2
+
+
+def play(of: Model, drive: Drive, chosen: np.ndarray, substeps: int = SUBSTEPS) -> np.ndarray:
+    """P and Q (2, n, N) [pu]; fails where there is no steady state."""
+    response = of.simulate(drive, chosen, substeps)
+    if (response.miss != 0).any():
+        missed = np.atleast_2d(chosen)[int(np.argmax((response.miss != 0).any(axis=0)))]
+        why = of.refusal(missed, drive)
+        raise AssertionError(
+            f"{of.title} has no steady state at {dict(zip(of.names, missed.tolist(), strict=True))}: {why}"
+        )
+    return np.stack([response.P, response.Q])
+
+
+# What every part must satisfy
+
+
+def says_what_it_is(cls: type[Part]) -> None:
+    """The docstring has equations, their source and what departs from it; every parameter is told and bounded."""
+    text = cls.__doc__ or ""
+    for needed, what in (
+        ("=", "equation"),
+        ("Source:", "line 'Source:'"),
+        ("Departures:", "line 'Departures:'"),
+    ):
+        assert needed in text, f"the docstring of '{cls.name}' has no {what}"
+    for parameter in cls.parameters:
+        parameter.check(f"{cls.name}.{parameter.name}")
+
+
+def prints_its_equations(cls: type[Part]) -> None:
+    """The equations in LaTeX show every parameter."""
+    text = " ".join(with_part(cls).latex())
+    for parameter in cls.parameters:
+        assert parameter.symbol in text, f"the equations of '{cls.name}' do not show {parameter.symbol}"
+
+
+def rests(cls: type[Part]) -> None:
+    """Under a steady voltage the load stays where it was before, whatever its parameters near their defaults."""
+    of = with_part(cls)
+    chosen = values(of, on)
+    near = np.random.default_rng(1).uniform(0.95, 1.05, (10, len(chosen))) * chosen
+    low, high = np.array([p.bounds for p in of.parameters], dtype=float).reshape(-1, 2).T
+    power = play(of, Drive.of([drives.flat()]), np.clip(near, low, high))
+    assert np.isfinite(power).all(), f"{of.title} diverges under a steady voltage"
+    off = np.abs(power - power[:, :, :1]).max()
+    assert off < STILL, f"{of.title} moves by {off:.2g} pu under a steady voltage"
+
+
+def is_finite_or_refused_at_its_bounds(cls: type[Part]) -> None:
+    """In every corner of its bounds a dip gives finite power, or the point is refused; at most 64 corners."""
+    of = with_part(cls)
+    corners = list(itertools.islice(itertools.product(*(p.bounds for p in cls.parameters)), 64))
+    rows = np.tile(values(of), (len(corners), 1))
+    own = [of.names.index(p.name) for p in cls.parameters]
+    rows[:, own] = np.array(corners)
+    response = of.simulate(drives.drive(0.3, 0.65), rows, 16)
+    good = (response.miss == 0).all(axis=0)
+    power = np.stack([response.P, response.Q])[:, good]
+    assert np.isfinite(power).all(), f"{of.title} is not finite in a corner of the bounds of '{cls.name}'"
+    assert np.abs(power).max(initial=0.0) < LARGEST, f"{of.title} draws more than {LARGEST:g} pu in a corner"
+
+
+def converges_in_order_four(cls: type[Part]) -> None:
+    """Halving the step divides the error by 16 on a smooth dip, where the equations are smooth."""
+    import sympy
+
+    of = with_part(cls)
+    eq = of.equations
+    written = [eq.expand(e) for e in (*(s.derivative for s in eq.states.values()), eq.P, eq.Q, *eq.steps.values())]
+    if eq.memories or not eq.states or any(e.has(sympy.Max, sympy.Min) for e in written):
+        return  # a corner costs the order
+    drive, chosen = Drive.of([drives.dip(0.3, step=10e-3, edge=0.04)]), values(of, on)
+    fine = play(of, drive, chosen, 4 * COUNTS[-1])
+    errors = np.array([np.abs(play(of, drive, chosen, n) - fine).max() for n in COUNTS])
+    used = (errors > ASYMPTOTIC[0]) & (errors < ASYMPTOTIC[1])
+    if used.sum() < 3:
+        assert errors.min() < ASYMPTOTIC[0], f"{of.title} does not converge: errors {errors}"
+        return
+    slope = np.polyfit(np.log2(np.array(COUNTS)[used]), np.log2(errors[used]), 1)[0]
+    assert abs(slope + 4) < 0.4, f"{of.title} converges in order {-slope:.2f}, not 4: errors {errors}"
+
+
+# Motors and static loads
+
+
+def composes_with_every_other(cls: type[Part]) -> None:
+    """Every registered static load or motor beside it gives a model, or is refused in a sentence."""
+    for other in _all("model/static" if issubclass(cls, Motor) else "model/motor"):
+        try:
+            _ = (model(cls, other) if issubclass(cls, Motor) else model(other, cls)).equations
+        except UserError:
+            continue
+
+
+def takes_or_refuses_every_effect(cls: type[Part]) -> None:
+    """Every registered effect is an edit of it, or is refused with a reason."""
+    motor, static = (cls, partners()[1]) if issubclass(cls, Motor) else (partners()[0], cls)
+    for effect in _all("effect"):
+        assert _taken(motor, static, effect) != "", f"'{effect.name}' refuses '{cls.name}' without a reason"
+
+
+# Effects
+
+
+def has_sizes_that_matter(cls: type[Effect]) -> None:
+    """Its sizes start at their null, and it says from where each matters and what looks like it."""
+    sizes = [p for p in cls.parameters if p.null is not None]
+    known = discover()["effect"]
+    for p in sizes:
+        assert p.default == p.null, f"the size {p.name} of '{cls.name}' starts at {p.default:g}, not at its null"
+        assert p.name in cls.relevant, f"'{cls.name}' does not say in 'relevant' from where its size {p.name} matters"
+    for name in cls.confused_with:
+        assert name in known.keys() - {cls.name}, f"'{cls.name}' is confused with '{name}', no other effect"
+
+
+def is_the_base_model_at_its_null(cls: type[Effect]) -> None:
+    """With its sizes at their nulls the load is the base model, whatever its other parameters: the two are nested."""
+    of, bare = with_part(cls), model(*_base(cls))
+    drive, rng, own = drives.drive(0.3, 0.5, 0.65), np.random.default_rng(2), cls()
+    rows = [values(of, lambda p: rng.uniform(*p.bounds) if p.null is None else p.null, own) for _ in range(3)]
+    off = np.abs(play(of, drive, np.array(rows)) - play(bare, drive, values(bare))).max()
+    assert off < SAME, f"at its null '{cls.name}' is {off:.2g} pu away from the base model"
+
+
+def is_seen_in_a_dip(cls: type[Effect]) -> None:
+    """Each size has a derivative at its null, and the size that matters changes the response of a dip."""
+    of, own, drive = with_part(cls), cls(), drives.drive(0.6)
+    for p in (p for p in cls.parameters if p.null is not None):
+        slopes = []
+        for h in (1e-4 * (p.bounds[1] - p.bounds[0]), 2e-4 * (p.bounds[1] - p.bounds[0])):
+            ends = [min(max(p.null + side * h, p.bounds[0]), p.bounds[1]) for side in (-1, 1)]
+            rows = np.array([values(of, lambda q, p=p, end=end: end if q is p else q.default, own) for end in ends])
+            slopes.append(np.diff(play(of, drive, rows), axis=1) / (ends[1] - ends[0]))
+        largest = np.abs(slopes[0]).max()
+        assert largest * cls.relevant.get(p.name, 0.1 * (p.bounds[1] - p.bounds[0])) > SHOWN, f"{p.name} shows nothing"
+        off = np.abs(slopes[1] - slopes[0]).max()
+        assert off < 0.03 * largest, f"{p.name} of '{cls.name}' has no derivative at its null"
+
+
+def is_taken_or_refused_by_every_model(cls: type[Effect]) -> None:
+    """Every registered motor and static load takes it, or refuses it with a reason; one takes it."""
+    reasons = [_reason(motor, static, cls) for motor, static in _bases()]
+    assert None in reasons, f"no model takes '{cls.name}': {reasons[0]}"
+    assert "" not in reasons, f"'{cls.name}' is refused without a reason"
+
+
+def _reason(motor: type[Motor], static: type[Static], cls: type[Effect]) -> str | None:
+    try:
+        return _taken(motor, static, cls)
+    except UserError as error:
+        return str(error)
+
+
+def sees_each_event_by_itself(cls: type[Measurement]) -> None:
+    """The end of one event does not leak into the beginning of the next, and power keeps its shape."""
+    of = with_part(cls)
+    chosen = values(of, on)
+    together, alone = play(of, drives.drive(0.3, 0.6), chosen), play(of, drives.drive(0.6), chosen)
+    assert np.array_equal(together[:, :, -alone.shape[2] :], alone), f"'{cls.name}' mixes events"
+
+
+Check = Callable[[type], None]
+EVERY: tuple[Check, ...] = (says_what_it_is, is_finite_or_refused_at_its_bounds)
+EQUATIONS: tuple[Check, ...] = (prints_its_equations, rests, converges_in_order_four)
+PARTS: tuple[Check, ...] = (*EVERY, *EQUATIONS, composes_with_every_other, takes_or_refuses_every_effect)
+EFFECTS: tuple[Check, ...] = (
+    *EVERY, has_sizes_that_matter, is_the_base_model_at_its_null, is_seen_in_a_dip, is_taken_or_refused_by_every_model,
+)  # fmt: skip
+SUITES: Sequence[tuple[type, tuple[type, ...], tuple[Check, ...]]] = (
+    (Motor, (), PARTS),
+    (Static, (), PARTS),
+    (Effect, (Measurement,), (*EFFECTS, *EQUATIONS)),
+    (Measurement, (), (*EFFECTS, sees_each_event_by_itself)),
+)
