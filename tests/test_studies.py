@@ -2,6 +2,7 @@
 
 import json
 import pickle
+from html import escape
 
 import numpy as np
 import pytest
@@ -80,7 +81,7 @@ def test_a_result_prints_and_tabulates(name, request):
     assert len(frame) == len(made.table().rows) == html.count("<tr>") - 1 > 0
     for column in frame.columns:
         assert column in repr(made)
-        assert f">{column}</th>" in html
+        assert f">{escape(column)}</th>" in html
 
 
 def test_a_comparison_holds_what_its_file_does(compared, tmp_path):
@@ -134,7 +135,7 @@ def test_a_study_tells_what_it_reads_and_each_search(dips, capsys):
     capsys.readouterr()
     tractexp.generalise(dips[1], validate=dips[0], optimizers="pso", budget=50, progress=False)
     lines.clear()
-    tractexp.paper(dips[1], parts=["figure4"], progress=lines.append)
+    tractexp.paper(dips[1], parts=["figure3"], progress=lines.append)
     assert lines == ["Figures 3 and 4: maps and flights"]
     assert capsys.readouterr().out == ""
 
@@ -181,7 +182,8 @@ def test_a_study_takes_a_model_in_every_form(forms, dips, model):
     given = {"mapping": model.node, "model": model.model}.get(forms, forms)
     made = tractexp.generalise(dips[1], given, validate="tibet_30pct", optimizers="pso", budget=50, progress=False)
     same = tractexp.generalise(dips[1], validate=dips[0], optimizers="pso", budget=50, progress=False)
-    assert made.to_dict() == same.to_dict()
+    assert made.identified == same.identified
+    assert made.residuals == same.residuals
 
 
 @pytest.mark.parametrize(
@@ -201,7 +203,7 @@ def test_a_study_takes_a_model_in_every_form(forms, dips, model):
         (lambda d: tractexp.benchmark(["pso"], seed=-1), "seed=-1 is out of range"),
         (
             lambda d: tractexp.generalise(d, validate=[]),
-            "generalise() needs dips that are not fitted: name them in val",
+            "generalise() needs dips that are not fitted: name them in validate",
         ),
         (lambda d: tractexp.generalise(d[1]), "generalise(): missing a required argument: 'validate'"),
         (lambda d: tractexp.generalise("a.csv", validate=d), "a.csv: there is no such file"),
