@@ -5,12 +5,11 @@ edits them (`eq.edit(sites.P_static, change)`) or reads them (`eq[sites.static_v
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from tractexp.errors import UserError, among
 
 if TYPE_CHECKING:
-    from tractexp.model.model import Model
     from tractexp.outcome import Table
 
 
@@ -53,14 +52,15 @@ def named(what: "Site | str") -> Site:
     return SITES[what]
 
 
-def sites(model: "Model") -> "Table":
-    """The sites of a model: what stands at each, and the registered effects that edit it.
+def sites(model: Any) -> "Table":
+    """The sites of a model, or of what `tractexp.compose` makes: what stands at each, and the registered effects that edit it.
 
     Every registered effect is tried on the model, which takes seconds the first time and is remembered then.
     """
     from tractexp.outcome import Table
     from tractexp.plugin import discover
 
+    model = getattr(model, "model", model)
     if not hasattr(model, "acceptance"):
         raise UserError(f"sites() takes a model, as compose() makes one, not a {type(model).__name__}")
     eq, effects = model.equations, discover().get("effect", {})
