@@ -83,14 +83,13 @@ def track(job: Job, made: Any, paths: list[Path]) -> None:
         return
     from tractexp import tracking
 
-    experiment = node["experiment"] or "benchmark bbob"
     metrics = {
         f"share_{name.replace(' ', '_')}_{d}d": made.share(name, d, made.plan.functions)
         for name in made.optimizers for d in made.plan.dimensions
     }  # fmt: skip
     optimizer = job.choices["optimizer"]
     run = tracking.Run(
-        experiment=experiment,
+        experiment=node["experiment"] or "benchmark bbob",
         name=f"{optimizer} on BBOB",
         parameters=tracking.flatten({key: job.config[key] for key in ("task", "optimizer", "seed")}),
         metrics=metrics,
@@ -98,5 +97,4 @@ def track(job: Job, made: Any, paths: list[Path]) -> None:
         artifacts=paths,
         parent=job.sweep,
     )
-    tracking.log(run, job.store)
-    say(f"logged in experiment '{experiment}'; to see it: tractexp ui")
+    job.send(run)

@@ -84,14 +84,12 @@ def track(job: Job, comparison: Any, folder: Path | None, paths: list[Path]) -> 
     if parent is not None and attach(parent, job.store, paths):
         say("logged on the run of the sweep; to see it: tractexp ui")
         return
-    experiment = node["experiment"] or f"compare {data}"
     run = tracking.Run(
-        experiment=experiment,
+        experiment=node["experiment"] or f"compare {data}",
         name=f"comparison of {len(comparison.summaries)} variants",
         parameters=tracking.flatten({"task": job.config["task"]}),
         metrics={f"median_{s.name}": s.objective.median for s in comparison.summaries if s.runs > s.failures},
         tags={"task": "compare", "data": data},
         artifacts=paths,
     )
-    tracking.log(run, job.store)
-    say(f"logged in experiment '{experiment}'; to see it: tractexp ui")
+    job.send(run)

@@ -138,7 +138,6 @@ class Job:
         if not node["enabled"]:
             return
         from tractexp import tracking
-        from tractexp.tasks.console import say
 
         parts = {group: self.choices[group] for group in ("task", "model", "optimizer", "data")}
         run = tracking.Run(
@@ -149,9 +148,15 @@ class Job:
             parent=self.sweep,
             **content,
         )
+        self.send(run, f" --uri {node['uri']}" if node["uri"] else "")
+
+    def send(self, run: Any, where: str = "") -> None:
+        """Log a run (`tracking.Run`), and say how to look at it."""
+        from tractexp import tracking
+        from tractexp.tasks.console import say
+
         if "_logger" in self.__dict__:
             self._logger.log(run)
         else:
             tracking.log(run, self.store)
-        chosen = f" --uri {node['uri']}" if node["uri"] else ""
-        say(f"logged in experiment '{self.experiment}'; to see it: tractexp ui{chosen}")
+        say(f"logged in experiment '{run.experiment}'; to see it: tractexp ui{where}")
