@@ -55,7 +55,8 @@ def named(what: "Site | str") -> Site:
 def sites(model: Any) -> "Table":
     """The sites of a model: what stands at each, and the registered effects that edit it.
 
-    `model` is what `tractexp.compose` makes, or that which simulates (`Model`). Every registered effect is tried on the model, which takes seconds the first time and is remembered then.
+    `model` is what `tractexp.compose` makes, or that which simulates (`Model`). Every registered effect is tried on it,
+    which takes seconds the first time and is remembered then.
     """
     from tractexp.outcome import Table
     from tractexp.plugin import discover
