@@ -38,7 +38,7 @@ def compute(folder: Path) -> float:
     for path in folder.glob("*/.hydra/config.yaml"):
         job = Job(yaml.safe_load(path.read_text()), {}, path.parent)
         if problem is None:  # it is the same for all
-            problem = job.problem(job.events().train)
+            problem = job.problem
             problem.objective((problem.lower + problem.upper)[None] / 2)  # the kernel is loaded
         started = time.process_time()
         search(problem, job.optimizer, job.seed, Limits(BUDGET))

@@ -91,6 +91,8 @@ def test_what_is_saved_is_json_and_comes_back_the_same(fit, found, dips, tmp_pat
     for name, result in made.items():
         path = result.save(tmp_path / f"{name}.json")
         json.loads(path.read_text(encoding="utf-8"), parse_constant=pytest.fail)
+        if name != "export":
+            assert "<figure" in result.report().html
         again = tractexp.load(path)
         assert type(again) is type(result)
         assert [list(map(str, row)) for row in again.table().rows] == [list(map(str, r)) for r in result.table().rows]
@@ -228,6 +230,7 @@ REFUSED = {
         d, optimizer={"name": "pso", "population": "many"}
     ),
     "objective=3 is an int, but it must be a text or a mapping": lambda d: tractexp.identify(d, objective=3),
+    "per_event='T_m' is a str, but it must be a list, each a text": lambda d: tractexp.identify(d, per_event="T_m"),
     "records is empty": lambda d: tractexp.identify([]),
     "false_alarms=0.9 is out of range": lambda d: tractexp.investigate(d, false_alarms=0.9),
     "names 'stator_resistence', which is no effect": lambda d: tractexp.investigate(d, effects=["stator_resistence"]),
@@ -288,8 +291,24 @@ def test_the_door_is_light():
 def test_every_public_name_is_there_and_says_what_it_does():
     from tractexp import PUBLIC
 
-    ours = ("compose", "export", "identify", "investigate", "load", "plan", "posterior", "profile", "read", "simulate")
-    for name in ours:
-        assert name in PUBLIC
+    for name in PUBLIC:
         assert name in dir(tractexp)
-        assert "`UserError`" in getattr(tractexp, name).__doc__
+        if name not in ("UserError", "sites"):
+            assert "`UserError`" in getattr(tractexp, name).__doc__
+
+
+def test_every_call_has_the_door_and_every_result_a_picture():
+    """All that is in a module of `api`, found rather than listed."""
+    from tractexp import PUBLIC
+    from tractexp.api.load import known_kinds
+    from tractexp.outcome import Outcome
+
+    for name in (name for name, module in PUBLIC.items() if module.startswith("tractexp.api")):
+        with pytest.raises(UserError, match=rf"^{name}\(\) has no argument 'nonsense'|is no setting|nothing to read"):
+            getattr(tractexp, name)(nonsense=1)
+    assert len(known_kinds()) == 11
+    for cls in known_kinds().values():
+        assert issubclass(cls, Outcome)
+        assert cls._repr_html_
+        assert cls.write
+        assert cls.kind == "export" or cls.report

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tractexp import PUBLIC
 from tractexp.plugin import discover
 
 ROOT = Path(__file__).parents[1]
@@ -33,6 +34,9 @@ def test_the_examples_of_the_python_page_run(resistive_dips, tmp_path, monkeypat
     assert names["again"].parameters["R_s"].most_likely == pytest.approx(0.02, rel=0.1)
     assert names["same"].result == names["fit"].result
     assert (tmp_path / "report.html").stat().st_size > 10_000
+    assert (tmp_path / "studied" / "generalise.json").is_file()
+    for name in PUBLIC:
+        assert f"tractexp.{name}" in page, name
 
 
 def test_the_notebook_runs_and_ends_well():

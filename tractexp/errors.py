@@ -27,6 +27,16 @@ def check_choice(where: str, value: object, allowed: Iterable[str]) -> None:
         raise UserError(f"{where}={value} is not one of {', '.join(allowed)}{nearest(str(value), allowed)}")
 
 
+def check_distinct(where: str, values: Iterable[object]) -> None:
+    """Raise `UserError` for no values, or for one that is there twice; `where` is the setting's full key."""
+    values = list(values)
+    if not values:
+        raise UserError(f"{where} is empty; give at least one")
+    for value in values:
+        if values.count(value) > 1:
+            raise UserError(f"{where} names {value} twice; name each once")
+
+
 def check_range(where: str, value: float, low: float = float("-inf"), high: float = float("inf")) -> None:
     """Raise `UserError` unless low <= value <= high (nan fails); `where` is the setting's full key."""
     if not low <= value <= high:

@@ -27,8 +27,13 @@ class Table:
     title: str = ""
     said: Sequence[str] = field(default=())
 
+    @property
+    def cells(self) -> list[list[str]]:
+        """The rows as they are read."""
+        return [[_told(cell) for cell in row] for row in self.rows]
+
     def __str__(self) -> str:
-        cells = [list(map(str, self.columns)), *([_told(cell) for cell in row] for row in self.rows)]
+        cells = [list(map(str, self.columns)), *self.cells]
         widths = [max(len(row[k]) for row in cells) for k in range(len(self.columns))]
         lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in cells]
         ruled = [lines[0], "  ".join("-" * w for w in widths), *lines[1:]] if self.columns else []

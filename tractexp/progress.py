@@ -5,9 +5,10 @@ instead, which every notebook has.
 """
 
 import functools
+import itertools
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -60,11 +61,18 @@ def searching(iterations: int | None, budget: int | None, progress: Progress = N
 
 @contextmanager
 def counting(what: str, total: int, progress: Progress = None) -> Iterator[Callable[[], None]]:
-    """Yield what is to be called at the end of each of `total` parts: a bar, or a line now and then in a log file."""
+    """Yield what is to be called at the end of each of `total` parts: a bar, or a line now and then in a log file.
+
+    A callable is told of each.
+    """
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
     if progress is False:
         yield lambda: None
+        return
+    if callable(progress):
+        ended = itertools.count(1)
+        yield lambda: progress(f"{next(ended)} of {total} {what}")
         return
     if _lively():
         columns = [TextColumn(f"  {what}"), BarColumn(bar_width=30), MofNCompleteColumn(), TimeRemainingColumn()]
@@ -97,6 +105,13 @@ def telling(progress: Progress) -> Iterator[Callable[[str], None]]:
             yield lambda line: update(stage=line)
     else:
         yield lambda line: say(f"  {line}")
+
+
+def tell(progress: Progress, lines: Iterable[str]) -> None:
+    """Tell a callable each line; else only how far a call is shown."""
+    if callable(progress):
+        for line in lines:
+            progress(line)
 
 
 def share(iteration: int, simulations: int, iterations: int | None, budget: int | None) -> float | None:
@@ -153,4 +168,5 @@ def _live(columns: list[Any], total: float | None, **fields: Any) -> Iterator[Ca
     try:
         yield update
     finally:
+        due = float("inf")  # what is told later is not shown
         shown.update(HTML(""))

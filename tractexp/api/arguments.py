@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from tractexp import plugin
-from tractexp.errors import UserError, among
+from tractexp.errors import UserError, among, check_distinct
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -28,7 +28,8 @@ WORDS = {
 def public(function: Callable[P, R]) -> Callable[P, R]:
     """A call whose arguments are checked: an unknown name or a wrong type is a `UserError` in one sentence.
 
-    Sentences from below name keys of the configuration (`model.bounds.C`); here they name the arguments (`bounds.C`).
+    Sentences from below name keys of the configuration (`model.bounds.C`); here they name the arguments (`bounds.C`),
+    and the call where they name the task.
     The command line, whose keys they are, calls the function without this door (`inspect.unwrap`).
     """
     signature = inspect.signature(function)
@@ -53,6 +54,7 @@ def public(function: Callable[P, R]) -> Callable[P, R]:
         except UserError as error:
             keys = "|".join([*named, *keywords, *(_settings("data") if open_ended else ())])
             sentence = str(error).replace("data.train", "records") if "records" in named else str(error)
+            sentence = re.sub(rf"\btask={function.__name__}\b", where, sentence)
             sentence = re.sub(rf"\b(?:{SECTIONS})\.(?=(?:{keys})\b)", "", sentence)
             raise UserError(sentence) from error.__cause__
 
@@ -73,8 +75,9 @@ def _is(value: Any, kind: Any) -> bool:
         return any(_is(value, one) for one in inner)
     if kind in (int, float):
         return isinstance(value, Integral if kind is int else Real) and not isinstance(value, bool)
-    if origin in (Sequence, list, tuple) and not isinstance(value, str | bytes):
-        return isinstance(value, Sequence) and all(_is(one, inner[0]) for one in value)
+    if origin in (Sequence, list, tuple):
+        listed = isinstance(value, Sequence) and not isinstance(value, str | bytes)
+        return listed and all(_is(one, inner[0]) for one in value)
     if origin is Mapping or origin is dict:
         return isinstance(value, Mapping) and all(_is(one, inner[1]) for one in value.values())
     kind = origin or kind
@@ -108,7 +111,7 @@ class Choice:
         None is the default of `conf/config.yaml`.
         """
         if isinstance(chosen, Choice):
-            return chosen
+            return cls(chosen.name, completed(group, chosen.node))
         chosen = default(group) if chosen is None else chosen
         check_kind(group, chosen, str | Mapping[str, Any])
         asked = {"name": chosen} if isinstance(chosen, str) else dict(chosen)
@@ -117,6 +120,20 @@ class Choice:
         name = str(asked.pop("name"))
         node = {**read_choice(group, name), **asked}
         return cls(name, completed(group, node))
+
+    @classmethod
+    def several(cls, group: str, chosen: Any) -> "list[Choice]":
+        """The choices of one, of a list, or of a mapping of the names to call them by to each; argument `groups`.
+
+        A mapping that has the key `name` is one choice with settings. Raises `UserError` for none and for doubles.
+        """
+        if isinstance(chosen, Mapping) and "name" not in chosen:
+            made = [dataclasses.replace(cls.of(group, one), name=name) for name, one in chosen.items()]
+        else:
+            listed = chosen if isinstance(chosen, Sequence) and not isinstance(chosen, str) else [chosen]
+            made = [cls.of(group, one) for one in listed]
+        check_distinct(f"{group}s", [one.name for one in made])
+        return made
 
     def build(self, group: str) -> Any:
         return plugin.build(group, self.node)

@@ -1,19 +1,21 @@
 """Optimizers on functions with known optima that nobody here wrote."""
 
 import dataclasses
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from tractexp.api.inputs import Written, distinct, optimizers_by_name
-from tractexp.errors import UserError, check_range
+from tractexp.api.arguments import Choice, public
+from tractexp.api.pages import Written
+from tractexp.errors import UserError, check_distinct, check_range
 from tractexp.outcome import Table
+from tractexp.progress import counting
 
 if TYPE_CHECKING:
-    from tractexp.comparison.bbob import Benchmark, Run
+    from tractexp.comparison.bbob import Benchmark
 
 FUNCTIONS, INSTANCES, DIMENSIONS = tuple(range(1, 25)), (1, 2, 3), (5,)
 MULTIPLIER = 3000
@@ -48,8 +50,8 @@ class Benchmarked(Written):
         columns = ["optimizer", "dimension", "all", *made.groups(), "solved"]
         return Table(columns, rows, f"share of targets met, functions solved: {scale(made)}", self.sentences)
 
-    def write(self, folder: Path) -> list[Path]:
-        """Write benchmark.html, benchmark.json and the figures."""
+    def _write(self, folder: Path) -> list[Path]:
+        """benchmark.html, benchmark.json and the figures."""
         from tractexp.report import benchmark as report
 
         figures = report.draw(self.made, folder)
@@ -74,8 +76,9 @@ class Benchmarked(Written):
         return cls(made, content["optimizers"])
 
 
+@public
 def benchmark(
-    optimizers: Any,
+    optimizers: Any = None,
     *,
     functions: Sequence[int] = FUNCTIONS,
     instances: Sequence[int] = INSTANCES,
@@ -84,20 +87,22 @@ def benchmark(
     targets: Sequence[float] = TARGETS,
     seed: int = 0,
     cores: int | None = None,
-    progress: "Callable[[Iterable[Run], int], Iterable[Run]]" = lambda runs, total: runs,
+    progress: Any = None,
 ) -> Benchmarked:
     """Run optimizers on the noiseless functions of BBOB; the same seed gives the same runs on any number of cores.
 
-    `optimizers` are names or plugins, or a mapping of names to these. Each run may make `multiplier` evaluations per
-    dimension; `targets` are distances to the optimum; `cores` None means all. `progress(runs, total)` passes on the
-    runs as they end. Raises `UserError` for arguments out of range, an optimizer that needs residuals, and where the
-    package `ioh` is missing.
+    `optimizers` is one as `tractexp.identify` takes it, a list of such, or a mapping of the names to call them by to
+    such. Each run may make `multiplier` evaluations per dimension; `targets` are distances to the optimum; `cores` None
+    means all. `progress`: None shows how many runs have ended, False does not; a callable is told of each.
+
+    Raises `UserError` for wrong names or values, an optimizer that needs residuals, and without the extra [benchmark].
     """
     from tractexp.comparison.bbob import Plan, package, perform
 
     check(functions, instances, dimensions, multiplier, targets, cores)
     check_range("seed", seed, 0)
-    tried = optimizers_by_name(optimizers)
+    chosen = Choice.several("optimizer", optimizers)
+    tried = {one.name: one.build("optimizer") for one in chosen}
     for name, optimizer in tried.items():
         if optimizer.polish:
             raise UserError(
@@ -107,26 +112,27 @@ def benchmark(
     package()
     ordered = tuple(sorted(targets, reverse=True))
     plan = Plan(tuple(functions), tuple(dimensions), tuple(instances), multiplier, ordered, seed)
-    made = perform(tried, plan, cores, progress)
-    return Benchmarked(made, {name: {"name": it.name, **dataclasses.asdict(it)} for name, it in tried.items()})
+    with counting("runs", len(plan.cases) * len(tried), progress) as count:
+        made = perform(tried, plan, cores, count)
+    return Benchmarked(made, {one.name: one.node for one in chosen})
 
 
 def check(
     functions: Sequence[int], instances: Sequence[int], dimensions: Sequence[int], multiplier: int,
-    targets: Sequence[float], cores: int | None, where: str = "",
+    targets: Sequence[float], cores: int | None,
 ) -> None:  # fmt: skip
-    """Raise `UserError` for arguments out of range; `where` stands before their names."""
+    """Raise `UserError` for settings out of range."""
     numbers = {
         "functions": (functions, 1, 24), "instances": (instances, 1, 10_000), "dimensions": (dimensions, 2, 100),
         "targets": (targets, 1e-12, 1e12),
     }  # fmt: skip
     for name, (values, low, high) in numbers.items():
-        distinct(f"{where}{name}", values)
+        check_distinct(f"task.{name}", values)
         for value in values:
-            check_range(f"{where}{name}", value, low, high)
-    check_range(f"{where}multiplier", multiplier, 1)
+            check_range(f"task.{name}", value, low, high)
+    check_range("task.multiplier", multiplier, 1)
     if cores is not None:
-        check_range(f"{where}cores", cores, 1)
+        check_range("task.cores", cores, 1)
 
 
 def _tuple(value: Any) -> Any:

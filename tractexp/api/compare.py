@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from tractexp.api.inputs import Written
+from tractexp.api.arguments import public
+from tractexp.api.pages import Written
 from tractexp.errors import UserError, check_range
 from tractexp.outcome import Table
 
@@ -55,8 +56,8 @@ class Compared(Written):
         title = f"{self.source}: {self.content['problem']}"
         return Table(columns, rows, title, [*self.sentences, *self.content["notes"]])
 
-    def write(self, folder: Path) -> list[Path]:
-        """Write comparison.html and comparison.json."""
+    def _write(self, folder: Path) -> list[Path]:
+        """comparison.html and comparison.json."""
         from tractexp.report.comparison import write_json, write_page
 
         page = write_page(self.comparison, folder / "comparison.html", self.source)
@@ -71,6 +72,7 @@ class Compared(Written):
         return cls(content["call"], content["source"], found)
 
 
+@public
 def compare(
     sweep: Path | str | None = None,
     *,
@@ -108,19 +110,17 @@ def compare(
     return made
 
 
-def check(
-    sweep: Any, filter: str | None, targets: Sequence[float], ties: float, floor: float | None, where: str = ""
-) -> None:
-    """Raise `UserError` for arguments out of range; `where` stands before their names."""
+def check(sweep: Any, filter: str | None, targets: Sequence[float], ties: float, floor: float | None) -> None:
+    """Raise `UserError` for settings out of range."""
     if sweep is not None and filter is not None:
-        raise UserError(f"{where}sweep and {where}filter are both given; the runs come from one or the other")
+        raise UserError("task.sweep and task.filter are both given; the runs come from one or the other")
     if floor is not None and not 0 < floor < float("inf"):
-        raise UserError(f"{where}floor={floor:g} must be an objective above 0, in pu²")
+        raise UserError(f"task.floor={floor:g} must be an objective above 0, in pu²")
     if not targets:
-        raise UserError(f"{where}targets is empty; it lists multiples of the floor, such as [10,2,1.01]")
+        raise UserError("task.targets is empty; it lists multiples of the floor, such as [10,2,1.01]")
     for target in targets:
-        check_range(f"{where}targets", target, 1.0)
-    check_range(f"{where}ties", ties, 0.0, 1.0)
+        check_range("task.targets", target, 1.0)
+    check_range("task.ties", ties, 0.0, 1.0)
 
 
 def _made(

@@ -18,8 +18,15 @@ if TYPE_CHECKING:
 GROUP, PARTS = "model", ("motor", "static")
 
 
+class Portable:
+    """Base of dataclasses that travel to other processes by their fields: what they cache is compiled code."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}  # type: ignore[arg-type]
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class LoadModel:
+class LoadModel(Portable):
     """A load model as a call takes it. Prints its parameters; in a notebook its equations, too."""
 
     motor: Mapping[str, Any]  # name and settings of the plugin

@@ -1,7 +1,6 @@
 """Identify on some dips, judge on milder and deeper ones, for any optimizers."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -10,21 +9,18 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from tractexp import files
-from tractexp.api.inputs import Setup, Written, optimizers_by_name
+from tractexp.api.arguments import Choice, public
+from tractexp.api.pages import Written
+from tractexp.api.setup import Setup
 from tractexp.errors import UserError, check_range
 from tractexp.outcome import Table
+from tractexp.progress import Progress, tell
 
 if TYPE_CHECKING:
-    from tractexp.identification.optimizer import Optimizer
-    from tractexp.identification.problem import Problem
     from tractexp.identification.result import Fit, Result
-    from tractexp.model.model import Model
-    from tractexp.record import Event, Record
 
 ARRAYS = ("t", "U", "P", "Q", "P_calculated", "Q_calculated")
 ERRORS = ("residual_P", "residual_Q", "epsilon_p", "epsilon_q")
-Callback = Callable[[int, float, int], None]  # of the search loop
-Watch = Callable[[str, "Optimizer", int], AbstractContextManager[Callback | None]]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -56,8 +52,8 @@ class Generalised(Written):
         said = ["residuals: mean absolute value of Eq. (21), pu; medians over the seeds"]
         return Table(columns, [[row[c] for c in columns] for row in self.medians], "on dips not fitted", said)
 
-    def write(self, folder: Path) -> list[Path]:
-        """Write generalise.json, and a figure for each optimizer and held-out dip."""
+    def _write(self, folder: Path) -> list[Path]:
+        """generalise.json, and a figure for each optimizer and held-out dip."""
         told = {"residuals": self.residuals, "identified": self.identified}
         return [files.write_json(folder / "generalise.json", told), *_draw(folder, self.curves)]
 
@@ -69,59 +65,58 @@ class Generalised(Written):
         return cls(content["residuals"], content["identified"], content["curves"])
 
 
+@public
 def generalise(
-    records: "Sequence[Event | Record]",
-    validate: "Sequence[Event | Record]",
+    records: Any,
+    model: Any = None,
     *,
-    model: "Model | Mapping[str, Any]",
-    optimizers: Any,
+    validate: Any,
+    optimizers: Any = None,
     seeds: int = 1,
-    seed: int = 0,
     bounds: Mapping[str, Sequence[float]] | None = None,
     fixed: Mapping[str, float] | None = None,
-    substeps: int | None = None,
     per_event: Sequence[str] | None = None,
+    substeps: int | None = None,
     objective: Any = None,
     budget: int | None = None,
     time_limit: float | None = None,
     target: float | None = None,
-    begin: "Callable[[Problem], None]" = lambda problem: None,
-    watch: Watch = lambda name, optimizer, seed: nullcontext(),
+    seed: int = 0,
+    progress: Any = None,
 ) -> Generalised:
-    """Fit `model` to `records` by each optimizer under `seeds` seeds from `seed` on, judge it on `validate`.
+    """Fit a model to `records` by each optimizer under `seeds` seeds from `seed` on, and judge it on `validate`.
 
-    `optimizers` are names or plugins, or a mapping of names to these; all have the same limits. Bounds, fixed values,
-    `objective` (None: least squares) and limits are as in an identification. `begin(problem)` is called once all is
-    found right; `watch(name, optimizer, seed)` is entered around each search and gives its callback. Raises
-    `UserError` for wrong input, and where no dip is held out.
+    `optimizers` is one as `tractexp.identify` takes it, a list of such, or a mapping of the names to call them by to
+    such; all have the same limits. Everything else is as in `tractexp.identify`. `progress`: None shows how far each
+    search is, False does not; a callable is told what is read, and which search begins.
+
+    Raises `UserError` for wrong names or values, and where no dip is held out.
     """
-    check_range("seeds", seeds, 1)
-    known = {"bounds": bounds, "fixed": fixed, "substeps": substeps, "per_event": per_event}
+    check_range("task.seeds", seeds, 1)
+    known = {"bounds": bounds, "fixed": fixed, "per_event": per_event, "substeps": substeps}
     limits = {"budget": budget, "time_limit": time_limit, "target": target}
-    setup = Setup.of(records, validate, model, known, objective, seed, **limits)
-    if not setup.held_out:
+    setup = Setup.of(records, model, validate, objective, known, seed=seed, **limits)
+    if not setup.validate:
         raise UserError(
             "task=generalise needs dips that are not fitted: name them in data.validate, a milder one to"
             " interpolate and a deeper one to extrapolate"
         )
-    chosen, problem = optimizers_by_name(optimizers), setup.problem()
-    begin(problem)
-    return _told(setup, list(_searched(setup, problem, chosen, seeds, watch)))
+    chosen = Choice.several("optimizer", optimizers)
+    tell(progress, setup.lines())
+    return _told(setup, list(_searched(setup, chosen, seeds, progress)))
 
 
 def _searched(
-    setup: Setup, problem: "Problem", optimizers: "Mapping[str, Optimizer]", seeds: int, watch: Watch
+    setup: Setup, optimizers: Sequence[Choice], seeds: int, progress: Progress
 ) -> "Iterable[tuple[Result, list[Fit]]]":
     """What each search identified, and its fits of the held-out events."""
     from tractexp.identification.result import conclude
-    from tractexp.identification.search import search
 
-    parts = {part: setup.model[part] for part in ("motor", "static", "effects")}
-    for name, optimizer in optimizers.items():
+    for optimizer in optimizers:
         for seed in range(setup.seed, setup.seed + seeds):
-            with watch(name, optimizer, seed) as progress:
-                found = search(problem, optimizer, seed, setup.search_limits, progress)
-            result, fits = conclude(problem, found, setup.held_out, seed, parts, name)
+            tell(progress, [f"{optimizer.name}, seed {seed}"])
+            found = setup.search(optimizer, seed, progress)
+            result, fits = conclude(setup.problem, found, setup.validate, seed, setup.model.node, optimizer.name)
             yield result, fits[len(setup.train) :]
 
 
@@ -129,7 +124,7 @@ def _told(setup: Setup, searched: "Sequence[tuple[Result, list[Fit]]]") -> Gener
     """The searches as plain data."""
     from tractexp.replication.searches import by_depth
 
-    kinds = by_depth(setup.held_out, setup.train)
+    kinds = by_depth(setup.validate, setup.train)
     rows = [row for result, fits in searched for row in _residuals(result, fits, kinds)]
     identified = [
         {key: getattr(result, key) for key in ("optimizer", "seed", "objective", "simulations", "parameters")}

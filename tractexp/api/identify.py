@@ -1,7 +1,7 @@
 """Identify a load model's parameters from recorded dips, and what such an identification says."""
 
 import functools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 
 from tractexp.api.arguments import Choice, public
-from tractexp.api.compose import LoadModel, model_of
-from tractexp.api.pages import Shown, shown
-from tractexp.api.read import Dips, again, dips_of, kept
+from tractexp.api.compose import LoadModel
+from tractexp.api.pages import Written
+from tractexp.api.read import dips_of
 from tractexp.api.response import Response, respond_to
-from tractexp.errors import UserError, check_range
+from tractexp.api.setup import Setup
+from tractexp.errors import UserError
 from tractexp.identification.result import Result
-from tractexp.outcome import Outcome, Table
-from tractexp.progress import Progress, searching
-from tractexp.record import Event, describe
+from tractexp.outcome import Table
+from tractexp.progress import Progress, tell
 
 if TYPE_CHECKING:
     from tractexp.identification.problem import Problem
@@ -27,86 +27,19 @@ if TYPE_CHECKING:
 
 ASTRAY = 0.99  # of the search's objective: least squares that get below it have left its valley or finished its work
 FIXED = "fixed"
-LEAST = {"seed": 0, "budget": 1, "time_limit": 0, "target": 0}
 
 
-@dataclass(frozen=True, eq=False)
-class Setup:
-    """What an identification was asked: events, model, and how it was searched."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Asked(Setup):
+    """What an identification was asked."""
 
-    train: Dips
-    validate: Dips
-    model: LoadModel
-    objective: Choice
     optimizer: Choice
-    seed: int = 0
-    budget: int | None = None
-    time_limit: float | None = None
-    target: float | None = None
     check_intervals: bool = True
 
-    @classmethod
-    def of(cls, records: Any, model: Any, validate: Any, objective: Any, optimizer: Any, known: Mapping[str, Any],
-           **search: Any) -> "Setup":  # fmt: skip
-        for key, least in LEAST.items():
-            if search.get(key) is not None:
-                check_range(key, search[key], least)
-        return cls(
-            dips_of("records", records, least=1),
-            dips_of("validate", validate),
-            model_of(model).with_(**known),
-            Choice.of("objective", objective),
-            Choice.of("optimizer", optimizer),
-            **search,
-        )
-
-    @functools.cached_property
-    def problem(self) -> "Problem":
-        return self.problem_of(self.train)
-
-    def problem_of(self, train: Sequence[Event]) -> "Problem":
-        """The identification problem of some events."""
-        from tractexp.identification.problem import Problem
-
-        m, loss = self.model, self.objective.build("objective")
-        return Problem(m.model, train, m.bounds, m.fixed, m.substeps, m.per_event, loss=loss)
-
-    def search(self, progress: Progress) -> "Found":
-        """Search; raises `UserError` where the input is wrong, before anything is told."""
-        from tractexp.identification.search import Limits, search
-
-        optimizer, limits = self.optimizer.build("optimizer"), Limits(self.budget, self.time_limit, self.target)
-        problem = self.problem
-        for line in lines(self.train, self.validate, problem, self.optimizer.name, self.seed):
-            if callable(progress):
-                progress(line)
-        with searching(getattr(optimizer, "iterations", None), limits.simulations, progress) as callback:
-            return search(problem, optimizer, self.seed, limits, callback)
-
-    def to_dict(self) -> dict[str, Any]:
-        plain = {key: getattr(self, key) for key in (*LEAST, "check_intervals")}
-        groups = {key: asdict(getattr(self, key)) for key in ("model", "objective", "optimizer")}
-        return {key: [kept(e) for e in getattr(self, key)] for key in ("train", "validate")} | groups | plain
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> "Setup":
-        made: dict[str, Any] = {**content, "model": LoadModel(**content["model"])}
-        made |= {key: Dips(map(again, content[key])) for key in ("train", "validate")}
-        made |= {key: Choice(**content[key]) for key in ("objective", "optimizer")}
-        return cls(**made)
-
-
-def lines(
-    train: Sequence[Event], validate: Sequence[Event], problem: "Problem", optimizer: str, seed: int
-) -> Iterator[str]:
-    """What is read and what will be done, a sentence each."""
-    for role, group in (("fit", train), ("validate", validate)):
-        for event in group:
-            yield f"{role}: {describe(event)}"
-            yield from (f"  note: {note}" for note in event.record.notes)
-    free = f"{problem.space.dimension} parameters"
-    yield f"model: {problem.model.title}, {free}; Runge-Kutta steps: {problem.step.describe(problem.events)}"
-    yield f"optimizer: {optimizer}, seed {seed}"
+    def found(self, progress: Progress) -> "Found":
+        """Where the search ends; raises `UserError` where the input is wrong, before anything is told."""
+        tell(progress, [*self.lines(), f"optimizer: {self.optimizer.name}, seed {self.seed}"])
+        return self.search(self.optimizer, self.seed, progress)
 
 
 @dataclass(frozen=True)
@@ -144,17 +77,17 @@ class Judged(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Identification(Outcome):
+class Identification(Written):
     """Identified parameters, how sure they are, and how well they fit. `result` is the content of `result.json`."""
 
     kind = "identification"
 
     result: Result
-    setup: Setup | None = None  # None where only a result.json is known
+    setup: Asked | None = None  # None where only a result.json is known
     found: "Found | None" = None
 
     @classmethod
-    def of(cls, setup: Setup, found: "Found") -> "Identification":
+    def of(cls, setup: Asked, found: "Found") -> "Identification":
         """Judge what a search found."""
         result, judged = _judge(setup, found)
         made = cls(result, setup, found)
@@ -166,7 +99,7 @@ class Identification(Outcome):
         return _judge(self.asked, self.ended)[1]
 
     @property
-    def asked(self) -> Setup:
+    def asked(self) -> Asked:
         """The call. Raises `UserError` where only a `result.json` was read."""
         if self.setup is None:
             raise UserError(
@@ -231,10 +164,6 @@ class Identification(Outcome):
         time, voltage = (np.asarray(values, dtype=float) for values in (t, U))
         return Response("prediction", time, voltage, *self.result.predict(time, voltage, f, P0, Q0))
 
-    def report(self) -> Shown:
-        """The page an engineer reads, as a notebook shows it; `save(path)` writes it."""
-        return shown(lambda folder: self.write_page(folder, self.write_fits(folder)))
-
     def table(self) -> Table:
         span = "{:.4g} .. {:.4g}".format
         rows = [
@@ -265,7 +194,12 @@ class Identification(Outcome):
         if found is not None:
             history = History(**{key: np.array(v, dtype=float) for key, v in found["history"].items()})
             found = Found(**found | {"values": np.array(found["values"], dtype=float), "history": history})
-        return cls(Result(**content["result"]), setup and Setup.from_dict(setup), found)
+        return cls(Result(**content["result"]), setup and Asked.from_dict(setup), found)
+
+    def _write(self, folder: Path) -> list[Path]:
+        """Fits and fitness, report.html and its figures, history.csv and result.json."""
+        fits = self.write_fits(folder)
+        return [*fits, *self.write_page(folder, fits), *self.write_result(folder)]
 
     def write_fits(self, folder: Path) -> list[Path]:
         """Write fit.svg (fit_2.svg and so on for further events) and fitness.svg."""
@@ -342,14 +276,14 @@ def identify(
     simulated.
     """
     known = {"bounds": bounds, "fixed": fixed, "per_event": per_event, "substeps": substeps}
-    setup = Setup.of(
-        records, model, validate, objective, optimizer, known, seed=seed, budget=budget, time_limit=time_limit,
-        target=target, check_intervals=check_intervals,
+    setup = Asked.of(
+        records, model, validate, objective, known, seed=seed, budget=budget, time_limit=time_limit, target=target,
+        optimizer=Choice.of("optimizer", optimizer), check_intervals=check_intervals,
     )  # fmt: skip
-    return Identification.of(setup, setup.search(progress))
+    return Identification.of(setup, setup.found(progress))
 
 
-def _judge(setup: Setup, found: "Found") -> tuple[Result, Judged]:
+def _judge(setup: Asked, found: "Found") -> tuple[Result, Judged]:
     """The result of a search and what stands behind it."""
     from tractexp.identification.profile import checked
     from tractexp.identification.result import conclude

@@ -1,7 +1,7 @@
 """Find where simulation and measurement disagree, name the missing effect, add it, show the gap shrink.
 
 The investigation itself is `tractexp.discrepancy`; everything this file asks of it stands in `_made`, `_estimated`
-and `Investigation.write`.
+and `Investigation._write`.
 """
 
 import functools
@@ -16,12 +16,13 @@ from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.compose import LoadModel, model_of
 from tractexp.api.identify import Identification
-from tractexp.api.pages import Shown, shown
-from tractexp.api.read import Dips, again, dips_of, kept
+from tractexp.api.pages import Written
+from tractexp.api.read import dips_of
 from tractexp.api.response import Response
+from tractexp.api.setup import Given
 from tractexp.errors import UserError, check_range
 from tractexp.identification.result import Result
-from tractexp.outcome import Outcome, Table
+from tractexp.outcome import Table
 from tractexp.progress import Progress, telling
 
 if TYPE_CHECKING:
@@ -29,28 +30,13 @@ if TYPE_CHECKING:
     from tractexp.discrepancy.investigate import Investigation as Steps
 
 
-@dataclass(frozen=True)
-class Question:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Question(Given):
     """What an investigation was asked."""
 
-    train: Dips
-    validate: Dips
-    model: LoadModel
     effects: Sequence[str]  # none: the whole catalogue
     false_alarms: float
     criteria: Mapping[str, float]
-    seed: int
-
-    def to_dict(self) -> dict[str, Any]:
-        records = {key: [kept(e) for e in getattr(self, key)] for key in ("train", "validate")}
-        plain = {key: getattr(self, key) for key in ("effects", "false_alarms", "criteria", "seed")}
-        return {**records, "model": asdict(self.model), **plain}
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> "Question":
-        made: dict[str, Any] = {**content, "model": LoadModel(**content["model"])}
-        made |= {key: Dips(map(again, content[key])) for key in ("train", "validate")}
-        return cls(**made)
 
 
 @dataclass(frozen=True)
@@ -81,7 +67,7 @@ class Gaps:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Investigation(Outcome):
+class Investigation(Written):
     """What is missing in a model, how sure that is, and the model with it. `content` is that of `discrepancy.json`."""
 
     kind = "investigation"
@@ -159,10 +145,6 @@ class Investigation(Outcome):
         """The chain of results, from the records to the verdict; of a loaded result it is investigated again."""
         return _made(self.question, False)
 
-    def report(self) -> Shown:
-        """The page that tells the investigation, as a notebook shows it; `save(path)` writes it."""
-        return shown(self.write_pages)
-
     def table(self) -> Table:
         rows = []
         for label, gap in (("fitted", self.gap.train), ("held out", self.gap.validate)):
@@ -181,9 +163,10 @@ class Investigation(Outcome):
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         return cls(Question.from_dict(content["question"]), content["content"], Result(**content["result"]))
 
-    def write(self, folder: Path) -> list[Path]:
-        """Write discrepancy.json, conf/model/extended.yaml, result.json and, where unexplained, what is left as CSV."""
+    def _write(self, folder: Path) -> list[Path]:
+        """discrepancy.json, conf/model/extended.yaml, result.json, what is left as CSV where unexplained, the page."""
         from tractexp.discrepancy import discrepancy_json
+        from tractexp.report import discrepancy
 
         base = {**self.question.model.node, "bounds": self.question.model.bounds, "fixed": self.question.model.fixed}
         paths = [
@@ -193,13 +176,8 @@ class Investigation(Outcome):
         ]
         if self.verdict == "unexplained":
             paths.append(discrepancy_json.write_left(self.steps, folder / "unexplained.csv"))
-        return paths
-
-    def write_pages(self, folder: Path) -> list[Path]:
-        """Write the figures and discrepancy.html."""
-        from tractexp.report import discrepancy
-
-        return discrepancy.report(folder, self.steps, ", ".join(e.record.name for e in self.question.train))
+        records = ", ".join(e.record.name for e in self.question.train)
+        return [*paths, *discrepancy.report(folder, self.steps, records)]
 
 
 @public
@@ -236,7 +214,10 @@ def investigate(
     if base.per_event:
         raise UserError(f"model.per_event={list(base.per_event)} has no meaning in an investigation; leave it out")
     train, held = dips_of("records", records, least=1), dips_of("validate", validate)
-    question = Question(train, held, base, tuple(effects), chosen["false_alarms"], dict(criteria or {}), seed)
+    question = Question(
+        train=train, validate=held, model=base, seed=seed, effects=tuple(effects),
+        false_alarms=chosen["false_alarms"], criteria=dict(criteria or {}),
+    )  # fmt: skip
     return _concluded(question, _made(question, progress))
 
 

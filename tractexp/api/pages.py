@@ -1,12 +1,13 @@
-"""A page with its figures inside, as a notebook shows it and a file keeps it."""
+"""Results told in a folder, and their page with its figures inside, as a notebook shows it and a file keeps it."""
 
 import html
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from tractexp import files
+from tractexp.outcome import Outcome
 
 
 @dataclass(frozen=True)
@@ -26,8 +27,31 @@ class Shown:
         return f'<iframe srcdoc="{html.escape(self.html)}" style="width:100%;height:40rem;border:0"></iframe>'
 
 
-def shown(written: Callable[[Path], Sequence[Path]]) -> Shown:
-    """The page among the files that `written` makes in a folder."""
-    with tempfile.TemporaryDirectory() as folder:
-        page = next(path for path in written(Path(folder)) if path.suffix == ".html")
-        return Shown(page.read_text(encoding="utf-8"))
+class Written(Outcome):
+    """Base of the results that are told in a folder. A subclass says in `_write` what it writes."""
+
+    def write(self, folder: Path | str) -> list[Path]:
+        """Write everything into a folder: the page where there is one, figures, files for machines; their paths."""
+        return self._write(Path(folder))
+
+    def report(self) -> Shown:
+        """The page, as a notebook shows it; `save(path)` writes it. Without a page of its own: table and figures."""
+        with tempfile.TemporaryDirectory() as folder:
+            paths = self._write(Path(folder))
+            pages = [path for path in paths if path.suffix == ".html"]
+            page = pages[0] if pages else self._page(paths, Path(folder) / "page.html")
+            return Shown(page.read_text(encoding="utf-8"))
+
+    def _write(self, folder: Path) -> list[Path]:
+        raise NotImplementedError
+
+    def _page(self, paths: Sequence[Path], path: Path) -> Path:
+        """A page of the table and of the figures among `paths`."""
+        from tractexp.report.page import Page
+
+        told = self.table()
+        page = Page(told.title or self.kind).table(told.columns, told.cells).text(*told.said)
+        for figure in paths:
+            if figure.suffix == ".svg":
+                page.figure(figure)
+        return page.write(path)

@@ -1,19 +1,21 @@
 """The paper's tables and figures, done again: one page, one verdict for each claim."""
 
 import functools
+import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from tractexp.api.inputs import Setup, Written
+from tractexp.api.arguments import public
+from tractexp.api.pages import Written
+from tractexp.api.setup import Setup
 from tractexp.errors import check_choice, check_range
 from tractexp.outcome import Table
+from tractexp.progress import NEXT_LINES, telling
 
 if TYPE_CHECKING:
-    from tractexp.model.model import Model
-    from tractexp.record import Event, Record
     from tractexp.replication.claims import Claim
     from tractexp.replication.study import Study
 
@@ -51,8 +53,8 @@ class Replicated(Written):
         told = ", ".join(f"{n} {verdict}" for verdict, n in self.counts.items())
         return Table(["where", "the paper's claim", "verdict", "measured"], rows, f"{len(rows)} claims: {told}")
 
-    def write(self, folder: Path) -> list[Path]:
-        """Write paper.html, paper.md and the figures."""
+    def _write(self, folder: Path) -> list[Path]:
+        """paper.html, paper.md and the figures."""
         from tractexp.report.paper import write
 
         return write(self.study, self.parts, self.claims, folder)
@@ -69,61 +71,78 @@ class Replicated(Written):
         return cls(Setup.from_dict(content["setup"]), content["settings"], content["parts"], judged)
 
 
+@public
 def paper(
-    records: "Sequence[Event | Record]",
-    validate: "Sequence[Event | Record]" = (),
+    records: Any,
+    model: Any = None,
     *,
-    model: "Model | Mapping[str, Any]",
+    validate: Any = (),
     parts: Sequence[str] = (),
     seeds: int = SEEDS,
-    seed: int = 0,
     workers: int | None = None,
     bounds: Mapping[str, Sequence[float]] | None = None,
     fixed: Mapping[str, float] | None = None,
-    substeps: int | None = None,
     per_event: Sequence[str] | None = None,
+    substeps: int | None = None,
     objective: Any = None,
     budget: int | None = None,
     time_limit: float | None = None,
     target: float | None = None,
-    tell: Callable[[str], None] = lambda line: None,
-    count: Callable[[int, int], None] = lambda done, total: None,
+    seed: int = 0,
+    progress: Any = None,
 ) -> Replicated:
-    """Measure what the paper claims on records fitted and held out; `parts` are tables and figures (none: all).
+    """Measure what the paper claims, on `records` fitted and on those of `validate`.
 
-    Each of the paper's optimizers searches under `seeds` seeds, on `workers` processes (None: one for each core).
-    `tell(line)` and `count(done, total)` hear how far it is. Raises `UserError` for wrong input, and where a part
-    needs a dip that is not there.
+    `parts` are tables and figures ("table2", "figure9", "equations"; none: all). Each of the paper's optimizers
+    searches under `seeds` seeds, on `workers` processes (None: one for each core). Everything else is as in
+    `tractexp.identify`. `progress`: None shows the stage, False does not; a callable is told each stage.
+
+    Raises `UserError` for wrong names or values, and where a part needs a held-out dip that is not there.
     """
     check(parts, seeds, workers)
-    known = {"bounds": bounds, "fixed": fixed, "substeps": substeps, "per_event": per_event}
+    known = {"bounds": bounds, "fixed": fixed, "per_event": per_event, "substeps": substeps}
     limits = {"budget": budget, "time_limit": time_limit, "target": target}
-    setup = Setup.of(records, validate, model, known, objective, seed, **limits)
-    settings = {"seeds": seeds, "workers": workers}
-    study, chosen = _study(setup, **settings, tell=tell, count=count), [p for p in PARTS if p in parts or not parts]
-    for kind, needing in HELD_OUT.items():
-        if needing & set(chosen):
-            study.held(kind)
-    from tractexp.replication.claims import claims
+    setup = Setup.of(records, model, validate, objective, known, seed=seed, **limits)
+    settings, chosen = {"seeds": seeds, "workers": workers}, [p for p in PARTS if p in parts or not parts]
+    with telling(progress) as tell:
+        study = _study(setup, **settings, tell=tell, count=_counted(tell))
+        for kind, needing in HELD_OUT.items():
+            if needing & set(chosen):
+                study.held(kind)
+        from tractexp.replication.claims import claims
 
-    made = Replicated(setup, settings, chosen, claims(study, chosen))
+        made = Replicated(setup, settings, chosen, claims(study, chosen))
     vars(made)["study"] = study
     return made
 
 
-def check(parts: Sequence[str], seeds: int, workers: int | None, where: str = "") -> None:
-    """Raise `UserError` for arguments out of range; `where` stands before their names."""
+def check(parts: Sequence[str], seeds: int, workers: int | None) -> None:
+    """Raise `UserError` for settings out of range."""
     for part in parts:
-        check_choice(f"{where}parts", part, PARTS)
-    check_range(f"{where}seeds", seeds, 1)
+        check_choice("task.parts", part, PARTS)
+    check_range("task.seeds", seeds, 1)
     if workers is not None:
-        check_range(f"{where}workers", workers, 1)
+        check_range("task.workers", workers, 1)
 
 
 def _study(setup: Setup, seeds: int, workers: int | None, **heard: Any) -> "Study":
     from tractexp.replication.study import Study
 
     return Study(
-        recipe=setup.problem, node=setup.model, train=setup.train, held_out=setup.held_out, seeds=seeds,
-        seed=setup.seed, workers=workers, limits=setup.search_limits, **heard,
+        recipe=setup.problem_of, node=asdict(setup.model), train=setup.train, held_out=setup.validate, seeds=seeds,
+        seed=setup.seed, workers=workers, limits=setup.limits, **heard,
     )  # fmt: skip
+
+
+def _counted(tell: Callable[[str], None]) -> Callable[[int, int], None]:
+    """What hears of each search that ends, and tells now and then how many have."""
+    told = time.perf_counter()
+
+    def count(done: int, total: int) -> None:
+        nonlocal told
+        now = time.perf_counter()
+        if done == total or now - told > NEXT_LINES:
+            told = now
+            tell(f"  {done} of {total} searches")
+
+    return count

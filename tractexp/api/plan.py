@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from tractexp import files
-from tractexp.api.arguments import Choice, public
-from tractexp.api.identify import Identification, Setup
-from tractexp.api.pages import Shown, shown
+from tractexp.api.arguments import public
+from tractexp.api.identify import Identification
+from tractexp.api.pages import Written
+from tractexp.api.setup import Setup
 from tractexp.errors import UserError, check_range
-from tractexp.outcome import Outcome, Table
+from tractexp.outcome import Table
 from tractexp.record import Event
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ SHAPE = ("depth", "duration", "rate")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Forecasts(Outcome):
+class Forecasts(Written):
     """A plan: what dips of other depths, lengths, rates and noises would tell. `content` is that of `plan.json`."""
 
     kind = "plan"
@@ -53,10 +54,6 @@ class Forecasts(Outcome):
         """Names of the events that tell most together, the best first; none of a single event."""
         return [event["name"] for event in self.content["best_events"]]
 
-    def report(self) -> Shown:
-        """The page, as a notebook shows it; `save(path)` writes it."""
-        return shown(self.write)
-
     def table(self) -> Table:
         """Half of the 95 % interval over the value, by depth."""
         names, rows = [*self.content["parameters"]], self.content["half_intervals"][DEPTH]
@@ -71,8 +68,8 @@ class Forecasts(Outcome):
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         return cls(Setup.from_dict(content["setup"]), content["asked"], content["content"])
 
-    def write(self, folder: Path) -> list[Path]:
-        """Write plan.json, plan.svg and plan.html."""
+    def _write(self, folder: Path) -> list[Path]:
+        """plan.json, plan.svg and plan.html."""
         from tractexp.report import plan, uncertainty
 
         path = files.write_json(folder / "plan.json", self.content)
@@ -116,7 +113,7 @@ def plan(
     if noise is not None:
         check_range("task.noise", noise, 1e-9, 1.0)
     known = {"bounds": bounds, "fixed": fixed, "substeps": substeps}
-    setup = Setup.of(records, model, (), None, Choice("", {}), known)
+    setup = Setup.of(records, model, (), None, known)
     if isinstance(values, Identification):
         values = values.result.parameters
     asked = {

@@ -13,15 +13,16 @@ import numpy as np
 from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.identify import Identification
+from tractexp.api.pages import Written
 from tractexp.errors import check_range
-from tractexp.outcome import Outcome, Table
+from tractexp.outcome import Table
 
 if TYPE_CHECKING:
     from tractexp.identification.posterior import Posterior
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Sampled(Outcome):
+class Sampled(Written):
     """A sample of the posterior under a flat prior within the bounds. `content` is that of `posterior.json`."""
 
     kind = "posterior"
@@ -60,8 +61,8 @@ class Sampled(Outcome):
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         return cls(Identification.from_dict(content["fit"]), content["settings"], content["content"])
 
-    def write(self, folder: Path) -> list[Path]:
-        """Write posterior.json, posterior.npz, history.csv and result.json."""
+    def _write(self, folder: Path) -> list[Path]:
+        """posterior.json, posterior.npz, history.csv and result.json."""
         packed = io.BytesIO()
         np.savez_compressed(packed, **self.draws)  # type: ignore[arg-type]
         path = files.write_json(folder / "posterior.json", self.content)

@@ -10,16 +10,17 @@ from typing import TYPE_CHECKING, Any, Self
 from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.identify import Identification
+from tractexp.api.pages import Written
 from tractexp.errors import check_range
 from tractexp.identification.result import Result
-from tractexp.outcome import Outcome, Table
+from tractexp.outcome import Table
 
 if TYPE_CHECKING:
     from tractexp.identification.profile import Profiles
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Profiled(Outcome):
+class Profiled(Written):
     """Profiles of the free parameters of an identification. `content` is that of `profile.json`."""
 
     kind = "profile"
@@ -68,8 +69,8 @@ class Profiled(Outcome):
         fit, result = Identification.from_dict(content["fit"]), Result(**content["result"])
         return cls(fit, content["points"], content["content"], result, content["curvature"])
 
-    def write(self, folder: Path) -> list[Path]:
-        """Write profiles.svg, profile.json, history.csv and result.json."""
+    def _write(self, folder: Path) -> list[Path]:
+        """profiles.svg, profile.json, history.csv and result.json."""
         from tractexp.report import uncertainty
 
         figure = uncertainty.profiles(folder / "profiles.svg", self.made)

@@ -45,9 +45,10 @@ class Response:
         errors = ", epsilon_p {:.3%}, epsilon_q {:.3%}".format(*self.epsilon) if self.epsilon else ""
         return f"{self.title}: t, U, P, Q of {len(self.t)} samples{errors}"
 
-    def _repr_svg_(self) -> str:
+    def _repr_html_(self) -> str:
         with tempfile.TemporaryDirectory() as folder:
-            return self.draw(Path(folder) / "response.svg").read_text(encoding="utf-8")
+            drawn = self.draw(Path(folder) / "response.svg").read_text(encoding="utf-8")
+        return drawn[drawn.index("<svg") :]
 
     def to_frame(self) -> Any:
         """A pandas frame of the columns."""

@@ -10,10 +10,11 @@ import numpy as np
 from tractexp.api.arguments import public
 from tractexp.api.compose import LoadModel, model_of
 from tractexp.api.identify import Identification
+from tractexp.api.pages import Written
 from tractexp.api.read import dips_of
 from tractexp.api.response import Response, respond_to
 from tractexp.errors import UserError, among, check_range
-from tractexp.outcome import Outcome, Table
+from tractexp.outcome import Table
 
 BEFORE = {"U0": 1.0, "P0": 1.0, "Q0": 0.5, "frequency": 50.0}  # a dip by hand, where nothing else is known
 
@@ -47,7 +48,7 @@ class Dip:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Simulation(Outcome):
+class Simulation(Written):
     """Responses, one for each event; a simulation of one event has its arrays `t`, `U`, `P`, `Q` itself."""
 
     kind = "simulation"
@@ -85,8 +86,8 @@ class Simulation(Outcome):
         responses = tuple(map(response, content["responses"]))
         return cls(LoadModel(**content["model"]), content["values"], responses)
 
-    def write(self, folder: Path) -> list[Path]:
-        """Write response.csv and response.svg, with a number from the second event on."""
+    def _write(self, folder: Path) -> list[Path]:
+        """response.csv and response.svg, with a number from the second event on."""
         return [path for k, one in enumerate(self.responses, start=1) for path in one.write(folder, k)]
 
 

@@ -132,18 +132,21 @@ def perform(
     optimizers: Mapping[str, Optimizer],
     plan: Plan,
     cores: int | None = None,
-    progress: Callable[[Iterable[Run], int], Iterable[Run]] = lambda runs, total: runs,
+    count: Callable[[], None] = lambda: None,
 ) -> "Benchmark":
     """Run all of it on `cores` processes (None: all there are); the runs do not depend on how many.
 
-    `progress(runs, total)` passes on the runs as they end, in any order.
+    `count()` is called as each run ends.
     """
     from joblib import Parallel, delayed
 
     titles = {f: Bbob(f, plan.dimensions[0], plan.instances[0], plan.targets).name for f in plan.functions}
     jobs = [delayed(run)(name, it, case, plan) for case in plan.cases for name, it in optimizers.items()]
     ending: Any = Parallel(n_jobs=cores or -1, return_as="generator_unordered")(jobs)
-    runs = {(r.optimizer, r.dimension, r.function, r.instance): r for r in progress(ending, len(jobs))}
+    runs = {}
+    for r in ending:
+        count()
+        runs[r.optimizer, r.dimension, r.function, r.instance] = r
     ordered = [
         runs[name, d, f, i] for name in optimizers for d in plan.dimensions for f in plan.functions
         for i in plan.instances

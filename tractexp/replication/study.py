@@ -1,7 +1,7 @@
 """What the parts of the page are made of, each measured when first asked for."""
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -38,8 +38,8 @@ class Study:
 
     recipe: Callable[[], Problem]
     node: Mapping[str, Any]  # the model's configuration
-    train: tuple[Event, ...]
-    held_out: tuple[Event, ...]
+    train: Sequence[Event]
+    held_out: Sequence[Event]
     seeds: int
     seed: int = 0
     workers: int | None = None

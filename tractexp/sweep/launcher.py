@@ -156,8 +156,7 @@ def warm(jobs: Sequence[SweepJob]) -> None:
             continue
         seen.add(key)
         with contextlib.suppress(Exception):  # the job itself will tell
-            made = Job(job.config, job.choices, job.folder)
-            problem = made.problem(made.events().train)
+            problem = Job(job.config, job.choices, job.folder).problem
             middle = (problem.lower + problem.upper)[None] / 2
             problem.objective(middle)
             problem.residuals(middle)

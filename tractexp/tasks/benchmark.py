@@ -1,15 +1,14 @@
 """Optimizers on functions that nobody here wrote."""
 
-from collections.abc import Iterable, Iterator
 from dataclasses import field
 from pathlib import Path
 from typing import Any
 
 from tractexp.api.benchmark import DIMENSIONS, FUNCTIONS, INSTANCES, MULTIPLIER, TARGETS, benchmark, check
-from tractexp.api.inputs import distinct
+from tractexp.errors import check_distinct
 from tractexp.plugin import build, get, plugin
-from tractexp.tasks.console import counting, say, table
-from tractexp.tasks.task import Job, Task
+from tractexp.tasks.console import listed, say, table
+from tractexp.tasks.task import Job, Task, call
 
 
 @plugin
@@ -32,39 +31,29 @@ class Benchmark(Task):
     cores: int | None = None  # processes; null: all cores, one for a job of a sweep
 
     def check(self) -> None:
-        check(self.functions, self.instances, self.dimensions, self.multiplier, self.targets, self.cores, "task.")
+        check(self.functions, self.instances, self.dimensions, self.multiplier, self.targets, self.cores)
         if self.against:
-            distinct("task.against", self.against)
+            check_distinct("task.against", self.against)
         for name in self.against:
             get("optimizer", name)
 
     def run(self, job: Job) -> None:
         plan = {key: getattr(self, key) for key in ("functions", "instances", "dimensions", "multiplier", "targets")}
         cores = self.cores or (1 if job.in_sweep else None)
-        made = benchmark(self.optimizers(job), **plan, seed=job.seed, cores=cores, progress=progress)
+        made = call(benchmark, self.optimizers(job), **plan, seed=job.seed, cores=cores)
         show(made.made)
         paths = made.write(job.folder)
-        for path in paths[:2]:
-            say(f"  {path}")
+        listed(paths[:2])
         track(job, made.made, paths)
 
     def optimizers(self, job: Job) -> dict[str, Any]:
         """The optimizer of the job, and those it is set against as they are by default, by name."""
         chosen = job.choices["optimizer"]
-        made = {chosen: job.optimizer}
+        made = {chosen: job.chosen}
         for name in self.against:
-            default = build("optimizer", {"name": name})
-            if default != job.optimizer:
-                made[f"{name} by default" if name == chosen else name] = default
+            if build("optimizer", {"name": name}) != job.optimizer:
+                made[f"{name} by default" if name == chosen else name] = {"name": name}
         return made
-
-
-def progress(runs: Iterable[Any], total: int) -> Iterator[Any]:
-    """Pass the runs on as they end, and say how many have."""
-    with counting("runs", total) as count:
-        for run in runs:
-            count()
-            yield run
 
 
 def show(made: Any) -> None:
@@ -94,14 +83,13 @@ def track(job: Job, made: Any, paths: list[Path]) -> None:
         return
     from tractexp import tracking
 
-    experiment = node["experiment"] or "benchmark bbob"
     metrics = {
         f"share_{name.replace(' ', '_')}_{d}d": made.share(name, d, made.plan.functions)
         for name in made.optimizers for d in made.plan.dimensions
     }  # fmt: skip
     optimizer = job.choices["optimizer"]
     run = tracking.Run(
-        experiment=experiment,
+        experiment=node["experiment"] or "benchmark bbob",
         name=f"{optimizer} on BBOB",
         parameters=tracking.flatten({key: job.config[key] for key in ("task", "optimizer", "seed")}),
         metrics=metrics,
@@ -109,5 +97,4 @@ def track(job: Job, made: Any, paths: list[Path]) -> None:
         artifacts=paths,
         parent=job.sweep,
     )
-    tracking.log(run, tracking.address(node["uri"]))
-    say(f"logged in experiment '{experiment}'; to see it: tractexp ui")
+    job.send(run)

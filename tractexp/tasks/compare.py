@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from tractexp.plugin import plugin
-from tractexp.tasks.console import say, table
-from tractexp.tasks.task import Job, Task
+from tractexp.tasks.console import listed, say, table
+from tractexp.tasks.task import Job, Task, call
 
 SAID = 8  # sentences on the terminal; the page has all
 
@@ -30,28 +30,20 @@ class Compare(Task):
     def check(self) -> None:
         from tractexp.api.compare import check
 
-        check(self.sweep, self.filter, self.targets, self.ties, self.floor, where="task.")
+        check(self.sweep, self.filter, self.targets, self.ties, self.floor)
 
     def run(self, job: Job) -> None:
         from tractexp.api.compare import compare
 
         node = job.config["tracking"]
         settings = {key: getattr(self, key) for key in ("filter", "data", "targets", "ties", "floor", "reference")}
-        made = compare(self.sweep, uri=node["uri"], experiment=node["experiment"], **settings)
+        made = call(compare, self.sweep, uri=node["uri"], experiment=node["experiment"], **settings)
         report(made.comparison, made.source)
         paths = made.write(job.folder)
         if made.folder is not None:
             paths = [Path(shutil.copy2(path, made.folder / path.name)) for path in paths] + paths
-        for path in paths:
-            say(f"  {path}")
+        listed(paths)
         track(job, made.comparison, made.folder, paths[-2:])
-
-
-def store(job: Job) -> str:
-    """The address of the MLflow store."""
-    from tractexp import tracking
-
-    return tracking.address(job.config["tracking"]["uri"])
 
 
 def report(comparison: Any, source: str) -> None:
@@ -89,17 +81,15 @@ def track(job: Job, comparison: Any, folder: Path | None, paths: list[Path]) -> 
 
     parent = parent_of(folder) if folder is not None else None
     data = comparison.gathered.variants[0].runs[0].data
-    if parent is not None and attach(parent, store(job), paths):
+    if parent is not None and attach(parent, job.store, paths):
         say("logged on the run of the sweep; to see it: tractexp ui")
         return
-    experiment = node["experiment"] or f"compare {data}"
     run = tracking.Run(
-        experiment=experiment,
+        experiment=node["experiment"] or f"compare {data}",
         name=f"comparison of {len(comparison.summaries)} variants",
         parameters=tracking.flatten({"task": job.config["task"]}),
         metrics={f"median_{s.name}": s.objective.median for s in comparison.summaries if s.runs > s.failures},
         tags={"task": "compare", "data": data},
         artifacts=paths,
     )
-    tracking.log(run, store(job))
-    say(f"logged in experiment '{experiment}'; to see it: tractexp ui")
+    job.send(run)

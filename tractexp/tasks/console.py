@@ -1,13 +1,18 @@
 """What a task prints: lines and tables."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 from tractexp.progress import FIRST_LINE as FIRST_LINE
 from tractexp.progress import NEXT_LINES as NEXT_LINES
 from tractexp.progress import console as console
-from tractexp.progress import counting as counting
 from tractexp.progress import say as say
-from tractexp.progress import searching as searching
+
+
+def listed(paths: Iterable[Path]) -> None:
+    """Print what was written."""
+    for path in paths:
+        say(f"  {path}")
 
 
 def table(columns: Sequence[str], rows: Sequence[Sequence[str]], title: str = "") -> None:

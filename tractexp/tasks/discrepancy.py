@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tractexp.plugin import plugin
-from tractexp.tasks.console import say, table
+from tractexp.tasks.console import listed, say, table
 from tractexp.tasks.task import LOAD, Job, Task, call
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ class Discrepancy(Task):
     def run(self, job: Job) -> None:
         from tractexp.api.investigate import investigate
 
-        events, node = job.events(), job.config["model"]
+        events, node = job.events, job.config["model"]
         read(events)
         job.prepare_log()
         found = call(
@@ -37,9 +37,8 @@ class Discrepancy(Task):
             progress=lambda line: say(f"  {line}"),
         )  # fmt: skip
         tell(found)
-        paths = [*found.write(job.folder), *found.write_pages(job.folder)]
-        for path in paths:
-            say(f"  {path}")
+        paths = found.write(job.folder)
+        listed(paths)
         conf = job.folder / "conf"
         say(f"the extended model: python -m tractexp --config-dir {conf} model=extended")
         log(job, found, [*(p for p in paths if conf not in p.parents), conf])

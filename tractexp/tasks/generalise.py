@@ -1,15 +1,13 @@
 """Identify on one dip, judge on a milder and a deeper one: Tables 4 and 5 of the paper, for any optimizers."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import field
 from typing import Any
 
 from tractexp.errors import check_range
 from tractexp.plugin import build, plugin
-from tractexp.tasks.console import say, searching, table
-from tractexp.tasks.identify import announce
-from tractexp.tasks.task import Job, Task
+from tractexp.tasks.console import listed, say, table
+from tractexp.tasks.task import Job, Task, call
 
 
 @plugin
@@ -32,46 +30,21 @@ class Generalise(Task):
     def run(self, job: Job) -> None:
         from tractexp.api.generalise import generalise
 
-        job = with_siblings(job, self.held_out)
-        events, config = job.events(), job.config
-        limits = {key: config[key] for key in ("budget", "time_limit", "target")}
-        made = generalise(
-            events.train, events.validate, model=config["model"], optimizers=compared(job, self.optimizers),
-            seeds=self.seeds, seed=job.seed, objective=config["objective"], **limits,
-            begin=lambda problem: announce(job, events, problem), watch=watch(config["budget"]),
-        )  # fmt: skip
+        def told(line: str) -> None:
+            say(line)
+            if line.startswith("model: "):  # as every task that searches, what was chosen on the command line
+                say(f"optimizer: {job.choices['optimizer']}, seed {job.seed}")
+
+        asked = job.holding_out(self.held_out).asked
+        made = call(generalise, **asked, optimizers=self.compared(job), seeds=self.seeds, progress=told)
         show(made.medians)
         paths = made.write(job.folder)
-        for path in paths:
-            say(f"  {path}")
+        listed(paths)
         job.log(name="generalisation", values={}, metrics=metrics(made.residuals), artifacts=paths)
 
-
-def with_siblings(job: Job, held_out: Mapping[str, list[str]]) -> Job:
-    """The job with the files held out that belong to its choice of data, where it names none itself."""
-    data: Mapping[str, Any] = job.config["data"]
-    if job.choices["data"] not in held_out or data.get("validate"):
-        return job
-    held = [path for path in held_out[job.choices["data"]] if path not in data["train"]]
-    return replace(job, config={**job.config, "data": {**data, "validate": held}})
-
-
-def compared(job: Job, names: list[str]) -> dict[str, Any]:
-    """The optimizers by name, the chosen one with the settings it was given."""
-    made = {name: build("optimizer", {"name": name}) for name in names}
-    return made | {job.choices["optimizer"]: job.optimizer}
-
-
-def watch(budget: int | None) -> Any:
-    """What says that a search begins and how far it is."""
-
-    @contextmanager
-    def watched(name: str, optimizer: Any, seed: int) -> Iterator[Any]:
-        say(f"{name}, seed {seed}")
-        with searching(getattr(optimizer, "iterations", None), budget) as progress:
-            yield progress
-
-    return watched
+    def compared(self, job: Job) -> dict[str, Any]:
+        """The optimizers by name, the chosen one with the settings it was given."""
+        return {name: {"name": name} for name in self.optimizers} | {job.choices["optimizer"]: job.chosen}
 
 
 def show(medians: Sequence[Mapping[str, Any]]) -> None:

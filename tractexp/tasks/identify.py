@@ -1,13 +1,13 @@
 """Identify a load model's parameters from recorded dips."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tractexp.identification.search import REFUSED
 from tractexp.plugin import plugin
-from tractexp.tasks.console import say, table
+from tractexp.tasks.console import listed, say, table
 from tractexp.tasks.task import Job, Task
 
 if TYPE_CHECKING:
@@ -25,25 +25,13 @@ class Identify(Task):
         fit = job.identified(say)
         report(fit)
         explain(fit)
-        paths = fit.write_fits(job.folder) if _wanted(self.figures, job) else []
-        if paths:
-            paths += fit.write_page(job.folder, paths)
-        paths += fit.write_result(job.folder)
-        for path in paths:
-            say(f"  {path}")
+        paths = fit.write(job.folder) if _wanted(self.figures, job) else fit.write_result(job.folder)
+        listed(paths)
         track(job, fit, paths, _wanted(self.predictor, job))
 
 
 def _wanted(setting: bool | None, job: Job) -> bool:
     return not job.in_sweep if setting is None else setting
-
-
-def announce(job: Job, events: Any, problem: Any) -> None:
-    """Say what was read and what will be done."""
-    from tractexp.api.identify import lines
-
-    for line in lines(events.train, events.validate, problem, job.choices["optimizer"], job.seed):
-        say(line)
 
 
 def report(fit: "Identification") -> None:

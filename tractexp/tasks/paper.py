@@ -1,19 +1,16 @@
 """The paper's tables and figures, done again: one page, one verdict for each claim."""
 
 import re
-import sys
 import time
 from collections import Counter
 from dataclasses import field
 from pathlib import Path
-from typing import Any
 
 from tractexp import files
 from tractexp.api.paper import SEEDS, check, paper
 from tractexp.plugin import plugin
-from tractexp.tasks.console import NEXT_LINES, say
-from tractexp.tasks.generalise import with_siblings
-from tractexp.tasks.task import Job, Task
+from tractexp.tasks.console import listed, say
+from tractexp.tasks.task import Job, Task, call
 
 
 @plugin
@@ -30,11 +27,19 @@ class Paper(Task):
     docs: str | None = None  # write paper.md to this file too, without its figures
 
     def check(self) -> None:
-        check(self.parts, self.seeds, self.workers, where="task.")
+        check(self.parts, self.seeds, self.workers)
 
     def run(self, job: Job) -> None:
+        from tractexp.api.setup import recorded
+
         started = time.perf_counter()
-        made = replicated(with_siblings(job, self.held_out), self.parts, self.seeds, self.workers)
+        job = job.holding_out(self.held_out)
+        for line in recorded(job.events.train, job.events.validate, "hold out"):
+            say(line)
+        made = call(
+            paper, **job.asked, parts=self.parts, seeds=self.seeds, workers=self.workers,
+            progress=lambda line: say(f"  {line}"),
+        )  # fmt: skip
         paths = made.write(job.folder)
         for claim in made.claims:
             say(f"  {claim.verdict}: {claim.text}")
@@ -43,40 +48,8 @@ class Paper(Task):
         say(f"in {time.perf_counter() - started:.0f} s")
         if self.docs is not None:
             paths.append(publish(paths, Path(self.docs)))
-        for path in paths:
-            say(f"  {path}")
+        listed(paths)
         log(job, paths, made.counts)
-
-
-def replicated(job: Job, parts: list[str], seeds: int, workers: int | None) -> Any:
-    """What is measured on a job's records, which are told first."""
-    from tractexp.record import describe
-
-    events, config = job.events(), job.config
-    for role, group in (("fit", events.train), ("hold out", events.validate)):
-        for event in group:
-            say(f"{role}: {describe(event)}")
-            for note in event.record.notes:
-                say(f"  note: {note}")
-    return paper(
-        events.train, events.validate, model=config["model"], parts=parts, seeds=seeds, seed=job.seed, workers=workers,
-        objective=config["objective"], **{key: config[key] for key in ("budget", "time_limit", "target")},
-        tell=lambda line: say(f"  {line}"), count=Counting(),
-    )  # fmt: skip
-
-
-class Counting:
-    """Says now and then how many searches are done."""
-
-    def __init__(self) -> None:
-        self.said = time.perf_counter()
-
-    def __call__(self, done: int, total: int) -> None:
-        now = time.perf_counter()
-        if done == total or now - self.said > NEXT_LINES:
-            self.said = now
-            say(f"    {done} of {total} searches")
-            sys.stdout.flush()
 
 
 def publish(paths: list[Path], docs: Path) -> Path:

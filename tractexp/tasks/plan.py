@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from tractexp.errors import check_range
 from tractexp.plugin import plugin
-from tractexp.tasks.console import say, table
+from tractexp.tasks.console import listed, say, table
 from tractexp.tasks.task import Job, Task, call
 
 if TYPE_CHECKING:
@@ -41,11 +41,10 @@ class Plan(Task):
         from tractexp.api.plan import plan
 
         asked = {key: getattr(self, key) for key in ASKED}
-        made = call(plan, job.events().train, job.config["model"], **asked)
+        made = call(plan, job.events.train, job.config["model"], **asked)
         tell(made.planned)
         paths = made.write(job.folder)
-        for path in paths:
-            say(f"  {path}")
+        listed(paths)
         job.log(
             name=f"plan for {self.parameter}",
             values=dict(made.content["parameters"]),

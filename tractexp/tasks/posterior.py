@@ -2,7 +2,7 @@
 
 from tractexp.errors import check_range
 from tractexp.plugin import plugin
-from tractexp.tasks.console import say, table
+from tractexp.tasks.console import listed, say, table
 from tractexp.tasks.identify import report, track
 from tractexp.tasks.task import Job, Task, call
 
@@ -35,6 +35,5 @@ class Posterior(Task):
             say("  note: the chain is shorter than 50 autocorrelation times; raise task.steps")
         say()
         paths = sampled.write(job.folder)
-        for path in paths:
-            say(f"  {path}")
+        listed(paths)
         track(job, fit, paths, predictor=False)

@@ -2,7 +2,7 @@
 
 from tractexp.errors import check_range
 from tractexp.plugin import plugin
-from tractexp.tasks.console import say, table
+from tractexp.tasks.console import listed, say, table
 from tractexp.tasks.identify import report, track
 from tractexp.tasks.task import Job, Task, call
 
@@ -30,6 +30,5 @@ class Profile(Task):
         say(f"{len(shown.rows)} profiles: {content['simulations']} simulations in {content['seconds']:.2f} s")
         say()
         paths = profiled.write(job.folder)
-        for path in paths:
-            say(f"  {path}")
+        listed(paths)
         track(job, profiled.identification, paths, predictor=False)

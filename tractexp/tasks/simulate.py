@@ -4,7 +4,7 @@ from dataclasses import field
 from pathlib import Path
 
 from tractexp.plugin import plugin
-from tractexp.tasks.console import say, table
+from tractexp.tasks.console import listed, say, table
 from tractexp.tasks.task import LOAD, Job, Task, call
 
 DIP = ("depth", "duration", "fall", "recovery", "start", "length", "rate", "U0", "P0", "Q0")
@@ -46,7 +46,7 @@ class Simulate(Task):
         from tractexp.identification.result import load
 
         model = Identification(load(Path(self.parameters))) if self.parameters else job.config["model"]
-        events = job.events() if self.depth is None else None
+        events = job.events if self.depth is None else None
         records = [*events.train, *events.validate] if events else ()
         dip = {key: getattr(self, key) for key in DIP}
         made = call(simulate, model, self.values, records=records, **dip)
@@ -56,8 +56,7 @@ class Simulate(Task):
         table(["parameter", "value", "unit"], rows)
         table(shown.columns, shown.rows)
         paths = made.write(job.folder)
-        for path in paths:
-            say(f"  {path}")
+        listed(paths)
         metrics = {
             f"event_{k}_epsilon_{c}": error
             for k, one in enumerate(made.responses, start=1)

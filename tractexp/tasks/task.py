@@ -3,7 +3,7 @@
 import functools
 import inspect
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
@@ -48,6 +48,7 @@ class Job:
         default_factory=dict
     )  # what the user chose, {"optimizer": "pso"}: not the defaults
 
+    @functools.cached_property
     def events(self) -> Any:
         """The recorded events, read and with their dips found (`Events` of `Event`)."""
         from tractexp.record import Events, detect
@@ -55,47 +56,48 @@ class Job:
         records = build("data", self.config["data"]).read()
         return Events([detect(r) for r in records.train], [detect(r) for r in records.validate])
 
+    def holding_out(self, siblings: Mapping[str, list[str]]) -> "Job":
+        """The job with those files held out that belong to its choice of data, where it names none itself."""
+        data: Mapping[str, Any] = self.config["data"]
+        if self.choices["data"] not in siblings or data.get("validate"):
+            return self
+        held = [path for path in siblings[self.choices["data"]] if path not in data["train"]]
+        return replace(self, config={**self.config, "data": {**data, "validate": held}})
+
     @functools.cached_property
     def optimizer(self) -> Any:
         return build("optimizer", self.config["optimizer"])
 
+    @property
+    def chosen(self) -> Any:
+        """The optimizer and what it is called (a `Choice`)."""
+        from tractexp.api.arguments import Choice
+
+        return Choice(self.choices["optimizer"], self.config["optimizer"])
+
+    @property
+    def asked(self) -> dict[str, Any]:
+        """What every search is asked, as arguments of a call: records, model, objective, seed and limits."""
+        same = {key: self.config[key] for key in ("model", "objective", "budget", "time_limit", "target", "seed")}
+        return {"records": self.events.train, "validate": self.events.validate, **same}
+
     @functools.cached_property
-    def model(self) -> Any:
-        from tractexp.identification.result import parts
-        from tractexp.model.model import compose
+    def problem(self) -> Any:
+        """The identification problem (a `Problem`)."""
+        from tractexp.api.setup import Setup
 
-        return compose(*parts(self.config["model"]))
-
-    def problem(self, events: Any) -> Any:
-        """The identification problem of these events (a `Problem`)."""
-        from tractexp.identification.problem import Problem
-
-        node, loss = self.config["model"], build("objective", self.config["objective"])
-        return Problem(
-            self.model, events, node["bounds"], node["fixed"], node["substeps"], node["per_event"], loss=loss
-        )
+        return Setup.of(self.events.train, self.config["model"], (), self.config["objective"], {}).problem
 
     def identified(self, progress: Callable[[str], None]) -> Any:
         """The identification that model, objective, optimizer and limits describe (an `Identification`)."""
-        from tractexp.api.arguments import Choice
         from tractexp.api.identify import identify
 
         def told(line: str) -> None:
             self.prepare_log()  # the first line is told once the input is found right
             progress(line)
 
-        config, events = self.config, self.events()
-        return call(
-            identify,
-            events.train,
-            config["model"],
-            validate=events.validate,
-            objective=config["objective"],
-            optimizer=Choice(self.choices["optimizer"], config["optimizer"]),
-            **{key: config[key] for key in ("budget", "time_limit", "target", "seed")},
-            check_intervals=not self.in_sweep,  # of many jobs nobody reads each profile; task=profile makes them
-            progress=told,
-        )
+        # of many jobs nobody reads each profile; task=profile makes them
+        return call(identify, **self.asked, optimizer=self.chosen, check_intervals=not self.in_sweep, progress=told)
 
     @property
     def seed(self) -> int:
@@ -107,7 +109,8 @@ class Job:
         return self.config["tracking"]["experiment"] or f"{self.choices['task']} {self.choices['data']}"
 
     @property
-    def _store(self) -> str:
+    def store(self) -> str:
+        """The address of the MLflow store."""
         from tractexp import tracking
 
         return tracking.address(self.config["tracking"]["uri"])
@@ -116,7 +119,7 @@ class Job:
     def _logger(self) -> Any:
         from tractexp.tracking.process import Logger
 
-        return Logger(self._store)
+        return Logger(self.store)
 
     def prepare_log(self) -> None:
         """Get MLflow ready beside the computation, in a process of its own; call it once the input is found right.
@@ -135,7 +138,6 @@ class Job:
         if not node["enabled"]:
             return
         from tractexp import tracking
-        from tractexp.tasks.console import say
 
         parts = {group: self.choices[group] for group in ("task", "model", "optimizer", "data")}
         run = tracking.Run(
@@ -146,9 +148,15 @@ class Job:
             parent=self.sweep,
             **content,
         )
+        self.send(run, f" --uri {node['uri']}" if node["uri"] else "")
+
+    def send(self, run: Any, where: str = "") -> None:
+        """Log a run (`tracking.Run`), and say how to look at it."""
+        from tractexp import tracking
+        from tractexp.tasks.console import say
+
         if "_logger" in self.__dict__:
             self._logger.log(run)
         else:
-            tracking.log(run, self._store)
-        chosen = f" --uri {node['uri']}" if node["uri"] else ""
-        say(f"logged in experiment '{self.experiment}'; to see it: tractexp ui{chosen}")
+            tracking.log(run, self.store)
+        say(f"logged in experiment '{run.experiment}'; to see it: tractexp ui{where}")

@@ -1,0 +1,110 @@
+"""What a call is given: records and a model, and for searches how a residual counts and when they end."""
+
+import functools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from typing import TYPE_CHECKING, Any, Self
+
+from tractexp.api.arguments import Choice
+from tractexp.api.compose import LoadModel, Portable, model_of
+from tractexp.api.read import Dips, again, dips_of, kept
+from tractexp.errors import check_range
+from tractexp.progress import Progress, searching
+from tractexp.record import Event, describe
+
+if TYPE_CHECKING:
+    from tractexp.identification.problem import Problem
+    from tractexp.identification.search import Found, Limits
+
+LEAST = {"seed": 0, "budget": 1, "time_limit": 0, "target": 0}
+PLAIN: Mapping[Any, Any] = {  # by the type of a field: to plain data, and back
+    Dips: (lambda events: list(map(kept, events)), lambda told: Dips(map(again, told))),
+    LoadModel: (asdict, lambda told: LoadModel(**told)),
+    Choice: (asdict, lambda told: Choice(**told)),
+}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Given(Portable):
+    """Events fitted and held out, the model with what is known of it, and the seed."""
+
+    train: Dips
+    validate: Dips
+    model: LoadModel
+    seed: int = 0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, the records with it."""
+        told = ((f, getattr(self, f.name)) for f in fields(self))
+        return {f.name: PLAIN[f.type][0](value) if f.type in PLAIN else value for f, value in told}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        types = {f.name: f.type for f in fields(cls)}
+        return cls(**{k: PLAIN[types[k]][1](told) if types.get(k) in PLAIN else told for k, told in content.items()})
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Setup(Given):
+    """What searches are asked. Travels to other processes, where compiled models cannot go."""
+
+    objective: Choice
+    budget: int | None = None
+    time_limit: float | None = None
+    target: float | None = None
+
+    @classmethod
+    def of(cls, records: Any, model: Any, validate: Any, objective: Any, known: Mapping[str, Any], **search: Any
+           ) -> Self:  # fmt: skip
+        """From the arguments of a call; `known` replaces keys of the model where it is not None."""
+        for key, least in LEAST.items():
+            if search.get(key) is not None:
+                check_range(key, search[key], least)
+        return cls(
+            train=dips_of("records", records, least=1),
+            validate=dips_of("validate", validate),
+            model=model_of(model).with_(**known),
+            objective=Choice.of("objective", objective),
+            **search,
+        )
+
+    @functools.cached_property
+    def problem(self) -> "Problem":
+        return self.problem_of()
+
+    def problem_of(self, train: Sequence[Event] | None = None) -> "Problem":
+        """The identification problem of some events, by default of those fitted; made anew."""
+        from tractexp.identification.problem import Problem
+
+        m, loss, events = self.model, self.objective.build("objective"), self.train if train is None else train
+        return Problem(m.model, events, m.bounds, m.fixed, m.substeps, m.per_event, loss=loss)
+
+    @property
+    def limits(self) -> "Limits":
+        """When a search ends."""
+        from tractexp.identification.search import Limits
+
+        return Limits(self.budget, self.time_limit, self.target)
+
+    def lines(self) -> list[str]:
+        """What is read and fitted, a sentence each."""
+        problem = self.problem
+        model = f"model: {problem.model.title}, {problem.space.dimension} parameters"
+        steps = f"Runge-Kutta steps: {problem.step.describe(problem.events)}"
+        return [*recorded(self.train, self.validate), f"{model}; {steps}"]
+
+    def search(self, optimizer: Choice, seed: int, progress: Progress) -> "Found":
+        """Search, and show how far that is."""
+        from tractexp.identification.search import search
+
+        plugin = optimizer.build("optimizer")
+        with searching(getattr(plugin, "iterations", None), self.budget, progress) as callback:
+            return search(self.problem, plugin, seed, self.limits, callback)
+
+
+def recorded(train: Sequence[Event], validate: Sequence[Event], held_out: str = "validate") -> Iterator[str]:
+    """What is read, a sentence for each event and each of its notes."""
+    for role, group in (("fit", train), (held_out, validate)):
+        for event in group:
+            yield f"{role}: {describe(event)}"
+            yield from (f"  note: {note}" for note in event.record.notes)
