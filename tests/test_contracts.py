@@ -7,6 +7,7 @@ import tractexp.testing
 from tractexp.errors import UserError
 from tractexp.extend import Effect, Measurement, Optimizer, Parameter, Reader, Static, plugin, sites
 from tractexp.plugin import _registry as registry
+from tractexp.plugin import get
 from tractexp.testing import loads, readers, searches
 
 TIBET = [f"pkg://tractexp.data/tibet_{depth}pct.csv" for depth in (50, 30)]
@@ -64,6 +65,16 @@ def stuck(self, evaluate, box, rng):
     yield
     evaluate(x)
     yield
+
+
+def late(word, initial):
+    """An edit with a lag or a memory that begins at `initial`."""
+
+    def edit(self, eq, a):
+        state = getattr(eq, word)("late", "x")
+        {"lag": eq.moves, "memory": eq.renews}[word](state, a - state, initial(eq))
+
+    return edit
 
 
 def missing(self):
@@ -125,13 +136,28 @@ def test_a_law_that_is_none_is_refused_when_the_model_is_composed(stranger, law,
         (lambda self, eq, a: eq.moves(eq.U, a, 0), "given 'U', which is no state"),
         (lambda self, eq, a: eq.lag("idle", "x"), "nothing says how the state 'idle' moves"),
         (lambda self, eq, a: eq.lag("x1", "x"), "called 'x1': the kernel uses that name"),
-        (lambda self, eq, a: eq.lag("omega", "x"), "has a state or quantity 'omega' already"),
+        (lambda self, eq, a: eq.lag("omega", "x"), "quantity 'omega' already, declared by the motor; prefix the names"),
+        (
+            lambda self, eq, a: eq.edit(sites.load_torqe, lambda T: T),
+            r"no 'sites\.load_torqe'; did you mean 'load_torque'",
+        ),
+        (late("lag", lambda eq: eq.U), r"before the event of 'late' contains U, which moves; use eq\.U0 or eq\.before"),
+        (late("memory", lambda eq: eq[sites.static_voltage]), "before the event of 'late' contains U, which moves"),
+        (late("lag", lambda eq: eq.omega), r"of 'late' contains omega, which moves; use eq\.before"),
+        (lambda self, eq, a: eq.require(eq.U2 - a, "too low"), r"\('too low'\) contains U2, which moves; use eq\.U20"),
     ],
 )
 def test_what_an_edit_does_wrong_is_a_sentence(stranger, edit, sentence):
     motor, static = loads.partners()
     with pytest.raises(UserError, match=sentence):
         _ = loads.model(motor, static, stranger(Effect, edit=edit)).equations
+
+
+def test_two_effects_with_one_name_of_a_state_are_refused_and_the_owner_is_named(stranger):
+    motor, static = loads.partners()
+    second = stranger(Effect, edit=lambda self, eq, a: eq.lag("link_power", "x"))
+    with pytest.raises(UserError, match="'link_power' already, declared by the effect dc_link_lag"):
+        _ = loads.model(motor, static, get("effect", "dc_link_lag"), second).equations
 
 
 def test_a_static_load_with_a_parameter_of_the_motor_is_refused(stranger):
