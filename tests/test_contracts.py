@@ -88,13 +88,17 @@ def missing(self):
         (Measurement, {"observe": mixed}, loads.sees_each_event_by_itself, "mixes events"),
         (Effect, {"edit": doubled}, loads.is_the_base_model_at_its_null, "pu away from the base model"),
         (Effect, {"edit": doubled}, loads.has_sizes_that_matter, "does not say in 'relevant'"),
+        (Effect, {"edit": unmoved, "relevant": {"a": 0.1}, "confused_with": ("load_drfit",)}, loads.has_sizes_that_matter,
+         "confused with 'load_drfit', no other effect; did you mean 'load_drift'"),
+        (Static, {"law": lambda self, u: (u, u), "__doc__": "A load. Source: here."}, loads.says_what_it_is,
+         "has no equation: no line with '=' or '->'"),
         (Effect, {"edit": unmoved}, loads.is_seen_in_a_dip, "shows nothing"),
         (Effect, {"edit": growing}, loads.rests, "under a steady voltage"),
         (Effect, {"edit": growing}, loads.says_what_it_is, "has no line 'Departures:'"),
         (Optimizer, {"search": proposed}, searches.gives_the_same_bits_for_the_same_seed, "another history"),
         (Optimizer, {"search": stuck}, searches.finds_the_bottom_of_a_bowl, "after a start of"),
     ],
-)
+)  # fmt: skip
 def test_a_contract_that_is_broken_says_how(stranger, base, attributes, check, sentence):
     with pytest.raises(AssertionError, match=sentence):
         check(stranger(base, **attributes))

@@ -160,15 +160,16 @@ def import_all(found: Iterable[ModuleType]) -> None:
                 base = next(b for b in cls.__mro__ if "group" in vars(b))
                 raise UserError(
                     f"{module.__file__}, line {inspect.getsourcelines(cls)[1]}: the class {cls.__name__} is a"
-                    f" {base.__name__} that is not decorated with @plugin, so nothing can choose it; write @plugin above"
-                    " it, or let its name start with an underscore"
+                    f" {base.__name__} that is not decorated with @plugin, so nothing can choose it; write @plugin"
+                    " above it, or let its name start with an underscore"
                 )
 
 
 def _forgotten(cls: Any, module: str, known: tuple[type, ...]) -> bool:
     """Whether a class of a module is neither a plugin, nor what plugins are made from."""
-    own = isinstance(cls, type) and issubclass(cls, Plugin) and cls.__module__ == module
-    return own and hasattr(cls, "group") and cls.__name__[0] != "_" and not any(issubclass(k, cls) for k in known)
+    if not (isinstance(cls, type) and issubclass(cls, Plugin) and cls.__module__ == module and hasattr(cls, "group")):
+        return False
+    return not (cls.__name__.startswith("_") or "name" in vars(cls) or any(issubclass(k, cls) for k in known))
 
 
 @contextmanager

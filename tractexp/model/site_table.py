@@ -10,7 +10,7 @@ from tractexp.plugin import discover, get
 
 
 def sites(model: Any) -> Table:
-    """The sites of a model: what stands at each, those of its effects that edit it, and the other registered effects that could.
+    """The sites of a model: what stands at each, which of its effects edit it, and which other ones could.
 
     Every registered effect is tried on the model, which takes seconds the first time and is remembered then.
     """
