@@ -88,7 +88,7 @@ def missing(self):
         (Measurement, {"observe": mixed}, loads.sees_each_event_by_itself, "mixes events"),
         (Effect, {"edit": doubled}, loads.is_the_base_model_at_its_null, "pu away from the base model"),
         (Effect, {"edit": doubled}, loads.has_sizes_that_matter, "does not say in 'relevant'"),
-        (Effect, {"edit": unmoved, "relevant": {"a": 0.1}, "confused_with": ("load_drfit",)}, loads.has_sizes_that_matter,
+        (Effect, {"edit": unmoved, "relevant": {"a": 1}, "confused_with": ("load_drfit",)}, loads.has_sizes_that_matter,
          "confused with 'load_drfit', no other effect; did you mean 'load_drift'"),
         (Static, {"law": lambda self, u: (u, u), "__doc__": "A load. Source: here."}, loads.says_what_it_is,
          "has no equation: no line with '=' or '->'"),
@@ -155,6 +155,20 @@ def test_what_an_edit_does_wrong_is_a_sentence(stranger, edit, sentence):
     motor, static = loads.partners()
     with pytest.raises(UserError, match=sentence):
         _ = loads.model(motor, static, stranger(Effect, edit=edit)).equations
+
+
+def test_a_law_is_evaluated_at_a_state_by_substitution(stranger):
+    def edit(self, eq, a):
+        late = eq.lag("late_voltage", "u_l")
+        eq.moves(late, (eq[sites.static_voltage] - late) / 0.1, 1)
+        eq.edit(sites.Q_static, lambda Q: (1 - a) * Q + a * Q.subs(eq[sites.static_voltage], late))
+
+    motor, static = loads.partners()
+    bare, eq = loads.model(motor, static).equations, loads.model(motor, static, stranger(Effect, edit=edit)).equations
+    law, edited = bare.expression(sites.Q_static), eq.expression(sites.Q_static)
+    u, late, a = bare[sites.static_voltage], eq["late_voltage"], eq["a"]
+    assert edited.subs(a, 1) == law.subs(u, late) != law
+    assert edited.subs(a, 0) == law
 
 
 def test_two_effects_with_one_name_of_a_state_are_refused_and_the_owner_is_named(stranger):

@@ -8,6 +8,7 @@ import os
 import re
 import subprocess
 import sys
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -128,6 +129,11 @@ def test_the_examples_of_the_documentation_keep_the_contracts(tmp_path):
     np.savetxt(tmp_path / "dip.tsv", np.c_[t, np.ones(100), np.ones(100), np.full(100, 0.5)], delimiter="\t")
     (tmp_path / "test_strangers.py").write_text(STRANGERS)
     passed("test_strangers.py", tmp_path, tmp_path)
+
+
+def test_the_package_of_the_documentation_is_the_one_that_is_installed_here():
+    (told,) = re.findall(r"```toml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    assert tomllib.loads(told) == tomllib.loads((TESTS / "acme" / "pyproject.toml").read_text(encoding="utf-8"))
 
 
 def test_the_documentation_tells_every_word_of_the_equations_and_every_site():
