@@ -7,6 +7,7 @@ import tractexp.testing
 from tractexp.errors import UserError
 from tractexp.extend import Effect, Measurement, Optimizer, Parameter, Reader, Static, plugin, sites
 from tractexp.plugin import _registry as registry
+from tractexp.plugin import get
 from tractexp.testing import loads, readers, searches
 
 TIBET = [f"pkg://tractexp.data/tibet_{depth}pct.csv" for depth in (50, 30)]
@@ -66,6 +67,16 @@ def stuck(self, evaluate, box, rng):
     yield
 
 
+def late(word, initial):
+    """An edit with a lag or a memory that begins at `initial`."""
+
+    def edit(self, eq, a):
+        state = getattr(eq, word)("late", "x")
+        {"lag": eq.moves, "memory": eq.renews}[word](state, a - state, initial(eq))
+
+    return edit
+
+
 def missing(self):
     raise KeyError("file")
 
@@ -77,13 +88,17 @@ def missing(self):
         (Measurement, {"observe": mixed}, loads.sees_each_event_by_itself, "mixes events"),
         (Effect, {"edit": doubled}, loads.is_the_base_model_at_its_null, "pu away from the base model"),
         (Effect, {"edit": doubled}, loads.has_sizes_that_matter, "does not say in 'relevant'"),
+        (Effect, {"edit": unmoved, "relevant": {"a": 1}, "confused_with": ("load_drfit",)}, loads.has_sizes_that_matter,
+         "confused with 'load_drfit', no other effect; did you mean 'load_drift'"),
+        (Static, {"law": lambda self, u: (u, u), "__doc__": "A load. Source: here."}, loads.says_what_it_is,
+         "has no equation: no line with '=' or '->'"),
         (Effect, {"edit": unmoved}, loads.is_seen_in_a_dip, "shows nothing"),
         (Effect, {"edit": growing}, loads.rests, "under a steady voltage"),
         (Effect, {"edit": growing}, loads.says_what_it_is, "has no line 'Departures:'"),
         (Optimizer, {"search": proposed}, searches.gives_the_same_bits_for_the_same_seed, "another history"),
         (Optimizer, {"search": stuck}, searches.finds_the_bottom_of_a_bowl, "after a start of"),
     ],
-)
+)  # fmt: skip
 def test_a_contract_that_is_broken_says_how(stranger, base, attributes, check, sentence):
     with pytest.raises(AssertionError, match=sentence):
         check(stranger(base, **attributes))
@@ -125,13 +140,42 @@ def test_a_law_that_is_none_is_refused_when_the_model_is_composed(stranger, law,
         (lambda self, eq, a: eq.moves(eq.U, a, 0), "given 'U', which is no state"),
         (lambda self, eq, a: eq.lag("idle", "x"), "nothing says how the state 'idle' moves"),
         (lambda self, eq, a: eq.lag("x1", "x"), "called 'x1': the kernel uses that name"),
-        (lambda self, eq, a: eq.lag("omega", "x"), "has a state or quantity 'omega' already"),
+        (lambda self, eq, a: eq.lag("omega", "x"), "quantity 'omega' already, declared by the motor; prefix the names"),
+        (
+            lambda self, eq, a: eq.edit(sites.load_torqe, lambda T: T),
+            r"no 'sites\.load_torqe'; did you mean 'load_torque'",
+        ),
+        (late("lag", lambda eq: eq.U), r"before the event of 'late' contains U, which moves; use eq\.U0 or eq\.before"),
+        (late("memory", lambda eq: eq[sites.static_voltage]), "before the event of 'late' contains U, which moves"),
+        (late("lag", lambda eq: eq.omega), r"of 'late' contains omega, which moves; use eq\.before"),
+        (lambda self, eq, a: eq.require(eq.U2 - a, "too low"), r"\('too low'\) contains U2, which moves; use eq\.U20"),
     ],
 )
 def test_what_an_edit_does_wrong_is_a_sentence(stranger, edit, sentence):
     motor, static = loads.partners()
     with pytest.raises(UserError, match=sentence):
         _ = loads.model(motor, static, stranger(Effect, edit=edit)).equations
+
+
+def test_a_law_is_evaluated_at_a_state_by_substitution(stranger):
+    def edit(self, eq, a):
+        late = eq.lag("late_voltage", "u_l")
+        eq.moves(late, (eq[sites.static_voltage] - late) / 0.1, 1)
+        eq.edit(sites.Q_static, lambda Q: (1 - a) * Q + a * Q.subs(eq[sites.static_voltage], late))
+
+    motor, static = loads.partners()
+    bare, eq = loads.model(motor, static).equations, loads.model(motor, static, stranger(Effect, edit=edit)).equations
+    law, edited = bare.expression(sites.Q_static), eq.expression(sites.Q_static)
+    u, late, a = bare[sites.static_voltage], eq["late_voltage"], eq["a"]
+    assert edited.subs(a, 1) == law.subs(u, late) != law
+    assert edited.subs(a, 0) == law
+
+
+def test_two_effects_with_one_name_of_a_state_are_refused_and_the_owner_is_named(stranger):
+    motor, static = loads.partners()
+    second = stranger(Effect, edit=lambda self, eq, a: eq.lag("link_power", "x"))
+    with pytest.raises(UserError, match="'link_power' already, declared by the effect dc_link_lag"):
+        _ = loads.model(motor, static, get("effect", "dc_link_lag"), second).equations
 
 
 def test_a_static_load_with_a_parameter_of_the_motor_is_refused(stranger):

@@ -1,17 +1,21 @@
 """Registration, refusals at registration, and a stranger's package installed for real."""
 
 import ast
+import importlib
+import importlib.metadata
 import json
 import os
 import re
 import subprocess
 import sys
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tractexp import plugin as framework
 from tractexp.errors import UserError
 from tractexp.identification.optimizer import Optimizer
 from tractexp.model.parts import Effect, Measurement, Motor, Static
@@ -127,6 +131,11 @@ def test_the_examples_of_the_documentation_keep_the_contracts(tmp_path):
     passed("test_strangers.py", tmp_path, tmp_path)
 
 
+def test_the_package_of_the_documentation_is_the_one_that_is_installed_here():
+    (told,) = re.findall(r"```toml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    assert tomllib.loads(told) == tomllib.loads((TESTS / "acme" / "pyproject.toml").read_text(encoding="utf-8"))
+
+
 def test_the_documentation_tells_every_word_of_the_equations_and_every_site():
     from tractexp.model.equations import Equations
     from tractexp.model.sites import SITES
@@ -147,6 +156,66 @@ def test_without_the_package_its_names_are_unknown(tmp_path):
     done = tractexp("optimizer=acme_descent", cwd=tmp_path)
     assert done.returncode == 2
     assert "there is no such choice" in done.stderr
+
+
+FORGOTTEN = """
+from tractexp.extend import Static, plugin
+
+class Shared(Static):
+    \"\"\"Source: here.\"\"\"
+
+    def law(self, u):
+        return u, u
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("x = 1\ndef law(:\n", r"module '\w+\.bad' cannot be imported: .*bad\.py, line 2: SyntaxError: invalid syntax"),
+        ("import json\n\njson.loads('{')\n", r"bad\.py, line 3: JSONDecodeError: Expecting property name"),
+        ("import nowhere_to_be_found\n", r"bad\.py, line 1: ModuleNotFoundError: No module named 'nowhere_to_be"),
+        (FORGOTTEN, r"bad\.py, line 4: the class Shared is a Static that is not decorated with @plugin"),
+    ],
+)
+def test_a_module_that_cannot_be_a_plugin_is_refused_with_its_file_and_line(text, sentence, tmp_path, monkeypatch):
+    name = f"rough_{tmp_path.name.replace('-', '_')}"
+    (tmp_path / name).mkdir()
+    (tmp_path / name / "__init__.py").write_text("")
+    (tmp_path / name / "bad.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(framework, "packages", lambda: (importlib.import_module(name),))
+    with pytest.raises(UserError, match=sentence):
+        discover.__wrapped__()
+
+
+def test_what_plugins_are_made_from_is_not_taken_for_a_plugin_without_its_decorator(tmp_path, monkeypatch):
+    made = tmp_path / "shared_bases"
+    made.mkdir()
+    (made / "__init__.py").write_text("")
+    text = FORGOTTEN + '\n@plugin\nclass Child(Shared):\n    """Source: here."""\n\nclass _Own(Static):\n    pass\n'
+    (made / "shared_base_child.py").write_text(text)
+    (made / "importer.py").write_text("from tractexp.extend import Static\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    try:
+        framework.import_all([importlib.import_module("shared_bases")])
+        assert get("model/static", "shared_base_child").__name__ == "Child"
+    finally:
+        framework._registry["model/static"].pop("shared_base_child", None)
+
+
+@pytest.mark.parametrize(
+    ("file", "sentence"),
+    [("", "cannot be imported: ModuleNotFoundError"), ("lonely_acme.py", "is a single file; make it a folder")],
+)
+def test_an_entry_point_that_is_no_package_is_refused(file, sentence, tmp_path, monkeypatch):
+    if file:
+        (tmp_path / file).write_text("")
+    monkeypatch.syspath_prepend(tmp_path)
+    point = importlib.metadata.EntryPoint("acme", "lonely_acme", framework.ENTRY_POINTS)
+    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: [point])
+    with pytest.raises(UserError, match=r"'lonely_acme' \(entry point 'acme'\) " + sentence):
+        framework.packages.__wrapped__()
 
 
 def test_every_plugin_has_a_schema_that_says_its_name():

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from tractexp import progress
 from tractexp.errors import UserError
 from tractexp.identification.least_squares import APART, Elite, _Residuals, least_squares_from, race
 from tractexp.identification.optimizer import REFUSED, Box, Evaluate, Optimizer
@@ -101,6 +102,18 @@ def test_progress_is_told_each_iteration():
     told = []
     search(Watched(), Scripted([np.full((4, 3), 0.2)] * 3), 0, progress=lambda *row: told.append(row))
     assert [(i, n) for i, _, n in told] == [(0, 4), (1, 8), (2, 12)]
+
+
+def test_an_end_that_the_search_has_passed_is_none(capsys, monkeypatch):
+    assert progress.share(3, 30, 4, None) == 0.75
+    assert progress.share(5, 30, 4, None) is None
+    assert progress.share(5, 30, 4, 60) == 0.5
+    assert [progress.left(6.0, done) for done in (0.75, 1.0, 0.0, None)] == [", about 2 s left", "", "", ""]
+    monkeypatch.setattr(progress, "FIRST_LINE", 0.0)
+    monkeypatch.setattr(progress, "_lively", lambda: False)
+    with progress.searching(4, None) as tell:
+        tell(5, 0.25, 30)
+    assert capsys.readouterr().out == "  iteration 5: 30 simulations, best objective 0.25\n"
 
 
 def test_a_target_ends_the_search_at_once():

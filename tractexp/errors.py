@@ -8,6 +8,10 @@ class UserError(Exception):
     """Wrong input. The message is a complete sentence for the person who gave it; no traceback is shown."""
 
 
+class Unknown(UserError, AttributeError):
+    """A plugin asked for a word that it is not offered, or assigned one."""
+
+
 def nearest(name: str, allowed: Iterable[str]) -> str:
     """Return "; did you mean 'x'?" for the closest allowed name, or "" when nothing is close."""
     close = difflib.get_close_matches(str(name), list(allowed), n=1, cutoff=0.5)

@@ -14,10 +14,13 @@ import dataclasses
 import functools
 import importlib
 import importlib.metadata
+import inspect
 import pkgutil
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
+from types import ModuleType
 from typing import Any, ClassVar, TypeVar, dataclass_transform, get_type_hints
 
 from tractexp.errors import UserError, among
@@ -121,23 +124,76 @@ def packages() -> tuple[Any, ...]:
     """The packages behind the entry points, imported, in order of name."""
     found = []
     for point in sorted(importlib.metadata.entry_points(group=ENTRY_POINTS), key=lambda p: (p.name, p.value)):
-        try:
+        with _told(f"the plugin package '{point.value}' (entry point '{point.name}')"):
             found.append(point.load())
-        except ImportError as error:
+        if not hasattr(found[-1], "__path__"):
             raise UserError(
-                f"the plugin package '{point.value}' (entry point '{point.name}') cannot be imported: {error}"
-            ) from error
+                f"the plugin package '{point.value}' (entry point '{point.name}') is a single file; make it a folder"
+                " with an __init__.py and a file for each plugin"
+            )
     return tuple(dict.fromkeys(found))
 
 
 @functools.cache
 def discover() -> Mapping[str, Mapping[str, type[Plugin]]]:
     """Import every plugin module once and return {group: {name: class}}."""
-    for package in packages():
+    import_all(packages())
+    return _registry
+
+
+def import_all(found: Iterable[ModuleType]) -> None:
+    """Import every module of some packages that does not start with an underscore.
+
+    Raises `UserError` with file and line for a module that cannot be imported, and for a class in it that is not
+    decorated with `@plugin`.
+    """
+    modules = []
+    for package in found:
         for module in pkgutil.walk_packages(package.__path__, package.__name__ + "."):
             if not module.name.rpartition(".")[2].startswith("_"):
-                importlib.import_module(module.name)
-    return _registry
+                with _told(f"the plugin module '{module.name}'"):
+                    modules.append(importlib.import_module(module.name))
+    known = tuple(cls for classes in _registry.values() for cls in classes.values())
+    for module in modules:
+        for cls in vars(module).values():
+            if _forgotten(cls, module.__name__, known):
+                base = next(b for b in cls.__mro__ if "group" in vars(b))
+                raise UserError(
+                    f"{module.__file__}, line {inspect.getsourcelines(cls)[1]}: the class {cls.__name__} is a"
+                    f" {base.__name__} that is not decorated with @plugin, so nothing can choose it; write @plugin"
+                    " above it, or let its name start with an underscore"
+                )
+
+
+def _forgotten(cls: Any, module: str, known: tuple[type, ...]) -> bool:
+    """Whether a class of a module is neither a plugin, nor what plugins are made from."""
+    if not (isinstance(cls, type) and issubclass(cls, Plugin) and cls.__module__ == module and hasattr(cls, "group")):
+        return False
+    return not (cls.__name__.startswith("_") or "name" in vars(cls) or any(issubclass(k, cls) for k in known))
+
+
+@contextmanager
+def _told(what: str) -> Iterator[None]:
+    """Tell in a sentence, with file and line, why an import failed."""
+    try:
+        yield
+    except UserError:
+        raise
+    except Exception as error:
+        why = error.msg if isinstance(error, SyntaxError) else error
+        raise UserError(f"{what} cannot be imported: {_place(error)}{type(error).__name__}: {why}") from error
+
+
+def _place(error: Exception) -> str:
+    """File and line of an error in what was imported, not in a library it called; "" where nothing was imported."""
+    import traceback
+
+    if isinstance(error, SyntaxError):
+        return f"{error.filename}, line {error.lineno}: "
+    frames = traceback.extract_tb(error.__traceback__)
+    folder = next((Path(f.filename).parent for f in frames if f.name == "<module>"), None)
+    own = [f for f in frames if folder and folder in Path(f.filename).parents]
+    return f"{own[-1].filename}, line {own[-1].lineno}: " if own else ""
 
 
 def configuration_folders() -> list[Path]:

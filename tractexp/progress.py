@@ -35,7 +35,7 @@ def say(text: str = "") -> None:
 @contextmanager
 def searching(iterations: int | None, budget: int | None, progress: Progress = None) -> Iterator[Any]:
     """Yield the search loop's progress callback: a live line, or a line now and then in a log file; None for False."""
-    from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, TextColumn
 
     if progress is False:
         yield None
@@ -46,15 +46,15 @@ def searching(iterations: int | None, budget: int | None, progress: Progress = N
     columns = [
         TextColumn("  searching"),
         BarColumn(bar_width=24),
-        TextColumn("{task.fields[simulations]} simulations, best objective {task.fields[best]:.4g},"),
-        TimeRemainingColumn(compact=True),
-        TextColumn("left"),
+        TextColumn("{task.fields[simulations]} simulations, best objective {task.fields[best]:.4g}{task.fields[rest]}"),
     ]
-    with _live(columns, 1.0 if iterations or budget else None, simulations=0, best=float("nan")) as update:
+    started, total = time.perf_counter(), 1.0 if iterations or budget else None
+    with _live(columns, total, simulations=0, best=float("nan"), rest="") as update:
 
         def callback(iteration: int, best: float, simulations: int) -> None:
             done = share(iteration, simulations, iterations, budget)
-            update(completed=done or 0.0, simulations=simulations, best=best)
+            rest = left(time.perf_counter() - started, done)
+            update(completed=done or 0.0, simulations=simulations, best=best, rest=rest)
 
         yield callback
 
@@ -115,9 +115,17 @@ def tell(progress: Progress, lines: Iterable[str]) -> None:
 
 
 def share(iteration: int, simulations: int, iterations: int | None, budget: int | None) -> float | None:
-    """How much of the search is done, in [0, 1], by whichever end comes first; None where neither is known."""
-    parts = [done / end for done, end in ((iteration, iterations), (simulations, budget)) if end]
-    return min(max(parts), 1.0) if parts else None
+    """How much of the search is done, in [0, 1], by whichever end comes first; None where neither is known.
+
+    An end that the search has passed, as an optimizer may pass its own `iterations`, was none.
+    """
+    parts = [done / end for done, end in ((iteration, iterations), (simulations, budget)) if end and done <= end]
+    return max(parts, default=None)
+
+
+def left(spent: float, done: float | None) -> str:
+    """The end of a progress line: how long the rest takes [s], where that can be told."""
+    return f", about {spent / done - spent:.0f} s left" if done and done < 1 else ""
 
 
 class _Lines:
@@ -131,9 +139,8 @@ class _Lines:
         if spent < self.due:
             return
         self.due = spent + NEXT_LINES
-        done = share(iteration, simulations, self.iterations, self.budget)
-        left = f", about {spent / done - spent:.0f} s left" if done else ""
-        say(f"  iteration {iteration}: {simulations} simulations, best objective {best:.4g}{left}")
+        rest = left(spent, share(iteration, simulations, self.iterations, self.budget))
+        say(f"  iteration {iteration}: {simulations} simulations, best objective {best:.4g}{rest}")
         sys.stdout.flush()
 
 

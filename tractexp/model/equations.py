@@ -12,7 +12,7 @@ from typing import Any, Literal, NoReturn
 import sympy
 from sympy import I, Symbol, conjugate, im, re
 
-from tractexp.errors import UserError, nearest
+from tractexp.errors import Unknown, UserError, nearest
 from tractexp.model import sites
 from tractexp.model.drive import EVENT, INPUTS
 from tractexp.model.names import check_name
@@ -61,10 +61,6 @@ class Memory:
     initial: sympy.Expr | None = None
 
 
-class Unknown(UserError, AttributeError):
-    """A plugin asked the equations for a word they do not have, or assigned one."""
-
-
 class Equations:
     """The declaration of one composite load, Eq. (7) of Wu et al. 2022.
 
@@ -106,6 +102,7 @@ class Equations:
             self.P_s0: "P_{s0}", self.Q_s0: "Q_{s0}", self.U_rate: r"\dot U", self.step: r"\Delta t",
         }  # fmt: skip
         self._power: dict[Site, sympy.Expr] = {sites.P: sympy.Integer(0), sites.Q: sympy.Integer(0)}
+        self._owners: dict[str, str] = {}  # who declared the parameter, state or quantity of a name
         self._writer = OWN
 
     def __getattr__(self, name: str) -> NoReturn:
@@ -203,7 +200,9 @@ class Equations:
 
     def _define(self, symbol: Symbol, expression: sympy.Expr, latex: str) -> Symbol:
         if symbol.name in self:
-            raise UserError(f"'{symbol.name}' is defined twice in this model; {self._writer} must name it otherwise")
+            owner = self._owner(symbol.name)
+            raise UserError(f"'{symbol.name}' is in this model already{owner}; {self._writer} must name it otherwise")
+        self._owners[symbol.name] = self._writer
         self.latex_names[symbol] = latex
         self.definitions[symbol] = expression
         return symbol
@@ -280,8 +279,17 @@ class Equations:
     def _new(self, symbol: Symbol) -> Symbol:
         check_name(symbol.name)
         if any(s.name == symbol.name for s in (*self.definitions, *self.states, *self.memories)):
-            raise Unfit(f"the model has a state or quantity '{symbol.name}' already")
+            owner = self._owner(symbol.name)
+            raise Unfit(f"the model has a state or quantity '{symbol.name}' already{owner}; prefix the names of states")
+        self._owners[symbol.name] = self._writer
         return symbol
+
+    def _owner(self, name: str) -> str:
+        """The end of a sentence about a name that is taken: by whom."""
+        if name not in self._owners:
+            return ""
+        owner = self._owners[name]
+        return f", declared by {({OWN: 'the motor', 'static': 'the static load'}).get(owner, f'the effect {owner}')}"
 
     def moves(
         self, state: Symbol, derivative: sympy.Expr, initial: sympy.Expr, balance: sympy.Expr | None = None
@@ -334,6 +342,18 @@ class Equations:
         others = [self.real(self.before(self.expand(power).xreplace(without_static))) for power in (self.P, self.Q)]
         self.definitions[self.P_s0] = self.P0 - others[0]
         self.definitions[self.Q_s0] = self.Q0 - others[1]
+        for symbol, declared in (self.states | self.memories).items():
+            self._check_still(f"the value before the event of '{symbol}'", declared.initial)
+        for requirement in self.requirements:
+            self._check_still(f"what must hold for a steady state ('{requirement.sentence}')", requirement.slack)
+
+    def _check_still(self, what: str, expression: sympy.Expr) -> None:
+        """Raise `UserError` where a value before the event is written in what moves after it."""
+        inputs = {self.U: "eq.U0", self.omega_s: "eq.omega_s0", self.U2: "eq.U20"}
+        moving = {*inputs, self.U_rate, self.t, *self.states, *self.memories}
+        if found := sorted(self.expand(expression).free_symbols & moving, key=str):
+            use = "".join(f"{inputs[s]} or " for s in found if s in inputs)
+            raise UserError(f"{what} contains {found[0]}, which moves; use {use}eq.before(...)")
 
     def before(self, expression: sympy.Expr) -> sympy.Expr:
         """An expression's value before the event, of constants: `eq.before(eq.omega)` is the speed there."""

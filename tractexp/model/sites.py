@@ -5,9 +5,9 @@ edits them (`eq.edit(sites.P_static, change)`) or reads them (`eq[sites.static_v
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NoReturn
 
-from tractexp.errors import UserError, among
+from tractexp.errors import Unknown, UserError, among
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,12 @@ P = Site("P", "P", "real", "pu", "bus", "active power of all parts together")
 Q = Site("Q", "Q", "real", "pu", "bus", "reactive power of all parts together")
 
 SITES = {site.name: site for site in list(globals().values()) if isinstance(site, Site)}
+
+
+def __getattr__(name: str) -> NoReturn:
+    if name.startswith("_"):  # what Python itself looks for in a module
+        raise AttributeError(name)
+    raise Unknown(f"there is no 'sites.{name}'{among(name, SITES, 'Sites')}")
 
 
 def named(what: "Site | str") -> Site:

@@ -7,12 +7,11 @@ Each check is a function of a plugin class in `loads`, `searches` and `readers`,
 
 import functools
 import importlib
-import pkgutil
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from tractexp.errors import UserError
-from tractexp.plugin import Plugin, discover
+from tractexp.plugin import Plugin, discover, import_all
 from tractexp.testing import loads, readers, searches
 
 SUITES = (*loads.SUITES, searches.SUITE, readers.SUITE)
@@ -39,9 +38,7 @@ def contract(package: str, samples: Mapping[str, Sequence[Mapping[str, Any]]] | 
 def plugins_of(package: str) -> list[type[Plugin]]:
     """The plugin classes in a package, in order of group and name."""
     discover()
-    for module in pkgutil.walk_packages(importlib.import_module(package).__path__, package + "."):
-        if not module.name.rpartition(".")[2].startswith("_"):
-            importlib.import_module(module.name)
+    import_all([importlib.import_module(package)])
     known = (cls for _, classes in sorted(discover().items()) for _, cls in sorted(classes.items()))
     return [cls for cls in known if cls.__module__.startswith(package + ".")]
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from tractexp.errors import UserError
+from tractexp.errors import UserError, among
 from tractexp.model.drive import Drive
 from tractexp.model.model import Model, compose
 from tractexp.model.parts import Effect, Measurement, Motor, Part, Static
@@ -115,7 +115,7 @@ def play(of: Model, drive: Drive, chosen: np.ndarray, substeps: int = SUBSTEPS) 
 def says_what_it_is(cls: type[Part]) -> None:
     """The docstring has equations, their source and what departs from it; every parameter is told and bounded."""
     text = cls.__doc__ or ""
-    assert "=" in text or "->" in text, f"the docstring of '{cls.name}' has no equation"
+    assert "=" in text or "->" in text, f"the docstring of '{cls.name}' has no equation: no line with '=' or '->'"
     for needed in ("Source:", "Departures:"):
         assert needed in text, f"the docstring of '{cls.name}' has no line '{needed}'"
     for parameter in cls.parameters:
@@ -205,7 +205,8 @@ def has_sizes_that_matter(cls: type[Effect]) -> None:
         assert p.default == p.null, f"the size {p.name} of '{cls.name}' starts at {p.default:g}, not at its null"
         assert p.name in cls.relevant, f"'{cls.name}' does not say in 'relevant' from where its size {p.name} matters"
     for name in cls.confused_with:
-        assert name in known.keys() - {cls.name}, f"'{cls.name}' is confused with '{name}', no other effect"
+        others = known.keys() - {cls.name}
+        assert name in others, f"'{cls.name}' is confused with '{name}', no other effect{among(name, others)}"
 
 
 def is_the_base_model_at_its_null(cls: type[Effect]) -> None:
