@@ -175,7 +175,14 @@ class Shared(Static):
         ("x = 1\ndef law(:\n", r"module '\w+\.bad' cannot be imported: .*bad\.py, line 2: SyntaxError: invalid syntax"),
         ("import json\n\njson.loads('{')\n", r"bad\.py, line 3: JSONDecodeError: Expecting property name"),
         ("import nowhere_to_be_found\n", r"bad\.py, line 1: ModuleNotFoundError: No module named 'nowhere_to_be"),
-        (FORGOTTEN, r"bad\.py, line 4: the class Shared is a Static that is not decorated with @plugin"),
+        (
+            FORGOTTEN,
+            r"bad\.py, line 4: the class Shared\(Static\) is not decorated with @plugin, so nothing can choose",
+        ),
+        (
+            "from tractexp.extend import sites\n\nsites.P_statc\n",
+            r"bad\.py, line 3: Unknown: there is no 'sites\.P_statc'",
+        ),
     ],
 )
 def test_a_module_that_cannot_be_a_plugin_is_refused_with_its_file_and_line(text, sentence, tmp_path, monkeypatch):

@@ -23,7 +23,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, ClassVar, TypeVar, dataclass_transform, get_type_hints
 
-from tractexp.errors import UserError, among
+from tractexp.errors import Unknown, UserError, among
 from tractexp.parameter import Parameter
 
 ENTRY_POINTS = "tractexp.plugins"
@@ -159,9 +159,9 @@ def import_all(found: Iterable[ModuleType]) -> None:
             if _forgotten(cls, module.__name__, known):
                 base = next(b for b in cls.__mro__ if "group" in vars(b))
                 raise UserError(
-                    f"{module.__file__}, line {inspect.getsourcelines(cls)[1]}: the class {cls.__name__} is a"
-                    f" {base.__name__} that is not decorated with @plugin, so nothing can choose it; write @plugin"
-                    " above it, or let its name start with an underscore"
+                    f"{module.__file__}, line {inspect.getsourcelines(cls)[1]}: the class"
+                    f" {cls.__name__}({base.__name__}) is not decorated with @plugin, so nothing can choose it; write"
+                    " @plugin above it, or let its name start with an underscore"
                 )
 
 
@@ -177,9 +177,9 @@ def _told(what: str) -> Iterator[None]:
     """Tell in a sentence, with file and line, why an import failed."""
     try:
         yield
-    except UserError:
-        raise
     except Exception as error:
+        if isinstance(error, UserError) and not isinstance(error, Unknown):
+            raise  # it names the class and the file by itself
         why = error.msg if isinstance(error, SyntaxError) else error
         raise UserError(f"{what} cannot be imported: {_place(error)}{type(error).__name__}: {why}") from error
 
