@@ -66,7 +66,25 @@ def _told(cell: Any) -> str:
     return f"{cell:.5g}" if isinstance(cell, float) else str(cell)
 
 
-class Outcome:
+class Tabulated:
+    """Shows itself by its `table`: printed, in a notebook, as a frame."""
+
+    def table(self) -> Table:
+        """What a person sees first."""
+        raise NotImplementedError
+
+    def to_frame(self) -> Any:
+        """The table as a pandas frame."""
+        return self.table().to_frame()
+
+    def __repr__(self) -> str:
+        return str(self.table())
+
+    def _repr_html_(self) -> str:
+        return self.table()._repr_html_()
+
+
+class Outcome(Tabulated):
     """Base of the results. A subclass names its `kind`, gives `to_dict` and `table`, and is made again by `from_dict`.
 
     The file that `save` writes is JSON: `tractexp` (the version), `kind`, and what `to_dict` holds.
@@ -79,10 +97,6 @@ class Outcome:
         super().__init_subclass__(**settings)
         if "kind" in vars(cls):
             Outcome.kinds[cls.kind] = cls
-
-    def table(self) -> Table:
-        """What a person sees first."""
-        raise NotImplementedError
 
     def to_dict(self) -> dict[str, Any]:
         """Everything found, as plain data that JSON knows."""
@@ -101,16 +115,6 @@ class Outcome:
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             told = f"it lacks {error}" if isinstance(error, KeyError) else str(error)
             raise UserError(f"this is not a whole saved {cls.kind}: {told}; save it again") from error
-
-    def to_frame(self) -> Any:
-        """The table as a pandas frame."""
-        return self.table().to_frame()
-
-    def __repr__(self) -> str:
-        return str(self.table())
-
-    def _repr_html_(self) -> str:
-        return self.table()._repr_html_()
 
     def save(self, path: Path | str) -> Path:
         """Write the result as one JSON file, whole or not at all; `tractexp.load` reads it back."""

@@ -17,8 +17,6 @@ from tractexp.errors import UserError, among, check_distinct
 P = ParamSpec("P")
 R = TypeVar("R")
 
-PACKAGE = Path(__file__).resolve().parents[1]
-CONF = next(p for p in (PACKAGE / "conf", PACKAGE.parent / "conf") if (p / "config.yaml").is_file())
 SECTIONS = "task|model|data"  # of the configuration, whose keys the arguments of a call are
 WORDS = {
     int: "a whole number", float: "a number", bool: "True or False", str: "a text", type(None): "None", Any: "anything",
@@ -184,7 +182,7 @@ def default(group: str) -> str:
     """What is chosen in a group where nothing else is: that of `conf/config.yaml`, as on the command line."""
     import yaml
 
-    content = yaml.safe_load((CONF / "config.yaml").read_text(encoding="utf-8"))
+    content = yaml.safe_load((plugin.CONF / "config.yaml").read_text(encoding="utf-8"))
     return next(item[group] for item in content["defaults"] if isinstance(item, dict) and group in item)
 
 
@@ -195,7 +193,7 @@ def choices(group: str, *, files: bool = False) -> list[str]:
 
 
 def _folders() -> list[Path]:
-    return [*plugin.configuration_folders(), CONF]
+    return [*plugin.configuration_folders(), plugin.CONF]
 
 
 def _file(group: str, name: str) -> Path | None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from tractexp.api.arguments import Choice, check_kind, default, public, read_choice
 from tractexp.errors import UserError, among
-from tractexp.outcome import Table
+from tractexp.outcome import Table, Tabulated
 
 if TYPE_CHECKING:
     from tractexp.model.model import Model
@@ -26,7 +26,7 @@ class Portable:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LoadModel(Portable):
+class LoadModel(Portable, Tabulated):
     """A load model as a call takes it. Prints its parameters; in a notebook its equations, too."""
 
     motor: Mapping[str, Any]  # name and settings of the plugin
@@ -73,15 +73,8 @@ class LoadModel(Portable):
         ]  # fmt: skip
         return Table(["parameter", "default", "unit", "bounds", "meaning"], rows, self.model.title)
 
-    def to_frame(self) -> Any:
-        """The table as a pandas frame."""
-        return self.table().to_frame()
-
-    def __repr__(self) -> str:
-        return str(self.table())
-
     def _repr_html_(self) -> str:
-        return self.table()._repr_html_() + "".join(f"<p>$${html.escape(line)}$$</p>" for line in self.model.latex())
+        return super()._repr_html_() + "".join(f"<p>$${html.escape(line)}$$</p>" for line in self.model.latex())
 
     def _repr_latex_(self) -> str:
         return "\n\n".join(f"$${line}$$" for line in self.model.latex())

@@ -10,14 +10,14 @@ import numpy as np
 from tractexp import plugin
 from tractexp.api.arguments import Choice, check_kind, choices, public
 from tractexp.errors import UserError, among
-from tractexp.outcome import Table
+from tractexp.outcome import Table, Tabulated
 from tractexp.record import Base, Event, Record, describe, detect
 
 REQUIRED, OPTIONAL = ("t", "U", "P", "Q"), ("f", "U2")
 GROUP = "data"
 
 
-class Dips(list[Event]):
+class Dips(Tabulated, list[Event]):
     """Events in a list that prints as a table."""
 
     def __getitem__(self, k: Any) -> Any:
@@ -36,16 +36,6 @@ class Dips(list[Event]):
         columns = ["event", "starts [s]", "depth", "lasts [ms]", "rate [Hz]", "P0 [pu]", "Q0 [pu]", "noise of P",
                    "channels"]  # fmt: skip
         return Table(columns, rows, f"{len(self)} dip{'s' * (len(self) != 1)}", notes)
-
-    def to_frame(self) -> Any:
-        """The table as a pandas frame."""
-        return self.table().to_frame()
-
-    def __repr__(self) -> str:
-        return str(self.table())
-
-    def _repr_html_(self) -> str:
-        return self.table()._repr_html_()
 
 
 @public

@@ -14,7 +14,6 @@ from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.kernels import Family, Kernels
 from tractexp.discrepancy.records import Records, power_profile
 from tractexp.identification.descent import Apart
-from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.problem import Problem
 from tractexp.model.drive import Drive
 from tractexp.model.model import Model
@@ -73,7 +72,7 @@ class Bench:
     @functools.cached_property
     def known(self) -> np.ndarray:
         """Which samples of P and Q count, (2, N)."""
-        return Likelihood.of(self.problem).known
+        return self.drive.weights > 0
 
     @property
     def samples(self) -> int:

@@ -153,11 +153,6 @@ def _number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def write(investigation: Investigation, path: Path) -> Path:
-    """Write `discrepancy.json`."""
-    return files.write_json(path, content(investigation))
-
-
 def write_model(investigation: Investigation, node: dict[str, Any], path: Path) -> Path:
     """Write the extended model as a choice of the group `model`, usable at once through `--config-dir`."""
     import yaml

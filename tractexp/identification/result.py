@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from tractexp import files
 from tractexp.errors import UserError
 from tractexp.identification.problem import Problem, excitation
 from tractexp.identification.search import REFUSED, Found, History
@@ -90,9 +91,7 @@ class Result:
 
     def write(self, path: Path) -> Path:
         """Write the file in one move, so that no half-written one is ever seen."""
-        part = path.with_suffix(".part")
-        part.write_text(json.dumps(asdict(self), indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-        return part.replace(path)
+        return files.write(path, json.dumps(asdict(self), indent=2, ensure_ascii=False) + "\n")
 
     def predict(
         self,
@@ -140,8 +139,7 @@ def write_history(path: Path, history: History) -> Path:
     """Write the search as CSV, one row per iteration: simulations and seconds spent, best objective so far [pu²]."""
     rows = zip(history.simulations, history.seconds, history.objective, strict=True)
     lines = [f"{k},{n},{s:.4f},{f!r}" for k, (n, s, f) in enumerate((int(n), float(s), float(f)) for n, s, f in rows)]
-    path.write_text("\n".join(["iteration,simulations,seconds,objective", *lines]) + "\n", encoding="utf-8")
-    return path
+    return files.write(path, "\n".join(["iteration,simulations,seconds,objective", *lines]) + "\n")
 
 
 def load(path: Path) -> Result:
