@@ -1,7 +1,7 @@
 """A page in one file: headings, text, tables, figures and equations, readable offline and on paper.
 
-Everything given as text is escaped. Figures are inline SVG, equations are typeset into SVG; nothing is loaded from
-elsewhere.
+Everything given as text is escaped. Charts carry their data and the library that draws them, figures are inline SVG,
+equations are typeset into SVG; nothing is loaded from elsewhere.
 """
 
 import functools
@@ -16,6 +16,7 @@ from typing import Any
 
 from tractexp import files
 from tractexp.errors import UserError, check_choice
+from tractexp.report.chart import Chart, script
 
 STYLE = """
 :root { --ink: #1d1d1f; --faint: #666; --line: #dcdcdc; --good: #00664a; --bad: #a33b00; }
@@ -40,10 +41,14 @@ td.words { white-space: normal; }
 figure { margin: 1rem 0; break-inside: avoid; }
 figure svg { max-width: 100%; height: auto; }
 figcaption { color: var(--faint); font-size: .88rem; max-width: 46rem; }
+.chart { width: 100%; } .charts { display: grid; gap: .4rem 1rem;
+  grid-template-columns: repeat(auto-fit, minmax(min(17rem, 100%), 1fr)); }
+.charts figure { margin: .3rem 0; min-width: 0; }
 .equation { margin: .7rem 0 .7rem 1.5rem; overflow-x: auto; } .equation svg { vertical-align: middle; }
 li { margin: .3rem 0; max-width: 46rem; }
 details { margin: .8rem 0; } summary { cursor: pointer; color: #0058a0; }
-@media print { body { margin: 0; max-width: none; font-size: 10.5pt; } .wide { overflow: visible; } }
+@media print { body { margin: 0; max-width: none; font-size: 10.5pt; } .wide { overflow: visible; }
+  .modebar-container { display: none !important; } .charts { grid-template-columns: 1fr 1fr; } }
 """
 KINDS = ("plain", "good", "bad")
 
@@ -54,6 +59,7 @@ class Page:
     def __init__(self, title: str, lead: str = ""):
         self.title, self.lead = title, lead
         self._parts: list[str] = []
+        self._charts = False
         self._figures = itertools.count(1)
 
     def heading(self, text: str, level: int = 2) -> "Page":
@@ -98,6 +104,19 @@ class Page:
         below = f"<figcaption>{html.escape(caption)}</figcaption>" if caption else ""
         return self._add(f"<figure>{inside}{below}</figure>")
 
+    def chart(self, chart: Chart, caption: str = "") -> "Page":
+        """A chart to look into; the caption says what it shows."""
+        below = f"<figcaption>{html.escape(caption)}</figcaption>" if caption else ""
+        self._charts = True
+        return self._add(f"<figure>{chart.element(caption)}{below}</figure>")
+
+    def charts(self, charts: Sequence[Chart], caption: str = "") -> "Page":
+        """Small charts side by side, as many as there is room for."""
+        self._add('<div class="charts">')
+        for chart in charts:
+            self.chart(chart)
+        return self._add("</div>").text(*[caption] * bool(caption))
+
     def equation(self, latex: str) -> "Page":
         """A displayed equation. What Matplotlib's mathtext cannot set is shown as its LaTeX source."""
         drawing = _typeset(latex)
@@ -117,7 +136,8 @@ class Page:
         title, lead = html.escape(self.title), html.escape(self.lead)
         head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{title}</title>'
         top = f"<h1>{title}</h1>" + (f'<p class="lead">{lead}</p>' if lead else "")
-        body = "\n".join([top, *self._parts])
+        draws = f"<script>{script()}</script>" if self._charts else ""
+        body = "\n".join([top, *self._parts, draws])
         head = f"<head>{head}<style>{STYLE}</style></head>"
         whole = f'<!DOCTYPE html>\n<html lang="en">{head}\n<body>\n{body}\n</body></html>\n'
         return files.write(path, whole)

@@ -1,0 +1,82 @@
+"""Charts: what goes in is what a browser draws, without a network, at every width, on paper."""
+
+import base64
+import itertools
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from tractexp.report.chart import MOST, Chart
+from tractexp.report.page import Page
+
+BLUE = "#0072B2"
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+
+
+def drawn(page, folder, *options):
+    """What a browser that reaches no other computer makes of a page: its elements, and what it complains of."""
+    path = page.write(folder / "page.html")
+    command = [
+        BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking",
+        f"--user-data-dir={folder / 'browser'}", "--host-resolver-rules=MAP * ~NOTFOUND", "--enable-logging=stderr",
+        "--v=0", *options, "--dump-dom", path.as_uri(),
+    ]  # fmt: skip
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    return done.stdout, [line for line in done.stderr.splitlines() if "CONSOLE" in line]
+
+
+def unpacked(packed):
+    return np.frombuffer(base64.b64decode(packed["bdata"]), dtype=f"<{packed['dtype']}")
+
+
+def test_a_curve_keeps_every_value_and_its_gaps():
+    x, y = np.arange(0, 1, 0.001), np.sin(np.arange(1000.0))
+    y[500:510] = np.nan
+    (trace,) = Chart("t [s]", ["P [pu]"]).line("P", x, y, BLUE).plain()["data"]
+    assert np.array_equal(unpacked(trace["x"]), x)
+    np.testing.assert_array_equal(unpacked(trace["y"]), y.astype("f4"))
+
+
+def test_a_long_curve_keeps_its_spike():
+    y = np.zeros(1_000_000)
+    y[654_321] = 1.0
+    (trace,) = Chart("t", ["y"]).line("y", np.arange(1e6), y, BLUE).plain()["data"]
+    assert len(unpacked(trace["y"])) < 2 * MOST
+    assert unpacked(trace["x"])[unpacked(trace["y"]).argmax()] == 654_321
+
+
+def test_equal_names_are_one_entry_of_the_legend():
+    chart = Chart("t", ["P", "Q"])
+    for panel in (0, 1):
+        chart.line("measured", np.arange(3), np.arange(3), BLUE, panel).shade(0, 1, BLUE, panel, "dip")
+    shown = [trace["name"] for trace in chart.plain()["data"] if trace["showlegend"]]
+    assert shown == ["measured", "dip"]
+
+
+def test_panels_fill_the_height_without_overlap():
+    layout = Chart("t", list("abc"), heights=(1, 2, 2)).plain()["layout"]
+    spans = [layout[key]["domain"] for key in ("yaxis", "yaxis2", "yaxis3")]
+    assert spans[0][1] == 1.0
+    assert spans[-1][0] == pytest.approx(0.0, abs=1e-12)
+    assert all(upper[0] > lower[1] for upper, lower in itertools.pairwise(spans))
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed here")
+@pytest.mark.parametrize("width", [500, 1280])  # a headless browser is no narrower than 500
+def test_a_browser_draws_every_kind_and_complains_of_nothing(tmp_path, width):
+    x = np.linspace(0, 1, 50)
+    chart = Chart("t [s]", ["U", "P"]).line("U", x, x, BLUE).band("noise", x, x - 1, x + 1, BLUE, 1)
+    chart.shade(0.2, 0.3, BLUE, name="dip").edge(0.2).level(0.5, "half").limits(None, 0, 1)
+    bars = Chart("gain", [""]).bars("gain", ["a", "b"], [2, 1], BLUE, told=["two", "one"])
+    forest = Chart("value", [""]).points("est", [0.3], ["C"], BLUE, spans=np.array([[0.1, 0.4]]), told=["C"])
+    fitness = Chart("n", ["f"], log_x=True, log_y=True).line("f", x + 1, x + 1, BLUE, step=True).level(1.5, "floor")
+    page = Page("charts").chart(chart, "one").charts([bars, forest, fitness], "three")
+    dom, complaints = drawn(page, tmp_path, f"--window-size={width},900")
+    assert complaints == []
+    assert dom.count('svg-container"') == 4
+    widths = [float(w) for w in re.findall(r'class="main-svg"[^>]*?width="([\d.]+)"', dom)]
+    assert widths
+    assert max(widths) <= width

@@ -1,0 +1,248 @@
+"""Charts that let one look: zoomed by dragging, told by hovering, saved as SVG from their corner, printed as drawn.
+
+A `Chart` is data and layout for Plotly.js (MIT), which lies beside this file and travels inside a page that has one.
+Nothing is drawn here, so that a page costs milliseconds and no plotting library is imported.
+"""
+
+import base64
+import functools
+import html
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tractexp.report import style
+
+LIBRARY = Path(__file__).parent / "vendor" / "plotly-basic.min.js"
+MOST = 20_000  # points of a line that are kept: beyond, each stretch keeps its lowest and highest
+FONT = 'system-ui, "Segoe UI", "Liberation Sans", sans-serif'
+SETTINGS = {
+    "responsive": True,
+    "displaylogo": False,
+    "showSendToCloud": False,  # nothing leaves this computer
+    "plotlyServerURL": "",
+    "modeBarButtonsToRemove": ["select2d", "lasso2d", "autoScale2d"],
+    "toImageButtonOptions": {"format": "svg"},
+}
+PAPER = 680  # pixels, the width of a printed page
+GAP = 0.045  # of the height, between panels
+HOVER = "%{y:.5g}"
+DRAW = """
+const charts = [...document.querySelectorAll(".chart")];
+for (const chart of charts) {
+  const {data, layout} = JSON.parse(chart.nextElementSibling.textContent);
+  Plotly.newPlot(chart, data, layout, SETTINGS);
+}
+const resize = () => charts.forEach(chart => chart.offsetParent && Plotly.Plots.resize(chart));
+const paper = chart => ({width: chart.closest(".charts") ? PAPER / 2 - 10 : PAPER});
+addEventListener("beforeprint", () => charts.forEach(chart => Plotly.relayout(chart, paper(chart))));
+addEventListener("afterprint", () => charts.forEach(chart => Plotly.relayout(chart, {width: null, autosize: true})));
+document.querySelectorAll("details").forEach(part => part.addEventListener("toggle", resize));
+"""
+
+
+@functools.cache
+def script() -> str:
+    """What a page with charts needs once: the library, and what draws the charts."""
+    drawing = DRAW.replace("SETTINGS", json.dumps(SETTINGS)).replace("PAPER", str(PAPER))
+    return LIBRARY.read_text(encoding="utf-8") + "\n" + drawing
+
+
+class Chart:
+    """Panels above each other that share the axis x. Colors are those of `style`; names may hold any character.
+
+    `panels` are the labels of the vertical axes from the top, `heights` their shares. `log_x` and `log_y` make axes
+    logarithmic. `pixels` is the height of the whole.
+    """
+
+    def __init__(
+        self,
+        x: str,
+        panels: Sequence[str],
+        *,
+        heights: Sequence[float] = (),
+        log_x: bool = False,
+        log_y: bool = False,
+        pixels: int | None = None,
+        title: str = "",
+    ):
+        self._data: list[dict[str, Any]] = []
+        self._shapes: list[dict[str, Any]] = []
+        self._notes: list[dict[str, Any]] = []
+        self._told: set[str] = set()
+        self._axes = self._laid_out(panels, heights or [1.0] * len(panels), log_y)
+        self._x: dict[str, Any] = {"title": {"text": html.escape(x)}, "anchor": _axis("y", len(panels) - 1)}
+        self._x |= {"showgrid": True, "gridcolor": "#E4E4E4", "zeroline": False, "ticks": "outside"}
+        if log_x:
+            self._x |= {"type": "log", "dtick": 1}
+        self._title = title
+        self._pixels = pixels or 130 + 170 * len(panels)
+
+    @staticmethod
+    def _laid_out(labels: Sequence[str], heights: Sequence[float], log: bool) -> dict[str, dict[str, Any]]:
+        room = (1 - GAP * (len(labels) - 1)) / sum(heights)
+        top, axes = 1.0, {}
+        for k, (label, share) in enumerate(zip(labels, heights, strict=True)):
+            low = max(top - share * room, 0.0)
+            axis: dict[str, Any] = {"title": {"text": html.escape(label)}, "domain": [low, top], "ticks": "outside"}
+            axis |= {"gridcolor": "#E4E4E4", "zeroline": False, "automargin": True, "linecolor": "#444"}
+            if log:
+                axis |= {"type": "log", "exponentformat": "power"}
+            axes["yaxis" + (str(k + 1) if k else "")] = axis
+            top = low - GAP
+        return axes
+
+    def line(
+        self, name: str, x: np.ndarray, y: np.ndarray, color: str, panel: int = 0, *, width: float = 1.6,
+        dash: str = "solid", step: bool = False,
+    ) -> "Chart":  # fmt: skip
+        """A curve; equal names are one entry of the legend. nan is a gap; `step` holds each value until the next."""
+        x, y = style.thin(np.asarray(x, dtype=float), np.asarray(y, dtype=float), MOST)
+        shape = {"shape": "hv"} if step else {}
+        line = {"color": color, "width": width, "dash": dash, **shape}
+        return self._add(name, panel, mode="lines", x=_packed(x, "f8"), y=_packed(y, "f4"), line=line)
+
+    def points(
+        self, name: str, x: Sequence[Any] | np.ndarray, y: Sequence[Any] | np.ndarray, color: str, panel: int = 0, *,
+        size: float = 7, symbol: str = "circle", told: Sequence[str] = (), spans: np.ndarray | None = None,
+    ) -> "Chart":  # fmt: skip
+        """Marks; `told` is what each says when pointed at, `spans` (n, 2) are the ends of intervals along x."""
+        made: dict[str, Any] = {"marker": {"color": color, "size": size, "symbol": symbol}}
+        if spans is not None:
+            middle = np.asarray(x, dtype=float)
+            made["error_x"] = {
+                "type": "data", "symmetric": False, "color": color, "thickness": 2, "width": 5,
+                "array": (spans[:, 1] - middle).tolist(), "arrayminus": (middle - spans[:, 0]).tolist(),
+            }  # fmt: skip
+        if told:
+            made |= {"text": [html.escape(t) for t in told], "hovertemplate": "%{text}<extra></extra>"}
+        return self._add(name, panel, mode="markers", x=_listed(x), y=_listed(y), **made)
+
+    def bars(
+        self, name: str, labels: Sequence[str], values: Sequence[float], color: str | Sequence[str], panel: int = 0, *,
+        told: Sequence[str] = (),
+    ) -> "Chart":  # fmt: skip
+        """Horizontal bars, the first label on top."""
+        self._axes[_key(panel)] |= {"autorange": "reversed", "type": "category"}
+        made: dict[str, Any] = {"text": [html.escape(t) for t in told], "textposition": "auto"} if told else {}
+        return self._add(
+            name, panel, kind="bar", orientation="h", x=_listed(values), y=_listed(labels),
+            marker={"color": color if isinstance(color, str) else list(color)},
+            hovertemplate="%{y}: %{x:.4g}<extra></extra>", **made,
+        )  # fmt: skip
+
+    def band(
+        self, name: str, x: np.ndarray, lower: np.ndarray, upper: np.ndarray, color: str, panel: int = 0, *,
+        step: bool = False,
+    ) -> "Chart":  # fmt: skip
+        """What lies between two curves, lightly filled."""
+        line = {"width": 0, "color": color, **({"shape": "hv"} if step else {})}
+        x, quiet = _packed(np.asarray(x, dtype=float), "f8"), {"mode": "lines", "line": line, "hoverinfo": "skip"}
+        self._add(name, panel, x=x, y=_packed(lower, "f4"), silent=True, **quiet)
+        return self._add(
+            name, panel, x=x, y=_packed(upper, "f4"), fill="tonexty", fillcolor=_faint(color), **quiet
+        )  # fmt: skip
+
+    def shade(
+        self, start: float, end: float, color: str, panel: int | None = None, name: str = "", opacity: float = 0.3
+    ) -> "Chart":
+        """A stretch of the axis x, in one panel or in all; `name` stands in the legend once."""
+        self._shapes.append(
+            {"type": "rect", "xref": "x", "x0": start, "x1": end, **_height(panel), "fillcolor": color,
+             "opacity": opacity, "line": {"width": 0}, "layer": "below"}
+        )  # fmt: skip
+        if name and name not in self._told:
+            square = {"color": color, "size": 11, "symbol": "square", "opacity": min(1.0, 2 * opacity)}
+            self._add(name, panel or 0, mode="markers", x=[None], y=[None], marker=square, hoverinfo="skip")
+        return self
+
+    def edge(self, x: float, color: str = style.FAINT, dash: str = "dot", panel: int | None = None) -> "Chart":
+        """A vertical line, in one panel or through all."""
+        line = {"color": color, "width": 1, "dash": dash}
+        self._shapes.append({"type": "line", "xref": "x", "x0": x, "x1": x, **_height(panel), "line": line})
+        return self
+
+    def level(self, y: float, text: str = "", panel: int = 0, color: str = style.FAINT, dash: str = "dash") -> "Chart":
+        """A horizontal line across a panel, with a word at its right end."""
+        axis, line = _axis("y", panel), {"color": color, "width": 1, "dash": dash}
+        self._shapes.append(
+            {"type": "line", "xref": "x domain", "x0": 0, "x1": 1, "yref": axis, "y0": y, "y1": y, "line": line}
+        )
+        if text:
+            log = self._axes[_key(panel)].get("type") == "log"
+            self._notes.append(
+                {"text": html.escape(text), "xref": "x domain", "x": 1, "xanchor": "right", "yref": axis,
+                 "y": float(np.log10(y)) if log else y, "yanchor": "bottom", "showarrow": False,
+                 "font": {"size": 11, "color": color}}
+            )  # fmt: skip
+        return self
+
+    def limits(self, panel: int | None, low: float, high: float) -> "Chart":
+        """What an axis shows at first: of a panel, or of x where `panel` is None."""
+        axis = self._x if panel is None else self._axes[_key(panel)]
+        axis["range"] = np.log10([low, high]).tolist() if axis.get("type") == "log" else [low, high]
+        return self
+
+    def plain(self) -> dict[str, Any]:
+        """Data and layout as Plotly reads them."""
+        layout = {
+            "height": self._pixels, "font": {"family": FONT, "size": 13, "color": "#1d1d1f"}, "hovermode": "x unified",
+            "hoversubplots": "axis", "paper_bgcolor": "#fff", "plot_bgcolor": "#fff", "bargap": 0.25,
+            "margin": {"l": 60, "r": 12, "t": 66 + 20 * bool(self._title), "b": 48},
+            "legend": {"orientation": "h", "x": 0, "y": 1.0, "yanchor": "bottom", "yref": "paper"},
+            "shapes": self._shapes, "annotations": self._notes, "xaxis": self._x, **self._axes,
+        }  # fmt: skip
+        kinds = {trace["type"] for trace in self._data} | {trace.get("mode", "") for trace in self._data}
+        if "lines" not in kinds:
+            layout |= {"hovermode": "closest"}
+        if self._title:
+            layout["title"] = {"text": html.escape(self._title), "x": 0, "xref": "paper", "font": {"size": 14}}
+        return {"data": self._data, "layout": layout}
+
+    def element(self, label: str) -> str:
+        """The chart as an element of a page."""
+        told = json.dumps(self.plain(), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+        return (
+            f'<div class="chart" role="img" aria-label="{html.escape(label)}" style="height:{self._pixels}px"></div>'
+            f'<script type="application/json">{told}</script>'
+        )
+
+    def _add(self, name: str, panel: int, kind: str = "scatter", silent: bool = False, **more: Any) -> "Chart":
+        shown = bool(name) and name not in self._told and not silent
+        if shown:
+            self._told.add(name)
+        trace = {"type": kind, "name": html.escape(name), "legendgroup": name, "showlegend": shown, "xaxis": "x",
+                 "yaxis": _axis("y", panel), "hovertemplate": HOVER}  # fmt: skip
+        self._data.append(trace | more)
+        return self
+
+
+def _axis(letter: str, panel: int) -> str:
+    return letter + (str(panel + 1) if panel else "")
+
+
+def _key(panel: int) -> str:
+    return "yaxis" + (str(panel + 1) if panel else "")
+
+
+def _height(panel: int | None) -> dict[str, Any]:
+    """All of a panel, or of the chart."""
+    return {"yref": "paper" if panel is None else f"{_axis('y', panel)} domain", "y0": 0, "y1": 1}
+
+
+def _packed(values: np.ndarray, kind: str) -> dict[str, str]:
+    """Numbers as Plotly's typed arrays: exact, and a third of the length of their digits."""
+    return {"dtype": kind, "bdata": base64.b64encode(np.asarray(values, dtype=f"<{kind}").tobytes()).decode()}
+
+
+def _listed(values: Sequence[Any] | np.ndarray) -> list[Any]:
+    plain = values.tolist() if isinstance(values, np.ndarray) else list(values)
+    return [html.escape(v) if isinstance(v, str) else None if v != v else v for v in plain]
+
+
+def _faint(color: str) -> str:
+    red, green, blue = (int(color[k : k + 2], 16) for k in (1, 3, 5))
+    return f"rgba({red},{green},{blue},0.18)"
