@@ -9,7 +9,6 @@ for library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 from tractexp.errors import UserError  # noqa: E402
-from tractexp.plugin import CONF  # noqa: E402
 
 OPEN = ("model.bounds.", "model.fixed.", "task.values", "task.criteria.")  # settings that take names of their own
 FULL_ERROR = "HYDRA_FULL_ERROR"  # Hydra's own switch: set it to see tracebacks
@@ -23,10 +22,14 @@ def main() -> int:
             from tractexp.tasks.ui import ui
 
             return ui(sys.argv[2:])
+        if sys.argv[1:2] == ["list"]:
+            from tractexp.usage import listed
+
+            return listed(sys.argv[2:])
         if {"--help", "-h"} & set(sys.argv[1:]):
             from tractexp.usage import usage
 
-            print(usage(CONF))
+            print(usage())
             return 0
         return _run()
     except UserError as error:
@@ -45,6 +48,7 @@ def main() -> int:
 def _run() -> int:
     import hydra
 
+    from tractexp.choices import CONF
     from tractexp.config import register
     from tractexp.refusal import explained
 
