@@ -165,7 +165,7 @@ def _is_package(module: str) -> int:
 
 @functools.cache
 def _folders(package: str) -> tuple[Path, ...]:
-    """The folders of a package; none where there is no such package. Only the topmost is looked up: that runs no code."""
+    """The folders of a package; none where there is none. Only the topmost is looked up, so that no code runs."""
     top, _, rest = package.partition(".")
     try:
         spec = importlib.util.find_spec(top) if top else None
