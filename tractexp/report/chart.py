@@ -195,7 +195,7 @@ class Chart:
 
     def plain(self) -> dict[str, Any]:
         """Data and layout as Plotly reads them."""
-        above = 26 if not self._legend else 66  # pixels
+        above = 26 if not self._legend else 66 if len(self._told) <= 6 else 86  # pixels; a narrow legend has three rows
         layout = {
             "height": self._pixels, "font": {"family": FONT, "size": 13, "color": "#1d1d1f"}, "hovermode": "x unified",
             "hoversubplots": "axis", "paper_bgcolor": "#fff", "plot_bgcolor": "#fff", "bargap": 0.25,
