@@ -1,5 +1,6 @@
 """Command line: compose the configuration, run the task, end with a sentence where the input is wrong."""
 
+import gc
 import os
 import sys
 
@@ -11,12 +12,21 @@ for library in ("OPENBLAS", "OMP", "MKL"):
 from tractexp.errors import UserError  # noqa: E402
 
 OPEN = ("model.bounds.", "model.fixed.", "task.values", "task.criteria.")  # settings that take names of their own
+UNLOGGED = (
+    "-",
+    "tracking.enabled=",
+    "task=export",
+    "experiment=",
+    "hydra.mode=",
+)  # no single job that is logged: maybe
+SELDOM = (50_000, 20, 50)  # what is imported stays: to look for garbage in it takes a quarter of a short job
 FULL_ERROR = "HYDRA_FULL_ERROR"  # Hydra's own switch: set it to see tracebacks
 
 
 def main() -> int:
     """Entry point of `tractexp` and `python -m tractexp`; returns the exit code."""
     traceback = os.environ.get(FULL_ERROR, "0") not in ("", "0")
+    gc.set_threshold(*SELDOM)
     try:
         if sys.argv[1:2] == ["ui"]:
             from tractexp.tasks.ui import ui
@@ -42,10 +52,16 @@ def main() -> int:
             file=sys.stderr,
         )
         return 130
+    finally:
+        gc.freeze()  # nor at the end, when everything goes anyway
     return 2
 
 
 def _run() -> int:
+    if not any(argument.startswith(UNLOGGED) for argument in sys.argv[1:]):
+        from tractexp.tracking.process import start_ahead
+
+        start_ahead()
     import hydra
 
     from tractexp.choices import CONF
