@@ -60,10 +60,11 @@ def entry_points() -> list[importlib.metadata.EntryPoint]:
     return sorted(importlib.metadata.entry_points(group=ENTRY_POINTS), key=lambda p: (p.name, p.value))
 
 
-def plugin_folders() -> list[tuple[str, Path]]:
+@functools.cache
+def plugin_folders() -> tuple[tuple[str, Path], ...]:
     """(package, folder) of the plugin packages that are there."""
     names = dict.fromkeys(point.module for point in entry_points())
-    return [(name, folder) for name in names for folder in _folders(name)]
+    return tuple((name, folder) for name in names for folder in _folders(name))
 
 
 def configuration_folders() -> list[Path]:
