@@ -16,6 +16,7 @@ from tractexp.api.setup import Setup
 from tractexp.errors import UserError, check_range
 from tractexp.outcome import Table
 from tractexp.record import Event
+from tractexp.report.plan import DEPTH, DURATION, NOISE, RATE
 
 if TYPE_CHECKING:
     from tractexp.identification.plan import Shape
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 DURATIONS = (0.06, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8)  # s
 RATES = (25.0, 50.0, 100.0, 200.0, 500.0, 1000.0)  # Hz
 NOISES = (0.001, 0.002, 0.005, 0.01, 0.02)  # of P before the event
-DEPTH, DURATION, RATE, NOISE = "depth", "duration [s]", "samples per second", "noise, of P before the dip"
 FIT, DEFAULT = "fit", "default"
 SHAPE = ("depth", "duration", "rate")
 
@@ -70,12 +70,10 @@ class Forecasts(Written):
         return cls(Setup.from_dict(content["setup"]), content["asked"], content["content"])
 
     def _write(self, folder: Path) -> list[Path]:
-        """plan.json, plan.svg and plan.html."""
-        from tractexp.report import plan, uncertainty
+        """plan.html and plan.json."""
+        from tractexp.report import plan
 
-        path = files.write_json(folder / "plan.json", self.content)
-        figure = uncertainty.plan(folder / "plan.svg", self.planned.scans, self.planned.needed.within)
-        return [path, figure, plan.page(folder / "plan.html", self.planned, figure)]
+        return [plan.page(folder / "plan.html", self.planned), files.write_json(folder / "plan.json", self.content)]
 
 
 @public

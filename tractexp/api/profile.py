@@ -33,7 +33,7 @@ class Profiled(Written):
 
     @functools.cached_property
     def made(self) -> "Profiles":
-        """What stands behind the figure; of a loaded result it is reckoned again."""
+        """What stands behind the page; of a loaded result it is reckoned again."""
         from tractexp.identification.profile import profiles
 
         return profiles(self.fit.judged.known, self.points)
@@ -70,12 +70,12 @@ class Profiled(Written):
         return cls(fit, content["points"], content["content"], result, content["curvature"])
 
     def _write(self, folder: Path) -> list[Path]:
-        """profiles.svg, profile.json, history.csv and result.json."""
-        from tractexp.report import uncertainty
+        """profile.html, profile.json, history.csv and result.json."""
+        from tractexp.report import profile
 
-        figure = uncertainty.profiles(folder / "profiles.svg", self.made)
         path = files.write_json(folder / "profile.json", self.content)
-        return [figure, path, *self.identification.write_result(folder)]
+        page = profile.page(folder / "profile.html", self.made)
+        return [page, path, *self.identification.write_result(folder)]
 
 
 @public

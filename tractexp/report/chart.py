@@ -55,7 +55,7 @@ class Chart:
     """Panels above each other that share the axis x. Colors are those of `style`; names may hold any character.
 
     `panels` are the labels of the vertical axes from the top, `heights` their shares. `log_x` and `log_y` make axes
-    logarithmic. `pixels` is the height of the whole.
+    logarithmic. `pixels` is the height of the whole. Without a `legend` names are told by hovering only.
     """
 
     def __init__(
@@ -68,6 +68,7 @@ class Chart:
         log_y: bool = False,
         pixels: int | None = None,
         title: str = "",
+        legend: bool = True,
     ):
         self._data: list[dict[str, Any]] = []
         self._shapes: list[dict[str, Any]] = []
@@ -78,7 +79,7 @@ class Chart:
         self._x |= {"showgrid": True, "gridcolor": "#E4E4E4", "zeroline": False, "ticks": "outside"}
         if log_x:
             self._x |= {"type": "log", "dtick": 1}
-        self._title = title
+        self._title, self._legend = title, legend
         self._pixels = pixels or 130 + 170 * len(panels)
 
     @staticmethod
@@ -186,12 +187,20 @@ class Chart:
         axis["range"] = np.log10([low, high]).tolist() if axis.get("type") == "log" else [low, high]
         return self
 
+    def ticks(self, panel: int | None, values: Sequence[float], texts: Sequence[str] = ()) -> "Chart":
+        """Where an axis is marked, and with which words: of a panel, or of x where `panel` is None."""
+        axis = self._x if panel is None else self._axes[_key(panel)]
+        axis |= {"tickmode": "array", "tickvals": list(values), "ticktext": list(texts) or [f"{v:g}" for v in values]}
+        return self
+
     def plain(self) -> dict[str, Any]:
         """Data and layout as Plotly reads them."""
+        above = 26 if not self._legend else 66 if len(self._told) <= 6 else 86  # pixels; a narrow legend has three rows
         layout = {
             "height": self._pixels, "font": {"family": FONT, "size": 13, "color": "#1d1d1f"}, "hovermode": "x unified",
             "hoversubplots": "axis", "paper_bgcolor": "#fff", "plot_bgcolor": "#fff", "bargap": 0.25,
-            "margin": {"l": 60, "r": 12, "t": 66 + 20 * bool(self._title), "b": 48},
+            "margin": {"l": 60, "r": 12, "t": above + 20 * bool(self._title), "b": 48},
+            "showlegend": self._legend,
             "legend": {"orientation": "h", "x": 0, "y": 1.0, "yanchor": "bottom", "yref": "paper"},
             "shapes": self._shapes, "annotations": self._notes, "xaxis": self._x, **self._axes,
         }  # fmt: skip
@@ -200,6 +209,8 @@ class Chart:
             layout |= {"hovermode": "closest"}
         if self._title:
             layout["title"] = {"text": html.escape(self._title), "x": 0, "xref": "paper", "font": {"size": 14}}
+            if not self._legend:  # just above the panels, below the buttons
+                layout["title"] |= {"yref": "paper", "y": 1, "yanchor": "bottom", "pad": {"b": 8}}
         return {"data": self._data, "layout": layout}
 
     def element(self, label: str) -> str:

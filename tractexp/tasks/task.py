@@ -117,9 +117,9 @@ class Job:
 
     @functools.cached_property
     def _logger(self) -> Any:
-        from tractexp.tracking.process import Logger
+        from tractexp.tracking.process import logger
 
-        return Logger(self.store)
+        return logger(self.store)
 
     def prepare_log(self) -> None:
         """Get MLflow ready beside the computation, in a process of its own; call it once the input is found right.

@@ -13,12 +13,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from tractexp.errors import UserError, check_choice
 from tractexp.tracking.store import database_of, open_store, sentences
+
+if TYPE_CHECKING:
+    import numpy as np
 
 STATUSES = ("FINISHED", "FAILED", "KILLED")
 CURVE_POINTS = 1000  # a longer curve is thinned evenly; the files of the run keep every point
@@ -41,7 +42,7 @@ class Run:
     name: str
     parameters: Mapping[str, Any] = field(default_factory=dict)
     metrics: Mapping[str, float] = field(default_factory=dict)
-    curves: Mapping[str, tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray]] = field(
+    curves: "Mapping[str, tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray]]" = field(
         default_factory=dict
     )
     tags: Mapping[str, str] = field(default_factory=dict)
@@ -81,7 +82,7 @@ def flatten(config: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
 def _text(value: Any) -> str:
     if isinstance(value, str):
         return value
-    if isinstance(value, np.generic | np.ndarray):
+    if hasattr(value, "tolist"):  # an array, or a number of one
         value = value.tolist()
     if value is None or isinstance(value, bool | int | float | list | tuple):
         return json.dumps(value, default=str, ensure_ascii=False)
@@ -178,6 +179,7 @@ def _create(client: Any, run: Run, uri: str) -> str:
 
 
 def _write(client: Any, run_id: str, run: Run) -> None:
+    import numpy as np
     from mlflow.entities import Metric, Param
 
     now = _milliseconds()
