@@ -8,7 +8,7 @@ from pathlib import Path
 from tractexp.files import write_json
 
 FILE = "status.json"
-RUNNING, FINISHED, FAILED = "running", "finished", "failed"
+RUNNING, FINISHED, FAILED, INTERRUPTED = "running", "finished", "failed", "interrupted"
 
 
 @dataclass(frozen=True)

@@ -24,11 +24,10 @@ from tractexp.sweep.compose import Composer
 from tractexp.sweep.job import SweepJob
 from tractexp.sweep.launcher import Cores
 from tractexp.sweep.parent import parent_run
-from tractexp.sweep.status import FAILED, FINISHED, RUNNING
+from tractexp.sweep.status import FAILED, FINISHED, INTERRUPTED, RUNNING
 from tractexp.tasks.console import say, table
 from tractexp.tasks.given import refuse_unread
 
-INTERRUPTED = "interrupted"
 REPEAT = "repeat the command to go on with the jobs that are left"
 
 
@@ -88,7 +87,7 @@ class Grid(Sweeper):
         for job in jobs:
             if job.folder.exists():
                 shutil.rmtree(job.folder)
-        problem = "it ended without a word: its worker was killed or never started"
+        end, problem = FAILED, "it ended without a word: its worker was killed or never started"
         try:
             if isinstance(self.launcher, Cores):
                 self.launcher.run(jobs)
@@ -96,7 +95,7 @@ class Grid(Sweeper):
                 batch = [[*job.overrides, *placement(job)] for job in jobs]
                 self.launcher.launch(batch, initial_job_idx=0)
         except KeyboardInterrupt:
-            problem = INTERRUPTED
+            end, problem = INTERRUPTED, ""
             raise KeyboardInterrupt(f"the sweep is interrupted; {REPEAT}") from None
         except UserError:
             raise
@@ -104,8 +103,8 @@ class Grid(Sweeper):
             problem = f"the launcher gave up: {str(error).strip().partition(chr(10))[0] or type(error).__name__}"
         finally:
             for job in jobs:
-                if problem != INTERRUPTED or job.folder.exists():  # a job not begun has nothing to tell
-                    settle(job, problem)
+                if end != INTERRUPTED or job.folder.exists():  # a job not begun has nothing to tell
+                    settle(job, end, problem)
 
 
 def swept(override: Override) -> list[str]:
@@ -155,12 +154,12 @@ def finished(job: SweepJob) -> bool:
     return same and found.status == FINISHED  # type: ignore[union-attr]
 
 
-def settle(job: SweepJob, problem: str) -> None:
-    """Write down that a job which has not said how it ended has failed."""
+def settle(job: SweepJob, end: str, problem: str) -> None:
+    """Write down the end of a job which has not said how it ended."""
     found = status.read(job.folder)
     if found is None or found.status == RUNNING:
         job.folder.mkdir(parents=True, exist_ok=True)
-        replace(job.status, status=FAILED, message=problem).write(job.folder)
+        replace(job.status, status=end, message=problem).write(job.folder)
 
 
 @contextlib.contextmanager

@@ -148,9 +148,15 @@ class Job:
             parent=self.sweep,
             **content,
         )
-        self.send(run, f" --uri {node['uri']}" if node["uri"] else "")
+        self.send(run)
 
-    def send(self, run: Any, where: str = "") -> None:
+    @property
+    def look(self) -> str:
+        """The command that shows what was logged."""
+        uri = self.config["tracking"]["uri"]
+        return f"tractexp ui --uri {uri}" if uri else "tractexp ui"
+
+    def send(self, run: Any) -> None:
         """Log a run (`tracking.Run`), and say how to look at it."""
         from tractexp import tracking
         from tractexp.tasks.console import say
@@ -159,4 +165,4 @@ class Job:
             self._logger.log(run)
         else:
             tracking.log(run, self.store)
-        say(f"logged in experiment '{run.experiment}'; to see it: tractexp ui{where}")
+        say(f"logged in experiment '{run.experiment}'; to see it: {self.look}")

@@ -1,7 +1,11 @@
 """Runs read back from the store as plain data."""
 
+import contextlib
+import json
+import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,11 +15,15 @@ from tractexp.tracking.store import open_store, sentences
 
 PAGE = 1000  # runs asked for at a time
 CURVES = ("fitness_by_simulations",)
+RESULT = "result.json"
 
 
 @dataclass(frozen=True)
 class Logged:
-    """One run as it lies in MLflow. `curves` are {name: (steps (n,), values (n,))}, by increasing step."""
+    """One run as it lies in MLflow. `curves` are {name: (steps (n,), values (n,))}, by increasing step.
+
+    `result` is its `result.json`, empty where the run has none or it is found no more.
+    """
 
     run_id: str
     name: str
@@ -25,6 +33,7 @@ class Logged:
     metrics: Mapping[str, float]
     tags: Mapping[str, str]
     curves: Mapping[str, tuple[np.ndarray, np.ndarray]]
+    result: Mapping[str, Any] = field(default_factory=dict)
 
 
 def find(uri: str, filter: str, experiment: str | None = None, curves: tuple[str, ...] = CURVES) -> list[Logged]:
@@ -72,8 +81,18 @@ def _logged(client: Any, run: Any, experiment: str, curves: tuple[str, ...]) -> 
     read = {name: _curve(client, run.info.run_id, name) for name in curves if name in run.data.metrics}
     return Logged(
         run.info.run_id, run.info.run_name, run.info.status, experiment,
-        dict(run.data.params), dict(run.data.metrics), dict(run.data.tags), read,
+        dict(run.data.params), dict(run.data.metrics), dict(run.data.tags), read, _result(client, run),
     )  # fmt: skip
+
+
+def _result(client: Any, run: Any) -> dict[str, Any]:
+    """The artifact `result.json`: artifacts lie by absolute path, so those of a folder that was moved are missing."""
+    from mlflow.exceptions import MlflowException
+
+    with contextlib.suppress(MlflowException, OSError, ValueError), tempfile.TemporaryDirectory() as folder:
+        path = client.download_artifacts(run.info.run_id, RESULT, folder)
+        return json.loads(Path(path).read_text(encoding="utf-8"))
+    return {}
 
 
 def _curve(client: Any, run_id: str, name: str) -> tuple[np.ndarray, np.ndarray]:
