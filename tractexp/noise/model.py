@@ -54,6 +54,12 @@ class Noise:
         """The largest variance that noise of the voltage causes at any sample, over that of the power."""
         return 0.0 if self.blur is None else float((self._mixed(self.blur) ** 2).sum(axis=0).max())
 
+    def scaled(self, factor: float) -> "Noise":
+        """The same noise, `factor` times as loud."""
+        wander = self.wander and replace(self.wander, intensity=self.wander.intensity * factor**2)
+        pairs = tuple((P.scaled(factor), Q.scaled(factor)) for P, Q in self.pairs)
+        return replace(self, pairs=pairs, wander=wander, blur=None if self.blur is None else self.blur * factor)
+
     def on(self, profile: np.ndarray, blur: np.ndarray | None = None) -> "Noise":
         """The same noise on other events: their power over that before (N,), what errors of their voltage do."""
         wander = None if self.wander is None else replace(self.wander, profile=profile)
