@@ -69,8 +69,13 @@ def _job(folder: Path) -> Run | None:
         ended = ended_search(result)
         told |= {key: float(ended[key]) for key in ENDED} | {"parameters": parameters_of(ended)}
     with _readable(folder / "history.csv") as path:
-        _, simulations, seconds, history = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2).T
-    return Run(**told, simulations=simulations, seconds=seconds, history=history)
+        return Run(**told, **_history(path.read_text(encoding="utf-8")))
+
+
+def _history(text: str) -> dict[str, np.ndarray]:
+    """The search by iteration, of a `history.csv`."""
+    _, simulations, seconds, history = np.loadtxt(text.splitlines(), delimiter=",", skiprows=1, ndmin=2).T
+    return {"simulations": simulations, "seconds": seconds, "history": history}
 
 
 def ended_search(result: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -149,8 +154,8 @@ def nested(flattened: Mapping[str, Any]) -> dict[str, Any]:
 def from_logged(logged: Iterable[Any], source: str) -> list[Run]:
     """Runs from what `tractexp.tracking.find` returns, oldest first; only identifications count, no parent runs.
 
-    MLflow keeps no seconds along the search: the run's duration is divided evenly over its simulations. Raises
-    `UserError` where there is none.
+    Where the artifacts of a run are missing, its search is known by the curve in MLflow alone, which has fewer points
+    and no seconds: what the search took is divided evenly over its simulations. Raises `UserError` where there is none.
     """
     runs = [_logged(one) for one in logged if one.tags.get("task") == TASK and "optimizer" in one.tags]
     if not runs:
@@ -171,12 +176,15 @@ def _logged(one: Any) -> Run:
         return Run(**told, interruption=f"its status in MLflow is {one.status}")
     if one.status != "FINISHED" or "objective" not in one.metrics or curve is None:
         return Run(**told, failure=f"its status in MLflow is {one.status}")
-    for key in (*ENDED, "seconds"):  # early runs have one value of each, the search's
-        ended[key] = one.metrics.get(f"search_{key}", one.metrics[key])
-    simulations, history = curve
-    seconds = ended.pop("seconds") * simulations / simulations[-1]
-    known = parameters_of(ended_search(one.result))
-    return Run(**told, **ended, simulations=simulations, seconds=seconds, history=history, parameters=known)
+    for key in (*ENDED, "simulations", "seconds"):  # early runs have one value of each, the search's
+        ended[key] = one.metrics.get(f"search_{key}", one.metrics.get(key, np.nan))
+    known = parameters_of(ended_search(json.loads(one.files.get("result.json", "{}"))))
+    total, seconds = ended.pop("simulations"), ended.pop("seconds")
+    if "history.csv" in one.files:
+        return Run(**told, **ended, **_history(one.files["history.csv"]), parameters=known)
+    simulations = np.fmin(curve[0], total)
+    spent = seconds * simulations / simulations[-1]
+    return Run(**told, **ended, simulations=simulations, seconds=spent, history=curve[1], parameters=known)
 
 
 def _value(text: str) -> Any:

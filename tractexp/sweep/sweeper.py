@@ -21,7 +21,7 @@ from tractexp.errors import UserError
 from tractexp.plugin import get
 from tractexp.sweep import status
 from tractexp.sweep.compose import Composer
-from tractexp.sweep.job import SweepJob
+from tractexp.sweep.job import SweepJob, shared
 from tractexp.sweep.launcher import Cores
 from tractexp.sweep.parent import parent_run
 from tractexp.sweep.status import FAILED, FINISHED, INTERRUPTED, RUNNING
@@ -179,20 +179,21 @@ def terminating() -> Iterator[None]:
 def conclude(jobs: Sequence[SweepJob]) -> None:
     """Print what the sweep found and which jobs failed. Raises `UserError` where any did."""
     ends = [(job, status.read(job.folder)) for job in jobs]
+    common = shared(jobs)
     found: dict[str, list[float]] = {}
     for job, _ in ends:
         value = status.objective(job.folder)
         if value is not None:
-            found.setdefault(job.choices["optimizer"], []).append(value)
+            found.setdefault(job.variant(common), []).append(value)
     if found:
         say()
         rows = sorted((sorted(values), name) for name, values in found.items())
         cells = [[n, str(len(v)), *(f"{x:.4e}" for x in (v[0], median(v), v[-1])), ""] for v, n in rows]
         table(["optimizer", "jobs", "best objective", "median", "worst", ""], cells)
+        say("objectives in pu² at the end of the search, before the estimate is polished")
     failed = [(job, end.message) for job, end in ends if end is not None and end.status == FAILED]
     if not failed:
         return
-    common = set.intersection(*(set(job.overrides) for job in jobs)) if len(jobs) > 1 else set()
     say()
     say("failed jobs")
     for job, why in failed:  # not in columns: they would cut the sentences

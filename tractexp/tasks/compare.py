@@ -90,7 +90,11 @@ def track(job: Job, comparison: Any, folder: Path | None, paths: list[Path]) -> 
         experiment=node["experiment"] or f"compare {data}",
         name=f"comparison of {len(comparison.summaries)} variants",
         parameters=tracking.flatten({"task": job.config["task"]}),
-        metrics={f"median_{s.name}": s.objective.median for s in comparison.summaries if s.runs > s.failures},
+        metrics={
+            tracking.metric_name(f"median {s.name}"): s.objective.median
+            for s in comparison.summaries
+            if s.runs > s.failures
+        },
         tags={"task": "compare", "data": data},
         artifacts=paths,
     )

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
 from tractexp.plugin import Plugin, build
+from tractexp.tasks.given import variant
 
 SEARCH = ("objective", "optimizer", "budget", "time_limit", "target")  # the settings of a search
 LOAD = ("model.motor", "model.static", "model.effects")  # the parts of a model, without what is known of its parameters
@@ -104,6 +105,11 @@ class Job:
         return int(self.config["seed"])
 
     @property
+    def variant(self) -> str:
+        """The optimizer and what else was chosen: runs of one variant differ in their seeds alone."""
+        return variant(self.choices["optimizer"], self.given)
+
+    @property
     def experiment(self) -> str:
         """The MLflow experiment: named by the configuration, or after task and data."""
         return self.config["tracking"]["experiment"] or f"{self.choices['task']} {self.choices['data']}"
@@ -140,11 +146,12 @@ class Job:
         from tractexp import tracking
 
         parts = {group: self.choices[group] for group in ("task", "model", "optimizer", "data")}
+        parts |= {"variant": self.variant, "seed": str(self.seed)}
         run = tracking.Run(
             experiment=self.experiment,
             name=name,
             parameters={**tracking.flatten(self.config), **values},
-            tags={**parts, "seed": str(self.seed), "git_commit": tracking.git_commit()},
+            tags={**parts, "git_commit": tracking.git_commit()},
             parent=self.sweep,
             **content,
         )

@@ -1,7 +1,6 @@
 """Runs read back from the store as plain data."""
 
 import contextlib
-import json
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,14 +14,14 @@ from tractexp.tracking.store import open_store, sentences
 
 PAGE = 1000  # runs asked for at a time
 CURVES = ("fitness_by_simulations",)
-RESULT = "result.json"
+FILES = ("result.json", "history.csv")
 
 
 @dataclass(frozen=True)
 class Logged:
     """One run as it lies in MLflow. `curves` are {name: (steps (n,), values (n,))}, by increasing step.
 
-    `result` is its `result.json`, empty where the run has none or it is found no more.
+    `files` is the text of its artifacts {"result.json": ...}, without those that it never had or that are gone.
     """
 
     run_id: str
@@ -33,7 +32,7 @@ class Logged:
     metrics: Mapping[str, float]
     tags: Mapping[str, str]
     curves: Mapping[str, tuple[np.ndarray, np.ndarray]]
-    result: Mapping[str, Any] = field(default_factory=dict)
+    files: Mapping[str, str] = field(default_factory=dict)
 
 
 def find(uri: str, filter: str, experiment: str | None = None, curves: tuple[str, ...] = CURVES) -> list[Logged]:
@@ -81,18 +80,20 @@ def _logged(client: Any, run: Any, experiment: str, curves: tuple[str, ...]) -> 
     read = {name: _curve(client, run.info.run_id, name) for name in curves if name in run.data.metrics}
     return Logged(
         run.info.run_id, run.info.run_name, run.info.status, experiment,
-        dict(run.data.params), dict(run.data.metrics), dict(run.data.tags), read, _result(client, run),
+        dict(run.data.params), dict(run.data.metrics), dict(run.data.tags), read, _files(client, run.info.run_id),
     )  # fmt: skip
 
 
-def _result(client: Any, run: Any) -> dict[str, Any]:
-    """The artifact `result.json`: artifacts lie by absolute path, so those of a folder that was moved are missing."""
+def _files(client: Any, run_id: str) -> dict[str, str]:
+    """Artifacts lie by absolute path, so those of a folder that was moved are missing."""
     from mlflow.exceptions import MlflowException
 
-    with contextlib.suppress(MlflowException, OSError, ValueError), tempfile.TemporaryDirectory() as folder:
-        path = client.download_artifacts(run.info.run_id, RESULT, folder)
-        return json.loads(Path(path).read_text(encoding="utf-8"))
-    return {}
+    found = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for name in FILES:
+            with contextlib.suppress(MlflowException, OSError, ValueError):
+                found[name] = Path(client.download_artifacts(run_id, name, folder)).read_text(encoding="utf-8")
+    return found
 
 
 def _curve(client: Any, run_id: str, name: str) -> tuple[np.ndarray, np.ndarray]:
