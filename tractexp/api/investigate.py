@@ -111,11 +111,30 @@ class Investigation(Written):
 
     @property
     def remainder(self) -> Table:
-        """Where nothing explains the disagreement: the shapes that stand out of what is left, the loudest first."""
-        shapes = self.content["remainder"]
-        said = [shape["sentence"] for shape in shapes]
-        columns = [key for key in shapes[0] if key != "sentence"] if shapes else []
+        """Where nothing explains the disagreement: the shapes in what the base model leaves, the loudest first."""
+        told = self.content["remainder"]
+        shapes = told["of_base"] if told else []
+        columns = [*shapes[0]] if shapes else []
+        said = [told["sentence"]] if told else []
         return Table(columns, [[shape[key] for key in columns] for shape in shapes], "what is left", said)
+
+    @property
+    def sizes(self) -> list[str]:
+        """How large the effects named are, with standard errors, as text: their parameters that have a null."""
+        return self._sizes(self.names, self.content["parameters"])
+
+    @property
+    def sizes_of_nearest(self) -> list[str]:
+        """The same of the candidates that come nearest where nothing explains the disagreement."""
+        near = self.content["nearest"]
+        return self._sizes(near["effects"], near["parameters"]) if near else []
+
+    @staticmethod
+    def _sizes(effects: Sequence[str], known: Mapping[str, Mapping[str, Any]]) -> list[str]:
+        from tractexp.plugin import get
+
+        own = [p for name in effects for p in get("effect", name)().parameters if p.null is not None]
+        return [_size(p.name, known[p.name], p.unit) for p in own]
 
     @property
     def sets(self) -> list[Mapping[str, Any]]:
@@ -170,11 +189,8 @@ class Investigation(Written):
                 errors = [f"{misfit.epsilon_p:.3%}", f"{misfit.epsilon_q:.3%}", f"{misfit.chi2_per_sample:.3f}"]
                 closed = f"{gap.closed:.0%}" if gap and stage == "after" and gap.closed is not None else ""
                 rows.append([label, stage, *errors, closed])
-        known = self.result.units
-        own = [n for n in self.content["parameters"] if n not in self.question.model.parameters]
-        sizes = [_size(n, self.content["parameters"][n], known[n]) for n in own if n in known]
-        left = [shape["sentence"] for shape in self.content["remainder"][:1]]
-        said = [self.reason, *sizes, *left, f"noise: {self.content['noise']}", f"next: {self.recommendation}"]
+        left = self.remainder.said
+        said = [self.reason, *self.sizes, *left, f"noise: {self.content['noise']}", f"next: {self.recommendation}"]
         columns = ["events", "", "epsilon_p", "epsilon_q", "chi2 per sample", "gap closed"]
         return Table(columns, rows, f"{self.verdict.upper()} {' and '.join(self.names)}".strip(), said)
 

@@ -32,7 +32,7 @@ def content(investigation: Investigation) -> dict[str, Any]:
         "left": investigation.last.left,
         "nearest": _nearest(investigation),
         "candidates": [*sets(investigation), *_singles(investigation)],
-        "remainder": [asdict(shape) | {"sentence": str(shape)} for shape in investigation.remainder],
+        "remainder": _remainder(investigation),
         "recommendation": recommendation(investigation),
         "extended": "conf/model/extended.yaml" if investigation.names else None,
         "noise": investigation.last.noise.describe(),
@@ -78,6 +78,18 @@ def _nearest(investigation: Investigation) -> dict[str, Any] | None:
         "explained_held_out": _number(near.held_out),
         "others": [{"effects": list(names), "explained": _number(share)} for names, share in near.others],
         "parameters": {name: _estimate(known[name]) for name in own},
+    }
+
+
+def _remainder(investigation: Investigation) -> dict[str, Any] | None:
+    """Shapes in what the nearest candidates leave, and in what the base model alone leaves, and the sentence."""
+    if investigation.headline is None:
+        return None
+    shape, base = investigation.headline
+    return {
+        "sentence": f"the {'base model' if base else 'nearest candidates'} miss{'es' * base} this: {shape}",
+        "of_nearest": [asdict(shape) for shape in investigation.remainder if investigation.verdict.nearest],
+        "of_base": [asdict(shape) for shape in investigation.remainder_of_base],
     }
 
 

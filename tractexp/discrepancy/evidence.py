@@ -6,7 +6,7 @@ import numpy as np
 
 from tractexp.discrepancy.investigate import Investigation
 from tractexp.discrepancy.judgement import judgements
-from tractexp.discrepancy.precision import own_parameters, standard_errors
+from tractexp.discrepancy.precision import standard_errors
 from tractexp.discrepancy.survivors import Rival
 from tractexp.discrepancy.verdict import NONE, TIED, UNEXPLAINED
 from tractexp.wording import in_words, joined, with_error
@@ -115,11 +115,10 @@ def _of_set(found: Investigation, rival: Rival) -> Evidence:
     status, why = _fate(found, rival, names)
     unit = weighed.extended.get(rival.fit.names, rival.fit).unit
     errors = {} if rival.tests is None else standard_errors(rival.tests)
-    at, units = found.bench.coordinates, {p.name: p.unit for p in found.bench.problem.parameters}
-    sizes = tuple(
-        Size(n, at.value(n, unit), errors.get(n, float("nan")), units[n]) for n in own_parameters(found.bench, names)
-    )
-    return Evidence(names, drop, FITTED, status, sizes, why)
+    at = found.bench.coordinates
+    own = [p for name in names for p in found.catalogue[name].sizes]
+    sizes = tuple(Size(p.name, at.value(p.name, unit), errors.get(p.name, np.nan), p.unit) for p in own)
+    return Evidence(names, max(drop, 0.0), FITTED, status, sizes, why)
 
 
 def _fate(found: Investigation, rival: Rival, names: tuple[str, ...]) -> tuple[str, str]:
@@ -143,23 +142,17 @@ def _fate(found: Investigation, rival: Rival, names: tuple[str, ...]) -> tuple[s
 def _singles(found: Investigation) -> list[Evidence]:
     """Every effect of the catalogue by itself: refitted where it was, else in one linear step from the base model."""
     refits, scores = found.explanations.refits, {s.name: s for s in found.first.scores}
-    base = found.first.fit.deviance
-    units = {p.name: p.unit for p in found.bench.problem.parameters}
+    base, at = found.first.fit.deviance, found.bench.coordinates
     rows = []
     for j in judgements(found):
         score, fit = scores.get(j.name), refits.get((j.name,))
-        drop = base - fit.deviance if fit else score.drop if score else float("nan")
-        sizes: tuple[Size, ...] = ()
-        if score is not None:
-            declared = {p.name: p for p in found.catalogue[j.name].sizes}
-            sizes = tuple(
-                Size(n, declared[n].null + v, score.deviation[n], declared[n].unit)
-                for n, v in score.size.items()
-                if score.deviation[n] < np.ptp(declared[n].bounds)  # else these events say nothing of it
-            )
-        if fit is not None:
-            at = found.bench.coordinates
-            own = own_parameters(found.bench, (j.name,))
-            sizes = tuple(Size(n, at.value(n, fit.unit), float("nan"), units[n]) for n in own)
-        rows.append(Evidence((j.name,), drop, FITTED if fit else ONE_STEP if score else "", j.status, sizes, j.why))
+        drop = base - fit.deviance if fit else score.drop if score else np.nan
+        sizes: list[Size] = []
+        for p in found.catalogue[j.name].sizes if fit or score else ():
+            if fit:
+                sizes.append(Size(p.name, at.value(p.name, fit.unit), np.nan, p.unit))
+            elif score and score.deviation[p.name] < np.ptp(p.bounds):  # else these events say nothing of it
+                sizes.append(Size(p.name, (p.null or 0.0) + score.size[p.name], score.deviation[p.name], p.unit))
+        how = FITTED if fit else ONE_STEP if score else ""
+        rows.append(Evidence((j.name,), max(drop, 0.0), how, j.status, tuple(sizes), j.why))
     return rows

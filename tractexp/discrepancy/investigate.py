@@ -104,10 +104,27 @@ class Investigation:
 
         On the held-out events only where the fitted ones show none: what explains those may not hold beyond them.
         """
-        if self.verdict.word != UNEXPLAINED:
-            return []
+        return self._left(self.overlays) if self.verdict.word == UNEXPLAINED else []
+
+    @functools.cached_property
+    def remainder_of_base(self) -> list[Remainder]:
+        """The same of what the base model alone leaves: the nearest candidates may have patched something up."""
+        if self.verdict.nearest is None:
+            return self.remainder
+        return self._left([replace(overlay, nearest=None) for overlay in self.overlays])
+
+    @property
+    def headline(self) -> tuple[Remainder, bool] | None:
+        """The loudest shape of the model whose remainder shapes describe best, and whether that is the base model."""
+        told = [(shapes, base) for shapes, base in ((self.remainder, False), (self.remainder_of_base, True)) if shapes]
+        if not told:
+            return None
+        shapes, base = max(told, key=lambda item: sum(shape.share for shape in item[0]))
+        return shapes[0], base or self.verdict.nearest is None
+
+    def _left(self, overlays: Sequence[Overlay]) -> list[Remainder]:
         noise, level = self.last.noise, self.bench.criteria.false_alarms
-        fitted, beyond = ([o for o in self.overlays if o.held_out == there] for there in (False, True))
+        fitted, beyond = ([o for o in overlays if o.held_out == there] for there in (False, True))
         return left(fitted, noise, level) or left(beyond, replace(noise, blur=None), level)
 
     @property

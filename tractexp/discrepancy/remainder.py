@@ -16,7 +16,7 @@ import numpy as np
 from tractexp.identification.result import excitation
 from tractexp.model.drive import Drive
 from tractexp.noise import Noise
-from tractexp.noise.color import FEWEST
+from tractexp.noise.color import FEWEST, SMALLEST
 from tractexp.noise.quiet import estimate
 from tractexp.record import Event
 
@@ -35,8 +35,8 @@ SPARING = 2.0  # of log(samples): what the two more numbers of a ringing must ga
 class Remainder:
     """One shape that is left: `size` is its amplitude at first [pu], with its sign where it does not ring.
 
-    `noise` is the size in standard deviations of the channel's noise, `share` the part of what exceeds the noise that
-    it accounts for, `after` the time since the dip began, or since it ended where it has `ended`.
+    `noise` is the size in standard deviations of the channel's noise before the dip, `share` the part of what exceeds
+    the noise that it accounts for, `after` the time since the dip began, or since it ended where it has `ended`.
     """
 
     event: str
@@ -88,6 +88,10 @@ class _Shape(NamedTuple):
     decay: float
     frequency: float
 
+    def rings(self, samples: int) -> bool:
+        """Whether it has a cycle in what is left of so many samples, and half of one before it has died away."""
+        return self.frequency * min(2 * self.decay, samples - self.start) >= 1
+
     def templates(self, samples: int) -> np.ndarray:
         """Its shapes of unit size, (1 or 2, samples): cosine and sine of a ringing."""
         m = np.arange(samples) - self.start
@@ -111,9 +115,9 @@ class _Stretch:
     def of(cls, event: Event, residual: np.ndarray, noise: Noise, blur: np.ndarray | None) -> "_Stretch":
         """The color of the noise is that before the dip, where that tells it: what is left would color its own."""
         drive = Drive.of([excitation(event)])
-        known = drive.weights > 0
-        if np.count_nonzero(known.all(axis=0)[: event.start]) >= FEWEST:
-            noise = estimate(residual, known, [slice(0, event.start)])
+        known, before = drive.weights > 0, slice(0, event.start)
+        if np.count_nonzero(known.all(axis=0)[before]) >= FEWEST:
+            noise = estimate(_level(residual[:, before]), known[:, before], [before])
         return cls(event, residual, replace(noise, wander=None, blur=blur), drive)
 
     def white(self, rows: np.ndarray) -> np.ndarray:
@@ -130,6 +134,12 @@ class _Stretch:
         sizes = np.linalg.lstsq(columns, left, rcond=None)[0]
         gain = float(left @ left - np.sum((left - columns @ sizes) ** 2))
         return gain, sizes, np.einsum("k,kcn->cn", sizes, raw)
+
+
+def _level(rows: np.ndarray) -> np.ndarray:
+    """Rows (2, n) about their straight lines: what a fit leaves before the dip may lie off zero."""
+    x = np.linspace(-1.0, 1.0, rows.shape[1])
+    return rows - np.stack([np.polynomial.Polynomial.fit(x, row, 1)(x) for row in rows])
 
 
 def remainders(
@@ -219,7 +229,8 @@ def _polished(stretch: _Stretch, shape: _Shape, channel: int) -> tuple[float, _S
     n = stretch.residual.shape[1]
 
     def gain(shape: _Shape) -> float:
-        return stretch.fitted(shape, channel)[0]
+        told = shape.rings(n) or not shape.frequency
+        return stretch.fitted(shape, channel)[0] if told else 0.0
 
     for _ in range(ROUNDS):
         if np.isfinite(shape.decay):
@@ -248,7 +259,7 @@ def _told(stretch: _Stretch, shape: _Shape, channel: int, sizes: np.ndarray, sha
     tau = shape.decay * step if shape.decay < STAYS * rest else None
     kind = "ringing" if ringing else "step" if tau is None else "pulse" if shape.decay < PULSE else "decay"
     size = float(np.hypot(*sizes)) if ringing else float(sizes[0])
-    level = float(stretch.noise.deviation(stretch.drive)[channel, : max(event.start, 1)].mean())
+    level = max((event.noise_P, event.noise_Q)[channel], SMALLEST)
     start = float(event.record.t[shape.start])
     ended = start > event.t_end - 1.5 * step
     frequency = shape.frequency / step if ringing else None

@@ -150,10 +150,12 @@ def _unexplained(weighed: HeldOut, nearest: Nearest | None) -> str:
             f"the model and the records disagree, and {tested} helps more than chance does: what the base model leaves"
             f" {chance}; {loudest}"
         )
-    most = len(best.fit.names) + len(explained.faults)
+    most = len(best.fit.names)
     together = f", alone or up to {most} together," if most > 1 else ""
     names = _with_faults(best, weighed)
-    share = f"explain{'s' * (most == 1)} {nearest.fitted:.0%} of what exceeds the noise, and what" if nearest else ""
+    share = (
+        f"explain{'s' * (len(names) == 1)} {nearest.fitted:.0%} of what exceeds the noise, and what" if nearest else ""
+    )
     comes = f"{joined(names)}, the nearest, {share or 'helps, but what'}"
     return (
         f"the model and the records disagree, and {tested}{together} explains it all: {comes} is left {chance};"

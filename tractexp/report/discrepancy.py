@@ -1,6 +1,6 @@
 """The page of an investigation: the verdict, what one sees, what explains it, how large it is, and how it was found."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ from tractexp.discrepancy.evidence import (
     CHOSEN,
     FITTED,
     KEPT,
+    ONE_STEP,
     Evidence,
     beside,
     chance_level,
@@ -19,6 +20,7 @@ from tractexp.discrepancy.evidence import (
 from tractexp.discrepancy.investigate import Investigation
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import Estimate, estimates
+from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.verdict import UNEXPLAINED
 from tractexp.report.chart import Chart
 from tractexp.report.overlay import overlaid
@@ -28,7 +30,7 @@ from tractexp.wording import in_words, joined, with_error
 KIND = {"none": "good", "named": "good", "tied": "plain", "unexplained": "bad"}
 COLORS = {CHOSEN: "#009E73", KEPT: "#E69F00"}
 REFITTED, ESTIMATED = "#0072B2", "#9A9A9A"
-BAR = 24  # pixels
+BAR, ROOM = 24, 1.2  # pixels; of the longest bar, for what stands beside the bars
 MOST_SETS = 12  # that are compared in a table
 
 
@@ -41,7 +43,7 @@ def page(path: Path, found: Investigation, title: str, adequacy: str = "") -> Pa
     lead = f"{found.bench.model.title}, {events} event{'s' * (events > 1)} fitted, {len(found.withheld)} held out"
     made = Page(f"Missing effect: {title}", lead)
     head = f"{found.verdict.word.upper()} {' or '.join(joined(names) for names in found.verdict.sets)}".strip()
-    left = [f"Left: {shape}." for shape in found.remainder[:1]]
+    left = [f"{_headline(found)}."] if found.headline else []
     said = [f"{found.verdict.reason}.", *left, *[adequacy] * bool(adequacy), f"Next: {recommendation(found)}."]
     made.verdict(head, *said, kind=KIND[found.verdict.word])
     overlaid(made.heading("Measured, before, after" if found.names else "Measured and calculated"), found.overlays)
@@ -55,6 +57,13 @@ def page(path: Path, found: Investigation, title: str, adequacy: str = "") -> Pa
     _disagreement(made, found)
     _noise(made, found)
     return made.write(path)
+
+
+def _headline(found: Investigation) -> str:
+    """What stands out most of that which nothing explains."""
+    assert found.headline is not None
+    shape, base = found.headline
+    return f"The base model misses this: {shape}" if base else f"The nearest candidates miss this: {shape}"
 
 
 def _smaller(made: Page, found: Investigation) -> None:
@@ -81,26 +90,33 @@ def _left(made: Page, found: Investigation) -> None:
     """What nothing explains, in words."""
     made.heading("What is left")
     shapes, near = found.remainder, found.verdict.nearest
-    whose = "the base model leaves" if near is None else f"{joined(near.names)}, the nearest, leaves"
-    if not shapes:
-        made.text(f"What {whose} has no simple shape: no ringing, decay, step or pulse stands out of the noise.")
-    else:
-        beyond = {event.record.name for event in found.withheld}
-        where = "the held-out events" if shapes[0].event in beyond else "the fitted events"
-        made.text(f"What stands out of that which {whose} on {where}, the loudest first: {shapes[0]}.")
-        rows = [
-            [s.event, s.channel, s.kind, f"{s.start:.3f}", s.when, _number(s.frequency), _number(s.time_constant),
-             _number(s.damping), f"{s.size:.3g}", f"{s.noise:.2g}", f"{s.share:.0%}"]
-            for s in shapes
-        ]  # fmt: skip
-        made.table(
-            ["event", "channel", "kind", "from t [s]", "when", "frequency [Hz]", "time constant [s]", "damping ratio",
-             "size [pu]", "times the noise", "share of the excess"], rows,
-            "Shapes c exp(-t/tau) cos(2 pi f t + phi) that fit what is left; the noise is that before the dip.",
-            words=(1, 2, 4),
-        )  # fmt: skip
+    whose = "the base model" if near is None else f"{joined(near.names)}, the nearest candidates,"
+    _shapes(made, found, shapes, whose)
+    if near is not None:
+        _shapes(made, found, found.remainder_of_base, "the base model alone")
     if near is not None:
         _nearest(made, found)
+
+
+def _shapes(made: Page, found: Investigation, shapes: Sequence[Remainder], whose: str) -> None:
+    """The shapes in what one model leaves."""
+    if not shapes:
+        made.text(f"Missed by {whose}: nothing of a simple shape, no ringing, decay, step or pulse.")
+        return
+    beyond = {event.record.name for event in found.withheld}
+    where = "held-out" if shapes[0].event in beyond else "fitted"
+    made.text(f"Missed by {whose} on the {where} events, the loudest first: {shapes[0]}.")
+    rows = [
+        [s.event, s.channel, s.kind, f"{s.start:.3f}", s.when, _number(s.frequency), _number(s.time_constant),
+         _number(s.damping), f"{s.size:.2g}", f"{s.noise:.2g}", f"{s.share:.0%}"]
+        for s in shapes
+    ]  # fmt: skip
+    made.table(
+        ["event", "channel", "kind", "from t [s]", "when", "frequency [Hz]", "time constant [s]", "damping ratio",
+         "size [pu]", "times the noise", "share of the excess"], rows,
+        "Shapes c exp(-t/tau) cos(2 pi f t + phi) fitted to what is left; the noise is that before the dip.",
+        words=(1, 2),
+    )  # fmt: skip
 
 
 def _nearest(made: Page, found: Investigation) -> None:
@@ -117,26 +133,34 @@ def _nearest(made: Page, found: Investigation) -> None:
     made.table(
         ["nearest candidates", "explain on the fitted events", "on the held-out events"], rows,
         "Shares of the deviance in excess of the noise. A large share is no explanation as long as what is left could"
-        " not come about by chance.",
+        " not come about by chance.", words=(0,),
     )  # fmt: skip
-    made.table(
-        ["parameter of the nearest", "meaning", "unit", "value", "95 % interval", "verdict"],
-        [[e.parameter.name, e.parameter.about, e.parameter.unit, _value(e), _interval(e), e.verdict] for e in own],
-        "As if the candidates were right; something else is missing, so that the intervals may miss the truth.",
-        words=(1, 2, 5),
-    )  # fmt: skip
+    with made.folded(f"How large {joined(near.names)} would be"):
+        made.table(
+            ["parameter", "meaning", "unit", "value", "95 % interval", "verdict"],
+            [[e.parameter.name, e.parameter.about, e.parameter.unit, _value(e), _interval(e), e.verdict] for e in own],
+            "As if they were right; something else is missing, so that the intervals may miss the truth.",
+            words=(1, 2, 5),
+        )  # fmt: skip
 
 
 def _candidates(made: Page, found: Investigation) -> None:
     rows = evidence(found)
+    labels = _labels(rows)
     made.heading("Candidates by their evidence")
     seen = [row for row in rows if np.isfinite(row.drop)]
     if seen:
-        made.chart(_bars(found, seen), _bars_caption(found, seen))
+        made.chart(_bars(found, seen, labels), _bars_caption(found, seen))
     for sentence in (why_not_the_most_helpful(found), beside(found)):
         made.text(*[sentence] * bool(sentence))
     told = [
-        [joined(r.names), "" if np.isnan(r.drop) else f"{r.drop:.1f}", r.status, "; ".join(map(str, r.sizes)), r.why]
+        [
+            f"{labels[r]}: {joined(r.names)}" if len(r.names) > 1 else labels[r],
+            "" if np.isnan(r.drop) else f"{r.drop:.1f}",
+            r.status,
+            "; ".join(map(str, r.sizes)),
+            r.why,
+        ]
         for r in rows
     ]
     chosen = found.last.fit.names
@@ -151,21 +175,31 @@ def _candidates(made: Page, found: Investigation) -> None:
         _further(made, found)
 
 
-def _bars(found: Investigation, rows: Sequence[Evidence]) -> Chart:
+def _labels(rows: Sequence[Evidence]) -> dict[Evidence, str]:
+    """A candidate's name; sets of several are numbered, because a chart has no room for all their names."""
+    sets = [row for row in rows if len(row.names) > 1]
+    return {row: f"set {sets.index(row) + 1}" if row in sets else row.names[0] for row in rows}
+
+
+def _bars(found: Investigation, rows: Sequence[Evidence], labels: Mapping[Evidence, str]) -> Chart:
     """How much each candidate explains by itself."""
     colors = [COLORS.get(r.status, REFITTED if r.how == FITTED else ESTIMATED) for r in rows]
-    told = [f"{r.drop:.1f}, {r.status if r.how == FITTED else f'{r.status}, estimated'}" for r in rows]
-    made = Chart("deviance lowered by", [""], pixels=130 + BAR * len(rows))
-    made.bars("", [joined(r.names) for r in rows], [r.drop for r in rows], colors, told=told)
-    return made.edge(chance_level(found), dash="dash")
+    told = [f"{r.drop:.{int(r.drop < 100)}f}{f', {r.status}' * (r.standing < 2)}" for r in rows]
+    chance = chance_level(found)
+    made = Chart("deviance", [""], pixels=130 + BAR * len(rows))
+    made.bars("", [labels[r] for r in rows], [r.drop for r in rows], colors, told=told)
+    return made.edge(chance, dash="dash").limits(None, 0.0, ROOM * max(chance, *(r.drop for r in rows)))
 
 
 def _bars_caption(found: Investigation, rows: Sequence[Evidence]) -> str:
-    told = "Green: in the verdict" + ("; orange: tied with it" if any(r.status == KEPT for r in rows) else "")
+    colors = ["green: in the verdict"] * bool(found.names)
+    colors += ["orange: tied with it"] * any(r.status == KEPT for r in rows)
+    colors += ["blue: refitted"] * any(r.how == FITTED and r.standing == 2 for r in rows)
+    colors += ["gray: estimated in one linear step"] * any(r.how == ONE_STEP for r in rows)
+    chance = f"{chance_level(found):.1f}, what chance gives to the most helpful of all in"
     return (
-        f"{told if found.names else 'None is in the verdict'}; blue: refitted beside the base model; gray: estimated in"
-        f" one linear step from it. Dashed, at {chance_level(found):.1f}: what chance gives to the most helpful of all"
-        f" in {found.bench.criteria.false_alarms:.0%} of cases."
+        f"By how much each alone lowers the deviance of the base model ({', '.join(colors)}). Dashed: {chance}"
+        f" {found.bench.criteria.false_alarms:.0%} of cases."
     )
 
 

@@ -15,8 +15,10 @@ SHOWN = 4  # events of each role that are not folded
 WITHIN = 2.0  # standard deviations of the noise band
 PANELS = ("U [pu]", "P [pu]", "ΔP [pu]", "Q [pu]", "ΔQ [pu]")
 HEIGHTS = (0.7, 1.5, 1.0, 1.5, 1.0)
-PIXELS = 640  # with the verdict above it fits on a printed page
-CAPTION = "ΔP and ΔQ are measured less calculated. Dotted: the dip begins and ends. Drag to zoom, double-click to see all again."
+PIXELS = 580
+CAPTION = (
+    "ΔP and ΔQ are measured less calculated. Dotted: the dip begins and ends. Drag to zoom, double-click to go back."
+)
 
 
 def overlaid(page: Page, overlays: Sequence[Overlay]) -> Page:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from tractexp.plugin import plugin
 from tractexp.tasks.console import say, table
 from tractexp.tasks.task import LOAD, Job, Task, call
+from tractexp.wording import joined
 
 if TYPE_CHECKING:
     from tractexp.api.investigate import Investigation
@@ -58,7 +59,7 @@ def tell(found: "Investigation", paths: Sequence[Path]) -> None:
     """Print the verdict first, then how large it is and how much it explains, where, and what was written."""
     content, shown = found.content, found.table()
     say()
-    say(f"verdict: {found.verdict.upper()} {' or '.join(' and '.join(s) for s in content['name_sets'])}".rstrip())
+    say(f"verdict: {found.verdict.upper()} {' or '.join(map(joined, content['name_sets']))}".rstrip())
     *said, noise, following = shown.said
     for line in said:
         say(f"  {line}")
@@ -71,9 +72,9 @@ def tell(found: "Investigation", paths: Sequence[Path]) -> None:
         say(f"where: {loudest['channel']} of {loudest['event']}, {span}, {loudest['share']:.0%} of the excess{more}")
     if near := content["nearest"]:
         held = near["explained_held_out"]
-        beyond = "" if held is None else f", {held:.0%} on the held-out events"
+        beyond = "" if held is None else f" and {held:.0%} on the held-out events"
         share = f"{near['explained']:.0%} of what exceeds the noise{beyond}"
-        say(f"nearest: {' and '.join(near['effects'])}, {share}; not accepted")
+        say(f"nearest, not accepted: {joined(near['effects'])}, {share}; {', '.join(found.sizes_of_nearest)}")
     say(noise)
     say(following)
     by_name = {path.name: path for path in paths}
