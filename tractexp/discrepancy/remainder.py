@@ -28,6 +28,7 @@ SHORTEST = 8  # samples of a shape
 ROUNDS = 2  # of polishing the frequency and the decay, then the start
 STAYS = 3.0  # lengths of the rest of the record: what takes so long to die away does not
 PULSE = 3.0  # samples: what is over sooner is a pulse
+HOPELESS = 0.6  # of what a shape must gain: one that gains less before it is polished never does
 SPARING = 2.0  # of log(samples): what the two more numbers of a ringing must gain over a decay
 
 
@@ -89,8 +90,9 @@ class _Shape(NamedTuple):
     frequency: float
 
     def rings(self, samples: int) -> bool:
-        """Whether it has a cycle in what is left of so many samples, and half of one before it has died away."""
-        return self.frequency * min(2 * self.decay, samples - self.start) >= 1
+        """Whether there is a cycle of it in so many samples and half of one before it dies away, and samples enough."""
+        lasts = min(2 * self.decay, samples - self.start)
+        return lasts >= SHORTEST and self.frequency * lasts >= 1
 
     def templates(self, samples: int) -> np.ndarray:
         """Its shapes of unit size, (1 or 2, samples): cosine and sine of a ringing."""
@@ -178,8 +180,11 @@ def _loudest(stretch: _Stretch, false_alarms: float) -> tuple[float, _Shape, int
     tried, found = _searched(white, max(stretch.event.start - 2, 0))
     sparing = SPARING * np.log(white.size)
     best = max(found, key=lambda f: f[0] - sparing * bool(f[1].frequency))
+    limit = 2 * np.log(tried / false_alarms)
+    if best[0] < HOPELESS * limit:
+        return None
     polished = max((_polished(stretch, best[1], c) for c in (0, 1)), key=lambda f: f[0])
-    return polished if tried * np.exp(-polished[0] / 2) < false_alarms else None
+    return polished if polished[0] > limit else None
 
 
 def _searched(white: np.ndarray, first: int) -> tuple[int, list[tuple[float, _Shape]]]:
@@ -187,7 +192,7 @@ def _searched(white: np.ndarray, first: int) -> tuple[int, list[tuple[float, _Sh
     length = white.shape[1] - first
     decays = np.geomspace(2.0, max(length, 4), DECAYS)
     shapes = [(float(d), 0.0) for d in (*decays, np.inf)]
-    for d in decays:
+    for d in decays[decays >= SHORTEST / 2]:
         spacing = max(1 / (2 * length), 1 / (8 * d))
         frequencies = np.arange(max(0.5 / d, 1 / length), HIGHEST, spacing)[:FREQUENCIES]
         shapes += [(float(d), float(f)) for f in frequencies]
