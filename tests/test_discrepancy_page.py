@@ -65,8 +65,8 @@ def test_measured_before_and_after_of_every_event_come_first(named, tmp_path):
     assert words.index("Measured, before, after") < words.index("event1, fitted") < words.index("event3, held out")
     assert words.index("event3, held out") < words.index("How much smaller the gap is")
     first, _, held, bars = charts
-    band = "± 2 standard deviations of the noise"
-    assert names(first) == {"measured", "base model", "extended model", "more is left than chance leaves", band}
+    band = "± 2 σ of the noise"
+    assert names(first) == {"measured", "base model", "extended model", "more than chance leaves", band}
     assert names(held) == {"measured", "base model", "extended model", band}
     event = named.bench.records.recorded[0]
     part = named.bench.drive.part(0)
@@ -173,12 +173,12 @@ def test_what_is_left_is_told_with_channel_start_and_size(unexplained, tmp_path)
     words, _ = page(unexplained, tmp_path)
     shapes = unexplained.remainder_of_base
     assert {(s.channel, s.kind) for s in shapes} >= {("P", "step")}
-    shape, _ = unexplained.headline
-    assert str(shape) in words[: words.index("Measured and calculated")]
+    assert unexplained.headline.startswith(("the base model misses this: ", "the nearest candidates miss this: "))
+    assert unexplained.headline[1:] in words[: words.index("Measured and calculated")]
     assert "Missed by the base model" in words
     made = content(unexplained)
     assert made["remainder"]["of_base"][0]["channel"] in "PQ"
-    assert str(shape) in made["remainder"]["sentence"]
+    assert made["remainder"]["sentence"] == unexplained.headline
 
 
 def test_an_unexplained_verdict_does_not_contradict_itself(unexplained, tmp_path):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tractexp.wording import in_words, joined, with_error
+from tractexp.wording import in_words, joined, percent, with_error
 
 
 @pytest.mark.parametrize(
@@ -27,3 +27,7 @@ def test_a_value_has_the_digits_that_its_error_leaves(value, error, told):
 def test_names_are_listed_as_in_a_sentence():
     assert [joined(names) for names in ((), ("a",), ("a", "b"), ("a", "b", "c"))] == ["", "a", "a and b", "a, b and c"]
     assert joined(("a", "b"), "or") == "a or b"
+
+
+def test_a_share_is_never_more_than_all_or_less_than_nothing():
+    assert [percent(share) for share in (-0.3, 0.234, 2.08)] == ["0%", "23%", "100%"]

@@ -24,6 +24,11 @@ def with_error(value: float, error: float) -> str:
     return f"{_powers(value, 4)} ± {_powers(error, 2)}"
 
 
+def percent(share: float) -> str:
+    """A share of a whole that is itself estimated: what seems more than all of it is all, and less than none, none."""
+    return f"{min(max(share, 0.0), 1.0):.0%}"
+
+
 def joined(names: Sequence[str], last: str = "and") -> str:
     """Names as a sentence lists them: 'a', 'a and b', 'a, b and c'."""
     return f" {last} ".join(part for part in (", ".join(names[:-1]), *names[-1:]) if part)

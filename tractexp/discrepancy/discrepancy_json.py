@@ -83,11 +83,10 @@ def _nearest(investigation: Investigation) -> dict[str, Any] | None:
 
 def _remainder(investigation: Investigation) -> dict[str, Any] | None:
     """Shapes in what the nearest candidates leave, and in what the base model alone leaves, and the sentence."""
-    if investigation.headline is None:
+    if not investigation.headline:
         return None
-    shape, base = investigation.headline
     return {
-        "sentence": f"the {'base model' if base else 'nearest candidates'} miss{'es' * base} this: {shape}",
+        "sentence": investigation.headline,
         "of_nearest": [asdict(shape) for shape in investigation.remainder if investigation.verdict.nearest],
         "of_base": [asdict(shape) for shape in investigation.remainder_of_base],
     }

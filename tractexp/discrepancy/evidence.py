@@ -51,7 +51,7 @@ class Evidence:
 def evidence(found: Investigation) -> list[Evidence]:
     """All candidates: those of the verdict first, then those tied with it, then the others; the most helpful first."""
     sets = [_of_set(found, rival) for rival in found.survivors.rivals if _names(found, rival)]
-    known = {row.names for row in sets}
+    known = {row.names for row in sets}  # of the chosen size
     rows = [*sets, *(row for row in _singles(found) if row.names not in known)]
     return sorted(rows, key=lambda row: (row.standing, -np.nan_to_num(row.drop, nan=-1.0), row.names))
 
@@ -98,7 +98,9 @@ def beside(found: Investigation) -> str:
 def _verdict_on(found: Investigation, name: str) -> str:
     """What became of one effect, as the end of a sentence."""
     row = next((r for r in evidence(found) if r.names == (name,)), None)
-    return "it was not refitted alone" if row is None else f"it is {row.status}, {row.why}"
+    if row is None:
+        return "it was not refitted alone"
+    return f"it is {row.why}" if row.status == "relevant" else f"it is {row.status}: {row.why}"
 
 
 def _names(found: Investigation, rival: Rival) -> tuple[str, ...]:
@@ -106,13 +108,10 @@ def _names(found: Investigation, rival: Rival) -> tuple[str, ...]:
 
 
 def _of_set(found: Investigation, rival: Rival) -> Evidence:
-    """A refitted set of the chosen size, with the faults of the measurement that are in all of them."""
-    names = _names(found, rival)
-    weighed = found.held_out
-    drop = rival.lowered
-    if weighed.faults and rival.fit.names in weighed.extended:
-        drop = weighed.bare.deviance - weighed.extended[rival.fit.names].deviance
-    status, why = _fate(found, rival, names)
+    """A refitted set of the chosen size; the faults of the measurement where they alone explain."""
+    weighed, names = found.held_out, rival.fit.names or found.held_out.faults
+    drop = rival.lowered if rival.fit.names else weighed.bare.deviance - weighed.extended[()].deviance
+    status, why = _fate(found, rival)
     unit = weighed.extended.get(rival.fit.names, rival.fit).unit
     errors = {} if rival.tests is None else standard_errors(rival.tests)
     at = found.bench.coordinates
@@ -121,8 +120,9 @@ def _of_set(found: Investigation, rival: Rival) -> Evidence:
     return Evidence(names, max(drop, 0.0), FITTED, status, sizes, why)
 
 
-def _fate(found: Investigation, rival: Rival, names: tuple[str, ...]) -> tuple[str, str]:
+def _fate(found: Investigation, rival: Rival) -> tuple[str, str]:
     """What became of a refitted set, and why."""
+    names = _names(found, rival)
     judged = found.held_out.judged.get(rival.fit.names)
     if names in found.verdict.sets:
         helps = " and helps on the held-out events" if judged is not None and judged.gap.gain > 0 else ""
@@ -154,5 +154,6 @@ def _singles(found: Investigation) -> list[Evidence]:
             elif score and score.deviation[p.name] < np.ptp(p.bounds):  # else these events say nothing of it
                 sizes.append(Size(p.name, (p.null or 0.0) + score.size[p.name], score.deviation[p.name], p.unit))
         how = FITTED if fit else ONE_STEP if score else ""
-        rows.append(Evidence((j.name,), max(drop, 0.0), how, j.status, tuple(sizes), j.why))
+        status = CHOSEN if j.name in found.names else j.status
+        rows.append(Evidence((j.name,), max(drop, 0.0), how, status, tuple(sizes), j.why))
     return rows

@@ -114,13 +114,16 @@ class Investigation:
         return self._left([replace(overlay, nearest=None) for overlay in self.overlays])
 
     @property
-    def headline(self) -> tuple[Remainder, bool] | None:
-        """The loudest shape of the model whose remainder shapes describe best, and whether that is the base model."""
+    def headline(self) -> str:
+        """What is left in one sentence: the loudest shape of the model whose remainder shapes describe best."""
         told = [(shapes, base) for shapes, base in ((self.remainder, False), (self.remainder_of_base, True)) if shapes]
         if not told:
-            return None
+            return ""
         shapes, base = max(told, key=lambda item: sum(shape.share for shape in item[0]))
-        return shapes[0], base or self.verdict.nearest is None
+        held_out = shapes[0].event in {event.record.name for event in self.withheld}
+        base |= self.verdict.nearest is None
+        whose = "the base model misses this" if base else "the nearest candidates miss this"
+        return f"{whose}{' on the held-out events' * held_out}: {shapes[0]}"
 
     def _left(self, overlays: Sequence[Overlay]) -> list[Remainder]:
         noise, level = self.last.noise, self.bench.criteria.false_alarms

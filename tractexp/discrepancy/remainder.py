@@ -54,7 +54,7 @@ class Remainder:
     share: float
 
     def __str__(self) -> str:
-        size = f"{abs(self.size):.2g} pu ({self.noise:.2g} times the noise)"
+        size = f"{abs(self.size):.2g} pu ({self.times} the noise)"
         what, when = f"{self.channel} of {self.event}", f"from t = {self.start:.3f} s on, {self.when}"
         way = "up" if self.size > 0 else "down"
         if self.kind == "ringing":
@@ -64,6 +64,11 @@ class Remainder:
             length = f"some {1000 * self.time_constant:.2g} ms"
             return f"{what} has a pulse {way} of {size} at t = {self.start:.3f} s, {self.when}, of {length}"
         return f"{what} is {way} by {size} {when}{self._ends}"
+
+    @property
+    def times(self) -> str:
+        """The size, told by the noise."""
+        return f"{self.noise:.{int(self.noise < 10)}f} times"
 
     @property
     def when(self) -> str:

@@ -14,7 +14,7 @@ from tractexp.discrepancy.next_dip import NextDip, next_dip
 from tractexp.discrepancy.survivors import Rival, Survivors
 from tractexp.noise import Noise
 from tractexp.record import Event
-from tractexp.wording import in_words, joined
+from tractexp.wording import in_words, joined, percent
 
 NONE, NAMED, TIED, UNEXPLAINED = "none", "named", "tied", "unexplained"
 
@@ -154,7 +154,9 @@ def _unexplained(weighed: HeldOut, nearest: Nearest | None) -> str:
     together = f", alone or up to {most} together," if most > 1 else ""
     names = _with_faults(best, weighed)
     share = (
-        f"explain{'s' * (len(names) == 1)} {nearest.fitted:.0%} of what exceeds the noise, and what" if nearest else ""
+        f"explain{'s' * (len(names) == 1)} {percent(nearest.fitted)} of what exceeds the noise, and what"
+        if nearest
+        else ""
     )
     comes = f"{joined(names)}, the nearest, {share or 'helps, but what'}"
     return (

@@ -25,7 +25,7 @@ from tractexp.discrepancy.verdict import UNEXPLAINED
 from tractexp.report.chart import Chart
 from tractexp.report.overlay import overlaid
 from tractexp.report.page import Page
-from tractexp.wording import in_words, joined, with_error
+from tractexp.wording import in_words, joined, percent, with_error
 
 KIND = {"none": "good", "named": "good", "tied": "plain", "unexplained": "bad"}
 COLORS = {CHOSEN: "#009E73", KEPT: "#E69F00"}
@@ -43,8 +43,8 @@ def page(path: Path, found: Investigation, title: str, adequacy: str = "") -> Pa
     lead = f"{found.bench.model.title}, {events} event{'s' * (events > 1)} fitted, {len(found.withheld)} held out"
     made = Page(f"Missing effect: {title}", lead)
     head = f"{found.verdict.word.upper()} {' or '.join(joined(names) for names in found.verdict.sets)}".strip()
-    left = [f"{_headline(found)}."] if found.headline else []
-    said = [f"{found.verdict.reason}.", *left, *[adequacy] * bool(adequacy), f"Next: {recommendation(found)}."]
+    left = [_sentence(found.headline)] if found.headline else []
+    said = [_sentence(found.verdict.reason), *left, *[adequacy] * bool(adequacy), f"Next: {recommendation(found)}."]
     made.verdict(head, *said, kind=KIND[found.verdict.word])
     overlaid(made.heading("Measured, before, after" if found.names else "Measured and calculated"), found.overlays)
     _smaller(made, found)
@@ -59,11 +59,10 @@ def page(path: Path, found: Investigation, title: str, adequacy: str = "") -> Pa
     return made.write(path)
 
 
-def _headline(found: Investigation) -> str:
-    """What stands out most of that which nothing explains."""
-    assert found.headline is not None
-    shape, base = found.headline
-    return f"The base model misses this: {shape}" if base else f"The nearest candidates miss this: {shape}"
+def _sentence(text: str) -> str:
+    """A reason as a sentence of its own; names keep their spelling."""
+    first = text if "_" in text.split()[0] else f"{text[0].upper()}{text[1:]}"
+    return f"{first}."
 
 
 def _smaller(made: Page, found: Investigation) -> None:
@@ -108,14 +107,14 @@ def _shapes(made: Page, found: Investigation, shapes: Sequence[Remainder], whose
     made.text(f"Missed by {whose} on the {where} events, the loudest first: {shapes[0]}.")
     rows = [
         [s.event, s.channel, s.kind, f"{s.start:.3f}", s.when, _number(s.frequency), _number(s.time_constant),
-         _number(s.damping), f"{s.size:.2g}", f"{s.noise:.2g}", f"{s.share:.0%}"]
+         _number(s.damping), f"{s.size:.2g}", s.times, f"{s.share:.0%}"]
         for s in shapes
     ]  # fmt: skip
     made.table(
         ["event", "channel", "kind", "from t [s]", "when", "frequency [Hz]", "time constant [s]", "damping ratio",
-         "size [pu]", "times the noise", "share of the excess"], rows,
+         "size [pu]", "of the noise", "of the excess"], rows,
         "Shapes c exp(-t/tau) cos(2 pi f t + phi) fitted to what is left; the noise is that before the dip.",
-        words=(1, 2),
+        words=(4,),
     )  # fmt: skip
 
 
@@ -126,9 +125,9 @@ def _nearest(made: Page, found: Investigation) -> None:
     assert near.rival.tests is not None
     known = {e.parameter.name: e for e in estimates(near.rival.tests, near.rival.fit.unit, near.names)}
     own = [known[p.name] for name in near.names for p in found.catalogue[name].effect.parameters]
-    held = f"{near.held_out:.0%}" if np.isfinite(near.held_out) else ""
-    rows = [[joined(near.names), f"{near.fitted:.0%}", held]]
-    rows += [[joined(names), f"{share:.0%}", ""] for names, share in near.others]
+    held = percent(near.held_out) if np.isfinite(near.held_out) else ""
+    rows = [[joined(near.names), percent(near.fitted), held]]
+    rows += [[joined(names), percent(share), ""] for names, share in near.others]
     made.text("The candidates that come nearest, none of which is accepted:")
     made.table(
         ["nearest candidates", "explain on the fitted events", "on the held-out events"], rows,
@@ -168,7 +167,7 @@ def _candidates(made: Page, found: Investigation) -> None:
     made.table(
         ["candidate", "deviance lowered by", "status", "size", "why"], told,
         f"Status of a refitted set is that among the sets of its size{single if chosen else ''}. Sizes have their"
-        " standard error where it was reckoned.", words=(2, 3, 4),
+        " standard error where it was reckoned.", words=(0, 2, 3, 4),
     )  # fmt: skip
     _sets(made, found)
     if chosen:

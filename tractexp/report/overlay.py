@@ -61,11 +61,11 @@ def _channel(made: Chart, overlay: Overlay, c: int, channel: str) -> None:
         _noise_band(made, t, middle, WITHIN * overlay.deviation[c], panel)
         for place in overlay.places:
             if place.channel == channel:
-                made.shade(place.start, place.end, FOUND, panel, "more is left than chance leaves", opacity=0.25)
+                made.shade(place.start, place.end, FOUND, panel, "more than chance leaves", opacity=0.25)
     made.line("measured", t, measured, style.MEASURED, above, width=3)
     for name, curve, color, dash in (
         ("base model", overlay.before, BASE, "solid"),
-        ("nearest candidates, not accepted", overlay.nearest, NEAREST, "dot"),
+        ("nearest candidates", overlay.nearest, NEAREST, "dot"),
         ("extended model", overlay.after, EXTENDED, "solid"),
     ):
         if curve is not None:
@@ -76,5 +76,5 @@ def _channel(made: Chart, overlay: Overlay, c: int, channel: str) -> None:
 def _noise_band(made: Chart, t: np.ndarray, middle: np.ndarray, half: np.ndarray, panel: int) -> None:
     """Where noise alone would let a sample lie; every so many samples of a long record."""
     some = slice(None, None, -(-len(t) // MOST))
-    name = f"± {WITHIN:g} standard deviations of the noise"
+    name = f"± {WITHIN:g} σ of the noise"
     made.band(name, t[some], (middle - half)[some], (middle + half)[some], style.FAINT, panel)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from tractexp.plugin import plugin
 from tractexp.tasks.console import say, table
 from tractexp.tasks.task import LOAD, Job, Task, call
-from tractexp.wording import joined
+from tractexp.wording import joined, percent
 
 if TYPE_CHECKING:
     from tractexp.api.investigate import Investigation
@@ -68,12 +68,13 @@ def tell(found: "Investigation", paths: Sequence[Path]) -> None:
     if places := content["where"]:
         loudest = places[0]
         span = f"{loudest['start']:.3f} to {loudest['end']:.3f} s"
-        more = f", and {len(places) - 1} more stretches" if len(places) > 1 else ""
+        others = len(places) - 1
+        more = f", and {others} more stretch{'es' * (others > 1)}" if others else ""
         say(f"where: {loudest['channel']} of {loudest['event']}, {span}, {loudest['share']:.0%} of the excess{more}")
     if near := content["nearest"]:
         held = near["explained_held_out"]
-        beyond = "" if held is None else f" and {held:.0%} on the held-out events"
-        share = f"{near['explained']:.0%} of what exceeds the noise{beyond}"
+        beyond = "" if held is None else f" and {percent(held)} on the held-out events"
+        share = f"{percent(near['explained'])} of what exceeds the noise{beyond}"
         say(f"nearest, not accepted: {joined(near['effects'])}, {share}; {', '.join(found.sizes_of_nearest)}")
     say(noise)
     say(following)
