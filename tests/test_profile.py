@@ -12,8 +12,8 @@ from test_report_page import read
 
 from tractexp.errors import UserError
 from tractexp.identification.problem import Problem
-from tractexp.identification.profile import End, Profile, checked, profiles, revised, threshold
-from tractexp.identification.uncertainty import assess, conclude
+from tractexp.identification.profile import End, Profile, checked, profiles, revised
+from tractexp.identification.uncertainty import conclude, threshold
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, Verdict
 from tractexp.report.profile import meaning, page
 
@@ -29,7 +29,7 @@ def events(depths, deviation, seed=1, Q_s0=0.35):
 
 @pytest.fixture(scope="module")
 def quiet():
-    return assess(Problem(study.model(), events((0.5,), 0.001)), study.TYPICAL)
+    return study.judged(Problem(study.model(), events((0.5,), 0.001)), study.TYPICAL).known
 
 
 def test_the_threshold_is_chi_squared_of_one_degree():
@@ -67,7 +67,7 @@ def test_a_point_of_a_profile_is_the_constrained_optimum(quiet):
 
 
 def test_a_shallow_dip_leaves_c_open_upwards_and_the_verdict_says_so():
-    known = assess(Problem(study.model(), events((0.15,), 0.01)), study.TYPICAL)
+    known = study.judged(Problem(study.model(), events((0.15,), 0.01)), study.TYPICAL).known
     made = {p.name: p for p in profiles(known).profiles}
     assert made["C"].ends == (End.CLOSED, End.BOUND)
     assert made["C"].interval[1] == pytest.approx(0.99)

@@ -66,9 +66,11 @@ def _run() -> int:
 
     from tractexp.choices import CONF
     from tractexp.config import register
+    from tractexp.provenance import started
     from tractexp.refusal import explained
 
     register()
+    started(sys.argv[1:])
     os.environ[FULL_ERROR] = "1"  # let exceptions through: they are told below, in one sentence
     sys.argv[1:] = map(opened, sys.argv[1:])
     refusals: list[UserError] = []

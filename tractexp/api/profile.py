@@ -52,7 +52,7 @@ class Profiled(Written):
 
     def table(self) -> Table:
         span = "{:.4g} .. {:.4g}".format
-        likely = self.result.uncertainty["most_likely"]
+        likely = self.result.free
         rows = [
             [name, f"{likely[name]:.4g}", span(*self.curvature[name]), span(*p["interval"])]
             for name, p in self.profiles.items()
@@ -94,7 +94,8 @@ def profile(fit: Identification, *, points: int = 24) -> Profiled:
     content = _content(made, time.perf_counter() - started)
     verdicts = {name: str(verdict) for name, verdict in made.verdicts.items()}
     intervals = {p.name: list(p.interval) for p in made.profiles}
-    fields = made.known.fields(notes=made.notes) | {"verdicts": verdicts, "intervals": intervals}
+    fields = made.known.fields() | {"verdicts": verdicts, "intervals": intervals}
+    fields["uncertainty"]["notes"] += made.notes
     ends = zip(made.known.names, made.known.values, made.known.half, strict=True)
     curvature = {name: (float(value - half), float(value + half)) for name, value, half in ends}
     done = Profiled(fit, points, content, replace(fit.result, **fields), curvature)

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.discrepancy.adequacy import SMALLEST_P
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.discrepancy_json import parameters, recommendation
 from tractexp.discrepancy.investigate import Investigation
 from tractexp.discrepancy.judgement import judgements
+from tractexp.identification.surprises import SMALLEST_P
 from tractexp.report import style
 from tractexp.report.page import Page
 
