@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from tractexp.files import write_json
-from tractexp.sweep.status import FAILED, FINISHED, objective, read
+from tractexp.sweep.status import FAILED, FINISHED, INTERRUPTED, objective, read
 
 FILE = "sweep.json"
 
@@ -56,7 +56,7 @@ def metrics(jobs: list[Any]) -> dict[str, float]:
     """The figures of a sweep as a whole."""
     ends = [(s.status, job.folder) for job in jobs if (s := read(job.folder)) is not None]
     best = [f for _, folder in ends if (f := objective(folder)) is not None]
-    counts = {f"jobs_{kind}": sum(status == kind for status, _ in ends) for kind in (FINISHED, FAILED)}
+    counts = {f"jobs_{kind}": sum(status == kind for status, _ in ends) for kind in (FINISHED, FAILED, INTERRUPTED)}
     return {"jobs": len(jobs), **counts, **({"best_objective": min(best)} if best else {})}
 
 

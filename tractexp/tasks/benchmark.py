@@ -84,7 +84,7 @@ def track(job: Job, made: Any, paths: list[Path]) -> None:
     from tractexp import tracking
 
     metrics = {
-        f"share_{name.replace(' ', '_')}_{d}d": made.share(name, d, made.plan.functions)
+        tracking.metric_name(f"share {name} {d}d"): made.share(name, d, made.plan.functions)
         for name in made.optimizers for d in made.plan.dimensions
     }  # fmt: skip
     optimizer = job.choices["optimizer"]

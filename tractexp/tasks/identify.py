@@ -79,6 +79,8 @@ def sure(fit: "Identification") -> None:
 
 def track(job: Job, fit: "Identification", paths: list[Path], predictor: bool) -> None:
     """Log figures, metrics, the fitness curve and, as a predictor, the identified model."""
+    from tractexp.tracking import at_common_steps
+
     result = fit.result
     metrics = {key: getattr(result, key) for key in ("objective", "epsilon_p", "epsilon_q", "simulations", "seconds")}
     of_search = ("objective", "epsilon_p", "epsilon_q", "simulations", "seconds")
@@ -89,12 +91,12 @@ def track(job: Job, fit: "Identification", paths: list[Path], predictor: bool) -
     known = history.objective < REFUSED
     best = history.objective[known]
     job.log(
-        name=f"{job.choices['optimizer']} seed {job.seed}",
+        name=f"{job.variant}, {' and '.join(e.record.name for e in job.events.train)}, seed {job.seed}",
         values=result.parameters,
         metrics=metrics,
         curves={
             "fitness": (np.flatnonzero(known), best),
-            "fitness_by_simulations": (history.simulations[known], best),
+            "fitness_by_simulations": at_common_steps(history.simulations[known], best),
         },
         artifacts=[*paths, job.folder / ".hydra"],
         seconds=result.seconds,

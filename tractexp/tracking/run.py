@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import numpy as np
 
 STATUSES = ("FINISHED", "FAILED", "KILLED")
+PER_DECADE = 40  # steps that curves share
 CURVE_POINTS = 1000  # a longer curve is thinned evenly; the files of the run keep every point
 BATCH_METRICS, BATCH_PARAMETERS = 900, 100  # MLflow takes at most 1000 entries a batch, 100 of them parameters
 VALUE_LENGTH = 6000  # characters MLflow stores of a parameter
@@ -87,6 +88,22 @@ def _text(value: Any) -> str:
     if value is None or isinstance(value, bool | int | float | list | tuple):
         return json.dumps(value, default=str, ensure_ascii=False)
     return str(value)
+
+
+def metric_name(text: str) -> str:
+    """Text as MLflow takes it for the name of a metric: "median issa levy=false" has a colon for the sign."""
+    return re.sub(r"[^\w.\- :/]", "_", text.replace("=", ":"), flags=re.ASCII)
+
+
+def at_common_steps(steps: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A curve (n,) of what was reached, by steps (n,) above 0, at steps that all such curves share.
+
+    MLflow averages runs step by step: where each has its own, the average jumps from one run to the next.
+    """
+    first, last = (int(np.ceil(PER_DECADE * np.log10(step))) for step in (steps[0], steps[-1]))
+    common = np.unique(np.ceil(10 ** (np.arange(first, last + 1) / PER_DECADE)))
+    common = common[common >= steps[0]]
+    return common, values[np.searchsorted(steps, common, side="right") - 1]
 
 
 @functools.cache

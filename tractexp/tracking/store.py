@@ -97,6 +97,7 @@ def import_mlflow(sql: bool = False) -> None:
     """Import MLflow without its telemetry and remarks, and with `sql` what it needs for a database."""
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
     os.environ.setdefault("MLFLOW_LOGGING_LEVEL", "WARNING")
+    os.environ.setdefault("MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR", "false")
     with light_import():
         import mlflow
 
