@@ -95,11 +95,13 @@ def metric_name(text: str) -> str:
     return re.sub(r"[^\w.\- :/]", "_", text.replace("=", ":"), flags=re.ASCII)
 
 
-def at_common_steps(steps: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def at_common_steps(steps: "np.ndarray", values: "np.ndarray") -> "tuple[np.ndarray, np.ndarray]":
     """A curve (n,) of what was reached, by steps (n,) above 0, at steps that all such curves share.
 
     MLflow averages runs step by step: where each has its own, the average jumps from one run to the next.
     """
+    import numpy as np
+
     first, last = (int(np.ceil(PER_DECADE * np.log10(step))) for step in (steps[0], steps[-1]))
     common = np.unique(np.ceil(10 ** (np.arange(first, last + 1) / PER_DECADE)))
     common = common[common >= steps[0]]
