@@ -206,17 +206,15 @@ class Chart:
             axis.pop("dtick", None)  # powers of ten alone would leave the axis bare
         return self
 
-    def ticks(self, panel: int | None, at: Sequence[float], labels: Sequence[str], turned: bool = False) -> "Chart":
-        """Names at places along an axis instead of its numbers: of a panel, or of x where `panel` is None."""
+    def ticks(
+        self, panel: int | None, at: Sequence[float], labels: Sequence[str] = (), turned: bool = False
+    ) -> "Chart":  # fmt: skip
+        """Where an axis is marked, and with which words instead of numbers: of a panel, or of x where it is None."""
         axis = self._x if panel is None else self._axes[_key(panel)]
-        axis |= {"tickvals": list(at), "ticktext": [html.escape(label) for label in labels]}
-        axis |= {"tickfont": {"size": 9 if turned else 11}, **({"tickangle": -90} if turned else {})}
-        return self
-
-    def ticks(self, panel: int | None, values: Sequence[float], texts: Sequence[str] = ()) -> "Chart":
-        """Where an axis is marked, and with which words: of a panel, or of x where `panel` is None."""
-        axis = self._x if panel is None else self._axes[_key(panel)]
-        axis |= {"tickmode": "array", "tickvals": list(values), "ticktext": list(texts) or [f"{v:g}" for v in values]}
+        words = [html.escape(label) for label in labels] or [f"{v:g}" for v in at]
+        axis |= {"tickmode": "array", "tickvals": list(at), "ticktext": words}
+        if labels:
+            axis |= {"tickfont": {"size": 9 if turned else 11}, **({"tickangle": -90} if turned else {})}
         return self
 
     def plain(self) -> dict[str, Any]:
