@@ -64,7 +64,8 @@ def test_values_have_names(fit, dips):
     assert response.P.shape == dips[1].record.t.shape
     record = dips[1].record
     assert response.epsilon[0] == pytest.approx(np.linalg.norm(response.P - record.P) / np.linalg.norm(record.P))
-    assert "weakly identified" in repr(fit) or "identified" in repr(fit)
+    assert repr(fit).startswith("electromechanical motor and exponential static load\nparameter  value")
+    assert fit.headline[1:] in repr(fit)
     assert "<table>" in fit._repr_html_()
     assert fit.to_frame()["parameter"].tolist() == list(MOTOR)
     assert fit.report().html.startswith("<!DOCTYPE html>")

@@ -169,21 +169,29 @@ def _finished(ends: Ends, robust: bool = False) -> Estimated:
             likelihood = cleaned(likelihood, units[:1])
         likelihood = replace(likelihood, noise=noise_at(observed, likelihood, units[0]))
         found = descend(likelihood.rows, units, apart=likelihood.apart)
-        order = np.argsort(found.deviance, kind="stable")
-        units, deviance = found.unit[order], found.deviance[order]
+        units = found.unit[np.argsort(found.deviance, kind="stable")]
     seen = surprise(observed, likelihood, units[0])
     if not seen.adequate:
         likelihood = replace(likelihood, noise=likelihood.noise.scaled(louder(likelihood, units[0])))
-    known = conclude(likelihood, units[0])
-    return Estimated(with_rivals(known, units[1:], deviance[1:]) if seen.adequate else known, seen, ends.starts)
+        return Estimated(conclude(likelihood, units[0]), seen, ends.starts)
+    likelihood = replace(likelihood, noise=noise_at(observed, likelihood, units[0], whole=True))  # nothing but noise
+    found = descend(likelihood.rows, units, apart=likelihood.apart)
+    best = int(found.deviance.argmin())
+    others = np.arange(len(units)) != best
+    known = conclude(likelihood, found.unit[best])
+    return Estimated(with_rivals(known, found.unit[others], found.deviance[others]), seen, ends.starts)
 
 
-def noise_at(observed: Observed, likelihood: Likelihood, unit: np.ndarray) -> Noise:
-    """The noise that a fit at coordinates (D,) leaves in quiet; where too little is quiet, in the whole residual."""
+def noise_at(observed: Observed, likelihood: Likelihood, unit: np.ndarray, whole: bool = False) -> Noise:
+    """The noise that a fit at coordinates (D,) leaves in quiet; of the `whole` residual where too little is quiet.
+
+    The whole tells more, too, where what is left is nothing but noise.
+    """
     rows, J = replace(likelihood, noise=Noise.white(1.0, 1.0)).jacobian(unit)
     residual, columns = rows.reshape(2, -1), J.T.reshape(-1, 2, likelihood.problem.drive.samples)
     blur = observed.blurred(likelihood.values(unit))
-    return observed.noise(residual, likelihood.known, columns, blur) or noise_of(likelihood, residual)
+    seen = observed.noise(residual, likelihood.known, columns, blur, whole)
+    return seen or noise_of(likelihood, residual)
 
 
 def noise_of(likelihood: Likelihood, residuals: np.ndarray) -> Noise:

@@ -16,10 +16,13 @@ from tractexp.model.drive import Drive
 from tractexp.noise.model import Noise
 from tractexp.noise.quiet import estimate, quiet_stretches
 from tractexp.noise.voltage import Smoothed, smoothed
-from tractexp.noise.wander import LESS, SEEN, WITHIN, Rest, Wander, find, power_profile
+from tractexp.noise.wander import LESS, WITHIN, Rest, Wander, find, power_profile
 from tractexp.record import Event
 
 LEAST_KEPT = 0.2  # of a residual's variance: where the fit takes more, it tells nothing of the noise
+# Twice the log-likelihood from which a load is said to wander. An investigation asks for less: a wandering that is not
+# there costs it little, and an estimate a third of its precision.
+SEEN = 5.0
 MOST_SAMPLES = 2_000_000  # of voltages with an error that are simulated at once
 
 
@@ -55,17 +58,18 @@ class Observed:
         return power_profile(self.drive.measured, self.drive.before, self.drive.first)
 
     def noise(
-        self, residuals: np.ndarray, known: np.ndarray, columns: np.ndarray, blur: np.ndarray | None
+        self, residuals: np.ndarray, known: np.ndarray, columns: np.ndarray, blur: np.ndarray | None, whole: bool
     ) -> Noise | None:
-        """Noise from what a fit leaves (2, N) in quiet; None where too few samples are.
+        """Noise from what a fit leaves (2, N) in quiet, or of the `whole` records; None where too few samples are.
 
         `columns` (k, 2, N) are what each coordinate could still change; `blur` is that of `blurred`.
         """
         apart = np.linalg.qr(columns.reshape(len(columns), -1)[np.any(columns != 0, axis=(1, 2))].T)[0]
         kept = np.maximum(1 - (apart**2).sum(axis=1), LEAST_KEPT).reshape(residuals.shape)  # the fit took the rest
         wander = functools.partial(self._wander, residuals, columns, known)
+        where = [self.drive.part(e) for e in range(self.drive.events)] if whole else self.quiet
         try:
-            return estimate(residuals / np.sqrt(kept), known, self.quiet, wander, blur)
+            return estimate(residuals / np.sqrt(kept), known, where, wander, blur)
         except UserError:
             return None
 
