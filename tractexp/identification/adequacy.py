@@ -17,6 +17,7 @@ from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.observed import Observed
 from tractexp.identification.surprises import SMALLEST_P, tail
 from tractexp.noise.span import spanned
+from tractexp.wording import in_words
 
 DRAWS = 199
 # p of what a fit leaves, below which it leaves something. Chosen on the calibration series of benchmarks/adequacy.py:
@@ -26,7 +27,6 @@ DISTINCT = 1e-3  # of the largest: weaker directions are rounding
 WALL = 1e-3  # of a range: what rests on a bound takes nothing from the residual
 SEED = 20201  # of the draws: the judgement of one record is always the same
 ACCEPTED = 0.05  # Eq. (20): a load model is acceptable below 5 %
-TOLD = 1e-6  # smaller p are told in words
 PER_EVENT = "parameters of each event"
 
 
@@ -136,8 +136,8 @@ def graded(surprise: Surprise, errors: Sequence[tuple[str, float]]) -> Adequacy:
         return Adequacy(Grade.WRONG_MODEL, _wrong(where, worst), surprise.p)
     return Adequacy(
         Grade.EFFECT_MISSING,
-        f"it fits within {worst:.1%}, but an effect is missing: do not use its intervals (noise alone leaves as much"
-        f" with p {chance(surprise.p)}; loudest: {surprise.where}, {surprise.ratio:.2g} times the noise)",
+        f"it fits within {worst:.1%}, but an effect is missing: do not use its intervals (p that noise alone"
+        f" leaves as much: {in_words(surprise.p)}; loudest: {surprise.where}, {surprise.ratio:.2g} times the noise)",
         surprise.p,
     )
 
@@ -145,8 +145,3 @@ def graded(surprise: Surprise, errors: Sequence[tuple[str, float]]) -> Adequacy:
 def _wrong(where: str, worst: float) -> str:
     off = f"{where} is off by {worst:.1%}, beyond the {ACCEPTED:.0%} of Eq. (20)"
     return f"this model does not describe this load: {off}"
-
-
-def chance(p: float) -> str:
-    """A probability as a sentence says it."""
-    return f"= {p:.2g}" if p >= TOLD else "less than one in a million"
