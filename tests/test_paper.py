@@ -289,7 +289,7 @@ def test_running_times_are_those_of_the_planted_histories():
 def test_every_experiment_composes_to_its_part(name):
     from hydra import compose, initialize_config_dir
 
-    from tractexp.__main__ import CONF
+    from tractexp.choices import CONF
     from tractexp.config import register
 
     register()

@@ -7,8 +7,6 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 PACKAGE = Path(__file__).parent
 
 
@@ -45,6 +43,8 @@ def _git(folder: Path, *command: str) -> str:
 
 def digest(record: Any) -> str:
     """SHA-256 of the channels of a `Record` as they were read: equal for equal numbers, whatever the file is called."""
+    import numpy as np
+
     made = hashlib.sha256()
     for name in ("t", "U", "P", "Q", "f", "U2"):
         values = getattr(record, name)
