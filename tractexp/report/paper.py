@@ -124,15 +124,16 @@ def _rows_of_parameters(study: Study, names: Sequence[str]) -> list[list[str]]:
         for name in names:
             row.append(f"{printed.TABLE_3[name][k]:g}")
             if parameter in index:
-                values = [f.values[index[parameter]] for f in study.compared[name]]
+                values = [f.values[index[parameter]] for f in study.searched(name)]
                 row += [number(values[0]), number(float(np.median(values)))]
             else:
                 row += ["-", "-"]
         rows.append(row)
+    fitted = {n: study.fits(n) for n in names}
     for label, table in (("epsilon_p", printed.EPSILON_P), ("epsilon_q", printed.EPSILON_Q)):
-        ours = {n: [getattr(fits[0], label) for fits in study.fitted[n]] for n in names}
+        ours = {n: [getattr(fits[0], label) for fits in fitted[n]] for n in names}
         rows.append([label, *_three(table, ours, names)])
-    ours = {n: [f.objective for f in study.compared[n]] for n in names}
+    ours = {n: [f.objective for f in study.searched(n)] for n in names}
     rows.append(["Obj.E [pu²]", *_three(printed.OBJECTIVE, ours, names)])
     return rows
 
@@ -257,7 +258,7 @@ def _fit(draw: Draw, name: str, fit: Any, role: str) -> Path:
 
 def figure8(sheet: Any, study: Study, draw: Draw) -> None:
     sheet.heading("Figure 8: the fit")
-    sheet.figure(_fit(draw, "figure8", study.fitted["issa"][0][0], "fitted"), "ISSA, one run.")
+    sheet.figure(_fit(draw, "figure8", study.first("issa")[0], "fitted"), "ISSA, one run.")
 
 
 def figure9(sheet: Any, study: Study, draw: Draw) -> None:
@@ -307,9 +308,10 @@ def _variants(study: Study) -> list[Variant]:
 def _held_figure(figure: str, kind: str) -> Callable[..., None]:
     def section(sheet: Any, study: Study, draw: Draw) -> None:
         sheet.heading(f"Figure {figure}: {kind}")
+        fits = study.first("issa")
         for k, e in enumerate(study.held(kind)):
             name = f"figure{figure}" + (f"_{k + 1}" if k else "")
-            sheet.figure(_fit(draw, name, study.fitted["issa"][0][e], kind), "ISSA, one run; residuals below.")
+            sheet.figure(_fit(draw, name, fits[e], kind), "ISSA, one run; residuals below.")
 
     return section
 
