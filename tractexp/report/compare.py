@@ -29,7 +29,7 @@ def fitness(variants: Sequence[Variant], by: str, floor: Floor) -> tuple[Chart, 
     """
     variants = [variant for variant in variants if variant.finished]
     names, bands = [v.name for v in variants], [band(v, by) for v in variants]
-    low, high = min(floor.value, *(b.lower.min() for b in bands)), max(map(_seen, bands))
+    low, high = min(floor.value, *(b.lower.min() for b in bands)), max(b.top for b in bands)
     counted = by == "simulations"
     first = min(b.x[(b.lower <= high).argmax()] for b in bands)
     first, last = max(first, 1) if counted else 0, max(b.x[-1] for b in bands)
@@ -43,11 +43,6 @@ def fitness(variants: Sequence[Variant], by: str, floor: Floor) -> tuple[Chart, 
     curves = [(b.x, b.median) for b in bands]
     whole = _together(blank("", _height(names)), names, curves, [] if len(names) > TOGETHER else bands)
     return whole, _apart(blank, names, curves, bands) if len(names) > TOGETHER else []
-
-
-def _seen(b: Band) -> float:
-    """The top of the axis: the upper quartile after a fiftieth of the search; the very start is off the page."""
-    return float(b.upper[np.searchsorted(b.x, b.x[0] + 0.02 * (b.x[-1] - b.x[0]))])
 
 
 def ecdf(variants: Sequence[Variant], floor: Floor) -> tuple[Chart, list[Chart]]:

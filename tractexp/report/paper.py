@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.comparison.floor import Floor
 from tractexp.comparison.runs import Run, Variant
 from tractexp.replication import equations, maps, printed
 from tractexp.replication.claims import CONFIRMED, IMPOSSIBLE, OPEN, REFUTED, Claim, number
 from tractexp.replication.study import AT_FLOOR, TARGETS, Study
-from tractexp.report import compare, figures, paper_figures
+from tractexp.report import figures, paper_figures
 from tractexp.report.markdown import Markdown, Together
 from tractexp.report.page import Page
 
@@ -268,10 +267,9 @@ def figure9(sheet: Any, study: Study, draw: Draw) -> None:
     by_simulations = {n: (h.simulations, h.objective) for n, h in first.items()}
     sheet.figure(figures.fitness(draw("figure9"), by_iteration, by_simulations, title="one run, seed 0"),
                  "One run, as the paper shows it, and the same by what it costs.")  # fmt: skip
-    floor = Floor(study.floor, "the lowest objective known")
     for by in ("iterations", "simulations"):
         sheet.figure(
-            compare.fitness(draw(f"figure9_{by}"), _variants(study), by, floor),
+            paper_figures.searches(draw(f"figure9_{by}"), _variants(study), by, study.floor),
             f"Median and quartiles of {study.seeds} seeds, by {by}; dotted the lowest objective known.",
         )
     rows = []
