@@ -13,21 +13,21 @@ from typing import Any
 
 import numpy as np
 
+from tractexp.errors import UserError
 from tractexp.identification.adequacy import Surprise, surprise
 from tractexp.identification.descent import Descent, descend
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.observed import Observed
 from tractexp.identification.problem import Problem
-from tractexp.identification.uncertainty import Uncertainty, conclude
+from tractexp.identification.uncertainty import Uncertainty, conclude, threshold
 from tractexp.identification.valleys import along_least_known, distinct, explored
-from tractexp.identification.verdict import UNIDENTIFIED, WEAK, Verdict
+from tractexp.identification.verdict import IDENTIFIED, WEAK, WITHIN, Verdict, size
 from tractexp.noise.color import FEWEST, fit_autoregression, stretches, white_noise
 from tractexp.noise.model import Noise, Pair
 
 ROUNDS = 2  # of noise and fit in turn
 BETTER = 0.5  # of the deviance, by which a search's valley must be better than those of the box
 OUTLIER = 5.0  # robust standard deviations from which a robust loss takes a sample for an outlier
-LEAST_KEPT = 0.2  # of a residual's variance: where the fit takes more, it tells nothing of the noise
 REMEMBERED = 4  # problems whose valleys are kept: the jobs of a sweep share one
 
 
@@ -97,6 +97,17 @@ class Ends:
 _remembered: OrderedDict[str, tuple[Ends, Estimated]] = OrderedDict()
 
 
+def polished(problem: Problem) -> Estimated:
+    """The estimate where nothing was searched. Raises `UserError` where nothing of the box can be simulated."""
+    _, best = _of_box(problem)
+    if best is None:
+        raise UserError(
+            f"no parameter set tried can be simulated before {problem.events[0].record.name}; give values by"
+            " task.values=<result.json>, or narrow model.bounds"
+        )
+    return best
+
+
 def estimate(problem: Problem, values: np.ndarray) -> Estimated:
     """The estimate for a problem whose search ended at free `values` (d,).
 
@@ -163,24 +174,25 @@ def _finished(ends: Ends, robust: bool = False) -> Estimated:
     seen = surprise(observed, likelihood, units[0])
     if not seen.adequate:
         likelihood = replace(likelihood, noise=likelihood.noise.scaled(louder(likelihood, units[0])))
-    known = conclude(likelihood, units[0])
-    return Estimated(with_rivals(known, units[1:], deviance[1:]) if seen.adequate else known, seen, ends.starts)
+        return Estimated(conclude(likelihood, units[0]), seen, ends.starts)
+    likelihood = replace(likelihood, noise=noise_at(observed, likelihood, units[0], whole=True))  # nothing but noise
+    found = descend(likelihood.rows, units, apart=likelihood.apart)
+    best = int(found.deviance.argmin())
+    others = np.arange(len(units)) != best
+    known = conclude(likelihood, found.unit[best])
+    return Estimated(with_rivals(known, found.unit[others], found.deviance[others]), seen, ends.starts)
 
 
-def noise_at(observed: Observed, likelihood: Likelihood, unit: np.ndarray) -> Noise:
-    """The noise that a fit at coordinates (D,) leaves in quiet; where too little is quiet, in the whole residual."""
-    residual = likelihood.residuals(unit[None])[0]
+def noise_at(observed: Observed, likelihood: Likelihood, unit: np.ndarray, whole: bool = False) -> Noise:
+    """The noise that a fit at coordinates (D,) leaves in quiet; of the `whole` residual where too little is quiet.
+
+    The whole tells more, too, where what is left is nothing but noise.
+    """
+    rows, J = replace(likelihood, noise=Noise.white(1.0, 1.0)).jacobian(unit)
+    residual, columns = rows.reshape(2, -1), J.T.reshape(-1, 2, likelihood.problem.drive.samples)
     blur = observed.blurred(likelihood.values(unit))
-    noise = observed.noise(residual / np.sqrt(kept(likelihood, unit)), likelihood.known, blur)
-    return noise or noise_of(likelihood, residual)
-
-
-def kept(likelihood: Likelihood, unit: np.ndarray) -> np.ndarray:
-    """What the fit leaves of the variance of each sample, (2, N): the rest of the noise it has absorbed."""
-    _, J = replace(likelihood, noise=Noise.white(1.0, 1.0)).jacobian(unit)
-    J = J[:, np.any(J != 0, axis=0)]
-    Q, _ = np.linalg.qr(J)
-    return np.maximum(1 - (Q**2).sum(axis=1), LEAST_KEPT).reshape(2, -1)
+    seen = observed.noise(residual, likelihood.known, columns, blur, whole)
+    return seen or noise_of(likelihood, residual)
 
 
 def noise_of(likelihood: Likelihood, residuals: np.ndarray) -> Noise:
@@ -224,24 +236,26 @@ def cleaned(likelihood: Likelihood, unit: np.ndarray) -> Likelihood:
 
 def with_rivals(known: Uncertainty, units: np.ndarray, deviance: Sequence[float]) -> Uncertainty:
     """The judgement with the intervals reaching over other valleys (n, D) that the records do not rule out."""
-    from tractexp.identification.profile import threshold
-
-    limit, spans, said = threshold(), {}, {}
+    limit, own = threshold(), dict(zip(known.names, known.intervals.tolist(), strict=True))
+    hull, said = dict(own), dict(known.verdicts)
     for unit, height in zip(units, np.asarray(deviance) - known.deviance, strict=True):
         if not height < limit:
             continue
         other = conclude(known.likelihood, unit)
-        half = np.where(np.isfinite(other.half), other.half, 0.0) * np.sqrt(1 - max(height, 0.0) / limit)
-        for name, value, reach in zip(other.names, other.values, half, strict=True):
-            low, high = spans.get(name, (np.inf, -np.inf))
-            spans[name] = min(low, float(value - reach)), max(high, float(value + reach))
-            said[name] = f"another valley, at {value:.4g}, fits as well"
-    if not spans:
-        return known
-    within = {n: tuple(known.intervals[k]) for k, n in enumerate(known.names)}
-    apart = {n for n, (a, b) in spans.items() if a < within[n][0] or b > within[n][1]}
-    verdicts = {
-        n: Verdict(UNIDENTIFIED if v.word == UNIDENTIFIED else WEAK, f"{v.detail}; {said[n]}") if n in apart else v
-        for n, v in known.verdicts.items()
-    }
-    return replace(known, rivals={n: spans[n] for n in apart}, verdicts=verdicts)
+        reach = np.where(np.isfinite(other.half), other.half, 0.0) * np.sqrt(1 - max(height, 0.0) / limit)
+        spans = np.clip(other.values[:, None] + reach[:, None] * [-1, 1], known.lower[:, None], known.upper[:, None])
+        for name, value, (low, high) in zip(other.names, other.values, spans, strict=True):
+            (a, b), (c, d) = own[name], hull[name]
+            hull[name] = [min(c, low), max(d, high)]
+            if not a <= value <= b:
+                said[name] = _of_two(said[name], value, hull[name], known, name)
+    wider = {n: (a, b) for n, (a, b) in hull.items() if [a, b] != own[n]}
+    return replace(known, rivals=wider, verdicts=said)
+
+
+def _of_two(verdict: Verdict, value: float, hull: Sequence[float], known: Uncertainty, name: str) -> Verdict:
+    """A verdict where another valley fits as well: weak unless the interval over both is narrow still."""
+    j = known.names.index(name)
+    narrow = (hull[1] - hull[0]) / 2 <= WITHIN * size(known.values[j], known.lower[j], known.upper[j])
+    word = WEAK if verdict.word == IDENTIFIED and not narrow else verdict.word
+    return Verdict(word, f"{verdict.detail}; another valley, at {value:.4g}, fits as well")

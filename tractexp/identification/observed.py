@@ -16,9 +16,13 @@ from tractexp.model.drive import Drive
 from tractexp.noise.model import Noise
 from tractexp.noise.quiet import estimate, quiet_stretches
 from tractexp.noise.voltage import Smoothed, smoothed
-from tractexp.noise.wander import LESS, SEEN, WITHIN, Wander, find, power_profile
+from tractexp.noise.wander import LESS, WITHIN, Rest, Wander, find, power_profile
 from tractexp.record import Event
 
+LEAST_KEPT = 0.2  # of a residual's variance: where the fit takes more, it tells nothing of the noise
+# Twice the log-likelihood from which a load is said to wander. An investigation asks for less: a wandering that is not
+# there costs it little, and an estimate a third of its precision.
+SEEN = 5.0
 MOST_SAMPLES = 2_000_000  # of voltages with an error that are simulated at once
 
 
@@ -53,18 +57,34 @@ class Observed:
         """Apparent power over that before each event, (N,)."""
         return power_profile(self.drive.measured, self.drive.before, self.drive.first)
 
-    def noise(self, residuals: np.ndarray, known: np.ndarray, blur: np.ndarray | None) -> Noise | None:
-        """Noise from residuals (2, N) in quiet; None where too few samples are. `blur` is that of `blurred`."""
+    def noise(
+        self, residuals: np.ndarray, known: np.ndarray, columns: np.ndarray, blur: np.ndarray | None, whole: bool
+    ) -> Noise | None:
+        """Noise from what a fit leaves (2, N) in quiet, or of the `whole` records; None where too few samples are.
+
+        `columns` (k, 2, N) are what each coordinate could still change; `blur` is that of `blurred`.
+        """
+        apart = np.linalg.qr(columns.reshape(len(columns), -1)[np.any(columns != 0, axis=(1, 2))].T)[0]
+        kept = np.maximum(1 - (apart**2).sum(axis=1), LEAST_KEPT).reshape(residuals.shape)  # the fit took the rest
+        wander = functools.partial(self._wander, residuals, columns, known)
+        where = [self.drive.part(e) for e in range(self.drive.events)] if whole else self.quiet
         try:
-            return estimate(residuals, known, self.quiet, self._wander, blur)
+            return estimate(residuals / np.sqrt(kept), known, where, wander, blur)
         except UserError:
             return None
 
-    def _wander(self, mix: np.ndarray) -> Wander | None:
-        """How the load wanders before the events, in mixed channels."""
-        before = [self.drive.measured[:, self.drive.part(e)][:, event.steady] for e, event in enumerate(self.events)]
-        mixed = [mix @ b for b in before if np.isfinite(b).all()]
-        return find(mixed, self.events[0].record.step, self.profile, seen=SEEN, within=WITHIN, less=LESS)
+    def _wander(self, left: np.ndarray, columns: np.ndarray, known: np.ndarray, mix: np.ndarray) -> Wander | None:
+        """How the load wanders before the events and during them, in mixed channels."""
+        parts = [self.drive.part(e) for e in range(self.drive.events)]
+        before = [self.drive.measured[:, p][:, event.steady] for p, event in zip(parts, self.events, strict=True)]
+        rests = []
+        if known.all():
+            mixed = np.einsum("ij,kjt->kit", mix, columns)
+            rests = [Rest(mix @ left[:, part], mixed[:, :, part], self.profile[part]) for part in parts]
+        return find(
+            [mix @ b for b in before if np.isfinite(b).all()], self.events[0].record.step, self.profile, rests,
+            seen=SEEN, within=WITHIN, less=LESS,
+        )  # fmt: skip
 
     def blurred(self, values: np.ndarray) -> np.ndarray | None:
         """What errors of the voltage do to the power at free values (d,): (k, 2, N) [pu], None where it has none."""

@@ -77,6 +77,13 @@ class Uncertainty:
         }
 
 
+def threshold(level: float = LEVEL) -> float:
+    """What the deviance may rise by: the chi-squared quantile of one degree of freedom."""
+    from scipy.special import chdtri
+
+    return float(chdtri(1, 1 - level))
+
+
 def conclude(likelihood: Likelihood, unit: np.ndarray, notes: Sequence[str] = ()) -> Uncertainty:
     """Intervals and verdicts at the maximum `unit` (D,) of a likelihood."""
     from scipy.special import stdtrit

@@ -92,11 +92,27 @@ class Noise:
         spreads = [a.deviation[0] / a.deviation[-1] for a in channels]
         return samples / max(1.0, *((g / s) ** 2 for g, s in zip(gains, spreads, strict=True)))
 
+    @property
+    def levels(self) -> tuple[float, float]:
+        """Standard deviations [pu] of P and of Q in the first event."""
+        back = np.eye(2) if self.mix is None else np.linalg.inv(self.mix)
+        P, Q = (float(np.sqrt(back[c] ** 2 @ [a.deviation[0] ** 2 for a in self.pairs[0]])) for c in (0, 1))
+        return P, Q
+
+    def memory(self, step: float) -> float:
+        """Within which time [s] a first-order autoregression as loud at rest as P forgets, samples `step` [s] apart.
+
+        Its neighbors correlate by a, with (1 + a) / (1 - a) the square of its gain at rest over its spread.
+        """
+        P = self.pairs[0][0]
+        gain = P.deviation[-1] / max(1 - float(P.coefficients[-1].sum()), 1e-3)
+        ratio = float(gain / P.deviation[0]) ** 2
+        a = (ratio - 1) / (ratio + 1)
+        return -step / float(np.log(a)) if a > 0 else 0.0
+
     def describe(self) -> str:
         """Level and color, as a run prints them."""
-        pair = self.pairs[0]
-        back = np.eye(2) if self.mix is None else np.linalg.inv(self.mix)
-        level = [np.sqrt(back[c] ** 2 @ [a.deviation[0] ** 2 for a in pair]) for c in (0, 1)]
+        pair, level = self.pairs[0], self.levels
         color = "white" if all(a.white for a in pair) else f"colored (order {max(a.order for a in pair)})"
         return f"P {level[0]:.2g} pu, Q {level[1]:.2g} pu, {color}"
 

@@ -62,8 +62,12 @@ def script() -> str:
 class Chart:
     """Panels above each other that share the axis x. Colors are those of `style`; names may hold any character.
 
-    `panels` are the labels of the vertical axes from the top, `heights` their shares. `log_x` and `log_y` make axes
-    logarithmic. `pixels` is the height of the whole. Where many curves are drawn, `hover` "closest" tells of one.
+        `panels` are the labels of the vertical axes from the top, `heights` their shares. `log_x` and `log_y` make axes
+    <<<<<<< HEAD
+        logarithmic. `pixels` is the height of the whole. Without a `legend` names are told by hovering only.
+    =======
+        logarithmic. `pixels` is the height of the whole. Where many curves are drawn, `hover` "closest" tells of one.
+    >>>>>>> comp
     """
 
     def __init__(
@@ -76,6 +80,7 @@ class Chart:
         log_y: bool = False,
         pixels: int | None = None,
         title: str = "",
+        legend: bool = True,
         hover: str = "x unified",
     ):
         self._data: list[dict[str, Any]] = []
@@ -87,7 +92,7 @@ class Chart:
         self._x |= {"showgrid": True, "gridcolor": "#E4E4E4", "zeroline": False, "ticks": "outside", "automargin": True}
         if log_x:
             self._x |= {"type": "log", "dtick": 1, "exponentformat": "power"}
-        self._title, self._hover = title, hover
+        self._title, self._legend, self._hover = title, legend, hover
         self._pixels = pixels or 130 + 170 * len(panels)
 
     @staticmethod
@@ -201,20 +206,26 @@ class Chart:
             axis.pop("dtick", None)  # powers of ten alone would leave the axis bare
         return self
 
-    def ticks(self, panel: int | None, at: Sequence[float], labels: Sequence[str], turned: bool = False) -> "Chart":
-        """Names at places along an axis instead of its numbers: of a panel, or of x where `panel` is None."""
+    def ticks(
+        self, panel: int | None, at: Sequence[float], labels: Sequence[str] = (), turned: bool = False
+    ) -> "Chart":  # fmt: skip
+        """Where an axis is marked, and with which words instead of numbers: of a panel, or of x where it is None."""
         axis = self._x if panel is None else self._axes[_key(panel)]
-        axis |= {"tickvals": list(at), "ticktext": [html.escape(label) for label in labels]}
-        axis |= {"tickfont": {"size": 9 if turned else 11}, **({"tickangle": -90} if turned else {})}
+        words = [html.escape(label) for label in labels] or [f"{v:g}" for v in at]
+        axis |= {"tickmode": "array", "tickvals": list(at), "ticktext": words}
+        if labels:
+            axis |= {"tickfont": {"size": 9 if turned else 11}, **({"tickangle": -90} if turned else {})}
         return self
 
     def plain(self) -> dict[str, Any]:
         """Data and layout as Plotly reads them."""
-        names = [trace["name"] for trace in self._data if trace["showlegend"]]
+        names = [trace["name"] for trace in self._data if trace["showlegend"]] if self._legend else []
+        above = 30 if not names else 66 if len(names) <= 6 else 86  # pixels; a narrow legend has three rows
         layout = {
             "height": self._pixels, "font": {"family": FONT, "size": 13, "color": "#1d1d1f"}, "hovermode": self._hover,
             "hoversubplots": "axis", "paper_bgcolor": "#fff", "plot_bgcolor": "#fff", "bargap": 0.25,
-            "margin": {"l": 60, "r": 12, "t": (66 if names else 30) + 20 * bool(self._title), "b": 48},
+            "margin": {"l": 60, "r": 12, "t": above + 20 * bool(self._title), "b": 48},
+            "showlegend": self._legend,
             "legend": {"orientation": "h", "x": 0, "y": 1.0, "yanchor": "bottom", "yref": "paper", **_above(names)},
             "shapes": self._shapes, "annotations": self._notes, "xaxis": self._x, **self._axes,
         }  # fmt: skip
@@ -223,6 +234,8 @@ class Chart:
             layout |= {"hovermode": "closest"}
         if self._title:
             layout["title"] = {"text": html.escape(self._title), "x": 0, "xref": "paper", "font": {"size": 14}}
+            if not self._legend:  # just above the panels, below the buttons
+                layout["title"] |= {"yref": "paper", "y": 1, "yanchor": "bottom", "pad": {"b": 8}}
         return {"data": self._data, "layout": layout}
 
     def element(self, label: str) -> str:

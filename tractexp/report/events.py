@@ -32,15 +32,15 @@ def event_chart(
     places: Sequence[Any] = (),
     title: str = "",
 ) -> Chart:
-    """U, P, Q and the residuals of each curve over time, the dip between dotted lines.
+    """U, P, Q and the residuals ΔP, ΔQ (calculated less measured) of each curve over time; dotted: the dip's edges.
 
     `noise` are standard deviations [pu] of P and Q: twice as much about zero is shaded in the residuals. `places` have
     `channel`, `start`, `end` [s]: where more than chance is left.
     """
     record = event.record
-    residual = "{} calculated - measured [pu]".format
+    residual = "Δ{} [pu]".format
     labels = ["U [pu]", "P [pu]", "Q [pu]", residual("P"), residual("Q")]
-    chart = Chart("t [s]", labels, heights=(1.0, 1.7, 1.7, 1.1, 1.1), pixels=860, title=title)
+    chart = Chart("t [s]", labels, heights=(1.0, 1.7, 1.7, 1.2, 1.2), pixels=900, title=title)
     chart.line("U measured", record.t, record.U, style.VOLTAGE)
     for c, (name, color) in enumerate(zip("PQ", COLORS, strict=True)):
         measured = getattr(record, name)

@@ -1,17 +1,12 @@
-"""Figures of what is known: correlation, residuals, profiles, and what a planned dip would tell."""
+"""Figures of what is known: correlation and residuals."""
 
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from tractexp.identification.plan import Forecast
-from tractexp.identification.profile import Profiles
 from tractexp.identification.residual_tests import LAGS, autocorrelation
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.report import style
-
-CEILING = 10.0  # times the value: wider intervals are drawn no further
 
 
 def correlation(path: Path, known: Uncertainty) -> Path:
@@ -70,58 +65,4 @@ def residuals(path: Path, known: Uncertainty) -> Path:
             left.legend(loc="upper right", ncols=2)
         panels[-1, 0].set_xlabel("t [s]")
         panels[-1, 1].set_xlabel("lag [samples]")
-        return style.save(figure, path)
-
-
-def profiles(path: Path, found: Profiles) -> Path:
-    """The profile likelihood of every parameter, with the interval it gives and the one of the information matrix."""
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
-    with rc_context(style.SETTINGS):
-        columns = min(4, len(found.profiles))
-        rows = -(-len(found.profiles) // columns)
-        figure = Figure(figsize=(2.3 * columns + 0.3, 2.1 * rows + 0.3), layout="constrained")
-        panels = figure.subplots(rows, columns, squeeze=False).ravel()
-        for j, (profile, panel) in enumerate(zip(found.profiles, panels, strict=False)):
-            value, half = found.known.values[j], found.known.half[j]
-            panel.plot(profile.values, profile.deviance, marker=".", color=style.PALETTE[0])
-            if np.isfinite(half):
-                x = np.linspace(profile.values.min(), profile.values.max(), 60)
-                panel.plot(
-                    x, found.threshold * ((x - value) / half) ** 2, color=style.MEASURED, zorder=1, linestyle="--"
-                )
-            panel.axhline(found.threshold, color=style.FAINT, linewidth=0.7)
-            panel.axvspan(*profile.interval, color="#E9F1F7", zorder=0)
-            panel.set(title=profile.name + (f"\n{profile.verdict}" if profile.verdict else ""))
-            panel.set_ylim(-0.3, 2.2 * found.threshold)
-            panel.locator_params(axis="x", nbins=4)
-        for panel in panels[len(found.profiles) :]:
-            panel.set_visible(False)
-        for panel in panels[::columns]:
-            panel.set_ylabel("deviance above the best")
-        return style.save(figure, path)
-
-
-def plan(path: Path, scans: Mapping[str, tuple[Sequence[float], Sequence[Forecast]]], within: float) -> Path:
-    """Half intervals in percent of the value against each scanned property of the dip; `scans` {label: (x, y)}."""
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
-    with rc_context(style.SETTINGS):
-        figure = Figure(figsize=(8.6, 6.4), layout="constrained")
-        panels = figure.subplots(2, 2, sharey=True).ravel()
-        for panel, (label, (x, forecasts)) in zip(panels, scans.items(), strict=False):
-            relative = 100 * np.minimum([f.relative for f in forecasts], CEILING)
-            for j, (name, line) in enumerate(zip(forecasts[0].names, style.lines(), strict=False)):
-                panel.plot(x, relative[:, j], **line, label=name)
-            panel.axhline(100 * within, color=style.FAINT, linewidth=0.7, linestyle="-.")
-            panel.set(xlabel=label, yscale="log")
-            if max(x) > 19.5 * min(x) > 0:  # few points, each tried: they are the ticks
-                panel.set_xscale("log")
-                panel.set_xticks(x, [f"{at:.4g}" for at in x])
-                panel.minorticks_off()
-        panels[0].set_ylabel("95 % interval, ± % of the value")
-        panels[2].set_ylabel("95 % interval, ± % of the value")
-        panels[0].legend(ncols=2, fontsize=7.5)
         return style.save(figure, path)

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from tractexp import provenance
 from tractexp.files import write_json
 from tractexp.sweep.status import FAILED, FINISHED, INTERRUPTED, objective, read
 
@@ -71,6 +72,6 @@ def _described(folder: Path, jobs: list[Any], overrides: list[str]) -> Any:
         experiment=first.experiment,
         name=f"sweep {folder.name}",
         parameters=shared,
-        tags={"task": first.choices["task"], "sweep": " ".join(overrides), "git_commit": tracking.git_commit()},
+        tags={"task": first.choices["task"], "sweep": " ".join(overrides), "git_commit": provenance.commit()},
         description=f"A sweep of {len(jobs)} jobs: `{' '.join(overrides)}`",
     )

@@ -4,6 +4,7 @@ from dataclasses import field
 from pathlib import Path
 from typing import Any
 
+from tractexp import provenance
 from tractexp.api.benchmark import DIMENSIONS, FUNCTIONS, INSTANCES, MULTIPLIER, TARGETS, benchmark, check
 from tractexp.errors import check_distinct
 from tractexp.plugin import build, get, plugin
@@ -95,7 +96,7 @@ def track(job: Job, made: Any, paths: list[Path]) -> None:
         name=f"{optimizer} on BBOB",
         parameters=tracking.flatten({key: job.config[key] for key in ("task", "optimizer", "seed")}),
         metrics=metrics,
-        tags={"task": "benchmark", "optimizer": optimizer, "seed": str(job.seed), "git_commit": tracking.git_commit()},
+        tags={"task": "benchmark", "optimizer": optimizer, "seed": str(job.seed), "git_commit": provenance.commit()},
         artifacts=paths,
         parent=job.sweep,
     )

@@ -100,5 +100,7 @@ def track(job: Job, fit: "Identification", paths: list[Path], predictor: bool) -
         },
         artifacts=[*paths, job.folder / ".hydra"],
         seconds=result.seconds,
+        description=fit.headline,
+        records=result.records,
         model=job.folder / "result.json" if predictor else None,
     )

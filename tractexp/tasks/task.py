@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
+from tractexp import provenance
 from tractexp.plugin import Plugin, build
 from tractexp.tasks.given import variant
 
@@ -123,9 +124,9 @@ class Job:
 
     @functools.cached_property
     def _logger(self) -> Any:
-        from tractexp.tracking.process import Logger
+        from tractexp.tracking.process import logger
 
-        return Logger(self.store)
+        return logger(self.store)
 
     def prepare_log(self) -> None:
         """Get MLflow ready beside the computation, in a process of its own; call it once the input is found right.
@@ -151,7 +152,7 @@ class Job:
             experiment=self.experiment,
             name=name,
             parameters={**tracking.flatten(self.config), **values},
-            tags={**parts, "git_commit": tracking.git_commit()},
+            tags={**parts, "git_commit": provenance.commit()},
             parent=self.sweep,
             **content,
         )
