@@ -62,12 +62,9 @@ def script() -> str:
 class Chart:
     """Panels above each other that share the axis x. Colors are those of `style`; names may hold any character.
 
-        `panels` are the labels of the vertical axes from the top, `heights` their shares. `log_x` and `log_y` make axes
-    <<<<<<< HEAD
-        logarithmic. `pixels` is the height of the whole. Without a `legend` names are told by hovering only.
-    =======
-        logarithmic. `pixels` is the height of the whole. Where many curves are drawn, `hover` "closest" tells of one.
-    >>>>>>> comp
+    `panels` are the labels of the vertical axes from the top, `heights` their shares. `log_x` and `log_y` make axes
+    logarithmic. `pixels` is the height of the whole. Without a `legend` names are told by hovering only; where many
+    curves are drawn, `hover` "closest" tells of one.
     """
 
     def __init__(
