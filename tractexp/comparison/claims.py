@@ -40,7 +40,11 @@ def answer(comparison: Comparison) -> str:
     rivals = [name for name in alike if name not in others]
     if rivals:
         return f"Take {best}, or as well {_listed(rivals)}: these runs do not tell them apart.{_spent(comparison)}"
-    why = f"it ends as low as {_listed(others)}, sooner" if others else "it ends lower than the others"
+    why = (
+        f"it ends as low as {_listed(others)}, sooner"
+        if others
+        else f"it ends lower than the other{'s' * (len(comparison.summaries) > 2)}"
+    )
     return f"Take {best}: {why}.{_spent(comparison)}"
 
 
