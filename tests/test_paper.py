@@ -292,13 +292,19 @@ def test_a_figure_of_one_run_makes_one_search(memory, tmp_path, monkeypatch):
     """Figure 8 shows ISSA with seed 0; it took the 90 searches of Table 3."""
     from tractexp.report import paper
 
-    made, run = [], searches.run
-    monkeypatch.setattr(searches, "run", lambda r, variants, seeds, *a: made.append((list(variants), seeds)) or run(
-        r, variants, seeds, *a))  # fmt: skip
-    problem = _recipe()
-    study = Study(_recipe, {}, problem.events, (), 30, workers=1, limits=searches.Limits(150))
-    paper.write(study, ["figure8"], claims.claims(study, ["figure8"]), tmp_path)
-    assert made == [(["issa"], 1)]
+    made, told, run = [], [], searches.run
+
+    def counted(recipe, variants, seeds, *rest, **more):
+        made.append((list(variants), seeds))
+        return run(recipe, variants, seeds, *rest, **more)
+
+    monkeypatch.setattr(searches, "run", counted)
+    for _ in range(2):
+        study = Study(_recipe, {}, _recipe().events, (), 30, workers=1, limits=searches.Limits(150), tell=told.append)
+        paper.write(study, ["figure8"], claims.claims(study, ["figure8"]), tmp_path)
+    assert made == [(["issa"], 1)] * 2
+    assert told[0] == told[1] == "searches of issa: seed 0, 300 iterations of 50"
+    assert told[2:] == ["  1 of them were made before by the same code on the same records, and are read back"]
     assert (tmp_path / "figure8.svg").exists()
 
 

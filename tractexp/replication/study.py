@@ -102,7 +102,10 @@ class Study:
         return self._run({key: {"name": "issa", key: False} for key in printed.INGREDIENTS})
 
     def _run(self, variants: Mapping[str, Mapping[str, Any]], seeds: int | None = None) -> dict[str, list[Found]]:
-        return searches.run(self.recipe, variants, seeds or self.seeds, self.limits, self.workers, self.count)
+        seeds = seeds or self.seeds
+        return searches.run(
+            self.recipe, variants, seeds, self.limits, self.workers, self.count, note=self.tell
+        )  # fmt: skip
 
     @functools.cached_property
     def equal(self) -> int:
