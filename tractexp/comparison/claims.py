@@ -28,9 +28,9 @@ def p_value(p: float) -> str:
 
 def answer(comparison: Comparison) -> str:
     """Which variant to take, as far as these runs say."""
-    if len(comparison.summaries) < 2:
-        return f"There is one variant only, {comparison.summaries[0].name}: nothing to choose from."
     best, *others = comparison.leaders
+    if len(comparison.summaries) < 2:
+        return f"There is one variant only, {best}: nothing to choose from."
     if max((pair.seeds for pair in comparison.pairs), default=0) < seeds_needed(len(comparison.pairs)):
         lowest = f"{_listed([best, *others])} have" if others else f"{best} has"
         return f"Not settled: there are too few seeds to test. {lowest} the lowest median objective so far."

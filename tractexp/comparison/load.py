@@ -72,7 +72,7 @@ def _job(folder: Path) -> Run | None:
         return Run(**told, **_history(path.read_text(encoding="utf-8")))
 
 
-def _history(text: str) -> dict[str, np.ndarray]:
+def _history(text: str) -> dict[str, Any]:
     """The search by iteration, of a `history.csv`."""
     _, simulations, seconds, history = np.loadtxt(text.splitlines(), delimiter=",", skiprows=1, ndmin=2).T
     return {"simulations": simulations, "seconds": seconds, "history": history}
@@ -110,7 +110,7 @@ def _status(folder: Path) -> Mapping[str, Any]:
         return {"message": "", **told, "status": str(told["status"])}
 
 
-def _unfinished(folder: Path, told: Mapping[str, Any]) -> dict[str, str]:
+def _unfinished(folder: Path, told: Mapping[str, Any]) -> dict[str, Any]:
     """Why a job has no result: {"failure": ...} or {"interruption": ...}; {} where it has one."""
     if INTERRUPTED in (told.get("status"), told.get("message")):  # early sweeps: "failed", with this message
         return {"interruption": "its sweep was interrupted"}

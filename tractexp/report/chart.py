@@ -117,7 +117,7 @@ class Chart:
         x, y = style.thin(np.asarray(x, dtype=float), np.asarray(y, dtype=float), MOST)
         shape = {"shape": "hv"} if step else {}
         line = {"color": color, "width": width, "dash": dash, **shape}
-        packed = {"x": _packed(x, "f8"), "y": _packed(y, "f4")}
+        packed: dict[str, Any] = {"x": _packed(x, "f8"), "y": _packed(y, "f4")}
         return self._add(name, panel, mode="lines", line=line, silent=not legend, **packed)
 
     def points(
@@ -155,11 +155,10 @@ class Chart:
     ) -> "Chart":  # fmt: skip
         """What lies between two curves, lightly filled."""
         line = {"width": 0, "color": color, **({"shape": "hv"} if step else {})}
-        x, quiet = _packed(np.asarray(x, dtype=float), "f8"), {"mode": "lines", "line": line, "hoverinfo": "skip"}
-        self._add(name, panel, x=x, y=_packed(lower, "f4"), silent=True, **quiet)
-        return self._add(
-            name, panel, x=x, y=_packed(upper, "f4"), fill="tonexty", fillcolor=_faint(color), **quiet
-        )  # fmt: skip
+        quiet: dict[str, Any] = {"mode": "lines", "line": line, "hoverinfo": "skip"}
+        quiet["x"] = _packed(np.asarray(x, dtype=float), "f8")
+        self._add(name, panel, y=_packed(lower, "f4"), silent=True, **quiet)
+        return self._add(name, panel, y=_packed(upper, "f4"), fill="tonexty", fillcolor=_faint(color), **quiet)
 
     def shade(
         self, start: float, end: float, color: str, panel: int | None = None, name: str = "", opacity: float = 0.3
