@@ -84,6 +84,22 @@ def test_an_investigation_names_what_is_missing_and_gives_a_model_again(found, f
     assert "R_s" in found.extended._repr_html_()
 
 
+def test_where_nothing_is_named_there_is_no_extended_model(dips, tmp_path):
+    """A base model under the name of an extended one would pass for an answer."""
+    found = tractexp.investigate(dips[:2], effects=["speed_dependent_torque"], criteria={"naming_share": 0.0})
+    assert found.names == ()
+    with pytest.raises(UserError, match=rf"no extended model: the verdict is '{found.verdict}'.* base model"):
+        _ = found.extended
+    assert found.question.model.effects == ()
+    assert found.fit.parameters.keys() == set(MOTOR)
+    assert [row[1] for row in found.table().rows] == ["before"]
+    assert found.content["extended"] is None
+    written = {path.name for path in found.write(tmp_path)}
+    assert "extended.yaml" not in written
+    assert ("unexplained.csv" in written) == (found.verdict == "unexplained")
+    assert found.remainder.said == ([found.content["remainder"]["sentence"]] if found.content["remainder"] else [])
+
+
 def test_what_is_saved_is_json_and_comes_back_the_same(fit, found, dips, tmp_path):
     made = {
         "fit": fit,

@@ -42,7 +42,7 @@ def at_fit(c, p, names=(), fault_p=1.0, blur=0.0, left=1.0):
 
 def judged_by(c, closed=1.0, gain=100.0, expected=100.0, p_left=1.0):
     """What held-out events say of an explanation."""
-    gap = Gap(None, None, closed, gain, expected, c.shown)
+    gap = Gap(None, None, closed, gain, expected, c.shown, None)
     return Judged(gap, SimpleNamespace(criteria=c), (), p_left)
 
 

@@ -470,8 +470,22 @@ def test_the_command_tells_the_story_and_its_extended_model_runs_at_once(tmp_pat
     made = json.loads((tmp_path / "run" / "discrepancy.json").read_text())
     assert made["effects"] == ["stator_resistance"]
     page = (tmp_path / "run" / "discrepancy.html").read_text()
-    for heading in ("1 Noise", "2 Is there", "3 Where", "4 Which", "5 How sure", "6 Added", "7 Smaller"):
-        assert heading in page
+    for heading in (
+        "Measured, before",
+        "How much smaller",
+        "Candidates by",
+        "Parameters before",
+        "Is there a",
+        "Noise",
+    ):
+        assert f">{heading}" in page
+    assert made["extended"] == "conf/model/extended.yaml"
+    lines = [line for line in done.stdout.splitlines() if line.strip()]
+    first = next(k for k, line in enumerate(lines) if line.startswith("verdict: "))
+    assert all(line.startswith(("fit: ", "hold out: ", "  ")) for line in lines[:first])  # records and steps only
+    assert lines[first + 1].startswith("  stator_resistance explains the disagreement, and none of the 4 other")
+    assert lines[first + 2].startswith("  R_s = 0.0")
+    assert not list((tmp_path / "run").glob("*.svg"))
     quick = ["optimizer=multistart_least_squares", "optimizer.starts=2", "hydra.run.dir=again"]
     done = tractexp("--config-dir", str(Path("run") / "conf"), "model=extended", *data, *quick, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
@@ -492,5 +506,9 @@ def test_on_a_real_record_it_says_that_it_does_not_know(shared_data, tmp_path):
     assert made["gap"]["train"]["before"]["chi2_per_sample"] > 10
     assert 0.2 < made["nearest"]["explained"] < 1
     assert 0.2 < made["nearest"]["explained_held_out"] < 1
+    assert all(len(at["interval"]) == 2 for at in made["nearest"]["parameters"].values())
+    assert made["extended"] is None
+    assert not (tmp_path / "run" / "conf").exists()
+    assert "extended model:" not in done.stdout
     assert "measured less calculated" in (tmp_path / "run" / "discrepancy.html").read_text()
     assert (tmp_path / "run" / "unexplained.csv").read_text().startswith("event,t,P,Q")

@@ -24,6 +24,7 @@ from tractexp.errors import UserError, check_range
 from tractexp.identification.result import Result
 from tractexp.outcome import Table
 from tractexp.progress import Progress, telling
+from tractexp.wording import with_error
 
 if TYPE_CHECKING:
     from tractexp.discrepancy.criteria import Criteria
@@ -109,6 +110,33 @@ class Investigation(Written):
         return Table(["effects", "status", "deviance lowered by"], rows, "candidates")
 
     @property
+    def remainder(self) -> Table:
+        """Where nothing explains the disagreement: the shapes in what the base model leaves, the loudest first."""
+        told = self.content["remainder"]
+        shapes = told["of_base"] if told else []
+        columns = [*shapes[0]] if shapes else []
+        said = [told["sentence"]] if told else []
+        return Table(columns, [[shape[key] for key in columns] for shape in shapes], "what is left", said)
+
+    @property
+    def sizes(self) -> list[str]:
+        """How large the effects named are, with standard errors, as text: their parameters that have a null."""
+        return self._sizes(self.names, self.content["parameters"])
+
+    @property
+    def sizes_of_nearest(self) -> list[str]:
+        """The same of the candidates that come nearest where nothing explains the disagreement."""
+        near = self.content["nearest"]
+        return self._sizes(near["effects"], near["parameters"]) if near else []
+
+    @staticmethod
+    def _sizes(effects: Sequence[str], known: Mapping[str, Mapping[str, Any]]) -> list[str]:
+        from tractexp.plugin import get
+
+        own = [p for name in effects for p in get("effect", name)().parameters if p.null is not None]
+        return [_size(p.name, known[p.name], p.unit) for p in own]
+
+    @property
     def sets(self) -> list[Mapping[str, Any]]:
         """The sets of effects that were refitted: `effects`, `status`, `likelihood_ratio`, `parameters`."""
         return [row for row in self.content["candidates"] if "why" not in row]  # single tests say why
@@ -126,18 +154,26 @@ class Investigation(Written):
 
     @functools.cached_property
     def extended(self) -> LoadModel:
-        """The model with the effects named: a model again, for any call."""
+        """The model with the effects named: a model again, for any call. Raises `UserError` where none was named."""
         model = self.question.model
-        return model.with_(effects=sorted({*model.effects, *self.names}))
+        if not self.names:
+            raise UserError(
+                f"there is no extended model: the verdict is '{self.verdict}', and nothing was added; go on with the"
+                " base model (.question.model), or give records that show more"
+            )
+        return model.with_(effects=sorted({*model.effects, *self.names}), fixed=self.content["held"])
 
     @functools.cached_property
     def fit(self) -> Identification:
-        """The extended model with the parameters that the investigation found; it predicts, simulates and exports."""
+        """The extended model with the parameters that the investigation found; it predicts, simulates and exports.
+
+        The base model where no effect was named.
+        """
         errors = {name: at["standard_error"] for name, at in self.content["parameters"].items()}
         return Identification(replace(self.result, standard_errors=errors))
 
     def predict(self, event: Any = None, **voltage: Any) -> Response:
-        """What the extended model draws in an event, or from a voltage: see `Identification.predict`."""
+        """What the model of `fit` draws in an event, or from a voltage: see `Identification.predict`."""
         return self.fit.predict(event, **voltage)
 
     @functools.cached_property
@@ -148,11 +184,13 @@ class Investigation(Written):
     def table(self) -> Table:
         rows = []
         for label, gap in (("fitted", self.gap.train), ("held out", self.gap.validate)):
-            for stage, misfit in (("before", gap.before), ("after", gap.after)) if gap else ():
+            stages = (("before", gap.before), ("after", gap.after)) if gap else ()
+            for stage, misfit in stages if self.names else stages[:1]:
                 errors = [f"{misfit.epsilon_p:.3%}", f"{misfit.epsilon_q:.3%}", f"{misfit.chi2_per_sample:.3f}"]
                 closed = f"{gap.closed:.0%}" if gap and stage == "after" and gap.closed is not None else ""
                 rows.append([label, stage, *errors, closed])
-        said = [self.reason, f"noise: {self.content['noise']}", f"next: {self.recommendation}"]
+        left = self.remainder.said
+        said = [self.reason, *self.sizes, *left, f"noise: {self.content['noise']}", f"next: {self.recommendation}"]
         columns = ["events", "", "epsilon_p", "epsilon_q", "chi2 per sample", "gap closed"]
         return Table(columns, rows, f"{self.verdict.upper()} {' and '.join(self.names)}".strip(), said)
 
@@ -164,20 +202,30 @@ class Investigation(Written):
         return cls(Question.from_dict(content["question"]), content["content"], Result(**content["result"]))
 
     def _write(self, folder: Path) -> list[Path]:
-        """discrepancy.json, conf/model/extended.yaml, result.json, what is left as CSV where unexplained, the page."""
+        """discrepancy.json, result.json and the page.
+
+        conf/model/extended.yaml where an effect was named, unexplained.csv where nothing explains.
+        """
         from tractexp.discrepancy import discrepancy_json
         from tractexp.report import discrepancy
 
         base = {**self.question.model.node, "bounds": self.question.model.bounds, "fixed": self.question.model.fixed}
         paths = [
             files.write_json(folder / "discrepancy.json", self.content),
-            discrepancy_json.write_model(self.steps, base, folder / "conf" / "model" / "extended.yaml"),
             self.result.write(folder / "result.json"),
         ]
+        if self.names:
+            paths.append(discrepancy_json.write_model(self.steps, base, folder / "conf" / "model" / "extended.yaml"))
         if self.verdict == "unexplained":
             paths.append(discrepancy_json.write_left(self.steps, folder / "unexplained.csv"))
         records = ", ".join(e.record.name for e in self.question.train)
-        return [*paths, *discrepancy.report(folder, self.steps, records)]
+        return [*paths, discrepancy.page(folder / "discrepancy.html", self.steps, records)]
+
+
+def _size(name: str, at: Mapping[str, Any], unit: str) -> str:
+    """A parameter of an effect as one line."""
+    error = float("nan") if at["standard_error"] is None else at["standard_error"]
+    return f"{name} = {with_error(at['value'], error)}{'' if unit == '1' else f' {unit}'}"
 
 
 @public
@@ -254,6 +302,7 @@ def _concluded(question: Question, steps: "Steps") -> Investigation:
 
 def _estimated(question: Question, steps: "Steps") -> Result:
     """The extended model's parameters as a result, which predicts and is logged as a model."""
+    from tractexp.discrepancy.recommended import adequacy
     from tractexp.identification.problem import Problem
     from tractexp.identification.result import conclude
     from tractexp.identification.search import Found, History
@@ -266,4 +315,5 @@ def _estimated(question: Question, steps: "Steps") -> Result:
     history = History(np.array([bench.effort.simulations]), np.array([objective]), values[None], np.zeros(1))
     status = f"ended with the verdict {steps.verdict.word}"
     found = Found(values, objective, bench.effort.simulations, 0, 0, 0.0, status, history)
-    return conclude(problem, found, question.validate, question.seed, model.node, "descent")[0]
+    result, _ = conclude(problem, found, question.validate, question.seed, model.node, "descent")
+    return replace(result, adequacy=adequacy(steps).told())

@@ -7,10 +7,14 @@ from typing import Any
 import numpy as np
 
 from tractexp import files
+from tractexp.discrepancy import recommended
 from tractexp.discrepancy.gap import Curves, Gap
 from tractexp.discrepancy.investigate import Investigation
 from tractexp.discrepancy.judgement import judgements
+from tractexp.discrepancy.precision import Estimate, estimates, own_parameters
 from tractexp.discrepancy.verdict import NAMED, UNEXPLAINED
+from tractexp.identification.adequacy import Grade
+from tractexp.wording import joined
 
 
 def content(investigation: Investigation) -> dict[str, Any]:
@@ -30,7 +34,11 @@ def content(investigation: Investigation) -> dict[str, Any]:
         "left": investigation.last.left,
         "nearest": _nearest(investigation),
         "candidates": [*sets(investigation), *_singles(investigation)],
+        "remainder": _remainder(investigation),
         "recommendation": recommendation(investigation),
+        "adequacy": recommended.adequacy(investigation).told(),
+        "held": recommended.held(investigation),
+        "extended": "conf/model/extended.yaml" if investigation.names else None,
         "noise": investigation.last.noise.describe(),
         "phasor_window": None if window is None else window.window,
         "false_alarm_rate": investigation.bench.criteria.false_alarms,
@@ -41,42 +49,24 @@ def content(investigation: Investigation) -> dict[str, Any]:
 
 def recommendation(investigation: Investigation) -> str:
     """What to do next, one sentence."""
-    if (d := investigation.verdict.next_dip) is not None:
-        first, second = (" and ".join(names) for names in investigation.verdict.sets[:2])
-        return (
-            f"record a dip of {d.depth:.0%} or more lasting {1000 * d.duration:.0f} ms: it tells {first} from {second}"
-            f" with a probability of {d.probability:.0%}"
-        )
+    if (dip := investigation.verdict.next_dip) is not None:
+        first, second = (joined(names) for names in investigation.verdict.sets[:2])
+        return dip.sentence(first, second, investigation.bench.criteria.decided)
     if investigation.verdict.word == UNEXPLAINED:
-        return (
-            "look at what is left (unexplained.csv) and at what switched at that time; no effect of the catalogue fits"
-        )
+        return "look at what is left (unexplained.csv) and at what switched at that time"
     if investigation.verdict.word == NAMED:
-        return "use the extended model; judge it on further events as they come"
+        grade = recommended.adequacy(investigation).grade
+        if grade is not Grade.ADEQUATE:
+            return "find what is missing still: investigate further events, or the extended model as the base model"
+        kept = recommended.held(investigation)
+        told = f"; these events cannot tell {joined(list(kept))}, which it holds" if kept else ""
+        return f"use the extended model{told}; judge it on further events as they come"
     return "use the base model; what is missing, if anything, is below the limits given for each effect"
 
 
 def parameters(investigation: Investigation) -> dict[str, dict[str, float]]:
     """Parameters of the extended model, each with its standard error where the fit gives one."""
-    at, unit = investigation.bench.coordinates, investigation.extended.unit
-    names = [*(at.names[k] for k in at.base), *_own(investigation)]
-    errors = _standard_errors(investigation)
-    return {n: {"value": at.value(n, unit), "standard_error": errors.get(n, float("nan"))} for n in names}
-
-
-def _own(investigation: Investigation) -> list[str]:
-    return [p.name for name in investigation.names for p in investigation.catalogue[name].effect.parameters]
-
-
-def _standard_errors(investigation: Investigation) -> dict[str, float]:
-    """From the curvature at the chosen fit; a parameter that rests on its bound has no number."""
-    at, tests = investigation.bench.coordinates, investigation.last
-    inside = [*at.base, *at.before, *at.parameters(tests.fit.names)]
-    columns = inside + [k for name in at.catalogue.of_measurement for k in at.sizes([name])]
-    inverse = np.linalg.pinv(tests.projection.R, rcond=1e-10)
-    spread = np.sqrt(np.einsum("ij,ij->i", inverse, inverse))
-    labels = {k: name for name, k in at.column.items() if k not in tests.tangent.held}
-    return {labels[k]: float(s * at.width(labels[k])) for k, s in zip(columns, spread, strict=True) if k in labels}
+    return {e.parameter.name: {"value": e.value, "standard_error": e.error} for e in investigation.after}
 
 
 def _gap(gap: Gap) -> dict[str, Any]:
@@ -88,11 +78,32 @@ def _nearest(investigation: Investigation) -> dict[str, Any] | None:
     near = investigation.verdict.nearest
     if near is None:
         return None
-    others = [{"effects": list(names), "explained": _number(share)} for names, share in near.others]
+    assert near.rival.tests is not None
+    unit, own = near.rival.fit.unit, own_parameters(investigation.bench, near.names)
+    known = {e.parameter.name: e for e in estimates(near.rival.tests, unit, near.names)}
     return {
-        "effects": list(near.names), "explained": _number(near.fitted), "explained_held_out": _number(near.held_out),
-        "others": others,
-    }  # fmt: skip
+        "effects": list(near.names),
+        "explained": _number(near.fitted),
+        "explained_held_out": _number(near.held_out),
+        "others": [{"effects": list(names), "explained": _number(share)} for names, share in near.others],
+        "parameters": {name: _estimate(known[name]) for name in own},
+    }
+
+
+def _remainder(investigation: Investigation) -> dict[str, Any] | None:
+    """Shapes in what the nearest candidates leave, and in what the base model alone leaves, and the sentence."""
+    if not investigation.headline:
+        return None
+    return {
+        "sentence": investigation.headline,
+        "of_nearest": [asdict(shape) for shape in investigation.remainder if investigation.verdict.nearest],
+        "of_base": [asdict(shape) for shape in investigation.remainder_of_base],
+    }
+
+
+def _estimate(known: Estimate) -> dict[str, Any]:
+    interval = [_number(end) for end in known.interval]
+    return {"value": known.value, "standard_error": _number(known.error), "interval": interval}
 
 
 def write_left(investigation: Investigation, path: Path) -> Path:
@@ -163,7 +174,7 @@ def write_model(investigation: Investigation, node: dict[str, Any], path: Path) 
         "defaults": [{"motor": node["motor"]["name"]}, {"static": node["static"]["name"]}, "_self_"],
         "effects": effects,
         "bounds": {n: list(b) for n, b in node["bounds"].items()},
-        "fixed": dict(node["fixed"]),
+        "fixed": {**node["fixed"], **recommended.held(investigation)},
     } | {part: chosen for part, chosen in settings.items() if chosen}
     head = "# The base model and what was found missing: python -m tractexp --config-dir <this conf> model=extended\n"
     return files.write(path, head + yaml.safe_dump(extended, sort_keys=False))

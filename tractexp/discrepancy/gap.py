@@ -43,6 +43,7 @@ class Gap:
     gain: float
     expected: float
     shown: float  # the criterion
+    noise: Noise  # by which both are judged
 
     @property
     def telling(self) -> bool:
@@ -80,7 +81,7 @@ def gap(
     closed = gained / explainable if explainable > 0 else float("nan")
     apart = (after.calculated - before.calculated)[None] * bench.known
     rows = bench.whiten(noise, apart)[0]
-    return Gap(before, after, float(closed), float(gained), float(rows @ rows), bench.criteria.shown)
+    return Gap(before, after, float(closed), float(gained), float(rows @ rows), bench.criteria.shown, noise)
 
 
 def left_over(bench: Bench, unit: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int]) -> float:

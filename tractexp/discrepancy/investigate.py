@@ -1,7 +1,8 @@
 """The whole investigation, from records to a verdict, in the eight steps of docs/missing-effects.md."""
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from tractexp.discrepancy.base_fit import BaseFit, base_fit
 from tractexp.discrepancy.bench import Bench
@@ -14,10 +15,13 @@ from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.gap import Gap, gap
 from tractexp.discrepancy.held_out import HeldOut, Judged, held_out
 from tractexp.discrepancy.kernels import Family
+from tractexp.discrepancy.overlay import Overlay, left, on_fitted, on_held_out
 from tractexp.discrepancy.places import Place, places
+from tractexp.discrepancy.precision import Estimate, estimates
 from tractexp.discrepancy.records import Records, check_events
+from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.survivors import Survivors, survivors
-from tractexp.discrepancy.verdict import NONE, Verdict, verdict
+from tractexp.discrepancy.verdict import NONE, UNEXPLAINED, Verdict, verdict
 from tractexp.discrepancy.window_search import behind_recorder
 from tractexp.model.model import Model
 from tractexp.record import Event
@@ -35,6 +39,7 @@ class Investigation:
     held_out: HeldOut
     verdict: Verdict
     train: Gap  # on the fitted events
+    withheld: tuple[Event, ...]  # the held-out events
 
     @property
     def bench(self) -> Bench:
@@ -74,6 +79,57 @@ class Investigation:
         """The gap on the held-out events."""
         return None if self.judged is None else self.judged.gap
 
+    @functools.cached_property
+    def before(self) -> list[Estimate]:
+        """The parameters of the base model alone."""
+        return estimates(self.first, self.bare.unit, ())
+
+    @functools.cached_property
+    def after(self) -> list[Estimate]:
+        """The parameters of the extended model."""
+        return estimates(self.verdict.chosen.tests or self.last, self.extended.unit, self.names)
+
+    @functools.cached_property
+    def overlays(self) -> list[Overlay]:
+        """Measured, before and after of every event, the fitted ones first."""
+        near, extended = self.verdict.nearest, bool(self.names)
+        return [
+            *on_fitted(self.bench, self.train, near, self.places, extended=extended),
+            *on_held_out(self.bench, self.withheld, self.judged, self.bare, near),
+        ]
+
+    @functools.cached_property
+    def remainder(self) -> list[Remainder]:
+        """What is left where nothing explains it, the loudest first: shapes in what the nearest model leaves.
+
+        On the held-out events only where the fitted ones show none: what explains those may not hold beyond them.
+        """
+        return self._left(self.overlays) if self.verdict.word == UNEXPLAINED else []
+
+    @functools.cached_property
+    def remainder_of_base(self) -> list[Remainder]:
+        """The same of what the base model alone leaves: the nearest candidates may have patched something up."""
+        if self.verdict.nearest is None:
+            return self.remainder
+        return self._left([replace(overlay, nearest=None) for overlay in self.overlays])
+
+    @property
+    def headline(self) -> str:
+        """What is left in one sentence: the loudest shape of the model whose remainder shapes describe best."""
+        told = [(shapes, base) for shapes, base in ((self.remainder, False), (self.remainder_of_base, True)) if shapes]
+        if not told:
+            return ""
+        shapes, base = max(told, key=lambda item: sum(shape.share for shape in item[0]))
+        held_out = shapes[0].event in {event.record.name for event in self.withheld}
+        base |= self.verdict.nearest is None
+        whose = "the base model misses this" if base else "the nearest candidates miss this"
+        return f"{whose}{' on the held-out events' * held_out}: {shapes[0]}"
+
+    def _left(self, overlays: Sequence[Overlay]) -> list[Remainder]:
+        noise, level = self.last.noise, self.bench.criteria.false_alarms
+        fitted, beyond = ([o for o in overlays if o.held_out == there] for there in (False, True))
+        return left(fitted, noise, level) or left(beyond, replace(noise, blur=None), level)
+
     @property
     def fitted_to_both(self) -> bool:
         """Whether the extended model was fitted to the held-out events, too."""
@@ -112,18 +168,19 @@ def investigate(
         base, first = behind_recorder(base, disagreement(base, seed), seed)
         standing_out = places(first)
         explained = explanations(base, first, seed)
-        left = survivors(explained, seed)
-        weighed = held_out(left, validate, seed)
+        surviving = survivors(explained, seed)
+        weighed = held_out(surviving, validate, seed)
         said = verdict(weighed, validate)
         return Investigation(
             base=base,
             first=first,
             places=() if said.word == NONE else tuple(standing_out),
             explanations=explained,
-            survivors=left,
+            survivors=surviving,
             held_out=weighed,
             verdict=said,
             train=_gap(base.bench, weighed, said),
+            withheld=tuple(validate),
         )
 
 

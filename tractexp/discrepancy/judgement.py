@@ -9,6 +9,7 @@ from tractexp.discrepancy.catalogue import Candidate
 from tractexp.discrepancy.investigate import Investigation
 from tractexp.discrepancy.next_dip import ONE_SIDED
 from tractexp.discrepancy.projection import Score
+from tractexp.wording import in_words
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ def judged(candidate: Candidate, score: Score, critical: float, testable: float)
     unit = "" if main.unit == "1" else f" {main.unit}"
     size, deviation, relevant = score.size[main.name], score.deviation[main.name], candidate.relevant(main)
     if score.p < critical:
-        return "relevant", f"its score stands out (p = {score.p:.2g})"
+        return "relevant", f"its score stands out: chance gives as much with a probability of {in_words(score.p)}"
     if not np.isfinite(deviation):
         return "not testable", "these events cannot show it"
     limit = abs(size) + ONE_SIDED * deviation

@@ -25,6 +25,16 @@ class NextDip:
     duration: float
     probability: float
 
+    def sentence(self, first: str, second: str, decided: float) -> str:
+        """What to wait for, and how surely it tells two explanations apart; `decided` is how surely it should."""
+        dip = f"a dip of {self.depth:.0%} or more lasting {1000 * self.duration:.0f} ms"
+        if self.probability >= decided:
+            return f"record {dip}: it tells {first} from {second} with a probability of {self.probability:.0%}"
+        return (
+            f"no dip of up to {DEPTHS[-1]:.0%} and {1000 * DURATIONS[-1]:.0f} ms is sure to tell {first} from {second};"
+            f" {dip} does so with a probability of {self.probability:.0%}"
+        )
+
 
 def next_dip(bench: Bench, tied: Sequence[Rival]) -> NextDip:
     """The mildest realistic dip that tells the first two tied sets apart as surely as asked, or else the surest.

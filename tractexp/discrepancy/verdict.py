@@ -14,6 +14,7 @@ from tractexp.discrepancy.next_dip import NextDip, next_dip
 from tractexp.discrepancy.survivors import Rival, Survivors
 from tractexp.noise import Noise
 from tractexp.record import Event
+from tractexp.wording import in_words, joined, percent
 
 NONE, NAMED, TIED, UNEXPLAINED = "none", "named", "tied", "unexplained"
 
@@ -25,11 +26,15 @@ class Nearest:
     Shares are of the deviance in excess of the noise, on the fitted and on the held-out events (nan without any).
     """
 
-    names: tuple[str, ...]
+    rival: Rival
     fitted: float
     held_out: float
     calculated: np.ndarray  # (2, N) pu, of the fitted events end to end
     others: list[tuple[tuple[str, ...], float]]  # the next ones, with their shares on the fitted events
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.rival.fit.names
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,15 +58,15 @@ def verdict(weighed: HeldOut, validate: Sequence[Event]) -> Verdict:
     left = weighed.survivors
     explained = left.explanations
     bench, first = explained.base.bench, explained.steps[0]
-    word, reason = _worded(explained, left, weighed)
+    word = _word(explained, left, weighed)
+    nearest = _nearest(bench, weighed.bare, left.rivals, weighed.noise, validate) if word == UNEXPLAINED else None
+    sets = _sets(weighed) if word in (NAMED, TIED) else ()
+    reason = _reason(word, weighed, sets, nearest)
     if weighed.together and weighed.kept:
         reason += "; what the fitted events leave open of it was fitted to the held-out ones, too"
     if (window := bench.records.window) is not None:
         reason += f"; {window.describe()}, which is taken into account"
     chosen = (weighed.kept or left.adequate or left.kept)[0]
-    sets: tuple[tuple[str, ...], ...] = ()
-    if word in (NAMED, TIED):
-        sets = tuple(tuple(sorted((*s.fit.names, *weighed.faults))) for s in weighed.kept)
     names = sets[0] if sets else ()
     at = (chosen.tests or explained.last) if names else first
     if at.resting:
@@ -73,34 +78,102 @@ def verdict(weighed: HeldOut, validate: Sequence[Event]) -> Verdict:
         sets=sets,
         chosen=chosen,
         next_dip=next_dip(bench, weighed.kept) if word == TIED else None,
-        nearest=_nearest(bench, weighed.bare, left.rivals, weighed.noise, validate) if word == UNEXPLAINED else None,
+        nearest=nearest,
     )
 
 
-def _worded(explained: Explanations, left: Survivors, weighed: HeldOut) -> tuple[str, str]:
-    """The word and its reason."""
-    first, criteria = explained.steps[0], explained.base.bench.criteria
+def _word(explained: Explanations, left: Survivors, weighed: HeldOut) -> str:
+    first = explained.steps[0]
     if explained.empty and first.adequate:
-        return NONE, f"no disagreement above the noise, at a false-alarm rate of {criteria.false_alarms:.0%}"
+        return NONE
     if not left.adequate:
-        tests = left.kept[0].tests
-        assert tests is not None
-        return UNEXPLAINED, (
-            "the model and the records disagree, and nothing in the catalogue explains it: what is left after the best"
-            f" explanation would come about by chance with p = {tests.p_left:.2g}; what stands out most:"
-            f" {tests.loudest}"
-        )
-    if not weighed.kept and first.adequate:
-        return NONE, (
-            "what seemed to help on the fitted events does not help on the held-out ones, and what the base model"
-            " leaves is no more than chance leaves"
-        )
+        return UNEXPLAINED
     if not weighed.kept:
-        return UNEXPLAINED, "what explains the fitted events does not hold on the held-out ones"
-    if len(weighed.kept) == 1:
-        names = " and ".join(sorted((*weighed.kept[0].fit.names, *weighed.faults)))
-        return NAMED, f"{names} explains the disagreement, and no other set of this size does"
-    return TIED, f"{len(weighed.kept)} explanations fit equally well on these events and cannot be told apart"
+        return NONE if first.adequate else UNEXPLAINED
+    return NAMED if len(weighed.kept) == 1 else TIED
+
+
+def _sets(weighed: HeldOut) -> tuple[tuple[str, ...], ...]:
+    """The effects of each explanation that is kept, with the faults of the measurement beside it."""
+    return tuple(_with_faults(s, weighed) for s in weighed.kept)
+
+
+def _with_faults(rival: Rival, weighed: HeldOut) -> tuple[str, ...]:
+    return tuple(sorted((*rival.fit.names, *weighed.faults)))
+
+
+def _reason(word: str, weighed: HeldOut, sets: Sequence[Sequence[str]], nearest: Nearest | None) -> str:
+    """The sentence behind the word."""
+    left = weighed.survivors
+    first = left.explanations.steps[0]
+    if word == NAMED:
+        return _named(sets[0], len(first.bench.catalogue.candidates))
+    if word == TIED:
+        return _tied(sets)
+    if word == UNEXPLAINED and not left.adequate:
+        return _unexplained(weighed, nearest)
+    if not weighed.kept and left.adequate and not left.explanations.empty:
+        seemed = " or ".join(joined(_with_faults(s, weighed)) for s in left.adequate)
+        if word == UNEXPLAINED:
+            return f"what explains the fitted events, {seemed}, does not hold on the held-out ones: {_denied(weighed)}"
+        return (
+            f"what seemed to help on the fitted events, {seemed}, does not help on the held-out ones, and what the base"
+            " model leaves is no more than chance leaves"
+        )
+    return f"no disagreement above the noise, at a false-alarm rate of {first.criteria.false_alarms:.0%}"
+
+
+def _named(names: Sequence[str], tested: int) -> str:
+    if len(names) > 1:
+        return f"{joined(names)} explain the disagreement, and no other set of {len(names)} of the {tested} tested does"
+    rest = f"none of the {tested - 1} other effects tested does" if tested > 1 else "no other effect was tested"
+    return f"{names[0]} explains the disagreement, and {rest}"
+
+
+def _tied(sets: Sequence[Sequence[str]]) -> str:
+    """Several explanations, told as the alternatives they are."""
+    each = "either" if len(sets) == 2 else "each"
+    told = joined([joined(names) for names in sets], "or")
+    return f"{told}: {each} explains the disagreement, and these events cannot tell them apart"
+
+
+def _unexplained(weighed: HeldOut, nearest: Nearest | None) -> str:
+    """What was tried, how far the nearest of it gets, and what stands out in what it leaves."""
+    left = weighed.survivors
+    best, explained = left.kept[0], left.explanations
+    assert best.tests is not None
+    tested = f"none of the {len(best.tests.bench.catalogue.candidates)} effects tested"
+    chance = f"would come about by chance with a probability of {in_words(best.tests.p_left)}"
+    loudest = f"what stands out most: {best.tests.loudest}"
+    if nearest is None and not explained.faults:
+        return (
+            f"the model and the records disagree, and {tested} helps more than chance does: what the base model leaves"
+            f" {chance}; {loudest}"
+        )
+    most = len(best.fit.names)
+    together = f", alone or up to {most} together," if most > 1 else ""
+    names = _with_faults(best, weighed)
+    share = (
+        f"explain{'s' * (len(names) == 1)} {percent(nearest.fitted)} of what exceeds the noise, and what"
+        if nearest
+        else ""
+    )
+    comes = f"{joined(names)}, the nearest, {share or 'helps, but what'}"
+    return (
+        f"the model and the records disagree, and {tested}{together} explains it all: {comes} is left {chance};"
+        f" {loudest}"
+    )
+
+
+def _denied(weighed: HeldOut) -> str:
+    """What the held-out events have against the best explanation of the fitted ones."""
+    judged = weighed.judged[weighed.survivors.adequate[0].fit.names]
+    if not judged.gap.helps:
+        return "there it fits no better than the base model"
+    return (
+        "what a fit to all events together leaves would come about by chance with a probability of"
+        f" {in_words(judged.p_left)}"
+    )
 
 
 def _nearest(
@@ -118,4 +191,4 @@ def _nearest(
         held = (there[0] - there[1]) / max(there[0] - other.samples, 1e-300)
     others = [(r.fit.names, (before.deviance - r.fit.deviance) / excess) for r in rivals[1:4]]
     share = (before.deviance - after.deviance) / excess
-    return Nearest(best.names, float(share), float(held), after.calculated, others)
+    return Nearest(rivals[0], float(share), float(held), after.calculated, others)

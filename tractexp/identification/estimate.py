@@ -169,8 +169,7 @@ def _finished(ends: Ends, robust: bool = False) -> Estimated:
             likelihood = cleaned(likelihood, units[:1])
         likelihood = replace(likelihood, noise=noise_at(observed, likelihood, units[0]))
         found = descend(likelihood.rows, units, apart=likelihood.apart)
-        order = np.argsort(found.deviance, kind="stable")
-        units, deviance = found.unit[order], found.deviance[order]
+        units = found.unit[np.argsort(found.deviance, kind="stable")]
     seen = surprise(observed, likelihood, units[0])
     if not seen.adequate:
         likelihood = replace(likelihood, noise=likelihood.noise.scaled(louder(likelihood, units[0])))

@@ -95,8 +95,7 @@ class Noise:
     @property
     def levels(self) -> tuple[float, float]:
         """Standard deviations [pu] of P and of Q in the first event."""
-        back = np.eye(2) if self.mix is None else np.linalg.inv(self.mix)
-        P, Q = (float(np.sqrt(back[c] ** 2 @ [a.deviation[0] ** 2 for a in self.pairs[0]])) for c in (0, 1))
+        P, Q = np.sqrt(self._fast_variance(0)).tolist()
         return P, Q
 
     def memory(self, step: float) -> float:
@@ -115,6 +114,23 @@ class Noise:
         pair, level = self.pairs[0], self.levels
         color = "white" if all(a.white for a in pair) else f"colored (order {max(a.order for a in pair)})"
         return f"P {level[0]:.2g} pu, Q {level[1]:.2g} pu, {color}"
+
+    def deviation(self, drive: Drive) -> np.ndarray:
+        """Standard deviation of every sample of P and Q, (2, N) [pu], with what its shapes add."""
+        variance = np.empty((2, drive.samples))
+        for e in range(drive.events):
+            part = drive.part(e)
+            shapes = np.einsum("ij,kjt->kit", self._unmixing, self._shapes(part))
+            variance[:, part] = self._fast_variance(e)[:, None] + (shapes**2).sum(axis=0)
+        return np.sqrt(variance)
+
+    @property
+    def _unmixing(self) -> np.ndarray:
+        return np.eye(2) if self.mix is None else np.linalg.inv(self.mix)
+
+    def _fast_variance(self, event: int) -> np.ndarray:
+        """Variance (2,) of the fast noise of P and Q [pu²]."""
+        return self._unmixing**2 @ [channel.deviation[0] ** 2 for channel in self.pair(event)]
 
     def _mixed(self, rows: np.ndarray) -> np.ndarray:
         """Channels (n, 2, N) mixed so that their noise is independent."""

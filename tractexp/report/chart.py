@@ -49,6 +49,8 @@ const paper = chart => ({width: chart.closest(".charts") ? PAPER / 2 - 10 : PAPE
 addEventListener("beforeprint", () => drawn().forEach(chart => Plotly.relayout(chart, paper(chart))));
 addEventListener("afterprint", () => drawn().forEach(chart => Plotly.relayout(chart, {width: null, autosize: true})));
 document.querySelectorAll("details").forEach(part => part.addEventListener("toggle", resize));
+// Once more: a legend that takes another line moves the panels only then.
+addEventListener("beforeprint", () => charts.forEach(chart => chart.data && Plotly.relayout(chart, paper(chart))));
 """
 
 

@@ -1,140 +1,274 @@
-"""The page of an investigation: noise, disagreement, where, which, how sure, added, smaller, in that order."""
+"""The page of an investigation: the verdict, what one sees, what explains it, how large it is, and how it was found."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from tractexp.discrepancy.bench import Bench
-from tractexp.discrepancy.discrepancy_json import parameters, recommendation
+from tractexp.discrepancy.discrepancy_json import recommendation
+from tractexp.discrepancy.evidence import (
+    CHOSEN,
+    FITTED,
+    KEPT,
+    ONE_STEP,
+    Evidence,
+    beside,
+    chance_level,
+    evidence,
+    why_not_the_most_helpful,
+)
 from tractexp.discrepancy.investigate import Investigation
 from tractexp.discrepancy.judgement import judgements
-from tractexp.identification.surprises import SMALLEST_P
-from tractexp.report import style
+from tractexp.discrepancy.precision import Estimate, estimates
+from tractexp.discrepancy.recommended import adequacy, held
+from tractexp.discrepancy.remainder import Remainder
+from tractexp.discrepancy.verdict import UNEXPLAINED
+from tractexp.report.chart import Chart
+from tractexp.report.overlay import overlaid
 from tractexp.report.page import Page
+from tractexp.wording import in_words, joined, percent, with_error
 
 KIND = {"none": "good", "named": "good", "tied": "plain", "unexplained": "bad"}
-
-CAPTIONS = {
-    "gap": "Before and after on the fitted events, measured less calculated.",
-    "gap_held_out": "Before and after on the held-out events, measured less calculated.",
-    "unexplained": "What the nearest candidates leave of the base model's residuals (gray): what is missing looks so.",
-}
+COLORS = {CHOSEN: "#009E73", KEPT: "#E69F00"}
+REFITTED, ESTIMATED = "#0072B2", "#9A9A9A"
+BAR, ROOM = 24, 1.2  # pixels; of the longest bar, for what stands beside the bars
+MOST_SETS = 12  # that are compared in a table
 
 
-def report(folder: Path, found: Investigation, title: str) -> list[Path]:
-    """Write the figures and discrepancy.html into `folder`; returns their paths."""
-    figures = [residuals(folder / "residuals.svg", found), smaller(folder / "gap.svg", found, held=False)]
-    if found.judged is not None:
-        figures.append(smaller(folder / "gap_held_out.svg", found, held=True))
-    if found.verdict.nearest is not None:
-        figures.append(left(folder / "unexplained.svg", found))
-    return [*figures, page(folder / "discrepancy.html", found, figures, title)]
-
-
-def page(path: Path, found: Investigation, figures: list[Path], title: str) -> Path:
+def page(path: Path, found: Investigation, title: str) -> Path:
     """Tell the investigation to a reader who was not there."""
-    names = " and ".join(found.names)
-    made = Page(f"Missing effect: {title}", f"{found.bench.model.title}, {len(found.bench.events)} events fitted")
-    made.verdict(f"{found.verdict.word.upper()} {names}".strip(), found.verdict.reason, kind=KIND[found.verdict.word])
-    made.heading("1 Noise").text(
-        f"{found.last.noise.describe()}. It is estimated where nothing happens, from what the fit leaves there, and"
-        " so contains what smoothing leaves of the voltage's noise. Time skew, measurement window and load drift are"
-        " free in every fit, each held by what is physically likely."
-    )
-    if (window := found.bench.records.window) is not None:
-        made.text(
-            f"{window.describe().capitalize()}, of voltage and current alike: any other window would"
-            " make the voltage bend where the power does not. The voltage that the load saw is reckoned back from the"
-            " record, and the current of the model is averaged as the recorder does. The extended configuration does"
-            " not do so."
-        )
-    made.heading("2 Is there a disagreement?").text(_gate(found))
-    made.heading("3 Where")
-    if found.places:
-        rows = [[p.event, p.channel, f"{p.start:.3f}", f"{p.end:.3f}", f"{p.share:.0%}"] for p in found.places]
-        made.table(["event", "channel", "from [s]", "to [s]", "share of the excess"], rows)
-    else:
-        made.text("No interval holds more energy than chance leaves there.")
-    made.figure(figures[0], "What the base model leaves; shaded: more than chance, at a family-wise error of "
-                            f"{found.bench.criteria.false_alarms:.0%}.")  # fmt: skip
-    _which(made, found)
-    _sure(made, found)
-    _added(made, found)
-    made.heading("7 Smaller")
-    made.table(["events", "", "epsilon_p", "epsilon_q", "chi2 per sample", "gap closed"], _gap_rows(found))
-    for figure in figures[1:]:
-        made.figure(figure, CAPTIONS[figure.stem])
-    made.heading("Next").text(recommendation(found))
+    events = len(found.bench.events)
+    lead = f"{found.bench.model.title}, {events} event{'s' * (events > 1)} fitted, {len(found.withheld)} held out"
+    made = Page(f"Missing effect: {title}", lead)
+    head = f"{found.verdict.word.upper()} {' or '.join(joined(names) for names in found.verdict.sets)}".strip()
+    left = [_sentence(found.headline)] if found.headline else []
+    said = [_sentence(found.verdict.reason), *left, _graded(found), f"Next: {recommendation(found)}."]
+    made.verdict(head, *said, kind=KIND[found.verdict.word])
+    overlaid(made.heading("Measured, before, after" if found.names else "Measured and calculated"), found.overlays)
+    _smaller(made, found)
+    if found.verdict.word == UNEXPLAINED:
+        _left(made, found)
+    _candidates(made, found)
+    _parameters(made, found)
+    if found.names:
+        _equations(made, found)
+    _disagreement(made, found)
+    _noise(made, found)
     return made.write(path)
 
 
-def _gate(found: Investigation) -> str:
-    first = found.first
-    best = first.scores[0] if first.scores else None
-    critical = first.chance.critical_p(found.bench.criteria.false_alarms)
-    text = f"What the base fit leaves would come about by chance with p = {first.p_left:.2g}"
-    text += f"; {first.loudest} stands out." if not first.adequate else "."
-    if best is None:
-        return text
-    p, alpha = max(best.p, SMALLEST_P), found.bench.criteria.false_alarms
+def _graded(found: Investigation) -> str:
+    """What the model that the investigation ends with is good for."""
+    which = "extended" if found.names else "base"
+    return f"The {which} model: {adequacy(found).sentence}."
+
+
+def _sentence(text: str) -> str:
+    """A reason as a sentence of its own; names keep their spelling."""
+    first = text if "_" in text.split()[0] else f"{text[0].upper()}{text[1:]}"
+    return f"{first}."
+
+
+def _smaller(made: Page, found: Investigation) -> None:
+    made.heading("How large the gap is" if not found.names else "How much smaller the gap is")
+    rows = []
+    for label, gap in (("fitted", found.train), ("held out", found.validate)):
+        if gap is None:
+            continue
+        stages = [("base model", gap.before), ("extended model", gap.after)]
+        for stage, c in stages if found.names else stages[:1]:
+            closed = f"{gap.closed:.0%}" if c is gap.after and np.isfinite(gap.closed) else ""
+            rows.append([label, stage, f"{c.epsilon_p:.3%}", f"{c.epsilon_q:.3%}", f"{c.chi2_per_sample:.3f}", closed])
+    columns = ["events", "model", "epsilon_p", "epsilon_q", "chi2 per sample"]
+    caption = "epsilon: relative error of P and Q, Eq. (20). chi2 per sample: 1 where only noise is left."
+    if found.names:
+        columns.append("gap closed")
+        caption += " Gap closed: the share of what an explanation could gain at all."
+    made.table(columns, [row[: len(columns)] for row in rows], caption, words=(1,))
+    if found.fitted_to_both:
+        made.text("The extended model was fitted to the held-out events, too: what they say of it is no test of it.")
+
+
+def _left(made: Page, found: Investigation) -> None:
+    """What nothing explains, in words."""
+    made.heading("What is left")
+    shapes, near = found.remainder, found.verdict.nearest
+    whose = "the base model" if near is None else f"{joined(near.names)}, the nearest candidates,"
+    _shapes(made, found, shapes, whose)
+    if near is not None:
+        _shapes(made, found, found.remainder_of_base, "the base model alone")
+    if near is not None:
+        _nearest(made, found)
+
+
+def _shapes(made: Page, found: Investigation, shapes: Sequence[Remainder], whose: str) -> None:
+    """The shapes in what one model leaves."""
+    if not shapes:
+        made.text(f"Missed by {whose}: nothing of a simple shape, no ringing, decay, step or pulse.")
+        return
+    beyond = {event.record.name for event in found.withheld}
+    where = "held-out" if shapes[0].event in beyond else "fitted"
+    made.text(f"Missed by {whose} on the {where} events, the loudest first: {shapes[0]}.")
+    rows = [
+        [s.event, s.channel, s.kind, f"{s.start:.3f}", s.when, _number(s.frequency), _number(s.time_constant),
+         _number(s.damping), f"{s.size:.2g}", s.times, f"{s.share:.0%}"]
+        for s in shapes
+    ]  # fmt: skip
+    made.table(
+        ["event", "channel", "kind", "from t [s]", "when", "frequency [Hz]", "time constant [s]", "damping ratio",
+         "size [pu]", "of the noise", "of the excess"], rows,
+        "Shapes c exp(-t/tau) cos(2 pi f t + phi) fitted to what is left; the noise is that before the dip.",
+        words=(4,),
+    )  # fmt: skip
+
+
+def _nearest(made: Page, found: Investigation) -> None:
+    """The candidates that come nearest, with their shares and sizes."""
+    near = found.verdict.nearest
+    assert near is not None
+    assert near.rival.tests is not None
+    known = {e.parameter.name: e for e in estimates(near.rival.tests, near.rival.fit.unit, near.names)}
+    own = [known[p.name] for name in near.names for p in found.catalogue[name].effect.parameters]
+    held = percent(near.held_out) if np.isfinite(near.held_out) else ""
+    rows = [[joined(near.names), percent(near.fitted), held]]
+    rows += [[joined(names), percent(share), ""] for names, share in near.others]
+    made.text("The candidates that come nearest, none of which is accepted:")
+    made.table(
+        ["nearest candidates", "explain on the fitted events", "on the held-out events"], rows,
+        "Shares of the deviance in excess of the noise. A large share is no explanation as long as what is left could"
+        " not come about by chance.", words=(0,),
+    )  # fmt: skip
+    with made.folded(f"How large {joined(near.names)} would be"):
+        made.table(
+            ["parameter", "meaning", "unit", "value", "95 % interval", "verdict"],
+            [[e.parameter.name, e.parameter.about, e.parameter.unit, _value(e), _interval(e), e.verdict] for e in own],
+            "As if they were right; something else is missing, so that the intervals may miss the truth.",
+            words=(1, 2, 5),
+        )  # fmt: skip
+
+
+def _candidates(made: Page, found: Investigation) -> None:
+    rows = evidence(found)
+    labels = _labels(rows)
+    made.heading("Candidates by their evidence")
+    seen = [row for row in rows if np.isfinite(row.drop)]
+    if seen:
+        made.chart(_bars(found, seen, labels), _bars_caption(found, seen))
+    for sentence in (why_not_the_most_helpful(found), beside(found)):
+        made.text(*[sentence] * bool(sentence))
+    told = [
+        [
+            f"{labels[r]}: {joined(r.names)}" if len(r.names) > 1 else labels[r],
+            "" if np.isnan(r.drop) else f"{r.drop:.1f}",
+            r.status,
+            "; ".join(map(str, r.sizes)),
+            r.why,
+        ]
+        for r in rows
+    ]
+    chosen = found.last.fit.names
+    single = f"; that of an effect outside of it is what the events say with {joined(chosen)} in the model"
+    made.table(
+        ["candidate", "deviance lowered by", "status", "size", "why"], told,
+        f"Status of a refitted set is that among the sets of its size{single if chosen else ''}. Sizes have their"
+        " standard error where it was reckoned.", words=(0, 2, 3, 4),
+    )  # fmt: skip
+    _sets(made, found)
+    if chosen:
+        _further(made, found)
+
+
+def _labels(rows: Sequence[Evidence]) -> dict[Evidence, str]:
+    """A candidate's name; sets of several are numbered, because a chart has no room for all their names."""
+    sets = [row for row in rows if len(row.names) > 1]
+    return {row: f"set {sets.index(row) + 1}" if row in sets else row.names[0] for row in rows}
+
+
+def _bars(found: Investigation, rows: Sequence[Evidence], labels: Mapping[Evidence, str]) -> Chart:
+    """How much each candidate explains by itself."""
+    colors = [COLORS.get(r.status, REFITTED if r.how == FITTED else ESTIMATED) for r in rows]
+    told = [f"{r.drop:.{int(r.drop < 100)}f}{f', {r.status}' * (r.standing < 2)}" for r in rows]
+    chance = chance_level(found)
+    made = Chart("deviance", [""], pixels=130 + BAR * len(rows))
+    made.bars("", [labels[r] for r in rows], [r.drop for r in rows], colors, told=told)
+    return made.edge(chance, dash="dash").limits(None, 0.0, ROOM * max(chance, *(r.drop for r in rows)))
+
+
+def _bars_caption(found: Investigation, rows: Sequence[Evidence]) -> str:
+    colors = ["green: in the verdict"] * bool(found.names)
+    colors += ["orange: tied with it"] * any(r.status == KEPT for r in rows)
+    colors += ["blue: refitted"] * any(r.how == FITTED and r.standing == 2 for r in rows)
+    colors += ["gray: estimated in one linear step"] * any(r.how == ONE_STEP for r in rows)
+    chance = f"{chance_level(found):.1f}, what chance gives to the most helpful of all in"
     return (
-        f"The most helpful single effect, {best.name}, lowers the deviance by {best.drop:.1f} (p = {p:.2g}; chance"
-        f" gives less than {critical:.2g} to the best of all candidates in {alpha:.0%} of cases). {text}"
+        f"By how much each alone lowers the deviance of the base model ({', '.join(colors)}). Dashed: {chance}"
+        f" {found.bench.criteria.false_alarms:.0%} of cases."
     )
 
 
-def _which(made: Page, found: Investigation) -> None:
-    made.heading("4 Which")
+def _sets(made: Page, found: Investigation) -> None:
+    """How the refitted sets of the chosen size compare."""
+    rows = [
+        [joined(r.fit.names) or "the base model", f"{r.fit.deviance:.1f}", f"{r.behind:.1f}", f"{r.distance:.1f}",
+         "rejected" if r.rejected else "adequate" if r.adequate else "not adequate",
+         "" if r.tests is None else in_words(r.tests.p_left)]
+        for r in found.survivors.rivals[:MOST_SETS]
+    ]  # fmt: skip
+    with made.folded("How the refitted sets compare"):
+        made.table(
+            ["set", "deviance", "behind", "distance of the curves", "verdict", "chance leaves as much"], rows,
+            "Every set of this size that was refitted. A set is rejected when, were it true, the best would not fit so"
+            " well; it is adequate when chance may leave as much as it does.", words=(4, 5),
+        )  # fmt: skip
+
+
+def _further(made: Page, found: Investigation) -> None:
+    """What the others would add once the chosen effects are in the model."""
     rows = []
     for j in judgements(found):
         size = ""
         if j.score is not None:
             size = ", ".join(f"{n} {v:.3g} ± {j.score.deviation[n]:.2g}" for n, v in j.score.size.items())
         rows.append([j.name, j.status, "" if j.score is None else f"{j.score.drop:.1f}", size, j.why])
+    names = joined(found.last.fit.names)
+    with made.folded(f"What each effect would add to a model that has {names}"):
+        made.table(
+            ["effect", "status", "deviance lowered by", "one-step size", "why"], rows,
+            "Scores with all nuisances projected out; sizes are departures from the null.", words=(1, 3, 4),
+        )  # fmt: skip
+
+
+def _parameters(made: Page, found: Investigation) -> None:
+    """The base model's parameters before and after, and those that came in."""
+    made.heading("Parameters before and after" if found.names else "Parameters of the base model")
+    before = {e.parameter.name: e for e in found.before}
+    rows = []
+    for e in found.after if found.names else found.before:
+        p, was = e.parameter, before.get(e.parameter.name)
+        told = [_value(was) if was else "not in it"] if found.names else []
+        rows.append([p.name, p.about, p.unit, *told, _value(e), _interval(e), e.verdict])
+    stages = ["before", "after"] if found.names else ["value"]
+    columns = ["parameter", "meaning", "unit", *stages, "95 % interval", "verdict"]
     made.table(
-        ["effect", "verdict", "drop of deviance", "one-step size", "why"], rows,
-        "Scores at the chosen model, all nuisances projected out.", words=(1, 3, 4),
+        columns, rows, "± one standard error, from the curvature at the fit to the fitted events.",
+        words=(1, 2, len(columns) - 1),
     )  # fmt: skip
+    if kept := held(found):
+        made.text(f"These events cannot tell {joined(list(kept))}: the extended model holds what was found.")
 
 
-def _sure(made: Page, found: Investigation) -> None:
-    made.heading("5 How sure")
-    rows = [
-        [" and ".join(r.fit.names) or "the base model", f"{r.fit.deviance:.1f}", f"{r.behind:.1f}", f"{r.distance:.1f}",
-         "rejected" if r.rejected else "adequate" if r.adequate else "not adequate",
-         "" if r.tests is None else f"{r.tests.p_left:.2g}"]
-        for r in found.survivors.rivals[:12]
-    ]  # fmt: skip
-    made.table(
-        ["set", "deviance", "behind", "distance of the curves", "verdict", "p of adequacy"], rows,
-        "Every set of this size that was refitted. A set is rejected when, were it true, the best would not fit so"
-        " well.", words=(4,),
-    )  # fmt: skip
-    if found.verdict.nearest is not None:
-        near = found.verdict.nearest
-        held = f"{near.held_out:.0%}" if np.isfinite(near.held_out) else ""
-        rows = [[" and ".join(near.names), f"{near.fitted:.0%}", held]]
-        rows += [[" and ".join(names), f"{share:.0%}", ""] for names, share in near.others]
-        made.table(["nearest candidates", "explains on the fitted events", "on the held-out events"], rows,
-                   "None of them is adequate. Shares of the deviance in excess of the noise.")  # fmt: skip
-    if len(found.verdict.sets) > 1:
-        made.text(
-            "These cannot be told apart on these events: " + "; ".join(" and ".join(s) for s in found.verdict.sets)
-        )
-
-
-def _added(made: Page, found: Investigation) -> None:
-    made.heading("6 Added")
-    if not found.names:
-        made.text("Nothing was added.")
-        return
+def _equations(made: Page, found: Investigation) -> None:
+    """The equations that changed or came in, and how the extended model is used."""
     from tractexp.model.model import compose
 
+    made.heading("The extended model")
+    made.text(
+        "conf/model/extended.yaml beside this page: python -m tractexp --config-dir conf model=extended. Its equations"
+        " that changed or came in:"
+    )
     base = found.bench.load
     effects = [found.catalogue[n].effect for n in found.names]
     before, after = base.latex(), compose(base.motor, base.static, [*base.effects, *effects]).latex()
-    made.text("Equations that changed or came in:")
     old = {line.split("=")[0]: line for line in before}
     for line in after:
         if line not in before and "|_0" not in line:
@@ -145,72 +279,57 @@ def _added(made: Page, found: Investigation) -> None:
     with made.folded("All equations of the extended model"):
         for line in after:
             made.equation(line)
-    rows = []
-    for name, at in parameters(found).items():
-        error = at["standard_error"]
-        rows.append([name, f"{at['value']:.5g}", f"{error:.2g}" if np.isfinite(error) else "at its bound"])
-    made.table(["parameter", "value", "standard error"], rows)
 
 
-def _gap_rows(found: Investigation) -> list[list[str]]:
-    rows = []
-    for label, gap in (("fitted", found.train), ("held out", found.validate)):
-        if gap is None:
-            continue
-        for stage, c in (("before", gap.before), ("after", gap.after)):
-            closed = f"{gap.closed:.0%}" if stage == "after" and np.isfinite(gap.closed) else ""
-            rows.append([label, stage, f"{c.epsilon_p:.3%}", f"{c.epsilon_q:.3%}", f"{c.chi2_per_sample:.3f}", closed])
-    return rows
+def _disagreement(made: Page, found: Investigation) -> None:
+    """Whether and where the base model disagrees with the records."""
+    first = found.first
+    made.heading("Is there a disagreement, and where?")
+    text = f"What the base model leaves would come about by chance with a probability of {in_words(first.p_left)}"
+    text += "." if first.adequate else f"; what stands out most: {first.loudest}."
+    if first.scores:
+        best, alpha = first.scores[0], found.bench.criteria.false_alarms
+        text += (
+            f" The effect that promises most in one linear step, {best.name}, would lower the deviance by"
+            f" {best.drop:.1f}, with a probability of {in_words(best.p)} by chance; chance gives less than"
+            f" {in_words(first.chance.critical_p(alpha))} to the best of all candidates in {alpha:.0%} of cases."
+        )
+    made.text(text)
+    if not found.places:
+        made.text("No interval holds more energy than chance leaves there.")
+        return
+    made.table(
+        ["event", "channel", "from [s]", "to [s]", "share of the excess"],
+        [[p.event, p.channel, f"{p.start:.3f}", f"{p.end:.3f}", f"{p.share:.0%}"] for p in found.places],
+        "Intervals in which the base model leaves more than chance does, at a family-wise error of"
+        f" {found.bench.criteria.false_alarms:.0%}; shaded in the charts.", words=(1,),
+    )  # fmt: skip
 
 
-def residuals(path: Path, found: Investigation) -> Path:
-    """The base model's residuals of every event, with the intervals that stand out shaded."""
-    calculated = found.train.before.calculated
-    return _panels(path, found.bench, [("base model", calculated, None)], found.places)
+def _noise(made: Page, found: Investigation) -> None:
+    made.heading("Noise").text(
+        f"{found.last.noise.describe()}. It is estimated where nothing happens, from what the fit leaves there, and"
+        " so contains what smoothing leaves of the voltage's noise. Time skew, measurement window and load drift are"
+        " free in every fit, each held by what is physically likely."
+    )
+    if (window := found.bench.records.window) is not None:
+        model = " The extended configuration does not do so." if found.names else ""
+        made.text(
+            f"{window.describe().capitalize()}, of voltage and current alike: any other window would"
+            " make the voltage bend where the power does not. The voltage that the load saw is reckoned back from the"
+            f" record, and the current of the model is averaged as the recorder does.{model}"
+        )
 
 
-def left(path: Path, found: Investigation) -> Path:
-    """What the nearest candidates leave of the base model's residuals."""
-    assert found.verdict.nearest is not None
-    before = ("base model", found.train.before.calculated, style.BEHIND)
-    return _panels(path, found.bench, [before, ("nearest candidates", found.verdict.nearest.calculated, None)], ())
+def _value(known: Estimate) -> str:
+    bound = "" if np.isfinite(known.error) else ", at its bound"
+    return f"{with_error(known.value, known.error)}{bound}"
 
 
-def smaller(path: Path, found: Investigation, held: bool) -> Path:
-    """Residuals before and after, on the fitted or the held-out events."""
-    bench, gap = found.bench, found.train
-    if held:
-        assert found.judged is not None
-        bench, gap = found.judged.bench, found.judged.gap
-    pairs = [("before", gap.before.calculated, style.MEASURED), ("after", gap.after.calculated, None)]
-    return _panels(path, bench, pairs if found.names else pairs[:1], ())
+def _interval(known: Estimate) -> str:
+    low, high = known.interval
+    return f"{low:.4g} to {high:.4g}" if np.isfinite(low) else ""
 
 
-def _panels(path: Path, bench: Bench, curves: list[tuple[str, np.ndarray, str | None]], places: Any) -> Path:
-    """One column per event (at most four), P above Q."""
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
-    events = bench.events[:4]
-    with rc_context(style.SETTINGS):
-        figure = Figure(figsize=(max(4.2, 2.9 * len(events)) + 1, 4.4))
-        panels = figure.subplots(2, len(events), sharex="col", sharey="row", squeeze=False)
-        for e, event in enumerate(events):
-            part = bench.drive.part(e)
-            for c, (name, color) in enumerate((("P", style.ACTIVE), ("Q", style.REACTIVE))):
-                panel, measured = panels[c, e], getattr(event.record, name)
-                for place in places:
-                    if (place.event, place.channel) == (event.record.name, name):
-                        panel.axvspan(place.start, place.end, color="#F2C14E", alpha=0.35, linewidth=0)
-                for label, made, chosen in curves:
-                    x, y = style.thin(event.record.t, measured - made[c, part])
-                    panel.plot(x, y, color=chosen or color, linewidth=0.8, label=f"{name} {label}")
-                panel.axhline(0.0, color=style.FAINT, linewidth=0.6, zorder=0.5)
-                if e == 0:
-                    panel.set_ylabel(f"residual of {name} [pu]")
-                    panel.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none")
-            panels[0, e].set_title(event.record.name)
-            panels[1, e].set_xlabel("t [s]")
-        wide = figure.get_figwidth()
-        figure.subplots_adjust(left=0.8 / wide, right=1 - 0.2 / wide, bottom=0.11, top=0.93, hspace=0.1, wspace=0.08)
-        return style.save(figure, path)
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.3g}"

@@ -7,20 +7,24 @@ import numpy as np
 
 from tractexp.record import Event
 from tractexp.report import style
-from tractexp.report.chart import Chart
+from tractexp.report.chart import MOST, Chart
 
-PLACE = "#F2C14E"  # shades what stands out
-COLORS = (style.ACTIVE, style.REACTIVE)  # of P and Q
-BAND = 2.0  # standard deviations of the noise
+FOUND = "#E69F00"  # shades what stands out
+WITHIN = 2.0  # standard deviations of the noise band
+PANELS = ("U [pu]", "P [pu]", "ΔP [pu]", "Q [pu]", "ΔQ [pu]")
+HEIGHTS = (0.7, 1.5, 1.0, 1.5, 1.0)
+PIXELS = 580
+CAPTION = (
+    "ΔP and ΔQ are measured less calculated. Dotted: the dip begins and ends. Drag to zoom, double-click to go back."
+)
 
 
 class Curve(NamedTuple):
-    """Calculated power (N,) each [pu]; without a color that of the channel."""
+    """Calculated power (2, N) [pu]: P, Q."""
 
-    label: str
-    P: np.ndarray
-    Q: np.ndarray
-    color: str | None = None
+    name: str
+    power: np.ndarray
+    color: str
     dash: str = "solid"
 
 
@@ -28,34 +32,40 @@ def event_chart(
     event: Event,
     curves: Sequence[Curve],
     *,
-    noise: tuple[float, float] | None = None,
+    deviation: np.ndarray | None = None,
+    around: np.ndarray | None = None,
     places: Sequence[Any] = (),
-    title: str = "",
+    driving: np.ndarray | None = None,
 ) -> Chart:
-    """U, P, Q and the residuals ΔP, ΔQ (calculated less measured) of each curve over time; dotted: the dip's edges.
+    """U, then P and Q with what the models leave of them.
 
-    `noise` are standard deviations [pu] of P and Q: twice as much about zero is shaded in the residuals. `places` have
-    `channel`, `start`, `end` [s]: where more than chance is left.
+    `deviation` (2, N) of the noise [pu] draws a band around the power `around` (2, N) and about zero. `places` have
+    `channel`, `start`, `end` [s]: where more than chance is left. `driving` (N,) is the voltage that the load saw,
+    where that is not the recorded one.
     """
-    record = event.record
-    residual = "Δ{} [pu]".format
-    labels = ["U [pu]", "P [pu]", "Q [pu]", residual("P"), residual("Q")]
-    chart = Chart("t [s]", labels, heights=(1.0, 1.7, 1.7, 1.2, 1.2), pixels=900, title=title)
-    chart.line("U measured", record.t, record.U, style.VOLTAGE)
-    for c, (name, color) in enumerate(zip("PQ", COLORS, strict=True)):
-        measured = getattr(record, name)
-        chart.line("measured", record.t, measured, style.MEASURED, 1 + c, width=4.0)
-        if noise is not None:
-            level = np.full(len(record.t), BAND * noise[c])
-            chart.band(f"± {BAND:g} standard deviations of the noise", record.t, -level, level, "#9A9A9A", 3 + c)
-        for curve in curves:
-            calculated = getattr(curve, name)
-            label = curve.label if curve.color else f"{name} {curve.label}"
-            look = {"color": curve.color or color, "dash": curve.dash, "width": 1.5}
-            chart.line(label, record.t, calculated, panel=1 + c, **look)
-            chart.line(label, record.t, calculated - measured, panel=3 + c, **(look | {"width": 1.0}))
+    record, t = event.record, event.record.t
+    made = Chart("t [s]", PANELS, heights=HEIGHTS, pixels=PIXELS)
+    made.line("measured", t, record.U, style.MEASURED, width=3)
+    if driving is not None and not np.array_equal(driving, record.U):
+        made.line("voltage that the load saw", t, driving, style.VOLTAGE, width=1)
+    for c, channel in enumerate("PQ"):
+        above, measured = 1 + 2 * c, getattr(record, channel)
+        if deviation is not None and around is not None:
+            for panel, middle in ((above, around[c]), (above + 1, np.zeros(len(t)))):
+                _noise_band(made, t, middle, WITHIN * deviation[c], panel)
         for place in places:
-            if place.channel == name:
-                for panel in (1 + c, 3 + c):
-                    chart.shade(place.start, place.end, PLACE, panel, "more than chance leaves")
-    return chart.edge(event.t_start).edge(event.t_end)
+            if place.channel == channel:
+                for panel in (above, above + 1):
+                    made.shade(place.start, place.end, FOUND, panel, "more than chance leaves", opacity=0.25)
+        made.line("measured", t, measured, style.MEASURED, above, width=3)
+        for name, power, color, dash in curves:
+            made.line(name, t, power[c], color, above, dash=dash)
+            made.line(name, t, measured - power[c], color, above + 1, width=1.1, dash=dash)
+    return made.edge(event.t_start).edge(event.t_end).limits(None, float(t[0]), float(t[-1]))
+
+
+def _noise_band(made: Chart, t: np.ndarray, middle: np.ndarray, half: np.ndarray, panel: int) -> None:
+    """Where noise alone would let a sample lie; every so many samples of a long record."""
+    some = slice(None, None, -(-len(t) // MOST))
+    name = f"± {WITHIN:g} σ of the noise"
+    made.band(name, t[some], (middle - half)[some], (middle + half)[some], style.FAINT, panel)

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.identification.adequacy import TOLD, Adequacy
+from tractexp.identification.adequacy import Adequacy
 from tractexp.identification.estimate import Estimated
 from tractexp.identification.residual_tests import LAGS, REJECTED, autocorrelation
 from tractexp.identification.search import REFUSED, History
@@ -14,8 +14,9 @@ from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED, TRADES
 from tractexp.report import style
 from tractexp.report.chart import Chart
-from tractexp.report.events import Curve, event_chart
+from tractexp.report.events import CAPTION, Curve, event_chart
 from tractexp.report.page import Page
+from tractexp.wording import in_words
 
 KIND = {"adequate": "good", "effect_missing": "plain", "wrong_model": "bad"}
 SHOWN = 4  # events whose curves are not folded away
@@ -73,13 +74,15 @@ def headline(known: Uncertainty) -> str:
 
 def _curves(made: Page, fits: Sequence[Any], known: Uncertainty) -> None:
     """One chart of each event; of many the later ones are folded away."""
-    levels = {(n["event"], n["channel"]): n["deviation"] for n in known.noise}
+    likelihood = known.likelihood
+    deviation = likelihood.noise.deviation(likelihood.problem.drive)
+    parts = [likelihood.problem.drive.part(e) for e in range(likelihood.problem.drive.events)]
+    made.text(CAPTION)
     for k, fit in enumerate(fits):
         record, role = fit.event.record, "fitted" if fit.role == "train" else "held out"
-        noise = tuple(levels.get((record.name, c), np.nan) for c in "PQ")
-        chart = event_chart(
-            fit.event, [Curve("estimate", fit.P, fit.Q)], noise=noise if np.isfinite(noise).all() else None,  # type: ignore[arg-type]
-        )  # fmt: skip
+        power = np.stack((fit.P, fit.Q))
+        noise = deviation[:, parts[k]] if fit.role == "train" else None
+        chart = event_chart(fit.event, [Curve("estimate", power, style.PALETTE[0])], deviation=noise, around=power)
         caption = f"{record.name}, {role}: epsilon_p {fit.epsilon_p:.3%}, epsilon_q {fit.epsilon_q:.3%}."
         caption = " ".join([caption, *(f"{note}." for note in record.notes)])
         if k < SHOWN:
@@ -202,7 +205,8 @@ def _left(made: Page, known: Uncertainty) -> None:
     with made.folded("tests of the residuals, and the noise"):
         made.table(
             ["event", "channel", "test", "statistic", "p", "says"],
-            [[t["event"], t["channel"], t["name"], digits(t["statistic"]), _p(t["p"]), t["says"]] for t in known.tests],
+            [[t["event"], t["channel"], t["name"], digits(t["statistic"]), in_words(t["p"]), t["says"]]
+             for t in known.tests],
             caption=f"Of the residuals after whitening; below p = {REJECTED} a test speaks.", words=(1, 2, 4, 5),
         )  # fmt: skip
         made.table(
@@ -222,10 +226,6 @@ def _conclusion(speaking: Sequence[dict[str, Any]], tests: int) -> str:
         return f"None of {tests} tests finds anything but noise in what is left: it is white and normal."
     said = sorted({f"{t['channel']} of {t['event']} is {t['says']}" for t in speaking})
     return f"{len(speaking)} of {tests} tests find more than noise in what is left: {'; '.join(said)}."
-
-
-def _p(p: float) -> str:
-    return f"{p:.2g}" if p >= TOLD else "less than one in a million"
 
 
 def _correlation(made: Page, known: Uncertainty) -> None:

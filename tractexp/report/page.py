@@ -26,6 +26,7 @@ body { margin: 2rem auto; max-width: 62rem; padding: 0 1.2rem; color: var(--ink)
 h1 { font-size: 1.7rem; line-height: 1.2; margin: 0 0 .4rem; }
 h2 { font-size: 1.2rem; margin: 2.2rem 0 .5rem; border-bottom: 1px solid var(--line); padding-bottom: .2rem; }
 h3 { font-size: 1rem; margin: 1.4rem 0 .3rem; }
+h1, h2, h3 { break-after: avoid; }
 p { margin: .5rem 0; max-width: 46rem; }
 .lead { color: var(--faint); }
 .verdict { border-left: 4px solid var(--faint); background: #f6f6f6; padding: .6rem 1rem; margin: 1rem 0; }

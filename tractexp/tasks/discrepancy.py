@@ -1,12 +1,14 @@
 """Find where simulation and measurement disagree, name the missing effect, add it, show the gap shrink."""
 
+from collections.abc import Sequence
 from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tractexp.plugin import plugin
-from tractexp.tasks.console import listed, say, table
+from tractexp.tasks.console import say, table
 from tractexp.tasks.task import LOAD, Job, Task, call
+from tractexp.wording import joined, percent
 
 if TYPE_CHECKING:
     from tractexp.api.investigate import Investigation
@@ -36,12 +38,10 @@ class Discrepancy(Task):
             false_alarms=self.false_alarms, criteria=self.criteria, seed=job.seed,
             progress=lambda line: say(f"  {line}"),
         )  # fmt: skip
-        tell(found)
         paths = found.write(job.folder)
-        listed(paths)
+        tell(found, paths)
         conf = job.folder / "conf"
-        say(f"the extended model: python -m tractexp --config-dir {conf} model=extended")
-        log(job, found, [*(p for p in paths if conf not in p.parents), conf])
+        log(job, found, [*(p for p in paths if conf not in p.parents), *([conf] if found.names else [])])
 
 
 def read(events: Any) -> None:
@@ -50,37 +50,40 @@ def read(events: Any) -> None:
 
     for role, group in (("fit", events.train), ("hold out", events.validate)):
         for event in group:
-            say(f"{role}: {event.record.name}: {describe(event)}")
+            say(f"{role}: {describe(event)}")
             for note in event.record.notes:
                 say(f"  note: {note}")
 
 
-def tell(found: "Investigation") -> None:
-    """Print the story: noise, disagreement, where, which, how sure, how much smaller."""
-    content, gap = found.content, found.gap
-    say(f"noise: {content['noise']}")
-    say(f"verdict: {found.verdict.upper()} {', '.join(found.names)}")
-    say(f"  {found.reason}")
-    for place in content["where"][:5]:
-        span = f"{place['start']:.3f} to {place['end']:.3f} s"
-        say(f"  where: {place['event']}, {place['channel']}, {span}, {place['share']:.0%}")
-    shown = found.table()
-    table(shown.columns[:-1], [row[:-1] for row in shown.rows])
-    if found.names:
-        say(f"share of the explainable gap closed on the fitted events: {_share(gap.train.closed)}")
-    if gap.validate is not None:
-        say(f"share of the explainable gap closed on the held-out events: {_share(gap.validate.closed)}")
+def tell(found: "Investigation", paths: Sequence[Path]) -> None:
+    """Print the verdict first, then how large it is and how much it explains, where, and what was written."""
+    content, shown = found.content, found.table()
+    say()
+    say(f"verdict: {found.verdict.upper()} {' or '.join(map(joined, content['name_sets']))}".rstrip())
+    *said, noise, following = shown.said
+    for line in said:
+        say(f"  {line}")
+    say(f"  the {'extended' if found.names else 'base'} model: {content['adequacy']['sentence']}")
+    columns = shown.columns if found.names else shown.columns[:-1]
+    table(columns, [row[: len(columns)] for row in shown.rows])
+    if places := content["where"]:
+        loudest = places[0]
+        span = f"{loudest['start']:.3f} to {loudest['end']:.3f} s"
+        others = len(places) - 1
+        more = f", and {others} more stretch{'es' * (others > 1)}" if others else ""
+        say(f"where: {loudest['channel']} of {loudest['event']}, {span}, {loudest['share']:.0%} of the excess{more}")
     if near := content["nearest"]:
         held = near["explained_held_out"]
-        beyond = "" if held is None else f", {held:.0%} on the held-out events"
-        share = f"{_share(near['explained'])} of what exceeds the noise{beyond}"
-        say(f"nearest: {' and '.join(near['effects'])} explains {share}")
-    say(f"next: {found.recommendation}")
-    say()
-
-
-def _share(share: float | None) -> str:
-    return "nan%" if share is None else f"{share:.0%}"
+        beyond = "" if held is None else f" and {percent(held)} on the held-out events"
+        share = f"{percent(near['explained'])} of what exceeds the noise{beyond}"
+        say(f"nearest, not accepted: {joined(near['effects'])}, {share}; {', '.join(found.sizes_of_nearest)}")
+    say(noise)
+    say(following)
+    by_name = {path.name: path for path in paths}
+    say(f"page: {by_name.pop('discrepancy.html')}")
+    say(f"beside it: {', '.join(sorted(by_name))}")
+    if model := by_name.get("extended.yaml"):
+        say(f"use the extended model: python -m tractexp --config-dir {model.parent.parent} model=extended")
 
 
 def log(job: Job, found: "Investigation", paths: list[Path]) -> None:

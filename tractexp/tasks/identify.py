@@ -40,6 +40,8 @@ def report(fit: "Identification") -> None:
     estimates(fit)
     rows = [[e["name"], e["role"], f"{e['epsilon_p']:.3%}", f"{e['epsilon_q']:.3%}"] for e in fit.result.events]
     table(["event", "role", "epsilon_p", "epsilon_q"], rows)
+    holds = "holds" if fit.result.acceptable else "does NOT hold"
+    say(f"acceptance of Eq. (20), epsilon_p and epsilon_q below 5 %: {holds}")
     if fit.trusted:
         sure(fit)
     for sentence in fit.result.uncertainty["notes"]:
@@ -52,12 +54,15 @@ def report(fit: "Identification") -> None:
 
 def estimates(fit: "Identification") -> None:
     """Print the estimates; where the search ended outside an interval, that too."""
+    from tractexp.api.identify import FIXED
+
     astray, trusted, rows = fit.astray, fit.trusted, []
     for e in fit.parameters.values():
         interval = "{:.4g} .. {:.4g}".format(*e.interval) if e.interval else ""
-        sure = [interval, brief(e.verdict)] if trusted else ["{:g} .. {:g}".format(*e.bounds)]
+        mark = "fixed" if e.verdict == FIXED else "at its bound" if e.name in fit.result.at_bound else ""
+        sure = [interval, brief(e.verdict)] if trusted else ["{:g} .. {:g}".format(*e.bounds), mark]
         rows.append([e.name, f"{e.value:.5g}", e.unit, *sure, *[f"{e.search:.4g}" * (e.name in astray)] * bool(astray)])
-    columns = ["95 % interval", "verdict"] if trusted else ["bounds"]
+    columns = ["95 % interval", "verdict"] if trusted else ["bounds", ""]
     table(["parameter", "value", "unit", *columns, *["search ended at"] * bool(astray)], rows)
 
 

@@ -1,0 +1,205 @@
+"""The page of an investigation: what one sees first, what explains it, and no sentence against another."""
+
+import base64
+import html
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_discrepancy import FEW, base, events
+from test_report_page import read
+
+from tractexp.discrepancy.discrepancy_json import content
+from tractexp.discrepancy.evidence import CHOSEN, beside, chance_level, evidence, why_not_the_most_helpful
+from tractexp.discrepancy.investigate import investigate
+from tractexp.discrepancy.next_dip import NextDip
+from tractexp.report import discrepancy, overlay
+
+
+@pytest.fixture(scope="module")
+def named():
+    made = events("stator_resistance", size=2.0, count=3)
+    return investigate(base(), made[:2], made[2:], {}, {}, only=FEW)
+
+
+@pytest.fixture(scope="module")
+def silent():
+    return investigate(base(), events(count=2)[:1], events(count=2)[1:], {}, {}, only=FEW)
+
+
+@pytest.fixture(scope="module")
+def unexplained():
+    made = events("load_step", size=3.0, count=3)
+    return investigate(base(), made[:2], made[2:], {}, {}, only=FEW)
+
+
+def page(found, folder, **more):
+    """The words of the page, and what its charts draw."""
+    path = discrepancy.page(folder / "discrepancy.html", found, "event1, event2", **more)
+    drawn = re.findall(r'<script type="application/json">([^<]*)</script>', path.read_text(encoding="utf-8"))
+    return words_of(path), [json.loads(each) for each in drawn]
+
+
+def words_of(path):
+    """The words of a page that is valid and whole, one space between them."""
+    read(path)
+    bare = re.sub(r"<(script|style)[^>]*>.*?</\1>", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+    return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", bare)).split())
+
+
+def curve(chart, name, axis):
+    """One curve of a chart."""
+    (trace,) = (t for t in chart["data"] if (t["name"], t["yaxis"]) == (name, axis) and t.get("mode") == "lines")
+    return np.frombuffer(base64.b64decode(trace["y"]["bdata"]), dtype="<f4")
+
+
+def names(chart):
+    return {trace["name"] for trace in chart["data"]}
+
+
+def test_measured_before_and_after_of_every_event_come_first(named, tmp_path):
+    words, charts = page(named, tmp_path)
+    assert [e.record.name for e in named.bench.events] == ["event1", "event2"]
+    assert words.index("Measured, before, after") < words.index("event1, fitted") < words.index("event3, held out")
+    assert words.index("event3, held out") < words.index("How much smaller the gap is")
+    first, _, held, bars = charts
+    band = "± 2 σ of the noise"
+    assert names(first) == {"measured", "base model", "extended model", "more than chance leaves", band}
+    assert names(held) == {"measured", "base model", "extended model", band}
+    event = named.bench.records.recorded[0]
+    part = named.bench.drive.part(0)
+    calculated = named.train.after.calculated[:, part]
+    for c, (channel, axis, below) in enumerate((("P", "y2", "y3"), ("Q", "y4", "y5"))):
+        measured = getattr(event.record, channel)
+        np.testing.assert_allclose(curve(first, "measured", axis), measured, rtol=1e-6)
+        np.testing.assert_allclose(curve(first, "extended model", axis), calculated[c], rtol=1e-6)
+        np.testing.assert_allclose(curve(first, "extended model", below), measured - calculated[c], atol=1e-6)
+        assert np.std(curve(first, "base model", below)) > 1.5 * np.std(curve(first, "extended model", below))
+    edges = [s["x0"] for s in first["layout"]["shapes"] if s["type"] == "line"]
+    assert edges == [event.t_start, event.t_end]
+    shaded = sorted((s["x0"], s["x1"]) for s in first["layout"]["shapes"] if s["type"] == "rect")
+    here = [p for p in named.places if p.event == "event1"]
+    assert shaded == sorted(2 * [(p.start, p.end) for p in here])  # in the power's panel and in that below it
+    assert bars["data"][0]["type"] == "bar"
+
+
+def test_the_noise_band_holds_what_the_extended_model_leaves(named):
+    shown = named.overlays[0]
+    off = (shown.measured - shown.after) / shown.deviation
+    assert 0.93 < np.mean(np.abs(off) < overlay.WITHIN) < 0.98
+    assert [o.held_out for o in named.overlays] == [False, False, True]
+
+
+def test_many_events_are_folded_and_none_is_left_out(named, tmp_path):
+    from tractexp.report.page import Page
+
+    many = named.overlays[:2] * 3
+    path = overlay.overlaid(Page("many"), many).write(tmp_path / "many.html")
+    words = words_of(path)
+    assert len(re.findall(r"event[12], fitted event[12]: dip of", words)) == 6
+    assert "2 more events, fitted" in words
+    text = path.read_text(encoding="utf-8")
+    assert text.index("<details>") > [m.start() for m in re.finditer('class="chart"', text)][overlay.SHOWN - 1]
+
+
+def test_candidates_are_sorted_by_evidence_the_chosen_first(named, tmp_path):
+    rows = evidence(named)
+    assert rows[0].names == ("stator_resistance",)
+    assert rows[0].status == CHOSEN
+    assert rows[0].drop == pytest.approx(named.survivors.rivals[0].lowered)
+    (size,) = rows[0].sizes
+    assert size.name == "R_s"
+    assert size.error == pytest.approx(next(e for e in named.after if e.parameter.name == "R_s").error)
+    drops = [row.drop for row in rows[1:] if np.isfinite(row.drop)]
+    assert drops == sorted(drops, reverse=True)
+    assert {row.names[0] for row in rows} >= {*FEW, "time_skew", "measurement_window", "load_drift"}
+    words, charts = page(named, tmp_path)
+    bars = charts[-1]["data"][0]
+    assert bars["y"] == [row.names[0] for row in rows if np.isfinite(row.drop)]
+    assert bars["marker"]["color"][0] == discrepancy.COLORS[CHOSEN]
+    assert charts[-1]["layout"]["shapes"][0]["x0"] == chance_level(named)
+    assert beside(named) in words
+
+
+def test_where_a_linear_step_favours_another_effect_one_sentence_says_why(named):
+    assert why_not_the_most_helpful(named) == ""
+    other = next(s for s in named.first.scores if s.name == "speed_dependent_torque")
+    favoured = replace(other, drop=1e6, p=0.0)
+    first = replace(named.first, scores=[favoured, *named.first.scores])
+    told = why_not_the_most_helpful(replace(named, first=first))
+    assert told.startswith("speed_dependent_torque promises most in one linear step from the base model")
+    assert "yet the verdict is stator_resistance, which lowers the deviance by" in told
+    assert "speed_dependent_torque" in told
+    chance = replace(named.first, scores=[replace(favoured, drop=1.0), *named.first.scores])
+    assert why_not_the_most_helpful(replace(named, first=chance)) == ""
+
+
+def test_parameters_stand_before_and_after_with_meaning_unit_interval_and_verdict(named, tmp_path):
+    words, _ = page(named, tmp_path)
+    assert "parameter meaning unit before after 95 % interval verdict" in words
+    assert "R_s stator resistance on the record's base pu not in it" in words
+    before, after = ({e.parameter.name: e for e in group} for group in (named.before, named.after))
+    assert before.keys() == after.keys() - {"R_s"}
+    for e in after.values():
+        low, high = e.interval
+        assert low < e.value < high
+        assert e.verdict.split()[0].rstrip(":") in ("identified", "weakly", "not")
+        assert f"{low:.4g} to {high:.4g}" in words
+    told = content(named)["parameters"]
+    assert told == {n: {"value": e.value, "standard_error": e.error} for n, e in after.items()}
+
+
+def test_the_sentence_of_a_grade_stands_in_the_verdict(named, tmp_path):
+    words, _ = page(named, tmp_path, adequacy="the model describes this load: use it")
+    assert words.index("the model describes this load: use it") < words.index("Next: ")
+
+
+def test_what_is_not_extended_is_not_called_so(silent, unexplained, tmp_path):
+    for found, word in ((silent, "none"), (unexplained, "unexplained")):
+        assert found.verdict.word == word
+        words, charts = page(found, tmp_path)
+        assert "extended" not in words.lower()
+        assert "Parameters of the base model" in words
+        assert "before after" not in words
+        assert [o.held_out for o in found.overlays].count(True) == 1
+        assert all("extended model" not in names(chart) for chart in charts)
+        assert all({"measured", "base model"} <= names(chart) for chart in charts[:-1])
+        assert content(found)["extended"] is None
+
+
+def test_what_is_left_is_told_with_channel_start_and_size(unexplained, tmp_path):
+    words, _ = page(unexplained, tmp_path)
+    shapes = unexplained.remainder_of_base
+    assert {(s.channel, s.kind) for s in shapes} >= {("P", "step")}
+    assert unexplained.headline.startswith(("the base model misses this: ", "the nearest candidates miss this: "))
+    assert unexplained.headline[1:] in words[: words.index("Measured and calculated")]
+    assert "Missed by the base model" in words
+    made = content(unexplained)
+    assert made["remainder"]["of_base"][0]["channel"] in "PQ"
+    assert made["remainder"]["sentence"] == unexplained.headline
+
+
+def test_an_unexplained_verdict_does_not_contradict_itself(unexplained, tmp_path):
+    """It says what was tested, not what the catalogue holds, and a probability that can be pictured."""
+    reason = unexplained.verdict.reason
+    tested = len(unexplained.catalogue.candidates)
+    assert tested == len(FEW) + 3
+    assert f"none of the {tested} effects tested" in reason
+    assert "catalogue" not in reason
+    assert "less than one in a million" in reason
+    assert not re.search(r"e-\d\d", reason)
+    if (near := unexplained.verdict.nearest) is not None:
+        assert re.search(rf"the nearest, explains? {near.fitted:.0%} of what exceeds the noise", reason)
+        told = content(unexplained)["nearest"]["parameters"]
+        assert {"value", "standard_error", "interval"} == next(iter(told.values())).keys()
+    words, _ = page(unexplained, tmp_path)
+    assert not re.search(r"\d\.\d+e-\d\d\d", words)
+
+
+def test_a_dip_that_does_not_decide_is_not_promised_to():
+    sure, unsure = NextDip(0.4, 0.1, 0.97), NextDip(0.7, 0.8, 0.6)
+    assert sure.sentence("a", "b", 0.95).startswith("record a dip of 40% or more lasting 100 ms: it tells a from b")
+    assert unsure.sentence("a", "b", 0.95).startswith("no dip of up to 70% and 800 ms is sure to tell a from b")
+    assert "60%" in unsure.sentence("a", "b", 0.95)

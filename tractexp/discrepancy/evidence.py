@@ -1,0 +1,159 @@
+"""Every candidate by its evidence: how much it explains, what became of it, how large it is, and why."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.discrepancy.investigate import Investigation
+from tractexp.discrepancy.judgement import judgements
+from tractexp.discrepancy.precision import standard_errors
+from tractexp.discrepancy.survivors import Rival
+from tractexp.discrepancy.verdict import NONE, TIED, UNEXPLAINED
+from tractexp.wording import in_words, joined, with_error
+
+CHOSEN, KEPT = "in the verdict", "tied"
+FITTED, ONE_STEP = "refitted", "one step"
+
+
+@dataclass(frozen=True)
+class Size:
+    """A parameter of a candidate, in `unit`; `error` is its standard error, nan where it was not reckoned."""
+
+    name: str
+    value: float
+    error: float
+    unit: str
+
+    def __str__(self) -> str:
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return f"{self.name} {with_error(self.value, self.error)}{unit}"
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """One candidate, of one or more effects. `drop` is by how much it lowers the deviance of the base model, nan where
+    that cannot be told; `how` tells whether it was refitted for that or estimated in one linear step.
+    """
+
+    names: tuple[str, ...]
+    drop: float
+    how: str
+    status: str
+    sizes: tuple[Size, ...]
+    why: str
+
+    @property
+    def standing(self) -> int:
+        """0 for what is in the verdict, 1 for what is tied with it, 2 for the rest."""
+        return {CHOSEN: 0, KEPT: 1}.get(self.status, 2)
+
+
+def evidence(found: Investigation) -> list[Evidence]:
+    """All candidates: those of the verdict first, then those tied with it, then the others; the most helpful first."""
+    sets = [_of_set(found, rival) for rival in found.survivors.rivals if _names(found, rival)]
+    known = {row.names for row in sets}  # of the chosen size
+    rows = [*sets, *(row for row in _singles(found) if row.names not in known)]
+    return sorted(rows, key=lambda row: (row.standing, -np.nan_to_num(row.drop, nan=-1.0), row.names))
+
+
+def chance_level(found: Investigation) -> float:
+    """The drop of the deviance that chance gives to the most helpful candidate as often as false alarms are allowed."""
+    from scipy.special import chdtri
+
+    return float(chdtri(1, found.first.chance.critical_p(found.bench.criteria.false_alarms)))
+
+
+def why_not_the_most_helpful(found: Investigation) -> str:
+    """Where the verdict is not the effect that a single linear step favours: one sentence why; "" otherwise."""
+    scores = found.first.scores
+    if not scores or scores[0].drop < chance_level(found) or found.names == (scores[0].name,):
+        return ""
+    best = scores[0]
+    promise = f"{best.name} promises most in one linear step from the base model"
+    row = next((r for r in evidence(found) if r.names == (best.name,) and r.how == FITTED), None)
+    if row is not None:
+        promise += f" (deviance lowered by {best.drop:.0f}; refitted, by {row.drop:.0f})"
+    if found.verdict.word == TIED and (best.name,) in found.verdict.sets:
+        return f"{promise}, and is one of the tied explanations."
+    if found.verdict.word in (NONE, UNEXPLAINED):
+        return f"{promise}, but that does not make it an explanation: {_verdict_on(found, best.name)}."
+    chosen = next(r for r in evidence(found) if r.standing == 0)
+    return (
+        f"{promise}, yet the verdict is {joined(found.names)}, which lowers the deviance by {chosen.drop:.0f}:"
+        f" {_verdict_on(found, best.name)}."
+    )
+
+
+def beside(found: Investigation) -> str:
+    """Why an effect that helps the base model may be called not testable: one sentence; "" where nothing is added."""
+    chosen = found.last.fit.names
+    if not chosen:
+        return ""
+    return (
+        f"With {joined(chosen)} in the model there is less left for the others to explain: one that helps the"
+        " base model alone may here be irrelevant, or not testable because a size that matters would stay in the noise."
+    )
+
+
+def _verdict_on(found: Investigation, name: str) -> str:
+    """What became of one effect, as the end of a sentence."""
+    row = next((r for r in evidence(found) if r.names == (name,)), None)
+    if row is None:
+        return "it was not refitted alone"
+    return f"it is {row.why}" if row.status == "relevant" else f"it is {row.status}: {row.why}"
+
+
+def _names(found: Investigation, rival: Rival) -> tuple[str, ...]:
+    return tuple(sorted((*rival.fit.names, *found.held_out.faults)))
+
+
+def _of_set(found: Investigation, rival: Rival) -> Evidence:
+    """A refitted set of the chosen size; the faults of the measurement where they alone explain."""
+    weighed, names = found.held_out, rival.fit.names or found.held_out.faults
+    drop = rival.lowered if rival.fit.names else weighed.bare.deviance - weighed.extended[()].deviance
+    status, why = _fate(found, rival)
+    unit = weighed.extended.get(rival.fit.names, rival.fit).unit
+    errors = {} if rival.tests is None else standard_errors(rival.tests)
+    at = found.bench.coordinates
+    own = [p for name in names for p in found.catalogue[name].sizes]
+    sizes = tuple(Size(p.name, at.value(p.name, unit), errors.get(p.name, np.nan), p.unit) for p in own)
+    return Evidence(names, max(drop, 0.0), FITTED, status, sizes, why)
+
+
+def _fate(found: Investigation, rival: Rival) -> tuple[str, str]:
+    """What became of a refitted set, and why."""
+    names = _names(found, rival)
+    judged = found.held_out.judged.get(rival.fit.names)
+    if names in found.verdict.sets:
+        helps = " and helps on the held-out events" if judged is not None and judged.gap.gain > 0 else ""
+        left = f"leaves no more than chance does{helps}"
+        return (CHOSEN, left) if names == found.names else (KEPT, left)
+    if rival.rejected:
+        best = joined(_names(found, found.survivors.rivals[0]))
+        return "rejected", f"were it true, {best} would not fit better by {rival.behind:.0f}"
+    if rival.tests is None:
+        return "not rejected", "among too many that fit alike to be tested further"
+    if not rival.adequate:
+        p = in_words(rival.tests.p_left)
+        return "not adequate", f"chance leaves as much as it does with a probability of {p}"
+    return "denied", "does not hold on the held-out events"
+
+
+def _singles(found: Investigation) -> list[Evidence]:
+    """Every effect of the catalogue by itself: refitted where it was, else in one linear step from the base model."""
+    refits, scores = found.explanations.refits, {s.name: s for s in found.first.scores}
+    base, at = found.first.fit.deviance, found.bench.coordinates
+    rows = []
+    for j in judgements(found):
+        score, fit = scores.get(j.name), refits.get((j.name,))
+        drop = base - fit.deviance if fit else score.drop if score else np.nan
+        sizes: list[Size] = []
+        for p in found.catalogue[j.name].sizes if fit or score else ():
+            if fit:
+                sizes.append(Size(p.name, at.value(p.name, fit.unit), np.nan, p.unit))
+            elif score and score.deviation[p.name] < np.ptp(p.bounds):  # else these events say nothing of it
+                sizes.append(Size(p.name, (p.null or 0.0) + score.size[p.name], score.deviation[p.name], p.unit))
+        how = FITTED if fit else ONE_STEP if score else ""
+        status = CHOSEN if j.name in found.names else j.status
+        rows.append(Evidence((j.name,), max(drop, 0.0), how, status, tuple(sizes), j.why))
+    return rows

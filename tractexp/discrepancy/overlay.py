@@ -1,0 +1,91 @@
+"""Measured, before and after, event by event, on one time axis: what a page overlays."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.fitting import Refit
+from tractexp.discrepancy.gap import Gap
+from tractexp.discrepancy.held_out import Judged, carried
+from tractexp.discrepancy.places import Place
+from tractexp.discrepancy.remainder import Remainder, remainders
+from tractexp.discrepancy.verdict import Nearest
+from tractexp.noise import Noise
+from tractexp.record import Event
+
+
+@dataclass(frozen=True, eq=False)
+class Overlay:
+    """One event as recorded, and P and Q (2, n) [pu] of the models on it.
+
+    `after` is the extended model's where there is one, `nearest` that of the candidates which come nearest where
+    nothing explains. `driving` (n,) is the voltage that the load saw, `deviation` (2, n) that of the noise.
+    """
+
+    event: Event
+    held_out: bool
+    driving: np.ndarray
+    before: np.ndarray
+    after: np.ndarray | None
+    nearest: np.ndarray | None
+    deviation: np.ndarray
+    places: tuple[Place, ...]
+
+    @property
+    def measured(self) -> np.ndarray:
+        """P and Q (2, n) [pu], nan in gaps."""
+        return np.stack([self.event.record.P, self.event.record.Q])
+
+
+def on_fitted(
+    bench: Bench, gap: Gap, nearest: Nearest | None, places: Sequence[Place], *, extended: bool
+) -> list[Overlay]:  # fmt: skip
+    """The fitted events; `extended` tells whether there is an extended model."""
+    after = gap.after.calculated if extended else None
+    near = None if nearest is None else nearest.calculated
+    return _each(bench, gap.noise, (gap.before.calculated, after, near), places, held_out=False)
+
+
+def on_held_out(
+    bench: Bench, withheld: Sequence[Event], judged: Judged | None, bare: Refit, nearest: Nearest | None
+) -> list[Overlay]:  # fmt: skip
+    """The held-out events: as the names were `judged` on them or, without any, the base model carried over."""
+    if not withheld:
+        return []
+    if judged is not None:
+        gap = judged.gap
+        return _each(judged.bench, gap.noise, (gap.before.calculated, gap.after.calculated, None), (), held_out=True)
+    other, units, noise = carried(bench, withheld, [bare, *([nearest.rival.fit] if nearest else [])])
+    made = [other.residuals(unit[None])[0] + other.drive.measured for unit in units]
+    return _each(other, noise, (made[0], None, made[1] if nearest else None), (), held_out=True)
+
+
+def left(overlays: Sequence[Overlay], noise: Noise, false_alarms: float) -> list[Remainder]:
+    """What the model that comes nearest leaves of these events, the loudest shape first."""
+    if not overlays:
+        return []
+    made = [next(m for m in (o.nearest, o.after, o.before) if m is not None) for o in overlays]
+    rest = np.concatenate([np.nan_to_num(o.measured - m) for o, m in zip(overlays, made, strict=True)], axis=1)
+    return remainders(rest, [o.event for o in overlays], noise, false_alarms)
+
+
+def _each(
+    bench: Bench,
+    noise: Noise,
+    curves: tuple[np.ndarray, np.ndarray | None, np.ndarray | None],
+    places: Sequence[Place],
+    *,
+    held_out: bool,
+) -> list[Overlay]:
+    """Curves (2, N) of events end to end, cut into events."""
+    deviation, made = noise.deviation(bench.drive), []
+    for e, event in enumerate(bench.records.recorded):
+        part = bench.drive.part(e)
+        before, after, nearest = (None if c is None else c[:, part] for c in curves)
+        assert before is not None
+        driving = bench.events[e].record.U
+        here = tuple(p for p in places if p.event == event.record.name)
+        made.append(Overlay(event, held_out, driving, before, after, nearest, deviation[:, part], here))
+    return made

@@ -1,0 +1,92 @@
+"""How well each parameter is known at a fit: its standard error, its 95 % interval, and the verdict in words."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtri
+
+from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.disagreement import Disagreement
+from tractexp.identification.information import Information
+from tractexp.identification.uncertainty import LEVEL
+from tractexp.identification.verdict import BOUND, judge
+from tractexp.parameter import Parameter
+
+WIDE = float(ndtri((1 + LEVEL) / 2))  # standard errors in half of an interval: the samples are many
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """One parameter at a fit: `error` is its standard error, nan where it rests on a bound or is not told."""
+
+    parameter: Parameter
+    value: float
+    error: float
+    verdict: str
+
+    @property
+    def half(self) -> float:
+        """Half of the 95 % interval; nan without a standard error."""
+        return WIDE * self.error
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 %, inside the bounds; nan without a standard error."""
+        ends = np.clip(self.value + self.half * np.array([-1.0, 1.0]), *self.parameter.bounds)
+        return float(ends[0]), float(ends[1])
+
+
+def standard_errors(tests: Disagreement) -> dict[str, float]:
+    """Of the base model's parameters and those of the effects in a fit, from the curvature there.
+
+    A parameter that rests on its bound has none.
+    """
+    at = tests.bench.coordinates
+    inverse = np.linalg.pinv(tests.projection.R, rcond=1e-10)
+    spread = np.sqrt(np.einsum("ij,ij->i", inverse, inverse))
+    labels = {k: name for name, k in at.column.items() if k not in tests.tangent.held}
+    columns = _columns(tests)
+    return {labels[k]: float(s * at.width(labels[k])) for k, s in zip(columns, spread, strict=True) if k in labels}
+
+
+def estimates(tests: Disagreement, unit: np.ndarray, effects: Sequence[str]) -> list[Estimate]:
+    """The base model's parameters and those of the named effects at coordinates (D,), as the tests of a fit know them.
+
+    The words are those of an identification.
+    """
+    bench = tests.bench
+    at, errors = bench.coordinates, standard_errors(tests)
+    declared = {p.name: p for p in bench.problem.parameters}
+    names = [*(at.names[k] for k in at.base), *own_parameters(bench, effects)]
+    seen = [n for n in names if n in errors]
+    values = {n: at.value(n, unit) for n in names}
+    words = _words(tests, seen, [values[n] for n in seen], [errors[n] for n in seen])
+    held = {n for n in names if at.column[n] in tests.tangent.held}
+    words |= {n: f"{BOUND}: better values lie beyond it" for n in held}
+    return [Estimate(declared[n], values[n], errors.get(n, np.nan), words.get(n, "not judged")) for n in names]
+
+
+def own_parameters(bench: Bench, effects: Sequence[str]) -> list[str]:
+    """Names of the parameters that effects bring with them."""
+    return [p.name for name in effects for p in bench.catalogue[name].effect.parameters]
+
+
+def _columns(tests: Disagreement) -> list[int]:
+    """The coordinates of the nuisances, in the order of the projection's columns."""
+    at = tests.bench.coordinates
+    inside = [*at.base, *at.before, *at.parameters(tests.fit.names)]
+    return inside + [k for name in at.catalogue.of_measurement for k in at.sizes([name])]
+
+
+def _words(
+    tests: Disagreement, names: Sequence[str], values: Sequence[float], errors: Sequence[float]
+) -> dict[str, str]:
+    """The verdict of each parameter, with all other coordinates left free beside them."""
+    at, R, columns = tests.bench.coordinates, tests.projection.R, _columns(tests)
+    own = [columns.index(at.column[n]) for n in names]
+    others = [i for i in range(len(columns)) if i not in own]
+    lower, upper = (np.array([bound[at.column[n]] for n in names]) for bound in (at.lower, at.upper))
+    information = Information.of(names, np.array(values), upper - lower, R[:, own], R[:, others])
+    judged = judge(information, lower, upper, WIDE * np.array(errors), WIDE)
+    return {name: str(verdict) for name, verdict in judged.items()}

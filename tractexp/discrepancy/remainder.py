@@ -1,0 +1,282 @@
+"""What is left of the records where nothing explains it, in words: a ringing, a decay, a step or a pulse, and where.
+
+The whitened residual of each event is searched for c exp(-(t - t0)/tau) cos(2 pi f (t - t0) + phi), t > t0, over all
+t0, tau and f at once: with z = exp(-1/tau + 2 pi i f) per sample, the sums of w[k + m] z^m from every k to the end are
+one recursive filter run backwards (a matched filter of every start). The loudest shape is fitted as the noise lets it
+be seen, taken away, and the next one looked for. f = 0 is a decay, and a step where tau is infinite too.
+"""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from tractexp.identification.result import excitation
+from tractexp.model.drive import Drive
+from tractexp.noise import Noise
+from tractexp.noise.color import FEWEST, SMALLEST
+from tractexp.noise.quiet import estimate
+from tractexp.record import Event
+
+MOST = 4  # shapes that are told
+DECAYS = 6  # time constants tried, from two samples to the length of the record after the dip
+FREQUENCIES = 512  # tried at most with each of them
+HIGHEST = 0.45  # of the sampling rate
+SHORTEST = 8  # samples of a shape
+ROUNDS = 2  # of polishing the frequency and the decay, then the start
+STAYS = 3.0  # lengths of the rest of the record: what takes so long to die away does not
+PULSE = 3.0  # samples: what is over sooner is a pulse
+HOPELESS = 0.6  # of what a shape must gain: one that gains less before it is polished never does
+SPARING = 2.0  # of log(samples): what the two more numbers of a ringing must gain over a decay
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """One shape that is left: `size` is its amplitude at first [pu], with its sign where it does not ring.
+
+    `noise` is the size in standard deviations of the channel's noise before the dip, `share` the part of what exceeds
+    the noise that it accounts for, `after` the time since the dip began, or since it ended where it has `ended`.
+    """
+
+    event: str
+    channel: str
+    kind: str  # "ringing", "decay", "step" or "pulse"
+    start: float  # s, time of the record
+    after: float  # s
+    ended: bool
+    frequency: float | None  # Hz
+    time_constant: float | None  # s; None where it stays
+    damping: float | None  # ratio of a ringing
+    size: float
+    noise: float
+    share: float
+
+    def __str__(self) -> str:
+        size = f"{abs(self.size):.2g} pu ({self.times} the noise)"
+        what, when = f"{self.channel} of {self.event}", f"from t = {self.start:.3f} s on, {self.when}"
+        way = "up" if self.size > 0 else "down"
+        if self.kind == "ringing":
+            return f"{what} rings at {self.frequency:.3g} Hz {when}, at first by {size}{self._ends}"
+        if self.kind == "pulse":
+            assert self.time_constant is not None
+            length = f"some {1000 * self.time_constant:.2g} ms"
+            return f"{what} has a pulse {way} of {size} at t = {self.start:.3f} s, {self.when}, of {length}"
+        return f"{what} is {way} by {size} {when}{self._ends}"
+
+    @property
+    def times(self) -> str:
+        """The size, told by the noise."""
+        return f"{self.noise:.{int(self.noise < 10)}f} times"
+
+    @property
+    def when(self) -> str:
+        """The start, told by the dip."""
+        edge = "the dip ends" if self.ended else "the dip begins"
+        if abs(self.after) < 0.0015:
+            return f"as {edge}"
+        side = "after" if self.after > 0 else "before"
+        return f"{abs(self.after):.3g} s {side} {edge}"
+
+    @property
+    def _ends(self) -> str:
+        if self.time_constant is None:
+            return ", and does not die away" if self.kind == "ringing" else ", and stays so"
+        damping = "" if self.damping is None else f" (damping ratio {self.damping:.2g})"
+        return f", and dies away with a time constant of {self.time_constant:.2g} s{damping}"
+
+
+class _Shape(NamedTuple):
+    """Where a shape begins [sample], its time constant [samples, inf] and its frequency [cycles per sample]."""
+
+    start: int
+    decay: float
+    frequency: float
+
+    def rings(self, samples: int) -> bool:
+        """Whether there is a cycle of it in so many samples and half of one before it dies away, and samples enough."""
+        lasts = min(2 * self.decay, samples - self.start)
+        return lasts >= SHORTEST and self.frequency * lasts >= 1
+
+    def templates(self, samples: int) -> np.ndarray:
+        """Its shapes of unit size, (1 or 2, samples): cosine and sine of a ringing."""
+        m = np.arange(samples) - self.start
+        envelope = np.where(m >= 0, np.exp(-np.maximum(m, 0) / self.decay), 0.0)
+        if not self.frequency:
+            return envelope[None]
+        phase = 2 * np.pi * self.frequency * m
+        return envelope * np.stack([np.cos(phase), np.sin(phase)])
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretch:
+    """What is left of one event, (2, n) [pu], and how its own noise whitens it."""
+
+    event: Event
+    residual: np.ndarray
+    noise: Noise
+    drive: Drive
+
+    @classmethod
+    def of(cls, event: Event, residual: np.ndarray, noise: Noise, blur: np.ndarray | None) -> "_Stretch":
+        """The color of the noise is that before the dip, where that tells it: what is left would color its own."""
+        drive = Drive.of([excitation(event)])
+        known, before = drive.weights > 0, slice(0, event.start)
+        if np.count_nonzero(known.all(axis=0)[before]) >= FEWEST:
+            noise = estimate(_level(residual[:, before]), known[:, before], [before])
+        return cls(event, residual, replace(noise, wander=None, blur=blur), drive)
+
+    def white(self, rows: np.ndarray) -> np.ndarray:
+        """(m, 2, n) [pu] to independent rows (m, 2, n) of unit variance."""
+        return self.noise.whiten(rows, self.drive, self.drive.weights > 0).reshape(rows.shape)
+
+    def fitted(self, shape: _Shape, channel: int) -> tuple[float, np.ndarray, np.ndarray]:
+        """By how much a shape in P (0) or Q (1) lowers the deviance, its sizes (1 or 2,) [pu], and itself (2, n)."""
+        templates = shape.templates(self.residual.shape[1])
+        raw = np.zeros((len(templates), *self.residual.shape))
+        raw[:, channel] = templates
+        rows, left = self.white(np.nan_to_num(raw)), self.white(self.residual[None])[0].ravel()
+        columns = rows.reshape(len(rows), -1).T
+        sizes = np.linalg.lstsq(columns, left, rcond=None)[0]
+        gain = float(left @ left - np.sum((left - columns @ sizes) ** 2))
+        return gain, sizes, np.einsum("k,kcn->cn", sizes, raw)
+
+
+def _level(rows: np.ndarray) -> np.ndarray:
+    """Rows (2, n) about their straight lines: what a fit leaves before the dip may lie off zero."""
+    x = np.linspace(-1.0, 1.0, rows.shape[1])
+    return rows - np.stack([np.polynomial.Polynomial.fit(x, row, 1)(x) for row in rows])
+
+
+def remainders(
+    residual: np.ndarray, events: Sequence[Event], noise: Noise, false_alarms: float = 0.05
+) -> list[Remainder]:  # fmt: skip
+    """The shapes that stand out of residuals (2, N) [pu], measured less calculated, of events end to end.
+
+    The loudest first, at most `MOST`; none where white noise would show as much with a probability of `false_alarms`.
+    Gaps are 0. `noise` is what a fit left in quiet stretches.
+    """
+    ends = np.cumsum([0, *(event.record.samples for event in events)])
+    parts = [slice(a, b) for a, b in itertools.pairwise(ends.tolist())]
+    stretches = [
+        _Stretch.of(event, residual[:, part], noise.of(e), None if noise.blur is None else noise.blur[:, :, part])
+        for e, (event, part) in enumerate(zip(events, parts, strict=True))
+    ]
+    excess = sum(float(np.sum(s.white(s.residual[None]) ** 2)) - s.residual.size for s in stretches)
+    loudest = [_loudest(s, false_alarms / len(stretches)) for s in stretches]
+    told: list[Remainder] = []
+    while len(told) < MOST and any(loudest):
+        e = max(range(len(stretches)), key=lambda e: loudest[e][0] if loudest[e] else 0.0)
+        gain, shape, channel = loudest[e]
+        _, sizes, curve = stretches[e].fitted(shape, channel)
+        told.append(_told(stretches[e], shape, channel, sizes, gain / max(excess, gain)))
+        stretches[e] = replace(stretches[e], residual=stretches[e].residual - curve)
+        loudest[e] = _loudest(stretches[e], false_alarms / len(stretches))
+    return told
+
+
+def _loudest(stretch: _Stretch, false_alarms: float) -> tuple[float, _Shape, int] | None:
+    """The shape that lowers the deviance of an event most, by how much, and its channel; None where chance does so.
+
+    The bound on chance is that of as many independent tries as there are starts, decays and frequencies.
+    """
+    white = stretch.white(stretch.residual[None])[0]
+    tried, found = _searched(white, max(stretch.event.start - 2, 0))
+    sparing = SPARING * np.log(white.size)
+    best = max(found, key=lambda f: f[0] - sparing * bool(f[1].frequency))
+    limit = 2 * np.log(tried / false_alarms)
+    if best[0] < HOPELESS * limit:
+        return None
+    polished = max((_polished(stretch, best[1], c) for c in (0, 1)), key=lambda f: f[0])
+    return polished if polished[0] > limit else None
+
+
+def _searched(white: np.ndarray, first: int) -> tuple[int, list[tuple[float, _Shape]]]:
+    """How many shapes were tried in white rows (2, n) from sample `first` on, and the best of each kind."""
+    length = white.shape[1] - first
+    decays = np.geomspace(2.0, max(length, 4), DECAYS)
+    shapes = [(float(d), 0.0) for d in (*decays, np.inf)]
+    for d in decays[decays >= SHORTEST / 2]:
+        spacing = max(1 / (2 * length), 1 / (8 * d))
+        frequencies = np.arange(max(0.5 / d, 1 / length), HIGHEST, spacing)[:FREQUENCIES]
+        shapes += [(float(d), float(f)) for f in frequencies]
+    best: dict[bool, tuple[float, _Shape]] = {}
+    for decay, frequency in shapes:
+        gains = _gains(white[:, first:], decay, frequency)
+        k = int(gains.argmax())
+        if (gain := float(gains[k])) > best.get(frequency > 0, (-1.0,))[0]:
+            best[frequency > 0] = gain, _Shape(first + k, decay, frequency)
+    return 2 * length * len(shapes), list(best.values())
+
+
+def _gains(white: np.ndarray, decay: float, frequency: float) -> np.ndarray:
+    """Drop of the sum of squares (n - SHORTEST,) by a shape from each sample on, in the channel that shows it most."""
+    from scipy.signal import lfilter
+
+    z = np.exp(-1 / decay + 2j * np.pi * frequency)
+    sums = lfilter([1.0], [1.0, -z], white[:, ::-1].astype(complex), axis=1)[:, ::-1]
+    left = np.arange(white.shape[1], 0, -1)  # samples from each on
+
+    def series(q: complex) -> np.ndarray:
+        """1 + q + ... over the samples left."""
+        return left.astype(complex) if abs(1 - q) < 1e-12 else (1 - q**left) / (1 - q)
+
+    power = series(abs(z) ** 2).real
+    if not frequency:
+        return (sums.real**2 / power).max(axis=0)[: 1 - SHORTEST]
+    double = series(z * z)
+    cc, ss, cs = (power + double.real) / 2, (power - double.real) / 2, double.imag / 2
+    a, b, determinant = sums.real, sums.imag, cc * ss - cs**2
+    gain = (ss * a**2 - 2 * cs * a * b + cc * b**2) / np.maximum(determinant, 1e-9)
+    return np.where(determinant > 0.01 * power**2 / 4, gain, 0.0).max(axis=0)[: 1 - SHORTEST]
+
+
+def _polished(stretch: _Stretch, shape: _Shape, channel: int) -> tuple[float, _Shape, int]:
+    """The best shape near one, as the noise lets it be seen in P (0) or Q (1)."""
+    from scipy.optimize import minimize
+
+    n = stretch.residual.shape[1]
+
+    def gain(shape: _Shape) -> float:
+        told = shape.rings(n) or not shape.frequency
+        return stretch.fitted(shape, channel)[0] if told else 0.0
+
+    for _ in range(ROUNDS):
+        if np.isfinite(shape.decay):
+            start, ringing = shape.start, bool(shape.frequency)
+
+            def at(x: np.ndarray, start: int = start, ringing: bool = ringing) -> _Shape:
+                return _Shape(start, float(np.exp(np.clip(x[0], 0.0, np.log(20 * n)))), abs(x[1]) if ringing else 0.0)
+
+            begin = np.array([np.log(shape.decay), shape.frequency][: 1 + ringing])
+            simplex = np.stack([begin, *(begin + np.diag([0.3, 0.1 / (2 * np.pi * shape.decay)][: 1 + ringing]))])
+            options = {"initial_simplex": simplex, "xatol": 1e-5, "fatol": 1e-3, "maxfev": 80}
+            done = minimize(lambda x, at=at: -gain(at(x)), begin, method="Nelder-Mead", options=options)
+            shape = max(shape, at(done.x), key=gain)
+        period = 1 / shape.frequency if shape.frequency else 4.0
+        reach = int(np.clip(period / 2, 3, 25))
+        near = range(max(shape.start - reach, 0), min(shape.start + reach, n - SHORTEST) + 1)
+        shape = max((shape._replace(start=k) for k in near), key=gain)
+    return gain(shape), shape, channel
+
+
+def _told(stretch: _Stretch, shape: _Shape, channel: int, sizes: np.ndarray, share: float) -> Remainder:
+    """A shape as a person reads it."""
+    event, step = stretch.event, stretch.event.record.step
+    ringing = bool(shape.frequency)
+    rest = stretch.residual.shape[1] - shape.start
+    tau = shape.decay * step if shape.decay < STAYS * rest else None
+    kind = "ringing" if ringing else "step" if tau is None else "pulse" if shape.decay < PULSE else "decay"
+    size = float(np.hypot(*sizes)) if ringing else float(sizes[0])
+    level = max((event.noise_P, event.noise_Q)[channel], SMALLEST)
+    start = float(event.record.t[shape.start])
+    ended = start > event.t_end - 1.5 * step
+    frequency = shape.frequency / step if ringing else None
+    pace = None if tau is None or frequency is None else np.hypot(2 * np.pi * frequency * tau, 1.0)
+    return Remainder(
+        event=event.record.name, channel="PQ"[channel], kind=kind, start=start,
+        after=start - (event.t_end if ended else event.t_start), ended=ended, frequency=frequency,
+        time_constant=tau, damping=None if pace is None else float(1 / pace), size=size, noise=abs(size) / level,
+        share=float(share),
+    )  # fmt: skip

@@ -1,0 +1,39 @@
+"""Numbers as a person reads them: the one way in which pages and the console tell a probability and an error."""
+
+import math
+from collections.abc import Sequence
+
+SEEN_AS_NEVER = 1e-6  # nobody tells one in ten million from one in a billion, and no model of the noise is that good
+MOST_DIGITS = 7  # after the point: smaller errors are told by powers of ten
+
+
+def in_words(p: float) -> str:
+    """A probability for a sentence or a cell: '0.45', '0.00012', 'less than one in a million'."""
+    if p < SEEN_AS_NEVER:
+        return "less than one in a million"
+    return f"{p:.2g}" if p >= 1e-4 else _powers(p, 2)
+
+
+def with_error(value: float, error: float) -> str:
+    """A value to the digits that its standard error leaves: '0.022016 ± 0.000078'."""
+    if not (math.isfinite(error) and error > 0):
+        return f"{value:.4g}"
+    digits = 1 - math.floor(math.log10(error))
+    if 0 <= digits <= MOST_DIGITS:
+        return f"{value:.{digits}f} ± {error:.{digits}f}"
+    return f"{_powers(value, 4)} ± {_powers(error, 2)}"
+
+
+def percent(share: float) -> str:
+    """A share of a whole that is itself estimated: what seems more than all of it is all, and less than none, none."""
+    return f"{min(max(share, 0.0), 1.0):.0%}"
+
+
+def joined(names: Sequence[str], last: str = "and") -> str:
+    """Names as a sentence lists them: 'a', 'a and b', 'a, b and c'."""
+    return f" {last} ".join(part for part in (", ".join(names[:-1]), *names[-1:]) if part)
+
+
+def _powers(value: float, digits: int) -> str:
+    """'2.6e-5' where Python says '2.6e-05'."""
+    return f"{value:.{digits}g}".replace("e-0", "e-").replace("e+0", "e")
