@@ -370,6 +370,16 @@ def test_an_interrupted_run_is_told_and_not_judged():
         gather([interrupted("a", 0)], "x")
 
 
+def test_runs_of_different_code_are_told():
+    runs = samples({"a": 1.0, "b": 2.0})
+    versions = [replace(r, code=["", "0.4 at 1c2d3e4f"][r.optimizer == "b"]) for r in runs]
+    assert gather(versions, "x").notes == ()
+    (note,) = gather([replace(r, code=f"0.{r.seed % 2}") for r in runs], "x").notes
+    assert note.startswith("The runs were made by different code (0.0, 0.1): a difference between variants may be")
+    told = {"tractexp_version": "0.4", "commit": "1c2d3e4f5a6b7c8d-dirty"}
+    assert [load.code_of(t) for t in (told, told | {"commit": ""}, {})] == ["0.4 at 1c2d3e4f-dirty", "0.4", ""]
+
+
 # The floor: that of the shipped dip is known from several hundred descents.
 
 LOWEST = 3.0858e-5
