@@ -108,8 +108,8 @@ def gather(runs: Sequence[Run], source: str, data: str | None = None) -> Gathere
     notes = [f"Of runs made more than once, the newest count: {left_out} left out."] if left_out else []
     if len(versions := {run.code for run in ended if run.code}) > 1:
         notes.append(
-            f"The runs were made by different code ({', '.join(sorted(versions))}): a difference between variants may be "
-            "one between versions."
+            f"The runs were made by different code ({', '.join(sorted(versions))}): a difference between variants may"
+            " be one between versions."
         )
     names = _names(runs)
     interrupted = {_identity(run): run for run in runs if run.interruption and _identity(run) not in unique}
