@@ -151,6 +151,13 @@ def test_parameters_stand_before_and_after_with_meaning_unit_interval_and_verdic
     assert told == {n: {"value": e.value, "standard_error": e.error} for n, e in after.items()}
 
 
+def test_a_long_verdict_is_cut_in_the_table_and_whole_below():
+    weak = "weakly identified: ± 32 %; trades against q_v (correlation 0.99); C q_v^0.2 is known to ± 1.8 %"
+    assert discrepancy._brief(weak) == "weakly identified: ± 32 %"
+    assert discrepancy._brief("at its bound (0.3; widen model.bounds.C)") == "at its bound (0.3; widen model.bounds.C)"
+    assert discrepancy._brief("identified (± 5 %)") == "identified (± 5 %)"
+
+
 def test_the_sentence_of_a_grade_stands_in_the_verdict(named, tmp_path):
     words, _ = page(named, tmp_path, adequacy="the model describes this load: use it")
     assert words.index("the model describes this load: use it") < words.index("Next: ")

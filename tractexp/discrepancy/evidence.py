@@ -129,7 +129,8 @@ def _fate(found: Investigation, rival: Rival) -> tuple[str, str]:
         left = f"leaves no more than chance does{helps}"
         return (CHOSEN, left) if names == found.names else (KEPT, left)
     if rival.rejected:
-        best = joined(_names(found, found.survivors.rivals[0]))
+        names = _names(found, found.survivors.rivals[0])
+        best = names[0] if len(names) == 1 else "the best set"
         return "rejected", f"were it true, {best} would not fit better by {rival.behind:.0f}"
     if rival.tests is None:
         return "not rejected", "among too many that fit alike to be tested further"

@@ -238,17 +238,26 @@ def _parameters(made: Page, found: Investigation) -> None:
     """The base model's parameters before and after, and those that came in."""
     made.heading("Parameters before and after" if found.names else "Parameters of the base model")
     before = {e.parameter.name: e for e in found.before}
-    rows = []
-    for e in found.after if found.names else found.before:
+    rows, known = [], found.after if found.names else found.before
+    for e in known:
         p, was = e.parameter, before.get(e.parameter.name)
         told = [_value(was) if was else "not in it"] if found.names else []
-        rows.append([p.name, p.about, p.unit, *told, _value(e), _interval(e), e.verdict])
+        rows.append([p.name, p.about, p.unit, *told, _value(e), _interval(e), _brief(e.verdict)])
     stages = ["before", "after"] if found.names else ["value"]
     columns = ["parameter", "meaning", "unit", *stages, "95 % interval", "verdict"]
     made.table(
         columns, rows, "± one standard error, from the curvature at the fit to the fitted events.",
         words=(1, 2, len(columns) - 1),
     )  # fmt: skip
+    why = [f"{e.parameter.name} is {e.verdict}." for e in known if _brief(e.verdict) != e.verdict]
+    if why:
+        with made.folded("Why some are known badly, and what of them is known"):
+            made.items(why)
+
+
+def _brief(verdict: str) -> str:
+    """The first clause of a verdict that has several: 'weakly identified: ± 32 %'."""
+    return verdict.split("; ")[0] if ": " in verdict.split(" (")[0] else verdict
 
 
 def _equations(made: Page, found: Investigation) -> None:
