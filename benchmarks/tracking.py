@@ -37,7 +37,7 @@ if compute:
         pass
     last += compute
 else:
-    store._import(sql=True)
+    store.import_mlflow(sql=True)
     lap("import_mlflow")
     tracking.prepare(uri)
     lap("open_store")

@@ -76,7 +76,7 @@ def test_a_browser_draws_every_kind_and_complains_of_nothing(tmp_path, width):
     page = Page("charts").chart(chart, "one").charts([bars, forest, fitness], "three")
     dom, complaints = drawn(page, tmp_path, f"--window-size={width},900")
     assert complaints == []
-    assert dom.count('svg-container"') == 4
+    assert dom.count('class="chart js-plotly-plot"') == 4
     widths = [float(w) for w in re.findall(r'class="main-svg"[^>]*?width="([\d.]+)"', dom)]
     assert widths
     assert max(widths) <= width

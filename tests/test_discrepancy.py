@@ -15,7 +15,6 @@ from scipy.special import chdtrc, ndtr
 from test_cli import tractexp
 
 from hidden_effects import Case, Noise, make, write
-from tractexp.discrepancy.adequacy import tail
 from tractexp.discrepancy.base_fit import base_fit
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.catalogue import catalogue
@@ -34,6 +33,7 @@ from tractexp.discrepancy.records import Records, check_events
 from tractexp.discrepancy.tangent import tangent
 from tractexp.errors import UserError
 from tractexp.identification.descent import Apart, normal
+from tractexp.identification.surprises import tail
 from tractexp.model.model import compose
 from tractexp.noise import Autoregression, white_noise
 from tractexp.noise import Noise as PowerNoise

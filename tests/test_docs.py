@@ -31,7 +31,7 @@ def test_the_examples_of_the_python_page_run(resistive_dips, tmp_path, monkeypat
     for example in re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL):
         exec(compile(example, "docs/python.md", "exec"), names)
     assert names["found"].names == ("stator_resistance",)
-    assert names["again"].parameters["R_s"].most_likely == pytest.approx(0.02, rel=0.1)
+    assert names["again"].parameters["R_s"].value == pytest.approx(0.02, rel=0.1)
     assert names["same"].result == names["fit"].result
     assert (tmp_path / "report.html").stat().st_size > 10_000
     assert (tmp_path / "studied" / "generalise.json").is_file()

@@ -219,7 +219,7 @@ def test_an_entry_point_that_is_no_package_is_refused(file, sentence, tmp_path, 
     if file:
         (tmp_path / file).write_text("")
     monkeypatch.syspath_prepend(tmp_path)
-    point = importlib.metadata.EntryPoint("acme", "lonely_acme", framework.ENTRY_POINTS)
+    point = importlib.metadata.EntryPoint("acme", "lonely_acme", "tractexp.plugins")
     monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: [point])
     with pytest.raises(UserError, match=r"'lonely_acme' \(entry point 'acme'\) " + sentence):
         framework.packages.__wrapped__()

@@ -1,16 +1,21 @@
 """Profiles: a parabola where theory says so, open sides, two minima, better optima, and the posterior beside them."""
 
+import json
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import uncertainty as study
+from test_chart import unpacked
+from test_report_page import read
 
 from tractexp.errors import UserError
 from tractexp.identification.problem import Problem
-from tractexp.identification.profile import End, Profile, checked, profiles, revised, threshold
-from tractexp.identification.uncertainty import assess, conclude
+from tractexp.identification.profile import End, Profile, checked, profiles, revised
+from tractexp.identification.uncertainty import conclude, threshold
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, Verdict
+from tractexp.report.profile import meaning, page
 
 
 def events(depths, deviation, seed=1, Q_s0=0.35):
@@ -24,7 +29,7 @@ def events(depths, deviation, seed=1, Q_s0=0.35):
 
 @pytest.fixture(scope="module")
 def quiet():
-    return assess(Problem(study.model(), events((0.5,), 0.001)), study.TYPICAL)
+    return study.judged(Problem(study.model(), events((0.5,), 0.001)), study.TYPICAL).known
 
 
 def test_the_threshold_is_chi_squared_of_one_degree():
@@ -62,7 +67,7 @@ def test_a_point_of_a_profile_is_the_constrained_optimum(quiet):
 
 
 def test_a_shallow_dip_leaves_c_open_upwards_and_the_verdict_says_so():
-    known = assess(Problem(study.model(), events((0.15,), 0.01)), study.TYPICAL)
+    known = study.judged(Problem(study.model(), events((0.15,), 0.01)), study.TYPICAL).known
     made = {p.name: p for p in profiles(known).profiles}
     assert made["C"].ends == (End.CLOSED, End.BOUND)
     assert made["C"].interval[1] == pytest.approx(0.99)
@@ -71,7 +76,9 @@ def test_a_shallow_dip_leaves_c_open_upwards_and_the_verdict_says_so():
     assert "open upwards" in judged.verdicts["C"].detail
     assert judged.profiled["C"] == pytest.approx(made["C"].interval, rel=1e-3)
     assert set(judged.profiled) >= {"C", "X_prime", "q_v"}
-    assert "T_m" not in judged.profiled  # narrow: a parabola anyway
+    narrow = {n for n, v, h in zip(known.names, known.values, known.half, strict=True) if h <= 0.05 * v}
+    assert narrow  # a parabola anyway
+    assert not narrow & set(judged.profiled)
     assert judged.verdicts["T_m"].word == IDENTIFIED
 
 
@@ -116,3 +123,50 @@ def test_too_few_walkers_are_refused(quiet):
 
     with pytest.raises(UserError, match=r"task.walkers=10 is too few: 9 coordinates need at least 18"):
         sample(quiet, walkers=10, steps=100, seed=0)
+
+
+def drawn(path):
+    """The charts of a page, by title, as they are drawn."""
+    told = re.findall(r'<script type="application/json">(.*?)</script>', path.read_text(encoding="utf-8"))
+    charts = [json.loads(chart) for chart in told]
+    return {chart["layout"]["title"]["text"].partition(":")[0]: chart for chart in charts}
+
+
+def test_the_page_draws_each_profile_with_its_parabola_threshold_and_interval(quiet, tmp_path):
+    found = profiles(quiet)
+    told, charts = read(page(tmp_path / "profile.html", found)), drawn(tmp_path / "profile.html")
+    assert list(charts) == list(quiet.names)
+    for profile, value, half in zip(found.profiles, quiet.values, quiet.half, strict=True):
+        chart = charts[profile.name]
+        curves = {trace["name"]: trace for trace in chart["data"] if trace["name"]}
+        x, y = (unpacked(curves["profile"][axis]) for axis in "xy")
+        np.testing.assert_allclose(np.interp(profile.values, x, y), profile.deviance, atol=1e-4)
+        for end in profile.interval:  # the interval is where the curve drawn crosses the threshold
+            assert np.interp(end, x, y) == pytest.approx(found.threshold, rel=0.02)
+        x, y = (unpacked(curves["curvature"][axis]) for axis in "xy")
+        assert np.interp(value + half, x, y) == pytest.approx(found.threshold, rel=0.02)
+        shaded, level = chart["layout"]["shapes"]
+        assert (shaded["x0"], shaded["x1"]) == profile.interval
+        assert level["y0"] == found.threshold
+    assert "For every parameter the curvature's interval is enough" in told.words
+    assert "Every parameter is identified." in told.words
+    for part in ("transient reactance on the record's base", "pu s²/rad", "is enough."):
+        assert part in told.words
+
+
+def test_the_page_says_where_curvature_misleads(quiet):
+    found = profiles(quiet, names=["M"])
+    (profile,), value, half = found.profiles, quiet.values[3], quiet.half[3]
+    bound, points = (End.CLOSED, End.BOUND), (End.POINTS, End.CLOSED)
+    for changes, sentence in (
+        ({}, "± .* is enough"),
+        ({"interval": (value - half, value + 3 * half)}, r"Lopsided: 3\.0 times as far up"),
+        ({"interval": (value - 2 * half, value + half)}, r"Lopsided: 2\.0 times as far down"),
+        ({"interval": (value - half / 2, value + half / 2)}, "Narrower than by curvature"),
+        ({"interval": (value - 2 * half, value + 2 * half)}, "Wider than by curvature"),
+        ({"ends": bound, "interval": (value - half, 0.03)}, r"No limit upwards but the bound 0\.03"),
+        ({"ends": (End.BOUND, End.BOUND)}, "No limit but the bounds: the record does not tell it"),
+        ({"ends": points}, "Not followed to its end downwards: raise points"),
+        ({"minima": (0.02,)}, r"0\.02 fits about as well as the estimate"),
+    ):
+        assert re.fullmatch(sentence + r"\.", meaning(found, replace(profile, **changes))), sentence

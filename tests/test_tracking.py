@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tractexp import tracking
+from tractexp import provenance, tracking
 from tractexp.errors import UserError
 from tractexp.tracking import Run
 from tractexp.tracking.process import Logger
@@ -146,7 +146,7 @@ def test_artifacts_lie_beside_the_database_wherever_the_process_runs(tmp_path, e
     elsewhere.mkdir()
     (elsewhere / "note.txt").write_text("hello")
     script = """
-import sys; from pathlib import Path; from tractexp import tracking
+import sys; from pathlib import Path; from tractexp import provenance, tracking
 run = tracking.Run("identify: tibet/50", "r", artifacts=[Path("note.txt")])
 print(tracking.log(run, tracking.default_uri(Path(sys.argv[1]))))"""
     run_id = python(script, str(home), cwd=elsewhere, check=True).stdout.strip()
@@ -158,7 +158,7 @@ print(tracking.log(run, tracking.default_uri(Path(sys.argv[1]))))"""
 def test_processes_that_meet_on_a_fresh_store_all_log_their_run(tmp_path):
     """MLflow's own migrations break when two processes start them together."""
     script = """
-import sys; from pathlib import Path; from tractexp import tracking
+import sys; from pathlib import Path; from tractexp import provenance, tracking
 run = tracking.Run("sweep", f"job-{sys.argv[2]}", metrics={"x": 1.0})
 tracking.log(run, tracking.default_uri(Path(sys.argv[1])))"""
     jobs = [
@@ -175,7 +175,7 @@ tracking.log(run, tracking.default_uri(Path(sys.argv[1])))"""
 
 def test_a_creation_that_was_killed_leaves_nothing_that_hinders_the_next(tmp_path):
     script = """
-import os, sys; from pathlib import Path; from tractexp import tracking
+import os, sys; from pathlib import Path; from tractexp import provenance, tracking
 os.replace = lambda *_: os._exit(9)
 tracking.prepare(tracking.default_uri(Path(sys.argv[1])))"""
     assert python(script, str(tmp_path)).returncode == 9
@@ -208,8 +208,8 @@ def test_flatten_joins_keys_and_spells_values_as_the_configuration_does():
 
 
 def test_the_commit_is_that_of_the_folder_and_says_when_files_were_changed(tmp_path):
-    assert tracking.git_commit(tmp_path / "nowhere") == ""
-    if tracking.git_commit(tmp_path):
+    assert provenance.commit(tmp_path / "nowhere") == ""
+    if provenance.commit(tmp_path):
         pytest.skip("the temporary folder lies inside a repository")
 
     def git(*arguments: str) -> str:
@@ -223,11 +223,21 @@ def test_the_commit_is_that_of_the_folder_and_says_when_files_were_changed(tmp_p
     git("commit", "-q", "-m", "first")
     git("tag", "-a", "v1", "-m", "a tag must not hide the commit")
     commit = git("rev-parse", "HEAD")
-    tracking.git_commit.cache_clear()
-    assert tracking.git_commit(tmp_path) == commit
+    provenance.commit.cache_clear()
+    assert provenance.commit(tmp_path) == commit
     (tmp_path / "a").write_text("2")
-    tracking.git_commit.cache_clear()
-    assert tracking.git_commit(tmp_path) == f"{commit}-dirty"
+    provenance.commit.cache_clear()
+    assert provenance.commit(tmp_path) == f"{commit}-dirty"
+
+
+def test_what_a_run_has_read_is_listed_by_its_digest(uri):
+    record = {"name": "dip1", "role": "train", "sha256": "ab" * 32}
+    run_id = tracking.log(tracking.Run("inputs", "one", records=[record]), uri)
+    (given,) = client(uri).get_run(run_id).inputs.dataset_inputs
+    assert given.dataset.name == "dip1"
+    assert given.dataset.digest == record["sha256"][:36]
+    assert json.loads(given.dataset.source) == {"sha256": record["sha256"]}
+    assert [tag.value for tag in given.tags] == ["train"]
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Command line: compose the configuration, run the task, end with a sentence where the input is wrong."""
 
+import gc
 import os
 import sys
 
@@ -9,24 +10,36 @@ for library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 from tractexp.errors import UserError  # noqa: E402
-from tractexp.plugin import CONF  # noqa: E402
 
 OPEN = ("model.bounds.", "model.fixed.", "task.values", "task.criteria.")  # settings that take names of their own
+UNLOGGED = (
+    "-",
+    "tracking.enabled=",
+    "task=export",
+    "experiment=",
+    "hydra.mode=",
+)  # no single job that is logged: maybe
+SELDOM = (50_000, 20, 50)  # what is imported stays: to look for garbage in it takes a quarter of a short job
 FULL_ERROR = "HYDRA_FULL_ERROR"  # Hydra's own switch: set it to see tracebacks
 
 
 def main() -> int:
     """Entry point of `tractexp` and `python -m tractexp`; returns the exit code."""
     traceback = os.environ.get(FULL_ERROR, "0") not in ("", "0")
+    gc.set_threshold(*SELDOM)
     try:
         if sys.argv[1:2] == ["ui"]:
             from tractexp.tasks.ui import ui
 
             return ui(sys.argv[2:])
+        if sys.argv[1:2] == ["list"]:
+            from tractexp.usage import listed
+
+            return listed(sys.argv[2:])
         if {"--help", "-h"} & set(sys.argv[1:]):
             from tractexp.usage import usage
 
-            print(usage(CONF))
+            print(usage())
             return 0
         return _run()
     except UserError as error:
@@ -39,16 +52,25 @@ def main() -> int:
             file=sys.stderr,
         )
         return 130
+    finally:
+        gc.freeze()  # nor at the end, when everything goes anyway
     return 2
 
 
 def _run() -> int:
+    if not any(argument.startswith(UNLOGGED) for argument in sys.argv[1:]):
+        from tractexp.tracking.process import start_ahead
+
+        start_ahead()
     import hydra
 
+    from tractexp.choices import CONF
     from tractexp.config import register
+    from tractexp.provenance import started
     from tractexp.refusal import explained
 
     register()
+    started(sys.argv[1:])
     os.environ[FULL_ERROR] = "1"  # let exceptions through: they are told below, in one sentence
     sys.argv[1:] = map(opened, sys.argv[1:])
     refusals: list[UserError] = []

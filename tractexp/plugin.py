@@ -13,22 +13,22 @@ built-in plugins come in by that same door.
 import dataclasses
 import functools
 import importlib
-import importlib.metadata
 import inspect
-import pkgutil
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
-from typing import Any, ClassVar, TypeVar, dataclass_transform, get_type_hints
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, dataclass_transform, get_type_hints
 
+from tractexp.choices import CONF as CONF
+from tractexp.choices import configuration_folders as configuration_folders
+from tractexp.choices import entry_points, modules
 from tractexp.errors import Unknown, UserError, among
 from tractexp.parameter import Parameter
 
-ENTRY_POINTS = "tractexp.plugins"
-HERE = Path(__file__).resolve().parent
-CONF = next(p for p in (HERE / "conf", HERE.parent / "conf") if (p / "config.yaml").is_file())  # in a wheel, in a clone
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 
 class Plugin:
@@ -122,16 +122,7 @@ def schema(cls: type[Plugin]) -> type:
 @functools.cache
 def packages() -> tuple[Any, ...]:
     """The packages behind the entry points, imported, in order of name."""
-    found = []
-    for point in sorted(importlib.metadata.entry_points(group=ENTRY_POINTS), key=lambda p: (p.name, p.value)):
-        with _told(f"the plugin package '{point.value}' (entry point '{point.name}')"):
-            found.append(point.load())
-        if not hasattr(found[-1], "__path__"):
-            raise UserError(
-                f"the plugin package '{point.value}' (entry point '{point.name}') is a single file; make it a folder"
-                " with an __init__.py and a file for each plugin"
-            )
-    return tuple(dict.fromkeys(found))
+    return tuple(dict.fromkeys(map(_package, entry_points())))
 
 
 @functools.cache
@@ -147,22 +138,58 @@ def import_all(found: Iterable[ModuleType]) -> None:
     Raises `UserError` with file and line for a module that cannot be imported, and for a class in it that is not
     decorated with `@plugin`.
     """
-    modules = []
-    for package in found:
-        for module in pkgutil.walk_packages(package.__path__, package.__name__ + "."):
-            if not module.name.rpartition(".")[2].startswith("_"):
-                with _told(f"the plugin module '{module.name}'"):
-                    modules.append(importlib.import_module(module.name))
+    made = [_module(name) for package in found for name in modules(package.__name__, package.__path__)]
+    for module in made:
+        _check_decorated(module)
+
+
+def registered() -> tuple[Mapping[str, Mapping[str, type[Plugin]]], dict[str, str]]:
+    """What can be used, as `discover`, and {package or module: the sentence on why it cannot}, each tried by itself."""
+    refused, made = {}, []
+    for point in entry_points():
+        try:
+            package = _package(point)
+        except UserError as error:
+            refused[point.module] = str(error)
+            continue
+        for name in modules(package.__name__, package.__path__):
+            try:
+                made.append(_module(name))
+            except UserError as error:
+                refused[name] = str(error)
+    for module in made:
+        try:
+            _check_decorated(module)
+        except UserError as error:
+            refused[module.__name__] = str(error)
+    return _registry, refused
+
+
+def _package(point: "EntryPoint") -> ModuleType:
+    what = f"the plugin package '{point.value}' (entry point '{point.name}')"
+    with _told(what):
+        found = point.load()
+    if not hasattr(found, "__path__"):
+        raise UserError(f"{what} is a single file; make it a folder with an __init__.py and a file for each plugin")
+    return found
+
+
+def _module(name: str) -> ModuleType:
+    with _told(f"the plugin module '{name}'"):
+        return importlib.import_module(name)
+
+
+def _check_decorated(module: ModuleType) -> None:
+    """Raise `UserError` for a class of a module that would be a plugin if it were decorated."""
     known = tuple(cls for classes in _registry.values() for cls in classes.values())
-    for module in modules:
-        for cls in vars(module).values():
-            if _forgotten(cls, module.__name__, known):
-                base = next(b for b in cls.__mro__ if "group" in vars(b))
-                raise UserError(
-                    f"{module.__file__}, line {inspect.getsourcelines(cls)[1]}: the class"
-                    f" {cls.__name__}({base.__name__}) is not decorated with @plugin, so nothing can choose it; write"
-                    " @plugin above it, or let its name start with an underscore"
-                )
+    for cls in vars(module).values():
+        if _forgotten(cls, module.__name__, known):
+            base = next(b for b in cls.__mro__ if "group" in vars(b))
+            raise UserError(
+                f"{module.__file__}, line {inspect.getsourcelines(cls)[1]}: the class"
+                f" {cls.__name__}({base.__name__}) is not decorated with @plugin, so nothing can choose it; write"
+                " @plugin above it, or let its name start with an underscore"
+            )
 
 
 def _forgotten(cls: Any, module: str, known: tuple[type, ...]) -> bool:
@@ -194,12 +221,6 @@ def _place(error: Exception) -> str:
     folder = next((Path(f.filename).parent for f in frames if f.name == "<module>"), None)
     own = [f for f in frames if folder and folder in Path(f.filename).parents]
     return f"{own[-1].filename}, line {own[-1].lineno}: " if own else ""
-
-
-def configuration_folders() -> list[Path]:
-    """The `conf/` folders of the installed plugin packages."""
-    folders = (Path(p) / "conf" for package in packages() for p in package.__path__)
-    return [folder for folder in folders if folder.is_dir()]
 
 
 def get(group: str, name: str) -> type[Any]:

@@ -1,49 +1,143 @@
-"""`tractexp --help`: the groups and their choices, told without composing a configuration."""
+"""`tractexp --help` and `tractexp list`: what can be chosen, told without composing a configuration."""
 
+import argparse
+import re
+import shutil
 import textwrap
-from collections import defaultdict
-from pathlib import Path
+from collections.abc import Collection, Mapping
 
-from tractexp import plugin
+from tractexp.choices import Choice, choices, defaults, sentence
+from tractexp.errors import UserError, among
 
-TOLD = ("task", "model", "model/motor", "model/static", "optimizer", "objective", "data", "experiment")
+WIDTH = 100  # columns
+FEW = 8  # names of a group that fit into a line or two of the help
+
+GROUPS = {
+    "task": "what to do",
+    "model": "a motor and a static load",
+    "model/motor": "the motor's equations",
+    "model/static": "the static load's equations",
+    "effect": "what a model may lack, added by model.effects=[NAME,...]",
+    "optimizer": "how the parameters are searched",
+    "objective": "what the search makes small",
+    "data": "the records",
+    "format": "what task=export writes, chosen by task.format=NAME",
+    "experiment": "a task with its settings, such as a table of the paper",
+    "hydra/launcher": "where the jobs of a sweep run; by default on the cores of this computer",
+}
+LATER = ("task", "format", "hydra/launcher")  # groups that the help has told, or leaves to `tractexp list`
 
 TEXT = """\
 tractexp: identify the parameters of a traction load from recorded voltage dips
 
-Choose with GROUP=NAME, change a value with KEY=VALUE:
+The commonest
+  tractexp data=csv 'data.train=[dip1.csv]'
+      identify a load from a dip (columns t,U,P,Q): how well it fits, how sure each parameter is
+  tractexp task=discrepancy data=csv 'data.train=[dip1.csv,dip2.csv]' 'data.validate=[dip3.csv]'
+      name the effect that the model lacks, and show the gap shrink
+  tractexp ui
+      look at everything that was logged, in a browser on this computer only
 
+Tasks, chosen by task=NAME; {task} by default
+{tasks}
+
+What else can be chosen, by GROUP=NAME (effects by model.effects=[NAME,...])
 {groups}
 
-Effects are added by model.effects=[NAME,...].
+  tractexp list GROUP        every name of a group with a line on each; without GROUP, of all
 
-Examples
-  tractexp optimizer=pso data=tibet_30pct seed=3
-  tractexp data=csv 'data.train=[dip1.csv]' 'data.validate=[dip2.csv]'
-  tractexp -m optimizer=issa,ssa,pso 'seed=range(0,30)'      a sweep
-  tractexp task=compare                                       the newest sweep, compared
-  tractexp task=discrepancy data=csv 'data.train=[dip1.csv,dip2.csv]' 'data.validate=[dip3.csv]'
-  tractexp ui                                                 the MLflow UI, on this computer only
-
-  tractexp --cfg job             every setting of the present choice
-  tractexp --hydra-help          the options of Hydra, which composes the configuration
-  eval "$(tractexp -sc install=bash)"        completion of groups, choices and keys
+Values are changed by KEY=VALUE
+  tractexp optimizer.population=100 model.bounds.C=[0.8,0.95] budget=5000 seed=7
+  tractexp -m optimizer=issa,ssa,pso 'seed=range(0,30)'        a sweep; then tractexp task=compare
+  tractexp --cfg job                                           every setting of the present choice
+  tractexp --hydra-help                                        Hydra's options
+  eval "$(tractexp -sc install=bash)"                          completion of groups, names and keys
 """
 
 
-def usage(conf: Path) -> str:
-    """The text of `--help`; `conf` is the folder of our own configurations."""
-    choices: dict[str, set[str]] = defaultdict(set)
-    for group, classes in plugin.discover().items():
-        choices[group] |= set(classes)
-    for folder in (conf, *plugin.configuration_folders()):
-        for file in folder.rglob("*.yaml"):
-            choices[file.parent.relative_to(folder).as_posix()].add(file.stem)
-    groups = "\n".join(_listed(group, choices[group]) for group in (*TOLD, "effect"))
-    return TEXT.format(groups=groups)
+def usage() -> str:
+    """The text of `--help`."""
+    found = choices()
+    tasks = {name: re.split("[:;] ", found["task"][name].about)[0] for name in _sorted("task", found["task"])}
+    groups = {group: _summary(group, found[group]) for group in _ordered(found) if group not in LATER}
+    return TEXT.format(task=defaults()["task"], tasks=_columns(tasks), groups=_columns(groups))
 
 
-def _listed(label: str, names: set[str]) -> str:
-    """A group and its choices, folded beneath each other."""
-    start = f"  {label:<{max(map(len, TOLD))}}  "
-    return textwrap.fill(", ".join(sorted(names)), 118, initial_indent=start, subsequent_indent=" " * len(start))
+def listed(arguments: list[str]) -> int:
+    """`tractexp list [GROUP ...]`: print every name with a sentence on each; returns the exit code.
+
+    Raises `UserError` for a group that is none.
+    """
+    about = "Tell what can be chosen: every name of a group with a line on each; without GROUP, of all groups."
+    parser = argparse.ArgumentParser(prog="tractexp list", description=about)
+    parser.add_argument("group", nargs="*", metavar="GROUP")
+    asked = [group.rstrip("/=") for group in parser.parse_args(arguments).group]
+    found = choices()
+    for group in asked:
+        if group not in found:
+            raise UserError(f"there is no group '{group}'{among(group, found, 'Groups')}")
+    found, refused = _tried(found)
+    width = min(WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns)
+    print("\n\n".join(_told(group, found[group], width) for group in asked or _ordered(found)))
+    for why in refused:
+        print(f"\nleft out: {why}")
+    return 0
+
+
+def _tried(found: Mapping[str, Mapping[str, Choice]]) -> tuple[dict[str, dict[str, Choice]], list[str]]:
+    """The choices as they are once every plugin is imported, and why those that fit no group cannot be."""
+    from tractexp.plugin import registered
+
+    known, refused = registered()
+    made = {group: dict(names) for group, names in found.items()}
+    for group, classes in known.items():
+        for name, cls in classes.items():  # made by a program, too, which the files do not tell
+            made.setdefault(group, {})[name] = Choice(name, sentence(cls.__doc__ or ""), cls.__module__)
+    for names in made.values():
+        for name, choice in names.items():
+            if choice.module in refused:
+                names[name] = Choice(name, f"cannot be used: {refused.pop(choice.module)}")
+    return made, list(refused.values())
+
+
+def _told(group: str, names: Mapping[str, Choice], width: int) -> str:
+    """A group and its names, each with its sentence."""
+    head = f"{group}: {GROUPS[group]}" if group in GROUPS else group
+    if chosen := defaults().get(group):
+        head += f"; {chosen} by default"
+    return f"{head}\n{_columns({name: names[name].about for name in _sorted(group, names)}, width)}"
+
+
+def _summary(group: str, names: Mapping[str, Choice]) -> str:
+    """The names of a group, variants counted beside what they vary; of many, how many."""
+    plugins = {name for name, choice in names.items() if choice.module}
+    families: dict[str, list[str]] = {name: [] for name in _sorted(group, names) if _of(name, plugins) == name}
+    for name in names:
+        families[_of(name, plugins)].append(name)
+    told = [f"{name} and {len(own) - 1} variants" if len(own) > 2 else ", ".join(own) for name, own in families.items()]
+    more = f" and {len(told) - FEW + 1} others" if len(told) > FEW else ""
+    return ", ".join(told[: FEW - 1] if more else told) + more
+
+
+def _of(name: str, plugins: Collection[str]) -> str:
+    """The plugin that a configuration varies, as its name says: `issa` of `issa_no_levy`; else the name itself."""
+    stems = [plugin for plugin in plugins if name.startswith(f"{plugin}_")]
+    return name if name in plugins or not stems else max(stems, key=len)
+
+
+def _ordered(found: Mapping[str, object]) -> list[str]:
+    return [*(group for group in GROUPS if group in found), *sorted(found.keys() - GROUPS)]
+
+
+def _sorted(group: str, names: Collection[str]) -> list[str]:
+    """Names in order, `figure3` before `figure10`, and first of all the one that is chosen by default."""
+    numbered = {name: [(word, int(digits or 0)) for word, digits in re.findall(r"(\D*)(\d*)", name)] for name in names}
+    return sorted(names, key=lambda name: (name != defaults().get(group), numbered[name]))
+
+
+def _columns(rows: Mapping[str, str], width: int = WIDTH) -> str:
+    """Names in a column, and beside each its text, folded."""
+    indent = 4 + max(map(len, rows), default=0)
+    folded = textwrap.TextWrapper(max(width, indent + 30), subsequent_indent=" " * indent)
+    folded.break_on_hyphens = folded.break_long_words = False
+    return "\n".join(folded.fill(f"  {name:<{indent - 2}}{text}") for name, text in rows.items())

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from tractexp import plugin
+from tractexp.choices import defaults
 from tractexp.errors import UserError, among, check_distinct
 
 P = ParamSpec("P")
@@ -110,7 +111,7 @@ class Choice:
         """
         if isinstance(chosen, Choice):
             return cls(chosen.name, completed(group, chosen.node))
-        chosen = default(group) if chosen is None else chosen
+        chosen = defaults()[group] if chosen is None else chosen
         check_kind(group, chosen, str | Mapping[str, Any])
         asked = {"name": chosen} if isinstance(chosen, str) else dict(chosen)
         if "name" not in asked:
@@ -176,14 +177,6 @@ def read_choice(group: str, name: str) -> dict[str, Any]:
     for key, value in content.items():
         made[key] = {**made[key], **value} if isinstance(value, dict) and isinstance(made.get(key), dict) else value
     return made
-
-
-def default(group: str) -> str:
-    """What is chosen in a group where nothing else is: that of `conf/config.yaml`, as on the command line."""
-    import yaml
-
-    content = yaml.safe_load((plugin.CONF / "config.yaml").read_text(encoding="utf-8"))
-    return next(item[group] for item in content["defaults"] if isinstance(item, dict) and group in item)
 
 
 def choices(group: str, *, files: bool = False) -> list[str]:

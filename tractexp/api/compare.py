@@ -1,5 +1,6 @@
 """Settle which optimizer is better, over the runs of a sweep or of any filter over MLflow."""
 
+import contextlib
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,10 +11,13 @@ from tractexp.api.arguments import public
 from tractexp.api.pages import Written
 from tractexp.errors import UserError, check_range
 from tractexp.outcome import Table
+from tractexp.progress import counting
 
 if TYPE_CHECKING:
     from tractexp.comparison.comparison import Comparison
-    from tractexp.comparison.runs import Run
+    from tractexp.comparison.floor import Polished
+    from tractexp.comparison.runs import Gathered, Run
+    from tractexp.identification.problem import Problem
 
 SWEEPS = Path("outputs", "sweeps")
 TARGETS = (10.0, 2.0, 1.01)
@@ -84,14 +88,16 @@ def compare(
     ties: float = 1e-3,
     floor: float | None = None,
     reference: str | None = None,
+    progress: Any = None,
 ) -> Compared:
     """Compare the variants in a sweep's folder (None: the newest under outputs/sweeps), or what a `filter` finds.
 
     The filter is MLflow's, over the store at `uri` (None: the current folder's) and one `experiment` (None: all).
     `data` keeps the runs on one choice of data. `targets` are those of running times, in multiples of the floor;
-    objectives within the share `ties` of it count as equal; `floor` [pu²] is what the noise leaves (None: the best of
-    all runs). With a `reference` only its pairs are tested. Raises `UserError` where no runs are found, or they are of
-    different problems.
+    objectives within the share `ties` of it count as equal; `floor` [pu²] is what the noise leaves (None: what least
+    squares reach from the ends of the runs and from many starts, or the best of all runs where their records cannot be
+    read any more). With a `reference` only its pairs are tested. `progress`: None shows how far that is, False does
+    not; a callable is told. Raises `UserError` where no runs are found, or they are of different problems.
     """
     check(sweep, filter, targets, ties, floor)
     if filter is None:
@@ -102,7 +108,7 @@ def compare(
         "sweep": sweep, "filter": filter, "uri": uri, "experiment": experiment, "data": data,
         "targets": list(targets), "ties": ties, "floor": floor, "reference": reference,
     }  # fmt: skip
-    source, comparison = _made(**call)
+    source, comparison = _made(**call, progress=progress)
     from tractexp.report.comparison import content
 
     made = Compared(call, source, content(comparison, source))
@@ -125,13 +131,47 @@ def check(sweep: Any, filter: str | None, targets: Sequence[float], ties: float,
 
 def _made(
     *, sweep: str | None, filter: str | None, uri: str | None, experiment: str | None, data: str | None,
-    reference: str | None, **judging: Any,
+    reference: str | None, progress: Any = False, **judging: Any,
 ) -> "tuple[str, Comparison]":  # fmt: skip
     from tractexp.comparison.comparison import compare
     from tractexp.comparison.runs import gather
 
     runs, source = _runs(sweep, filter, uri, experiment)
-    return source, compare(gather(runs, source, data), reference=reference, plain=_plain(), **judging)
+    gathered = gather(runs, source, data)
+    polished, why_not = _polished(gathered, progress)
+    known = {"polished": polished, "why_not": why_not}
+    return source, compare(gathered, reference=reference, plain=_plain(), **known, **judging)
+
+
+def _polished(gathered: "Gathered", progress: Any) -> "tuple[Polished | None, str]":
+    """What polishing found on the problem that the runs' configuration describes; None, and why, where it cannot."""
+    from tractexp.comparison.floor import polish
+
+    runs = [run for variant in gathered.variants for run in variant.runs]
+    try:
+        problem = _problem(next(run for run in runs if run.finished))
+    except UserError as error:
+        return None, f"the problem cannot be put again ({str(error).rstrip('.')})"
+    except (KeyError, TypeError, ValueError) as error:
+        return None, f"the configuration of the runs is not understood any more ({type(error).__name__}: {error})"
+    with contextlib.ExitStack() as stack:
+        found = polish(problem, runs, lambda n: stack.enter_context(counting("groups of descents", n, progress)))
+    return found, "" if found else "the records or the model have changed since: these parameters fit otherwise now"
+
+
+def _problem(run: "Run") -> "Problem":
+    """The problem that a run's configuration describes. Raises `UserError` where its records are not there any more."""
+    from tractexp.api.setup import Setup
+    from tractexp.comparison.load import nested
+    from tractexp.plugin import build
+    from tractexp.record import detect
+
+    config = nested(run.config)
+    home = Path(run.folder) if run.folder else Path()  # relative paths count from where the run was started
+    with contextlib.chdir(home) if home.is_dir() else contextlib.nullcontext():
+        records = build("data", config["data"]).read()
+    train = [detect(record) for record in records.train]
+    return Setup.of(train, config["model"], (), config.get("objective"), {}).problem
 
 
 def _runs(

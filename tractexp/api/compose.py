@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tractexp.api.arguments import Choice, check_kind, default, public, read_choice
+from tractexp.api.arguments import Choice, check_kind, public, read_choice
+from tractexp.choices import defaults
 from tractexp.errors import UserError, among
 from tractexp.outcome import Table, Tabulated
 
@@ -120,7 +121,7 @@ def model_of(given: Any) -> LoadModel:
     if isinstance(given, LoadModel):
         return given
     if given is None or isinstance(given, str | Path):
-        given = read_choice(GROUP, str(given or default(GROUP)))
+        given = read_choice(GROUP, str(given or defaults()[GROUP]))
     elif not isinstance(given, Mapping):
         given = _node(given)
     known = [f.name for f in dataclasses.fields(LoadModel)]

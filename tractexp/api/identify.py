@@ -20,12 +20,13 @@ from tractexp.outcome import Table
 from tractexp.progress import Progress, tell
 
 if TYPE_CHECKING:
-    from tractexp.identification.problem import Problem
+    from tractexp.identification.adequacy import Adequacy
+    from tractexp.identification.estimate import Estimated
     from tractexp.identification.result import Fit
     from tractexp.identification.search import Found
-    from tractexp.identification.uncertainty import Together, Uncertainty
+    from tractexp.identification.together import Together
+    from tractexp.identification.uncertainty import Uncertainty
 
-ASTRAY = 0.99  # of the search's objective: least squares that get below it have left its valley or finished its work
 FIXED = "fixed"
 
 
@@ -44,11 +45,14 @@ class Asked(Setup):
 
 @dataclass(frozen=True)
 class Estimate:
-    """One parameter: its value and how sure it is. Interval (95 %) and standard error are None where there is none."""
+    """One parameter: its value and how sure it is. Interval (95 %) and standard error are None where there is none.
+
+    `search` is where the optimizer itself ended.
+    """
 
     name: str
-    value: float  # where the search ended: least objective
-    most_likely: float  # what interval, error and verdict are about
+    value: float
+    search: float
     unit: str
     interval: tuple[float, float] | None
     standard_error: float | None
@@ -72,8 +76,10 @@ class Judged(NamedTuple):
     """What stands behind a result: heavy, and reckoned again from a loaded one."""
 
     fits: "list[Fit]"
-    known: "Uncertainty"
+    estimated: "Estimated"
+    known: "Uncertainty"  # with the intervals that profiles gave
     together: "Together | None"
+    adequacy: "Adequacy"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -123,27 +129,41 @@ class Identification(Written):
     def parameters(self) -> Estimates:
         """The estimates by name; a parameter with a value of its own in each event is there as T_m[1], T_m[2], too."""
         r, about = self.result, {p.name: p.about for p in self.model.model.parameters}
-        values = dict(r.parameters)
-        for name, own in r.per_event.items():
-            values |= {f"{name}[{k}]": value for k, value in enumerate(own, start=1)}
-        likely, made = r.uncertainty.get("most_likely", {}), Estimates()
+        values, ended, made = _by_event(r.parameters, r.per_event), r.search, Estimates()
+        search = _by_event(ended["parameters"], ended["per_event"]) if ended else values
         for name, value in values.items():
             of, interval = name.partition("[")[0], r.intervals.get(name)
             without = "mean of its events" if name in r.per_event else FIXED if r.verdicts else ""
             verdict = r.verdicts.get(name, without)
             bounds = tuple(r.bounds.get(of, (float("nan"),) * 2))
             made[name] = Estimate(
-                name, value, likely.get(name, value), r.units.get(of, ""), tuple(interval) if interval else None,  # type: ignore[arg-type]
+                name, value, search[name], r.units.get(of, ""), tuple(interval) if interval else None,  # type: ignore[arg-type]
                 r.standard_errors.get(name), verdict, bounds, about.get(of, ""),  # type: ignore[arg-type]
             )  # fmt: skip
         return made
+
+    @property
+    def grade(self) -> str:
+        """`adequate`, `effect_missing` or `wrong_model`; "" where it was not judged."""
+        return self.result.adequacy.get("grade", "")
+
+    @property
+    def headline(self) -> str:
+        """What this identification is good for, in one sentence."""
+        return self.result.adequacy.get("sentence", "")
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the model describes the load, so that intervals and verdicts mean what they say."""
+        return self.grade == "adequate"
 
     @functools.cached_property
     def advice(self) -> list[str]:
         """What to do next, the most pressing first."""
         from tractexp.identification.advice import advise
 
-        return advise(self.judged.known, self.judged.together.odd if self.judged.together else ())
+        judged = self.judged
+        return advise(judged.known, judged.adequacy, judged.together.odd if judged.together else ())
 
     def predict(
         self, event: Any = None, *, t: Any = None, U: Any = None, f: Any = None, P0: float | None = None,
@@ -165,22 +185,43 @@ class Identification(Written):
         return Response("prediction", time, voltage, *self.result.predict(time, voltage, f, P0, Q0))
 
     def table(self) -> Table:
-        span = "{:.4g} .. {:.4g}".format
+        """Estimates; intervals only where the model describes the load, the search's end only where it lies outside."""
+        span, trusted = "{:.4g} .. {:.4g}".format, self.trusted
+        astray = self.astray
         rows = [
-            [e.name, e.value, e.most_likely, e.unit, span(*e.interval) if e.interval else "", e.standard_error,
-             e.verdict]
+            [e.name, e.value, e.unit]
+            + [span(*e.interval) if e.interval else "", e.verdict] * trusted
+            + [e.search if e.name in astray else ""] * bool(astray)
             for e in self.parameters.values()
-        ]  # fmt: skip
-        r, holds = self.result, "holds" if self.result.acceptable else "does NOT hold"
-        said = [
+        ]
+        columns = ["parameter", "value", "unit", *["95 % interval", "verdict"] * trusted, *["search"] * bool(astray)]
+        return Table(columns, rows, self.model.model.title, self._said())
+
+    @property
+    def astray(self) -> list[str]:
+        """Parameters whose interval does not hold the value that the search ended at."""
+        return [
+            e.name for e in self.parameters.values() if e.interval and not e.interval[0] <= e.search <= e.interval[1]
+        ]
+
+    def search_told(self) -> str:
+        """Where the optimizer itself ended, in one line; "" where that is not known."""
+        if not (s := self.result.search):
+            return ""
+        told = f"search: {self.result.optimizer} {s['status']}: objective {s['objective']:.4g} pu² (the estimate's is"
+        told += f" {self.result.objective:.4g}), epsilon_p {s['epsilon_p']:.3%}, epsilon_q {s['epsilon_q']:.3%},"
+        return f"{told} {s['simulations']} simulations in {s['seconds']:.2f} s"
+
+    def _said(self) -> list[str]:
+        r = self.result
+        said = [f"{self.headline[0].upper()}{self.headline[1:]}."] if self.headline else []
+        said += [
             f"{e['name']} ({e['role']}): epsilon_p {e['epsilon_p']:.3%}, epsilon_q {e['epsilon_q']:.3%}"
             for e in r.events
         ]
-        said.append(f"acceptance of Eq. (20), epsilon_p and epsilon_q below 5 %: {holds}; the search {r.status}")
+        said += [told] if (told := self.search_told()) else []
         said += [f"note: {note}" for note in r.uncertainty.get("notes", ())]
-        said += [f"next: {sentence}" for sentence in (self.advice if "judged" in self.__dict__ else ())]
-        columns = ["parameter", "value", "most likely", "unit", "95 % interval", "standard error", "verdict"]
-        return Table(columns, rows, self.model.model.title, said)
+        return said + [f"next: {sentence}" for sentence in (self.advice if "judged" in self.__dict__ else ())]
 
     def to_dict(self) -> dict[str, Any]:
         found = None if self.found is None else asdict(self.found)
@@ -197,47 +238,27 @@ class Identification(Written):
         return cls(Result(**content["result"]), setup and Asked.from_dict(setup), found)
 
     def _write(self, folder: Path) -> list[Path]:
-        """Fits and fitness, report.html and its figures, history.csv and result.json."""
-        fits = self.write_fits(folder)
-        return [*fits, *self.write_page(folder, fits), *self.write_result(folder)]
+        """result.json and history.csv, then report.html."""
+        return [*self.write_result(folder), *self.write_page(folder)]
 
-    def write_fits(self, folder: Path) -> list[Path]:
-        """Write fit.svg (fit_2.svg and so on for further events) and fitness.svg."""
-        from tractexp.report import figures
+    def write_page(self, folder: Path) -> list[Path]:
+        """Write report.html."""
+        from tractexp.provenance import command
+        from tractexp.report import identify
 
-        setup, paths = self.asked, []
-        for k, fit in enumerate(self.judged.fits, start=1):
-            record, role = fit.event.record, "fitted" if fit.role == "train" else "held out"
-            path = figures.fit(
-                folder / ("fit.svg" if k == 1 else f"fit_{k}.svg"), record.t, record.U, (record.P, record.Q),
-                (fit.P, fit.Q), title=f"{record.name} ({role}), {setup.optimizer.name}",
-                epsilon=(fit.epsilon_p, fit.epsilon_q), notes=record.notes,
-            )  # fmt: skip
-            paths.append(path)
-        history, name = self.ended.history, setup.optimizer.name
-        by_iteration = {name: (np.arange(len(history.objective)), history.objective)}
-        by_simulations = {name: (history.simulations, history.objective)}
-        title = f"search of {name}, seed {setup.seed}, on {', '.join(e.record.name for e in setup.train)}"
-        return [*paths, figures.fitness(folder / "fitness.svg", by_iteration, by_simulations, title=title)]
-
-    def write_page(self, folder: Path, fits: Sequence[Path]) -> list[Path]:
-        """Write the figures of the uncertainty and report.html, with the figures `fits` (but fitness.svg) in it."""
-        from tractexp.report import identify, uncertainty
-
-        known = self.judged.known
-        correlation = uncertainty.correlation(folder / "correlation.svg", known)
-        residuals = uncertainty.residuals(folder / "residuals.svg", known)
-        page = identify.page(
-            self.result, known, self.judged.together, self.advice, fits[:-1], correlation, residuals
+        judged, about = self.judged, {p.name: p.about for p in self.model.model.parameters}
+        made = identify.page(
+            self.result, judged.fits, judged.estimated, judged.known, judged.together, judged.adequacy, self.advice,
+            self.ended.history, about, self.search_told(), command(),
         )  # fmt: skip
-        return [correlation, residuals, page.write(folder / "report.html")]
+        return [made.write(folder / "report.html")]
 
     def write_result(self, folder: Path) -> list[Path]:
-        """Write history.csv and result.json."""
+        """Write result.json and history.csv."""
         from tractexp.identification.result import write_history
 
         return [
-            write_history(folder / "history.csv", self.ended.history), self.result.write(folder / "result.json"),
+            self.result.write(folder / "result.json"), write_history(folder / "history.csv", self.ended.history),
         ]  # fmt: skip
 
 
@@ -283,26 +304,35 @@ def identify(
     return Identification.of(setup, setup.found(progress))
 
 
+def _by_event(values: Mapping[str, float], per_event: Mapping[str, Sequence[float]]) -> dict[str, float]:
+    """Parameters by name, with T_m[1], T_m[2], ... where each event has its own."""
+    own = {f"{name}[{k}]": value for name, each in per_event.items() for k, value in enumerate(each, start=1)}
+    return {**values, **own}
+
+
 def _judge(setup: Asked, found: "Found") -> tuple[Result, Judged]:
-    """The result of a search and what stands behind it."""
+    """The estimate that a search led to, and what stands behind it."""
+    from tractexp.identification.adequacy import graded
+    from tractexp.identification.estimate import estimate
     from tractexp.identification.profile import checked
-    from tractexp.identification.result import conclude
-    from tractexp.identification.uncertainty import assess, compare_events
+    from tractexp.identification.result import conclude, refuse_nothing_found
+    from tractexp.identification.together import compare_events
 
     problem = setup.problem
-    result, fits = conclude(problem, found, setup.validate, setup.seed, setup.model.node, setup.optimizer.name)
-    known = assess(problem, found.values, robust=not problem.loss.quadratic)
-    known = checked(known) if setup.check_intervals else known
+    refuse_nothing_found(problem, found)
+    estimated = estimate(problem, found.values)
+    known = estimated.known
+    if setup.check_intervals and estimated.surprise.adequate:
+        known = checked(known)
+    result, fits = conclude(
+        problem, found, setup.validate, setup.seed, setup.model.node, setup.optimizer.name, known.values
+    )
+    adequacy = graded(estimated.surprise, [(f"{c} of {e['name']}", e[f"epsilon_{c.lower()}"])
+                                           for e in result.events for c in "PQ"])  # fmt: skip
     together = compare_events(known) if len(problem.events) > 1 else None
-    return replace(result, **known.fields(together, _astray(problem, found, known))), Judged(fits, known, together)
-
-
-def _astray(problem: "Problem", found: "Found", known: "Uncertainty") -> list[str]:
-    """A sentence where the search's own values lie far from the most likely ones: it ended in another valley."""
-    better = float(problem.objective(known.values[None])[0])
-    if better >= ASTRAY * found.objective:
-        return []
-    return [
-        f"the search stopped short: least squares from where it ended lower the objective from {found.objective:.4g} to"
-        f" {better:.4g}; take the most likely values, or optimizer.polish=true"
-    ]
+    fields = known.fields()
+    fields["uncertainty"] |= together.fields() if together else {"gains": {}, "odd_events": []}
+    fields["uncertainty"]["notes"] += together.notes if together else []
+    starts = [s.told(problem.space.names) for s in estimated.starts]
+    result = replace(result, **fields, adequacy=adequacy.told(), starts=starts)
+    return result, Judged(fits, estimated, known, together, adequacy)

@@ -16,15 +16,16 @@ from tractexp.api.setup import Setup
 from tractexp.errors import UserError, check_range
 from tractexp.outcome import Table
 from tractexp.record import Event
+from tractexp.report.plan import DEPTH, DURATION, NOISE, RATE
 
 if TYPE_CHECKING:
     from tractexp.identification.plan import Shape
+    from tractexp.noise import Noise
     from tractexp.report.plan import Planned
 
 DURATIONS = (0.06, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8)  # s
 RATES = (25.0, 50.0, 100.0, 200.0, 500.0, 1000.0)  # Hz
 NOISES = (0.001, 0.002, 0.005, 0.01, 0.02)  # of P before the event
-DEPTH, DURATION, RATE, NOISE = "depth", "duration [s]", "samples per second", "noise, of P before the dip"
 FIT, DEFAULT = "fit", "default"
 SHAPE = ("depth", "duration", "rate")
 
@@ -69,12 +70,10 @@ class Forecasts(Written):
         return cls(Setup.from_dict(content["setup"]), content["asked"], content["content"])
 
     def _write(self, folder: Path) -> list[Path]:
-        """plan.json, plan.svg and plan.html."""
-        from tractexp.report import plan, uncertainty
+        """plan.html and plan.json."""
+        from tractexp.report import plan
 
-        path = files.write_json(folder / "plan.json", self.content)
-        figure = uncertainty.plan(folder / "plan.svg", self.planned.scans, self.planned.needed.within)
-        return [path, figure, plan.page(folder / "plan.html", self.planned, figure)]
+        return [plan.page(folder / "plan.html", self.planned), files.write_json(folder / "plan.json", self.content)]
 
 
 @public
@@ -100,7 +99,7 @@ def plan(
     How deep must a dip be for `parameter` (H stands for M) to be known with half of its 95 % interval `within` a share
     of the value? The dip is that of the deepest of `records`, unless `depth` (of the voltage before), `duration` [s],
     `rate` [1/s] or `noise` (standard deviation, as a share of P before the event; white) are given. `values` are what
-    is planned at: "fit", a quick fit to that record; "default", the model's; an identification; or the path of a
+    is planned at: "fit", the estimate of that record; "default", the model's; an identification; or the path of a
     `result.json`. Of several records those that tell most together are chosen, until another one narrows the intervals
     by less than the share `least`, at most `events` of them. The model is as in `tractexp.identify`.
 
@@ -137,43 +136,46 @@ def _planned(setup: Setup, parameter: str, within: float, values: Any, least: fl
     if problem.per_event:
         raise UserError("task=plan plans for shared parameters; leave model.per_event empty")
     deepest = max(recorded, key=lambda e: e.depth)
-    shape = _shape(deepest, **given)
+    at, origin, noise = _guess(setup, deepest, values)
+    shape = _shape(deepest, seen=noise, **given)
     shape.check()
-    at, origin = _guess(setup, deepest, values)
     scans = _scans(problem, at, shape)
     needed = depth_needed(scans[DEPTH][1], parameter, within)
     best = best_events(problem, at, least, events) if len(recorded) > 1 else []
     return Planned(problem, at, origin, _described(shape), needed, scans, best, least, events)
 
 
-def _shape(event: Event, noise: float | None, **given: float | None) -> "Shape":
-    """The dip to plan for: the recorded one with what is given replaced."""
+def _shape(event: Event, noise: float | None, seen: "Noise | None" = None, **given: float | None) -> "Shape":
+    """The dip to plan for: the recorded one, with the noise `seen` in its fit, and what is given replaced."""
     from tractexp.identification.plan import Shape
 
-    shape = replace(Shape.of(event), **{key: value for key, value in given.items() if value is not None})  # type: ignore[arg-type]
+    shape = replace(Shape.of(event, seen), **{key: value for key, value in given.items() if value is not None})  # type: ignore[arg-type]
     if noise is not None:
         shape = replace(shape, noise_P=noise * abs(event.P0), noise_Q=noise * abs(event.P0), memory=0.0)
     return shape
 
 
-def _guess(setup: Setup, event: Event, values: Any) -> tuple[np.ndarray, str]:
-    """Free values (d,) to plan at, and where they are from."""
-    from tractexp.identification.plan import guess
+def _guess(setup: Setup, event: Event, values: Any) -> "tuple[np.ndarray, str, Noise | None]":
+    """Free values (d,) to plan at, where they are from, and the noise that the fit showed."""
+    from tractexp.identification.estimate import polished
     from tractexp.identification.result import load
 
     problem = setup.problem_of([event])
     if values == FIT:
-        return guess(problem), f"the values of a quick fit to {event.record.name}"
+        fit = polished(problem)
+        origin = f"the estimate of {event.record.name}"
+        if not fit.surprise.adequate:
+            origin += ", though an effect is missing there: the forecast holds for the noise alone"
+        return fit.known.values, origin, fit.known.likelihood.noise.of(0)
     if values == DEFAULT:
         defaults = [p.default for p in problem.parameters if p.name in problem.space.names]
-        return np.array(defaults), "the model's default values"
+        return np.array(defaults), "the model's default values", None
     given = isinstance(values, Mapping)
     known = values if given else load(Path(values)).parameters
     if missing := [name for name in problem.space.names if name not in known]:
         raise UserError(f"task.values={values}: that result has no {', '.join(missing)}; it is of another model")
-    return np.array(
-        [known[n] for n in problem.space.names]
-    ), f"the values of {'an identification' if given else values}"
+    origin = f"the values of {'an identification' if given else values}"
+    return np.array([known[n] for n in problem.space.names]), origin, None
 
 
 def _scans(problem: Any, values: np.ndarray, shape: "Shape") -> dict[str, Any]:

@@ -46,7 +46,7 @@ class Sampled(Written):
     def table(self) -> Table:
         span, r = "{:.4g} .. {:.4g}".format, self.fit.result
         rows = [
-            [name, f"{r.uncertainty['most_likely'][name]:.4g}", span(*r.intervals[name]), span(*interval)]
+            [name, f"{r.free[name]:.4g}", span(*r.intervals[name]), span(*interval)]
             for name, interval in self.content["intervals"].items()
         ]
         said = f"autocorrelation time {self.content['autocorrelation']:.0f} of {self.settings['steps']} steps"

@@ -33,7 +33,7 @@ class Profiled(Written):
 
     @functools.cached_property
     def made(self) -> "Profiles":
-        """What stands behind the figure; of a loaded result it is reckoned again."""
+        """What stands behind the page; of a loaded result it is reckoned again."""
         from tractexp.identification.profile import profiles
 
         return profiles(self.fit.judged.known, self.points)
@@ -52,7 +52,7 @@ class Profiled(Written):
 
     def table(self) -> Table:
         span = "{:.4g} .. {:.4g}".format
-        likely = self.result.uncertainty["most_likely"]
+        likely = self.result.free
         rows = [
             [name, f"{likely[name]:.4g}", span(*self.curvature[name]), span(*p["interval"])]
             for name, p in self.profiles.items()
@@ -70,12 +70,12 @@ class Profiled(Written):
         return cls(fit, content["points"], content["content"], result, content["curvature"])
 
     def _write(self, folder: Path) -> list[Path]:
-        """profiles.svg, profile.json, history.csv and result.json."""
-        from tractexp.report import uncertainty
+        """profile.html, profile.json, history.csv and result.json."""
+        from tractexp.report import profile
 
-        figure = uncertainty.profiles(folder / "profiles.svg", self.made)
         path = files.write_json(folder / "profile.json", self.content)
-        return [figure, path, *self.identification.write_result(folder)]
+        page = profile.page(folder / "profile.html", self.made)
+        return [page, path, *self.identification.write_result(folder)]
 
 
 @public
@@ -94,7 +94,8 @@ def profile(fit: Identification, *, points: int = 24) -> Profiled:
     content = _content(made, time.perf_counter() - started)
     verdicts = {name: str(verdict) for name, verdict in made.verdicts.items()}
     intervals = {p.name: list(p.interval) for p in made.profiles}
-    fields = made.known.fields(notes=made.notes) | {"verdicts": verdicts, "intervals": intervals}
+    fields = made.known.fields() | {"verdicts": verdicts, "intervals": intervals}
+    fields["uncertainty"]["notes"] += made.notes
     ends = zip(made.known.names, made.known.values, made.known.half, strict=True)
     curvature = {name: (float(value - half), float(value + half)) for name, value, half in ends}
     done = Profiled(fit, points, content, replace(fit.result, **fields), curvature)

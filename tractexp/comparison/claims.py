@@ -3,9 +3,12 @@
 import numpy as np
 
 from tractexp.comparison.ablation import Ablation, Effect
-from tractexp.comparison.comparison import Comparison, Pair
+from tractexp.comparison.comparison import Comparison, Pair, seeds_needed
+from tractexp.comparison.floor import AT_FLOOR
 from tractexp.comparison.statistics import ALPHA
-from tractexp.comparison.summary import AT_FLOOR, Spread
+from tractexp.comparison.summary import Spread
+
+MORE = 1.2  # times the simulations of another variant are worth a word
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -23,8 +26,45 @@ def p_value(p: float) -> str:
     return f"{p:.2g}" if p >= 1e-4 else f"{p:.1e}"
 
 
+def answer(comparison: Comparison) -> str:
+    """Which variant to take, as far as these runs say."""
+    if len(comparison.summaries) < 2:
+        return f"There is one variant only, {comparison.summaries[0].name}: nothing to choose from."
+    best, *others = comparison.leaders
+    if max((pair.seeds for pair in comparison.pairs), default=0) < seeds_needed(len(comparison.pairs)):
+        lowest = f"{_listed([best, *others])} have" if others else f"{best} has"
+        return f"Not settled: there are too few seeds to test. {lowest} the lowest median objective so far."
+    _, worse, alike = _verdicts(comparison, best)
+    if worse:
+        return f"Not settled: {best} has the lowest median objective, but {_listed(worse)} did better seed by seed."
+    rivals = [name for name in alike if name not in others]
+    if rivals:
+        return f"Take {best}, or as well {_listed(rivals)}: these runs do not tell them apart.{_spent(comparison)}"
+    why = f"it ends as low as {_listed(others)}, sooner" if others else "it ends lower than the others"
+    return f"Take {best}: {why}.{_spent(comparison)}"
+
+
+def _spent(comparison: Comparison) -> str:
+    """What the best variant spent, where that is more than another did."""
+    first, *others = comparison.summaries
+    least = min(others, key=lambda summary: summary.simulations.median)
+    if not first.simulations.median > MORE * least.simulations.median:
+        return ""
+    spent = (f"{number(float(round(s.simulations.median)))} simulations" for s in (first, least))
+    return f" It spent {next(spent)}, where {least.name} spent {next(spent)}."
+
+
+def _verdicts(comparison: Comparison, name: str) -> tuple[list[str], list[str], list[str]]:
+    """The variants that one is significantly better than, those it is worse than, and those it is not told from."""
+    own = [pair for pair in comparison.pairs if name in (pair.first, pair.second)]
+    beaten = [pair.second for pair in own if pair.significant and pair.first == name]
+    worse = [pair.first for pair in own if pair.significant and pair.second == name]
+    alike = [pair.second if pair.first == name else pair.first for pair in own if not pair.significant]
+    return beaten, worse, alike
+
+
 def headline(comparison: Comparison) -> str:
-    """The shortest true answer to the question which variant is best."""
+    """How the best variant stands to the others."""
     if not comparison.pairs:
         return "No difference between variants was tested."
     best, *others = comparison.leaders
@@ -33,10 +73,7 @@ def headline(comparison: Comparison) -> str:
         said = f"{_listed([best, *others])} reach the lowest median objective ({within}); {best}, the fastest of them,"
     else:
         said = f"{best} has the lowest median objective; it"
-    own = [pair for pair in comparison.pairs if best in (pair.first, pair.second)]
-    beaten = [pair.second for pair in own if pair.significant and pair.first == best]
-    worse = [pair.first for pair in own if pair.significant and pair.second == best]
-    alike = [pair.second if pair.first == best else pair.first for pair in own if not pair.significant]
+    beaten, worse, alike = _verdicts(comparison, best)
     verdicts = [f"is significantly better than {_listed(beaten)}"] if beaten else []
     verdicts += [f"is significantly worse than {_listed(worse)} over paired seeds"] if worse else []
     verdicts += [f"shows no significant difference to {_listed(alike)}"] if alike else []
@@ -113,11 +150,24 @@ def of_speed(comparison: Comparison) -> str:
 
 def of_floor(comparison: Comparison) -> str:
     """How often the noise floor was reached."""
-    shares = sorted(((s.at_floor, s.runs, s.name) for s in comparison.summaries), key=lambda row: (-row[0], row[2]))
-    told = [f"{name} {round(share * n)} of {n}" for share, n, name in shares[:6]]
-    more = f" (the best six of {len(shares)})" if len(shares) > 6 else ""
+    told = _ranked([(s.at_floor, s.runs, s.name) for s in comparison.summaries])
     value, source = number(comparison.floor.value, 5), comparison.floor.source
-    return f"Runs within {AT_FLOOR:.0%} of the floor of {value} pu² ({source}): {', '.join(told)}{more}."
+    return f"Runs within {AT_FLOOR:.0%} of the floor of {value} pu² ({source}): {told}."
+
+
+def of_valley(comparison: Comparison) -> str:
+    """How often a search ended where the floor's values are only a descent away; "" where that is not known."""
+    rows = [(s.in_valley, s.runs - s.failures, s.name) for s in comparison.summaries if s.in_valley is not None]
+    if not rows:
+        return ""
+    return f"Runs that ended in the floor's valley, from where least squares reach it: {_ranked(rows)}."
+
+
+def _ranked(rows: list[tuple[float, int, str]]) -> str:
+    """Shares of runs in words, the largest first: (share, runs, variant)."""
+    rows = sorted(rows, key=lambda row: (-row[0], row[2]))
+    more = f" (the best six of {len(rows)})" if len(rows) > 6 else ""
+    return ", ".join(f"{name} {round(share * n)} of {n}" for share, n, name in rows[:6]) + more
 
 
 def of_effect(effect: Effect) -> str:
@@ -149,7 +199,13 @@ def of_unknown(ablation: Ablation) -> str:
 
 def sentences(comparison: Comparison) -> list[str]:
     """All claims, the most general first."""
-    told = [headline(comparison), of_floor(comparison), of_speed(comparison), of_ranks(comparison)]
+    told = [
+        headline(comparison),
+        of_floor(comparison),
+        of_valley(comparison),
+        of_speed(comparison),
+        of_ranks(comparison),
+    ]
     told += [of_pair(comparison, pair) for group in near_and_far(comparison) for pair in group]
     if comparison.ablation:
         told += [of_effect(effect) for effect in comparison.ablation.effects]

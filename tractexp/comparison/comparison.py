@@ -7,6 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from tractexp.comparison.ablation import Ablation, ablate
+from tractexp.comparison.floor import Floor, Polished, floor_of
 from tractexp.comparison.runs import Gathered, Variant
 from tractexp.comparison.statistics import (
     ALPHA,
@@ -17,7 +18,7 @@ from tractexp.comparison.statistics import (
     vargha_delaney,
     wilcoxon,
 )
-from tractexp.comparison.summary import Floor, Summary, floor_of, summarize
+from tractexp.comparison.summary import Summary, summarize
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,7 @@ class Comparison:
 
     gathered: Gathered
     floor: Floor
+    polished: Polished | None  # None where the problem of the runs could not be put again
     targets: tuple[float, ...]  # multiples of the floor
     ties: float  # objectives within this share of the floor are equal
     summaries: tuple[Summary, ...]
@@ -72,25 +74,37 @@ def compare(
     floor: float | None = None,
     reference: str | None = None,
     plain: Mapping[str, str] | None = None,
+    polished: Polished | None = None,
+    why_not: str = "",
 ) -> Comparison:
     """Compare variants; with a `reference`, only its pairs are tested. `plain`: see `ablation.ablate`.
 
-    A failed run counts as worse than any other. Raises `UserError` for an unknown reference.
+    `polished` gives the floor, unless `floor` does; `why_not` says why there is no such. A failed run counts as worse
+    than any other. Raises `UserError` for an unknown reference.
     """
     if reference is not None:
         reference = gathered[reference].name
-    low = floor_of(gathered.variants, floor)
+    low = floor_of([run for variant in gathered.variants for run in variant.runs], floor, polished, why_not)
     least = (1 + ties) * low.value
-    summaries = [summarize(variant, low, targets) for variant in gathered.variants]
+    summaries = [summarize(variant, low, targets, polished) for variant in gathered.variants]
     hardest = int(np.argmin(targets))
     summaries.sort(key=lambda s: (*_standing(s.objective.median, least), s.ert["simulations"][hardest], s.name))
     pairs, notes = _pairs(gathered.variants, least, reference)
     ranks, more = _ranks(gathered.variants, least)
     ablation = ablate(gathered.variants, plain or {}, least)
+    if floor is not None and polished is not None and polished.objective < (1 - ties) * floor:
+        notes.append(
+            f"task.floor={floor:g} lies above what least squares reach from many starts, {polished.objective:.5g} pu²."
+        )
     everything = (*gathered.notes, *notes, *more)
     return Comparison(
-        gathered, low, tuple(targets), ties, tuple(summaries), pairs, ranks, ablation, reference, everything
+        gathered, low, polished, tuple(targets), ties, tuple(summaries), pairs, ranks, ablation, reference, everything
     )
+
+
+def seeds_needed(pairs: int) -> int:
+    """The fewest seeds by which a difference can pass Wilcoxon's test where so many pairs are corrected for."""
+    return int(np.floor(np.log2(2 * pairs / ALPHA))) + 1 if pairs else LEAST_SEEDS
 
 
 def _standing(median: float, least: float) -> tuple[bool, float]:
@@ -116,7 +130,7 @@ def _pairs(variants: Sequence[Variant], least: float, reference: str | None) -> 
     made = [_pair(*row, least) for row in enough]
     corrected = holm([pair.p for pair in made])
     pairs = [Pair(**{**vars(pair), "corrected": float(p)}) for pair, p in zip(made, corrected, strict=True)]
-    needed = int(np.floor(np.log2(2 * len(made) / ALPHA))) + 1 if made else 0
+    needed = seeds_needed(len(made))
     if made and max(pair.seeds for pair in made) < needed:
         notes.append(
             f"With {len(made)} pairs corrected for, fewer than {needed} seeds can show no difference at {ALPHA:.0%}, "

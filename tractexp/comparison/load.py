@@ -13,7 +13,9 @@ from tractexp.comparison.runs import Run
 from tractexp.errors import UserError
 
 TASK = "identify"  # the task whose runs are compared
-FINISHED = "finished"  # what a job's status.json says when all went well
+FINISHED, RUNNING, INTERRUPTED = "finished", "running", "interrupted"  # what a job's status.json says
+UNDER_WAY = ("RUNNING", "SCHEDULED", "KILLED")  # what MLflow says of a run that neither finished nor failed
+ENDED = ("objective", "epsilon_p", "epsilon_q")
 
 
 def newest_sweep(folder: Path) -> Path:
@@ -50,19 +52,41 @@ def _job(folder: Path) -> Run | None:
     config = _yaml(folder / ".hydra" / "config.yaml")
     if config["task"]["name"] != TASK:
         return None
-    choices = _yaml(folder / ".hydra" / "hydra.yaml")["hydra"]["runtime"]["choices"]
+    status = _status(folder)
+    unfinished = _unfinished(folder, status)
+    runtime: Mapping[str, Any] = {"choices": status.get("choices")}
+    if (folder / ".hydra" / "hydra.yaml").is_file() or not (unfinished and runtime["choices"]):
+        runtime = _yaml(folder / ".hydra" / "hydra.yaml")["hydra"]["runtime"]  # of a job ended at once it is missing
+    choices = runtime["choices"]
     told: dict[str, Any] = {
         "optimizer": choices["optimizer"], "data": choices["data"], "seed": int(config["seed"]),
-        "config": flat(config), "where": folder.name,
+        "config": flat(config), "where": folder.name, "folder": runtime.get("cwd", ""),
     }  # fmt: skip
-    if failure := _failure(folder):
-        return Run(**told, failure=failure)
+    if unfinished:
+        return Run(**told, **unfinished)
     with _readable(folder / "result.json") as path:
         result = json.loads(path.read_text(encoding="utf-8"))
-        told |= {key: float(result[key]) for key in ("objective", "epsilon_p", "epsilon_q")}
+        ended = ended_search(result)
+        told |= {key: float(ended[key]) for key in ENDED} | {"parameters": parameters_of(ended)}
     with _readable(folder / "history.csv") as path:
-        _, simulations, seconds, history = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2).T
-    return Run(**told, simulations=simulations, seconds=seconds, history=history)
+        return Run(**told, **_history(path.read_text(encoding="utf-8")))
+
+
+def _history(text: str) -> dict[str, np.ndarray]:
+    """The search by iteration, of a `history.csv`."""
+    _, simulations, seconds, history = np.loadtxt(text.splitlines(), delimiter=",", skiprows=1, ndmin=2).T
+    return {"simulations": simulations, "seconds": seconds, "history": history}
+
+
+def ended_search(result: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Where the optimizer itself ended, of a `result.json`: in early ones, that was the whole of it."""
+    return result.get("search") or result
+
+
+def parameters_of(ended: Mapping[str, Any]) -> dict[str, float]:
+    """{name: value}, where it differs by event {"T_m[1]": value, ...} as well."""
+    own = {f"{name}[{k}]": v for name, values in ended.get("per_event", {}).items() for k, v in enumerate(values, 1)}
+    return {**ended.get("parameters", {}), **own}
 
 
 @contextmanager
@@ -77,15 +101,24 @@ def _readable(path: Path) -> Iterator[Path]:
         raise UserError(f"{path} cannot be read: {reason}; run this job again, or remove its folder") from error
 
 
-def _failure(folder: Path) -> str:
-    """Why a job has no result, "" where it has one."""
-    if (folder / "status.json").is_file():
-        with _readable(folder / "status.json") as path:
-            told = json.loads(path.read_text(encoding="utf-8"))
-            status, message = str(told["status"]), str(told.get("message") or "")
-        if status != FINISHED:
-            return message or f"its status is {status}"
-    return "" if (folder / "result.json").is_file() else "it left no result.json: it was ended, or still runs"
+def _status(folder: Path) -> Mapping[str, Any]:
+    """The content of `status.json`; {} where the job was none of a sweep of ours, or has not begun."""
+    if not (folder / "status.json").is_file():
+        return {}
+    with _readable(folder / "status.json") as path:
+        told = json.loads(path.read_text(encoding="utf-8"))
+        return {"message": "", **told, "status": str(told["status"])}
+
+
+def _unfinished(folder: Path, told: Mapping[str, Any]) -> dict[str, str]:
+    """Why a job has no result: {"failure": ...} or {"interruption": ...}; {} where it has one."""
+    if INTERRUPTED in (told.get("status"), told.get("message")):  # early sweeps: "failed", with this message
+        return {"interruption": "its sweep was interrupted"}
+    if told and told["status"] not in (FINISHED, RUNNING):
+        return {"failure": told["message"] or f"its status is {told['status']}"}
+    if (folder / "result.json").is_file() and (folder / "history.csv").is_file():
+        return {}
+    return {"interruption": "it left no result: it was ended, or still runs"}
 
 
 def _yaml(path: Path) -> Any:
@@ -106,11 +139,23 @@ def flat(node: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return made
 
 
+def nested(flattened: Mapping[str, Any]) -> dict[str, Any]:
+    """The reverse of `flat`; a mapping that was empty is not there."""
+    made: dict[str, Any] = {}
+    for key, value in flattened.items():
+        *path, last = key.split(".")
+        node = made
+        for part in path:
+            node = node.setdefault(part, {})
+        node[last] = value
+    return made
+
+
 def from_logged(logged: Iterable[Any], source: str) -> list[Run]:
     """Runs from what `tractexp.tracking.find` returns, oldest first; only identifications count, no parent runs.
 
-    MLflow keeps no seconds along the search: the run's duration is divided evenly over its simulations. Raises
-    `UserError` where there is none.
+    Where the artifacts of a run are missing, its search is known by the curve in MLflow alone, which has fewer points
+    and no seconds: what the search took is divided evenly over its simulations. Raises `UserError` where there is none.
     """
     runs = [_logged(one) for one in logged if one.tags.get("task") == TASK and "optimizer" in one.tags]
     if not runs:
@@ -126,13 +171,20 @@ def _logged(one: Any) -> Run:
         "optimizer": one.tags["optimizer"], "data": one.tags["data"], "seed": int(one.tags["seed"]),
         "config": {key: _value(text) for key, text in one.parameters.items()}, "where": one.name,
     }  # fmt: skip
-    curve = one.curves.get("fitness_by_simulations")
+    curve, ended = one.curves.get("fitness_by_simulations"), {}
+    if one.status in UNDER_WAY:
+        return Run(**told, interruption=f"its status in MLflow is {one.status}")
     if one.status != "FINISHED" or "objective" not in one.metrics or curve is None:
         return Run(**told, failure=f"its status in MLflow is {one.status}")
-    simulations, history = curve
-    seconds = one.metrics["seconds"] * simulations / simulations[-1]
-    told |= {key: one.metrics[key] for key in ("objective", "epsilon_p", "epsilon_q")}
-    return Run(**told, simulations=simulations, seconds=seconds, history=history)
+    for key in (*ENDED, "simulations", "seconds"):  # early runs have one value of each, the search's
+        ended[key] = one.metrics.get(f"search_{key}", one.metrics.get(key, np.nan))
+    known = parameters_of(ended_search(json.loads(one.files.get("result.json", "{}"))))
+    total, seconds = ended.pop("simulations"), ended.pop("seconds")
+    if "history.csv" in one.files:
+        return Run(**told, **ended, **_history(one.files["history.csv"]), parameters=known)
+    simulations = np.fmin(curve[0], total)
+    spent = seconds * simulations / simulations[-1]
+    return Run(**told, **ended, simulations=simulations, seconds=spent, history=curve[1], parameters=known)
 
 
 def _value(text: str) -> Any:

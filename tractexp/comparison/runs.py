@@ -1,4 +1,7 @@
-"""One run of a comparison, and the runs of one variant: an optimizer with its settings, under all its seeds."""
+"""One run of a comparison, and the runs of one variant: an optimizer with its settings, under all its seeds.
+
+What is compared is where each search ended, before the estimate was polished.
+"""
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -9,12 +12,18 @@ import numpy as np
 
 from tractexp.errors import UserError, among
 
-LIMITS = ("budget", "time_limit", "target")  # settings beside the optimizer's own that make a variant
+# The parts of a configuration. Every key belongs to one of them, so that nothing swept is pooled under one name.
+PROBLEM = ("data", "model", "objective")  # one comparison has one of each
+SETTINGS = ("optimizer", "task", "budget", "time_limit", "target")  # what differs in these makes a variant
+REST = ("seed", "tracking")  # what differs in these does not
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One identification. The history has one entry per iteration; a failed run has none and the objective inf."""
+    """The search of one identification, as it ended. The history has one entry per iteration.
+
+    A failed run has none and the objective inf. An interrupted one neither failed nor finished.
+    """
 
     optimizer: str  # as chosen: "issa_no_levy"
     data: str  # as chosen: "tibet_50pct"
@@ -27,11 +36,14 @@ class Run:
     simulations: np.ndarray = field(default_factory=lambda: np.empty(0))  # (n,) spent by the end of an iteration
     seconds: np.ndarray = field(default_factory=lambda: np.empty(0))  # (n,)
     history: np.ndarray = field(default_factory=lambda: np.empty(0))  # (n,) best objective so far, pu²
+    parameters: Mapping[str, float] = field(default_factory=dict)  # empty where they are not known
     failure: str = ""  # why there is no result
+    interruption: str = ""  # why there is none yet
+    folder: str = ""  # where it ran, from which relative paths count; "" where that is not known
 
     @property
     def finished(self) -> bool:
-        return not self.failure
+        return not (self.failure or self.interruption)
 
     def spent(self, target: float, cost: str) -> float:
         """Simulations or seconds (`cost`) by the end of the iteration that reached `target`; inf where none did."""
@@ -65,6 +77,7 @@ class Gathered:
     variants: tuple[Variant, ...]
     problem: str
     notes: tuple[str, ...]
+    interrupted: tuple[tuple[str, Run], ...] = ()  # (variant, run), which are not judged
 
     def __getitem__(self, name: str) -> Variant:
         found = [variant for variant in self.variants if variant.name == name]
@@ -78,7 +91,8 @@ class Gathered:
 def gather(runs: Sequence[Run], source: str, data: str | None = None) -> Gathered:
     """Group runs into variants; `data` keeps the runs on that choice of data. Later repeats replace earlier ones.
 
-    Raises `UserError` where no run is left, none finished, or the runs do not solve the same problem.
+    Interrupted runs are told apart from those that are judged. Raises `UserError` where no run is left, none
+    finished, or the runs do not solve the same problem.
     """
     if data is not None:
         known = {run.data for run in runs}
@@ -86,36 +100,64 @@ def gather(runs: Sequence[Run], source: str, data: str | None = None) -> Gathere
         if not runs:
             raise UserError(f"task.data={data}: {source} has no run on these data{among(data, known, 'Data')}")
     _check_same_problem(runs, source)
-    failures = [run for run in runs if not run.finished]
-    if len(failures) == len(runs):
-        raise UserError(
-            f"none of the {len(runs)} runs of {source} finished, so there is nothing to compare; "
-            f"the first failed because: {failures[0].failure}"
-        )
-    unique = {(run.optimizer, _settings(run), run.seed): run for run in runs}
-    left_out = len(runs) - len(unique)
+    _check_any_finished(runs, source)
+    ended = [run for run in runs if not run.interruption]
+    unique = {_identity(run): run for run in ended}
+    left_out = len(ended) - len(unique)
     notes = [f"Of runs made more than once, the newest count: {left_out} left out."] if left_out else []
-    return Gathered(_variants(list(unique.values())), _problem_name(runs[0]), tuple(notes))
+    names = _names(runs)
+    interrupted = {_identity(run): run for run in runs if run.interruption and _identity(run) not in unique}
+    unjudged = tuple((names[_settings(run)], run) for run in interrupted.values())
+    if unjudged:
+        count = f"{len(unjudged)} runs were" if len(unjudged) > 1 else "One run was"
+        notes.append(f"{count} interrupted, or still going on, and not judged: see the end of the page.")
+    return Gathered(_variants(list(unique.values()), names), _problem_name(runs[0]), tuple(notes), unjudged)
 
 
-def _settings(run: Run) -> tuple[tuple[str, str], ...]:
-    kept = {k: v for k, v in run.config.items() if k.startswith("optimizer.") or k in LIMITS}
-    return tuple(sorted((k, repr(v)) for k, v in kept.items()))
+def _check_any_finished(runs: Sequence[Run], source: str) -> None:
+    if any(run.finished for run in runs):
+        return
+    failures = [run.failure for run in runs if run.failure]
+    why = f"the first failed because: {failures[0]}" if failures else "all were interrupted, or still go on"
+    raise UserError(f"none of the {len(runs)} runs of {source} finished, so there is nothing to compare; {why}")
 
 
-def _variants(runs: list[Run]) -> tuple[Variant, ...]:
-    groups: dict[str, dict[Any, list[Run]]] = defaultdict(lambda: defaultdict(list))
+Settings = tuple[str, tuple[tuple[str, str], ...]]  # the optimizer as chosen, and what is set
+
+
+def _settings(run: Run) -> Settings:
+    kept = {key: value for key, value in run.config.items() if key.partition(".")[0] in SETTINGS}
+    return run.optimizer, tuple(sorted((key, repr(value)) for key, value in kept.items()))
+
+
+def _identity(run: Run) -> tuple[Settings, int]:
+    return _settings(run), run.seed
+
+
+def _names(runs: Sequence[Run]) -> dict[Settings, str]:
+    """What each variant is called: its optimizer, and the settings in which runs of that optimizer differ."""
+    groups: dict[str, list[Settings]] = defaultdict(list)
+    for settings in dict.fromkeys(map(_settings, runs)):
+        groups[settings[0]].append(settings)
+    names = {}
+    for optimizer, several in groups.items():
+        differing = {item for _, settings in several for item in settings}
+        differing -= set.intersection(*(set(settings) for _, settings in several))
+        for one in several:
+            parts = [f"{k.removeprefix('optimizer.')}={_plain(v)}" for k, v in one[1] if (k, v) in differing]
+            names[one] = " ".join([optimizer, *parts])
+    return names
+
+
+def _variants(runs: list[Run], names: Mapping[Settings, str]) -> tuple[Variant, ...]:
+    groups: dict[Settings, list[Run]] = defaultdict(list)
     for run in runs:
-        groups[run.optimizer][_settings(run)].append(run)
+        groups[_settings(run)].append(run)
     made = []
-    for optimizer, by_settings in groups.items():
-        differing = {item for settings in by_settings for item in settings}
-        differing -= set.intersection(*map(set, by_settings))
-        for settings, members in by_settings.items():
-            parts = [f"{key.removeprefix('optimizer.')}={_plain(v)}" for key, v in settings if (key, v) in differing]
-            own = {key.removeprefix("optimizer."): members[0].config[key] for key, _ in settings}
-            members.sort(key=lambda run: run.seed)
-            made.append(Variant(" ".join([optimizer, *parts]), optimizer, own, tuple(members)))
+    for settings, members in groups.items():
+        own = {key.removeprefix("optimizer."): members[0].config[key] for key, _ in settings[1]}
+        members.sort(key=lambda run: run.seed)
+        made.append(Variant(names[settings], settings[0], own, tuple(members)))
     return tuple(sorted(made, key=lambda variant: variant.name))
 
 
@@ -130,15 +172,15 @@ def _problem_name(run: Run) -> str:
 
 
 def _check_same_problem(runs: Sequence[Run], source: str) -> None:
-    """Objectives compare only on the same data and model."""
+    """Objectives compare only on the same data, with the same model, by the same measure."""
     chosen = sorted({run.data for run in runs})
     if len(chosen) > 1:
         raise UserError(
             f"{source} holds runs on different data ({', '.join(chosen)}), whose objectives cannot be compared; "
             f"choose one, such as task.data={chosen[0]}"
         )
-    for part in ("data", "model"):
-        contents = [{k: repr(v) for k, v in run.config.items() if k.startswith(part + ".")} for run in runs]
+    for part in PROBLEM:
+        contents = [{k: repr(v) for k, v in run.config.items() if k.partition(".")[0] == part} for run in runs]
         for key in sorted({key for content in contents for key in content}):
             values = sorted({_plain(content.get(key, "None")) for content in contents})
             if len(values) > 1:

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tractexp.comparison.floor import AT_FLOOR, Floor, Polished
 from tractexp.comparison.runs import Run, Variant
 from tractexp.comparison.statistics import expected_running_time
 
-AT_FLOOR = 0.01  # a run within this share of the floor has reached it
 COSTS = ("simulations", "seconds")
 ECDF_TARGETS = 1 + 10.0 ** np.arange(3.0, -2.01, -0.2)  # multiples of the floor: 1001 down to 1.01
 
@@ -42,26 +42,11 @@ class Summary:
     epsilon_q: Spread
     simulations: Spread
     at_floor: float  # share of runs within 1 % of the floor
+    in_valley: float | None  # share of finished runs that ended in the floor's valley; None where that is not known
     ert: dict[str, list[float]]  # {"simulations": [one for each target], "seconds": [...]}
 
 
-@dataclass(frozen=True)
-class Floor:
-    """The objective that the noise leaves, and where that number comes from."""
-
-    value: float
-    source: str
-
-
-def floor_of(variants: Sequence[Variant], given: float | None) -> Floor:
-    """The floor as `given`, or the best objective of all runs."""
-    if given is not None:
-        return Floor(given, "as given by task.floor")
-    value, best = min((run.objective, variant.name) for variant in variants for run in variant.runs)
-    return Floor(value, f"the best objective of all runs compared, reached by {best}")
-
-
-def summarize(variant: Variant, floor: Floor, targets: Sequence[float]) -> Summary:
+def summarize(variant: Variant, floor: Floor, targets: Sequence[float], polished: Polished | None = None) -> Summary:
     """`targets` are multiples of the floor."""
     done = variant.finished
     spreads = {key: Spread.of([getattr(run, key) for run in done]) for key in ("objective", "epsilon_p", "epsilon_q")}
@@ -69,9 +54,10 @@ def summarize(variant: Variant, floor: Floor, targets: Sequence[float]) -> Summa
     ert = {cost: [running_time(variant, target * floor.value, cost) for target in targets] for cost in COSTS}
     simulations = Spread.of([run.simulations[-1] for run in done])
     failures = len(variant.runs) - len(done)
+    inside = [there for run in done if polished and (there := polished.in_valley(run)) is not None]
     return Summary(
         variant.name, len(variant.runs), failures, **spreads, simulations=simulations,
-        at_floor=float(np.mean(reached)), ert=ert,
+        at_floor=float(np.mean(reached)), in_valley=float(np.mean(inside)) if inside else None, ert=ert,
     )  # fmt: skip
 
 
@@ -115,6 +101,7 @@ def band(variant: Variant, by: str, points: int = 300) -> Band:
     done = variant.finished
     steps = [run.simulations if by == "simulations" else np.arange(len(run.history)) for run in done]
     first, last = max(step[0] for step in steps), max(step[-1] for step in steps)
-    x = np.unique(np.linspace(first, last, points).round())
+    spaced = np.geomspace if by == "simulations" else np.linspace  # as they are drawn
+    x = np.unique(spaced(first, last, points).round())
     at = [run.history[np.searchsorted(step, x, side="right") - 1] for run, step in zip(done, steps, strict=True)]
     return Band(x, *np.quantile(at, (0.25, 0.5, 0.75), axis=0))

@@ -1,76 +1,24 @@
-"""What a fit leaves: statistics of the whitened, projected residual, and how surprising they are.
-
-Each looks for another kind of thing that no effect of the catalogue accounts for. Sums of many parts (b,) have a gamma
-tail, the largest of many (b, k) that of a Gumbel distribution, both with the moments of draws under the null, so that
-the tails reach further than their number.
-"""
-
-from dataclasses import dataclass
+"""What a fit leaves that no effect of the catalogue accounts for, by every statistic of an investigation."""
 
 import numpy as np
-from scipy.special import gammaincc
 
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.projection import Projection
-from tractexp.discrepancy.pushes import windows
-
-SMALLEST_P = 1e-300
-LOUDEST = "the loudest window"
-STRIDE = 4  # samples between the instants at which a step is looked for
-BINS = 1024  # of the transform in which an oscillation is looked for
-PULSES = (0.01, 0.03, 0.1)  # s, lengths of the pulses that are looked for after the dips
-BURSTS = (0.1, 0.3)  # s, lengths of the stretches after the dips in which an oscillation may come and go
-FEWEST = 8  # samples of a stretch with an oscillation
-
-
-@dataclass(frozen=True, eq=False)
-class Cell:
-    """A stretch of one channel of one event, as samples of the drive and as times of the record."""
-
-    event: int
-    channel: str
-    part: slice
-    start: float  # s
-    end: float
+from tractexp.identification import surprises
+from tractexp.identification.surprises import SMALLEST_P
 
 
 def statistics(projection: Projection, bench: Bench) -> dict[str, np.ndarray]:
     """Every statistic by what it looks for: a sum (b,), or those of which the largest counts (b, k)."""
-    channels = channels_of(projection, bench)
-    after = aligned(channels, bench)
+    of_channels = surprises.statistics(channels_of(projection, bench), bench)
     by_test = {
         "pushes into the balances": projection.unrest(),
         "a further effect": -np.log(least_p(projection))[:, None],
-        LOUDEST: energies(channels, bench),
-        "a step or a pulse": np.concatenate([steps(channels, bench), pulses(after, bench)], axis=1),
-        "an oscillation": np.concatenate([tones(channels, bench), bursts(after, bench)], axis=1),
+        **of_channels,
     }
     if len(bench.events) > 1:
         by_test["parameters of each event"] = projection.unsteadiness()
     return by_test
-
-
-def tail(draws: np.ndarray, value: np.ndarray) -> float:
-    """How often a statistic is at least as large as `value`, (1,) or (1, k), given draws (b,) or (b, k)."""
-    if draws.ndim == 1:
-        mean, variance = draws.mean(), max(draws.var(), 1e-300)
-        return max(float(gammaincc(mean**2 / variance, max(value[0], 0.0) * mean / variance)), SMALLEST_P)
-    mean, spread, largest = extremes(draws)
-    scale = max(largest.std() * np.sqrt(6) / np.pi, 1e-12)
-    departure = ((value - mean) / spread).max()
-    return max(float(-np.expm1(-np.exp(-(departure - largest.mean()) / scale - np.euler_gamma))), SMALLEST_P)
-
-
-def extremes(draws: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mean and spread (k,) of draws (b, k), and the largest of each in these terms, (b,).
-
-    Each draw is judged by the others: among many columns its own part in their mean and spread would tell.
-    """
-    b, whole, squares = len(draws), draws.sum(axis=0), (draws**2).sum(axis=0)
-    mean = (whole - draws) / (b - 1)
-    spread = np.sqrt(np.maximum((squares - draws**2) / (b - 1) - mean**2, 0.0)) + 1e-12
-    largest = ((draws - mean) / spread).max(axis=1)
-    return draws.mean(axis=0), draws.std(axis=0) + 1e-12, largest
 
 
 def least_p(projection: Projection) -> np.ndarray:
@@ -81,85 +29,3 @@ def least_p(projection: Projection) -> np.ndarray:
 def channels_of(projection: Projection, bench: Bench) -> np.ndarray:
     """Whitened, projected residuals (b, 2, N), without the rows of the prior."""
     return projection.r[:, : 2 * bench.drive.samples].reshape(len(projection.r), 2, -1)
-
-
-def cells_of(bench: Bench) -> list[Cell]:
-    """Every window of every event, for P and for Q."""
-    cells = []
-    for e, event in enumerate(bench.events):
-        first, step, origin = int(bench.drive.first[e]), event.record.step, event.record.t[0]
-        for a, b in windows(bench, e):
-            i, j = round(a / step), min(round(b / step), event.record.samples)
-            if j - i < 2:
-                continue
-            part = slice(first + i, first + j)
-            cells += [Cell(e, c, part, origin + i * step, origin + (j - 1) * step) for c in "PQ"]
-    return cells
-
-
-def energies(channels: np.ndarray, bench: Bench) -> np.ndarray:
-    """Energy of each residual (b, 2, N) in each cell, (b, cells), over that of a sample in quiet."""
-    square = channels**2
-    square /= np.mean(np.concatenate([square[:, :, part] for part in bench.quiet], axis=2), axis=2, keepdims=True)
-    return np.stack([square[:, "PQ".index(c.channel), c.part].sum(axis=1) for c in cells_of(bench)], axis=1)
-
-
-def aligned(channels: np.ndarray, bench: Bench) -> np.ndarray:
-    """What follows the dips, summed over the events at the same time after each, (b, 2, n) of unit variance.
-
-    Timers and controls answer every dip alike, however little each event shows of it.
-    """
-    drive = bench.drive
-    after = [channels[:, :, drive.part(e)][:, :, event.end :] for e, event in enumerate(bench.events)]
-    common = min(p.shape[2] for p in after)
-    return sum(p[:, :, :common] for p in after) / np.sqrt(len(after))
-
-
-def steps(channels: np.ndarray, bench: Bench) -> np.ndarray:
-    """Square of the sum from each instant to the end of an event, in P and in Q, (b, instants)."""
-    columns = []
-    for e in range(len(bench.events)):
-        sums = np.cumsum(channels[:, :, bench.drive.part(e)][:, :, ::-1], axis=2)[:, :, ::STRIDE]
-        columns.append(sums**2)
-    return np.concatenate(columns, axis=2).reshape(len(channels), -1)
-
-
-def pulses(after: np.ndarray, bench: Bench) -> np.ndarray:
-    """Square of the sum over each short stretch of aligned residuals (b, 2, n), in P and in Q, (b, stretches)."""
-    sums = np.cumsum(np.pad(after, ((0, 0), (0, 0), (1, 0))), axis=2)
-    columns = [np.empty((len(after), 0))]
-    for length in PULSES:
-        n = max(round(length / bench.events[0].record.step), 1)
-        if n < sums.shape[2]:
-            columns.append(((sums[:, :, n:] - sums[:, :, :-n])[:, :, :: -(-n // 4)] ** 2 / n).reshape(len(after), -1))
-    return np.concatenate(columns, axis=1)
-
-
-def tones(channels: np.ndarray, bench: Bench) -> np.ndarray:
-    """Power at each frequency of all events and channels, in the dip, after it and in both, (b, frequencies)."""
-    power = np.zeros((len(channels), 3, BINS // 2 + 1))
-    for e, event in enumerate(bench.events):
-        own = channels[:, :, bench.drive.part(e)]
-        for k, part in enumerate((slice(event.start, event.end), slice(event.end, None), slice(event.start, None))):
-            stretch = own[:, :, part]
-            if stretch.shape[2] >= FEWEST:
-                power[:, k] += np.sum(_power(stretch), axis=1) / stretch.shape[2]
-    return power.reshape(len(channels), -1)
-
-
-def bursts(after: np.ndarray, bench: Bench) -> np.ndarray:
-    """Power of aligned residuals (b, 2, n) by frequency in stretches that overlap by half, (b, cells)."""
-    columns = [np.empty((len(after), 0))]
-    for length in BURSTS:
-        n = round(length / bench.events[0].record.step)
-        if FEWEST <= n <= after.shape[2]:
-            stretches = np.lib.stride_tricks.sliding_window_view(after, n, axis=2)[:, :, :: n // 2]
-            power = np.abs(np.fft.rfft(stretches, 2 * n, axis=3)) ** 2 / n
-            columns.append(power.sum(axis=1).reshape(len(after), -1))
-    return np.concatenate(columns, axis=1)
-
-
-def _power(stretch: np.ndarray) -> np.ndarray:
-    """Power (..., frequencies) of stretches (..., n), of long ones folded onto one transform's length."""
-    padded = -(-stretch.shape[-1] // BINS) * BINS
-    return np.abs(np.fft.rfft(stretch, padded, axis=-1)[..., :: padded // BINS]) ** 2

@@ -8,7 +8,8 @@ import numpy as np
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.fitting import Refit, refit
 from tractexp.discrepancy.noise_in_quiet import QuietNoise, white
-from tractexp.discrepancy.valleys import best_fits
+from tractexp.identification.likelihood import Likelihood
+from tractexp.identification.valleys import best_fits
 from tractexp.noise import Noise
 
 ROUNDS = 2  # of noise and fit in turn
@@ -51,7 +52,7 @@ def fitted_from(bench: Bench, starts: Sequence[np.ndarray], valleys: Sequence[np
 def _valleys(bench: Bench) -> list[np.ndarray]:
     """The best fits (D,) of the base model alone, by its own fast kernel."""
     at = bench.coordinates
-    ends = best_fits(bench.kernels.bare, bench.apart(0))
+    ends = best_fits(Likelihood.of(bench.kernels.bare), bench.apart(0))
     starts = np.tile(at.null, (len(ends), 1))
     starts[:, [*at.base, *at.before]] = ends
     return list(starts)

@@ -12,13 +12,14 @@ from tractexp.discrepancy.cores import side_by_side
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.kernels import Family, Kernels
-from tractexp.discrepancy.records import Records, power_profile
+from tractexp.discrepancy.records import Records
 from tractexp.identification.descent import Apart
 from tractexp.identification.problem import Problem
 from tractexp.model.drive import Drive
 from tractexp.model.model import Model
 from tractexp.noise import Noise
 from tractexp.noise.quiet import quiet_stretches
+from tractexp.noise.wander import power_profile
 from tractexp.record import Event
 
 

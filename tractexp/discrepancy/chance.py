@@ -8,11 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.adequacy import SMALLEST_P, least_p, statistics, tail
+from tractexp.discrepancy.adequacy import least_p, statistics
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.noise_in_quiet import QuietNoise
 from tractexp.discrepancy.projection import Projection
 from tractexp.discrepancy.tangent import Tangent, rich_residuals
+from tractexp.identification.surprises import SMALLEST_P, tail
 from tractexp.noise import Noise
 
 DRAWS = 199

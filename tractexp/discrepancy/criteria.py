@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tractexp.errors import UserError, among, check_range
+from tractexp.noise import wander
 
 DERIVED, CHOSEN = "derived", "chosen"
 
@@ -98,15 +99,15 @@ class Criteria:
         "the error of the estimate then is a tenth of the noise, as large as what a level of 5 % allows",
     )  # fmt: skip
     wandering_seen: float = _criterion(
-        2.0, (0.0, 1e6), "twice the log-likelihood from which a load is said to wander", CHOSEN,
+        wander.SEEN, (0.0, 1e6), "twice the log-likelihood from which a load is said to wander", CHOSEN,
         "half a chi-square of one degree is beyond it in 8 % of channels; a wandering that is not there costs little",
     )  # fmt: skip
     wandering_within: float = _criterion(
-        2.0, (0.0, 1e6), "what the events must show beyond that where it is not seen before them", CHOSEN,
+        wander.WITHIN, (0.0, 1e6), "what the events must show beyond that where it is not seen before them", CHOSEN,
         "what answers a dip does not wander",
     )  # fmt: skip
     wandering_likely: float = _criterion(
-        1.0, (0.0, 1e6), "log-likelihood below the largest at which the intensity is taken", CHOSEN,
+        wander.LESS, (0.0, 1e6), "log-likelihood below the largest at which the intensity is taken", CHOSEN,
         "to be safe: the larger end of an interval of 84 %",
     )  # fmt: skip
     measurement_prior: float = _criterion(

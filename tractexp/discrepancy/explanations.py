@@ -15,7 +15,7 @@ from tractexp.discrepancy.disagreement import Disagreement, examined
 from tractexp.discrepancy.fitting import Refit, Start, best_of, no_worse_than_subsets, refit, rough_refit
 from tractexp.discrepancy.projection import Score
 from tractexp.discrepancy.tangent import Column, tangent
-from tractexp.discrepancy.valleys import DISTINCT
+from tractexp.identification.valleys import DISTINCT
 from tractexp.noise import Noise
 
 MOST_EFFECTS = 3

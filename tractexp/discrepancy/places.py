@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.adequacy import LOUDEST, Cell, cells_of, channels_of, energies, extremes
+from tractexp.discrepancy.adequacy import channels_of
 from tractexp.discrepancy.disagreement import Disagreement
+from tractexp.identification.surprises import LOUDEST, Cell, cells_of, energies, extremes
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,6 @@ import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from tractexp.discrepancy.recorder_window import RecorderWindow
 from tractexp.errors import UserError
 from tractexp.noise.voltage import Smoothed, smoothed
@@ -58,9 +56,3 @@ def check_events(train: Sequence[Event], validate: Sequence[Event]) -> None:
                     f"{one.record.where} has the channel {channel} and {other.record.where} has not: events of one"
                     " investigation need the same channels; remove the column or add it"
                 )
-
-
-def power_profile(measured: np.ndarray, before: np.ndarray, first: np.ndarray) -> np.ndarray:
-    """Apparent power (N,) over that before each event, of P and Q (2, N) with means `before` (E, 2)."""
-    level = np.repeat(np.linalg.norm(before, axis=1), np.diff(first))
-    return np.linalg.norm(measured, axis=0) / np.maximum(level, 1e-9)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tractexp.errors import UserError
+from tractexp.identification.adequacy import Adequacy, Grade
 from tractexp.identification.information import SHARE
 from tractexp.identification.plan import Forecast, Shape, over_depth
 from tractexp.identification.uncertainty import Uncertainty
@@ -12,11 +13,16 @@ from tractexp.identification.verdict import BOUND, EDGE, UNIDENTIFIED, WEAK, WIT
 from tractexp.noise.color import runs
 
 
-def advise(known: Uncertainty, odd: Sequence[str] = ()) -> list[str]:
-    """Sentences, the most pressing first. `odd` events do not fit with the rest."""
-    missing = any("an effect is missing" in note for note in known.notes)
-    said = ["find the missing effect: task=discrepancy"] * missing
-    said += [f"leave {name} out, or free what differs there by model.per_event" for name in odd]
+def advise(known: Uncertainty, adequacy: Adequacy, odd: Sequence[str] = ()) -> list[str]:
+    """Sentences, the most pressing first. `odd` events do not fit with the rest.
+
+    Of a model that does not describe the load nothing is said that would only hold if it did.
+    """
+    said = [f"leave {name} out, or free what differs there by model.per_event" for name in odd]
+    if adequacy.grade is Grade.WRONG_MODEL:
+        return ["find what is missing: task=discrepancy; or choose another model: tractexp list model", *said]
+    if adequacy.grade is Grade.EFFECT_MISSING:
+        return ["find the missing effect: task=discrepancy", *said]
     said += [
         f"widen model.bounds.{name}, or ask whether the model is the right one"
         for name, verdict in known.verdicts.items()

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tractexp.identification.descent import Apart
 from tractexp.identification.problem import Problem
 from tractexp.noise.color import SMALLEST, fit_autoregression, stretches
 from tractexp.noise.model import Noise, Pair
@@ -113,6 +114,13 @@ class Likelihood:
         above[lost_up], below[lost_down] = rows[0], rows[0]
         span = np.where(lost_up, 0.0, up) + np.where(lost_down, 0.0, down)
         return rows[0], ((above - below) / np.where(span > 0, span, 1.0)[:, None]).T
+
+    @property
+    def apart(self) -> list[Apart]:
+        """P0 and Q0 act on the rows of their own event only: one simulation has the differences of all events."""
+        events = self.problem.drive.events
+        rows = np.array([self.part_of(e) for e in range(events)])
+        return [Apart(self.free + np.arange(events) * 2 + c, rows) for c in (0, 1)]
 
     def part_of(self, event: int) -> np.ndarray:
         """Which rows (R,) belong to an event."""

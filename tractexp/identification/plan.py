@@ -10,11 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.errors import UserError, among, check_range
-from tractexp.identification.descent import descend
 from tractexp.identification.information import Information
 from tractexp.identification.likelihood import Likelihood, before_the_event
 from tractexp.identification.problem import Problem
-from tractexp.identification.starts import even
 from tractexp.identification.uncertainty import LEVEL
 from tractexp.noise import Autoregression, Noise
 from tractexp.record import Base, Event, Record
@@ -23,7 +21,6 @@ BEFORE, AFTER = 0.3, 1.5  # s recorded before and after a planned dip
 EDGE = 0.02  # s, fall and rise of a planned dip
 FINEST = 5e-4  # s, longest Runge-Kutta step of a forecast
 DEPTHS = np.arange(0.05, 0.951, 0.025)
-STARTS = 24  # of the quick fit that finds a guess
 INERTIA = "H"  # H = M omega_s / 2 has the relative precision of M
 
 
@@ -42,13 +39,13 @@ class Shape:
     memory: float = 0.0
 
     @classmethod
-    def of(cls, event: Event) -> "Shape":
-        """The shape of a recorded event; the noise forgets as it does before the dip, where P tells."""
-        noise, _ = before_the_event(event)
-        neighbors = 0.0 if noise.white else float(noise.coefficients[1, 0])
+    def of(cls, event: Event, noise: Noise | None = None) -> "Shape":
+        """The shape of a recorded event, with the noise that a fit found there, or that before the dip."""
+        seen = noise or Noise((before_the_event(event),))
+        (noise_P, noise_Q), memory = seen.levels, seen.memory(event.record.step)
         return cls(
-            event.depth, event.duration, event.rate, event.noise_P, event.noise_Q, event.P0, event.Q0,
-            event.record.base.frequency, -event.record.step / math.log(neighbors) if neighbors > 0 else 0.0,
+            event.depth, event.duration, event.rate, noise_P, noise_Q, event.P0, event.Q0,
+            event.record.base.frequency, memory,
         )  # fmt: skip
 
     @property
@@ -239,18 +236,3 @@ def best_events(problem: Problem, values: np.ndarray, least: float, most: int | 
         name = problem.events[best].record.name
         choices.append(Choice(best, name, gain if len(chosen) > 1 else 1.0, tuple(half.tolist())))
     return choices
-
-
-def guess(problem: Problem) -> np.ndarray:
-    """Free values (d,) from a quick fit from many starts, for a plan that has nothing better."""
-    likelihood = Likelihood.of(problem)
-    defaults = np.array([p.default for p in problem.parameters if p.name in problem.space.names])
-    scatter = problem.space.from_unit(even(STARTS - 1, problem.space.dimension))
-    found = descend(likelihood.rows, likelihood.to_unit(np.concatenate((defaults[None], scatter))), tolerance=0.1)
-    best = int(found.deviance.argmin())
-    if not np.isfinite(found.deviance[best]):
-        raise UserError(
-            f"no parameter set tried can be simulated before {problem.events[0].record.name}, so that nothing can be"
-            " planned; give values by task.values=<result.json>, or narrow model.bounds"
-        )
-    return likelihood.values(found.unit[best])

@@ -1,5 +1,6 @@
 """The identification problem: free parameters of a model against recorded events, Eq. (8)."""
 
+import copy
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -138,6 +139,14 @@ class Problem:
         self.drive = Drive.of([replace(excitation(e), **weights) for e in self.events])
         self._scale = self.loss.scales(self.events, self.drive)
         self.step = self._step(substeps)
+
+    def driven_by(self, events: Sequence[Event]) -> "Problem":
+        """The same problem with other voltages of the same lengths; Runge-Kutta steps and scales stay."""
+        other = copy.copy(self)
+        other.events = tuple(events)
+        weights = {"weight_P": self.loss.weight_P, "weight_Q": self.loss.weight_Q}
+        other.drive = Drive.of([replace(excitation(e), **weights) for e in other.events])
+        return other
 
     def _sources(self, event: int) -> list[int]:
         """Which free column each parameter of the model is taken from in an event, -1 where it is fixed."""

@@ -12,7 +12,7 @@ from enum import StrEnum
 import numpy as np
 
 from tractexp.identification.descent import descend
-from tractexp.identification.uncertainty import LEVEL, Uncertainty, conclude
+from tractexp.identification.uncertainty import Uncertainty, conclude, threshold
 from tractexp.identification.verdict import BOUND, IDENTIFIED, UNIDENTIFIED, WEAK, WITHIN, Verdict, size
 
 BEYOND = 1.6  # of the threshold: a lane ends when its deviance has risen so far
@@ -119,13 +119,6 @@ def checked(known: Uncertainty) -> Uncertainty:
         profiled={p.name: p.interval for p in made.profiles},
         notes=[*made.known.notes, *made.notes],
     )
-
-
-def threshold(level: float = LEVEL) -> float:
-    """What the deviance may rise by: the chi-squared quantile of one degree of freedom."""
-    from scipy.special import chdtri
-
-    return float(chdtri(1, 1 - level))
 
 
 def profiles(known: Uncertainty, points: int = 24, names: Sequence[str] | None = None) -> Profiles:

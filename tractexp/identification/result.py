@@ -1,4 +1,4 @@
-"""What an identification found: the model again, how well it fits each event, and its file `result.json`."""
+"""What an identification found: the estimate, how well it fits each event, and its file `result.json`."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -8,16 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from tractexp import files
+from tractexp import files, provenance
 from tractexp.errors import UserError
+from tractexp.identification.adequacy import ACCEPTED
 from tractexp.identification.problem import Problem, excitation
 from tractexp.identification.search import REFUSED, Found, History
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import Model, compose
 from tractexp.plugin import build
 from tractexp.record import Event, find_dips
-
-ACCEPTED = 0.05  # Eq. (20): a load model is acceptable below 5 %
 
 
 def parts(node: Mapping[str, Any]) -> tuple[Any, Any, list[Any]]:
@@ -58,7 +57,11 @@ def respond(model: Model, values: np.ndarray, event: Event, role: str) -> Fit:
 
 @dataclass(frozen=True)
 class Result:
-    """The content of `result.json`. `model` and `before` are what it takes to simulate it again."""
+    """The content of `result.json`. `model` and `before` are what it takes to simulate it again.
+
+    Parameters, errors, intervals and verdicts belong to the estimate; `search` is where the optimizer itself ended, and
+    simulations, iterations, seconds and status are what it took to get there.
+    """
 
     parameters: dict[str, float]
     objective: float
@@ -77,12 +80,25 @@ class Result:
     model: dict[str, Any]
     before: dict[str, float]
     optimizer: str = ""
+    search: dict[str, Any] = field(default_factory=dict)
+    adequacy: dict[str, Any] = field(default_factory=dict)  # grade, sentence, p; empty where it was not judged
     notes: list[str] = field(default_factory=list)
     per_event: dict[str, list[float]] = field(default_factory=dict)  # of which `parameters` holds the mean
     standard_errors: dict[str, float | None] = field(default_factory=dict)  # None: not identifiable
-    intervals: dict[str, list[float]] = field(default_factory=dict)  # 95 %, about the most likely values
+    intervals: dict[str, list[float]] = field(default_factory=dict)  # 95 %
     verdicts: dict[str, str] = field(default_factory=dict)
     uncertainty: dict[str, Any] = field(default_factory=dict)
+    starts: list[dict[str, Any]] = field(default_factory=list)  # of the descents to the estimate, the best first
+    records: list[dict[str, str]] = field(default_factory=list)  # name, role, sha256 of its channels
+    tractexp_version: str = ""
+    commit: str = ""  # of the package's repository; "" for a wheel
+
+    @property
+    def free(self) -> dict[str, float]:
+        """The estimate by the names of intervals and verdicts: T_m[1], T_m[2] where events have values of their own."""
+        own = {f"{n}[{k}]": v for n, values in self.per_event.items() for k, v in enumerate(values, start=1)}
+        values = self.parameters | own
+        return {name: values[name] for name in self.verdicts or values}
 
     @property
     def acceptable(self) -> bool:
@@ -154,32 +170,29 @@ def load(path: Path) -> Result:
 
 
 def conclude(
-    problem: Problem, found: Found, validate: Sequence[Event], seed: int, settings: Mapping[str, Any], optimizer: str
+    problem: Problem,
+    found: Found,
+    validate: Sequence[Event],
+    seed: int,
+    settings: Mapping[str, Any],
+    optimizer: str,
+    estimate: np.ndarray | None = None,
 ) -> tuple[Result, list[Fit]]:
-    """Judge what a search found on the fitted and the held-out events.
+    """Judge the free values `estimate` (d,) on the fitted and the held-out events, by default where the search ended.
 
     Raises `UserError` where no candidate at all had a steady state.
     """
+    refuse_nothing_found(problem, found)
     model = problem.model
-    if found.objective >= REFUSED:
-        raise UserError(
-            f"none of the {found.simulations} parameter sets tried could be simulated:"
-            f" {model.refusal(problem.full(found.values)[0], problem.drive) or 'all diverged'};"
-            " widen model.bounds or free model.fixed"
-        )
-    values = problem.full(found.values)[0]
-    own = problem.by_event(found.values)[:, 0]
-    fits = [respond(model, v, event, "train") for v, event in zip(own, problem.events, strict=True)]
-    fits += [respond(model, values, event, "validate") for event in validate]
-    trained = [fit for fit in fits if fit.role == "train"]
-    measured = {c: np.concatenate([getattr(f.event.record, c) for f in trained]) for c in "PQ"}
-    calculated = {c: np.concatenate([getattr(f, c) for f in trained]) for c in "PQ"}
+    free = found.values if estimate is None else estimate
+    fits, epsilon_p, epsilon_q = fitted(problem, free)
+    fits += [respond(model, problem.full(free)[0], event, "validate") for event in validate]
     first = problem.events[0]
     result = Result(
-        parameters={name: float(v) for name, v in zip(model.names, values, strict=True)},
-        objective=found.objective,
-        epsilon_p=relative_error(measured["P"], calculated["P"]),
-        epsilon_q=relative_error(measured["Q"], calculated["Q"]),
+        **_values(problem, free),
+        objective=float(problem.objective(free[None])[0]),
+        epsilon_p=epsilon_p,
+        epsilon_q=epsilon_q,
         simulations=found.simulations,
         refused=found.refused,
         iterations=found.iterations,
@@ -190,16 +203,66 @@ def conclude(
             {"name": f.event.record.name, "role": f.role, "epsilon_p": f.epsilon_p, "epsilon_q": f.epsilon_q}
             for f in fits
         ],
-        at_bound=at_bound(problem, found.values),
+        at_bound=at_bound(problem, free),
         units={p.name: p.unit for p in problem.parameters},
         bounds={p.name: list(p.bounds) for p in problem.parameters},
         model=dict(settings),
         before={"U0": first.U0, "P0": first.P0, "Q0": first.Q0, "frequency": first.record.base.frequency},
         optimizer=optimizer,
-        per_event={name: own[:, model.names.index(name)].tolist() for name in problem.per_event},
+        search=searched(problem, found),
         notes=[note for f in fits for note in f.event.record.notes],
+        records=[
+            {"name": f.event.record.name, "role": f.role, "sha256": provenance.digest(f.event.record)} for f in fits
+        ],
+        tractexp_version=provenance.version(),
+        commit=provenance.commit(),
     )
     return result, fits
+
+
+def refuse_nothing_found(problem: Problem, found: Found) -> None:
+    """Raise `UserError` where no candidate at all had a steady state."""
+    if found.objective >= REFUSED:
+        why = problem.model.refusal(problem.full(found.values)[0], problem.drive) or "all diverged"
+        raise UserError(
+            f"none of the {found.simulations} parameter sets tried could be simulated: {why};"
+            " widen model.bounds or free model.fixed"
+        )
+
+
+def fitted(problem: Problem, free: np.ndarray) -> tuple[list[Fit], float, float]:
+    """The fitted events at free values (d,), and epsilon_p and epsilon_q of Eq. (20) over all of them, as fractions."""
+    own = problem.by_event(free)[:, 0]
+    fits = [respond(problem.model, v, event, "train") for v, event in zip(own, problem.events, strict=True)]
+    measured = {c: np.concatenate([getattr(f.event.record, c) for f in fits]) for c in "PQ"}
+    calculated = {c: np.concatenate([getattr(f, c) for f in fits]) for c in "PQ"}
+    return fits, relative_error(measured["P"], calculated["P"]), relative_error(measured["Q"], calculated["Q"])
+
+
+def searched(problem: Problem, found: Found) -> dict[str, Any]:
+    """Where the optimizer itself ended, and what that took: what optimizers are compared by."""
+    _, epsilon_p, epsilon_q = fitted(problem, found.values)
+    return {
+        **_values(problem, found.values),
+        "objective": found.objective,
+        "epsilon_p": epsilon_p,
+        "epsilon_q": epsilon_q,
+        "simulations": found.simulations,
+        "seconds": found.seconds,
+        "refused": found.refused,
+        "iterations": found.iterations,
+        "status": found.status,
+        "at_bound": at_bound(problem, found.values),
+    }
+
+
+def _values(problem: Problem, free: np.ndarray) -> dict[str, Any]:
+    """Parameters by name, and those with a value of their own in each event."""
+    names, own = problem.model.names, problem.by_event(free)[:, 0]
+    return {
+        "parameters": {n: float(v) for n, v in zip(names, problem.full(free)[0], strict=True)},
+        "per_event": {name: own[:, names.index(name)].tolist() for name in problem.per_event},
+    }
 
 
 def at_bound(problem: Problem, values: np.ndarray, share: float = 1e-3) -> list[str]:

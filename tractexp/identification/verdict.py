@@ -17,6 +17,7 @@ WITHIN = 0.2  # an interval of at most plus and minus this share of the value id
 NEAR_ZERO = 0.1  # of the range: what may be zero is measured against this where its value is smaller
 TRADES = 0.8  # correlation from which two parameters are said to trade against each other
 PARTNERS = 2  # named at most
+STEEPEST = 4.0  # power of a combination that is told
 EDGE = 1e-3  # of the range: closer than this is at the bound
 
 
@@ -38,7 +39,9 @@ def size(value: float, low: float, high: float) -> float:
 
 def shown(value: float, half: float, low: float, high: float) -> str:
     """A half-width in percent of the value, or as a number where the value is next to nothing."""
-    return f"± {100 * half / abs(value):.2g} %" if size(value, low, high) == abs(value) else f"± {half:.2g}"
+    if size(value, low, high) != abs(value):
+        return f"± {half:.2g}"
+    return f"± {100 * half / abs(value):.2g} %" if half <= abs(value) else "wider than its value"
 
 
 def judge(
@@ -84,6 +87,8 @@ def _trade(information: Information, j: int, factor: float) -> list[str]:
         exponents = np.zeros(len(values))
         exponents[j], exponents[k] = 1.0, -covariance[j, k] / covariance[k, k] * values[k] / values[j]
         known = factor * information.relative_error(exponents)
+        if known > WITHIN or abs(exponents[k]) > STEEPEST or abs(exponents[k]) < 1 / STEEPEST:
+            return said  # a combination that is hardly known, or that nobody would think in
         said.append(f"{combination(information.names, exponents)} is known to ± {100 * known:.2g} %")
     return said
 

@@ -54,6 +54,12 @@ class Noise:
         """The largest variance that noise of the voltage causes at any sample, over that of the power."""
         return 0.0 if self.blur is None else float((self._mixed(self.blur) ** 2).sum(axis=0).max())
 
+    def scaled(self, factor: float) -> "Noise":
+        """The same noise, `factor` times as loud."""
+        wander = self.wander and replace(self.wander, intensity=self.wander.intensity * factor**2)
+        pairs = tuple((P.scaled(factor), Q.scaled(factor)) for P, Q in self.pairs)
+        return replace(self, pairs=pairs, wander=wander, blur=None if self.blur is None else self.blur * factor)
+
     def on(self, profile: np.ndarray, blur: np.ndarray | None = None) -> "Noise":
         """The same noise on other events: their power over that before (N,), what errors of their voltage do."""
         wander = None if self.wander is None else replace(self.wander, profile=profile)
@@ -86,9 +92,26 @@ class Noise:
         spreads = [a.deviation[0] / a.deviation[-1] for a in channels]
         return samples / max(1.0, *((g / s) ** 2 for g, s in zip(gains, spreads, strict=True)))
 
+    @property
+    def levels(self) -> tuple[float, float]:
+        """Standard deviations [pu] of P and of Q in the first event."""
+        P, Q = np.sqrt(self._fast_variance(0)).tolist()
+        return P, Q
+
+    def memory(self, step: float) -> float:
+        """Within which time [s] a first-order autoregression as loud at rest as P forgets, samples `step` [s] apart.
+
+        Its neighbors correlate by a, with (1 + a) / (1 - a) the square of its gain at rest over its spread.
+        """
+        P = self.pairs[0][0]
+        gain = P.deviation[-1] / max(1 - float(P.coefficients[-1].sum()), 1e-3)
+        ratio = float(gain / P.deviation[0]) ** 2
+        a = (ratio - 1) / (ratio + 1)
+        return -step / float(np.log(a)) if a > 0 else 0.0
+
     def describe(self) -> str:
         """Level and color, as a run prints them."""
-        pair, level = self.pairs[0], np.sqrt(self._fast_variance(0))
+        pair, level = self.pairs[0], self.levels
         color = "white" if all(a.white for a in pair) else f"colored (order {max(a.order for a in pair)})"
         return f"P {level[0]:.2g} pu, Q {level[1]:.2g} pu, {color}"
 

@@ -15,6 +15,7 @@ from tractexp.noise.span import spanned
 MODES = 48
 SLOW = 3  # cosines of a stretch that belong to wandering before its fast noise is modelled
 DISTINCT = 0.03  # of the strongest direction: columns that differ by less from others are none of their own
+SEEN, WITHIN, LESS = 2.0, 2.0, 1.0  # of `find`, where nobody says otherwise
 GRID = np.concatenate(([0.0], np.geomspace(1e-3, 1e4, 71)))  # of the intensity, variances of the channel per second
 STIFF = np.concatenate(([0.0], np.geomspace(1e-4, 1e12, 97)))  # of a single stretch, in variances of its noise
 
@@ -97,6 +98,12 @@ def find(
     both = total + rest - rest[:, :1]
     gained = max(2 * row[: last + 1].max() for row, last in zip(both, most, strict=True))
     return found if gained - within >= seen else None
+
+
+def power_profile(measured: np.ndarray, before: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """Apparent power (N,) over that before each event, of P and Q (2, N) with means `before` (E, 2)."""
+    level = np.repeat(np.linalg.norm(before, axis=1), np.diff(first))
+    return np.linalg.norm(measured, axis=0) / np.maximum(level, 1e-9)
 
 
 def _last(likelihood: np.ndarray, less: float) -> int:

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from tractexp.identification.estimate import estimate
 from tractexp.identification.problem import Problem
 from tractexp.identification.result import Fit, parts, respond
 from tractexp.identification.search import search
-from tractexp.identification.uncertainty import Uncertainty, assess
+from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED
 from tractexp.model.model import compose
 from tractexp.plugin import build
@@ -69,7 +70,9 @@ def fit(node: Mapping[str, Any], motor: str, train: Sequence[Event], held_out: S
     fits += [respond(model, values, event, "validate") for event in held_out]
     substeps = int(problem.step.substeps.max())
     known = dict(zip(model.names, values.tolist(), strict=True))
-    return Order(motor, known, found.objective, tuple(fits), assess(problem, found.values), duration(problem), substeps)
+    return Order(
+        motor, known, found.objective, tuple(fits), estimate(problem, found.values).known, duration(problem), substeps
+    )
 
 
 def duration(problem: Problem) -> float:

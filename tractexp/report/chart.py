@@ -28,18 +28,26 @@ SETTINGS = {
     "toImageButtonOptions": {"format": "svg"},
 }
 PAPER = 680  # pixels, the width of a printed page
+PHONE, ENTRY, LETTER = 240, 45, 7  # pixels: a legend on a phone, one of its entries without the name, a letter
 GAP = 0.045  # of the height, between panels
 HOVER = "%{y:.5g}"
+DECADE = 20  # an axis that spans less has its ticks between powers of ten
 DRAW = """
 const charts = [...document.querySelectorAll(".chart")];
-for (const chart of charts) {
+const draw = chart => {
   const {data, layout} = JSON.parse(chart.nextElementSibling.textContent);
   Plotly.newPlot(chart, data, layout, SETTINGS);
-}
-const resize = () => charts.forEach(chart => chart.offsetParent && Plotly.Plots.resize(chart));
+};
+const folded = chart => chart.closest("details:not([open])");  // drawn when first opened: many cost seconds
+charts.filter(chart => !folded(chart)).forEach(draw);
+const drawn = () => charts.filter(chart => chart.data && chart.offsetParent);
+const resize = () => {
+  charts.filter(chart => !chart.data && !folded(chart)).forEach(draw);
+  drawn().forEach(chart => Plotly.Plots.resize(chart));
+};
 const paper = chart => ({width: chart.closest(".charts") ? PAPER / 2 - 10 : PAPER});
-addEventListener("beforeprint", () => charts.forEach(chart => Plotly.relayout(chart, paper(chart))));
-addEventListener("afterprint", () => charts.forEach(chart => Plotly.relayout(chart, {width: null, autosize: true})));
+addEventListener("beforeprint", () => drawn().forEach(chart => Plotly.relayout(chart, paper(chart))));
+addEventListener("afterprint", () => drawn().forEach(chart => Plotly.relayout(chart, {width: null, autosize: true})));
 document.querySelectorAll("details").forEach(part => part.addEventListener("toggle", resize));
 // Once more: a legend that takes another line moves the panels only then.
 addEventListener("beforeprint", () => charts.forEach(chart => chart.data && Plotly.relayout(chart, paper(chart))));
@@ -56,8 +64,12 @@ def script() -> str:
 class Chart:
     """Panels above each other that share the axis x. Colors are those of `style`; names may hold any character.
 
-    `panels` are the labels of the vertical axes from the top, `heights` their shares. `log_x` and `log_y` make axes
-    logarithmic. `pixels` is the height of the whole.
+        `panels` are the labels of the vertical axes from the top, `heights` their shares. `log_x` and `log_y` make axes
+    <<<<<<< HEAD
+        logarithmic. `pixels` is the height of the whole. Without a `legend` names are told by hovering only.
+    =======
+        logarithmic. `pixels` is the height of the whole. Where many curves are drawn, `hover` "closest" tells of one.
+    >>>>>>> comp
     """
 
     def __init__(
@@ -70,6 +82,8 @@ class Chart:
         log_y: bool = False,
         pixels: int | None = None,
         title: str = "",
+        legend: bool = True,
+        hover: str = "x unified",
     ):
         self._data: list[dict[str, Any]] = []
         self._shapes: list[dict[str, Any]] = []
@@ -77,10 +91,10 @@ class Chart:
         self._told: set[str] = set()
         self._axes = self._laid_out(panels, heights or [1.0] * len(panels), log_y)
         self._x: dict[str, Any] = {"title": {"text": html.escape(x)}, "anchor": _axis("y", len(panels) - 1)}
-        self._x |= {"showgrid": True, "gridcolor": "#E4E4E4", "zeroline": False, "ticks": "outside"}
+        self._x |= {"showgrid": True, "gridcolor": "#E4E4E4", "zeroline": False, "ticks": "outside", "automargin": True}
         if log_x:
-            self._x |= {"type": "log", "dtick": 1}
-        self._title = title
+            self._x |= {"type": "log", "dtick": 1, "exponentformat": "power"}
+        self._title, self._legend, self._hover = title, legend, hover
         self._pixels = pixels or 130 + 170 * len(panels)
 
     @staticmethod
@@ -99,13 +113,17 @@ class Chart:
 
     def line(
         self, name: str, x: np.ndarray, y: np.ndarray, color: str, panel: int = 0, *, width: float = 1.6,
-        dash: str = "solid", step: bool = False,
+        dash: str = "solid", step: bool = False, legend: bool = True,
     ) -> "Chart":  # fmt: skip
-        """A curve; equal names are one entry of the legend. nan is a gap; `step` holds each value until the next."""
+        """A curve; equal names are one entry of the legend. nan is a gap; `step` holds each value until the next.
+
+        Without `legend` it is named where it is pointed at only.
+        """
         x, y = style.thin(np.asarray(x, dtype=float), np.asarray(y, dtype=float), MOST)
         shape = {"shape": "hv"} if step else {}
         line = {"color": color, "width": width, "dash": dash, **shape}
-        return self._add(name, panel, mode="lines", x=_packed(x, "f8"), y=_packed(y, "f4"), line=line)
+        packed = {"x": _packed(x, "f8"), "y": _packed(y, "f4")}
+        return self._add(name, panel, mode="lines", line=line, silent=not legend, **packed)
 
     def points(
         self, name: str, x: Sequence[Any] | np.ndarray, y: Sequence[Any] | np.ndarray, color: str, panel: int = 0, *,
@@ -186,15 +204,31 @@ class Chart:
         """What an axis shows at first: of a panel, or of x where `panel` is None."""
         axis = self._x if panel is None else self._axes[_key(panel)]
         axis["range"] = np.log10([low, high]).tolist() if axis.get("type") == "log" else [low, high]
+        if axis.get("type") == "log" and high < DECADE * low:
+            axis.pop("dtick", None)  # powers of ten alone would leave the axis bare
+        return self
+
+    def ticks(
+        self, panel: int | None, at: Sequence[float], labels: Sequence[str] = (), turned: bool = False
+    ) -> "Chart":  # fmt: skip
+        """Where an axis is marked, and with which words instead of numbers: of a panel, or of x where it is None."""
+        axis = self._x if panel is None else self._axes[_key(panel)]
+        words = [html.escape(label) for label in labels] or [f"{v:g}" for v in at]
+        axis |= {"tickmode": "array", "tickvals": list(at), "ticktext": words}
+        if labels:
+            axis |= {"tickfont": {"size": 9 if turned else 11}, **({"tickangle": -90} if turned else {})}
         return self
 
     def plain(self) -> dict[str, Any]:
         """Data and layout as Plotly reads them."""
+        names = [trace["name"] for trace in self._data if trace["showlegend"]] if self._legend else []
+        above = 30 if not names else 66 if len(names) <= 6 else 86  # pixels; a narrow legend has three rows
         layout = {
-            "height": self._pixels, "font": {"family": FONT, "size": 13, "color": "#1d1d1f"}, "hovermode": "x unified",
+            "height": self._pixels, "font": {"family": FONT, "size": 13, "color": "#1d1d1f"}, "hovermode": self._hover,
             "hoversubplots": "axis", "paper_bgcolor": "#fff", "plot_bgcolor": "#fff", "bargap": 0.25,
-            "margin": {"l": 60, "r": 12, "t": 66 + 20 * bool(self._title), "b": 48},
-            "legend": {"orientation": "h", "x": 0, "y": 1.0, "yanchor": "bottom", "yref": "paper"},
+            "margin": {"l": 60, "r": 12, "t": above + 20 * bool(self._title), "b": 48},
+            "showlegend": self._legend,
+            "legend": {"orientation": "h", "x": 0, "y": 1.0, "yanchor": "bottom", "yref": "paper", **_above(names)},
             "shapes": self._shapes, "annotations": self._notes, "xaxis": self._x, **self._axes,
         }  # fmt: skip
         kinds = {trace["type"] for trace in self._data} | {trace.get("mode", "") for trace in self._data}
@@ -202,6 +236,8 @@ class Chart:
             layout |= {"hovermode": "closest"}
         if self._title:
             layout["title"] = {"text": html.escape(self._title), "x": 0, "xref": "paper", "font": {"size": 14}}
+            if not self._legend:  # just above the panels, below the buttons
+                layout["title"] |= {"yref": "paper", "y": 1, "yanchor": "bottom", "pad": {"b": 8}}
         return {"data": self._data, "layout": layout}
 
     def element(self, label: str) -> str:
@@ -220,6 +256,12 @@ class Chart:
                  "yaxis": _axis("y", panel), "hovertemplate": HOVER}  # fmt: skip
         self._data.append(trace | more)
         return self
+
+
+def _above(names: Sequence[str]) -> dict[str, Any]:
+    """An empty line over a legend that takes several on a phone: the buttons stand there."""
+    several = sum(ENTRY + LETTER * len(name) for name in names) > PHONE
+    return {"title": {"text": "\u00a0", "side": "top"}} if several else {}
 
 
 def _axis(letter: str, panel: int) -> str:

@@ -1,72 +1,78 @@
-"""The figures of a comparison. A few variants share a panel; many get a small one each, with the first behind."""
+"""The charts of a comparison. Few variants have a color each; of many the first have, and the others are gray."""
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tractexp.comparison.runs import Variant
+from tractexp.comparison.claims import number
+from tractexp.comparison.floor import Floor, Polished
+from tractexp.comparison.runs import Run, Variant
 from tractexp.comparison.statistics import Ranks
-from tractexp.comparison.summary import ECDF_TARGETS, Band, Floor, band, runtimes
+from tractexp.comparison.summary import ECDF_TARGETS, Band, band, runtimes
 from tractexp.report import style
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from tractexp.report.chart import Chart
 
 TOGETHER = len(style.PALETTE)  # more curves than colors are not told apart in one panel
-COLUMNS = 4
-Draw = Callable[["Axes", int, dict[str, Any]], None]  # panel, number of the variant, style of its line
+SMALL = 230  # pixels, the height of a chart beside others
+ROW = 20, 34  # pixels of a variant in a chart with a row for each, where there are many and few
+PANEL = 135  # pixels of a parameter
+JITTER = 0.3  # of a row: dots of equal height hide each other
+INSIDE, OUTSIDE = style.PALETTE[0], style.PALETTE[1]
+Curves = Sequence[tuple[np.ndarray, np.ndarray]]
+Blank = Callable[[str, int | None], Chart]  # title and height -> a chart without curves, its axes as the others'
 
 
-def fitness(path: Path, variants: Sequence[Variant], by: str, floor: Floor) -> Path:
-    """Median and quartile band of the best objective by "iterations" or "simulations", where a run finished."""
+def fitness(variants: Sequence[Variant], by: str, floor: Floor) -> tuple[Chart, list[Chart]]:
+    """Median and quartile band of the best objective by "iterations" or "simulations", where a run finished.
+
+    The whole; and where there are more variants than colors, one for each with the first behind it in gray.
+    """
     variants = [variant for variant in variants if variant.finished]
-    bands = [band(variant, by, 300 if len(variants) <= TOGETHER else 100) for variant in variants]
+    names, bands = [v.name for v in variants], [band(v, by) for v in variants]
+    low, high = min(floor.value, *(b.lower.min() for b in bands)), max(map(_seen, bands))
+    counted = by == "simulations"
+    first = min(b.x[(b.lower <= high).argmax()] for b in bands)
+    first, last = max(first, 1) if counted else 0, max(b.x[-1] for b in bands)
 
-    def draw(panel: "Axes", i: int, line: dict[str, Any]) -> None:
-        b = bands[i]
-        panel.plot(b.x, b.median, drawstyle="steps-post", **line)
-        if line["color"] != style.BEHIND:
-            panel.fill_between(b.x, b.lower, b.upper, step="post", color=line["color"], alpha=0.18, linewidth=0)
+    def blank(title: str = "", pixels: int | None = None) -> Chart:
+        label = ["best objective [pu²]"]
+        made = Chart(by, label, log_x=counted, log_y=True, hover="closest", title=title, pixels=pixels)
+        made.limits(0, low / (high / low) ** 0.06, high).level(floor.value, "floor")
+        return made.limits(None, first, last)
 
-    low, high = min(b.lower.min() for b in bands), max(_seen(b) for b in bands)
-
-    def finish(panel: "Axes") -> None:
-        style.logarithmic(panel, "y", low, high)
-        panel.set_ylim(low / (high / low) ** 0.04, high)
-        panel.axhline(floor.value, color=style.FAINT, linewidth=0.8, linestyle=(0, (2, 2)), zorder=0.6)
-
-    return _panels(path, [v.name for v in variants], draw, finish, (by, "best objective [pu²]"))
+    curves = [(b.x, b.median) for b in bands]
+    whole = _together(blank("", _height(names)), names, curves, [] if len(names) > TOGETHER else bands)
+    return whole, _apart(blank, names, curves, bands) if len(names) > TOGETHER else []
 
 
 def _seen(b: Band) -> float:
-    """The top of the axis: the upper quartile after a hundredth of the search; the very start is off the page."""
-    return float(b.upper[min(len(b.x) // 100, len(b.x) - 1)])
+    """The top of the axis: the upper quartile after a fiftieth of the search; the very start is off the page."""
+    return float(b.upper[np.searchsorted(b.x, b.x[0] + 0.02 * (b.x[-1] - b.x[0]))])
 
 
-def ecdf(path: Path, variants: Sequence[Variant], floor: Floor) -> Path:
+def ecdf(variants: Sequence[Variant], floor: Floor) -> tuple[Chart, list[Chart]]:
     """The share of all targets that all runs of a variant have reached, by simulations."""
-    return runtime_curves(path, [v.name for v in variants], [runtimes(v, floor) for v in variants], "simulations")
+    return runtime_curves([v.name for v in variants], [runtimes(v, floor) for v in variants], "simulations")
 
 
-def runtime_curves(path: Path, names: Sequence[str], costs: Sequence[np.ndarray], label: str) -> Path:
+def runtime_curves(names: Sequence[str], costs: Sequence[np.ndarray], label: str) -> tuple[Chart, list[Chart]]:
     """The ECDF of runtimes, sorted, inf where a target was not reached; `label` says what they are counted in."""
     reached = np.concatenate([cost[np.isfinite(cost)] for cost in costs])
     first, last = (reached.min(), reached.max()) if len(reached) else (1.0, 10.0)
 
-    def draw(panel: "Axes", i: int, line: dict[str, Any]) -> None:
-        x, counts = np.unique(costs[i][np.isfinite(costs[i])], return_counts=True)
-        y = np.cumsum(counts) / len(costs[i])
-        x, y = style.thin(x, y, 120)
-        panel.plot([first, *x, 1.1 * last], [0, *y, *(y[-1:] if len(y) else [0])], drawstyle="steps-post", **line)
+    def blank(title: str = "", pixels: int | None = None) -> Chart:
+        made = Chart(label, ["share of targets reached"], log_x=True, hover="closest", title=title, pixels=pixels)
+        return made.limits(0, 0, 1.02).limits(None, first, 1.1 * last)
 
-    def finish(panel: "Axes") -> None:
-        style.logarithmic(panel, "x", first, last)
-        panel.set_ylim(0, 1.02)
+    curves = [_shares(cost, first, 1.1 * last) for cost in costs]
+    whole = _together(blank("", _height(names)), names, curves, [])
+    return whole, _apart(blank, names, curves, []) if len(names) > TOGETHER else []
 
-    return _panels(path, names, draw, finish, (label, "share of targets reached"))
+
+def _shares(cost: np.ndarray, first: float, last: float) -> tuple[np.ndarray, np.ndarray]:
+    x, counts = np.unique(cost[np.isfinite(cost)], return_counts=True)
+    x, y = style.thin(x, np.cumsum(counts) / len(cost), 240)
+    return np.array([first, *x, last]), np.array([0, *y, *(y[-1:] if len(y) else [0])])
 
 
 def targets_told() -> str:
@@ -74,126 +80,95 @@ def targets_told() -> str:
     return f"{len(ECDF_TARGETS)} targets from {ECDF_TARGETS[0]:.0f} to {ECDF_TARGETS[-1]:.2f} times the floor"
 
 
-def _panels(
-    path: Path, names: Sequence[str], draw: Draw, finish: Callable[["Axes"], None], labels: Sequence[str]
-) -> Path:
-    from matplotlib import rc_context
-
-    with rc_context(style.SETTINGS):
-        whole = _together if len(names) <= TOGETHER else _apart
-        return style.save(whole(names, draw, finish, labels), path)
-
-
-def _together(names: Sequence[str], draw: Draw, finish: Callable[["Axes"], None], labels: Sequence[str]) -> "Figure":
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(8.0, 4.2), layout="constrained")
-    panel = figure.subplots()
-    for i, (name, line) in enumerate(zip(names, style.lines(), strict=False)):
-        draw(panel, i, line | {"label": name})
-    finish(panel)
-    panel.set(xlabel=labels[0], ylabel=labels[1])
-    figure.legend(loc="outside right upper")
-    return figure
+def _together(chart: Chart, names: Sequence[str], curves: Curves, bands: Sequence[Band]) -> Chart:
+    """All curves in one chart, the first ones in color and on top; bands where they are given."""
+    for name, (x, y) in list(zip(names, curves, strict=True))[TOGETHER:]:
+        chart.line(name, x, y, style.BEHIND, step=True, legend=False)
+    for b, color in zip(bands, style.PALETTE, strict=False):
+        chart.band("", b.x, b.lower, b.upper, color, step=True)
+    for name, (x, y), color in zip(names, curves, style.PALETTE, strict=False):
+        chart.line(name, x, y, color, step=True, width=2)
+    return chart
 
 
-def _apart(names: Sequence[str], draw: Draw, finish: Callable[["Axes"], None], labels: Sequence[str]) -> "Figure":
-    """Small panels with the axes of the first, laid out by hand: Matplotlib's layout engines take seconds for many."""
-    from matplotlib.figure import Figure
-
-    rows = -(-len(names) // COLUMNS)
-    height = 0.75 + 1.3 * rows
-    figure = Figure(figsize=(8.6, height))
-    panels = figure.subplots(rows, COLUMNS, sharex=True, sharey=True).ravel()
-    figure.subplots_adjust(0.09, 0.55 / height, 0.99, 1 - 0.2 / height, wspace=0.08, hspace=0.28)
-    for i, (panel, name) in enumerate(zip(panels, names, strict=False)):
-        draw(panel, 0, {"color": style.BEHIND, "linewidth": 1.5, "linestyle": "-"})
-        draw(panel, i, {"color": style.PALETTE[0], "linestyle": "-", "linewidth": 1.5})
-        finish(panel)
-        panel.set_title(name, fontsize=7.5, loc="left", pad=2, y=1.0)
-        panel.tick_params(labelsize=7, labelbottom=i >= len(names) - COLUMNS)
-        if panel.get_xscale() == "linear":
-            panel.locator_params(axis="x", nbins=3, prune="upper")
-    for panel in panels[len(names) :]:
-        panel.remove()
-    figure.text(0.54, 0.1 / height, labels[0], ha="center")
-    figure.text(0.012, 0.5, labels[1], va="center", rotation="vertical")
-    return figure
+def _height(names: Sequence[str]) -> int:
+    """Pixels of a chart of curves: their names may take several lines of the legend."""
+    letters = sum(6 + len(name) for name in names[:TOGETHER])
+    return 310 + 22 * (letters // 36)
 
 
-def boxes(path: Path, variants: Sequence[Variant], floor: Floor) -> Path:
-    """Box plots of the final objective, one row per variant, every run a dot; failed runs are not drawn."""
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
+def _apart(blank: Blank, names: Sequence[str], curves: Curves, bands: Sequence[Band]) -> list[Chart]:
+    """One small chart for each curve, the first curve behind it."""
+    made = []
+    for k, (name, (x, y)) in enumerate(zip(names, curves, strict=True)):
+        chart = blank(name, SMALL)
+        chart.line(names[0], *curves[0], style.BEHIND, step=True, legend=False)
+        for b in bands[k : k + 1]:
+            chart.band("", b.x, b.lower, b.upper, style.PALETTE[0], step=True)
+        made.append(chart.line(name, x, y, style.PALETTE[0], step=True, legend=False))
+    return made
 
+
+def spread(variants: Sequence[Variant], floor: Floor) -> Chart:
+    """Where every finished run ended, one row for each variant, with the median and the quartiles of each."""
     variants = [variant for variant in variants if variant.finished]
-    samples = [np.array([run.objective for run in variant.finished]) for variant in variants]
-    everything = np.concatenate(samples)
-    with rc_context(style.SETTINGS):
-        figure = Figure(figsize=(8.0, 0.9 + 0.27 * len(samples)), layout="constrained")
-        panel = figure.subplots()
-        rows = np.arange(len(samples))
-        ink = {"color": style.PALETTE[0], "linewidth": 1.0}
-        panel.boxplot(
-            samples, positions=rows, orientation="horizontal", widths=0.55, showfliers=False, whis=(0, 100),
-            medianprops={"color": style.PALETTE[1], "linewidth": 2}, boxprops=ink, whiskerprops=ink, capprops=ink,
-        )  # fmt: skip
-        for row, sample in zip(rows, samples, strict=True):
-            offset = row + 0.16 * np.cos(np.pi * np.arange(len(sample)))  # two lines of dots: fewer hide each other
-            panel.plot(sample, offset, ".", color=style.FAINT, markersize=2.5, alpha=0.5)
-        panel.axvline(floor.value, color=style.FAINT, linewidth=0.8, linestyle=(0, (2, 2)))
-        panel.set_yticks(rows, [variant.name for variant in variants])
-        panel.invert_yaxis()
-        panel.grid(axis="y", visible=False)
-        style.logarithmic(panel, "x", everything.min(), everything.max())
-        panel.set_xlabel("objective at the end of the search [pu²]")
-        return style.save(figure, path)
+    chart = _rows("objective [pu²]", [v.name for v in variants], log=True)
+    dots = [(run, row + shift) for row, v in enumerate(variants) for run, shift in _scattered(v)]
+    told = [f"{run.optimizer}, seed {run.seed}: {number(run.objective, 4)} pu²" for run, _ in dots]
+    ends = np.array([run.objective for run, _ in dots])
+    chart.points("every run", ends, [y for _, y in dots], style.FAINT, size=4, told=told)
+    ended = [[run.objective for run in v.finished] for v in variants]
+    lower, middle, upper = np.array([np.quantile(values, (0.25, 0.5, 0.75)) for values in ended]).T
+    told = [f"{v.name}: median {number(m, 4)} pu²" for v, m in zip(variants, middle, strict=True)]
+    chart.points(
+        "median and quartiles", middle, np.arange(len(variants)), style.PALETTE[0], told=told,
+        spans=np.column_stack((lower, upper)), symbol="diamond", size=9,
+    )  # fmt: skip
+    margin = max(ends.max() / floor.value, 1.2) ** 0.04
+    return chart.edge(floor.value, dash="dash").limits(None, min(floor.value, ends.min()) / margin, ends.max() * margin)
 
 
-def critical_difference(path: Path, ranks: Ranks) -> Path:
-    """Mean ranks on an axis, best to the left; a bar joins variants that do not differ significantly (Nemenyi)."""
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
+def _scattered(variant: Variant) -> list[tuple[Run, float]]:
+    """The finished runs with a share of a row by which each is moved, so that equal ones are seen."""
+    done = variant.finished
+    return list(zip(done, JITTER * np.cos(2.4 * np.arange(len(done))), strict=True))
 
+
+def _rows(label: str, names: Sequence[str], *, log: bool = False) -> Chart:
+    """A chart with a row for each name, the first on top."""
+    chart = Chart(label, [""], log_x=log, pixels=140 + ROW[len(names) <= TOGETHER] * len(names), hover="closest")
+    return chart.ticks(0, range(len(names)), names).limits(0, len(names) - 0.4, -0.6)
+
+
+def mean_ranks(ranks: Ranks) -> Chart:
+    """Mean ranks over seeds with half of Nemenyi's critical difference to either side, the best on top."""
     order = np.argsort(ranks.mean, kind="stable")
-    half = -(-len(order) // 2)
-    bars = len(ranks.groups)
-    depth = 0.6 + 0.22 * bars + 0.3 * half
-    with rc_context(style.SETTINGS | {"axes.grid": False}):
-        figure = Figure(figsize=(8.0, 0.7 + depth))
-        panel = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        panel.set_axis_off()
-        label = 0.3 + 0.062 * max(map(len, ranks.names))  # inch, with its rank
-        margin = (label + 0.3) * (len(order) - 1) / (8.0 - 2 * (label + 0.3))
-        panel.set(xlim=(1 - margin, len(order) + margin), ylim=(depth, -0.7))
-        _axis(panel, len(order), ranks.critical_difference)
-        place = {ranks.names[i]: ranks.mean[i] for i in order}
-        for k, group in enumerate(ranks.groups):
-            ends = [place[group[0]], place[group[-1]]]
-            pad = 0.004 * len(order)
-            panel.plot(
-                [ends[0] - pad, ends[1] + pad],
-                [0.25 + 0.22 * k] * 2,
-                color=style.ACTIVE,
-                linewidth=3.5,
-                solid_capstyle="butt",
-            )
-        for k, i in enumerate(order):
-            left = k < half
-            y = 0.4 + 0.22 * bars + 0.3 * (k if left else len(order) - 1 - k)
-            x = 1 - 0.03 * len(order) if left else 1.03 * len(order)
-            panel.plot([ranks.mean[i], ranks.mean[i], x], [0, y, y], color="#444444", linewidth=0.8)
-            text = f"{ranks.names[i]}  {ranks.mean[i]:.2f} " if left else f" {ranks.mean[i]:.2f}  {ranks.names[i]}"
-            panel.text(x, y, text, ha="right" if left else "left", va="center", fontsize=8.5)
-        return style.save(figure, path)
+    names, mean = [ranks.names[k] for k in order], np.array(ranks.mean)[order]
+    half = ranks.critical_difference / 2
+    chart = _rows("mean rank over the seeds (1 is best)", names)
+    told = [f"{name}: {rank:.2f}" for name, rank in zip(names, mean, strict=True)]
+    spans = np.column_stack((mean - half, mean + half))
+    chart.points("", mean, np.arange(len(names)), style.PALETTE[0], told=told, spans=spans)
+    return chart.limits(None, min(1, spans.min()) - 0.1, max(len(names), spans.max()) + 0.1)
 
 
-def _axis(panel: "Axes", count: int, difference: float) -> None:
-    """The axis of ranks, and above it the length of the critical difference."""
-    panel.plot([1, count], [0, 0], color="black", linewidth=1)
-    for rank in range(1, count + 1):
-        panel.plot([rank, rank], [0, -0.07], color="black", linewidth=1)
-        if count <= 15 or rank in (1, count) or rank % 5 == 0:
-            panel.text(rank, -0.11, str(rank), ha="center", va="bottom", fontsize=8)
-    panel.plot([1, 1 + difference], [-0.42, -0.42], color="black", linewidth=1.5, marker="|", markersize=7)
-    panel.text(1 + difference / 2, -0.47, f"critical difference {difference:.2f}", ha="center", va="bottom", fontsize=8)
+def parameters(variants: Sequence[Variant], polished: Polished) -> Chart:
+    """The parameters at which every run ended, a panel for each over its bounds, and where the floor's lie."""
+    variants = [variant for variant in variants if any(run in polished.reached for run in variant.finished)]
+    names = list(polished.parameters)
+    labels = [f"{name} [{polished.units[name]}]" if polished.units[name] != "1" else name for name in names]
+    turned = sum(4 + len(v.name) for v in variants) > 40  # characters side by side on a phone
+    room = 6 * max(len(v.name) for v in variants) if turned else 0
+    chart = Chart("", labels, pixels=100 + PANEL * len(names) + room, hover="closest")
+    dots = [(run, k + shift) for k, v in enumerate(variants) for run, shift in _scattered(v) if run in polished.reached]
+    for panel, name in enumerate(names):
+        for inside, label, color in ((False, "elsewhere", OUTSIDE), (True, "in the floor's valley", INSIDE)):
+            some = [(run, x) for run, x in dots if polished.in_valley(run) is inside]
+            told = [f"{run.optimizer}, seed {run.seed}: {name} {run.parameters[name]:.4g}" for run, _ in some]
+            values = [run.parameters[name] for run, _ in some]
+            chart.points(label, [x for _, x in some], values, color, panel, size=5, told=told)
+        low, high = polished.bounds[name]
+        edge = 0.03 * (high - low)
+        chart.level(polished.parameters[name], panel=panel, color=INSIDE).limits(panel, low - edge, high + edge)
+    chart.ticks(None, range(len(variants)), [v.name for v in variants], turned)
+    return chart.limits(None, -0.6, len(variants) - 0.4)

@@ -1,7 +1,6 @@
 """A comparison as one self-contained page for people, and as one JSON file for machines."""
 
 import math
-import tempfile
 from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -11,11 +10,15 @@ from tractexp.comparison import claims
 from tractexp.comparison.ablation import Ablation
 from tractexp.comparison.claims import number, p_value
 from tractexp.comparison.comparison import Comparison, Pair
+from tractexp.comparison.floor import AT_FLOOR
+from tractexp.comparison.runs import Run, Variant
 from tractexp.comparison.statistics import ALPHA, size_of
-from tractexp.comparison.summary import AT_FLOOR, Spread
+from tractexp.comparison.summary import Spread
 from tractexp.report import compare as figures
+from tractexp.report.chart import Chart
 from tractexp.report.page import Page
 
+AT_END = "at the end of the search"
 QUOTED = 12  # more sentences than these about pairs are folded away
 
 
@@ -23,17 +26,18 @@ def write_page(comparison: Comparison, path: Path, source: str) -> Path:
     """Write `comparison.html`; `source` says where the runs are from."""
     runs = sum(summary.runs for summary in comparison.summaries)
     title = f"Comparison of {len(comparison.summaries)} optimizers on {comparison.gathered.problem}"
-    page = Page(title, f"{runs} runs of {source}.")
-    page.verdict(claims.headline(comparison), claims.of_floor(comparison), claims.of_speed(comparison))
+    page = Page(title, f"{runs} runs of {source}. Objectives, errors and parameters are those {AT_END}.")
+    told = (claims.headline, claims.of_floor, claims.of_valley, claims.of_speed)
+    page.verdict(claims.answer(comparison), *(text for claim in told if (text := claim(comparison))))
     if comparison.notes:
         page.heading("Mind").items(comparison.notes)
-    with tempfile.TemporaryDirectory() as folder:
-        _quality(page, comparison)
-        _speed(page, comparison, Path(folder))
-        _differences(page, comparison, Path(folder))
+    _quality(page, comparison)
+    _parameters(page, comparison)
+    _speed(page, comparison)
+    _differences(page, comparison)
     if comparison.ablation:
         _switches(page, comparison.ablation)
-    _failures(page, comparison)
+    _not_judged(page, comparison)
     _reading(page, comparison)
     return page.write(path)
 
@@ -44,20 +48,54 @@ def _spread(spread: Spread, scale: float = 1.0) -> list[str]:
 
 
 def _quality(page: Page, comparison: Comparison) -> None:
-    page.heading("How good")
+    page.heading("Where the runs ended")
+    drawn = figures.spread(comparison.variants, comparison.floor)
+    page.chart(drawn, f"Objective {AT_END} of every run that finished. Dashed: the floor.")
     columns = ["variant", "runs", "failed", "best", "lower quartile", "median", "upper quartile", "worst", "at floor"]
     rows = [
-        [s.name, str(s.runs), str(s.failures), *_spread(s.objective), f"{s.at_floor:.0%}"] for s in comparison.summaries
+        [s.name, str(s.runs), str(s.failures), *_spread(s.objective), f"{s.at_floor:.0%}", _share(s.in_valley)]
+        for s in comparison.summaries
     ]
     floor = f"the floor, {number(comparison.floor.value, 5)} pu² ({comparison.floor.source})"
-    page.table(columns, rows, f"Objective of Eq. (8) [pu²]. At floor: share of runs within {AT_FLOOR:.0%} of {floor}.")
+    page.table(
+        [*columns, "in its valley"],
+        rows,
+        f"Objective of Eq. (8) [pu²] {AT_END}. At floor: share of runs within {AT_FLOOR:.0%} of {floor}. In its "
+        "valley: share of the finished runs from whose end least squares reach it.",
+    )
     for name in ("epsilon_p", "epsilon_q"):
         rows = [[s.name, *_spread(getattr(s, name), 100.0)] for s in comparison.summaries]
         with page.folded(f"{name} of Eq. (20)"):
-            page.table(["variant", *columns[3:-1]], rows, f"{name}, in percent.")
+            page.table(["variant", *columns[3:-1]], rows, f"{name} {AT_END}, in percent.")
 
 
-def _speed(page: Page, comparison: Comparison, folder: Path) -> None:
+def _share(value: float | None) -> str:
+    return "-" if value is None else f"{value:.0%}"
+
+
+def _parameters(page: Page, comparison: Comparison) -> None:
+    """Every run's parameters against the floor's; nothing where the problem could not be put again."""
+    polished = comparison.polished
+    if polished is None or not polished.reached:
+        return
+    page.heading("The parameters of every run")
+    drawn = figures.parameters(comparison.variants, polished)
+    inside = sum(polished.in_valley(run) is True for run in polished.reached)
+    page.chart(
+        drawn,
+        f"Parameters {AT_END}, over the bounds of each; dashed: those of the lowest objective, "
+        f"{number(polished.objective, 5)} pu². Least squares from where they ended lead {inside} of "
+        f"{len(polished.reached)} runs there, and the others to higher valleys.",
+    )
+    rows = [
+        [name, polished.units[name], number(value, 4), *(number(bound, 4) for bound in polished.bounds[name])]
+        for name, value in polished.parameters.items()
+    ]
+    with page.folded("the values of the lowest objective"):
+        page.table(["parameter", "unit", "value", "lower bound", "upper bound"], rows)
+
+
+def _speed(page: Page, comparison: Comparison) -> None:
     page.heading("How fast")
     goals = [f"{target:g} x floor" for target in comparison.targets]
     columns = ["variant", "simulations", *(f"{g} [simulations]" for g in goals), *(f"{g} [s]" for g in goals)]
@@ -67,41 +105,49 @@ def _speed(page: Page, comparison: Comparison, folder: Path) -> None:
         + [number(x) for x in s.ert["seconds"]]
         for s in comparison.summaries
     ]
+    for by in ("simulations", "iterations"):
+        told = f"Best objective by {by}: the median" + (" and the quartiles." if _few(comparison) else ".")
+        costs = " An iteration may cost several populations." if by == "iterations" else ""
+        _curves(page, comparison, figures.fitness(comparison.variants, by, comparison.floor), told + costs)
+    told = f"Runtimes: the share of {figures.targets_told()} reached by all runs, by simulations."
+    _curves(page, comparison, figures.ecdf(comparison.variants, comparison.floor), told)
     page.table(
         columns,
         rows,
         "Median of all simulations made, and expected running time (ERT) to each target: what all runs spent until "
         "they reached it, those that did not all they had, per run that did.",
     )
-    many = len(comparison.summaries) > figures.TOGETHER
-    behind = f" Gray: {comparison.summaries[0].name}." if many else ""
-    band = "Median and quartiles of the best objective by {}. Dashed: the floor." + behind
-    for by in ("simulations", "iterations"):
-        drawn = figures.fitness(folder / f"{by}.svg", comparison.variants, by, comparison.floor)
-        page.figure(drawn, band.format(by) + (" An iteration may cost several populations." * (by == "iterations")))
-    drawn = figures.ecdf(folder / "ecdf.svg", comparison.variants, comparison.floor)
-    page.figure(drawn, f"Runtimes: the share of {figures.targets_told()} reached by all runs, by simulations.{behind}")
 
 
-def _differences(page: Page, comparison: Comparison, folder: Path) -> None:
+def _few(comparison: Comparison) -> bool:
+    return len(comparison.summaries) <= figures.TOGETHER
+
+
+def _curves(page: Page, comparison: Comparison, drawn: tuple[Chart, list[Chart]], told: str) -> None:
+    """A chart of all variants; where there are many, one of each folded away."""
+    whole, each = drawn
+    many = f" In color the first {figures.TOGETHER}; gray ones are named when pointed at." if each else ""
+    page.chart(whole, told + many)
+    if each:
+        with page.folded("each variant in a chart of its own"):
+            page.charts(each, f"In gray: {comparison.summaries[0].name}.")
+
+
+def _differences(page: Page, comparison: Comparison) -> None:
     page.heading("Is the difference more than chance?")
-    page.figure(
-        figures.boxes(folder / "boxes.svg", comparison.variants, comparison.floor),
-        "Quartiles, range and every run. Dashed: the floor.",
-    )
     if comparison.ranks:
         page.text(claims.of_ranks(comparison))
-        page.figure(
-            figures.critical_difference(folder / "ranks.svg", comparison.ranks),
-            f"Mean ranks over seeds, 1 is best. A bar joins variants whose ranks do not differ significantly at "
-            f"{ALPHA:.0%} (Nemenyi).",
+        page.chart(
+            figures.mean_ranks(comparison.ranks),
+            f"Mean ranks over seeds, with half of Nemenyi's critical difference to either side: variants whose bars "
+            f"do not overlap differ significantly at {ALPHA:.0%}.",
         )
     if not comparison.pairs:
         return
     main, rest = claims.near_and_far(comparison)
     _pairs(page, main, "")
     if rest:
-        with page.folded(f"the other {len(rest)} pairs"):
+        with page.folded(f"the other {len(rest)} pairs" if len(rest) > 1 else "the other pair"):
             _pairs(page, rest, "")
     told = [claims.of_pair(comparison, pair) for pair in (*main, *rest)]
     page.heading("To quote", 3).items(told[:QUOTED])
@@ -155,16 +201,18 @@ def _switches(page: Page, ablation: Ablation) -> None:
         page.text(unknown)
 
 
-def _failures(page: Page, comparison: Comparison) -> None:
-    rows = [
-        [variant.name, str(run.seed), run.where, run.failure]
-        for variant in comparison.variants
-        for run in variant.runs
-        if not run.finished
-    ]
-    if rows:
-        page.heading(f"Failures: {len(rows)}")
-        page.table(["variant", "seed", "job", "because"], rows, words=(2, 3))
+def _not_judged(page: Page, comparison: Comparison) -> None:
+    """The runs without a result: those that failed, and those that were interrupted."""
+    failed = _failed(comparison)
+    interrupted = [(name, run.seed, run.where, run.interruption) for name, run in comparison.gathered.interrupted]
+    for title, rows in (("Failures", failed), ("Interrupted: not judged", interrupted)):
+        if rows:
+            page.heading(f"{title}: {len(rows)}")
+            page.table(["variant", "seed", "job", "because"], [list(map(str, row)) for row in rows], words=(2, 3))
+
+
+def _failed(comparison: Comparison) -> list[tuple[str, int, str, str]]:
+    return [(v.name, run.seed, run.where, run.failure) for v in comparison.variants for run in v.runs if run.failure]
 
 
 def _reading(page: Page, comparison: Comparison) -> None:
@@ -173,7 +221,9 @@ def _reading(page: Page, comparison: Comparison) -> None:
             f"Objectives within {comparison.ties:g} of the floor count as equal in the tests: what is left there is "
             "rounding, not quality. The tables show them as they are.",
             "A failed run counts as worse than any other in the tests; its budget counts as spent in the ERT; "
-            "quartiles and curves are those of the finished runs.",
+            "quartiles and curves are those of the finished runs. An interrupted run counts as nothing.",
+            "The optimizer is judged by where its own search ended. An identification goes on from there: its estimate "
+            "is polished by least squares from several starts, and mostly the same whichever optimizer is taken.",
             "A target counts as reached at the end of the iteration in which it was, so running times are at most "
             "one iteration too long.",
             "Not significant means that these runs do not show a difference, not that there is none.",
@@ -185,26 +235,36 @@ def _reading(page: Page, comparison: Comparison) -> None:
 
 def content(comparison: Comparison, source: str) -> dict[str, Any]:
     """What `comparison.json` holds: every number of the page. What is not finite is None."""
+    failed = _failed(comparison)
+    interrupted = [(name, run.seed, run.where, run.interruption) for name, run in comparison.gathered.interrupted]
+    keys = ("variant", "seed", "job", "message")
+    polished = comparison.polished
     told = {
         "source": source,
         "problem": comparison.gathered.problem,
-        "floor": comparison.floor,
+        "values": f"objectives, errors and parameters are those {AT_END}",
+        "answer": claims.answer(comparison),
+        "floor": {**asdict(comparison.floor), "parameters": polished.parameters if polished else None},
         "targets": comparison.targets,
         "ties": comparison.ties,
         "variants": comparison.summaries,
+        "runs": [_told(variant, run, comparison) for variant in comparison.variants for run in variant.finished],
         "pairs": [asdict(pair) | {"significant": pair.significant} for pair in comparison.pairs],
         "ranks": comparison.ranks,
         "ablation": comparison.ablation,
         "sentences": claims.sentences(comparison),
         "notes": comparison.notes,
-        "failures": [
-            {"variant": variant.name, "seed": run.seed, "job": run.where, "message": run.failure}
-            for variant in comparison.variants
-            for run in variant.runs
-            if not run.finished
-        ],
+        "failures": [dict(zip(keys, row, strict=True)) for row in failed],
+        "interrupted": [dict(zip(keys, row, strict=True)) for row in interrupted],
     }
     return files.plain(_as_dicts(told))
+
+
+def _told(variant: Variant, run: Run, comparison: Comparison) -> dict[str, Any]:
+    """One run, as `comparison.json` holds it."""
+    inside = comparison.polished.in_valley(run) if comparison.polished else None
+    kept = {key: getattr(run, key) for key in ("seed", "objective", "epsilon_p", "epsilon_q", "parameters")}
+    return {"variant": variant.name, **kept, "simulations": run.simulations[-1], "in_valley": inside}
 
 
 def write_json(comparison: Comparison, path: Path, source: str) -> Path:

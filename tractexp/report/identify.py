@@ -1,30 +1,68 @@
-"""The page of an identification, to be read in a minute: what was found, how sure, how well it fits, what next."""
+"""The page of an identification, to be read in a minute: what it is good for, what was found, how sure, what next."""
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
-from tractexp.identification.uncertainty import Together, Uncertainty
-from tractexp.identification.verdict import BOUND, IDENTIFIED
+import numpy as np
+
+from tractexp.identification.adequacy import Adequacy
+from tractexp.identification.estimate import Estimated
+from tractexp.identification.residual_tests import LAGS, REJECTED, autocorrelation
+from tractexp.identification.search import REFUSED, History
+from tractexp.identification.together import Together
+from tractexp.identification.uncertainty import Uncertainty
+from tractexp.identification.verdict import IDENTIFIED, TRADES
+from tractexp.report import style
+from tractexp.report.chart import Chart
+from tractexp.report.events import CAPTION, Curve, event_chart
 from tractexp.report.page import Page
+from tractexp.wording import in_words
+
+KIND = {"adequate": "good", "effect_missing": "plain", "wrong_model": "bad"}
+SHOWN = 4  # events whose curves are not folded away
+SMALLEST = 0.01  # of the deviance: starts closer than this ended in the same place
 
 
 def digits(value: float) -> str:
     return f"{value:.4g}"
 
 
-def rows(known: Uncertainty, units: dict[str, str]) -> list[list[str]]:
-    """One row for each free parameter: name, most likely value, unit, interval, standard error, verdict."""
-    table = []
-    errors = known.information.standard_errors
-    for j, name in enumerate(known.names):
-        low, high = known.intervals[j]
-        error = digits(errors[j]) if errors[j] < float("inf") else "none"
-        unit = units.get(name.partition("[")[0], "")
-        table.append(
-            [name, digits(known.values[j]), unit, f"{digits(low)} .. {digits(high)}", error, str(known.verdicts[name])]
-        )
-    return table
+def page(
+    result: Any, fits: Sequence[Any], estimated: Estimated, known: Uncertainty, together: Together | None,
+    adequacy: Adequacy, advice: Sequence[str], history: History, about: dict[str, str], search: str, command: str,
+) -> Page:  # fmt: skip
+    """The whole page. `about` {parameter: meaning}; `search` is where the optimizer ended, in words."""
+    names = ", ".join(e["name"] for e in result.events if e["role"] == "train")
+    made = Page(f"Identification of {names}", f"{result.optimizer}, seed {result.seed}.")
+    sentence = f"{adequacy.sentence[0].upper()}{adequacy.sentence[1:]}."
+    made.verdict(sentence, _acceptance(result), *_identified(known, adequacy), kind=KIND[adequacy.grade])
+    made.heading("Measured and calculated")
+    _curves(made, fits, known)
+    made.heading("Parameters")
+    _parameters(made, result, known, adequacy, about)
+    made.heading("What to do next").items(advice)
+    if together is not None and adequacy.good:
+        _events(made, known, together)
+    made.heading("The search and the estimate").text(f"{search[0].upper()}{search[1:]}.")
+    made.chart(_fitness(history, result), "Best objective of the search; dashed: the estimate's.")
+    _starts(made, estimated, known)
+    made.heading("What the fit leaves")
+    _left(made, known)
+    made.heading("How the estimates depend on each other")
+    _correlation(made, known)
+    made.heading("How this page was made")
+    made.table(["", ""], _origin(result, command), words=(1,))
+    return made
+
+
+def _acceptance(result: Any) -> str:
+    holds = "holds" if result.acceptable else "does not hold"
+    errors = f"epsilon_p {result.epsilon_p:.2%}, epsilon_q {result.epsilon_q:.2%}"
+    return f"Acceptance of Eq. (20), below 5 %, {holds}: {errors}."
+
+
+def _identified(known: Uncertainty, adequacy: Adequacy) -> list[str]:
+    return [headline(known)] if adequacy.good else []
 
 
 def headline(known: Uncertainty) -> str:
@@ -34,72 +72,181 @@ def headline(known: Uncertainty) -> str:
     return f"{good} of {len(known.verdicts)} parameters are identified" + (f"; {', '.join(poor)}" if poor else "") + "."
 
 
-def page(
-    result: Any,
-    known: Uncertainty,
-    together: Together | None,
-    advice: Sequence[str],
-    fits: Sequence[Path],
-    correlation: Path,
-    residuals: Path,
-) -> Page:
-    """The whole page; the paths are figures to be drawn into it."""
-    names = ", ".join(e["name"] for e in result.events if e["role"] == "train")
-    made = Page(f"Identification of {names}", f"{result.optimizer}, seed {result.seed}; the search {result.status}.")
-    holds = "holds" if result.acceptable else "does not hold"
-    errors = f"epsilon_p {result.epsilon_p:.2%}, epsilon_q {result.epsilon_q:.2%}"
-    acceptance = f"Acceptance of Eq. (20), below 5 %, {holds}: {errors}."
-    sound = result.acceptable and not known.notes and not any(v.word == BOUND for v in known.verdicts.values())
-    made.verdict(headline(known), acceptance, *(f"{note}." for note in result.uncertainty["notes"]),
-                 kind="good" if sound else "bad")  # fmt: skip
-    made.heading("Parameters")
-    made.table(
-        ["parameter", "most likely", "unit", "95 % interval", "standard error", "verdict"],
-        rows(known, result.units),
-        caption="Most likely: colored noise whitened, the power before the dip left free. The search's own values,"
-        " which minimize the objective, are below.",
-        words=(5,),
+def _curves(made: Page, fits: Sequence[Any], known: Uncertainty) -> None:
+    """One chart of each event; of many the later ones are folded away."""
+    likelihood = known.likelihood
+    deviation = likelihood.noise.deviation(likelihood.problem.drive)
+    parts = [likelihood.problem.drive.part(e) for e in range(likelihood.problem.drive.events)]
+    made.text(CAPTION)
+    for k, fit in enumerate(fits):
+        record, role = fit.event.record, "fitted" if fit.role == "train" else "held out"
+        power = np.stack((fit.P, fit.Q))
+        noise = deviation[:, parts[k]] if fit.role == "train" else None
+        chart = event_chart(fit.event, [Curve("estimate", power, style.PALETTE[0])], deviation=noise, around=power)
+        caption = f"{record.name}, {role}: epsilon_p {fit.epsilon_p:.3%}, epsilon_q {fit.epsilon_q:.3%}."
+        caption = " ".join([caption, *(f"{note}." for note in record.notes)])
+        if k < SHOWN:
+            made.chart(chart, caption)
+        else:
+            with made.folded(f"{record.name}, {role}"):
+                made.chart(chart, caption)
+
+
+def _parameters(made: Page, result: Any, known: Uncertainty, adequacy: Adequacy, about: dict[str, str]) -> None:
+    """Table and, where intervals mean something, their picture against the bounds."""
+    search = {**result.search["parameters"]}
+    for name, each in result.search["per_event"].items():
+        search |= {f"{name}[{k}]": value for k, value in enumerate(each, start=1)}
+    columns = ["parameter", "meaning", "value", "unit", "bounds"]
+    columns += ["95 % interval", "standard error", "verdict"] if adequacy.good else []
+    values = result.free | {n: v for n, v in result.parameters.items() if n not in result.per_event}
+    made.table([*columns, "search ended at"], [
+        [name, about.get(_base(name), ""), digits(value), result.units.get(_base(name), ""),
+         "{:g} .. {:g}".format(*result.bounds[_base(name)]),
+         *(_sure(known, name) if adequacy.good else []), digits(search[name])]
+        for name, value in values.items()
+    ], caption="The estimate is the most likely set: noise whitened, the power before each dip left free. pu: per unit"
+               " of the record's base." + ("" if adequacy.good else " Intervals are withheld: they would tell how far"
+               " noise moves the values, not how far what is missing does."),
+        words=(1, 7) if adequacy.good else (1,))  # fmt: skip
+    if adequacy.good:
+        made.chart(_forest(known, search), "Estimates and 95 % intervals within the bounds of each parameter (0 is the"
+                                           " lower, 1 the upper bound); cross: where the search ended.")  # fmt: skip
+
+
+def _base(name: str) -> str:
+    return name.partition("[")[0]
+
+
+def _sure(known: Uncertainty, name: str) -> list[str]:
+    """Interval, standard error and verdict of one parameter; of a fixed one that it is fixed."""
+    if name not in known.names:
+        return ["", "", "fixed"]
+    j = known.names.index(name)
+    low, high = known.intervals[j]
+    error = known.information.standard_errors[j]
+    told = digits(error) if np.isfinite(error) else "none"
+    return [f"{digits(low)} .. {digits(high)}", told, str(known.verdicts[name])]
+
+
+def _forest(known: Uncertainty, search: dict[str, float]) -> Chart:
+    """Every interval on the range between its bounds."""
+    lower, width = known.lower, known.upper - known.lower
+    at, spans = (known.values - lower) / width, (known.intervals - lower[:, None]) / width[:, None]
+    told = [
+        f"{n}: {digits(v)}, {digits(a)} .. {digits(b)}"
+        for n, v, (a, b) in zip(known.names, known.values, known.intervals, strict=True)
+    ]
+    ended = (np.array([search[n] for n in known.names]) - lower) / width
+    chart = Chart("between the bounds", [""], pixels=110 + 34 * len(known.names))
+    chart.points("estimate and 95 % interval", at, known.names, style.PALETTE[0], size=9, told=told, spans=spans)
+    chart.points("search", ended, known.names, style.PALETTE[1], symbol="x", size=8,
+                 told=[f"{n}: search ended at {digits(search[n])}" for n in known.names])  # fmt: skip
+    return chart.limits(None, -0.02, 1.02).limits(0, len(known.names) - 0.5, -0.5)
+
+
+def _fitness(history: History, result: Any) -> Chart:
+    found = history.objective < REFUSED
+    chart = Chart("simulations", ["best objective [pu²]"], log_y=True, pixels=300)
+    best = np.maximum(history.objective[found], 1e-30)
+    chart.line(result.optimizer or "search", history.simulations[found], best, style.PALETTE[0], step=True)
+    return chart.level(max(result.objective, 1e-30), "estimate")
+
+
+def _starts(made: Page, estimated: Estimated, known: Uncertainty) -> None:
+    """Where each descent to the estimate ended."""
+    starts = estimated.starts
+    above = np.maximum([s.above for s in starts], SMALLEST)
+    chart = Chart("rank of the start", ["deviance above the best"], log_y=True, pixels=280)
+    looks = {"search": ("x", style.PALETTE[1]), "box": ("circle", style.PALETTE[0]),
+             "beside the best": ("diamond", style.PALETTE[2])}  # fmt: skip
+    for origin, (symbol, color) in looks.items():
+        at = [k for k, s in enumerate(starts) if s.origin == origin]
+        told = [
+            f"{origin}: " + ", ".join(f"{n} {digits(v)}" for n, v in zip(known.names, starts[k].values, strict=True))
+            for k in at
+        ]
+        if at:
+            chart.points(origin, [k + 1 for k in at], above[at], color, symbol=symbol, told=told)
+    valleys = sum(1 for k, s in enumerate(starts) if k == 0 or s.above - starts[k - 1].above > 1.0)
+    made.chart(
+        chart,
+        f"Descents of the likelihood from {len(starts)} starts ended at {valleys} heights; those at the lowest are the"
+        " estimate's valley. A difference of 3.8 is what a 95 % interval spans.",
     )
-    made.heading("What to do next").items(advice)
-    if together is not None:
-        _events(made, known, together)
-    made.heading("Fit")
-    for path in fits:
-        made.figure(path)
-    made.heading("What the fit leaves").figure(residuals)
-    made.table(
-        ["event", "channel", "test", "statistic", "p", "says"],
-        [
-            [t["event"], t["channel"], t["name"], digits(t["statistic"]), f"{t['p']:.2g}", t["says"]]
-            for t in known.tests
-        ],
-        caption="Of the residuals after whitening; below p = 0.01 a test speaks.",
-        words=(1, 2, 5),
-    )
-    made.table(
-        ["event", "channel", "noise [pu]", "before the dip [pu]", "order", "neighbors' correlation"],
-        [
-            [n["event"], n["channel"], digits(n["deviation"]), digits(n["before"]), str(n["order"]),
-             f"{n['correlation']:.2f}"]
-            for n in known.noise
-        ],
-        caption="Noise model of each channel: an autoregression of the residual, its order chosen by AICc.",
-        words=(1,),
-    )  # fmt: skip
-    made.heading("How the estimates depend on each other").figure(
-        correlation,
-        "Correlation. Two parameters near +1 or -1 trade against each other: the record knows a combination.",
-    )
-    with made.folded("Values that minimize the objective, Eq. (8)"):
-        made.table(
-            ["parameter", "value", "unit", "bounds"],
-            [
-                [name, digits(value), result.units[name], f"{result.bounds[name][0]:g} .. {result.bounds[name][1]:g}"]
-                for name, value in result.parameters.items()
-            ],
-            caption=f"objective {result.objective:.4g} pu², {result.simulations} simulations, {result.seconds:.2f} s",
+    with made.folded("where each start ended"):
+        made.table(["from", "above the best", *known.names],
+                   [[s.origin, f"{s.above:.3g}", *map(digits, s.values)] for s in starts])  # fmt: skip
+
+
+def _left(made: Page, known: Uncertainty) -> None:
+    """Whitened residuals, their autocorrelation, and what the tests of them say."""
+    likelihood = known.likelihood
+    drive, events = likelihood.problem.drive, likelihood.problem.events
+    white = likelihood.rows(known.unit[None])[0].reshape(2, -1)
+    colored = [t for t in known.tests if t["p"] < REJECTED]
+    made.text(_conclusion(colored, len(known.tests)))
+    for e, event in enumerate(events[:SHOWN]):
+        part = drive.part(e)
+        chart = Chart(
+            "t [s]", ["P", "Q"], pixels=320, title=f"{event.record.name}: whitened residual [standard deviations]"
         )
-    return made
+        lags = Chart("lag [samples]", ["autocorrelation"], pixels=320)
+        for c, (name, color) in enumerate(zip("PQ", (style.ACTIVE, style.REACTIVE), strict=True)):
+            seen = likelihood.known[c, part]
+            rows = white[c, part][seen]
+            chart.line(name, event.record.t[seen], rows, color, c, width=0.8)
+            x = np.arange(1, min(LAGS, len(rows) // 4) + 1)
+            lags.points(name, x + 0.2 * c, autocorrelation(rows, len(x)), color, size=5)
+            limit = 1.96 / np.sqrt(max(len(rows), 1))
+            lags.level(limit).level(-limit)
+        made.chart(chart.edge(event.t_start).edge(event.t_end))
+        made.chart(lags, "Autocorrelation of the whitened residual; between the dashed lines is chance.")
+    with made.folded("tests of the residuals, and the noise"):
+        made.table(
+            ["event", "channel", "test", "statistic", "p", "says"],
+            [[t["event"], t["channel"], t["name"], digits(t["statistic"]), in_words(t["p"]), t["says"]] for t in known.tests],
+            caption=f"Of the residuals after whitening; below p = {REJECTED} a test speaks.", words=(1, 2, 4, 5),
+        )  # fmt: skip
+        made.table(
+            ["event", "channel", "noise [pu]", "before the dip [pu]", "order", "neighbors' correlation",
+             "correlation of P and Q"],
+            [[n["event"], n["channel"], digits(n["deviation"]), digits(n["before"]), str(n["order"]),
+              f"{n['correlation']:.2f}", f"{n['between_P_and_Q']:.2f}"] for n in known.noise],
+            caption="Noise of each channel, told from what the fit leaves before the dips and at the end of the"
+                    " records: an autoregression of P and Q mixed until they are independent.", words=(1,),
+        )  # fmt: skip
+
+
+def _conclusion(speaking: Sequence[dict[str, Any]], tests: int) -> str:
+    if not tests:
+        return "There are too few samples to test what is left."
+    if not speaking:
+        return f"None of {tests} tests finds anything but noise in what is left: it is white and normal."
+    said = sorted({f"{t['channel']} of {t['event']} is {t['says']}" for t in speaking})
+    return f"{len(speaking)} of {tests} tests find more than noise in what is left: {'; '.join(said)}."
+
+
+def _correlation(made: Page, known: Uncertainty) -> None:
+    """The strongest correlations in words, all of them as a table."""
+    names, matrix = known.names, known.information.correlation
+    pairs = [(abs(matrix[i, j]), i, j) for i in range(len(names)) for j in range(i)]
+    strong = [
+        f"{names[j]} and {names[i]} ({matrix[i, j]:+.3f})" for r, i, j in sorted(pairs, reverse=True) if r >= TRADES
+    ]
+    made.text(
+        f"These trade against each other, so that the record knows a combination of them: {', '.join(strong)}."
+        if strong else "No two parameters trade against each other."
+    )  # fmt: skip
+    with made.folded("all correlations"):
+        made.table(["", *names], [[n, *(f"{r:+.2f}" for r in row)] for n, row in zip(names, matrix, strict=True)])
+
+
+def _origin(result: Any, command: str) -> list[list[str]]:
+    told = [["command", command]] if command else []
+    told.append(["tractexp", f"{result.tractexp_version}{f', commit {result.commit}' if result.commit else ''}"])
+    told += [[f"record {r['name']} ({r['role']})", f"SHA-256 {r['sha256']}"] for r in result.records]
+    return told
 
 
 def _events(made: Page, known: Uncertainty, together: Together) -> None:

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from tractexp.comparison.floor import Floor
 from tractexp.comparison.runs import Run, Variant
-from tractexp.comparison.summary import Floor
 from tractexp.replication import equations, maps, printed
 from tractexp.replication.claims import CONFIRMED, IMPOSSIBLE, OPEN, REFUTED, Claim, number
 from tractexp.replication.study import AT_FLOOR, TARGETS, Study

@@ -1,15 +1,27 @@
 """The page of a plan: what was asked, the answer, what each kind of dip would tell, and which events to fit."""
 
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from tractexp.identification.plan import INERTIA, Choice, Forecast, Needed
+from tractexp.identification.plan import INERTIA, Choice, Forecast, Needed, column
 from tractexp.identification.problem import Problem
+from tractexp.report.chart import Chart
 from tractexp.report.page import Page
+from tractexp.report.style import PALETTE
 
+DEPTH, DURATION, RATE, NOISE = "depth", "duration [s]", "samples per second", "noise, of P before the dip"
+AXES = {  # of a scan: what its axis says, and what a value is multiplied by
+    DEPTH: ("depth of the dip [%]", 100.0),
+    DURATION: ("duration of the dip [ms]", 1000.0),
+    RATE: ("samples per second", 1.0),
+    NOISE: ("noise [% of P before the dip]", 100.0),
+}
+LINES = [(color, dash) for dash in ("solid", "dash", "dot") for color in PALETTE]
+CEILING = 10.0  # times the value: wider intervals are not told
 ROWS = 20  # of a table, about: of a longer scan every other row
 
 
@@ -30,29 +42,39 @@ class Planned:
 
 def percent(relative: float) -> str:
     """A share as a number of percent; a dash from ten times the value on."""
-    if not relative < 10:
+    if not relative < CEILING:
         return "-"
     return f"{100 * relative:.0f}" if relative >= 0.0995 else f"{100 * relative:.2g}"
 
 
-def page(path: Path, planned: Planned, figure: Path) -> Path:
-    """Write the page, with `figure` drawn into it; returns its path."""
+def page(path: Path, planned: Planned) -> Path:
+    """Write the page; returns its path."""
     needed = planned.needed
     answer = str(needed)
     title = f"How deep a dip tells {needed.parameter}"
     made = Page(title, f"A plan for {planned.problem.model.title}, before anything more is recorded.")
     made.verdict(f"{answer[0].upper()}{answer[1:]}.", kind="bad" if needed.depth is None else "good")
+    by_depth, *others = [_chart(planned, label, legend=label == DEPTH) for label in planned.scans]
+    made.chart(by_depth, _caption(needed))
     _asked(made, planned)
-    made.heading("What a dip would tell")
+    made.heading("What another kind of dip would tell")
     made.text(
-        "One property of the dip is varied at a time, the others stay as above. In each row: half of the 95 % interval,"
-        " in percent of the value; a dash where it is ten times the value or more."
+        "One property of the dip is varied at a time, the others stay as planned. Each curve is half of the 95 %"
+        " interval in percent of the value, in the colors above; it ends where that is ten times the value,"
+        " or the record cannot tell it."
     )
-    for label, (x, forecasts) in planned.scans.items():
-        step = max(1, round(len(x) / ROWS))
-        rows = [[f"{at:.4g}", *map(percent, f.relative)] for at, f in zip(x[::step], forecasts[::step], strict=True)]
-        made.table([label, *forecasts[0].names], rows)
-    made.figure(figure, f"The same, with the ± {100 * needed.within:g} % that was asked for as a line.")
+    made.charts(others)
+    with made.folded("The same in numbers"):
+        for label, (x, forecasts) in planned.scans.items():
+            step = max(1, round(len(x) / ROWS))
+            rows = [
+                [f"{at:.4g}", *map(percent, f.relative)] for at, f in zip(x[::step], forecasts[::step], strict=True)
+            ]
+            made.table(
+                [label, *forecasts[0].names],
+                rows,
+                caption="Half of the 95 % interval in percent of the value; a dash from ten times the value on.",
+            )
     _events(made, planned)
     made.heading("What it rests on").items(
         [
@@ -65,10 +87,47 @@ def page(path: Path, planned: Planned, figure: Path) -> Path:
     return made.write(path)
 
 
+def _caption(needed: Needed) -> str:
+    met = "" if needed.depth is None else ", met at the dotted line"
+    return (
+        "Half of the 95 % interval of each parameter, in percent of its value, by the depth of the dip. Dashed: the"
+        f" ± {100 * needed.within:g} % asked for {needed.parameter}{met}."
+    )
+
+
+def _chart(planned: Planned, label: str, legend: bool) -> Chart:
+    """Half intervals in percent against one property of the dip; the parameter asked for is drawn bold."""
+    needed, (x, forecasts) = planned.needed, planned.scans[label]
+    text, factor = AXES[label]
+    at = factor * np.asarray(x, dtype=float)
+    relative = np.array([f.relative for f in forecasts])
+    relative = 100 * np.where(relative < CEILING, relative, np.nan)
+    few = max(at) > 19.5 * min(at) > 0  # tried values far apart: they are the marks
+    chart = Chart(text, ["± % of the value"], log_x=few, log_y=True, pixels=440 if legend else 320, legend=legend)
+    bold = column(forecasts[0].names, needed.parameter)
+    for j, (name, (color, dash)) in enumerate(zip(forecasts[0].names, itertools.cycle(LINES), strict=False)):
+        name = f"{name} ({INERTIA})" if j == bold and needed.parameter == INERTIA else name
+        chart.line(name, at, relative[:, j], color, dash=dash, width=3.2 if j == bold else 1.5)
+    chart.level(100 * needed.within)
+    if label == DEPTH and needed.depth is not None:
+        chart.edge(factor * needed.depth)
+    if few:
+        chart.ticks(None, at.tolist()).limits(None, min(at) / 1.1, 1.2 * max(at))
+    low, high = np.nanmin(relative, initial=100 * needed.within), np.nanmax(relative, initial=100 * needed.within)
+    return chart.limits(0, 0.8 * low, 1.25 * high).ticks(0, marks(low, high))
+
+
+def marks(low: float, high: float) -> list[float]:
+    """Where a logarithmic axis from low to high is marked: powers of ten, and 2 and 5 times these where it is short."""
+    digits = (1.0, 2.0, 5.0) if high < 100 * low else (1.0,)
+    powers = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
+    return [float(f"{digit}e{power}") for power in powers for digit in digits]
+
+
 def _asked(made: Page, planned: Planned) -> None:
     """The question, the dip and the parameters it is planned at."""
     needed, problem = planned.needed, planned.problem
-    stands = f" (it has the relative precision of M, since {INERTIA} = M omega_s / 2)" * (needed.parameter == INERTIA)
+    stands = ", which is known as well as M," * (needed.parameter == INERTIA)
     made.heading("What was asked").items(
         [
             f"How deep must a dip be for {needed.parameter}{stands} to be known within ± {100 * needed.within:g} %?",
@@ -76,19 +135,31 @@ def _asked(made: Page, planned: Planned) -> None:
             f"Recorded already: {', '.join(e.record.name for e in problem.events)}.",
         ]
     )
-    about = {p.name: p for p in problem.parameters}
-    rows = [
-        [name, f"{value:.4g}", about[name].unit, f"{low:g} .. {high:g}", about[name].about]
-        for name, value, low, high in zip(
-            problem.space.names, planned.values, problem.lower, problem.upper, strict=True
-        )
-    ]
-    rows += [
-        [name, f"{value:.4g}", about[name].unit, "fixed", about[name].about] for name, value in problem.fixed.items()
-    ]
     made.table(
-        ["parameter", "value", "unit", "bounds", "meaning"], rows, caption=f"Planned at {planned.origin}.", words=(4,)
+        ["symbol", "meaning", "value", "unit", "bounds"],
+        [*_symbols(planned)],
+        caption=f"Planned at {planned.origin}. P and Q are the active and reactive power; pu is per unit of the"
+        " record's own base.",
+        words=(1,),
     )
+
+
+def _symbols(planned: Planned) -> Iterator[list[str]]:
+    """A line for every parameter, and for the inertia constant that stands for M."""
+    problem = planned.problem
+    values = dict(zip(problem.space.names, planned.values, strict=True)) | dict(problem.fixed)
+    for parameter in problem.parameters:
+        name, (low, high) = parameter.name, parameter.bounds
+        within = "fixed" if name in problem.fixed else f"{low:g} .. {high:g}"
+        yield [name, parameter.about, f"{values[name]:.4g}", parameter.unit, within]
+    if "M" in values:
+        frequency = problem.events[0].record.base.frequency
+        yield [
+            INERTIA,
+            f"inertia constant M omega_s / 2, omega_s = 2 pi {frequency:g} rad/s: kinetic energy at synchronous"
+            " speed, over the base power",
+            f"{values['M'] * np.pi * frequency:.4g}", "s", "those of M",
+        ]  # fmt: skip
 
 
 def _events(made: Page, planned: Planned) -> None:

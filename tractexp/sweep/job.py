@@ -5,7 +5,7 @@ import shutil
 import signal
 import time
 import traceback
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from tractexp.errors import UserError
 from tractexp.sweep import identity
 from tractexp.sweep.parent import parent_of
 from tractexp.sweep.status import FAILED, FINISHED, RUNNING, Status
-from tractexp.tasks.given import given
+from tractexp.tasks.given import given, variant
 
 OUTPUT, TRACEBACK = "output.txt", "traceback.txt"
 
@@ -40,10 +40,20 @@ class SweepJob:
         chosen = given(overrides, choices)
         return cls(config, kept, tuple(overrides), told, identity.inputs(config), folder, chosen)
 
+    def variant(self, common: Collection[str]) -> str:
+        """What the optimizer is called with the settings that it does not share with all jobs: the `common` ones."""
+        own = given((text for text in self.overrides if text not in common), self.choices)
+        return variant(self.choices["optimizer"], own)
+
     @property
     def status(self) -> Status:
         """How this job stands when it starts."""
         return Status(RUNNING, "", self.configuration, self.inputs, 0.0, self.choices, self.config["seed"])
+
+
+def shared(jobs: Sequence[SweepJob]) -> set[str]:
+    """The overrides that all jobs of a sweep have; none of a sweep of one."""
+    return set.intersection(*(set(job.overrides) for job in jobs)) if len(jobs) > 1 else set()
 
 
 def work(job: SweepJob) -> Status:

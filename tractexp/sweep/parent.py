@@ -6,8 +6,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from tractexp import provenance
 from tractexp.files import write_json
-from tractexp.sweep.status import FAILED, FINISHED, objective, read
+from tractexp.sweep.status import FAILED, FINISHED, INTERRUPTED, objective, read
 
 FILE = "sweep.json"
 
@@ -56,7 +57,7 @@ def metrics(jobs: list[Any]) -> dict[str, float]:
     """The figures of a sweep as a whole."""
     ends = [(s.status, job.folder) for job in jobs if (s := read(job.folder)) is not None]
     best = [f for _, folder in ends if (f := objective(folder)) is not None]
-    counts = {f"jobs_{kind}": sum(status == kind for status, _ in ends) for kind in (FINISHED, FAILED)}
+    counts = {f"jobs_{kind}": sum(status == kind for status, _ in ends) for kind in (FINISHED, FAILED, INTERRUPTED)}
     return {"jobs": len(jobs), **counts, **({"best_objective": min(best)} if best else {})}
 
 
@@ -71,6 +72,6 @@ def _described(folder: Path, jobs: list[Any], overrides: list[str]) -> Any:
         experiment=first.experiment,
         name=f"sweep {folder.name}",
         parameters=shared,
-        tags={"task": first.choices["task"], "sweep": " ".join(overrides), "git_commit": tracking.git_commit()},
+        tags={"task": first.choices["task"], "sweep": " ".join(overrides), "git_commit": provenance.commit()},
         description=f"A sweep of {len(jobs)} jobs: `{' '.join(overrides)}`",
     )

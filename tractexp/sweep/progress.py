@@ -1,15 +1,15 @@
-"""What a person sees while a sweep runs: jobs done, the best of each optimizer so far, the time left."""
+"""What a person sees while a sweep runs: jobs done, the best of each variant so far, the time left."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from tractexp.sweep.job import SweepJob
+from tractexp.sweep.job import SweepJob, shared
 from tractexp.sweep.status import FAILED, Status, objective
 from tractexp.tasks.console import FIRST_LINE, NEXT_LINES, console, say
 
-SHOWN = 3  # optimizers named in a line of a log file
+SHOWN = 3  # variants named in a line of a log file
 
 
 class Tally:
@@ -17,20 +17,21 @@ class Tally:
 
     def __init__(self, jobs: Sequence[SweepJob]):
         self.total, self.done, self.failed = len(jobs), 0, 0
-        self.jobs: dict[str, int] = {}  # done, by optimizer
+        self.common = shared(jobs)
+        self.jobs: dict[str, int] = {}  # done, by variant
         self.best: dict[str, float] = {}
         self.started = self.first = time.perf_counter()
 
     def add(self, job: SweepJob, end: Status) -> None:
-        optimizer = job.choices["optimizer"]
+        variant = job.variant(self.common)
         self.done += 1
         if self.done == 1:
             self.first = time.perf_counter()
         self.failed += end.status == FAILED
-        self.jobs[optimizer] = self.jobs.get(optimizer, 0) + 1
+        self.jobs[variant] = self.jobs.get(variant, 0) + 1
         value = objective(job.folder)
         if value is not None:
-            self.best[optimizer] = min(value, self.best.get(optimizer, value))
+            self.best[variant] = min(value, self.best.get(variant, value))
 
     def ranked(self) -> list[tuple[str, float]]:
         return sorted(self.best.items(), key=lambda item: item[1])
@@ -105,7 +106,7 @@ def _live(tally: Tally) -> Iterator[Callable[[SweepJob, Status], None]]:
 
 
 def _table(tally: Tally) -> Any:
-    """The best objective of each optimizer so far, best first."""
+    """The best objective of each variant so far, best first."""
     from rich.table import Table
 
     made = Table.grid(padding=(0, 2))

@@ -8,7 +8,7 @@ from pathlib import Path
 from tractexp.files import write_json
 
 FILE = "status.json"
-RUNNING, FINISHED, FAILED = "running", "finished", "failed"
+RUNNING, FINISHED, FAILED, INTERRUPTED = "running", "finished", "failed", "interrupted"
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,9 @@ def read(folder: Path) -> Status | None:
 
 
 def objective(folder: Path) -> float | None:
-    """The objective in the job's `result.json`; None where its task writes none."""
+    """The objective where the job's search ended; None where its task writes no `result.json`."""
     try:
-        return float(json.loads((folder / "result.json").read_text(encoding="utf-8"))["objective"])
+        found = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+        return float((found.get("search") or found)["objective"])
     except (OSError, ValueError, TypeError, KeyError):
         return None

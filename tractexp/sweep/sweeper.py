@@ -21,14 +21,13 @@ from tractexp.errors import UserError
 from tractexp.plugin import get
 from tractexp.sweep import status
 from tractexp.sweep.compose import Composer
-from tractexp.sweep.job import SweepJob
+from tractexp.sweep.job import SweepJob, shared
 from tractexp.sweep.launcher import Cores
 from tractexp.sweep.parent import parent_run
-from tractexp.sweep.status import FAILED, FINISHED, RUNNING
+from tractexp.sweep.status import FAILED, FINISHED, INTERRUPTED, RUNNING
 from tractexp.tasks.console import say, table
 from tractexp.tasks.given import refuse_unread
 
-INTERRUPTED = "interrupted"
 REPEAT = "repeat the command to go on with the jobs that are left"
 
 
@@ -88,7 +87,7 @@ class Grid(Sweeper):
         for job in jobs:
             if job.folder.exists():
                 shutil.rmtree(job.folder)
-        problem = "it ended without a word: its worker was killed or never started"
+        end, problem = FAILED, "it ended without a word: its worker was killed or never started"
         try:
             if isinstance(self.launcher, Cores):
                 self.launcher.run(jobs)
@@ -96,7 +95,7 @@ class Grid(Sweeper):
                 batch = [[*job.overrides, *placement(job)] for job in jobs]
                 self.launcher.launch(batch, initial_job_idx=0)
         except KeyboardInterrupt:
-            problem = INTERRUPTED
+            end, problem = INTERRUPTED, ""
             raise KeyboardInterrupt(f"the sweep is interrupted; {REPEAT}") from None
         except UserError:
             raise
@@ -104,8 +103,8 @@ class Grid(Sweeper):
             problem = f"the launcher gave up: {str(error).strip().partition(chr(10))[0] or type(error).__name__}"
         finally:
             for job in jobs:
-                if problem != INTERRUPTED or job.folder.exists():  # a job not begun has nothing to tell
-                    settle(job, problem)
+                if end != INTERRUPTED or job.folder.exists():  # a job not begun has nothing to tell
+                    settle(job, end, problem)
 
 
 def swept(override: Override) -> list[str]:
@@ -155,12 +154,12 @@ def finished(job: SweepJob) -> bool:
     return same and found.status == FINISHED  # type: ignore[union-attr]
 
 
-def settle(job: SweepJob, problem: str) -> None:
-    """Write down that a job which has not said how it ended has failed."""
+def settle(job: SweepJob, end: str, problem: str) -> None:
+    """Write down the end of a job which has not said how it ended."""
     found = status.read(job.folder)
     if found is None or found.status == RUNNING:
         job.folder.mkdir(parents=True, exist_ok=True)
-        replace(job.status, status=FAILED, message=problem).write(job.folder)
+        replace(job.status, status=end, message=problem).write(job.folder)
 
 
 @contextlib.contextmanager
@@ -180,20 +179,21 @@ def terminating() -> Iterator[None]:
 def conclude(jobs: Sequence[SweepJob]) -> None:
     """Print what the sweep found and which jobs failed. Raises `UserError` where any did."""
     ends = [(job, status.read(job.folder)) for job in jobs]
+    common = shared(jobs)
     found: dict[str, list[float]] = {}
     for job, _ in ends:
         value = status.objective(job.folder)
         if value is not None:
-            found.setdefault(job.choices["optimizer"], []).append(value)
+            found.setdefault(job.variant(common), []).append(value)
     if found:
         say()
         rows = sorted((sorted(values), name) for name, values in found.items())
         cells = [[n, str(len(v)), *(f"{x:.4e}" for x in (v[0], median(v), v[-1])), ""] for v, n in rows]
         table(["optimizer", "jobs", "best objective", "median", "worst", ""], cells)
+        say("objectives in pu² at the end of the search, before the estimate is polished")
     failed = [(job, end.message) for job, end in ends if end is not None and end.status == FAILED]
     if not failed:
         return
-    common = set.intersection(*(set(job.overrides) for job in jobs)) if len(jobs) > 1 else set()
     say()
     say("failed jobs")
     for job, why in failed:  # not in columns: they would cut the sentences

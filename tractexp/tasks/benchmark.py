@@ -4,6 +4,7 @@ from dataclasses import field
 from pathlib import Path
 from typing import Any
 
+from tractexp import provenance
 from tractexp.api.benchmark import DIMENSIONS, FUNCTIONS, INSTANCES, MULTIPLIER, TARGETS, benchmark, check
 from tractexp.errors import check_distinct
 from tractexp.plugin import build, get, plugin
@@ -84,7 +85,7 @@ def track(job: Job, made: Any, paths: list[Path]) -> None:
     from tractexp import tracking
 
     metrics = {
-        f"share_{name.replace(' ', '_')}_{d}d": made.share(name, d, made.plan.functions)
+        tracking.metric_name(f"share {name} {d}d"): made.share(name, d, made.plan.functions)
         for name in made.optimizers for d in made.plan.dimensions
     }  # fmt: skip
     optimizer = job.choices["optimizer"]
@@ -93,7 +94,7 @@ def track(job: Job, made: Any, paths: list[Path]) -> None:
         name=f"{optimizer} on BBOB",
         parameters=tracking.flatten({key: job.config[key] for key in ("task", "optimizer", "seed")}),
         metrics=metrics,
-        tags={"task": "benchmark", "optimizer": optimizer, "seed": str(job.seed), "git_commit": tracking.git_commit()},
+        tags={"task": "benchmark", "optimizer": optimizer, "seed": str(job.seed), "git_commit": provenance.commit()},
         artifacts=paths,
         parent=job.sweep,
     )

@@ -14,7 +14,7 @@ SAID = 8  # sentences on the terminal; the page has all
 
 @plugin
 class Compare(Task):
-    """Settle which optimizer is better: tables, tests over paired seeds, figures, one page, sentences to quote."""
+    """Settle which optimizer is better: tables, tests over paired seeds, charts, one page, sentences to quote."""
 
     reads = ()
     instead = {"data": "choose among the runs by task.data"}
@@ -22,7 +22,7 @@ class Compare(Task):
     sweep: str | None = None  # folder of a sweep; null: the newest under outputs/sweeps
     filter: str | None = None  # instead: a filter over MLflow, "tags.data = 'tibet_50pct'"
     data: str | None = None  # compare the runs on this choice of data only
-    floor: float | None = None  # objective that the noise leaves; null: the best of all runs
+    floor: float | None = None  # objective that the noise leaves; null: polished from the runs and many starts
     targets: list[float] = field(default_factory=lambda: [10.0, 2.0, 1.01])  # of running times, times the floor
     ties: float = 1e-3  # objectives within this share of the floor count as equal in the tests
     reference: str | None = None  # test only against this variant; null: every pair
@@ -61,7 +61,9 @@ def report(comparison: Any, source: str) -> None:
         for s in comparison.summaries
     ]
     table(["variant", "failed", "median", "worst", "at floor", "ERT"], rows)
-    say(f"objectives in pu²; at floor: within 1 %; ERT: simulations expected to {target:g} times the floor")
+    say(f"objectives in pu² at the end of the search; at floor: within 1 %; ERT: simulations to {target:g} x floor")
+    say()
+    say(claims.answer(comparison))
     told = claims.sentences(comparison)
     for text in [*told[:SAID], *comparison.notes]:
         say(f"- {text}")
@@ -82,13 +84,17 @@ def track(job: Job, comparison: Any, folder: Path | None, paths: list[Path]) -> 
     parent = parent_of(folder) if folder is not None else None
     data = comparison.gathered.variants[0].runs[0].data
     if parent is not None and attach(parent, job.store, paths):
-        say("logged on the run of the sweep; to see it: tractexp ui")
+        say(f"logged on the run of the sweep; to see it: {job.look}")
         return
     run = tracking.Run(
         experiment=node["experiment"] or f"compare {data}",
         name=f"comparison of {len(comparison.summaries)} variants",
         parameters=tracking.flatten({"task": job.config["task"]}),
-        metrics={f"median_{s.name}": s.objective.median for s in comparison.summaries if s.runs > s.failures},
+        metrics={
+            tracking.metric_name(f"median {s.name}"): s.objective.median
+            for s in comparison.summaries
+            if s.runs > s.failures
+        },
         tags={"task": "compare", "data": data},
         artifacts=paths,
     )

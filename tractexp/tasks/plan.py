@@ -15,10 +15,10 @@ ASKED = ("parameter", "within", "depth", "duration", "rate", "noise", "values", 
 
 @plugin
 class Plan(Task):
-    """Forecast the intervals that a recording would give, without fitting it: plan.html, plan.json, plan.svg.
+    """Forecast the intervals that a recording would give, without fitting it: plan.html and plan.json.
 
-    The dip is that of the deepest record in `data`, or as set here. The parameters are guessed by a quick fit to
-    that record, or are the model's defaults, or those of an earlier result.json.
+    The dip is that of the deepest record in `data`, or as set here. The parameters and the noise are those of the
+    estimate that identify makes of it, or the model's defaults, or those of an earlier result.json.
     """
 
     reads = ("data", "model")

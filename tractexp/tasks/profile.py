@@ -9,7 +9,7 @@ from tractexp.tasks.task import Job, Task, call
 
 @plugin
 class Profile(Task):
-    """Identify, then find the best fit for each value of each parameter in turn: profile.json and profiles.svg."""
+    """Identify, then find the best fit for each value of each parameter in turn: profile.html and profile.json."""
 
     points: int = 24  # at most so many on either side of the optimum
 

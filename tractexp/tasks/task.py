@@ -7,7 +7,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
+from tractexp import provenance
 from tractexp.plugin import Plugin, build
+from tractexp.tasks.given import variant
 
 SEARCH = ("objective", "optimizer", "budget", "time_limit", "target")  # the settings of a search
 LOAD = ("model.motor", "model.static", "model.effects")  # the parts of a model, without what is known of its parameters
@@ -104,6 +106,11 @@ class Job:
         return int(self.config["seed"])
 
     @property
+    def variant(self) -> str:
+        """The optimizer and what else was chosen: runs of one variant differ in their seeds alone."""
+        return variant(self.choices["optimizer"], self.given)
+
+    @property
     def experiment(self) -> str:
         """The MLflow experiment: named by the configuration, or after task and data."""
         return self.config["tracking"]["experiment"] or f"{self.choices['task']} {self.choices['data']}"
@@ -117,9 +124,9 @@ class Job:
 
     @functools.cached_property
     def _logger(self) -> Any:
-        from tractexp.tracking.process import Logger
+        from tractexp.tracking.process import logger
 
-        return Logger(self.store)
+        return logger(self.store)
 
     def prepare_log(self) -> None:
         """Get MLflow ready beside the computation, in a process of its own; call it once the input is found right.
@@ -140,17 +147,24 @@ class Job:
         from tractexp import tracking
 
         parts = {group: self.choices[group] for group in ("task", "model", "optimizer", "data")}
+        parts |= {"variant": self.variant, "seed": str(self.seed)}
         run = tracking.Run(
             experiment=self.experiment,
             name=name,
             parameters={**tracking.flatten(self.config), **values},
-            tags={**parts, "seed": str(self.seed), "git_commit": tracking.git_commit()},
+            tags={**parts, "git_commit": provenance.commit()},
             parent=self.sweep,
             **content,
         )
-        self.send(run, f" --uri {node['uri']}" if node["uri"] else "")
+        self.send(run)
 
-    def send(self, run: Any, where: str = "") -> None:
+    @property
+    def look(self) -> str:
+        """The command that shows what was logged."""
+        uri = self.config["tracking"]["uri"]
+        return f"tractexp ui --uri {uri}" if uri else "tractexp ui"
+
+    def send(self, run: Any) -> None:
         """Log a run (`tracking.Run`), and say how to look at it."""
         from tractexp import tracking
         from tractexp.tasks.console import say
@@ -159,4 +173,4 @@ class Job:
             self._logger.log(run)
         else:
             tracking.log(run, self.store)
-        say(f"logged in experiment '{run.experiment}'; to see it: tractexp ui{where}")
+        say(f"logged in experiment '{run.experiment}'; to see it: {self.look}")

@@ -8,7 +8,7 @@ from tractexp.errors import UserError
 def ui(arguments: list[str]) -> int:
     """Serve the store of the current folder (or `--uri`) on loopback until interrupted; returns the exit code.
 
-    The address printed opens on the comparison of the newest experiment, by optimizer.
+    The address printed opens on the comparison of the newest experiment, by variant.
     """
     parser = argparse.ArgumentParser(prog="tractexp ui", description="Open the MLflow UI on this computer only.")
     parser.add_argument("--uri", help="tracking store; default: outputs/mlflow.db of the current folder")
@@ -16,11 +16,9 @@ def ui(arguments: list[str]) -> int:
     parser.add_argument("--open", action="store_true", help="open it in the browser")
     chosen = parser.parse_args(arguments)
     from tractexp import tracking
-    from tractexp.tracking.ui import check_servable, serve
+    from tractexp.tracking.ui import serve
 
-    uri = tracking.address(chosen.uri)
-    check_servable(uri, port=chosen.port)
-    return serve(uri, port=chosen.port, page=_page(uri), open_browser=chosen.open)
+    return serve(tracking.address(chosen.uri), port=chosen.port, page=_page, open_browser=chosen.open)
 
 
 def _page(uri: str) -> str:

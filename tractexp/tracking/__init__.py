@@ -1,10 +1,11 @@
 """The one package that knows MLflow. Plain data goes in; MLflow is imported when something is logged, not before."""
 
 from tractexp.tracking.run import Run as Run
+from tractexp.tracking.run import at_common_steps as at_common_steps
 from tractexp.tracking.run import finish_parent as finish_parent
 from tractexp.tracking.run import flatten as flatten
-from tractexp.tracking.run import git_commit as git_commit
 from tractexp.tracking.run import log as log
+from tractexp.tracking.run import metric_name as metric_name
 from tractexp.tracking.run import reopen_parent as reopen_parent
 from tractexp.tracking.run import start_parent as start_parent
 from tractexp.tracking.run import tag_experiment as tag_experiment

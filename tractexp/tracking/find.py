@@ -1,7 +1,10 @@
 """Runs read back from the store as plain data."""
 
+import contextlib
+import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,11 +14,15 @@ from tractexp.tracking.store import open_store, sentences
 
 PAGE = 1000  # runs asked for at a time
 CURVES = ("fitness_by_simulations",)
+FILES = ("result.json", "history.csv")
 
 
 @dataclass(frozen=True)
 class Logged:
-    """One run as it lies in MLflow. `curves` are {name: (steps (n,), values (n,))}, by increasing step."""
+    """One run as it lies in MLflow. `curves` are {name: (steps (n,), values (n,))}, by increasing step.
+
+    `files` is the text of its artifacts {"result.json": ...}, without those that it never had or that are gone.
+    """
 
     run_id: str
     name: str
@@ -25,6 +32,7 @@ class Logged:
     metrics: Mapping[str, float]
     tags: Mapping[str, str]
     curves: Mapping[str, tuple[np.ndarray, np.ndarray]]
+    files: Mapping[str, str] = field(default_factory=dict)
 
 
 def find(uri: str, filter: str, experiment: str | None = None, curves: tuple[str, ...] = CURVES) -> list[Logged]:
@@ -72,8 +80,20 @@ def _logged(client: Any, run: Any, experiment: str, curves: tuple[str, ...]) -> 
     read = {name: _curve(client, run.info.run_id, name) for name in curves if name in run.data.metrics}
     return Logged(
         run.info.run_id, run.info.run_name, run.info.status, experiment,
-        dict(run.data.params), dict(run.data.metrics), dict(run.data.tags), read,
+        dict(run.data.params), dict(run.data.metrics), dict(run.data.tags), read, _files(client, run.info.run_id),
     )  # fmt: skip
+
+
+def _files(client: Any, run_id: str) -> dict[str, str]:
+    """Artifacts lie by absolute path, so those of a folder that was moved are missing."""
+    from mlflow.exceptions import MlflowException
+
+    found = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for name in FILES:
+            with contextlib.suppress(MlflowException, OSError, ValueError):
+                found[name] = Path(client.download_artifacts(run_id, name, folder)).read_text(encoding="utf-8")
+    return found
 
 
 def _curve(client: Any, run_id: str, name: str) -> tuple[np.ndarray, np.ndarray]:

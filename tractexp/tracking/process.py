@@ -1,43 +1,79 @@
 """Log from a second process that gets MLflow ready while the job computes.
 
-Importing MLflow and opening the store take over a second, and in a thread they would hold up the job by as much
-(measured). In a process of their own they cost a job that computes that long next to nothing. For a single job;
+Importing MLflow and opening the store take two seconds, and in a thread they would hold up the job by as much
+(measured). In a process of their own they cost a job that takes as long next to nothing, if they begin when the command
+does: before the configuration is composed, and long before anything is known to be worth logging. For a single job;
 the workers of a sweep keep every core busy and import MLflow once each, so they call `tracking.log`.
 """
 
+import atexit
 import os
 import pickle
 import subprocess
 import sys
 from types import TracebackType
+from typing import Any
 
 from tractexp.errors import UserError
 from tractexp.tracking.run import Run, log
-from tractexp.tracking.store import prepare
+from tractexp.tracking.store import import_mlflow, prepare
+
+_ahead: "list[Logger]" = []
+
+
+def start_ahead() -> None:
+    """Start a process for `logger` to take; it ends with this one where nothing is logged."""
+    made = Logger()
+    _ahead.append(made)
+    atexit.register(made.close)
+
+
+def logger(uri: str) -> "Logger":
+    """The process that was started ahead or a new one, with the store at `uri` opened."""
+    made = _ahead.pop() if _ahead else Logger()
+    made.open(uri)
+    return made
 
 
 class Logger:
     """`with Logger(uri) as logger: ...; logger.log(run)`. Left without a run, it logs nothing.
 
-    Start it when the input has been found right: the process creates the store.
+    It imports MLflow at once. It creates the store when it is told where that is, at first or by `open`: do so when the
+    input has been found right.
     """
 
-    def __init__(self, uri: str):
-        command = [sys.executable, "-c", f"from {__name__} import main; main({uri!r})"]
+    def __init__(self, uri: str = ""):
         self._process = subprocess.Popen(
-            command,
+            [sys.executable, "-c", f"from {__name__} import main; main()"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             start_new_session=True,  # Ctrl-C is the job's business: it ends this process by leaving the `with`
         )
+        self._opened = False
+        if uri:
+            self.open(uri)
 
     def __enter__(self) -> "Logger":
         return self
 
+    def open(self, uri: str) -> None:
+        """Let the process create or open the store at `uri` meanwhile, once; what is wrong with it, `log` tells."""
+        self._tell(uri)
+        self._opened = True
+
+    def _tell(self, message: Any) -> None:
+        assert self._process.stdin is not None
+        try:
+            pickle.dump(message, self._process.stdin)
+            self._process.stdin.flush()
+        except BrokenPipeError:
+            pass  # it has ended, which `log` tells
+
     def log(self, run: Run) -> str:
         """As `tracking.log`, once. Paths in `run` are taken from where the process was started."""
         run.check()
-        answer, _ = self._process.communicate(pickle.dumps(run))
+        self._tell(run)
+        answer, _ = self._process.communicate()
         if not answer:
             raise UserError(f"the process that logs to MLflow ended with code {self._process.returncode}")
         run_id, error = pickle.loads(answer)
@@ -45,18 +81,26 @@ class Logger:
             raise UserError(error)
         return run_id
 
-    def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def close(self) -> None:
+        """End the process: at once where no store was opened, else when the store is whole."""
         if self._process.returncode is None:
+            if not self._opened:
+                self._process.kill()
             self._process.communicate()  # it reads the end of its input and ends
 
+    def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
 
-def main(uri: str) -> None:
-    """Get ready, wait for the run on standard input, log it, answer on standard output."""
+
+def main() -> None:
+    """Get ready, wait for an address and a run on standard input, log the run, answer on standard output."""
+    import_mlflow()
     run_id = problem = ""
     try:
-        prepare(uri)
-        if run := sys.stdin.buffer.read():
-            run_id = log(pickle.loads(run), uri)
+        prepare(uri := pickle.load(sys.stdin.buffer))
+        run_id = log(pickle.load(sys.stdin.buffer), uri)
+    except EOFError:
+        pass  # nothing to log
     except UserError as error:
         problem = str(error)
         sys.stdin.buffer.read()

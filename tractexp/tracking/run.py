@@ -3,24 +3,25 @@
 A job that is killed therefore leaves no run that claims to be running. Only the run of a sweep is opened first.
 """
 
-import functools
 import getpass
 import json
 import re
-import subprocess
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
+from tractexp import provenance
 from tractexp.errors import UserError, check_choice
 from tractexp.tracking.store import database_of, open_store, sentences
 
+if TYPE_CHECKING:
+    import numpy as np
+
 STATUSES = ("FINISHED", "FAILED", "KILLED")
+PER_DECADE = 40  # steps that curves share
 CURVE_POINTS = 1000  # a longer curve is thinned evenly; the files of the run keep every point
 BATCH_METRICS, BATCH_PARAMETERS = 900, 100  # MLflow takes at most 1000 entries a batch, 100 of them parameters
 VALUE_LENGTH = 6000  # characters MLflow stores of a parameter
@@ -41,7 +42,7 @@ class Run:
     name: str
     parameters: Mapping[str, Any] = field(default_factory=dict)
     metrics: Mapping[str, float] = field(default_factory=dict)
-    curves: Mapping[str, tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray]] = field(
+    curves: "Mapping[str, tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray]]" = field(
         default_factory=dict
     )
     tags: Mapping[str, str] = field(default_factory=dict)
@@ -51,6 +52,7 @@ class Run:
     status: str = "FINISHED"
     seconds: float = 0.0
     model: Path | None = None
+    records: "Sequence[Mapping[str, str]]" = ()  # name, role, sha256: MLflow's inputs
     children: "Sequence[Run]" = ()
 
     def check(self) -> None:
@@ -81,25 +83,29 @@ def flatten(config: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
 def _text(value: Any) -> str:
     if isinstance(value, str):
         return value
-    if isinstance(value, np.generic | np.ndarray):
+    if hasattr(value, "tolist"):  # an array, or a number of one
         value = value.tolist()
     if value is None or isinstance(value, bool | int | float | list | tuple):
         return json.dumps(value, default=str, ensure_ascii=False)
     return str(value)
 
 
-@functools.cache
-def git_commit(folder: Path | None = None) -> str:
-    """The commit of the repository around `folder` (default: where the process runs), "" where there is none.
+def metric_name(text: str) -> str:
+    """Text as MLflow takes it for the name of a metric: "median issa levy=false" has a colon for the sign."""
+    return re.sub(r"[^\w.\- :/]", "_", text.replace("=", ":"), flags=re.ASCII)
 
-    Uncommitted changes to tracked files add "-dirty".
+
+def at_common_steps(steps: "np.ndarray", values: "np.ndarray") -> "tuple[np.ndarray, np.ndarray]":
+    """A curve (n,) of what was reached, by steps (n,) above 0, at steps that all such curves share.
+
+    MLflow averages runs step by step: where each has its own, the average jumps from one run to the next.
     """
-    command = ["git", "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
-    try:
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=5)
-    except (OSError, subprocess.TimeoutExpired):
-        return ""
-    return done.stdout.strip() if done.returncode == 0 else ""
+    import numpy as np
+
+    first, last = (int(np.ceil(PER_DECADE * np.log10(step))) for step in (steps[0], steps[-1]))
+    common = np.unique(np.ceil(10 ** (np.arange(first, last + 1) / PER_DECADE)))
+    common = common[common >= steps[0]]
+    return common, values[np.searchsorted(steps, common, side="right") - 1]
 
 
 def log(run: Run, uri: str) -> str:
@@ -168,7 +174,7 @@ def _create(client: Any, run: Run, uri: str) -> str:
         "mlflow.user": _user(),
         "mlflow.source.name": "tractexp",
         "mlflow.source.type": "LOCAL",
-        "mlflow.source.git.commit": git_commit(),
+        "mlflow.source.git.commit": provenance.commit(),
         "mlflow.note.content": run.description,
         "mlflow.parentRunId": run.parent or "",
     }
@@ -178,6 +184,7 @@ def _create(client: Any, run: Run, uri: str) -> str:
 
 
 def _write(client: Any, run_id: str, run: Run) -> None:
+    import numpy as np
     from mlflow.entities import Metric, Param
 
     now = _milliseconds()
@@ -190,12 +197,23 @@ def _write(client: Any, run_id: str, run: Run) -> None:
     chunks = zip_longest(_chunks(metrics, BATCH_METRICS), _chunks(parameters, BATCH_PARAMETERS), fillvalue=[])
     for some_metrics, some_parameters in chunks:
         client.log_batch(run_id, some_metrics, some_parameters)
+    if run.records:
+        client.log_inputs(run_id, datasets=[_input(record) for record in run.records])
     for path in run.artifacts:
         client.log_artifact(run_id, str(path))
     if run.model:
         from tractexp.tracking.model import log_model
 
         log_model(client, run_id, run.model)
+
+
+def _input(record: Mapping[str, str]) -> Any:
+    """One record as MLflow lists what a run has read: its digest is the SHA-256 of its channels, shortened."""
+    from mlflow.entities import Dataset, DatasetInput, InputTag
+
+    source = json.dumps({"sha256": record["sha256"]})
+    dataset = Dataset(record["name"][:500], record["sha256"][:36], "tractexp record", source)
+    return DatasetInput(dataset, [InputTag("mlflow.data.context", record["role"])])
 
 
 def _chunks(items: list[Any], size: int) -> list[list[Any]]:

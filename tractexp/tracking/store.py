@@ -50,7 +50,7 @@ def open_store(uri: str) -> Any:
     if not uri.strip():
         raise UserError("tracking: the address of the MLflow store is empty; it is like sqlite:////folder/mlflow.db")
     database = database_of(uri)
-    _import(sql=database is not None)
+    import_mlflow(sql=database is not None)
     from mlflow import MlflowClient
 
     with sentences(uri):
@@ -93,9 +93,11 @@ def _check_database(database: Path) -> None:
 
 
 @functools.cache
-def _import(sql: bool) -> None:
+def import_mlflow(sql: bool = False) -> None:
+    """Import MLflow without its telemetry and remarks, and with `sql` what it needs for a database."""
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
     os.environ.setdefault("MLFLOW_LOGGING_LEVEL", "WARNING")
+    os.environ.setdefault("MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR", "false")
     with light_import():
         import mlflow
 

@@ -10,20 +10,28 @@ import tempfile
 import time
 import urllib.request
 import webbrowser
+from collections.abc import Callable
 from typing import IO
 
 from tractexp.errors import UserError
 from tractexp.tracking.store import database_of
 
+USUAL = 10  # s until the server answers: 5 on two free cores, 20 on busy ones
 
-def serve(uri: str, host: str = "127.0.0.1", port: int = 5000, page: str = "", open_browser: bool = False) -> int:
+
+def serve(
+    uri: str, host: str = "127.0.0.1", port: int = 5000, page: Callable[[str], str] = lambda uri: "",
+    open_browser: bool = False,
+) -> int:  # fmt: skip
     """Run the MLflow UI on the store at `uri` until Ctrl-C or SIGTERM, and return the exit code.
 
-    `page` is what follows the address, such as "#/experiments/1". Raises `UserError` when there is no store yet,
-    the port is taken or the server does not start.
+    `page` makes what follows the address, such as "#/experiments/1", of the store, while the server starts. Raises
+    `UserError` when there is no store yet, the port is taken or the server does not start.
     """
     check_servable(uri, host, port)
     address = f"http://{host}:{port}/"
+    print(f"starting the MLflow UI on {address}, which takes about {USUAL} s; it shows {uri}", flush=True)
+    started = time.monotonic()
     command = [sys.executable, "-m", "mlflow", "server", "--backend-store-uri", uri, "--registry-store-uri", uri]
     command += ["--host", host, "--port", str(port), "--workers", "1"]
     settings = {"MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false", "MLFLOW_DISABLE_TELEMETRY": "true"}
@@ -33,10 +41,11 @@ def serve(uri: str, host: str = "127.0.0.1", port: int = 5000, page: str = "", o
             command, env=settings | os.environ, stdout=output, stderr=output, start_new_session=True
         )
         try:
+            opened = address + page(uri)
             _wait_until_up(server, address, output)
-            print(f"MLflow UI: {address}{page}  (Ctrl-C ends it)", flush=True)
+            print(f"ready after {time.monotonic() - started:.0f} s: {opened}  (Ctrl-C ends it)", flush=True)
             if open_browser:
-                webbrowser.open(address + page)
+                webbrowser.open(opened)
             return server.wait()
         except KeyboardInterrupt:
             return 0

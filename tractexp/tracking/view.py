@@ -1,4 +1,4 @@
-"""The view that MLflow's page opens on: runs grouped by optimizer, averaged over seeds, with their fitness curves.
+"""The view that MLflow's page opens on: runs grouped by variant, averaged over seeds, with their fitness curves.
 
 MLflow keeps shared views as experiment tags. That is its internal affair and not documented: the address below is
 understood by the versions tested, and one that does not know it shows its ordinary page.
@@ -7,6 +7,7 @@ understood by the versions tested, and one that does not know it shows its ordin
 import base64
 import json
 import zlib
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tractexp.tracking.run import tag_experiment
@@ -16,16 +17,21 @@ KEY = "tractexp"
 TAG = f"mlflow.sharedViewState.{KEY}"
 SECTION = "tractexp-charts"
 RUNS = "tags.task = 'identify' and metrics.objective >= 0"  # a sweep's own run has no objective
+GROUPS = ("variant", "optimizer")  # tags to group by: runs logged before they had the first are told by the second
 STATE = {
     "searchFilter": RUNS,
-    "orderByKey": "metrics.`objective`",
+    "orderByKey": "metrics.`search_objective`",
     "orderByAsc": True,
-    "groupBy": {"aggregateFunction": "average", "groupByKeys": [{"mode": "tag", "groupByData": "optimizer"}]},
     "runsExpanded": {},
+    "runsHiddenMode": "SHOW_ALL",  # by default the first ten
     "useGroupedValuesInCharts": True,
     "hideEmptyCharts": True,
     "compareRunsMode": "CHART",
 }
+AXES = {
+    "xAxisKey": "step", "xAxisScaleType": "linear", "yAxisKey": "metric", "lineSmoothness": 0, "range": {},
+    "useGlobalXaxisKey": True, "useGlobalLineSmoothing": True, "yAxisExpressions": [],
+}  # fmt: skip
 
 
 def _chart(kind: str, metric: str, **more: Any) -> dict[str, Any]:
@@ -35,27 +41,31 @@ def _chart(kind: str, metric: str, **more: Any) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _state(optimizers: set[str]) -> dict[str, Any]:
-    """The view: one closed group for each optimizer, the fitness curves first, on a logarithmic axis."""
-    curve = {
-        "scaleType": "log", "xAxisKey": "step", "xAxisScaleType": "linear", "yAxisKey": "metric", "lineSmoothness": 0,
-        "range": {}, "useGlobalXaxisKey": True, "useGlobalLineSmoothing": True, "yAxisExpressions": [],
-    }  # fmt: skip
-    lines = [
-        _chart("LINE", metric, selectedMetricKeys=[metric], **curve) for metric in ("fitness_by_simulations", "fitness")
+def _state(runs: Sequence[Mapping[str, str]]) -> dict[str, Any]:
+    """The view of runs with these tags: one closed group for each variant, the fitness curves first.
+
+    What spans decades has a logarithmic axis. Bars have none and are labelled with two decimals: the rest is points.
+    """
+    keys = GROUPS[:1] if all("variant" in tags for tags in runs) else GROUPS
+    groups = {".".join(f"{key}.{tags.get(key, '')}" for key in keys) for tags in runs}
+    curves = [
+        _chart("LINE", metric, selectedMetricKeys=[metric], **AXES | {"scaleType": "log", "xAxisScaleType": scale})
+        for metric, scale in (("fitness_by_simulations", "log"), ("fitness", "linear"))
     ]
-    bars = [
-        _chart("BAR", metric, dataAccessKey=metric)
-        for metric in ("objective", "epsilon_p", "epsilon_q", "simulations", "seconds")
+    points = [
+        _chart("LINE", metric, selectedMetricKeys=[metric], displayPoints=True, **AXES | {"scaleType": "log"})
+        for metric in ("search_objective", "objective", "epsilon_p", "epsilon_q")
     ]
+    bars = [_chart("BAR", metric, dataAccessKey=metric) for metric in ("search_simulations", "search_seconds")]
     section = {"uuid": SECTION, "name": "Comparison", "display": True, "deleted": False, "isGenerated": False}
+    columns = ("objective", "epsilon_p", "epsilon_q", "search_objective", "search_simulations")
     return STATE | {
-        "selectedColumns": [
-            "attributes.`Source`", "tags.`optimizer`", "tags.`seed`",
-            "metrics.`objective`", "metrics.`epsilon_p`", "metrics.`epsilon_q`", "metrics.`simulations`",
-        ],
-        "groupsExpanded": {f"tag.optimizer.{optimizer}": False for optimizer in optimizers},
-        "compareRunCharts": [*lines, *bars],
+        "groupBy": {
+            "aggregateFunction": "average", "groupByKeys": [{"mode": "tag", "groupByData": key} for key in keys],
+        },
+        "selectedColumns": [*(f"metrics.`{name}`" for name in columns), "tags.`variant`", "tags.`seed`"],
+        "groupsExpanded": {f"tag.{group}": False for group in groups},
+        "compareRunCharts": [*curves, *points, *bars],
         "compareRunSections": [section | {"isReordered": False}],
     }  # fmt: skip
 
@@ -73,7 +83,7 @@ def comparison_view(uri: str) -> str:
             return ""
         experiment_id = newest[0].info.experiment_id
         runs = client.search_runs([experiment_id], RUNS, max_results=1000, order_by=["start_time DESC"])
-    state = _state({run.data.tags["optimizer"] for run in runs if "optimizer" in run.data.tags})
+    state = _state([run.data.tags for run in runs])
     packed = base64.b64encode(zlib.compress(json.dumps(state).encode())).decode()
     tag_experiment(names[experiment_id], {TAG: f"deflate;{packed}"}, uri)
     return f"#/experiments/{experiment_id}/runs?viewStateShareKey={KEY}&compareRunsMode=CHART"

@@ -1,0 +1,198 @@
+"""The estimate and its grade: one answer whatever was searched with, silent on noise, outspoken on what is missing."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import uncertainty as study
+
+import tractexp
+from tractexp.identification import adequacy
+from tractexp.identification.adequacy import Grade, Surprise, graded
+from tractexp.identification.descent import Descent
+from tractexp.identification.estimate import estimate, polished
+from tractexp.identification.likelihood import Likelihood
+from tractexp.identification.observed import Observed
+from tractexp.identification.problem import Problem
+from tractexp.identification.valleys import distinct
+from tractexp.noise import Noise
+
+TRUTH = study.TYPICAL
+
+
+def recorded(deviation=0.004, seed=5, correlation=0.0, depth=0.5, spoil=None, name="dip"):
+    """An event of the printed equations with noise; `spoil` changes the clean power (2, N) at times t."""
+    t, U = study.Shape(depth).voltage()
+    power = study.printed(TRUTH, t, U, 0.35)
+    if spoil is not None:
+        power = spoil(t, power)
+    return study.event(t, U, power + study.noise(np.random.default_rng(seed), len(t), deviation, correlation), name)
+
+
+def stepped(size):
+    """A load that is switched on 0.3 s after the dip: nothing of the model can do that."""
+
+    def spoil(t, power):
+        return power + size * (t > 0.85) * np.array([[1.0], [0.0]])
+
+    return spoil
+
+
+def identified(event, **settings):
+    chosen = {"model": "third_order_exponential", "optimizer": "pso", "budget": 3000, "progress": False}
+    return tractexp.identify(event, **chosen | settings)
+
+
+@pytest.fixture(scope="module")
+def fit():
+    return identified(recorded())
+
+
+def test_the_estimate_does_not_depend_on_the_search(fit):
+    others = [identified(recorded(), optimizer=name, seed=seed) for name, seed in (("ssa", 3), ("random_search", 1))]
+    for other in others:
+        assert other.result.search["parameters"] != fit.result.search["parameters"]
+        assert other.result.parameters == fit.result.parameters
+        assert other.result.intervals == fit.result.intervals
+
+
+def test_the_estimate_fits_no_worse_than_any_search_by_its_own_likelihood(fit):
+    known = fit.judged.known
+    likelihood = known.likelihood
+    ended = np.array([fit.result.search["parameters"][n] for n in known.names])
+    rows = likelihood.rows(likelihood.to_unit(ended))[0]
+    assert known.deviance <= rows @ rows
+
+
+def test_result_json_tells_estimate_search_and_origin(fit, tmp_path):
+    fit.write_result(tmp_path)
+    told = json.loads((tmp_path / "result.json").read_text())
+    assert told["parameters"].keys() == told["intervals"].keys() == told["search"]["parameters"].keys()
+    assert set(told["search"]) >= {"objective", "epsilon_p", "epsilon_q", "simulations", "seconds"}
+    assert told["search"]["objective"] == fit.found.objective
+    assert told["adequacy"]["grade"] == "adequate"
+    assert told["tractexp_version"]
+    (record,) = told["records"]
+    assert len(record["sha256"]) == 64
+    assert told["starts"][0]["above"] == 0.0
+    assert {start["from"] for start in told["starts"]} == {"box", "beside the best", "search"}
+
+
+def test_equal_numbers_have_equal_digests_and_others_have_not():
+    from tractexp.provenance import digest
+
+    one, two = recorded().record, recorded(seed=6).record
+    assert digest(one) == digest(replace(one, name="renamed"))
+    assert digest(one) != digest(two)
+
+
+def test_a_commit_is_that_of_the_package_not_of_the_folder_one_stands_in(tmp_path, monkeypatch):
+    import subprocess
+
+    from tractexp.provenance import commit
+
+    subprocess.run(["git", "init", "-q", str(tmp_path)], check=True)
+    assert commit(tmp_path) == ""  # a repository that does not keep these files
+    monkeypatch.chdir(tmp_path)
+    commit.cache_clear()
+    here = commit()
+    assert here == "" or len(here.removesuffix("-dirty")) == 40
+
+
+def test_nothing_missing_is_graded_adequate_and_a_step_of_the_load_is_not():
+    grades = [identified(recorded(seed=seed)).grade for seed in range(6)]
+    assert grades == ["adequate"] * 6
+    missing = identified(recorded(spoil=stepped(0.02)))
+    assert missing.grade == "effect_missing"
+    assert missing.result.adequacy["p"] < 1e-6
+    assert "do not use its intervals" in missing.headline
+    assert "interval" not in " ".join(missing.table().columns)
+    assert missing.advice == ["find the missing effect: task=discrepancy"]
+
+
+def test_a_model_that_is_off_by_more_than_eq_20_allows_is_the_wrong_one():
+    wrong = identified(recorded(), model="static_exponential")
+    assert wrong.grade == "wrong_model"
+    assert wrong.headline.startswith("this model does not describe this load: ")
+    assert not any("further dip" in sentence or "T_m" in sentence for sentence in wrong.advice)
+
+
+def test_p_of_noise_alone_is_no_smaller_than_it_says():
+    """60 judgements of noise drawn anew: one in ten below 0.1, give or take."""
+    observed = Observed.of(Problem(study.model(), [recorded()]))
+    known = polished(observed.problem).known
+    clean = known.likelihood.residuals(known.unit[None])[0] + observed.drive.measured
+    rng, p = np.random.default_rng(2), []
+    for _ in range(60):
+        drive = replace(observed.drive, measured=clean + 0.004 * rng.standard_normal(clean.shape))
+        problem = observed.problem.driven_by(observed.problem.events)
+        problem.drive = drive
+        again = replace(known.likelihood, problem=problem)
+        p.append(adequacy.surprise(replace(observed, problem=problem), again, known.unit).p)
+    assert 0.0 <= np.mean(np.array(p) < 0.1) < 0.25
+    assert min(p) > adequacy.ADEQUATE_P
+
+
+def test_the_thresholds_of_the_grades_are_where_they_are_said_to_be():
+    """Loosened, each of these would give another grade."""
+    errors = [("P of dip", 0.049)]
+    assert graded(Surprise(0.0011, "", 2.0, "P"), errors).grade is Grade.ADEQUATE
+    assert graded(Surprise(0.0009, "", 2.0, "P"), errors).grade is Grade.EFFECT_MISSING
+    assert graded(Surprise(0.0009, "", 2.0, "P"), [("P of dip", 0.051)]).grade is Grade.WRONG_MODEL
+    assert graded(Surprise(None, "", None, ""), errors).grade is Grade.EFFECT_MISSING
+    assert "less than one in a million" in graded(Surprise(1e-19, "", 2.0, "P"), errors).sentence
+
+
+def test_correlated_noise_of_p_and_q_is_seen_and_used():
+    t, U = study.Shape(0.5).voltage()
+    rng = np.random.default_rng(4)
+    common = 0.004 * rng.standard_normal(len(t))
+    power = study.printed(TRUTH, t, U, 0.35) + common * np.array([[1.0], [0.8]])
+    power += 0.0005 * rng.standard_normal(power.shape)
+    known = polished(Problem(study.model(), [study.event(t, U, power)])).known
+    assert known.noise[0]["between_P_and_Q"] > 0.95
+    apart = Likelihood.of(known.likelihood.problem, Noise.white(0.004, 0.0032))
+    _, J = apart.jacobian(known.unit)
+    loose = np.sqrt(np.diag(np.linalg.inv(J.T @ J)))[: apart.free] * (known.upper - known.lower)
+    assert (known.information.standard_errors < loose).all()
+    assert np.median(known.information.standard_errors / loose) < 0.6
+
+
+def test_noise_of_the_voltage_widens_the_intervals():
+    clean = recorded(0.001)
+    rng = np.random.default_rng(8)
+    noisy = clean.record.U + 0.003 * rng.standard_normal(clean.record.samples)
+    spoiled = study.event(clean.record.t, noisy, np.array([clean.record.P, clean.record.Q]))
+    quiet, loud = (polished(Problem(study.model(), [e])).known for e in (clean, spoiled))
+    assert quiet.noise[0]["of_the_voltage"] == 0.0
+    assert loud.noise[0]["of_the_voltage"] > 0.5
+    assert (loud.half > quiet.half).all()
+    assert (np.abs(loud.values - TRUTH) < 2 * loud.half).all()
+
+
+def test_valleys_are_told_apart_and_the_best_comes_first():
+    unit = np.array([[0.1, 0.1], [0.12, 0.1], [0.9, 0.9]])
+    ends = Descent(unit, np.array([5.0, 4.0, 3.0]), 0)
+    np.testing.assert_array_equal(distinct(ends, 2), unit[[2, 1]])
+
+
+def test_a_search_that_found_a_better_valley_leads_to_the_estimate(monkeypatch):
+    """Where the box shows only a bad valley, the estimate comes from where the search ended."""
+    from tractexp.identification import estimate as module
+
+    problem = Problem(study.model(), [recorded(seed=77)])
+    whole = polished(problem).known
+
+    def one_bad_start(likelihood, apart=()):
+        from tractexp.identification.descent import descend
+
+        bad = likelihood.to_unit(TRUTH * np.array([1, 0.4, 0.45, 1, 1, 1, 0.5]))
+        return descend(likelihood.rows, bad, np.ones_like(bad, dtype=bool))
+
+    monkeypatch.setattr(module, "explored", one_bad_start)
+    monkeypatch.setattr(module, "along_least_known", lambda likelihood, unit: unit[None])
+    monkeypatch.setattr(module, "_remembered", type(module._remembered)())
+    found = estimate(problem, TRUTH)
+    np.testing.assert_allclose(found.known.values, whole.values, rtol=1e-3)
+    assert found.starts[0].origin in ("search", "beside the best")

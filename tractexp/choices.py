@@ -1,0 +1,176 @@
+"""What can be chosen in each group, read from the files that declare it.
+
+Nothing is imported, so that `--help` takes no time and a plugin that cannot be imported hides none of the others. A
+plugin is a class decorated with `@plugin` in a module of a plugin package, in the group that its bases declare; a
+configuration is a YAML file in a package's `conf/` folder. Names that start with an underscore are nobody's choice.
+"""
+
+import ast
+import functools
+import importlib.metadata
+import importlib.util
+import pkgutil
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ENTRY_POINTS = "tractexp.plugins"
+HERE = Path(__file__).resolve().parent
+CONF = next(p for p in (HERE / "conf", HERE.parent / "conf") if (p / "config.yaml").is_file())  # in a wheel, in a clone
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A name that a group offers: what it is, in a sentence, and the module of its class ("" for a configuration)."""
+
+    name: str
+    about: str
+    module: str = ""
+
+
+def choices() -> dict[str, dict[str, Choice]]:
+    """{group: {name: choice}}. A plugin is told by its docstring, a configuration by its leading comment."""
+    found: dict[str, dict[str, Choice]] = defaultdict(dict)
+    for folder in (CONF, *configuration_folders()):
+        for file in folder.rglob("*.yaml"):
+            place = file.relative_to(folder).with_suffix("")
+            if len(place.parts) > 1 and not any(part.startswith("_") for part in place.parts):
+                found[place.parent.as_posix()][place.name] = Choice(place.name, _comment(file))
+    for package, folder in plugin_folders():
+        for module in modules(package, [str(folder)]):
+            for group, about in _declared(module):
+                name = module.rpartition(".")[2]
+                found[group][name] = Choice(name, about, module)
+    return found
+
+
+@functools.cache
+def defaults() -> dict[str, str]:
+    """{group: what is chosen where nothing else is}: that of `conf/config.yaml`."""
+    import yaml
+
+    content = yaml.safe_load((CONF / "config.yaml").read_text(encoding="utf-8"))
+    return {group: name for item in content["defaults"] if isinstance(item, dict) for group, name in item.items()}
+
+
+def entry_points() -> list[importlib.metadata.EntryPoint]:
+    """The plugin packages that are installed, in order of name."""
+    return sorted(importlib.metadata.entry_points(group=ENTRY_POINTS), key=lambda p: (p.name, p.value))
+
+
+@functools.cache
+def plugin_folders() -> tuple[tuple[str, Path], ...]:
+    """(package, folder) of the plugin packages that are there."""
+    names = dict.fromkeys(point.module for point in entry_points())
+    return tuple((name, folder) for name in names for folder in _folders(name))
+
+
+def configuration_folders() -> list[Path]:
+    """The `conf/` folders of the plugin packages, of which the last that has a file is the one that is read."""
+    return [folder / "conf" for _, folder in plugin_folders() if (folder / "conf").is_dir()]
+
+
+def modules(package: str, folders: Iterable[str]) -> Iterator[str]:
+    """The modules below a package, in its subpackages too, that do not start with an underscore."""
+    for folder in folders:
+        for info in pkgutil.iter_modules([folder]):
+            if not info.name.startswith("_"):
+                yield f"{package}.{info.name}"
+            if info.ispkg:
+                yield from modules(f"{package}.{info.name}", [str(Path(folder, info.name))])
+
+
+def sentence(text: str) -> str:
+    """The first sentence of a text, on one line."""
+    first = " ".join(text.strip().partition("\n\n")[0].split())
+    return re.split(r"(?<=[.!?])\s+(?=[A-Z])", first)[0]
+
+
+def _comment(file: Path) -> str:
+    """The first sentence of the comment a file begins with, beyond Hydra's directives and the command it stands for."""
+    lines = []
+    for line in file.read_text(encoding="utf-8").splitlines():
+        if not line.startswith("#"):
+            break
+        told = line.lstrip("# ")
+        if not told.startswith(("@package", "python -m", "tractexp ")):
+            lines.append(told)
+    return sentence("\n".join(lines))
+
+
+def _declared(module: str) -> Iterator[tuple[str, str]]:
+    """(group, first sentence) of the plugins that a module declares."""
+    for node in _tree(module).body:
+        if not (isinstance(node, ast.ClassDef) and any(_last(d) == "plugin" for d in node.decorator_list)):
+            continue
+        if group := _group(node, module, ()):
+            yield group, sentence(ast.get_docstring(node) or "")
+
+
+def _group(node: ast.ClassDef, module: str, passed: tuple[ast.ClassDef, ...]) -> str:
+    """The group that a class or its first base to know declares; "" where the bases lead nowhere."""
+    for item in node.body:
+        if isinstance(item, ast.AnnAssign | ast.Assign) and isinstance(item.value, ast.Constant):
+            targets = item.targets if isinstance(item, ast.Assign) else [item.target]
+            if "group" in map(_last, targets):
+                return str(item.value.value)
+    for base in node.bases:
+        met, there = _class(_last(base), module, {module})
+        if met is not None and met not in (node, *passed) and (group := _group(met, there, (*passed, node))):
+            return group
+    return ""
+
+
+def _class(name: str, module: str, seen: set[str]) -> tuple[ast.ClassDef | None, str]:
+    """Where a class is that a module calls by this name: followed through `from ... import`, as Python would."""
+    for node in _tree(module).body:
+        if isinstance(node, ast.ClassDef) and node.name == name:
+            return node, module
+        if isinstance(node, ast.ImportFrom):
+            package = module.split(".")[: -node.level + _is_package(module) or None] if node.level else []
+            there = ".".join([*package, *([node.module] if node.module else [])])
+            for alias in node.names:
+                if (alias.asname or alias.name) == name and there not in seen:
+                    return _class(alias.name, there, seen | {there})
+    return None, module
+
+
+def _last(node: ast.expr) -> str:
+    """`plugin` of `@plugin`, of `@extend.plugin` and of `@plugin()`."""
+    if isinstance(node, ast.Call):
+        node = node.func
+    return node.attr if isinstance(node, ast.Attribute) else node.id if isinstance(node, ast.Name) else ""
+
+
+@functools.cache
+def _tree(module: str) -> ast.Module:
+    """A module parsed; an empty one where it cannot be, for then Python says why when it is imported."""
+    file = _source(module)
+    try:
+        return ast.parse(file.read_bytes()) if file else ast.Module([], [])
+    except (SyntaxError, ValueError, OSError):
+        return ast.Module([], [])
+
+
+def _source(module: str) -> Path | None:
+    package, _, name = module.rpartition(".")
+    own = [folder / "__init__.py" for folder in _folders(module)]
+    return next((f for f in (*own, *(folder / f"{name}.py" for folder in _folders(package))) if f.is_file()), None)
+
+
+def _is_package(module: str) -> int:
+    return int(bool(_folders(module)))
+
+
+@functools.cache
+def _folders(package: str) -> tuple[Path, ...]:
+    """The folders of a package; none where there is none. Only the topmost is looked up, so that no code runs."""
+    top, _, rest = package.partition(".")
+    try:
+        spec = importlib.util.find_spec(top) if top else None
+    except (ImportError, ValueError):
+        return ()
+    found = (Path(p, *rest.split(".")) if rest else Path(p) for p in (spec and spec.submodule_search_locations) or ())
+    return tuple(folder for folder in found if folder.is_dir())

@@ -1,0 +1,62 @@
+"""The valleys of a model: its best fits from all over its box, because a few random starts may all miss the best.
+
+What a model seems to miss in a wrong valley is not missing, and what is estimated there is not the estimate.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tractexp.identification.descent import Apart, Descent, descend
+from tractexp.identification.likelihood import Likelihood
+from tractexp.identification.starts import best_distinct, even
+
+SCREENED = 4096  # points of the box that are simulated
+STARTS, APART = 24, 0.5  # the best of them that are so far apart in the unit cube
+FEW, SAME, PROMISING = 8, 0.05, 10  # iterations after which only so many, so far apart, are refined
+MORE, TOLERANCE = 12, 0.1  # iterations of those, and of the deviance
+KEPT, DISTINCT = 4, 0.2  # of their ends, and how far apart in the unit cube: several end in the same valley
+ALONG = (0.3, 0.6, 0.9)  # of the way to the wall: where other valleys are looked for
+
+
+def explored(likelihood: Likelihood, apart: Sequence[Apart] = ()) -> Descent:
+    """Where descents from the most promising points of the box end: coordinates (at most 10, free + 2 E)."""
+    problem = likelihood.problem
+    points = even(SCREENED, problem.space.dimension)
+    points = points[best_distinct(points, problem.objective(problem.space.from_unit(points)), APART, STARTS, norm=2)]
+    begin = np.full((len(points), points.shape[1] + 2 * problem.drive.events), 0.5)
+    begin[:, : points.shape[1]] = points
+    begun = descend(likelihood.rows, begin, None, FEW, TOLERANCE, apart)
+    free = slice(points.shape[1])
+    promising = begun.unit[best_distinct(begun.unit[:, free], begun.deviance, SAME, PROMISING, norm=2)]
+    return descend(likelihood.rows, promising, None, MORE, TOLERANCE, apart)
+
+
+def best_fits(likelihood: Likelihood, apart: Sequence[Apart]) -> np.ndarray:
+    """Coordinates (at most 4, free + 2 E) of the best fits of distinct valleys: parameters, P0 and Q0 of each event.
+
+    The best of them may not stay so once what the recorder did is free.
+    """
+    return distinct(explored(likelihood, apart), likelihood.free)
+
+
+def distinct(ends: Descent, free: int) -> np.ndarray:
+    """Coordinates (at most 4, D) of the ends of distinct valleys, the best first."""
+    return ends.unit[best_distinct(ends.unit[:, :free], ends.deviance, DISTINCT, KEPT, norm=2)]
+
+
+def along_least_known(likelihood: Likelihood, unit: np.ndarray) -> np.ndarray:
+    """Points (6, D) on either side of an optimum (D,), in the direction that the records know least.
+
+    Where q_v is near 2, for instance, the static load takes over the motor's U²/X' and any C will do, so that there
+    is one valley on either side of it.
+    """
+    _, J = likelihood.jacobian(unit)
+    direction = np.linalg.svd(J[:, : likelihood.free], full_matrices=False)[2][-1]
+    points = []
+    for way in (direction, -direction):
+        room = np.where(way > 0, 1 - unit[: len(way)], unit[: len(way)]) / np.maximum(np.abs(way), 1e-12)
+        for share in ALONG:
+            points.append(unit.copy())
+            points[-1][: len(way)] += share * room.min() * way
+    return np.array(points)

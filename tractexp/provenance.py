@@ -1,0 +1,67 @@
+"""Where a result comes from: the version and commit of this package, and digests of the records."""
+
+import functools
+import hashlib
+import shlex
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+PACKAGE = Path(__file__).parent
+
+
+@functools.cache
+def version() -> str:
+    """The version of the installed package, "" where it runs uninstalled."""
+    from importlib.metadata import PackageNotFoundError
+    from importlib.metadata import version as installed
+
+    try:
+        return installed("tractexp")
+    except PackageNotFoundError:
+        return ""
+
+
+@functools.cache
+def commit(folder: Path = PACKAGE) -> str:
+    """The commit of the repository that keeps the files of `folder`; "" where none does, as for an installed wheel.
+
+    By default that of this package, wherever the process runs. Uncommitted changes to tracked files add "-dirty".
+    """
+    try:
+        if not _git(folder, "ls-files", "--", "."):
+            return ""
+        return _git(folder, "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*")
+    except (OSError, subprocess.SubprocessError):
+        return ""
+
+
+def _git(folder: Path, *command: str) -> str:
+    done = subprocess.run(["git", *command], cwd=folder, capture_output=True, text=True, timeout=5, check=True)
+    return done.stdout.strip()
+
+
+def digest(record: Any) -> str:
+    """SHA-256 of the channels of a `Record` as they were read: equal for equal numbers, whatever the file is called."""
+    made = hashlib.sha256()
+    for name in ("t", "U", "P", "Q", "f", "U2"):
+        values = getattr(record, name)
+        if values is not None:
+            made.update(name.encode())
+            made.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
+    return made.hexdigest()
+
+
+_started: list[str] = []
+
+
+def started(arguments: list[str]) -> None:
+    """Remember the command line that this process was started by."""
+    _started[:] = ["tractexp", *arguments]
+
+
+def command() -> str:
+    """The command line of this run, to be typed again; "" where there was none, as from Python."""
+    return shlex.join(_started)

@@ -1,0 +1,71 @@
+"""One event as it was recorded and as models calculate it: voltage, P, Q and what is left, to be looked into."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tractexp.record import Event
+from tractexp.report import style
+from tractexp.report.chart import MOST, Chart
+
+FOUND = "#E69F00"  # shades what stands out
+WITHIN = 2.0  # standard deviations of the noise band
+PANELS = ("U [pu]", "P [pu]", "ΔP [pu]", "Q [pu]", "ΔQ [pu]")
+HEIGHTS = (0.7, 1.5, 1.0, 1.5, 1.0)
+PIXELS = 580
+CAPTION = (
+    "ΔP and ΔQ are measured less calculated. Dotted: the dip begins and ends. Drag to zoom, double-click to go back."
+)
+
+
+class Curve(NamedTuple):
+    """Calculated power (2, N) [pu]: P, Q."""
+
+    name: str
+    power: np.ndarray
+    color: str
+    dash: str = "solid"
+
+
+def event_chart(
+    event: Event,
+    curves: Sequence[Curve],
+    *,
+    deviation: np.ndarray | None = None,
+    around: np.ndarray | None = None,
+    places: Sequence[Any] = (),
+    driving: np.ndarray | None = None,
+) -> Chart:
+    """U, then P and Q with what the models leave of them.
+
+    `deviation` (2, N) of the noise [pu] draws a band around the power `around` (2, N) and about zero. `places` have
+    `channel`, `start`, `end` [s]: where more than chance is left. `driving` (N,) is the voltage that the load saw,
+    where that is not the recorded one.
+    """
+    record, t = event.record, event.record.t
+    made = Chart("t [s]", PANELS, heights=HEIGHTS, pixels=PIXELS)
+    made.line("measured", t, record.U, style.MEASURED, width=3)
+    if driving is not None and not np.array_equal(driving, record.U):
+        made.line("voltage that the load saw", t, driving, style.VOLTAGE, width=1)
+    for c, channel in enumerate("PQ"):
+        above, measured = 1 + 2 * c, getattr(record, channel)
+        if deviation is not None and around is not None:
+            for panel, middle in ((above, around[c]), (above + 1, np.zeros(len(t)))):
+                _noise_band(made, t, middle, WITHIN * deviation[c], panel)
+        for place in places:
+            if place.channel == channel:
+                for panel in (above, above + 1):
+                    made.shade(place.start, place.end, FOUND, panel, "more than chance leaves", opacity=0.25)
+        made.line("measured", t, measured, style.MEASURED, above, width=3)
+        for name, power, color, dash in curves:
+            made.line(name, t, power[c], color, above, dash=dash)
+            made.line(name, t, measured - power[c], color, above + 1, width=1.1, dash=dash)
+    return made.edge(event.t_start).edge(event.t_end).limits(None, float(t[0]), float(t[-1]))
+
+
+def _noise_band(made: Chart, t: np.ndarray, middle: np.ndarray, half: np.ndarray, panel: int) -> None:
+    """Where noise alone would let a sample lie; every so many samples of a long record."""
+    some = slice(None, None, -(-len(t) // MOST))
+    name = f"± {WITHIN:g} σ of the noise"
+    made.band(name, t[some], (middle - half)[some], (middle + half)[some], style.FAINT, panel)

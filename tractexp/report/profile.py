@@ -1,0 +1,170 @@
+"""The page of the profiles: how the fit worsens when one parameter is held, and what that says about its interval."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tractexp.identification.profile import End, Profile, Profiles
+from tractexp.identification.verdict import IDENTIFIED, Verdict, shown
+from tractexp.report.chart import Chart
+from tractexp.report.page import Page
+from tractexp.report.style import ACTIVE, FAINT, PALETTE
+
+ALIKE = 0.2  # of the half interval by curvature: closer ends are the same interval
+ABOVE = 2.2  # thresholds that a chart shows
+BELOW = 0.12  # thresholds of room below the best fit
+ENOUGH = "is enough"
+CURVE, PARABOLA, SHADE = PALETTE[0], FAINT, PALETTE[5]
+CAPTION = (
+    "Blue: the deviance (twice the fall of the log-likelihood) of the best fit for each value of the parameter, above"
+    " the best of all. Dashed: the parabola of the curvature at the estimate. Where the blue curve crosses the line at"
+    " {threshold:.2f}, the 95 % interval ends; it is shaded. The mark is the estimate."
+)
+
+
+def page(path: Path, found: Profiles) -> Path:
+    """Write the page; returns its path."""
+    known, verdicts = found.known, found.verdicts
+    names = ", ".join(e.record.name for e in known.likelihood.problem.events)
+    made = Page(
+        f"Profile likelihood: {names}",
+        "One parameter is held at value after value, all others are fitted again each time.",
+    )
+    says = {profile.name: meaning(found, profile) for profile in found.profiles}
+    made.verdict(*_told(says, verdicts), *(f"{_upper(note)}." for note in found.notes), kind=_kind(verdicts))
+    made.charts([_chart(found, profile, verdicts[profile.name]) for profile in found.profiles])
+    made.text(CAPTION.format(threshold=found.threshold))
+    made.heading("Intervals")
+    made.table(
+        ["parameter", "meaning", "estimate", "unit", "95 % by curvature", "95 % by profile", "what the profile says"],
+        [_row(found, profile, says[profile.name]) for profile in found.profiles],
+        words=(1, 6),
+    )
+    made.heading("What it rests on").items(
+        [
+            "The interval by curvature is right where the deviance is a parabola; the profile is right wherever the"
+            " model and the noise are, and needs no parabola.",
+            f"{found.simulations} simulations beyond the identification.",
+            "An effect that the model lacks moves the estimates and is in neither interval.",
+        ]
+    )
+    return made.write(path)
+
+
+def _row(found: Profiles, profile: Profile, says: str) -> list[str]:
+    """A line of the table of intervals."""
+    value, half = _curvature(found, profile.name)
+    declared = _declared(found, profile.name)
+    by_curvature = _span(value - half, value + half) if np.isfinite(half) else "none"
+    return [profile.name, declared.about, f"{value:.4g}", declared.unit, by_curvature, _span(*profile.interval), says]
+
+
+def meaning(found: Profiles, profile: Profile) -> str:
+    """What a profile says beside the interval of the curvature, in a sentence."""
+    names = ("downwards", "upwards")
+    open_sides = [side for end, side in zip(profile.ends, names, strict=True) if end is End.BOUND]
+    short = [side for end, side in zip(profile.ends, names, strict=True) if end is End.POINTS]
+    low, high = profile.interval
+    said = []
+    if len(open_sides) == 2:
+        said.append("no limit but the bounds: the record does not tell it")
+    elif open_sides:
+        at = low if open_sides == ["downwards"] else high
+        said.append(f"no limit {open_sides[0]} but the bound {at:.4g}")
+    if short:
+        said.append(f"not followed to its end {' and '.join(short)}: raise points")
+    if profile.minima:
+        said.append(f"{' and '.join(f'{m:.4g}' for m in profile.minima)} fits about as well as the estimate")
+    if not said:
+        said.append(_compared(found, profile))
+    return f"{_upper('; '.join(said))}."
+
+
+def _compared(found: Profiles, profile: Profile) -> str:
+    """Both sides closed, one minimum: whether ± half is enough."""
+    (low, high), (value, half) = profile.interval, _curvature(found, profile.name)
+    if not np.isfinite(half):
+        return "the curvature gives no interval, the profile does"
+    off = np.array([low - (value - half), high - (value + half)]) / half
+    if np.abs(off).max() <= ALIKE:
+        return f"{shown(value, half, *_declared(found, profile.name).bounds)} {ENOUGH}"
+    if off[0] > ALIKE and off[1] < -ALIKE:
+        return "narrower than by curvature"
+    if off[0] < -ALIKE and off[1] > ALIKE:
+        return "wider than by curvature"
+    up, down = high - value, value - low
+    reach, side = (up / down, "up") if up > down else (down / up, "down")
+    return f"lopsided: {reach:.1f} times as far {side}"
+
+
+def _told(says: Mapping[str, str], verdicts: Mapping[str, Verdict]) -> list[str]:
+    """The page in two sentences: where curvature is enough, and where it misleads."""
+    enough = [name for name, said in says.items() if said.endswith(f"{ENOUGH}.")]
+    rest = [name for name in says if name not in enough]
+    told = []
+    if enough:
+        every = "every parameter" if not rest else ", ".join(enough)
+        told.append(f"For {every} the curvature's interval is enough: the likelihood is a parabola there.")
+    if rest:
+        told.append(f"For {', '.join(rest)} it misleads; take the profile's interval.")
+    poor = [f"{name} is {verdict.word}" for name, verdict in verdicts.items() if verdict.word != IDENTIFIED]
+    told.append(f"{_upper('; '.join(poor))}." if poor else "Every parameter is identified.")
+    return told
+
+
+def _kind(verdicts: Mapping[str, Verdict]) -> str:
+    return "good" if all(verdict.word == IDENTIFIED for verdict in verdicts.values()) else "plain"
+
+
+def _curvature(found: Profiles, name: str) -> tuple[float, float]:
+    """Estimate and half of the interval by curvature."""
+    j = found.known.names.index(name)
+    return float(found.known.values[j]), float(found.known.half[j])
+
+
+def _chart(found: Profiles, profile: Profile, verdict: Verdict) -> Chart:
+    """One profile, with the parabola, the threshold, the interval and the estimate."""
+    value, half = _curvature(found, profile.name)
+    unit, top = _declared(found, profile.name).unit, ABOVE * found.threshold
+    x, y = _smooth(profile)
+    chart = Chart(
+        profile.name if unit == "1" else f"{profile.name} [{unit}]", ["deviance"], pixels=290,
+        title=f"{profile.name}: {verdict.word}", legend=False,
+    )  # fmt: skip
+    chart.shade(*profile.interval, SHADE, opacity=0.25)
+    if np.isfinite(half):
+        parabola = found.threshold * ((x - value) / half) ** 2
+        chart.line("curvature", x, np.where(parabola < 2 * top, parabola, np.nan), PARABOLA, dash="dash")
+    chart.line("profile", x, y, CURVE).points("", profile.values, profile.deviance, CURVE, size=4)
+    chart.points("", [value], [0.0], ACTIVE, size=9, told=[f"estimate {value:.5g}"])
+    chart.level(found.threshold).ticks(0, [0.0, found.threshold, 2 * found.threshold], _marks(found.threshold))
+    return chart.limits(0, -BELOW * found.threshold, top).limits(None, x.min(), x.max())
+
+
+def _marks(threshold: float) -> list[str]:
+    return [f"{times * threshold:.2f}".rstrip("0").rstrip(".") for times in range(3)]
+
+
+def _smooth(profile: Profile) -> tuple[np.ndarray, np.ndarray]:
+    """The curve between the points fitted: straight on the signed root, as the interval is found."""
+    x = np.linspace(profile.values.min(), profile.values.max(), 201)
+    best = profile.values[profile.deviance.argmin()]
+    root = np.sign(profile.values - best) * np.sqrt(np.maximum(profile.deviance, 0.0))
+    x = np.union1d(x, profile.values)
+    return x, np.interp(x, profile.values, root) ** 2
+
+
+def _declared(found: Profiles, name: str) -> Any:
+    """The parameter (a `Parameter`) of a name, which may say its event."""
+    return next(p for p in found.known.likelihood.problem.parameters if p.name == name.partition("[")[0])
+
+
+def _span(low: float, high: float) -> str:
+    return f"{low:.4g} .. {high:.4g}"
+
+
+def _upper(text: str) -> str:
+    """With a capital, unless it begins with a parameter's name."""
+    return text if "_" in text.split(" ")[0] else text[:1].upper() + text[1:]
