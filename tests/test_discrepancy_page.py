@@ -16,6 +16,7 @@ from tractexp.discrepancy.evidence import CHOSEN, beside, chance_level, evidence
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.next_dip import NextDip
 from tractexp.report import discrepancy, overlay
+from tractexp.report.events import WITHIN
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +89,7 @@ def test_measured_before_and_after_of_every_event_come_first(named, tmp_path):
 def test_the_noise_band_holds_what_the_extended_model_leaves(named):
     shown = named.overlays[0]
     off = (shown.measured - shown.after) / shown.deviation
-    assert 0.93 < np.mean(np.abs(off) < overlay.WITHIN) < 0.98
+    assert 0.93 < np.mean(np.abs(off) < WITHIN) < 0.98
     assert [o.held_out for o in named.overlays] == [False, False, True]
 
 

@@ -11,7 +11,7 @@ from tractexp.discrepancy.survivors import Rival
 from tractexp.discrepancy.verdict import NONE, TIED, UNEXPLAINED
 from tractexp.wording import in_words, joined, with_error
 
-CHOSEN, KEPT = "in the verdict", "tied"
+CHOSEN, KEPT = "added", "tied"
 FITTED, ONE_STEP = "refitted", "one step"
 
 
@@ -44,12 +44,12 @@ class Evidence:
 
     @property
     def standing(self) -> int:
-        """0 for what is in the verdict, 1 for what is tied with it, 2 for the rest."""
+        """0 for what was added, 1 for what is tied with it, 2 for the rest."""
         return {CHOSEN: 0, KEPT: 1}.get(self.status, 2)
 
 
 def evidence(found: Investigation) -> list[Evidence]:
-    """All candidates: those of the verdict first, then those tied with it, then the others; the most helpful first."""
+    """All candidates: what was added first, then what is tied with it, then the others; the most helpful first."""
     sets = [_of_set(found, rival) for rival in found.survivors.rivals if _names(found, rival)]
     known = {row.names for row in sets}  # of the chosen size
     rows = [*sets, *(row for row in _singles(found) if row.names not in known)]

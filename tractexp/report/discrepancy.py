@@ -191,7 +191,7 @@ def _bars(found: Investigation, rows: Sequence[Evidence], labels: Mapping[Eviden
 
 
 def _bars_caption(found: Investigation, rows: Sequence[Evidence]) -> str:
-    colors = ["green: in the verdict"] * bool(found.names)
+    colors = ["green: added"] * bool(found.names)
     colors += ["orange: tied with it"] * any(r.status == KEPT for r in rows)
     colors += ["blue: refitted"] * any(r.how == FITTED and r.standing == 2 for r in rows)
     colors += ["gray: estimated in one linear step"] * any(r.how == ONE_STEP for r in rows)
@@ -265,6 +265,8 @@ def _equations(made: Page, found: Investigation) -> None:
     from tractexp.model.model import compose
 
     made.heading("The extended model")
+    if others := [joined(names) for names in found.verdict.sets[1:]]:
+        made.text(f"It has {joined(found.names)}; {joined(others, 'or')} instead would fit these events as well.")
     made.text(
         "conf/model/extended.yaml beside this page: python -m tractexp --config-dir conf model=extended. Its equations"
         " that changed or came in:"
@@ -289,7 +291,7 @@ def _disagreement(made: Page, found: Investigation) -> None:
     first = found.first
     made.heading("Is there a disagreement, and where?")
     text = f"What the base model leaves would come about by chance with a probability of {in_words(first.p_left)}"
-    text += "." if first.adequate else f"; what stands out most: {first.loudest}."
+    text += "." if first.adequate else f"; the most surprised of the tests looks for {first.loudest}."
     if first.scores:
         best, alpha = first.scores[0], found.bench.criteria.false_alarms
         text += (
