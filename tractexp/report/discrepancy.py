@@ -20,6 +20,7 @@ from tractexp.discrepancy.evidence import (
 from tractexp.discrepancy.investigate import Investigation
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import Estimate, estimates
+from tractexp.discrepancy.recommended import adequacy, held
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.verdict import UNEXPLAINED
 from tractexp.report.chart import Chart
@@ -34,17 +35,14 @@ BAR, ROOM = 24, 1.2  # pixels; of the longest bar, for what stands beside the ba
 MOST_SETS = 12  # that are compared in a table
 
 
-def page(path: Path, found: Investigation, title: str, adequacy: str = "") -> Path:
-    """Tell the investigation to a reader who was not there.
-
-    `adequacy` is the sentence that grades the model recommended, where it was judged.
-    """
+def page(path: Path, found: Investigation, title: str) -> Path:
+    """Tell the investigation to a reader who was not there."""
     events = len(found.bench.events)
     lead = f"{found.bench.model.title}, {events} event{'s' * (events > 1)} fitted, {len(found.withheld)} held out"
     made = Page(f"Missing effect: {title}", lead)
     head = f"{found.verdict.word.upper()} {' or '.join(joined(names) for names in found.verdict.sets)}".strip()
     left = [_sentence(found.headline)] if found.headline else []
-    said = [_sentence(found.verdict.reason), *left, *[adequacy] * bool(adequacy), f"Next: {recommendation(found)}."]
+    said = [_sentence(found.verdict.reason), *left, _graded(found), f"Next: {recommendation(found)}."]
     made.verdict(head, *said, kind=KIND[found.verdict.word])
     overlaid(made.heading("Measured, before, after" if found.names else "Measured and calculated"), found.overlays)
     _smaller(made, found)
@@ -57,6 +55,12 @@ def page(path: Path, found: Investigation, title: str, adequacy: str = "") -> Pa
     _disagreement(made, found)
     _noise(made, found)
     return made.write(path)
+
+
+def _graded(found: Investigation) -> str:
+    """What the model that the investigation ends with is good for."""
+    which = "extended" if found.names else "base"
+    return f"The {which} model: {adequacy(found).sentence}."
 
 
 def _sentence(text: str) -> str:
@@ -253,6 +257,8 @@ def _parameters(made: Page, found: Investigation) -> None:
     if why:
         with made.folded("Why some are known badly, and what of them is known"):
             made.items(why)
+    if kept := held(found):
+        made.text(f"These events cannot tell {joined(list(kept))}: the extended model holds what was found.")
 
 
 def _brief(verdict: str) -> str:

@@ -205,7 +205,8 @@ def _left(made: Page, known: Uncertainty) -> None:
     with made.folded("tests of the residuals, and the noise"):
         made.table(
             ["event", "channel", "test", "statistic", "p", "says"],
-            [[t["event"], t["channel"], t["name"], digits(t["statistic"]), in_words(t["p"]), t["says"]] for t in known.tests],
+            [[t["event"], t["channel"], t["name"], digits(t["statistic"]), in_words(t["p"]), t["says"]]
+             for t in known.tests],
             caption=f"Of the residuals after whitening; below p = {REJECTED} a test speaks.", words=(1, 2, 4, 5),
         )  # fmt: skip
         made.table(
