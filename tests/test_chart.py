@@ -64,6 +64,45 @@ def test_panels_fill_the_height_without_overlap():
     assert all(upper[0] > lower[1] for upper, lower in itertools.pairwise(spans))
 
 
+def test_an_axis_takes_names_and_a_short_logarithmic_one_more_than_powers_of_ten():
+    layout = Chart("x", [""], log_x=True).ticks(0, [0, 1], ["a<", "b"]).limits(None, 2e-5, 9e-5).plain()["layout"]
+    assert (layout["yaxis"]["tickvals"], layout["yaxis"]["ticktext"]) == ([0, 1], ["a&lt;", "b"])
+    assert "dtick" not in layout["xaxis"]
+    assert Chart("x", [""], log_x=True).limits(None, 1, 1e4).plain()["layout"]["xaxis"]["dtick"] == 1
+    assert Chart("", [""]).ticks(None, [0], ["a"], turned=True).plain()["layout"]["xaxis"]["tickangle"] == -90
+
+
+def test_a_curve_without_legend_is_named_where_it_is_pointed_at():
+    chart = Chart("x", ["y"], hover="closest").line("one", np.arange(3), np.arange(3), BLUE)
+    chart.line("other", np.arange(3), np.arange(3), BLUE, legend=False)
+    told = chart.plain()
+    assert [(t["name"], t["showlegend"]) for t in told["data"]] == [("one", True), ("other", False)]
+    assert told["layout"]["hovermode"] == "closest"
+
+
+def test_a_legend_that_takes_several_lines_on_a_phone_leaves_a_line_to_the_buttons():
+    chart = Chart("x", ["y"])
+    for name in ("pso", "issa"):
+        chart.line(name, np.arange(3), np.arange(3), BLUE)
+    assert "title" not in chart.plain()["layout"]["legend"]
+    chart.line("multistart_least_squares", np.arange(3), np.arange(3), BLUE)
+    assert chart.plain()["layout"]["legend"]["title"]["side"] == "top"
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed here")
+@pytest.mark.parametrize("opened", [False, True])
+def test_a_folded_chart_is_drawn_when_it_is_opened(tmp_path, opened):
+    page, chart = Page("charts"), Chart("x", ["y"]).line("one", np.arange(3), np.arange(3), BLUE)
+    page.chart(chart, "shown")
+    with page.folded("more"):
+        page.chart(chart, "folded")
+    if opened:
+        page._add("<script>setTimeout(() => document.querySelector('details').open = true, 500)</script>")
+    dom, complaints = drawn(page, tmp_path, "--virtual-time-budget=3000")
+    assert complaints == []
+    assert dom.count('class="chart js-plotly-plot"') == 1 + opened
+
+
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed here")
 @pytest.mark.parametrize("width", [500, 1280])  # a headless browser is no narrower than 500
 def test_a_browser_draws_every_kind_and_complains_of_nothing(tmp_path, width):

@@ -15,8 +15,9 @@ from test_report_page import read
 
 from tractexp.comparison import claims, load
 from tractexp.comparison.comparison import compare
-from tractexp.comparison.runs import Run, gather
-from tractexp.comparison.summary import ECDF_TARGETS, band, floor_of, running_time, runtimes, summarize
+from tractexp.comparison.floor import Floor, floor_of, polish
+from tractexp.comparison.runs import PROBLEM, REST, SETTINGS, Run, gather
+from tractexp.comparison.summary import ECDF_TARGETS, band, running_time, runtimes, summarize
 from tractexp.errors import UserError
 
 FLOOR = 8.1e-6
@@ -66,6 +67,7 @@ def test_a_planted_better_optimizer_is_found():
     assert claims.headline(result) == (
         "good has the lowest median objective; it is significantly better than bad and worse."
     )
+    assert claims.answer(result) == "Take good: it ends lower than the others."
 
 
 def test_optimizers_that_do_not_differ_are_not_told_apart():
@@ -92,9 +94,10 @@ def test_runs_that_all_reach_the_floor_are_equal_whatever_is_left_of_rounding():
     (pair,) = result.pairs
     assert (pair.p, pair.effect, pair.significant) == (1.0, 0.5, False)
     assert result.floor.value == FLOOR
-    assert "reached by a" in result.floor.source
+    assert result.floor.source == "the best of all runs compared, by a"
     assert "is not significant" in claims.of_pair(result, pair)
     assert claims.headline(result).startswith("a and b reach the lowest median objective (equal within 0.10% of the")
+    assert claims.answer(result) == "Take a: it ends as low as b, sooner."
 
 
 def test_the_order_of_the_runs_does_not_matter(tmp_path):
@@ -123,13 +126,14 @@ def test_a_sentence_does_not_hide_that_one_variant_had_more_simulations():
     told = claims.of_pair(result, result.pairs[0])
     assert "with 10,050 simulations (median)" in told
     assert "with 5,050 for ssa" in told
+    assert claims.answer(result).endswith("It spent 10,050 simulations, where ssa spent 5,050 simulations.")
 
 
 def test_a_summary_is_that_of_the_numbers():
     """Objectives 1 to 5 times 1e-5 with the floor at 1e-5: one run of five is within 1 % of it."""
     runs = [a_run("a", s, (s + 1) * 1e-5) for s in range(5)] + [a_failure("a", 5)]
     (variant,) = gather(runs, "x").variants
-    told = summarize(variant, floor_of([variant], None), TARGETS)
+    told = summarize(variant, floor_of(variant.runs, None, None), TARGETS)
     assert (told.runs, told.failures) == (6, 1)
     assert vars(told.objective) == pytest.approx(
         {"best": 1e-5, "lower": 2e-5, "median": 3e-5, "upper": 4e-5, "worst": 5e-5}
@@ -155,7 +159,7 @@ def test_running_times_are_counted_by_hand():
 
 def test_runtimes_hold_every_target_of_every_run():
     (variant,) = gather([a_run("a", s, FLOOR) for s in range(3)] + [a_failure("a", 9)], "x").variants
-    costs = runtimes(variant, floor_of([variant], None))
+    costs = runtimes(variant, floor_of(variant.runs, None, None))
     assert costs.shape == (4 * len(ECDF_TARGETS),)
     assert np.isinf(costs).sum() == len(ECDF_TARGETS)
     assert (np.diff(costs[np.isfinite(costs)]) >= 0).all()
@@ -283,6 +287,7 @@ def test_too_few_seeds_are_said_and_nothing_is_tested():
     assert "needs at least 6" in result.notes[0]
     assert "The variants were not ranked: they have 5 seeds in common" in result.notes[1]
     assert claims.headline(result) == "No difference between variants was tested."
+    assert claims.answer(result).startswith("Not settled: there are too few seeds to test. a has the lowest median")
 
 
 def test_seeds_too_few_for_the_correction_are_said():
@@ -291,12 +296,21 @@ def test_seeds_too_few_for_the_correction_are_said():
     (note,) = compared(runs).notes
     assert "With 15 pairs corrected for, fewer than 10 seeds can show no difference" in note
     assert min(p.corrected for p in compared(runs).pairs) == pytest.approx(15 * 2 / 64)
+    assert claims.answer(compared(runs)).startswith("Not settled: there are too few seeds to test.")
     assert compared(samples({name: 10.0**k for k, name in enumerate("abcdef")}, seeds=range(10))).notes == ()
 
 
 def test_one_variant_is_described_and_not_tested():
     result = compared(samples({"a": 1.0}))
     assert result.notes == ("There is one variant only, a: nothing to test it against.",)
+    assert claims.answer(result) == "There is one variant only, a: nothing to choose from."
+
+
+def test_variants_that_are_not_told_apart_are_offered_together():
+    result = compared(samples({"a": 1.0, "b": 1.0, "c": 9.0}))
+    first, second = (s.name for s in result.summaries[:2])
+    assert {first, second} == {"a", "b"}
+    assert claims.answer(result) == f"Take {first}, or as well {second}: these runs do not tell them apart."
 
 
 def test_different_problems_are_refused():
@@ -313,6 +327,198 @@ def test_different_problems_are_refused():
         gather([a_failure("a", 0), a_failure("a", 1)], "x")
 
 
+def test_every_part_of_the_configuration_makes_a_problem_a_variant_or_neither():
+    """A key of no part would be swept and pooled under one name, unseen."""
+    import dataclasses
+
+    from tractexp.schema import Config
+
+    assert {field.name for field in dataclasses.fields(Config)} == {*PROBLEM, *SETTINGS, *REST}
+
+
+@pytest.mark.parametrize(("key", "value"), [("task.figures", True), ("target", 1e-5), ("time_limit", 2.0)])
+def test_settings_beside_the_optimizers_make_variants_too(key, value):
+    runs = samples({"a": 1.0}, seeds=range(3))
+    other = [replace(r, config=r.config | {key: value}) for r in runs]
+    plain = [replace(r, config=r.config | {key: None}) for r in runs]
+    names = [v.name for v in gather([*plain, *other], "x").variants]
+    assert names == [f"a {key}=null", f"a {key}={str(value).lower()}"] or names == sorted(names)
+    assert len(names) == 2
+
+
+def test_another_measure_is_another_problem():
+    other = [replace(r, config=r.config | {"objective.weight_Q": 2.0}) for r in samples({"b": 1.0})]
+    with pytest.raises(UserError, match=r"differ in objective.weight_Q \(2.0, null\)"):
+        gather([*samples({"a": 1.0}), *other], "x")
+
+
+def interrupted(optimizer, seed):
+    return replace(a_failure(optimizer, seed), failure="", interruption="its sweep was interrupted")
+
+
+def test_an_interrupted_run_is_told_and_not_judged():
+    whole = samples({"a": 1.0, "b": 2.0})
+    result = compared([*whole, *(interrupted("b", s) for s in (30, 31)), interrupted("c", 0), interrupted("a", 3)])
+    assert [(name, run.seed) for name, run in result.gathered.interrupted] == [("b", 30), ("b", 31), ("c", 0)]
+    alone = compared(whole)
+    assert result.pairs == alone.pairs
+    assert [(s.runs, s.failures, s.at_floor, s.ert) for s in result.summaries] == [
+        (s.runs, s.failures, s.at_floor, s.ert) for s in alone.summaries
+    ]
+    assert "3 runs were interrupted, or still going on, and not judged: see the end of the page." in result.notes
+    with pytest.raises(UserError, match=r"none of the 1 runs of x finished.*; all were interrupted"):
+        gather([interrupted("a", 0)], "x")
+
+
+def test_runs_of_different_code_are_told():
+    runs = samples({"a": 1.0, "b": 2.0})
+    versions = [replace(r, code=["", "0.4 at 1c2d3e4f"][r.optimizer == "b"]) for r in runs]
+    assert gather(versions, "x").notes == ()
+    (note,) = gather([replace(r, code=f"0.{r.seed % 2}") for r in runs], "x").notes
+    assert note.startswith("The runs were made by different code (0.0, 0.1): a difference between variants may be")
+    told = {"tractexp_version": "0.4", "commit": "1c2d3e4f5a6b7c8d-dirty"}
+    assert [load.code_of(t) for t in (told, told | {"commit": ""}, {})] == ["0.4 at 1c2d3e4f-dirty", "0.4", ""]
+
+
+# The floor: that of the shipped dip is known from several hundred descents.
+
+LOWEST = 3.0858e-5
+NODE = {"motor": {"name": "electromechanical"}, "static": {"name": "exponential"}}
+SHIPPED = {"data.name": "csv", "data.train": ["pkg://tractexp.data/tibet_50pct.csv"]} | {
+    f"model.{part}.name": node["name"] for part, node in NODE.items()
+}
+
+
+@pytest.fixture(scope="module")
+def problem():
+    from tractexp.api.setup import Setup
+    from tractexp.plugin import build
+    from tractexp.record import detect
+
+    (record,) = build("data", {"name": "csv", "train": SHIPPED["data.train"]}).read().train
+    return Setup.of([detect(record)], NODE, (), None, {}).problem
+
+
+def ended_at(problem, optimizer, seed, values, **more):
+    """A run on the shipped dip that ended at these parameters."""
+    (objective,) = problem.objective(np.array([values]))
+    parameters = dict(zip(problem.space.names, map(float, values), strict=True))
+    return replace(a_run(optimizer, seed, float(objective), data=SHIPPED), parameters=parameters, **more)
+
+
+@pytest.fixture(scope="module")
+def polished(problem):
+    """Runs that all stop short, six in the floor's valley and one in another, and what polishing makes of them."""
+    lowest = polish(problem, [a_run("a", 0, 1e-3, data=SHIPPED)], lambda n: lambda: None)
+    values = np.array([lowest.parameters[name] for name in problem.space.names])
+    near = [ended_at(problem, "a", s, values * (1 + 0.01 * np.sin(s + np.arange(len(values))))) for s in range(6)]
+    shallow = dict(lowest.parameters, X_prime=0.45, C=0.45, q_v=1.6)
+    far = ended_at(problem, "b", 0, np.array([shallow[name] for name in problem.space.names]))
+    return [*near, far], polish(problem, [*near, far], lambda n: lambda: None)
+
+
+def test_the_floor_is_polished_where_no_run_reached_it(polished):
+    runs, found = polished
+    assert min(run.objective for run in runs) > 1.05 * LOWEST
+    assert found.objective == pytest.approx(LOWEST, rel=1e-4)
+    floor = floor_of(runs, None, found)
+    assert (floor.value, floor.source) == (
+        found.objective, f"the lowest that least squares reach from where 7 runs ended and from {found.starts} starts"
+        " all over the bounds",
+    )  # fmt: skip
+    assert floor_of(runs, 2e-5, found) == Floor(2e-5, "as given by task.floor")
+
+
+def test_runs_are_told_apart_by_the_valley_they_ended_in(polished):
+    runs, found = polished
+    assert [found.in_valley(run) for run in runs] == [True] * 6 + [False]
+    assert found.reached[runs[-1]] > 1.2 * LOWEST
+    made = compare(gather(runs, "x"), targets=TARGETS, ties=1e-3, polished=found)
+    assert {s.name: s.in_valley for s in made.summaries} == {"a": 1.0, "b": 0.0}
+    assert claims.of_valley(made).endswith("from where least squares reach it: a 6 of 6, b 0 of 1.")
+    assert {s.in_valley for s in compare(gather(runs, "x"), targets=TARGETS, ties=1e-3).summaries} == {None}
+
+
+def test_runs_of_records_that_have_changed_since_are_not_polished(problem, polished):
+    runs, _ = polished
+    assert polish(problem, [replace(r, objective=1.1 * r.objective) for r in runs], lambda n: lambda: None) is None
+
+
+def test_a_floor_given_too_high_is_said(polished):
+    runs, found = polished
+    made = compare(gather(runs, "x"), targets=TARGETS, ties=1e-3, polished=found, floor=4e-5)
+    assert made.floor.value == 4e-5
+    assert any("task.floor=4e-05 lies above what least squares reach" in note for note in made.notes)
+
+
+# The charts.
+
+
+def drawn(chart, name):
+    """The points of one name of a chart: (x, y)."""
+    traces = [trace for trace in chart.plain()["data"] if trace["name"] == name]
+    return [(x, y) for trace in traces for x, y in zip(trace["x"], trace["y"], strict=True)]
+
+
+def test_every_run_that_finished_is_drawn():
+    from tractexp.report.compare import spread
+
+    result = compared([*samples({"a": 1.0, "b": 2.0}), a_failure("b", 77)])
+    points = drawn(spread(result.variants, result.floor), "every run")
+    assert sorted(x for x, _ in points) == sorted(run.objective for v in result.variants for run in v.finished)
+    assert len(points) == 60
+    assert {round(y) for _, y in points} == {0, 1}
+
+
+def test_every_runs_parameters_are_drawn_over_their_bounds(polished, problem):
+    from tractexp.report.compare import parameters
+
+    runs, found = polished
+    chart = parameters(gather(runs, "x").variants, found)
+    layout = chart.plain()["layout"]
+    n = len(problem.space.names)
+    assert len(drawn(chart, "in the floor&#x27;s valley")) == 6 * n
+    assert len(drawn(chart, "elsewhere")) == n
+    assert layout["xaxis"]["ticktext"] == ["a", "b"]
+    for k, (low, high) in enumerate(zip(problem.space.lower, problem.space.upper, strict=True)):
+        shown = layout["yaxis" + (str(k + 1) if k else "")]["range"]
+        assert shown[0] < low < high < shown[1]
+    levels = sorted(shape["y0"] for shape in layout["shapes"])
+    assert levels == sorted(found.parameters.values())
+
+
+@pytest.mark.parametrize(("count", "each"), [(3, 0), (7, 0), (20, 20)])
+def test_of_many_variants_the_first_are_in_color_and_each_has_a_chart(count, each):
+    from tractexp.report import style
+    from tractexp.report.compare import ecdf, fitness
+
+    result = compared(samples({f"v{k:02}": 1.5**k for k in range(count)}, seeds=range(6)))
+    for whole, small in (fitness(result.variants, "simulations", result.floor), ecdf(result.variants, result.floor)):
+        curves = [t for t in whole.plain()["data"] if t["name"]]
+        assert {t["name"] for t in curves} == {v.name for v in result.variants}
+        assert sum(t["showlegend"] for t in curves) == min(count, 7)
+        assert sum(t["line"]["color"] == style.BEHIND for t in curves) == max(count - 7, 0)
+        assert len(small) == each
+
+
+def test_mean_ranks_differ_where_their_bars_do_not_overlap():
+    from tractexp.report.compare import mean_ranks
+
+    ranks = compared(samples({"a": 1.0, "b": 1.02, "c": 9.0, "d": 9.5})).ranks
+    (trace,) = mean_ranks(ranks).plain()["data"]
+    reach = {
+        name: (x - low, x + high)
+        for name, x, low, high in zip(
+            sorted(ranks.names, key=lambda n: ranks.mean[ranks.names.index(n)]), trace["x"],
+            trace["error_x"]["arrayminus"], trace["error_x"]["array"], strict=True,
+        )
+    }  # fmt: skip
+    for a, b in itertools.combinations(ranks.names, 2):
+        apart = abs(ranks.mean[ranks.names.index(a)] - ranks.mean[ranks.names.index(b)]) >= ranks.critical_difference
+        (low, high) = sorted((reach[a], reach[b]))
+        assert (low[1] < high[0]) == apart
+
+
 # Sweep folders and the command line.
 
 
@@ -324,16 +530,24 @@ def write_sweep(folder: Path, runs) -> Path:
             "task": {"name": "identify"},
             "seed": run.seed,
             "budget": None,
-            "data": {"name": "csv", "train": ["a"]},
+            "data": {"name": "csv", "train": run.config["data.train"]},
+            "model": NODE if run.config["data.train"] == SHIPPED["data.train"] else {},
         }
         config |= {"optimizer": {k.removeprefix("optimizer."): v for k, v in run.config.items() if k.startswith("opt")}}
         choices = {"task": "identify", "optimizer": run.optimizer, "data": run.data}
         (job / ".hydra" / "config.yaml").write_text(json.dumps(config))
         (job / ".hydra" / "hydra.yaml").write_text(json.dumps({"hydra": {"runtime": {"choices": choices}}}))
+        if run.interruption:
+            continue
         if run.failure:
             (job / "status.json").write_text(json.dumps({"status": "failed", "message": run.failure}))
             continue
         figures = {key: getattr(run, key) for key in ("objective", "epsilon_p", "epsilon_q")}
+        if run.parameters:  # as an identification writes them: the estimate, and where its search ended
+            figures = {key: 0.5 * value for key, value in figures.items()} | {
+                "parameters": {key: 2 * value for key, value in run.parameters.items()},
+                "search": figures | {"parameters": run.parameters},
+            }
         (job / "result.json").write_text(json.dumps(figures))
         rows = zip(run.simulations, run.seconds, run.history, strict=True)
         lines = [f"{k},{int(n)},{s:.4f},{f!r}" for k, (n, s, f) in enumerate((n, s, float(f)) for n, s, f in rows)]
@@ -365,7 +579,14 @@ def test_a_sweep_is_read_back_as_it_was_run(tmp_path):
 def test_a_job_without_a_result_did_not_finish(tmp_path):
     folder = write_sweep(tmp_path, samples({"a": 1.0}, seeds=range(2)))
     (folder / "0" / "result.json").unlink()
-    assert load.from_sweep(folder)[0].failure == "it left no result.json: it was ended, or still runs"
+    assert load.from_sweep(folder)[0].interruption == "it left no result: it was ended, or still runs"
+    for told in ({"status": "running"}, {"status": "interrupted"}, {"status": "failed", "message": "interrupted"}):
+        (folder / "0" / "status.json").write_text(json.dumps(told))
+        run = load.from_sweep(folder)[0]
+        assert run.interruption, told
+        assert not run.failure
+    (folder / "0" / "status.json").write_text(json.dumps({"status": "failed", "message": "it burst"}))
+    assert load.from_sweep(folder)[0].failure == "it burst"
     for name, content in (("history.csv", "nonsense"), ("result.json", "{}"), ("result.json", "[")):
         (folder / "1" / name).write_text(content)
         with pytest.raises(UserError, match=rf"{name} cannot be read"):
@@ -400,9 +621,11 @@ def test_the_command_compares_the_newest_sweep(swept):
 
 def test_the_page_is_self_contained_and_complete(swept):
     reader = read(swept[0] / "out" / "comparison.html")
-    assert reader.tags.count("svg") == 5
+    text = (swept[0] / "out" / "comparison.html").read_text()
+    assert text.count('class="chart"') == 5
     for part in (
-        "How good", "How fast", "Is the difference more than chance?", "To quote", "Failures: 1", "it <b>burst</b>",
+        "Where the runs ended", "at the end of the search", "Take", "How fast",
+        "Is the difference more than chance?", "To quote", "Failures: 1", "it <b>burst</b>",
         "bad <b>", "How to read this page", "by iterations", "by simulations", "Runtimes", "critical difference",
     ):  # fmt: skip
         assert part in reader.words, part
@@ -452,4 +675,77 @@ def test_two_seeds_are_compared_without_a_test_and_say_so(tmp_path):
     done = tractexp("task.sweep=few", "hydra.run.dir=out", cwd=tmp_path)
     assert done.returncode == 0
     assert "a and b have 2 in common, and the Wilcoxon signed-rank test needs at least 6" in done.stdout
-    assert read(tmp_path / "out" / "comparison.html").tags.count("svg") == 4
+    assert (tmp_path / "out" / "comparison.html").read_text().count('class="chart"') == 4
+
+
+def test_a_job_ended_while_its_folder_was_made_is_interrupted(tmp_path):
+    """Its configuration is there, Hydra's account of it is not; who it was stands in its status."""
+    folder = write_sweep(tmp_path, [*samples({"a": 1.0}, seeds=range(2)), interrupted("a", 2)])
+    (folder / "2" / ".hydra" / "hydra.yaml").unlink()
+    with pytest.raises(UserError, match=r"hydra\.yaml cannot be read"):
+        load.from_sweep(folder)
+    told = {"status": "interrupted", "message": "", "choices": {"optimizer": "a", "data": "tibet_50pct"}}
+    (folder / "2" / "status.json").write_text(json.dumps(told))
+    run = load.from_sweep(folder)[2]
+    assert (run.optimizer, run.seed, run.interruption) == ("a", 2, "its sweep was interrupted")
+
+
+def test_the_search_is_compared_and_not_the_estimate_it_was_polished_to(tmp_path, polished):
+    import tractexp
+
+    runs, found = polished
+    made = tractexp.compare(
+        write_sweep(tmp_path, [*runs, replace(interrupted("b", 1), config=runs[-1].config)]), progress=False
+    )
+    content = made.content
+    assert content["values"] == "objectives, errors and parameters are those at the end of the search"
+    assert [r["objective"] for r in content["runs"]] == [r.objective for r in runs]
+    assert content["runs"][0]["parameters"] == runs[0].parameters
+    assert [r["in_valley"] for r in content["runs"]] == [True] * 6 + [False]
+    assert content["floor"]["value"] == pytest.approx(found.objective)
+    assert content["floor"]["parameters"] == pytest.approx(found.parameters)
+    assert content["interrupted"] == [
+        {"variant": "b", "seed": 1, "job": "7", "message": "it left no result: it was ended, or still runs"}
+    ]
+    words = read(made.write(tmp_path / "page")[0]).words
+    for part in ("The parameters of every run", "lead 6 of 7 runs there", "Interrupted: not judged: 1"):
+        assert part in words, part
+
+
+def test_records_that_cannot_be_read_any_more_leave_the_best_run_for_a_floor(tmp_path):
+    import tractexp
+
+    made = tractexp.compare(write_sweep(tmp_path, samples({"a": 1.0, "b": 2.0}, seeds=range(6))))
+    best = min(r["objective"] for r in made.content["runs"])
+    assert made.content["floor"]["value"] == best
+    assert "nothing lower was looked for, because the problem cannot be put again (" in made.content["floor"]["source"]
+    assert "a.csv" in made.content["floor"]["source"]
+    assert "The parameters of every run" not in read(made.write(tmp_path / "page")[0]).words
+
+
+def test_relative_paths_count_from_where_the_sweep_was_run(tmp_path, polished, monkeypatch):
+    """The folder is another when it is compared, and may hold another file of that name."""
+    import importlib.resources
+    import shutil
+
+    import tractexp
+
+    home, elsewhere = tmp_path / "home", tmp_path / "elsewhere"
+    for folder in (home, elsewhere):
+        folder.mkdir()
+    shutil.copy(str(importlib.resources.files("tractexp.data") / "tibet_50pct.csv"), home / "dip.csv")
+    shutil.copy(str(importlib.resources.files("tractexp.data") / "tibet_30pct.csv"), elsewhere / "dip.csv")
+    runs, found = polished
+    folder = write_sweep(tmp_path / "sweep", runs)
+    for job in folder.iterdir():
+        config = json.loads((job / ".hydra" / "config.yaml").read_text())
+        config["data"]["train"] = ["dip.csv"]
+        (job / ".hydra" / "config.yaml").write_text(json.dumps(config))
+        told = json.loads((job / ".hydra" / "hydra.yaml").read_text())
+        told["hydra"]["runtime"]["cwd"] = str(home)
+        (job / ".hydra" / "hydra.yaml").write_text(json.dumps(told))
+    monkeypatch.chdir(elsewhere)
+    assert tractexp.compare(folder, progress=False).content["floor"]["value"] == pytest.approx(found.objective)
+    shutil.move(elsewhere / "dip.csv", home / "dip.csv")
+    changed = tractexp.compare(folder, progress=False).content["floor"]["source"]
+    assert "because the records or the model have changed since" in changed

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -28,19 +29,28 @@ EXPERIMENT = "identify tibet_50pct"
 SCREENSHOT = Path(__file__).parents[1] / "outputs" / "mlflow_comparison.png"
 
 
-def log(uri, run, parent=None):
-    """Log a run as `task=identify` does."""
-    metrics = {key: getattr(run, key) for key in ("objective", "epsilon_p", "epsilon_q")}
+def log(uri, run, parent=None, variant=None):
+    """Log a run as `task=identify` does: the estimate, half as far off as the search that it is polished from."""
+    ended = {key: getattr(run, key) for key in ("objective", "epsilon_p", "epsilon_q")}
+    ended |= {"seconds": run.seconds[-1], "simulations": run.simulations[-1]}
+    metrics = {key: 0.5 * value for key, value in ended.items()} | {f"search_{k}": v for k, v in ended.items()}
+    variant = variant or run.optimizer
     logged = tracking.Run(
         EXPERIMENT,
         f"{run.optimizer} seed {run.seed}",
         parameters=tracking.flatten(run.config),
-        metrics=metrics | {"seconds": run.seconds[-1]},
+        metrics=metrics,
         curves={
             "fitness": (np.arange(len(run.history)), run.history),
             "fitness_by_simulations": (run.simulations, run.history),
         },
-        tags={"task": "identify", "optimizer": run.optimizer, "data": run.data, "seed": str(run.seed)},
+        tags={
+            "task": "identify",
+            "optimizer": run.optimizer,
+            "data": run.data,
+            "seed": str(run.seed),
+            "variant": variant,
+        },
         parent=parent,
     )
     return tracking.log(logged, uri)
@@ -131,26 +141,99 @@ def test_a_filter_that_finds_nothing_is_one_sentence(filled, arguments, sentence
 def test_a_run_that_failed_in_mlflow_is_a_failure(filled):
     _, uri, _, _ = filled
     (one,) = find(uri, "tags.seed = '3' and tags.optimizer = 'ssa'")
-    (run,) = load.from_logged([type(one)(**{**vars(one), "status": "KILLED"})], "x")
-    assert run.failure == "its status in MLflow is KILLED"
+    (run,) = load.from_logged([replace(one, status="FAILED")], "x")
+    assert (run.failure, run.interruption) == ("its status in MLflow is FAILED", "")
+    for status in ("KILLED", "RUNNING", "SCHEDULED"):
+        (run,) = load.from_logged([replace(one, status=status)], "x")
+        assert (run.failure, run.interruption) == ("", f"its status in MLflow is {status}")
     with pytest.raises(UserError, match="matches no run of task=identify"):
         load.from_logged([], "the filter")
 
 
-def test_the_view_groups_by_optimizer_and_draws_fitness_curves(filled):
-    _, uri, _, _ = filled
+def viewed(uri):
+    """The view that is stored in the newest experiment."""
     page = comparison_view(uri)
     experiment = re.fullmatch(r"#/experiments/(\d+)/runs\?viewStateShareKey=tractexp&compareRunsMode=CHART", page)[1]
     from mlflow import MlflowClient
 
     kind, _, packed = MlflowClient(uri).get_experiment(experiment).tags[TAG].partition(";")
-    state = json.loads(zlib.decompress(base64.b64decode(packed)))
     assert kind == "deflate"
+    return json.loads(zlib.decompress(base64.b64decode(packed)))
+
+
+def test_the_view_groups_by_variant_and_draws_fitness_curves(filled):
+    state = viewed(filled[1])
     assert state["groupBy"] == {
-        "aggregateFunction": "average", "groupByKeys": [{"mode": "tag", "groupByData": "optimizer"}],
+        "aggregateFunction": "average", "groupByKeys": [{"mode": "tag", "groupByData": "variant"}],
     }  # fmt: skip
-    assert state["groupsExpanded"] == {"tag.optimizer.issa": False, "tag.optimizer.ssa": False}
-    assert [chart["metricKey"] for chart in state["compareRunCharts"]][:2] == ["fitness_by_simulations", "fitness"]
+    assert state["groupsExpanded"] == {"tag.variant.issa": False, "tag.variant.ssa": False}
+    charts = {chart["metricKey"]: chart for chart in state["compareRunCharts"]}
+    assert list(charts)[:2] == ["fitness_by_simulations", "fitness"]
+    for metric in ("fitness_by_simulations", "fitness", "search_objective", "objective", "epsilon_p", "epsilon_q"):
+        assert charts[metric]["scaleType"] == "log", metric
+    columns = [name.strip("`") for name in state["selectedColumns"]]
+    for name in ("objective", "epsilon_p", "epsilon_q", "search_objective"):
+        assert f"metrics.`{name}" in columns
+
+
+def test_two_settings_of_one_optimizer_are_two_groups_of_the_view(tmp_path):
+    uri = tracking.default_uri(tmp_path)
+    for run, variant in zip(samples({"issa": 1.0}, seeds=range(2)), ("issa", "issa population=30"), strict=True):
+        log(uri, run, variant=variant)
+    assert set(viewed(uri)["groupsExpanded"]) == {"tag.variant.issa", "tag.variant.issa population=30"}
+
+
+def test_runs_logged_before_variants_had_a_tag_are_grouped_by_optimizer_too(tmp_path):
+    uri = tracking.default_uri(tmp_path)
+    run_id = log(uri, samples({"issa": 1.0}, seeds=range(1))[0])
+    log(uri, samples({"ssa": 1.0}, seeds=range(1))[0])
+    from mlflow import MlflowClient
+
+    MlflowClient(uri).delete_tag(run_id, "variant")
+    assert [key["groupByData"] for key in viewed(uri)["groupBy"]["groupByKeys"]] == ["variant", "optimizer"]
+
+
+def test_files_of_a_run_tell_what_its_metrics_do_not(tmp_path):
+    """The parameters that the search ended at, and its seconds; without the files the curve stands in."""
+    uri = tracking.default_uri(tmp_path)
+    (run,) = samples({"issa": 1.0}, seeds=range(1))
+    search = {"parameters": {"C": 0.7}, "per_event": {"T_m": [0.3, 0.4]}}
+    (tmp_path / "result.json").write_text(json.dumps({"parameters": {"C": 0.9}, "search": search}))
+    rows = [
+        f"{k},{n:.0f},{0.02 * k:.4f},{f!r}"
+        for k, (n, f) in enumerate(zip(run.simulations, run.history.tolist(), strict=True))
+    ]
+    (tmp_path / "history.csv").write_text("\n".join(["iteration,simulations,seconds,objective", *rows]))
+    tags = {"task": "identify", "optimizer": "issa", "data": "tibet_50pct", "seed": "0"}
+    metrics = {"objective": 1.0, "search_objective": 2.0, "epsilon_p": 0.1, "epsilon_q": 0.1, "seconds": 9.0}
+    curves = {"fitness_by_simulations": tracking.at_common_steps(run.simulations, run.history)}
+    made = tracking.Run(
+        EXPERIMENT, "r", {}, metrics, curves, tags, [tmp_path / "result.json", tmp_path / "history.csv"]
+    )
+    tracking.log(made, uri)
+    (logged,) = find(uri, "tags.seed = '0'")
+    (back,) = load.from_logged([logged], "x")
+    assert back.parameters == {"C": 0.7, "T_m[1]": 0.3, "T_m[2]": 0.4}
+    assert back.objective == 2.0
+    np.testing.assert_array_equal(back.history, run.history)
+    np.testing.assert_allclose(back.seconds, 0.02 * np.arange(len(run.history)))
+    (bare,) = load.from_logged([replace(logged, files={})], "x")
+    assert bare.parameters == {}
+    assert bare.history[-1] == run.history[-1]
+
+
+def test_a_page_logged_elsewhere_is_told_how_to_be_seen(tmp_path):
+    """The settings that differ name the variants, also where MLflow takes no sign of equality."""
+    runs = [
+        replace(r, config=r.config | {"optimizer.population": n})
+        for n in (30, 50) for r in samples({"issa": 1.0}, seeds=range(6))
+    ]  # fmt: skip
+    write_sweep(tmp_path / "swept", runs)
+    done = tractexp("task.sweep=swept", "hydra.run.dir=out", "tracking.uri=sqlite:///x.db", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "to see it: tractexp ui --uri sqlite:///x.db" in done.stdout
+    (run,) = find(tracking.address(f"sqlite:///{tmp_path}/x.db"), "tags.task = 'compare'")
+    assert set(run.metrics) == {"median issa population:30", "median issa population:50"}
 
 
 def test_a_store_without_runs_opens_on_the_plain_page(tmp_path):
@@ -198,7 +281,7 @@ def test_the_page_opened_shows_the_comparison(filled, tmp_path):
         server.send_signal(signal.SIGTERM)
         server.wait(30)
     words = re.sub(r"<[^>]*>", " ", seen.stdout)
-    for part in ("Group: issa", "Group: ssa", "Group by: optimizer", "fitness_by_simulations", "16 matching runs"):
+    for part in ("Group: issa", "Group: ssa", "Group by: variant", "fitness_by_simulations", "16 matching runs"):
         assert part in re.sub(r"\s+", " ", words), part
     assert "issa (fitness)" in words  # a curve by optimizer, in the legend
     assert SCREENSHOT.stat().st_size > 50_000
@@ -206,9 +289,9 @@ def test_the_page_opened_shows_the_comparison(filled, tmp_path):
 
 def address(server, log):
     for _ in range(600):
-        found = re.search(r"http://\S+", log.read_text())
+        found = re.search(r"(?<=ready after ).*?(http://\S+)", log.read_text())
         if found:
-            return found[0]
+            return found[1]
         assert server.poll() is None, log.read_text()
         time.sleep(0.1)
     raise AssertionError(log.read_text())

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from itertools import product
 from types import SimpleNamespace
 
@@ -193,9 +194,11 @@ def test_generalise_compares_the_chosen_optimizer_too_and_says_that_the_data_are
     folder, printed_ = generalised
     content = json.loads((folder / "run" / "generalise.json").read_text())
     assert {(r["optimizer"], r["kind"]) for r in content["residuals"]} == {
-        (n, k) for n in ("pso", "issa") for k in ("interpolation", "extrapolation")
+        (n, k) for n in ("estimate", "pso", "issa") for k in ("interpolation", "extrapolation")
     }
     assert all(i["simulations"] == 400 for i in content["identified"])
+    (estimate,) = (i for i in content["identified"] if i["optimizer"] == "estimate")
+    assert estimate["parameters"] not in [i["parameters"] for i in content["identified"] if i is not estimate]
     assert "synthetic stand-in" in printed_
     for name in ("pso_interpolation", "pso_extrapolation", "issa_interpolation", "issa_extrapolation"):
         assert "synthetic stand-in" in (folder / "run" / f"{name}.svg").read_text()
@@ -212,7 +215,9 @@ def test_the_best_objective_at_a_count_is_that_of_the_last_whole_iteration():
 
 def test_workers_change_no_result():
     made = [
-        searches.run(_recipe, {"pso": {"name": "pso"}, "ssa": {"name": "ssa"}}, 6, searches.Limits(150), workers)
+        searches.run(
+            _recipe, {"pso": {"name": "pso"}, "ssa": {"name": "ssa"}}, 6, searches.Limits(150), workers, remember=False
+        )
         for workers in (1, 2)
     ]
     for name in ("pso", "ssa"):
@@ -221,16 +226,100 @@ def test_workers_change_no_result():
         assert len(set(a)) == 6
 
 
-def _recipe():
+@pytest.fixture
+def memory(tmp_path, monkeypatch):
+    """A cache of its own, in which nothing is remembered yet; the kernels are those of the others."""
+    from tractexp.replication import remembered
+
+    monkeypatch.setattr(remembered, "cache_folder", lambda: tmp_path)
+    return tmp_path / "searches"
+
+
+def searched(monkeypatch, recipe=None, settings=None, seeds=2, budget=150):
+    """The searches found, and how many of them were made just now."""
+    made, search = [], searches.search
+    monkeypatch.setattr(searches, "search", lambda *a: made.append(a) or search(*a))
+    found = searches.run(recipe or _recipe, {"pso": {"name": "pso", **(settings or {})}}, seeds,
+                         searches.Limits(budget), workers=1)["pso"]  # fmt: skip
+    monkeypatch.setattr(searches, "search", search)
+    return found, len(made)
+
+
+def test_a_search_made_before_is_read_back_bit_for_bit(memory, monkeypatch):
+    first, made = searched(monkeypatch)
+    again, more = searched(monkeypatch, seeds=3)
+    assert (made, more) == (2, 1)
+    for a, b in zip(first, again[:2], strict=True):
+        np.testing.assert_array_equal(a.values, b.values)
+        for name in ("simulations", "objective", "values", "seconds"):
+            np.testing.assert_array_equal(getattr(a.history, name), getattr(b.history, name))
+        assert (a.objective, a.simulations, a.refused, a.iterations, a.seconds, a.status) == (
+            b.objective, b.simulations, b.refused, b.iterations, b.seconds, b.status
+        )  # fmt: skip
+
+
+def test_a_search_of_anything_else_is_never_read_back(memory, monkeypatch):
+    from tractexp import provenance
+
+    searched(monkeypatch)
+    assert searched(monkeypatch, settings={"population": 20})[1] == 2
+    assert searched(monkeypatch, budget=151)[1] == 2
+    assert searched(monkeypatch, lambda: _recipe(bounds={"C": (0.5, 0.9)}))[1] == 2
+    assert searched(monkeypatch, lambda: _recipe(shift=1e-9))[1] == 2
+    assert searched(monkeypatch, lambda: _recipe(motor="mechanical"))[1] == 2
+    monkeypatch.setattr(provenance, "code", lambda: "changed")
+    assert searched(monkeypatch)[1] == 2
+
+
+def test_a_damaged_memory_is_made_anew_and_the_oldest_are_forgotten(memory, monkeypatch):
+    from tractexp.replication import remembered
+
+    searched(monkeypatch)
+    for k, path in enumerate(memory.iterdir()):
+        path.write_bytes([b"no zip", path.read_bytes()[:200]][k])
+    assert searched(monkeypatch)[1] == 2
+    assert searched(monkeypatch)[1] == 0
+    monkeypatch.setattr(remembered, "MOST", 3)
+    searched(monkeypatch, seeds=5)
+    assert len(list(memory.iterdir())) == 3
+
+
+def test_a_search_that_a_clock_may_end_is_not_remembered(memory, monkeypatch):
+    limits = searches.Limits(150, seconds=60.0)
+    searches.run(_recipe, {"pso": {"name": "pso"}}, 1, limits, workers=1)
+    assert not memory.exists()
+
+
+def test_a_figure_of_one_run_makes_one_search(memory, tmp_path, monkeypatch):
+    """Figure 8 shows ISSA with seed 0; it took the 90 searches of Table 3."""
+    from tractexp.report import paper
+
+    made, told, run = [], [], searches.run
+
+    def counted(recipe, variants, seeds, *rest, **more):
+        made.append((list(variants), seeds))
+        return run(recipe, variants, seeds, *rest, **more)
+
+    monkeypatch.setattr(searches, "run", counted)
+    for _ in range(2):
+        study = Study(_recipe, {}, _recipe().events, (), 30, workers=1, limits=searches.Limits(150), tell=told.append)
+        paper.write(study, ["figure8"], claims.claims(study, ["figure8"]), tmp_path)
+    assert made == [(["issa"], 1)] * 2
+    assert told[0] == told[1] == "searches of issa: seed 0, 300 iterations of 50"
+    assert told[2:] == ["  1 of them were made before by the same code on the same records, and are read back"]
+    assert (tmp_path / "figure8.svg").exists()
+
+
+def _recipe(motor="electromechanical", shift=0.0, **known):
     from tractexp.identification.problem import Problem
     from tractexp.identification.result import parts
     from tractexp.model.model import compose
     from tractexp.plugin import build
     from tractexp.record import detect
 
-    node = {"motor": {"name": "electromechanical"}, "static": {"name": "exponential"}}
-    records = build("data", {"name": "csv", "train": ["pkg://tractexp.data/tibet_50pct.csv"]}).read()
-    return Problem(compose(*parts(node)), [detect(r) for r in records.train])
+    node = {"motor": {"name": motor}, "static": {"name": "exponential"}}
+    (record,) = build("data", {"name": "csv", "train": ["pkg://tractexp.data/tibet_50pct.csv"]}).read().train
+    return Problem(compose(*parts(node)), [detect(replace(record, P=record.P + shift))], **known)
 
 
 def planted(seeds, levels):

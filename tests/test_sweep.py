@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import os
+import re
 import shutil
 import signal
 import sqlite3
@@ -89,7 +90,7 @@ def results(folder):
     found = {}
     for path in folder.glob("*/result.json"):
         content = json.loads(path.read_text())
-        del content["seconds"]
+        del content["seconds"], content["search"]["seconds"]
         history = [line.split(",") for line in (path.parent / "history.csv").read_text().splitlines()]
         content["history"] = [(row[0], row[1], row[3]) for row in history]
         found[content["optimizer"], content["seed"]] = content
@@ -382,3 +383,48 @@ def test_an_experiment_is_a_sweep_by_itself_of_thirty_seeds(experiment, optimize
     assert len(seeds) >= optimizers
     assert all(found == set(range(30)) for found in seeds.values())
     assert all("data.train" in end["message"] for end in ends)
+
+
+def test_settings_of_one_optimizer_are_not_pooled_under_its_name(tmp_path):
+    sweep = ("-m", "optimizer=pso,random_search", "budget=100,200", "seed=0,1", "model.fixed.q_v=3", HERE)
+    done = tractexp(*sweep, "tracking.enabled=false", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    names = [line.strip().split("  ")[0] for line in done.stdout.splitlines() if re.match(r" *\w+ budget=\d+  ", line)]
+    assert sorted(names) == [f"{name} budget={n}" for name in ("pso", "random_search") for n in (100, 200)]
+
+
+@pytest.mark.parametrize(
+    ("chosen", "name"),
+    [
+        ({"optimizer": "issa", "seed": "3", "task": "identify", "tracking.uri": "sqlite:///x.db"}, "issa"),
+        ({"optimizer.levy": "false", "optimizer.gaussian": "true", "seed": "0"}, "issa gaussian=true levy=false"),
+        ({"model": "third_order_zip", "budget": "500", "data": "csv"}, "issa budget=500 model=third_order_zip"),
+        ({"data.train": "[/home/me/dip1.csv,b/dip2.csv]"}, "issa data.train=[dip1.csv,dip2.csv]"),
+    ],
+)
+def test_a_variant_is_named_after_what_was_chosen_but_the_seed(chosen, name):
+    from tractexp.tasks.given import variant
+
+    assert variant("issa", chosen) == name
+
+
+def test_jobs_that_were_interrupted_are_counted_apart_from_those_that_failed(tmp_path):
+    from tractexp.sweep.parent import metrics
+    from tractexp.sweep.status import Status
+
+    class Placed:
+        def __init__(self, folder):
+            self.folder = folder
+
+    jobs = [Placed(tmp_path / str(k)) for k in range(4)]
+    for job, status in zip(jobs, ("finished", "failed", "interrupted", "interrupted"), strict=True):
+        Status(status, "", "", "").write(job.folder)
+    assert metrics(jobs) == {"jobs": 4, "jobs_finished": 1, "jobs_failed": 1, "jobs_interrupted": 2}
+
+
+def test_the_objective_of_a_job_is_that_of_its_search(tmp_path):
+    from tractexp.sweep.status import objective
+
+    for told, value in (({"objective": 1.0, "search": {"objective": 2.0}}, 2.0), ({"objective": 1.0}, 1.0)):
+        (tmp_path / "result.json").write_text(json.dumps(told))
+        assert objective(tmp_path) == value

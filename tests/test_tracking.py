@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import socket
 import sqlite3
@@ -207,6 +208,28 @@ def test_flatten_joins_keys_and_spells_values_as_the_configuration_does():
     }
 
 
+def test_a_name_of_a_metric_is_one_that_mlflow_takes(uri):
+    names = [tracking.metric_name(f"median {name}") for name in ("issa levy=false", "a*b (c)", "issa bounds.C=[0.5]")]
+    assert names == ["median issa levy:false", "median a_b _c_", "median issa bounds.C:_0.5_"]
+    run_id = tracking.log(Run("e", "r", metrics=dict.fromkeys(names, 1.0)), uri)
+    assert set(client(uri).get_run(run_id).data.metrics) == set(names)
+
+
+def test_curves_of_runs_meet_at_common_steps():
+    """MLflow averages step by step; a curve holds what was reached by a step, and its end."""
+    ends = []
+    for first, every, total in ((50, 103, 30_000), (50, 98, 30_500), (9, 9, 40)):
+        steps = np.arange(first, total, every, dtype=float)
+        values = 1 / steps
+        x, y = tracking.at_common_steps(steps, values)
+        assert x[0] >= first
+        assert x[-1] >= steps[-1]
+        assert y[-1] == values[-1]
+        assert all(value == values[steps <= step].min() for step, value in zip(x, y, strict=True))
+        ends.append(x)
+    assert len(set(ends[0]) & set(ends[1])) >= len(ends[0]) - 1 > 100
+
+
 def test_the_commit_is_that_of_the_folder_and_says_when_files_were_changed(tmp_path):
     assert provenance.commit(tmp_path / "nowhere") == ""
     if provenance.commit(tmp_path):
@@ -383,7 +406,9 @@ def test_the_ui_answers_on_loopback_and_leaves_nothing_behind(tmp_path, uri):
     )
     try:
         said = ui.stdout.readline()
-        assert said.startswith(f"MLflow UI: http://127.0.0.1:{port}/")
+        assert said.startswith(f"starting the MLflow UI on http://127.0.0.1:{port}/, which takes about")
+        assert f"it shows {uri}" in said
+        assert re.match(rf"ready after \d+ s: http://127\.0\.0\.1:{port}/", ui.stdout.readline())
         assert answers(f"http://127.0.0.1:{port}/")
         assert answers(f"http://127.0.0.1:{port}/health")
         artifact = f"http://127.0.0.1:{port}/get-artifact?path=note.txt&run_uuid={run_id}"

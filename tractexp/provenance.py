@@ -1,4 +1,4 @@
-"""Where a result comes from: the version and commit of this package, and digests of the records."""
+"""Where a result comes from: the version, commit and code of this package, and digests of the records."""
 
 import functools
 import hashlib
@@ -39,6 +39,22 @@ def commit(folder: Path = PACKAGE) -> str:
 def _git(folder: Path, *command: str) -> str:
     done = subprocess.run(["git", *command], cwd=folder, capture_output=True, text=True, timeout=5, check=True)
     return done.stdout.strip()
+
+
+@functools.cache
+def code() -> str:
+    """SHA-256 of the installed code, plugins of all packages included: what is computed by the same is the same."""
+    made = hashlib.sha256()
+    for file in sorted({file for folder in folders() for file in folder.rglob("*.py")}):
+        made.update(hashlib.sha256(file.read_bytes()).digest())
+    return made.hexdigest()
+
+
+def folders() -> set[Path]:
+    """The folders of this package and of those with plugins."""
+    from tractexp import plugin
+
+    return {PACKAGE, *(Path(path) for package in plugin.packages() for path in package.__path__)}
 
 
 def digest(record: Any) -> str:

@@ -51,12 +51,11 @@ class Benchmarked(Written):
         return Table(columns, rows, f"share of targets met, functions solved: {scale(made)}", self.sentences)
 
     def _write(self, folder: Path) -> list[Path]:
-        """benchmark.html, benchmark.json and the figures."""
+        """benchmark.html and benchmark.json."""
         from tractexp.report import benchmark as report
 
-        figures = report.draw(self.made, folder)
-        page = report.write_page(self.made, figures, folder / "benchmark.html")
-        return [page, report.write_json(self.made, self.optimizers, folder / "benchmark.json"), *figures.values()]
+        page = report.write_page(self.made, folder / "benchmark.html")
+        return [page, report.write_json(self.made, self.optimizers, folder / "benchmark.json")]
 
     def to_dict(self) -> dict[str, Any]:
         from tractexp.report.benchmark import content

@@ -44,6 +44,11 @@ class Compared(Written):
         return Path(self.call["sweep"]) if self.call["filter"] is None else None
 
     @property
+    def answer(self) -> str:
+        """Which variant to take, as far as these runs say."""
+        return self.content["answer"]
+
+    @property
     def sentences(self) -> list[str]:
         """What may be quoted."""
         return self.content["sentences"]
@@ -58,7 +63,7 @@ class Compared(Written):
         ]  # fmt: skip
         columns = ["variant", "failed", "median [pu²]", "worst [pu²]", "share at floor", "ERT [simulations]"]
         title = f"{self.source}: {self.content['problem']}"
-        return Table(columns, rows, title, [*self.sentences, *self.content["notes"]])
+        return Table(columns, rows, title, [self.answer, *self.sentences, *self.content["notes"]])
 
     def _write(self, folder: Path) -> list[Path]:
         """comparison.html and comparison.json."""

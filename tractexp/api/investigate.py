@@ -161,7 +161,7 @@ class Investigation(Written):
                 f"there is no extended model: the verdict is '{self.verdict}', and nothing was added; go on with the"
                 " base model (.question.model), or give records that show more"
             )
-        return model.with_(effects=sorted({*model.effects, *self.names}))
+        return model.with_(effects=sorted({*model.effects, *self.names}), fixed=self.content["held"])
 
     @functools.cached_property
     def fit(self) -> Identification:
@@ -302,6 +302,7 @@ def _concluded(question: Question, steps: "Steps") -> Investigation:
 
 def _estimated(question: Question, steps: "Steps") -> Result:
     """The extended model's parameters as a result, which predicts and is logged as a model."""
+    from tractexp.discrepancy.recommended import adequacy
     from tractexp.identification.problem import Problem
     from tractexp.identification.result import conclude
     from tractexp.identification.search import Found, History
@@ -314,4 +315,5 @@ def _estimated(question: Question, steps: "Steps") -> Result:
     history = History(np.array([bench.effort.simulations]), np.array([objective]), values[None], np.zeros(1))
     status = f"ended with the verdict {steps.verdict.word}"
     found = Found(values, objective, bench.effort.simulations, 0, 0, 0.0, status, history)
-    return conclude(problem, found, question.validate, question.seed, model.node, "descent")[0]
+    result, _ = conclude(problem, found, question.validate, question.seed, model.node, "descent")
+    return replace(result, adequacy=adequacy(steps).told())

@@ -28,9 +28,9 @@ def p_value(p: float) -> str:
 
 def answer(comparison: Comparison) -> str:
     """Which variant to take, as far as these runs say."""
-    if len(comparison.summaries) < 2:
-        return f"There is one variant only, {comparison.summaries[0].name}: nothing to choose from."
     best, *others = comparison.leaders
+    if len(comparison.summaries) < 2:
+        return f"There is one variant only, {best}: nothing to choose from."
     if max((pair.seeds for pair in comparison.pairs), default=0) < seeds_needed(len(comparison.pairs)):
         lowest = f"{_listed([best, *others])} have" if others else f"{best} has"
         return f"Not settled: there are too few seeds to test. {lowest} the lowest median objective so far."
@@ -40,7 +40,11 @@ def answer(comparison: Comparison) -> str:
     rivals = [name for name in alike if name not in others]
     if rivals:
         return f"Take {best}, or as well {_listed(rivals)}: these runs do not tell them apart.{_spent(comparison)}"
-    why = f"it ends as low as {_listed(others)}, sooner" if others else "it ends lower than the others"
+    why = (
+        f"it ends as low as {_listed(others)}, sooner"
+        if others
+        else f"it ends lower than the other{'s' * (len(comparison.summaries) > 2)}"
+    )
     return f"Take {best}: {why}.{_spent(comparison)}"
 
 

@@ -68,11 +68,12 @@ def _job(folder: Path) -> Run | None:
         result = json.loads(path.read_text(encoding="utf-8"))
         ended = ended_search(result)
         told |= {key: float(ended[key]) for key in ENDED} | {"parameters": parameters_of(ended)}
+        told["code"] = code_of(result)
     with _readable(folder / "history.csv") as path:
         return Run(**told, **_history(path.read_text(encoding="utf-8")))
 
 
-def _history(text: str) -> dict[str, np.ndarray]:
+def _history(text: str) -> dict[str, Any]:
     """The search by iteration, of a `history.csv`."""
     _, simulations, seconds, history = np.loadtxt(text.splitlines(), delimiter=",", skiprows=1, ndmin=2).T
     return {"simulations": simulations, "seconds": seconds, "history": history}
@@ -81,6 +82,13 @@ def _history(text: str) -> dict[str, np.ndarray]:
 def ended_search(result: Mapping[str, Any]) -> Mapping[str, Any]:
     """Where the optimizer itself ended, of a `result.json`: in early ones, that was the whole of it."""
     return result.get("search") or result
+
+
+def code_of(result: Mapping[str, Any]) -> str:
+    """The version and commit of the package, of a `result.json`: "0.4.0 at 1c2d3e4f"; "" in early ones."""
+    version, commit = result.get("tractexp_version", ""), result.get("commit", "")
+    dirty = "-dirty" * commit.endswith("-dirty")
+    return f"{version} at {commit[:8]}{dirty}" if version and commit else version
 
 
 def parameters_of(ended: Mapping[str, Any]) -> dict[str, float]:
@@ -110,7 +118,7 @@ def _status(folder: Path) -> Mapping[str, Any]:
         return {"message": "", **told, "status": str(told["status"])}
 
 
-def _unfinished(folder: Path, told: Mapping[str, Any]) -> dict[str, str]:
+def _unfinished(folder: Path, told: Mapping[str, Any]) -> dict[str, Any]:
     """Why a job has no result: {"failure": ...} or {"interruption": ...}; {} where it has one."""
     if INTERRUPTED in (told.get("status"), told.get("message")):  # early sweeps: "failed", with this message
         return {"interruption": "its sweep was interrupted"}
@@ -178,13 +186,14 @@ def _logged(one: Any) -> Run:
         return Run(**told, failure=f"its status in MLflow is {one.status}")
     for key in (*ENDED, "simulations", "seconds"):  # early runs have one value of each, the search's
         ended[key] = one.metrics.get(f"search_{key}", one.metrics.get(key, np.nan))
-    known = parameters_of(ended_search(json.loads(one.files.get("result.json", "{}"))))
+    result = json.loads(one.files.get("result.json", "{}"))
+    known = {"parameters": parameters_of(ended_search(result)), "code": code_of(result)}
     total, seconds = ended.pop("simulations"), ended.pop("seconds")
     if "history.csv" in one.files:
-        return Run(**told, **ended, **_history(one.files["history.csv"]), parameters=known)
+        return Run(**told, **ended, **_history(one.files["history.csv"]), **known)
     simulations = np.fmin(curve[0], total)
     spent = seconds * simulations / simulations[-1]
-    return Run(**told, **ended, simulations=simulations, seconds=spent, history=curve[1], parameters=known)
+    return Run(**told, **ended, simulations=simulations, seconds=spent, history=curve[1], **known)
 
 
 def _value(text: str) -> Any:

@@ -39,6 +39,7 @@ class Run:
     parameters: Mapping[str, float] = field(default_factory=dict)  # empty where they are not known
     failure: str = ""  # why there is no result
     interruption: str = ""  # why there is none yet
+    code: str = ""  # version and commit of the package; "" where that is not known
     folder: str = ""  # where it ran, from which relative paths count; "" where that is not known
 
     @property
@@ -105,6 +106,11 @@ def gather(runs: Sequence[Run], source: str, data: str | None = None) -> Gathere
     unique = {_identity(run): run for run in ended}
     left_out = len(ended) - len(unique)
     notes = [f"Of runs made more than once, the newest count: {left_out} left out."] if left_out else []
+    if len(versions := {run.code for run in ended if run.code}) > 1:
+        notes.append(
+            f"The runs were made by different code ({', '.join(sorted(versions))}): a difference between variants may"
+            " be one between versions."
+        )
     names = _names(runs)
     interrupted = {_identity(run): run for run in runs if run.interruption and _identity(run) not in unique}
     unjudged = tuple((names[_settings(run)], run) for run in interrupted.values())

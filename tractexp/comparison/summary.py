@@ -92,6 +92,11 @@ class Band:
     median: np.ndarray
     upper: np.ndarray
 
+    @property
+    def top(self) -> float:
+        """Of an axis: the upper quartile after a fiftieth of the search. The very start is off the page."""
+        return float(self.upper[np.searchsorted(self.x, self.x[0] + 0.02 * (self.x[-1] - self.x[0]))])
+
 
 def band(variant: Variant, by: str, points: int = 300) -> Band:
     """The fitness curves of a variant's finished runs by "iterations" or "simulations".

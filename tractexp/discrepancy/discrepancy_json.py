@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 
 from tractexp import files
+from tractexp.discrepancy import recommended
 from tractexp.discrepancy.gap import Curves, Gap
 from tractexp.discrepancy.investigate import Investigation
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import Estimate, estimates, own_parameters
 from tractexp.discrepancy.verdict import NAMED, UNEXPLAINED
+from tractexp.identification.adequacy import Grade
 from tractexp.wording import joined
 
 
@@ -34,6 +36,8 @@ def content(investigation: Investigation) -> dict[str, Any]:
         "candidates": [*sets(investigation), *_singles(investigation)],
         "remainder": _remainder(investigation),
         "recommendation": recommendation(investigation),
+        "adequacy": recommended.adequacy(investigation).told(),
+        "held": recommended.held(investigation),
         "extended": "conf/model/extended.yaml" if investigation.names else None,
         "noise": investigation.last.noise.describe(),
         "phasor_window": None if window is None else window.window,
@@ -51,7 +55,12 @@ def recommendation(investigation: Investigation) -> str:
     if investigation.verdict.word == UNEXPLAINED:
         return "look at what is left (unexplained.csv) and at what switched at that time"
     if investigation.verdict.word == NAMED:
-        return "use the extended model; judge it on further events as they come"
+        grade = recommended.adequacy(investigation).grade
+        if grade is not Grade.ADEQUATE:
+            return "find what is missing still: investigate further events, or the extended model as the base model"
+        kept = recommended.held(investigation)
+        told = f"; these events cannot tell {joined(list(kept))}, which it holds" if kept else ""
+        return f"use the extended model{told}; judge it on further events as they come"
     return "use the base model; what is missing, if anything, is below the limits given for each effect"
 
 
@@ -165,7 +174,7 @@ def write_model(investigation: Investigation, node: dict[str, Any], path: Path) 
         "defaults": [{"motor": node["motor"]["name"]}, {"static": node["static"]["name"]}, "_self_"],
         "effects": effects,
         "bounds": {n: list(b) for n, b in node["bounds"].items()},
-        "fixed": dict(node["fixed"]),
+        "fixed": {**node["fixed"], **recommended.held(investigation)},
     } | {part: chosen for part, chosen in settings.items() if chosen}
     head = "# The base model and what was found missing: python -m tractexp --config-dir <this conf> model=extended\n"
     return files.write(path, head + yaml.safe_dump(extended, sort_keys=False))

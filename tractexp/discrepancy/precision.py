@@ -26,9 +26,14 @@ class Estimate:
     verdict: str
 
     @property
+    def half(self) -> float:
+        """Half of the 95 % interval; nan without a standard error."""
+        return WIDE * self.error
+
+    @property
     def interval(self) -> tuple[float, float]:
         """95 %, inside the bounds; nan without a standard error."""
-        ends = np.clip(self.value + WIDE * self.error * np.array([-1.0, 1.0]), *self.parameter.bounds)
+        ends = np.clip(self.value + self.half * np.array([-1.0, 1.0]), *self.parameter.bounds)
         return float(ends[0]), float(ends[1])
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from tractexp.identification import surprises
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.observed import Observed
-from tractexp.identification.surprises import SMALLEST_P, tail
+from tractexp.identification.surprises import SMALLEST_P, Layout, tail
 from tractexp.noise.span import spanned
 from tractexp.wording import in_words
 
@@ -90,7 +90,7 @@ def surprise(observed: Observed, likelihood: Likelihood, unit: np.ndarray, seed:
         by_test[PER_EVENT] = ((rest @ _of_each_event(likelihood, J, Q).T) ** 2).sum(axis=1)
     left = {name: tail(values[1:], values[:1]) for name, values in by_test.items()}
     loudest = min(left, key=left.__getitem__)
-    ratio, where = _loudest_stretch(channels[0], observed)
+    ratio, where = loudest_stretch(channels[0], observed)
     return Surprise(min(1.0, max(len(left) * left[loudest], SMALLEST_P)), loudest, ratio, where)
 
 
@@ -108,18 +108,21 @@ def _of_each_event(likelihood: Likelihood, J: np.ndarray, Q: np.ndarray) -> np.n
     return spanned(split, DISTINCT, least=1e-9)
 
 
-def _loudest_stretch(channels: np.ndarray, observed: Observed) -> tuple[float, str]:
+def loudest_stretch(channels: np.ndarray, layout: Layout) -> tuple[float, str]:
     """The loudest window of the whitened residual (2, N): how many times the noise, and where it is."""
-    cells = surprises.cells_of(observed)
+    cells = surprises.cells_of(layout)
     level = [float(np.sqrt(np.mean(channels["PQ".index(c.channel), c.part] ** 2))) for c in cells]
     k = int(np.argmax(level))
     cell = cells[k]
-    name = observed.events[cell.event].record.name
+    name = layout.events[cell.event].record.name
     return level[k], f"{cell.channel} of {name} from {cell.start:.3f} to {cell.end:.3f} s"
 
 
-def graded(surprise: Surprise, errors: Sequence[tuple[str, float]]) -> Adequacy:
-    """The grade of an estimate that leaves this, with relative errors [(event and channel, epsilon of Eq. (20))]."""
+def graded(surprise: Surprise, errors: Sequence[tuple[str, float]], least_p: float = ADEQUATE_P) -> Adequacy:
+    """The grade of an estimate that leaves this, with relative errors [(event and channel, epsilon of Eq. (20))].
+
+    What is left is nothing but noise from p = `least_p` on.
+    """
     if surprise.p is None:
         where, worst = max(errors, key=lambda e: e[1])
         if worst >= ACCEPTED:
@@ -129,15 +132,15 @@ def graded(surprise: Surprise, errors: Sequence[tuple[str, float]]) -> Adequacy:
             f"it fits within {worst:.1%}, but too few samples before and after the dips are quiet to tell whether an"
             " effect is missing: do not rely on its intervals", None,
         )  # fmt: skip
-    if surprise.adequate:
+    if surprise.p >= least_p:
         return Adequacy(Grade.ADEQUATE, "the model describes this load: use it", surprise.p)
     where, worst = max(errors, key=lambda e: e[1])
     if worst >= ACCEPTED:
         return Adequacy(Grade.WRONG_MODEL, _wrong(where, worst), surprise.p)
     return Adequacy(
         Grade.EFFECT_MISSING,
-        f"it fits within {worst:.1%}, but an effect is missing: do not use its intervals (p that noise alone"
-        f" leaves as much: {in_words(surprise.p)}; loudest: {surprise.where}, {surprise.ratio:.2g} times the noise)",
+        f"it fits within {worst:.1%}, but an effect is missing: do not use its intervals ({surprise.where} is"
+        f" {surprise.ratio:.2g} times as loud as the noise; p of what is left by chance: {in_words(surprise.p)})",
         surprise.p,
     )
 

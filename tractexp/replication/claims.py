@@ -83,7 +83,7 @@ def table1(study: Study) -> list[Claim]:
 
 def table2(study: Study) -> list[Claim]:
     """The values ISSA identifies and their errors."""
-    fits = [several[0] for several in study.fitted["issa"]]
+    fits = [several[0] for several in study.fits("issa")]
     P, Q = (np.array([getattr(f, e) for f in fits]) for e in ("epsilon_p", "epsilon_q"))
     errors = f"medians {percent(np.median(P))} and {percent(np.median(Q))}, worst {percent(max(P.max(), Q.max()))}"
     sine = equations.steady_state_sine(printed.TABLE_3["issa"])

@@ -9,6 +9,7 @@ from tractexp.identification.problem import Problem
 from tractexp.identification.search import Found, Limits, search
 from tractexp.plugin import build
 from tractexp.record import Event
+from tractexp.replication.remembered import Remembered
 
 CHUNK = 5  # searches that share the composition of a model
 Recipe = Callable[[], Problem]  # what a worker builds its problem from: a `Problem` holds compiled code
@@ -22,27 +23,37 @@ def run(
     limits: Limits | None = None,
     workers: int | None = None,
     tell: Callable[[int, int], None] = lambda done, total: None,
+    remember: bool = True,
+    note: Callable[[str], None] = lambda line: None,
 ) -> dict[str, list[Found]]:
     """Search with every variant under seeds 0, 1, ...; `tell(done, total)` counts the searches done.
 
-    One seed gives one history, whatever the number of workers (None: one for each core).
+    One seed gives one history, whatever the number of workers (None: one for each core). What was searched before by
+    the same code on the same problem is read back where it is to `remember`, and `note` is told; its seconds are those
+    of then.
     """
     from joblib import Parallel, cpu_count, delayed
 
-    problem = recipe()
+    problem, limits = recipe(), limits or Limits()
+    known = Remembered(problem, limits, remember)
+    found = {label: [known.get(settings, seed) for seed in range(seeds)] for label, settings in variants.items()}
+    missing = {label: [seed for seed in range(seeds) if several[seed] is None] for label, several in found.items()}
+    done, total = 0, sum(map(len, missing.values()))
+    if known_before := seeds * len(variants) - total:
+        note(f"  {known_before} of them were made before by the same code on the same records, and are read back")
+    chunks = [(label, left[k : k + CHUNK]) for label, left in missing.items() for k in range(0, len(left), CHUNK)]
+    if not chunks:
+        return found  # type: ignore[return-value]
     problem.objective(problem.space.from_unit(np.full((1, problem.space.dimension), 0.5)))  # compiled once, for all
-    chunks = [
-        (label, range(first, min(first + CHUNK, seeds))) for label in variants for first in range(0, seeds, CHUNK)
-    ]
-    found: dict[str, list[Found]] = {label: [] for label in variants}
     parallel: Any = Parallel(n_jobs=min(workers or cpu_count(), len(chunks)), return_as="generator")
-    jobs = (delayed(_chunk)(recipe, dict(variants[label]), part, limits or Limits()) for label, part in chunks)
-    done = 0
+    jobs = (delayed(_chunk)(recipe, dict(variants[label]), part, limits) for label, part in chunks)
     for (label, part), outcome in zip(chunks, parallel(jobs), strict=True):
-        found[label] += outcome
+        for seed, one in zip(part, outcome, strict=True):
+            found[label][seed] = one
+            known.put(variants[label], seed, one)
         done += len(part)
-        tell(done, len(variants) * seeds)
-    return found
+        tell(done, total)
+    return found  # type: ignore[return-value]
 
 
 def _chunk(recipe: Recipe, settings: dict[str, Any], seeds: Sequence[int], limits: Limits) -> list[Found]:

@@ -65,9 +65,22 @@ class Study:
 
     @functools.cached_property
     def compared(self) -> dict[str, list[Found]]:
-        """Tables 2 and 3: the three optimizers at the paper's settings."""
-        self.tell(f"Tables 2 to 5: {', '.join(printed.COMPARED)}, {self.seeds} seeds, 300 iterations of 50")
-        return self._run({name: {"name": name} for name in printed.COMPARED})
+        """Tables 3 to 5: the three optimizers at the paper's settings."""
+        return self._searched(printed.COMPARED, self.seeds)
+
+    def searched(self, name: str) -> list[Found]:
+        """The searches of one of the three, which need not those of the others."""
+        return self.compared[name] if "compared" in vars(self) else self._searched((name,), self.seeds)[name]
+
+    def first(self, name: str) -> list[Fit]:
+        """The one run that the paper's figures show, seed 0: the fits of the fitted events, then of those held out."""
+        found = self.compared[name] if "compared" in vars(self) else self._searched((name,), 1)[name]
+        return self.respond(found[0].values)
+
+    def _searched(self, names: Sequence[str], seeds: int) -> dict[str, list[Found]]:
+        several = f"{seeds} seeds" if seeds > 1 else "seed 0"
+        self.tell(f"searches of {', '.join(names)}: {several}, 300 iterations of 50")
+        return self._run({name: {"name": name} for name in names}, seeds)
 
     @functools.cached_property
     def readings(self) -> dict[str, dict[str, list[Found]]]:
@@ -88,8 +101,11 @@ class Study:
         self.tell("section 5: ISSA without each of its ingredients")
         return self._run({key: {"name": "issa", key: False} for key in printed.INGREDIENTS})
 
-    def _run(self, variants: Mapping[str, Mapping[str, Any]]) -> dict[str, list[Found]]:
-        return searches.run(self.recipe, variants, self.seeds, self.limits, self.workers, self.count)
+    def _run(self, variants: Mapping[str, Mapping[str, Any]], seeds: int | None = None) -> dict[str, list[Found]]:
+        seeds = seeds or self.seeds
+        return searches.run(
+            self.recipe, variants, seeds, self.limits, self.workers, self.count, note=self.tell
+        )  # fmt: skip
 
     @functools.cached_property
     def equal(self) -> int:
@@ -103,7 +119,7 @@ class Study:
 
     def objectives(self, name: str, by: str) -> np.ndarray:
         """(seeds,) at the end of all "iterations", or where an equal number of "simulations" is spent."""
-        found = self.compared[name]
+        found = self.searched(name)
         return np.array([f.objective if by == "iterations" else searches.best_at(f, self.equal) for f in found])
 
     def pair(self, first: str, second: str, by: str) -> Pair:
@@ -158,7 +174,11 @@ class Study:
     @functools.cached_property
     def fitted(self) -> dict[str, list[list[Fit]]]:
         """{optimizer: for each seed the fits of the fitted events, then of those held out}."""
-        return {name: [self.respond(f.values) for f in found] for name, found in self.compared.items()}
+        return {name: self.fits(name) for name in self.compared}
+
+    def fits(self, name: str) -> list[list[Fit]]:
+        """Those of one optimizer."""
+        return [self.respond(found.values) for found in self.searched(name)]
 
     def respond(self, values: np.ndarray) -> list[Fit]:
         """All events, played through the model with free `values`."""

@@ -1,4 +1,4 @@
-"""A benchmark as one self-contained page for people, its figures, and one JSON file for machines."""
+"""A benchmark as one self-contained page for people, and as one JSON file for machines."""
 
 import json
 import math
@@ -9,6 +9,7 @@ from typing import Any
 
 from tractexp import files
 from tractexp.comparison.bbob import Benchmark
+from tractexp.report.chart import Chart
 from tractexp.report.compare import runtime_curves
 from tractexp.report.page import Page
 
@@ -69,48 +70,78 @@ def running_times(benchmark: Benchmark, dimension: int, target: int) -> list[lis
     ]
 
 
-def draw(benchmark: Benchmark, folder: Path) -> dict[tuple[int, str], Path]:
-    """The ECDF over all functions and over each group, {(dimension, group or "all"): path}."""
+def answer(benchmark: Benchmark, dimension: int) -> str:
+    """Which optimizer to take in one dimension, and where another did better."""
+    functions = benchmark.plan.functions
+    best, *others = sorted(benchmark.optimizers, key=lambda name: -benchmark.share(name, dimension, functions))
+    share = f"{benchmark.share(best, dimension, functions):.0%}"
+    if not others:
+        return f"{best} met {share} of the targets in dimension {dimension}; task.against=[NAME] sets it beside others."
+    second = f"{benchmark.share(others[0], dimension, functions):.0%} of {others[0]}"
+    told = f"Take {best} in dimension {dimension}: it met most targets, {share} against {second}."
+    if share == second.partition(" ")[0]:
+        told = f"{best} and {others[0]} met as many targets in dimension {dimension}, {share}."
+    elsewhere = []
+    for group, chosen in benchmark.groups().items():
+        shares = {name: benchmark.share(name, dimension, chosen) for name in (best, *others)}
+        lead = max(shares, key=lambda name: shares[name])
+        if shares[lead] > shares[best]:
+            elsewhere.append(f"{group} ({lead} {shares[lead]:.0%}, {best} {shares[best]:.0%})")
+    return told + (f" Another did better in a group of functions: {'; '.join(elsewhere)}." if elsewhere else "")
+
+
+def charts(benchmark: Benchmark, dimension: int) -> dict[str, tuple[Chart, list[Chart]]]:
+    """The ECDF over all functions and over each group, {group or "all": the whole, and each where they are many}."""
     groups = benchmark.groups()
     chosen: Mapping[str, Iterable[int]] = {"all": benchmark.plan.functions} | (groups if len(groups) > 1 else {})
     drawn = {}
-    for d in benchmark.plan.dimensions:
-        for group, functions in chosen.items():
-            hits = [benchmark.hits(name, d, functions) for name in benchmark.optimizers]
-            path = folder / f"ecdf_{d}d_{group.replace(' ', '_')}.svg"
-            drawn[d, group] = runtime_curves(path, benchmark.optimizers, hits, "evaluations")
+    for group, functions in chosen.items():
+        hits = [benchmark.hits(name, dimension, functions) for name in benchmark.optimizers]
+        drawn[group] = runtime_curves(benchmark.optimizers, hits, "evaluations")
     return drawn
 
 
-def write_page(benchmark: Benchmark, figures: Mapping[tuple[int, str], Path], path: Path) -> Path:
+def write_page(benchmark: Benchmark, path: Path) -> Path:
     """Write `benchmark.html`."""
     plan = benchmark.plan
     page = Page(f"Benchmark of {benchmark.optimizers[0]} on BBOB", f"{scale(benchmark)}; seed {plan.seed}.")
-    page.verdict(*sentences(benchmark))
-    hardest = len(plan.targets) - 1
+    page.verdict(*(answer(benchmark, d) for d in plan.dimensions), *sentences(benchmark))
     for d in plan.dimensions:
         page.heading(f"Dimension {d}")
-        columns, rows = shares(benchmark, d)
-        page.table(
-            columns,
-            rows,
-            f"Share of the {len(plan.targets)} targets, {plan.targets[0]:g} to {plan.targets[-1]:g} from the optimum,"
-            " met by all runs. Solved: functions on which every run met the last one.",
-        )
-        page.figure(figures[d, "all"], "Runtimes: the share of all targets met by all runs, by evaluations.")
-        with page.folded("the same by group of functions"):
-            for group in benchmark.groups():
-                if (d, group) in figures:
-                    chosen = ", ".join(f"f{f}" for f in benchmark.groups()[group])
-                    page.figure(figures[d, group], f"{group.capitalize()}: {chosen}.")
-        page.heading(f"Expected running times in dimension {d}", 3)
-        page.table(["function", *benchmark.optimizers], running_times(benchmark, d, hardest), _caption(plan, hardest))
-        with page.folded("to the other targets"):
-            for target in range(hardest):
-                page.table(
-                    ["function", *benchmark.optimizers], running_times(benchmark, d, target), _caption(plan, target)
-                )
+        _shares(page, benchmark, d)
+        _times(page, benchmark, d)
     return _reading(page).write(path)
+
+
+def _shares(page: Page, benchmark: Benchmark, d: int) -> None:
+    """The share of targets met, in a table and by evaluations."""
+    plan, drawn = benchmark.plan, charts(benchmark, d)
+    page.table(
+        *shares(benchmark, d),
+        f"Share of the {len(plan.targets)} targets, {plan.targets[0]:g} to {plan.targets[-1]:g} from the optimum,"
+        " met by all runs. Solved: functions on which every run met the last one.",
+    )
+    whole, each = drawn.pop("all")
+    page.chart(whole, "Runtimes: the share of all targets met by all runs, by evaluations.")
+    if each:
+        with page.folded("each optimizer in a chart of its own"):
+            page.charts(each, f"In gray: {benchmark.optimizers[0]}.")
+    if drawn:
+        with page.folded("the same by group of functions"):
+            for group, (chart, _) in drawn.items():
+                numbers = ", ".join(f"f{f}" for f in benchmark.groups()[group])
+                page.chart(chart, f"{group.capitalize()}: {numbers}.")
+
+
+def _times(page: Page, benchmark: Benchmark, d: int) -> None:
+    """The expected running times to each target, the hardest first."""
+    hardest = len(benchmark.plan.targets) - 1
+    columns = ["function", *benchmark.optimizers]
+    page.heading(f"Expected running times in dimension {d}", 3)
+    page.table(columns, running_times(benchmark, d, hardest), _caption(benchmark.plan, hardest))
+    with page.folded("to the other targets"):
+        for target in range(hardest):
+            page.table(columns, running_times(benchmark, d, target), _caption(benchmark.plan, target))
 
 
 def _caption(plan: Any, target: int) -> str:

@@ -64,12 +64,9 @@ def script() -> str:
 class Chart:
     """Panels above each other that share the axis x. Colors are those of `style`; names may hold any character.
 
-        `panels` are the labels of the vertical axes from the top, `heights` their shares. `log_x` and `log_y` make axes
-    <<<<<<< HEAD
-        logarithmic. `pixels` is the height of the whole. Without a `legend` names are told by hovering only.
-    =======
-        logarithmic. `pixels` is the height of the whole. Where many curves are drawn, `hover` "closest" tells of one.
-    >>>>>>> comp
+    `panels` are the labels of the vertical axes from the top, `heights` their shares. `log_x` and `log_y` make axes
+    logarithmic. `pixels` is the height of the whole. Without a `legend` names are told by hovering only; where many
+    curves are drawn, `hover` "closest" tells of one.
     """
 
     def __init__(
@@ -122,7 +119,7 @@ class Chart:
         x, y = style.thin(np.asarray(x, dtype=float), np.asarray(y, dtype=float), MOST)
         shape = {"shape": "hv"} if step else {}
         line = {"color": color, "width": width, "dash": dash, **shape}
-        packed = {"x": _packed(x, "f8"), "y": _packed(y, "f4")}
+        packed: dict[str, Any] = {"x": _packed(x, "f8"), "y": _packed(y, "f4")}
         return self._add(name, panel, mode="lines", line=line, silent=not legend, **packed)
 
     def points(
@@ -160,11 +157,10 @@ class Chart:
     ) -> "Chart":  # fmt: skip
         """What lies between two curves, lightly filled."""
         line = {"width": 0, "color": color, **({"shape": "hv"} if step else {})}
-        x, quiet = _packed(np.asarray(x, dtype=float), "f8"), {"mode": "lines", "line": line, "hoverinfo": "skip"}
-        self._add(name, panel, x=x, y=_packed(lower, "f4"), silent=True, **quiet)
-        return self._add(
-            name, panel, x=x, y=_packed(upper, "f4"), fill="tonexty", fillcolor=_faint(color), **quiet
-        )  # fmt: skip
+        quiet: dict[str, Any] = {"mode": "lines", "line": line, "hoverinfo": "skip"}
+        quiet["x"] = _packed(np.asarray(x, dtype=float), "f8")
+        self._add(name, panel, y=_packed(lower, "f4"), silent=True, **quiet)
+        return self._add(name, panel, y=_packed(upper, "f4"), fill="tonexty", fillcolor=_faint(color), **quiet)
 
     def shade(
         self, start: float, end: float, color: str, panel: int | None = None, name: str = "", opacity: float = 0.3

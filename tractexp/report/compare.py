@@ -29,25 +29,22 @@ def fitness(variants: Sequence[Variant], by: str, floor: Floor) -> tuple[Chart, 
     """
     variants = [variant for variant in variants if variant.finished]
     names, bands = [v.name for v in variants], [band(v, by) for v in variants]
-    low, high = min(floor.value, *(b.lower.min() for b in bands)), max(map(_seen, bands))
+    low, high = min(floor.value, *(b.lower.min() for b in bands)), max(b.top for b in bands)
     counted = by == "simulations"
     first = min(b.x[(b.lower <= high).argmax()] for b in bands)
     first, last = max(first, 1) if counted else 0, max(b.x[-1] for b in bands)
 
     def blank(title: str = "", pixels: int | None = None) -> Chart:
-        label = ["best objective [pu²]"]
-        made = Chart(by, label, log_x=counted, log_y=True, hover="closest", title=title, pixels=pixels)
+        label = "best objective [pu²]" if not title else "pu²"
+        made = Chart(
+            by, [label], log_x=counted, log_y=True, hover="closest", title=title, pixels=pixels, legend=not title
+        )
         made.limits(0, low / (high / low) ** 0.06, high).level(floor.value, "floor")
         return made.limits(None, first, last)
 
     curves = [(b.x, b.median) for b in bands]
     whole = _together(blank("", _height(names)), names, curves, [] if len(names) > TOGETHER else bands)
     return whole, _apart(blank, names, curves, bands) if len(names) > TOGETHER else []
-
-
-def _seen(b: Band) -> float:
-    """The top of the axis: the upper quartile after a fiftieth of the search; the very start is off the page."""
-    return float(b.upper[np.searchsorted(b.x, b.x[0] + 0.02 * (b.x[-1] - b.x[0]))])
 
 
 def ecdf(variants: Sequence[Variant], floor: Floor) -> tuple[Chart, list[Chart]]:
@@ -61,7 +58,8 @@ def runtime_curves(names: Sequence[str], costs: Sequence[np.ndarray], label: str
     first, last = (reached.min(), reached.max()) if len(reached) else (1.0, 10.0)
 
     def blank(title: str = "", pixels: int | None = None) -> Chart:
-        made = Chart(label, ["share of targets reached"], log_x=True, hover="closest", title=title, pixels=pixels)
+        share = "share of targets reached" if not title else "share"
+        made = Chart(label, [share], log_x=True, hover="closest", title=title, pixels=pixels, legend=not title)
         return made.limits(0, 0, 1.02).limits(None, first, 1.1 * last)
 
     curves = [_shares(cost, first, 1.1 * last) for cost in costs]

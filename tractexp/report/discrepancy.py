@@ -20,6 +20,7 @@ from tractexp.discrepancy.evidence import (
 from tractexp.discrepancy.investigate import Investigation
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import Estimate, estimates
+from tractexp.discrepancy.recommended import adequacy, held
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.verdict import UNEXPLAINED
 from tractexp.report.chart import Chart
@@ -34,17 +35,14 @@ BAR, ROOM = 24, 1.2  # pixels; of the longest bar, for what stands beside the ba
 MOST_SETS = 12  # that are compared in a table
 
 
-def page(path: Path, found: Investigation, title: str, adequacy: str = "") -> Path:
-    """Tell the investigation to a reader who was not there.
-
-    `adequacy` is the sentence that grades the model recommended, where it was judged.
-    """
+def page(path: Path, found: Investigation, title: str) -> Path:
+    """Tell the investigation to a reader who was not there."""
     events = len(found.bench.events)
     lead = f"{found.bench.model.title}, {events} event{'s' * (events > 1)} fitted, {len(found.withheld)} held out"
     made = Page(f"Missing effect: {title}", lead)
     head = f"{found.verdict.word.upper()} {' or '.join(joined(names) for names in found.verdict.sets)}".strip()
     left = [_sentence(found.headline)] if found.headline else []
-    said = [_sentence(found.verdict.reason), *left, *[adequacy] * bool(adequacy), f"Next: {recommendation(found)}."]
+    said = [_sentence(found.verdict.reason), *left, _graded(found), f"Next: {recommendation(found)}."]
     made.verdict(head, *said, kind=KIND[found.verdict.word])
     overlaid(made.heading("Measured, before, after" if found.names else "Measured and calculated"), found.overlays)
     _smaller(made, found)
@@ -57,6 +55,12 @@ def page(path: Path, found: Investigation, title: str, adequacy: str = "") -> Pa
     _disagreement(made, found)
     _noise(made, found)
     return made.write(path)
+
+
+def _graded(found: Investigation) -> str:
+    """What the model that the investigation ends with is good for."""
+    which = "extended" if found.names else "base"
+    return f"The {which} model: {adequacy(found).sentence}."
 
 
 def _sentence(text: str) -> str:
@@ -191,7 +195,7 @@ def _bars(found: Investigation, rows: Sequence[Evidence], labels: Mapping[Eviden
 
 
 def _bars_caption(found: Investigation, rows: Sequence[Evidence]) -> str:
-    colors = ["green: in the verdict"] * bool(found.names)
+    colors = ["green: added"] * bool(found.names)
     colors += ["orange: tied with it"] * any(r.status == KEPT for r in rows)
     colors += ["blue: refitted"] * any(r.how == FITTED and r.standing == 2 for r in rows)
     colors += ["gray: estimated in one linear step"] * any(r.how == ONE_STEP for r in rows)
@@ -238,17 +242,28 @@ def _parameters(made: Page, found: Investigation) -> None:
     """The base model's parameters before and after, and those that came in."""
     made.heading("Parameters before and after" if found.names else "Parameters of the base model")
     before = {e.parameter.name: e for e in found.before}
-    rows = []
-    for e in found.after if found.names else found.before:
+    rows, known = [], found.after if found.names else found.before
+    for e in known:
         p, was = e.parameter, before.get(e.parameter.name)
         told = [_value(was) if was else "not in it"] if found.names else []
-        rows.append([p.name, p.about, p.unit, *told, _value(e), _interval(e), e.verdict])
+        rows.append([p.name, p.about, p.unit, *told, _value(e), _interval(e), _brief(e.verdict)])
     stages = ["before", "after"] if found.names else ["value"]
     columns = ["parameter", "meaning", "unit", *stages, "95 % interval", "verdict"]
     made.table(
         columns, rows, "± one standard error, from the curvature at the fit to the fitted events.",
         words=(1, 2, len(columns) - 1),
     )  # fmt: skip
+    why = [f"{e.parameter.name} is {e.verdict}." for e in known if _brief(e.verdict) != e.verdict]
+    if why:
+        with made.folded("Why some are known badly, and what of them is known"):
+            made.items(why)
+    if kept := held(found):
+        made.text(f"These events cannot tell {joined(list(kept))}: the extended model holds what was found.")
+
+
+def _brief(verdict: str) -> str:
+    """The first clause of a verdict that has several: 'weakly identified: ± 32 %'."""
+    return verdict.split("; ")[0] if ": " in verdict.split(" (")[0] else verdict
 
 
 def _equations(made: Page, found: Investigation) -> None:
@@ -256,6 +271,8 @@ def _equations(made: Page, found: Investigation) -> None:
     from tractexp.model.model import compose
 
     made.heading("The extended model")
+    if others := [joined(names) for names in found.verdict.sets[1:]]:
+        made.text(f"It has {joined(found.names)}; {joined(others, 'or')} instead would fit these events as well.")
     made.text(
         "conf/model/extended.yaml beside this page: python -m tractexp --config-dir conf model=extended. Its equations"
         " that changed or came in:"
@@ -280,7 +297,7 @@ def _disagreement(made: Page, found: Investigation) -> None:
     first = found.first
     made.heading("Is there a disagreement, and where?")
     text = f"What the base model leaves would come about by chance with a probability of {in_words(first.p_left)}"
-    text += "." if first.adequate else f"; what stands out most: {first.loudest}."
+    text += "." if first.adequate else f"; the most surprised of the tests looks for {first.loudest}."
     if first.scores:
         best, alpha = first.scores[0], found.bench.criteria.false_alarms
         text += (

@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.comparison.floor import Floor
 from tractexp.comparison.runs import Run, Variant
 from tractexp.replication import equations, maps, printed
 from tractexp.replication.claims import CONFIRMED, IMPOSSIBLE, OPEN, REFUTED, Claim, number
 from tractexp.replication.study import AT_FLOOR, TARGETS, Study
-from tractexp.report import compare, figures, paper_figures
+from tractexp.report import figures, paper_figures
 from tractexp.report.markdown import Markdown, Together
 from tractexp.report.page import Page
 
@@ -124,15 +123,16 @@ def _rows_of_parameters(study: Study, names: Sequence[str]) -> list[list[str]]:
         for name in names:
             row.append(f"{printed.TABLE_3[name][k]:g}")
             if parameter in index:
-                values = [f.values[index[parameter]] for f in study.compared[name]]
+                values = [f.values[index[parameter]] for f in study.searched(name)]
                 row += [number(values[0]), number(float(np.median(values)))]
             else:
                 row += ["-", "-"]
         rows.append(row)
+    fitted = {n: study.fits(n) for n in names}
     for label, table in (("epsilon_p", printed.EPSILON_P), ("epsilon_q", printed.EPSILON_Q)):
-        ours = {n: [getattr(fits[0], label) for fits in study.fitted[n]] for n in names}
+        ours = {n: [getattr(fits[0], label) for fits in fitted[n]] for n in names}
         rows.append([label, *_three(table, ours, names)])
-    ours = {n: [f.objective for f in study.compared[n]] for n in names}
+    ours = {n: [f.objective for f in study.searched(n)] for n in names}
     rows.append(["Obj.E [pu²]", *_three(printed.OBJECTIVE, ours, names)])
     return rows
 
@@ -257,7 +257,7 @@ def _fit(draw: Draw, name: str, fit: Any, role: str) -> Path:
 
 def figure8(sheet: Any, study: Study, draw: Draw) -> None:
     sheet.heading("Figure 8: the fit")
-    sheet.figure(_fit(draw, "figure8", study.fitted["issa"][0][0], "fitted"), "ISSA, one run.")
+    sheet.figure(_fit(draw, "figure8", study.first("issa")[0], "fitted"), "ISSA, one run.")
 
 
 def figure9(sheet: Any, study: Study, draw: Draw) -> None:
@@ -267,10 +267,9 @@ def figure9(sheet: Any, study: Study, draw: Draw) -> None:
     by_simulations = {n: (h.simulations, h.objective) for n, h in first.items()}
     sheet.figure(figures.fitness(draw("figure9"), by_iteration, by_simulations, title="one run, seed 0"),
                  "One run, as the paper shows it, and the same by what it costs.")  # fmt: skip
-    floor = Floor(study.floor, "the lowest objective known")
     for by in ("iterations", "simulations"):
         sheet.figure(
-            compare.fitness(draw(f"figure9_{by}"), _variants(study), by, floor),
+            paper_figures.searches(draw(f"figure9_{by}"), _variants(study), by, study.floor),
             f"Median and quartiles of {study.seeds} seeds, by {by}; dotted the lowest objective known.",
         )
     rows = []
@@ -307,9 +306,10 @@ def _variants(study: Study) -> list[Variant]:
 def _held_figure(figure: str, kind: str) -> Callable[..., None]:
     def section(sheet: Any, study: Study, draw: Draw) -> None:
         sheet.heading(f"Figure {figure}: {kind}")
+        fits = study.first("issa")
         for k, e in enumerate(study.held(kind)):
             name = f"figure{figure}" + (f"_{k + 1}" if k else "")
-            sheet.figure(_fit(draw, name, study.fitted["issa"][0][e], kind), "ISSA, one run; residuals below.")
+            sheet.figure(_fit(draw, name, fits[e], kind), "ISSA, one run; residuals below.")
 
     return section
 

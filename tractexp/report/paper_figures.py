@@ -1,10 +1,12 @@
 """The figures of the paper, drawn from our own measurements. Arrays in, a file out."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from tractexp.comparison.runs import Variant
+from tractexp.comparison.summary import band
 from tractexp.report import style
 
 ITERATIONS = 150  # shown of an orbit
@@ -70,6 +72,29 @@ def flights(path: Path, steps: np.ndarray, tails: Mapping[str, np.ndarray]) -> P
         style.logarithmic(right, "y", 1e-5, 1)
         right.set(xlabel="x", ylabel="share of steps with |s| > x")
         right.legend(loc="upper right")
+        return style.save(figure, path)
+
+
+def searches(path: Path, variants: Sequence[Variant], by: str, floor: float) -> Path:
+    """Figure 9 over all seeds: median and quartile band of the best objective by "iterations" or "simulations"."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    bands = [band(variant, by) for variant in variants]
+    low, high = min(floor, *(b.lower.min() for b in bands)), max(b.top for b in bands)
+    with rc_context(style.SETTINGS):
+        figure = Figure(figsize=(8.0, 4.2), layout="constrained")
+        panel = figure.subplots()
+        for variant, b, color in zip(variants, bands, style.PALETTE, strict=False):
+            panel.plot(b.x, b.median, drawstyle="steps-post", color=color, label=variant.name)
+            panel.fill_between(b.x, b.lower, b.upper, step="post", color=color, alpha=0.18, linewidth=0)
+        style.logarithmic(panel, "y", low, high)
+        panel.set_ylim(low / (high / low) ** 0.04, high)
+        panel.axhline(floor, color=style.FAINT, linewidth=0.8, linestyle=(0, (2, 2)), zorder=0.6)
+        if by == "simulations":
+            style.logarithmic(panel, "x", min(b.x[0] for b in bands), max(b.x[-1] for b in bands))
+        panel.set(xlabel=by, ylabel="best objective [pu²]")
+        figure.legend(loc="outside right upper")
         return style.save(figure, path)
 
 

@@ -9,8 +9,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import tractexp
-from tractexp import plugin
+from tractexp import provenance
 
 PACKAGE = "pkg://"
 
@@ -24,18 +23,11 @@ def configuration(config: Mapping[str, Any], choices: Mapping[str, str]) -> str:
 def inputs(config: Mapping[str, Any]) -> str:
     """SHA-256 of the installed code, plugins of all packages included, and of the data files the job names."""
     named = sorted(set(_strings(config.get("data") or {})))
-    return _digest("".join([_code(), *map(_file, named)]).encode())
+    return _digest("".join([provenance.code(), *map(_file, named)]).encode())
 
 
 def _digest(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
-
-
-@functools.cache
-def _code() -> str:
-    folders = {Path(p) for package in (tractexp, *plugin.packages()) for p in package.__path__}
-    files = sorted({file for folder in folders for file in folder.rglob("*.py")})
-    return "".join(_digest(file.read_bytes()) for file in files)
 
 
 @functools.cache

@@ -14,7 +14,7 @@ from tractexp.tasks.task import Job, Task, call
 
 @plugin
 class Benchmark(Task):
-    """Run the optimizer and those it is set against on BBOB: ERT and ECDF tables, figures, one page, JSON."""
+    """Run the optimizer and those it is set against on BBOB: ERT and ECDF, one page, JSON."""
 
     reads = ("optimizer",)
     instead = {
@@ -44,7 +44,7 @@ class Benchmark(Task):
         made = call(benchmark, self.optimizers(job), **plan, seed=job.seed, cores=cores)
         show(made.made)
         paths = made.write(job.folder)
-        listed(paths[:2])
+        listed(paths)
         track(job, made.made, paths)
 
     def optimizers(self, job: Job) -> dict[str, Any]:
@@ -66,6 +66,8 @@ def show(made: Any) -> None:
         _, rows = report.shares(made, dimension)
         columns = ["optimizer", "all", *(span(group) for group in made.groups().values()), "solved"]
         table(columns, rows, f"dimension {dimension}: share of targets met, functions solved")
+    for dimension in made.plan.dimensions:
+        say(report.answer(made, dimension))
     for sentence in report.sentences(made):
         say(f"- {sentence}")
     say()

@@ -1,0 +1,38 @@
+"""The model that an investigation ends with: what it is good for, in the words of an identification, and what it holds.
+
+Parameters that the events cannot tell are held at the values found, and told: a model is no better known for having
+more of them.
+"""
+
+from tractexp.discrepancy.adequacy import channels_of
+from tractexp.discrepancy.disagreement import Disagreement
+from tractexp.discrepancy.gap import Gap
+from tractexp.discrepancy.investigate import Investigation
+from tractexp.identification.adequacy import Adequacy, Surprise, graded, loudest_stretch
+from tractexp.identification.verdict import UNIDENTIFIED, size
+
+
+def adequacy(found: Investigation) -> Adequacy:
+    """The grade of the extended model, or of the base model where nothing is named, on all events."""
+    tests: Disagreement = (found.verdict.chosen.tests or found.last) if found.names else found.first
+    ratio, where = loudest_stretch(channels_of(tests.projection, found.bench)[0], found.bench)
+    p = 1.0 if found.verdict.word == "none" else tests.p_left  # no disagreement: by the same false-alarm rate
+    surprise = Surprise(p, tests.loudest, ratio, where)
+    errors = [*_errors("the fitted events", found.train), *_errors("the held-out events", found.validate)]
+    return graded(surprise, errors, found.bench.criteria.adequate_p)
+
+
+def _errors(label: str, gap: Gap | None) -> list[tuple[str, float]]:
+    """Relative errors of Eq. (20) of the model that is recommended."""
+    return [] if gap is None else [(f"P of {label}", gap.after.epsilon_p), (f"Q of {label}", gap.after.epsilon_q)]
+
+
+def held(found: Investigation) -> dict[str, float]:
+    """Parameters of the extended model that the events cannot tell (to half their size), at the values found."""
+    if not found.names:
+        return {}
+    return {
+        e.parameter.name: e.value
+        for e in found.after
+        if e.verdict.startswith(UNIDENTIFIED) or e.half > size(e.value, *e.parameter.bounds) / 2
+    }
