@@ -39,11 +39,11 @@ def page(path: Path, found: Profiles, grade: str = "", trusted: bool = True) -> 
         "One parameter is held at value after value, all others are fitted again each time.",
     )
     says = {profile.name: meaning(found, profile) for profile in found.profiles}
-    told = [*_where(says), *(_poor(verdicts) if trusted else [NOISE_ALONE])]
+    told = [*_where(says), *_poor(verdicts)] if trusted else [NOISE_ALONE, *_where(says)]
     graded = [f"{upper(grade)}."] * bool(grade)
     made.verdict(*graded, *told, *(f"{upper(note)}." for note in found.notes), kind=_kind(verdicts, trusted))
-    words = {name: f": {verdict.word}" * trusted for name, verdict in verdicts.items()}
-    made.charts([_chart(found, profile, profile.name + words[profile.name]) for profile in found.profiles])
+    titles = {name: f"{name}: {verdict.word}" if trusted else "" for name, verdict in verdicts.items()}
+    made.charts([_chart(found, profile, titles[profile.name]) for profile in found.profiles])
     made.text(CAPTION.format(threshold=found.threshold))
     made.heading("Intervals")
     made.table(
@@ -117,7 +117,7 @@ def _where(says: Mapping[str, str]) -> list[str]:
         every = "every parameter" if not rest else ", ".join(enough)
         told.append(f"For {every} the curvature's interval is enough: the likelihood is a parabola there.")
     if rest:
-        told.append(f"For {', '.join(rest)} it misleads; take the profile's interval.")
+        told.append(f"For {', '.join(rest)} it misleads: there the profile's interval is the right one.")
     return told
 
 
