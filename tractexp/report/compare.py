@@ -132,11 +132,8 @@ def spread(variants: Sequence[Variant], floor: Floor) -> Chart:
 
 def _round(low: float, high: float) -> list[float]:
     """A few round numbers between two."""
-    for marks in ROUND:
-        at = [m * 10.0**k for k in range(-20, 5) for m in marks if low <= m * 10.0**k <= high]
-        if len(at) > 2:
-            break
-    return at
+    few, more = ([m * 10.0**k for k in range(-20, 5) for m in marks if low <= m * 10.0**k <= high] for marks in ROUND)
+    return few if len(few) > 2 else more
 
 
 def _scattered(variant: Variant) -> list[tuple[Run, float]]:
