@@ -228,6 +228,32 @@ def test_the_papers_values_get_the_reason_they_cannot_be_simulated(tmp_path):
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.parametrize(
+    ("arguments", "ahead"),
+    [
+        ([], True),
+        (["optimizer=pso", "task=profile"], True),
+        (["tracking.enabled=false"], False),
+        (["--cfg", "job"], False),
+        (["-m", "seed=1,2"], False),
+        (["task=export"], False),
+    ],
+)
+def test_only_a_single_job_that_logs_starts_the_process_that_logs(arguments, ahead, monkeypatch):
+    import hydra
+
+    from tractexp import __main__
+    from tractexp.tracking import process
+
+    started = []
+    monkeypatch.setattr(process, "start_ahead", lambda: started.append(True))
+    monkeypatch.setattr(hydra, "main", lambda **_: lambda job: lambda: None)
+    monkeypatch.setattr(sys, "argv", ["tractexp", *arguments])
+    monkeypatch.setenv("HYDRA_FULL_ERROR", "0")  # which the command sets for itself
+    assert __main__._run() == 0
+    assert bool(started) == ahead
+
+
 def test_a_traceback_is_shown_when_asked_for(tmp_path):
     command = [sys.executable, "-m", "tractexp", "seed=-1"]
     done = subprocess.run(

@@ -251,9 +251,12 @@ def test_the_voltages_noise_is_part_of_the_noise_of_the_power():
     drive = made.drive
     drawn = noise.draw(np.random.default_rng(4), 200, np.diff(drive.first).tolist())
     rows = made.whiten(noise, drawn)
+    ratio = drawn.std(axis=0) / noise.deviation(drive)  # also where errors of the voltage are most of it
+    assert ratio.mean(axis=1) == pytest.approx([1.0, 1.0], abs=0.02)
     assert noise.loudest_blur > Criteria().blurred
     loud = drawn.var(axis=0) > 4 * np.median(drawn.var(axis=0), axis=1, keepdims=True)  # the edges of the dips
     assert loud.sum() > 20
+    assert ratio[loud].mean() == pytest.approx(1.0, abs=0.02)
     assert rows.var() == pytest.approx(1.0, abs=0.02)
     assert rows.reshape(drawn.shape)[:, loud].var() == pytest.approx(1.0, abs=0.1)
 

@@ -16,6 +16,7 @@ from tractexp.discrepancy.evidence import CHOSEN, beside, chance_level, evidence
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.next_dip import NextDip
 from tractexp.report import discrepancy, overlay
+from tractexp.report.events import WITHIN
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +89,7 @@ def test_measured_before_and_after_of_every_event_come_first(named, tmp_path):
 def test_the_noise_band_holds_what_the_extended_model_leaves(named):
     shown = named.overlays[0]
     off = (shown.measured - shown.after) / shown.deviation
-    assert 0.93 < np.mean(np.abs(off) < overlay.WITHIN) < 0.98
+    assert 0.93 < np.mean(np.abs(off) < WITHIN) < 0.98
     assert [o.held_out for o in named.overlays] == [False, False, True]
 
 
@@ -149,6 +150,13 @@ def test_parameters_stand_before_and_after_with_meaning_unit_interval_and_verdic
         assert f"{low:.4g} to {high:.4g}" in words
     told = content(named)["parameters"]
     assert told == {n: {"value": e.value, "standard_error": e.error} for n, e in after.items()}
+
+
+def test_a_long_verdict_is_cut_in_the_table_and_whole_below():
+    weak = "weakly identified: ± 32 %; trades against q_v (correlation 0.99); C q_v^0.2 is known to ± 1.8 %"
+    assert discrepancy._brief(weak) == "weakly identified: ± 32 %"
+    assert discrepancy._brief("at its bound (0.3; widen model.bounds.C)") == "at its bound (0.3; widen model.bounds.C)"
+    assert discrepancy._brief("identified (± 5 %)") == "identified (± 5 %)"
 
 
 def test_the_sentence_of_a_grade_stands_in_the_verdict(named, tmp_path):

@@ -194,9 +194,11 @@ def test_generalise_compares_the_chosen_optimizer_too_and_says_that_the_data_are
     folder, printed_ = generalised
     content = json.loads((folder / "run" / "generalise.json").read_text())
     assert {(r["optimizer"], r["kind"]) for r in content["residuals"]} == {
-        (n, k) for n in ("pso", "issa") for k in ("interpolation", "extrapolation")
+        (n, k) for n in ("estimate", "pso", "issa") for k in ("interpolation", "extrapolation")
     }
     assert all(i["simulations"] == 400 for i in content["identified"])
+    (estimate,) = (i for i in content["identified"] if i["optimizer"] == "estimate")
+    assert estimate["parameters"] not in [i["parameters"] for i in content["identified"] if i is not estimate]
     assert "synthetic stand-in" in printed_
     for name in ("pso_interpolation", "pso_extrapolation", "issa_interpolation", "issa_extrapolation"):
         assert "synthetic stand-in" in (folder / "run" / f"{name}.svg").read_text()
@@ -374,7 +376,7 @@ def test_running_times_are_those_of_the_planted_histories():
 def test_every_experiment_composes_to_its_part(name):
     from hydra import compose, initialize_config_dir
 
-    from tractexp.__main__ import CONF
+    from tractexp.choices import CONF
     from tractexp.config import register
 
     register()

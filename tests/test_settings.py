@@ -5,7 +5,7 @@ import re
 import pytest
 from test_cli import tractexp
 
-from tractexp.__main__ import CONF
+from tractexp.choices import CONF
 from tractexp.config import register
 from tractexp.errors import UserError
 from tractexp.plugin import build, discover

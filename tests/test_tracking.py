@@ -17,7 +17,7 @@ import pytest
 
 from tractexp import provenance, tracking
 from tractexp.errors import UserError
-from tractexp.tracking import Run
+from tractexp.tracking import Run, process
 from tractexp.tracking.process import Logger
 from tractexp.tracking.run import CURVE_POINTS
 from tractexp.tracking.ui import serve
@@ -450,6 +450,32 @@ def test_a_second_process_that_is_given_no_run_ends_without_one(uri):
         raise ZeroDivisionError
     assert logger._process.returncode == 0
     assert [e.name for e in client(uri).search_experiments()] == ["Default"]
+
+
+def test_a_process_that_is_told_of_no_store_makes_none_and_is_not_waited_for(tmp_path):
+    started = time.monotonic()
+    with Logger() as logger:
+        pass
+    assert logger._process.returncode == -signal.SIGKILL
+    assert time.monotonic() - started < 1.0  # MLflow alone takes longer
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_process_that_was_started_ahead_is_the_one_that_logs(uri):
+    process.start_ahead()
+    (ahead,) = process._ahead
+    with process.logger(uri) as taken, process.logger(uri) as another:
+        assert taken is ahead is not another
+        assert client(uri).get_run(taken.log(Run("e", "r"))).info.status == "FINISHED"
+
+
+def test_to_start_the_process_imports_nothing_that_takes_time():
+    program = (
+        "import sys; import tractexp.tracking.process;"
+        "heavy = {'mlflow', 'numpy', 'pandas', 'sqlalchemy', 'hydra'} & sys.modules.keys(); assert not heavy, heavy"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
 
 
 def test_a_second_process_passes_its_sentence_on(tmp_path):

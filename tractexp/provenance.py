@@ -7,8 +7,6 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 PACKAGE = Path(__file__).parent
 
 
@@ -61,6 +59,8 @@ def folders() -> set[Path]:
 
 def digest(record: Any) -> str:
     """SHA-256 of the channels of a `Record` as they were read: equal for equal numbers, whatever the file is called."""
+    import numpy as np
+
     made = hashlib.sha256()
     for name in ("t", "U", "P", "Q", "f", "U2"):
         values = getattr(record, name)

@@ -19,13 +19,21 @@ from tractexp.progress import Progress, tell
 if TYPE_CHECKING:
     from tractexp.identification.result import Fit, Result
 
+TOLD = (
+    "residuals: mean absolute value of Eq. (21), pu; medians over the seeds. estimate: the most likely parameters;"
+    " beside it where each optimizer's search ended"
+)
 ARRAYS = ("t", "U", "P", "Q", "P_calculated", "Q_calculated")
+ESTIMATE = "estimate"  # stands for an optimizer in what is told of the most likely parameters
 ERRORS = ("residual_P", "residual_Q", "epsilon_p", "epsilon_q")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Generalised(Written):
-    """Residuals on the held-out dips: a row for each optimizer, seed and dip; and the parameters they come from."""
+    """Residuals on the held-out dips: a row for each optimizer, seed and dip; and the parameters they come from.
+
+    The optimizer "estimate" is the most likely set; the others tell where their searches ended.
+    """
 
     kind = "generalisation"
 
@@ -49,7 +57,7 @@ class Generalised(Written):
 
     def table(self) -> Table:
         columns = ["event", "kind", "optimizer", *ERRORS]
-        said = ["residuals: mean absolute value of Eq. (21), pu; medians over the seeds"]
+        said = [TOLD]
         return Table(columns, [[row[c] for c in columns] for row in self.medians], "on dips not fitted", said)
 
     def _write(self, folder: Path) -> list[Path]:
@@ -109,15 +117,21 @@ def generalise(
 def _searched(
     setup: Setup, optimizers: Sequence[Choice], seeds: int, progress: Progress
 ) -> "Iterable[tuple[Result, list[Fit]]]":
-    """What each search identified, and its fits of the held-out events."""
+    """The estimate, then where each search ended, with the fits of the held-out events."""
+    from tractexp.identification.estimate import estimate
     from tractexp.identification.result import conclude
 
+    problem, node, fitted = setup.problem, setup.model.node, len(setup.train)
     for optimizer in optimizers:
         for seed in range(setup.seed, setup.seed + seeds):
             tell(progress, [f"{optimizer.name}, seed {seed}"])
             found = setup.search(optimizer, seed, progress)
-            result, fits = conclude(setup.problem, found, setup.validate, seed, setup.model.node, optimizer.name)
-            yield result, fits[len(setup.train) :]
+            if (optimizer, seed) == (optimizers[0], setup.seed):
+                likely = estimate(problem, found.values).known.values
+                result, fits = conclude(problem, found, setup.validate, seed, node, ESTIMATE, likely)
+                yield result, fits[fitted:]
+            result, fits = conclude(problem, found, setup.validate, seed, node, optimizer.name)
+            yield result, fits[fitted:]
 
 
 def _told(setup: Setup, searched: "Sequence[tuple[Result, list[Fit]]]") -> Generalised:

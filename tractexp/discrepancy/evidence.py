@@ -11,7 +11,7 @@ from tractexp.discrepancy.survivors import Rival
 from tractexp.discrepancy.verdict import NONE, TIED, UNEXPLAINED
 from tractexp.wording import in_words, joined, with_error
 
-CHOSEN, KEPT = "in the verdict", "tied"
+CHOSEN, KEPT = "added", "tied"
 FITTED, ONE_STEP = "refitted", "one step"
 
 
@@ -44,12 +44,12 @@ class Evidence:
 
     @property
     def standing(self) -> int:
-        """0 for what is in the verdict, 1 for what is tied with it, 2 for the rest."""
+        """0 for what was added, 1 for what is tied with it, 2 for the rest."""
         return {CHOSEN: 0, KEPT: 1}.get(self.status, 2)
 
 
 def evidence(found: Investigation) -> list[Evidence]:
-    """All candidates: those of the verdict first, then those tied with it, then the others; the most helpful first."""
+    """All candidates: what was added first, then what is tied with it, then the others; the most helpful first."""
     sets = [_of_set(found, rival) for rival in found.survivors.rivals if _names(found, rival)]
     known = {row.names for row in sets}  # of the chosen size
     rows = [*sets, *(row for row in _singles(found) if row.names not in known)]
@@ -129,7 +129,8 @@ def _fate(found: Investigation, rival: Rival) -> tuple[str, str]:
         left = f"leaves no more than chance does{helps}"
         return (CHOSEN, left) if names == found.names else (KEPT, left)
     if rival.rejected:
-        best = joined(_names(found, found.survivors.rivals[0]))
+        names = _names(found, found.survivors.rivals[0])
+        best = names[0] if len(names) == 1 else "the best set"
         return "rejected", f"were it true, {best} would not fit better by {rival.behind:.0f}"
     if rival.tests is None:
         return "not rejected", "among too many that fit alike to be tested further"

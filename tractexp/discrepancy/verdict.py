@@ -144,7 +144,7 @@ def _unexplained(weighed: HeldOut, nearest: Nearest | None) -> str:
     assert best.tests is not None
     tested = f"none of the {len(best.tests.bench.catalogue.candidates)} effects tested"
     chance = f"would come about by chance with a probability of {in_words(best.tests.p_left)}"
-    loudest = f"what stands out most: {best.tests.loudest}"
+    loudest = f"the most surprised of the tests looks for {best.tests.loudest}"
     if nearest is None and not explained.faults:
         return (
             f"the model and the records disagree, and {tested} helps more than chance does: what the base model leaves"

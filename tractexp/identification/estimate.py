@@ -172,8 +172,9 @@ def _finished(ends: Ends, robust: bool = False) -> Estimated:
         units = found.unit[np.argsort(found.deviance, kind="stable")]
     seen = surprise(observed, likelihood, units[0])
     if not seen.adequate:
-        likelihood = replace(likelihood, noise=likelihood.noise.scaled(louder(likelihood, units[0])))
-        return Estimated(conclude(likelihood, units[0]), seen, ends.starts)
+        factor = louder(likelihood, units[0])
+        known = conclude(replace(likelihood, noise=likelihood.noise.scaled(factor)), units[0])
+        return Estimated(replace(known, widened=factor), seen, ends.starts)
     likelihood = replace(likelihood, noise=noise_at(observed, likelihood, units[0], whole=True))  # nothing but noise
     found = descend(likelihood.rows, units, apart=likelihood.apart)
     best = int(found.deviance.argmin())

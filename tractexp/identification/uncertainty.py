@@ -33,6 +33,7 @@ class Uncertainty:
     notes: list[str]
     profiled: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # intervals that replace the curvature's
     rivals: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # intervals of valleys that fit as well
+    widened: float = 1.0  # by which the noise was made louder, because more than noise is left
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ the voltage's noise, which enters the model and leaves it in P and Q at once.
 
 import functools
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ BURN_IN = 500  # samples
 UNSEEN = 0.05  # standard deviations of the fast noise: shapes that do less are left out
 
 Pair = tuple[Autoregression, Autoregression]  # of P and of Q
+Shrunk = tuple[tuple[int, ...], np.ndarray, np.ndarray]  # channels, orthonormal shapes (k, R) in them, what goes (k,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +35,7 @@ class Noise:
     shocks: tuple[np.ndarray, np.ndarray] | None = None  # of unit variance, as they were seen; None: normal
     wander: Wander | None = None  # of the mixed channels
     blur: np.ndarray | None = None  # (k, 2, N) pu: what errors of the voltage do, each of one standard deviation
-    _shrunk: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict, init=False)
+    _shrunk: dict[int, "list[Shrunk]"] = field(default_factory=dict, init=False)
 
     @classmethod
     def white(cls, P: float, Q: float) -> "Noise":
@@ -58,7 +59,9 @@ class Noise:
         """The same noise, `factor` times as loud."""
         wander = self.wander and replace(self.wander, intensity=self.wander.intensity * factor**2)
         pairs = tuple((P.scaled(factor), Q.scaled(factor)) for P, Q in self.pairs)
-        return replace(self, pairs=pairs, wander=wander, blur=None if self.blur is None else self.blur * factor)
+        made = replace(self, pairs=pairs, wander=wander, blur=None if self.blur is None else self.blur * factor)
+        made._shrunk.update(self._shrunk)  # shapes and noise keep their ratio
+        return made
 
     def on(self, profile: np.ndarray, blur: np.ndarray | None = None) -> "Noise":
         """The same noise on other events: their power over that before (N,), what errors of their voltage do."""
@@ -148,17 +151,27 @@ class Noise:
         """
         if self.wander is None and self.blur is None:
             return white
-        flat = white.reshape(len(white), -1)
         if event not in self._shrunk:
-            shapes = self._fast(self._shapes(part), known, event)
-            _, values, basis = np.linalg.svd(shapes.reshape(len(shapes), -1), full_matrices=False)
-            seen = values > UNSEEN
-            self._shrunk[event] = basis[seen], 1 - 1 / np.sqrt(1 + values[seen] ** 2)
-        basis, share = self._shrunk[event]
-        return (flat - ((flat @ basis.T) * share) @ basis).reshape(white.shape)
+            self._shrunk[event] = [_shrunk(*shapes) for shapes in self._whitened_shapes(known, part, event)]
+        for channels, basis, share in self._shrunk[event]:
+            flat = white[:, channels].reshape(len(white), -1)
+            flat = flat - ((flat @ basis.T) * share) @ basis
+            white[:, channels] = flat.reshape(len(white), len(channels), -1)
+        return white
+
+    def _whitened_shapes(
+        self, known: np.ndarray, part: slice, event: int
+    ) -> Iterator[tuple[tuple[int, ...], np.ndarray]]:
+        """Channels and the whitened shapes (k, R) in them: P and Q apart where nothing changes both at once."""
+        shapes = self._fast(self._shapes(part), known, event)
+        if self.blur is not None:
+            yield (0, 1), shapes.reshape(len(shapes), -1)
+            return
+        for c, own in enumerate(np.split(shapes, 2)):
+            yield (c,), own[:, c]
 
     def _shapes(self, part: slice) -> np.ndarray:
-        """Shapes (k, 2, samples) of the mixed channels in one event, of one standard deviation each."""
+        """Shapes (k, 2, samples) of the mixed channels in one event, of one standard deviation each; P's before Q's."""
         shapes = [np.empty((0, 2, part.stop - part.start))]
         if self.wander is not None:
             for c in (0, 1):
@@ -179,3 +192,13 @@ class Noise:
             colored.append(channel.recurring(shocks)[:, BURN_IN:])
         shapes = self._shapes(part)
         return np.stack(colored, axis=1) + np.einsum("bk,kct->bct", rng.standard_normal((count, len(shapes))), shapes)
+
+
+def _shrunk(channels: tuple[int, ...], shapes: np.ndarray) -> Shrunk:
+    """Right singular vectors of shapes (k, R) that are seen, and 1 - (1 + s²)^(-1/2) of their singular values s.
+
+    By the eigenvectors of their products: a fifth of the time of a singular value decomposition.
+    """
+    squares, vectors = np.linalg.eigh(shapes @ shapes.T)
+    seen = squares > UNSEEN**2
+    return channels, (vectors[:, seen] / np.sqrt(squares[seen])).T @ shapes, 1 - 1 / np.sqrt(1 + squares[seen])

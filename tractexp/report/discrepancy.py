@@ -195,7 +195,7 @@ def _bars(found: Investigation, rows: Sequence[Evidence], labels: Mapping[Eviden
 
 
 def _bars_caption(found: Investigation, rows: Sequence[Evidence]) -> str:
-    colors = ["green: in the verdict"] * bool(found.names)
+    colors = ["green: added"] * bool(found.names)
     colors += ["orange: tied with it"] * any(r.status == KEPT for r in rows)
     colors += ["blue: refitted"] * any(r.how == FITTED and r.standing == 2 for r in rows)
     colors += ["gray: estimated in one linear step"] * any(r.how == ONE_STEP for r in rows)
@@ -242,19 +242,28 @@ def _parameters(made: Page, found: Investigation) -> None:
     """The base model's parameters before and after, and those that came in."""
     made.heading("Parameters before and after" if found.names else "Parameters of the base model")
     before = {e.parameter.name: e for e in found.before}
-    rows = []
-    for e in found.after if found.names else found.before:
+    rows, known = [], found.after if found.names else found.before
+    for e in known:
         p, was = e.parameter, before.get(e.parameter.name)
         told = [_value(was) if was else "not in it"] if found.names else []
-        rows.append([p.name, p.about, p.unit, *told, _value(e), _interval(e), e.verdict])
+        rows.append([p.name, p.about, p.unit, *told, _value(e), _interval(e), _brief(e.verdict)])
     stages = ["before", "after"] if found.names else ["value"]
     columns = ["parameter", "meaning", "unit", *stages, "95 % interval", "verdict"]
     made.table(
         columns, rows, "± one standard error, from the curvature at the fit to the fitted events.",
         words=(1, 2, len(columns) - 1),
     )  # fmt: skip
+    why = [f"{e.parameter.name} is {e.verdict}." for e in known if _brief(e.verdict) != e.verdict]
+    if why:
+        with made.folded("Why some are known badly, and what of them is known"):
+            made.items(why)
     if kept := held(found):
         made.text(f"These events cannot tell {joined(list(kept))}: the extended model holds what was found.")
+
+
+def _brief(verdict: str) -> str:
+    """The first clause of a verdict that has several: 'weakly identified: ± 32 %'."""
+    return verdict.split("; ")[0] if ": " in verdict.split(" (")[0] else verdict
 
 
 def _equations(made: Page, found: Investigation) -> None:
@@ -262,6 +271,8 @@ def _equations(made: Page, found: Investigation) -> None:
     from tractexp.model.model import compose
 
     made.heading("The extended model")
+    if others := [joined(names) for names in found.verdict.sets[1:]]:
+        made.text(f"It has {joined(found.names)}; {joined(others, 'or')} instead would fit these events as well.")
     made.text(
         "conf/model/extended.yaml beside this page: python -m tractexp --config-dir conf model=extended. Its equations"
         " that changed or came in:"
@@ -286,7 +297,7 @@ def _disagreement(made: Page, found: Investigation) -> None:
     first = found.first
     made.heading("Is there a disagreement, and where?")
     text = f"What the base model leaves would come about by chance with a probability of {in_words(first.p_left)}"
-    text += "." if first.adequate else f"; what stands out most: {first.loudest}."
+    text += "." if first.adequate else f"; the most surprised of the tests looks for {first.loudest}."
     if first.scores:
         best, alpha = first.scores[0], found.bench.criteria.false_alarms
         text += (

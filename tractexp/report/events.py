@@ -12,7 +12,7 @@ from tractexp.report.chart import MOST, Chart
 FOUND = "#E69F00"  # shades what stands out
 WITHIN = 2.0  # standard deviations of the noise band
 PANELS = ("U [pu]", "P [pu]", "ΔP [pu]", "Q [pu]", "ΔQ [pu]")
-HEIGHTS = (0.7, 1.5, 1.0, 1.5, 1.0)
+HEIGHTS = (0.9, 1.5, 1.0, 1.5, 1.0)
 PIXELS = 580
 CAPTION = (
     "ΔP and ΔQ are measured less calculated. Dotted: the dip begins and ends. Drag to zoom, double-click to go back."

@@ -75,7 +75,7 @@ def headline(known: Uncertainty) -> str:
 def _curves(made: Page, fits: Sequence[Any], known: Uncertainty) -> None:
     """One chart of each event; of many the later ones are folded away."""
     likelihood = known.likelihood
-    deviation = likelihood.noise.deviation(likelihood.problem.drive)
+    deviation = likelihood.noise.deviation(likelihood.problem.drive) / known.widened
     parts = [likelihood.problem.drive.part(e) for e in range(likelihood.problem.drive.events)]
     made.text(CAPTION)
     for k, fit in enumerate(fits):
@@ -183,7 +183,7 @@ def _left(made: Page, known: Uncertainty) -> None:
     """Whitened residuals, their autocorrelation, and what the tests of them say."""
     likelihood = known.likelihood
     drive, events = likelihood.problem.drive, likelihood.problem.events
-    white = likelihood.rows(known.unit[None])[0].reshape(2, -1)
+    white = known.widened * likelihood.rows(known.unit[None])[0].reshape(2, -1)
     colored = [t for t in known.tests if t["p"] < REJECTED]
     made.text(_conclusion(colored, len(known.tests)))
     for e, event in enumerate(events[:SHOWN]):
@@ -200,7 +200,8 @@ def _left(made: Page, known: Uncertainty) -> None:
             lags.points(name, x + 0.2 * c, autocorrelation(rows, len(x)), color, size=5)
             limit = 1.96 / np.sqrt(max(len(rows), 1))
             lags.level(limit).level(-limit)
-        made.chart(chart.edge(event.t_start).edge(event.t_end))
+        told = f"{event.record.name}: the whitened residual, in standard deviations of the noise."
+        made.chart(chart.edge(event.t_start).edge(event.t_end), told)
         made.chart(lags, "Autocorrelation of the whitened residual; between the dashed lines is chance.")
     with made.folded("tests of the residuals, and the noise"):
         made.table(
@@ -212,7 +213,7 @@ def _left(made: Page, known: Uncertainty) -> None:
         made.table(
             ["event", "channel", "noise [pu]", "before the dip [pu]", "order", "neighbors' correlation",
              "correlation of P and Q"],
-            [[n["event"], n["channel"], digits(n["deviation"]), digits(n["before"]), str(n["order"]),
+            [[n["event"], n["channel"], digits(n["deviation"] / known.widened), digits(n["before"]), str(n["order"]),
               f"{n['correlation']:.2f}", f"{n['between_P_and_Q']:.2f}"] for n in known.noise],
             caption="Noise of each channel, told from what the fit leaves before the dips and at the end of the"
                     " records: an autoregression of P and Q mixed until they are independent.", words=(1,),

@@ -34,7 +34,7 @@ p { margin: .5rem 0; max-width: 46rem; }
 .good { border-color: var(--good); } .bad { border-color: var(--bad); }
 .wide { overflow-x: auto; margin: .8rem 0; }
 table { border-collapse: collapse; font-size: .84rem; font-variant-numeric: tabular-nums; }
-caption { caption-side: bottom; text-align: left; color: var(--faint); padding-top: .35rem; }
+figure.table .wide { margin: 0; } figure.table figcaption { font-size: .84rem; padding-top: .35rem; }
 th, td { padding: .22rem .6rem; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap; }
 th { vertical-align: bottom; white-space: normal; border-bottom-color: var(--faint); font-weight: 600; }
 th:first-child, td:first-child, .words { text-align: left; }
@@ -87,10 +87,11 @@ class Page:
             told = zip(marks, cells, strict=True)
             return f"<tr>{''.join(f'{m.format(tag)}{html.escape(str(c))}</{tag}>' for m, c in told)}</tr>"
 
-        below = f"<caption>{html.escape(caption)}</caption>" if caption else ""
+        below = f"<figcaption>{html.escape(caption)}</figcaption>" if caption else ""
         body = "\n".join(line(row, "td") for row in rows)
         head = f"<thead>{line(columns, 'th')}</thead>"
-        return self._add(f'<div class="wide"><table>{below}{head}<tbody>\n{body}\n</tbody></table></div>')
+        table = f'<div class="wide"><table>{head}<tbody>\n{body}\n</tbody></table></div>'
+        return self._add(f'<figure class="table">{table}{below}</figure>')  # the caption stays where a table scrolls
 
     def figure(self, path: Path, caption: str = "") -> "Page":
         """An SVG file, drawn into the page. Raises `UserError` where it is not there or not SVG."""

@@ -83,7 +83,8 @@ def tell(found: "Investigation", paths: Sequence[Path]) -> None:
     say(f"page: {by_name.pop('discrepancy.html')}")
     say(f"beside it: {', '.join(sorted(by_name))}")
     if model := by_name.get("extended.yaml"):
-        say(f"use the extended model: python -m tractexp --config-dir {model.parent.parent} model=extended")
+        which = f", which has {joined(found.names)}" * (found.verdict == "tied")
+        say(f"use the extended model{which}: python -m tractexp --config-dir {model.parent.parent} model=extended")
 
 
 def log(job: Job, found: "Investigation", paths: list[Path]) -> None:

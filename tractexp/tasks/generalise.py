@@ -49,6 +49,8 @@ class Generalise(Task):
 
 def show(medians: Sequence[Mapping[str, Any]]) -> None:
     """Print a table for each held-out dip, medians over the seeds."""
+    from tractexp.api.generalise import TOLD
+
     say()
     for event, kind in dict.fromkeys((row["event"], row["kind"]) for row in medians):
         cells = [
@@ -57,7 +59,7 @@ def show(medians: Sequence[Mapping[str, Any]]) -> None:
             for row in medians if row["event"] == event
         ]  # fmt: skip
         table(["optimizer", "residual P", "residual Q", "epsilon_p", "epsilon_q", ""], cells, f"{kind}: {event}")
-    say("residuals: mean absolute value of Eq. (21), pu")
+    say(TOLD)
 
 
 def metrics(rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
