@@ -15,6 +15,7 @@ from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.evidence import CHOSEN, beside, chance_level, evidence, why_not_the_most_helpful
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.next_dip import NextDip
+from tractexp.discrepancy.recommended import adequacy
 from tractexp.report import discrepancy, overlay
 from tractexp.report.events import WITHIN
 
@@ -159,9 +160,11 @@ def test_a_long_verdict_is_cut_in_the_table_and_whole_below():
     assert discrepancy._brief("identified (± 5 %)") == "identified (± 5 %)"
 
 
-def test_the_sentence_of_a_grade_stands_in_the_verdict(named, tmp_path):
-    words, _ = page(named, tmp_path, adequacy="the model describes this load: use it")
-    assert words.index("the model describes this load: use it") < words.index("Next: ")
+def test_the_model_recommended_is_graded_in_the_verdict(named, unexplained, tmp_path):
+    for found, whose in ((named, "The extended model: "), (unexplained, "The base model: ")):
+        words, _ = page(found, tmp_path)
+        assert words.index(f"{whose}{adequacy(found).sentence}") < words.index("Next: ")
+    assert adequacy(named).grade == "adequate" != adequacy(unexplained).grade
 
 
 def test_what_is_not_extended_is_not_called_so(silent, unexplained, tmp_path):

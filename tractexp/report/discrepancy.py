@@ -253,12 +253,11 @@ def _parameters(made: Page, found: Investigation) -> None:
         columns, rows, "± one standard error, from the curvature at the fit to the fitted events.",
         words=(1, 2, len(columns) - 1),
     )  # fmt: skip
-    why = [f"{e.parameter.name} is {e.verdict}." for e in known if _brief(e.verdict) != e.verdict]
-    if why:
-        with made.folded("Why some are known badly, and what of them is known"):
-            made.items(why)
     if kept := held(found):
         made.text(f"These events cannot tell {joined(list(kept))}: the extended model holds what was found.")
+    if why := [f"{e.parameter.name} is {e.verdict}." for e in known if _brief(e.verdict) != e.verdict]:
+        with made.folded("Why some are known badly, and what of them is known"):
+            made.items(why)
 
 
 def _brief(verdict: str) -> str:
