@@ -11,10 +11,12 @@ from test_chart import unpacked
 from test_report_page import read
 
 from tractexp.errors import UserError
+from tractexp.identification.posterior import Posterior
 from tractexp.identification.problem import Problem
 from tractexp.identification.profile import End, Profile, checked, profiles, revised
 from tractexp.identification.uncertainty import conclude, threshold
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, Verdict
+from tractexp.report import posterior
 from tractexp.report.profile import meaning, page
 
 
@@ -126,18 +128,16 @@ def test_too_few_walkers_are_refused(quiet):
 
 
 def drawn(path):
-    """The charts of a page, by title, as they are drawn."""
+    """The charts of a page, as they are drawn."""
     told = re.findall(r'<script type="application/json">(.*?)</script>', path.read_text(encoding="utf-8"))
-    charts = [json.loads(chart) for chart in told]
-    return {chart["layout"]["title"]["text"].partition(":")[0]: chart for chart in charts}
+    return [json.loads(chart) for chart in told]
 
 
 def test_the_page_draws_each_profile_with_its_parabola_threshold_and_interval(quiet, tmp_path):
     found = profiles(quiet)
     told, charts = read(page(tmp_path / "profile.html", found)), drawn(tmp_path / "profile.html")
-    assert list(charts) == list(quiet.names)
-    for profile, value, half in zip(found.profiles, quiet.values, quiet.half, strict=True):
-        chart = charts[profile.name]
+    for chart, profile, value, half in zip(charts, found.profiles, quiet.values, quiet.half, strict=True):
+        assert chart["layout"]["title"]["text"] == f"{profile.name}: identified"
         curves = {trace["name"]: trace for trace in chart["data"] if trace["name"]}
         x, y = (unpacked(curves["profile"][axis]) for axis in "xy")
         np.testing.assert_allclose(np.interp(profile.values, x, y), profile.deviance, atol=1e-4)
@@ -152,6 +152,35 @@ def test_the_page_draws_each_profile_with_its_parabola_threshold_and_interval(qu
     assert "Every parameter is identified." in told.words
     for part in ("transient reactance on the record's base", "pu s²/rad", "is enough."):
         assert part in told.words
+
+
+def test_the_page_of_a_model_that_lacks_something_calls_nothing_identified(quiet, tmp_path):
+    found = profiles(quiet, names=["M", "p_v"])
+    told = read(page(tmp_path / "profile.html", found, "it fits within 2%, but an effect is missing", trusted=False))
+    assert "It fits within 2%, but an effect is missing." in told.words
+    assert "The intervals below say what the noise leaves open, not what the model lacks." in told.words
+    assert "identified" not in told.words
+    assert "title" not in drawn(tmp_path / "profile.html")[0]["layout"]
+
+
+def test_the_page_of_a_posterior_shows_its_draws_beside_the_fit(quiet, tmp_path):
+    rng = np.random.default_rng(1)
+    error = quiet.half / quiet.factor
+    draws = quiet.values + error * rng.standard_normal((20_000, len(error)))
+    draws[:, 1] += 1.5 * error[1]  # of one parameter they lie elsewhere
+    draws[:, 6] = quiet.values[6] + error[6] * (draws[:, 2] - quiet.values[2]) / error[2]  # as C does, so does q_v
+    path = posterior.page(tmp_path / "posterior.html", quiet, Posterior(quiet.names, draws, 2000, 50.0, 0.3, 1))
+    told, charts = read(path).words, drawn(path)
+    assert "but those of X_prime: take the posterior's." in told
+    assert "The chain lasts 40 autocorrelation times; 50 are asked for: raise steps." in told
+    assert "C and q_v depend on each other most" in told
+    assert len(charts) == len(quiet.names) + 1
+    first = charts[0]
+    edges, density = (unpacked(first["data"][-1][axis]).astype(float) for axis in "xy")
+    assert np.sum(np.diff(edges) * density[:-1]) == pytest.approx(1, rel=1e-4)
+    shaded, estimate = first["layout"]["shapes"]
+    assert (shaded["x0"], shaded["x1"]) == pytest.approx(np.quantile(draws[:, 0], [0.025, 0.975]))
+    assert estimate["x0"] == quiet.values[0]
 
 
 def test_the_page_says_where_curvature_misleads(quiet):

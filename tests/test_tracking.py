@@ -469,6 +469,37 @@ def test_the_process_that_was_started_ahead_is_the_one_that_logs(uri):
         assert client(uri).get_run(taken.log(Run("e", "r"))).info.status == "FINISHED"
 
 
+@pytest.mark.skipif(os.name == "nt", reason="asks for a process by a signal")
+@pytest.mark.parametrize("told", ["", "process.logger(sys.argv[1]); "])
+def test_a_command_that_logs_nothing_waits_for_nothing_and_leaves_no_word(told, uri, tmp_path):
+    program = (
+        "import sys, time; from tractexp.tracking import process; process.start_ahead();"
+        f"(ahead,) = process._ahead; {told}print(ahead._process.pid, time.time(), flush=True)"
+    )
+    with (tmp_path / "said.txt").open("w+") as said:
+        done = subprocess.Popen([sys.executable, "-c", program, uri], stdout=-1, stderr=said, text=True)
+        pid, ended = done.stdout.readline().split()
+        assert done.wait(30) == 0
+        assert time.time() - float(ended) < 1.0  # MLflow alone takes longer
+        done.stdout.close()
+        deadline = time.monotonic() + 60
+        while alive(int(pid)):
+            assert time.monotonic() < deadline, "the process outlives the command"
+            time.sleep(0.1)
+        said.seek(0)
+        assert said.read() == ""
+
+
+def alive(pid):
+    """Whether a process that is not our child still runs."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    state = Path(f"/proc/{pid}/stat")
+    return not (state.exists() and state.read_text().rpartition(")")[2].split()[0] == "Z")
+
+
 def test_to_start_the_process_imports_nothing_that_takes_time():
     program = (
         "import sys; import tractexp.tracking.process;"

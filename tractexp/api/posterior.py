@@ -62,13 +62,17 @@ class Sampled(Written):
         return cls(Identification.from_dict(content["fit"]), content["settings"], content["content"])
 
     def _write(self, folder: Path) -> list[Path]:
-        """posterior.json, posterior.npz, history.csv and result.json."""
+        """posterior.html, posterior.json, posterior.npz, history.csv and result.json."""
+        from tractexp.report import posterior
+
         packed = io.BytesIO()
         np.savez_compressed(packed, **self.draws)  # type: ignore[arg-type]
         path = files.write_json(folder / "posterior.json", self.content)
         draws = files.write(folder / "posterior.npz", packed.getvalue())
-        result = replace(self.fit.result, **self.fit.judged.known.fields())
-        return [path, draws, *replace(self.fit, result=result).write_result(folder)]
+        fit, known = self.fit, self.fit.judged.known
+        page = posterior.page(folder / "posterior.html", known, self.drawn, fit.headline, fit.trusted)
+        result = replace(fit.result, **known.fields())
+        return [page, path, draws, *replace(fit, result=result).write_result(folder)]
 
 
 @public

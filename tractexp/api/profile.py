@@ -57,7 +57,9 @@ class Profiled(Written):
             [name, f"{likely[name]:.4g}", span(*self.curvature[name]), span(*p["interval"])]
             for name, p in self.profiles.items()
         ]
-        said = [f"{name}: {p['verdict']}" for name, p in self.profiles.items()]
+        fit = self.fit
+        said = [f"{fit.headline[0].upper()}{fit.headline[1:]}."] if fit.headline else []
+        said += [f"{name}: {p['verdict']}" for name, p in self.profiles.items()] if fit.trusted else []
         return Table(["parameter", "most likely", "by curvature", "by profile"], rows, "95 % intervals", said)
 
     def to_dict(self) -> dict[str, Any]:
@@ -74,7 +76,7 @@ class Profiled(Written):
         from tractexp.report import profile
 
         path = files.write_json(folder / "profile.json", self.content)
-        page = profile.page(folder / "profile.html", self.made)
+        page = profile.page(folder / "profile.html", self.made, self.fit.headline, self.fit.trusted)
         return [page, path, *self.identification.write_result(folder)]
 
 

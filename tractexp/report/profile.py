@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.identification.profile import End, Profile, Profiles
+from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED, Verdict, shown
 from tractexp.report.chart import Chart
 from tractexp.report.page import Page
@@ -16,6 +17,7 @@ ALIKE = 0.2  # of the half interval by curvature: closer ends are the same inter
 ABOVE = 2.2  # thresholds that a chart shows
 BELOW = 0.12  # thresholds of room below the best fit
 ENOUGH = "is enough"
+NOISE_ALONE = "The intervals below say what the noise leaves open, not what the model lacks."
 CURVE, PARABOLA, SHADE = PALETTE[0], FAINT, PALETTE[5]
 CAPTION = (
     "Blue: the deviance (twice the fall of the log-likelihood) of the best fit for each value of the parameter, above"
@@ -24,8 +26,12 @@ CAPTION = (
 )
 
 
-def page(path: Path, found: Profiles) -> Path:
-    """Write the page; returns its path."""
+def page(path: Path, found: Profiles, grade: str = "", trusted: bool = True) -> Path:
+    """Write the page; returns its path.
+
+    `grade` is the sentence that grades the identification. Where its intervals are not `trusted`, because the model
+    lacks something, no parameter is called identified.
+    """
     known, verdicts = found.known, found.verdicts
     names = ", ".join(e.record.name for e in known.likelihood.problem.events)
     made = Page(
@@ -33,8 +39,11 @@ def page(path: Path, found: Profiles) -> Path:
         "One parameter is held at value after value, all others are fitted again each time.",
     )
     says = {profile.name: meaning(found, profile) for profile in found.profiles}
-    made.verdict(*_told(says, verdicts), *(f"{_upper(note)}." for note in found.notes), kind=_kind(verdicts))
-    made.charts([_chart(found, profile, verdicts[profile.name]) for profile in found.profiles])
+    told = [*_where(says), *_poor(verdicts)] if trusted else [NOISE_ALONE, *_where(says)]
+    graded = [f"{upper(grade)}."] * bool(grade)
+    made.verdict(*graded, *told, *(f"{upper(note)}." for note in found.notes), kind=_kind(verdicts, trusted))
+    titles = {name: f"{name}: {verdict.word}" if trusted else "" for name, verdict in verdicts.items()}
+    made.charts([_chart(found, profile, titles[profile.name]) for profile in found.profiles])
     made.text(CAPTION.format(threshold=found.threshold))
     made.heading("Intervals")
     made.table(
@@ -56,9 +65,9 @@ def page(path: Path, found: Profiles) -> Path:
 def _row(found: Profiles, profile: Profile, says: str) -> list[str]:
     """A line of the table of intervals."""
     value, half = _curvature(found, profile.name)
-    declared = _declared(found, profile.name)
-    by_curvature = _span(value - half, value + half) if np.isfinite(half) else "none"
-    return [profile.name, declared.about, f"{value:.4g}", declared.unit, by_curvature, _span(*profile.interval), says]
+    about = declared(found.known, profile.name)
+    by_curvature = span(value - half, value + half) if np.isfinite(half) else "none"
+    return [profile.name, about.about, f"{value:.4g}", about.unit, by_curvature, span(*profile.interval), says]
 
 
 def meaning(found: Profiles, profile: Profile) -> str:
@@ -79,7 +88,7 @@ def meaning(found: Profiles, profile: Profile) -> str:
         said.append(f"{' and '.join(f'{m:.4g}' for m in profile.minima)} fits about as well as the estimate")
     if not said:
         said.append(_compared(found, profile))
-    return f"{_upper('; '.join(said))}."
+    return f"{upper('; '.join(said))}."
 
 
 def _compared(found: Profiles, profile: Profile) -> str:
@@ -89,7 +98,7 @@ def _compared(found: Profiles, profile: Profile) -> str:
         return "the curvature gives no interval, the profile does"
     off = np.array([low - (value - half), high - (value + half)]) / half
     if np.abs(off).max() <= ALIKE:
-        return f"{shown(value, half, *_declared(found, profile.name).bounds)} {ENOUGH}"
+        return f"{shown(value, half, *declared(found.known, profile.name).bounds)} {ENOUGH}"
     if off[0] > ALIKE and off[1] < -ALIKE:
         return "narrower than by curvature"
     if off[0] < -ALIKE and off[1] > ALIKE:
@@ -99,8 +108,8 @@ def _compared(found: Profiles, profile: Profile) -> str:
     return f"lopsided: {reach:.1f} times as far {side}"
 
 
-def _told(says: Mapping[str, str], verdicts: Mapping[str, Verdict]) -> list[str]:
-    """The page in two sentences: where curvature is enough, and where it misleads."""
+def _where(says: Mapping[str, str]) -> list[str]:
+    """Where curvature is enough, and where it misleads."""
     enough = [name for name, said in says.items() if said.endswith(f"{ENOUGH}.")]
     rest = [name for name in says if name not in enough]
     told = []
@@ -108,14 +117,20 @@ def _told(says: Mapping[str, str], verdicts: Mapping[str, Verdict]) -> list[str]
         every = "every parameter" if not rest else ", ".join(enough)
         told.append(f"For {every} the curvature's interval is enough: the likelihood is a parabola there.")
     if rest:
-        told.append(f"For {', '.join(rest)} it misleads; take the profile's interval.")
-    poor = [f"{name} is {verdict.word}" for name, verdict in verdicts.items() if verdict.word != IDENTIFIED]
-    told.append(f"{_upper('; '.join(poor))}." if poor else "Every parameter is identified.")
+        told.append(f"For {', '.join(rest)} it misleads: there the profile's interval is the right one.")
     return told
 
 
-def _kind(verdicts: Mapping[str, Verdict]) -> str:
+def _kind(verdicts: Mapping[str, Verdict], trusted: bool) -> str:
+    if not trusted:
+        return "bad"
     return "good" if all(verdict.word == IDENTIFIED for verdict in verdicts.values()) else "plain"
+
+
+def _poor(verdicts: Mapping[str, Verdict]) -> list[str]:
+    """Which parameters are not identified."""
+    poor = [f"{name} is {verdict.word}" for name, verdict in verdicts.items() if verdict.word != IDENTIFIED]
+    return [f"{upper('; '.join(poor))}." if poor else "Every parameter is identified."]
 
 
 def _curvature(found: Profiles, name: str) -> tuple[float, float]:
@@ -124,14 +139,14 @@ def _curvature(found: Profiles, name: str) -> tuple[float, float]:
     return float(found.known.values[j]), float(found.known.half[j])
 
 
-def _chart(found: Profiles, profile: Profile, verdict: Verdict) -> Chart:
+def _chart(found: Profiles, profile: Profile, title: str) -> Chart:
     """One profile, with the parabola, the threshold, the interval and the estimate."""
     value, half = _curvature(found, profile.name)
-    unit, top = _declared(found, profile.name).unit, ABOVE * found.threshold
+    top = ABOVE * found.threshold
     x, y = _smooth(profile)
     chart = Chart(
-        profile.name if unit == "1" else f"{profile.name} [{unit}]", ["deviance"], pixels=290,
-        title=f"{profile.name}: {verdict.word}", legend=False,
+        axis(found.known, profile.name), ["deviance"], pixels=290,
+        title=title, legend=False,
     )  # fmt: skip
     chart.shade(*profile.interval, SHADE, opacity=0.25)
     if np.isfinite(half):
@@ -156,15 +171,22 @@ def _smooth(profile: Profile) -> tuple[np.ndarray, np.ndarray]:
     return x, np.interp(x, profile.values, root) ** 2
 
 
-def _declared(found: Profiles, name: str) -> Any:
+def declared(known: Uncertainty, name: str) -> Any:
     """The parameter (a `Parameter`) of a name, which may say its event."""
-    return next(p for p in found.known.likelihood.problem.parameters if p.name == name.partition("[")[0])
+    return next(p for p in known.likelihood.problem.parameters if p.name == name.partition("[")[0])
 
 
-def _span(low: float, high: float) -> str:
+def axis(known: Uncertainty, name: str) -> str:
+    """A parameter and its unit, as an axis says them."""
+    unit = declared(known, name).unit
+    return name if unit == "1" else f"{name} [{unit}]"
+
+
+def span(low: float, high: float) -> str:
+    """An interval as text."""
     return f"{low:.4g} .. {high:.4g}"
 
 
-def _upper(text: str) -> str:
+def upper(text: str) -> str:
     """With a capital, unless it begins with a parameter's name."""
     return text if "_" in text.split(" ")[0] else text[:1].upper() + text[1:]

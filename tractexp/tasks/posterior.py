@@ -9,7 +9,7 @@ from tractexp.tasks.task import Job, Task, call
 
 @plugin
 class Posterior(Task):
-    """Identify, then sample the posterior under a flat prior within the bounds: posterior.json and posterior.npz."""
+    """Identify, then sample the posterior under a flat prior within the bounds: posterior.html, .json and .npz."""
 
     walkers: int = 48
     steps: int = 2000

@@ -24,7 +24,7 @@ class Profile(Task):
         report(fit)
         shown = profiled.table()
         table(shown.columns, shown.rows)
-        for sentence in (*shown.said, *(f"note: {note}" for note in profiled.made.notes)):
+        for sentence in (*shown.said[1:], *(f"note: {note}" for note in profiled.made.notes)):  # beyond the grade
             say(f"  {sentence}")
         content = profiled.content
         say(f"{len(shown.rows)} profiles: {content['simulations']} simulations in {content['seconds']:.2f} s")

@@ -7,6 +7,7 @@ the workers of a sweep keep every core busy and import MLflow once each, so they
 """
 
 import atexit
+import contextlib
 import os
 import pickle
 import subprocess
@@ -23,9 +24,15 @@ _ahead: "list[Logger]" = []
 
 def start_ahead() -> None:
     """Start a process for `logger` to take; it ends with this one where nothing is logged."""
-    made = Logger()
-    _ahead.append(made)
-    atexit.register(made.close)
+    if not _ahead:
+        atexit.register(_end_ahead)
+    _ahead.append(Logger())
+
+
+def _end_ahead() -> None:
+    """End what was not taken. A process that was taken and given no run ends by itself, and nobody waits for it."""
+    while _ahead:
+        _ahead.pop().close()
 
 
 def logger(uri: str) -> "Logger":
@@ -100,10 +107,11 @@ def main() -> None:
         prepare(uri := pickle.load(sys.stdin.buffer))
         run_id = log(pickle.load(sys.stdin.buffer), uri)
     except EOFError:
-        pass  # nothing to log
+        os._exit(0)  # nothing to log, and perhaps nobody to tell
     except UserError as error:
         problem = str(error)
         sys.stdin.buffer.read()
-    sys.stdout.buffer.write(pickle.dumps((run_id, problem)))
-    sys.stdout.flush()
+    with contextlib.suppress(BrokenPipeError):
+        sys.stdout.buffer.write(pickle.dumps((run_id, problem)))
+        sys.stdout.flush()
     os._exit(0)  # all is on disk: do not keep the job waiting for the teardown of some thousand modules

@@ -1,0 +1,93 @@
+"""The page of a sample of the posterior: how likely each value is, beside what the fit says of it."""
+
+from pathlib import Path
+
+import numpy as np
+
+from tractexp.identification.posterior import ENOUGH, Posterior
+from tractexp.identification.uncertainty import Uncertainty
+from tractexp.report.chart import Chart
+from tractexp.report.page import Page
+from tractexp.report.profile import ALIKE, NOISE_ALONE, axis, declared, span, upper
+from tractexp.report.style import ACTIVE, FAINT, PALETTE
+
+BINS = 60  # of a histogram
+DOTS = 1500  # draws shown of a pair
+CAPTION = (
+    "Blue: how often the draws fall on each value. Dashed: the normal distribution that the curvature at the estimate"
+    " stands for. Shaded: the 95 % interval of the posterior. Dotted: the estimate."
+)
+
+
+def page(path: Path, known: Uncertainty, drawn: Posterior, grade: str = "", trusted: bool = True) -> Path:
+    """Write the page; returns its path. `grade` and `trusted` as on the page of the profiles."""
+    names = ", ".join(e.record.name for e in known.likelihood.problem.events)
+    made = Page(
+        f"Posterior: {names}",
+        f"A flat prior within the bounds; {len(drawn.draws)} draws of {drawn.steps} steps of emcee's ensemble.",
+    )
+    told = [f"{upper(grade)}."] * bool(grade) + [_agreement(known, drawn)] + [NOISE_ALONE] * (not trusted)
+    made.verdict(*told, _settled(drawn), kind="bad" if not trusted else "good" if drawn.converged else "plain")
+    made.charts([_chart(known, drawn, j) for j in range(len(drawn.names))])
+    made.text(CAPTION)
+    made.heading("Intervals")
+    made.table(
+        ["parameter", "meaning", "estimate", "unit", "95 % by the fit", "95 % by the posterior"],
+        [
+            [name, declared(known, name).about, f"{value:.4g}", declared(known, name).unit, span(*own), span(*found)]
+            for name, value, own, found in zip(drawn.names, known.values, known.intervals, drawn.intervals, strict=True)
+        ],
+        words=(1,),
+    )
+    a, b = _closest(drawn)
+    made.heading(f"{drawn.names[a]} and {drawn.names[b]} depend on each other most")
+    r = np.corrcoef(drawn.draws[:, [a, b]].T)[0, 1]
+    made.chart(_pair(known, drawn, a, b), f"{min(DOTS, len(drawn.draws))} of the draws; their correlation is {r:+.2f}.")
+    return made.write(path)
+
+
+def _agreement(known: Uncertainty, drawn: Posterior) -> str:
+    """Whose intervals the posterior confirms."""
+    off = np.abs(drawn.intervals - known.intervals).max(axis=1) / np.maximum(
+        np.ptp(known.intervals, axis=1) / 2, 1e-300
+    )
+    moved = [name for name, far in zip(drawn.names, off, strict=True) if not far <= ALIKE]
+    if not moved:
+        return "The posterior confirms the intervals of the fit."
+    return f"The posterior confirms the intervals of the fit but those of {', '.join(moved)}: take the posterior's."
+
+
+def _settled(drawn: Posterior) -> str:
+    """Whether the chain is long enough, in a sentence."""
+    lasts = f"The chain lasts {drawn.steps / drawn.autocorrelation:.0f} autocorrelation times"
+    return f"{lasts}." if drawn.converged else f"{lasts}; {ENOUGH:.0f} are asked for: raise steps."
+
+
+def _chart(known: Uncertainty, drawn: Posterior, j: int) -> Chart:
+    """The density of one parameter's draws."""
+    draws, value, half = drawn.draws[:, j], known.values[j], known.half[j]
+    density, edges = np.histogram(draws, BINS, density=True)
+    chart = Chart(axis(known, drawn.names[j]), ["density"], pixels=250, legend=False)
+    chart.shade(*drawn.intervals[j], PALETTE[5], opacity=0.25)
+    if np.isfinite(half):
+        at, error = np.linspace(edges[0], edges[-1], 151), half / known.factor
+        normal = np.exp(-(((at - value) / error) ** 2) / 2) / (error * np.sqrt(2 * np.pi))
+        chart.line("curvature", at, normal, FAINT, dash="dash")
+    chart.line("posterior", edges, np.append(density, density[-1]), PALETTE[0], step=True)
+    return chart.edge(float(value), ACTIVE).limits(None, edges[0], edges[-1])
+
+
+def _closest(drawn: Posterior) -> tuple[int, int]:
+    """The two parameters whose draws correlate most."""
+    r = np.abs(np.atleast_2d(np.corrcoef(drawn.draws.T)))
+    np.fill_diagonal(r, -1.0)
+    a, b = np.unravel_index(r.argmax(), r.shape)
+    return int(min(a, b)), int(max(a, b))
+
+
+def _pair(known: Uncertainty, drawn: Posterior, a: int, b: int) -> Chart:
+    """Draws of two parameters against each other."""
+    some = drawn.draws[:: max(1, len(drawn.draws) // DOTS)][:DOTS]
+    chart = Chart(axis(known, drawn.names[a]), [axis(known, drawn.names[b])], pixels=420)
+    chart.points("draws", some[:, a], some[:, b], PALETTE[5], size=3)
+    return chart.points("estimate", [known.values[a]], [known.values[b]], ACTIVE, size=10)
