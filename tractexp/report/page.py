@@ -39,7 +39,7 @@ th, td { padding: .22rem .6rem; text-align: right; border-bottom: 1px solid var(
 th { vertical-align: bottom; white-space: normal; border-bottom-color: var(--faint); font-weight: 600; }
 th:first-child, td:first-child, .words { text-align: left; }
 td.words { white-space: normal; min-width: 8rem; }
-figure { margin: 1rem 0; } figure, tr { break-inside: avoid; } h1, h2, h3 { break-after: avoid; }
+figure { margin: 1rem 0; } figure, tr { break-inside: avoid; }
 figure svg { max-width: 100%; height: auto; }
 figcaption { color: var(--faint); font-size: .88rem; max-width: 46rem; }
 .chart { width: 100%; } .charts { display: grid; gap: .4rem 1rem;
