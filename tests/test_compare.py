@@ -67,7 +67,7 @@ def test_a_planted_better_optimizer_is_found():
     assert claims.headline(result) == (
         "good has the lowest median objective; it is significantly better than bad and worse."
     )
-    assert claims.answer(result) == "Take good: it ends lower than the others."
+    assert claims.answer(result) == "Take good: it ends lower than bad and worse."
 
 
 def test_optimizers_that_do_not_differ_are_not_told_apart():
@@ -304,6 +304,14 @@ def test_one_variant_is_described_and_not_tested():
     result = compared(samples({"a": 1.0}))
     assert result.notes == ("There is one variant only, a: nothing to test it against.",)
     assert claims.answer(result) == "There is one variant only, a: nothing to choose from."
+
+
+def test_the_lowest_that_had_too_few_seeds_is_not_recommended():
+    result = compared([*samples({"a": 1.0, "b": 9.0}), a_run("lucky", 0, 0.9 * FLOOR), a_run("lucky", 1, FLOOR / 2)])
+    assert result.summaries[0].name == "lucky"
+    assert claims.answer(result) == (
+        "lucky has the lowest median objective, but too few seeds to test. Of the others: Take a: it ends lower than b."
+    )
 
 
 def test_variants_that_are_not_told_apart_are_offered_together():

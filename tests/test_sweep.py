@@ -422,9 +422,10 @@ def test_jobs_that_were_interrupted_are_counted_apart_from_those_that_failed(tmp
     assert metrics(jobs) == {"jobs": 4, "jobs_finished": 1, "jobs_failed": 1, "jobs_interrupted": 2}
 
 
-def test_the_objective_of_a_job_is_that_of_its_search(tmp_path):
-    from tractexp.sweep.status import objective
+def test_the_objective_of_a_job_is_told_from_that_of_its_search(tmp_path):
+    from tractexp.sweep.status import objective, search_objective
 
-    for told, value in (({"objective": 1.0, "search": {"objective": 2.0}}, 2.0), ({"objective": 1.0}, 1.0)):
+    for told, ended in (({"objective": 1.0, "search": {"objective": 2.0}}, 2.0), ({"objective": 1.0}, 1.0)):
         (tmp_path / "result.json").write_text(json.dumps(told))
-        assert objective(tmp_path) == value
+        assert (objective(tmp_path), search_objective(tmp_path)) == (1.0, ended)
+    assert search_objective(tmp_path / "nowhere") is None

@@ -34,24 +34,37 @@ def answer(comparison: Comparison) -> str:
     if max((pair.seeds for pair in comparison.pairs), default=0) < seeds_needed(len(comparison.pairs)):
         lowest = f"{_listed([best, *others])} have" if others else f"{best} has"
         return f"Not settled: there are too few seeds to test. {lowest} the lowest median objective so far."
-    _, worse, alike = _verdicts(comparison, best)
+    if (tested := _best_tested(comparison)) != best:
+        advice = _advice(comparison, tested, [])
+        return f"{best} has the lowest median objective, but too few seeds to test. Of the others: {advice}"
+    return _advice(comparison, best, others)
+
+
+def _best_tested(comparison: Comparison) -> str:
+    """The best of the variants that had seeds enough for a test; of all where none had."""
+    tested = {name for pair in comparison.pairs for name in (pair.first, pair.second)}
+    return next((s.name for s in comparison.summaries if s.name in tested), comparison.summaries[0].name)
+
+
+def _advice(comparison: Comparison, best: str, others: list[str]) -> str:
+    """Whether to take the variant whose median is lowest, or as low as those of others and reached sooner."""
+    beaten, worse, alike = _verdicts(comparison, best)
     if worse:
         return f"Not settled: {best} has the lowest median objective, but {_listed(worse)} did better seed by seed."
     rivals = [name for name in alike if name not in others]
     if rivals:
-        return f"Take {best}, or as well {_listed(rivals)}: these runs do not tell them apart.{_spent(comparison)}"
-    why = (
-        f"it ends as low as {_listed(others)}, sooner"
-        if others
-        else f"it ends lower than the other{'s' * (len(comparison.summaries) > 2)}"
-    )
-    return f"Take {best}: {why}.{_spent(comparison)}"
+        return (
+            f"Take {best}, or as well {_listed(rivals)}: these runs do not tell them apart.{_spent(comparison, best)}"
+        )
+    why = [f"it ends as low as {_listed(others)}, sooner"] if others else []
+    why += [f"it ends lower than {_listed(beaten)}"] if beaten else []
+    return f"Take {best}: {', and '.join(why)}.{_spent(comparison, best)}"
 
 
-def _spent(comparison: Comparison) -> str:
+def _spent(comparison: Comparison, best: str) -> str:
     """What the best variant spent, where that is more than another did."""
-    first, *others = comparison.summaries
-    least = min(others, key=lambda summary: summary.simulations.median)
+    (first,) = (summary for summary in comparison.summaries if summary.name == best)
+    least = min(comparison.summaries, key=lambda summary: summary.simulations.median)
     if not first.simulations.median > MORE * least.simulations.median:
         return ""
     spent = (f"{number(float(round(s.simulations.median)))} simulations" for s in (first, least))
@@ -85,8 +98,8 @@ def headline(comparison: Comparison) -> str:
 
 
 def near_and_far(comparison: Comparison) -> tuple[list[Pair], list[Pair]]:
-    """The pairs with the reference, or with the best variant where there is none; and the others."""
-    chosen = comparison.reference or comparison.leaders[0]
+    """The pairs with the reference, or with the best variant tested where there is none; and the others."""
+    chosen = comparison.reference or _best_tested(comparison)
     near = [pair for pair in comparison.pairs if chosen in (pair.first, pair.second)]
     return near, [pair for pair in comparison.pairs if pair not in near]
 

@@ -161,8 +161,8 @@ def _ranks(variants: Sequence[Variant], least: float) -> tuple[Ranks | None, lis
     seeds = sorted(set.intersection(*({*variant.objectives} for variant in variants)))
     if len(seeds) < LEAST_SEEDS:
         return None, [
-            f"The variants were not ranked: they have {len(seeds)} seeds in common, and Friedman's test with its "
-            f"critical difference needs at least {LEAST_SEEDS}."
+            f"The variants were not ranked: they have {len(seeds) or 'no'} seed{'s' * (len(seeds) != 1)} in common, "
+            f"and Friedman's test with its critical difference needs at least {LEAST_SEEDS}."
         ]
     table = np.array([[max(v.objectives[seed], least) for v in variants] for seed in seeds])
     return friedman([v.name for v in variants], table), []

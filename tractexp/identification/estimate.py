@@ -26,6 +26,8 @@ from tractexp.noise.color import FEWEST, fit_autoregression, stretches, white_no
 from tractexp.noise.model import Noise, Pair
 
 ROUNDS = 2  # of noise and fit in turn
+HOPELESS = 1.3  # times the least deviance under the noise before the dips: valleys beyond it are given up
+BEHIND = 25.0  # of the deviance under the noise found: valleys farther behind are
 BETTER = 0.5  # of the deviance, by which a search's valley must be better than those of the box
 OUTLIER = 5.0  # robust standard deviations from which a robust loss takes a sample for an outlier
 REMEMBERED = 4  # problems whose valleys are kept: the jobs of a sweep share one
@@ -163,19 +165,23 @@ def _digest(problem: Problem) -> str:
 def _finished(ends: Ends, robust: bool = False) -> Estimated:
     """Noise and fit in turn from the best valleys, and the judgement of the best of them."""
     observed, likelihood = ends.observed, ends.likelihood
-    units = distinct(ends.descent, likelihood.free)
+    near = ends.descent.deviance <= HOPELESS * ends.lowest
+    units = distinct(Descent(ends.descent.unit[near], ends.descent.deviance[near], 0), likelihood.free)
+    blur = observed.blurred(likelihood.values(units[0]))
     for _ in range(ROUNDS):
         if robust:
             likelihood = cleaned(likelihood, units[:1])
-        likelihood = replace(likelihood, noise=noise_at(observed, likelihood, units[0]))
+        likelihood = replace(likelihood, noise=noise_at(observed, likelihood, units[0], blur))
         found = descend(likelihood.rows, units, apart=likelihood.apart)
-        units = found.unit[np.argsort(found.deviance, kind="stable")]
+        order = np.argsort(found.deviance, kind="stable")
+        units = found.unit[order[found.deviance[order] <= found.deviance.min() + BEHIND]]
     seen = surprise(observed, likelihood, units[0])
     if not seen.adequate:
         factor = louder(likelihood, units[0])
         known = conclude(replace(likelihood, noise=likelihood.noise.scaled(factor)), units[0])
         return Estimated(replace(known, widened=factor), seen, ends.starts)
-    likelihood = replace(likelihood, noise=noise_at(observed, likelihood, units[0], whole=True))  # nothing but noise
+    whole = noise_at(observed, likelihood, units[0], observed.blurred(likelihood.values(units[0])), whole=True)
+    likelihood = replace(likelihood, noise=whole)  # nothing but noise is left: all of it tells
     found = descend(likelihood.rows, units, apart=likelihood.apart)
     best = int(found.deviance.argmin())
     others = np.arange(len(units)) != best
@@ -183,14 +189,15 @@ def _finished(ends: Ends, robust: bool = False) -> Estimated:
     return Estimated(with_rivals(known, found.unit[others], found.deviance[others]), seen, ends.starts)
 
 
-def noise_at(observed: Observed, likelihood: Likelihood, unit: np.ndarray, whole: bool = False) -> Noise:
+def noise_at(
+    observed: Observed, likelihood: Likelihood, unit: np.ndarray, blur: np.ndarray | None, whole: bool = False
+) -> Noise:
     """The noise that a fit at coordinates (D,) leaves in quiet; of the `whole` residual where too little is quiet.
 
-    The whole tells more, too, where what is left is nothing but noise.
+    The whole tells more, too, where what is left is nothing but noise. `blur` is that of `Observed.blurred`.
     """
     rows, J = replace(likelihood, noise=Noise.white(1.0, 1.0)).jacobian(unit)
     residual, columns = rows.reshape(2, -1), J.T.reshape(-1, 2, likelihood.problem.drive.samples)
-    blur = observed.blurred(likelihood.values(unit))
     seen = observed.noise(residual, likelihood.known, columns, blur, whole)
     return seen or noise_of(likelihood, residual)
 

@@ -10,12 +10,13 @@ from tractexp.comparison.runs import Run, Variant
 from tractexp.comparison.statistics import Ranks
 from tractexp.comparison.summary import ECDF_TARGETS, Band, band, runtimes
 from tractexp.report import style
-from tractexp.report.chart import Chart
+from tractexp.report.chart import DECADE, Chart
 
 TOGETHER = len(style.PALETTE)  # more curves than colors are not told apart in one panel
 SMALL = 230  # pixels, the height of a chart beside others
 ROW = 20, 34  # pixels of a variant in a chart with a row for each, where there are many and few
 PANEL = 135  # pixels of a parameter
+ROUND = (1, 2, 3, 5), (1, 1.5, 2, 3, 4, 5, 6, 8)  # times a power of ten
 JITTER = 0.3  # of a row: dots of equal height hide each other
 INSIDE, OUTSIDE = style.PALETTE[0], style.PALETTE[1]
 Curves = Sequence[tuple[np.ndarray, np.ndarray]]
@@ -123,7 +124,16 @@ def spread(variants: Sequence[Variant], floor: Floor) -> Chart:
         spans=np.column_stack((lower, upper)), symbol="diamond", size=9,
     )  # fmt: skip
     margin = max(ends.max() / floor.value, 1.2) ** 0.04
-    return chart.edge(floor.value, dash="dash").limits(None, min(floor.value, ends.min()) / margin, ends.max() * margin)
+    low, high = min(floor.value, ends.min()) / margin, ends.max() * margin
+    if high < DECADE * low and len(at := _round(low, high)) > 2:  # Plotly's own are as long as 0.4 times 10 to the -4
+        chart.ticks(None, at, [f"{value:.1e}".replace(".0", "").replace("e-0", "e-") for value in at])
+    return chart.edge(floor.value, dash="dash").limits(None, low, high)
+
+
+def _round(low: float, high: float) -> list[float]:
+    """A few round numbers between two."""
+    few, more = ([m * 10.0**k for k in range(-20, 5) for m in marks if low <= m * 10.0**k <= high] for marks in ROUND)
+    return few if len(few) > 2 else more
 
 
 def _scattered(variant: Variant) -> list[tuple[Run, float]]:

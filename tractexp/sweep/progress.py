@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from tractexp.sweep.job import SweepJob, shared
-from tractexp.sweep.status import FAILED, Status, objective
+from tractexp.sweep.status import FAILED, Status, search_objective
 from tractexp.tasks.console import FIRST_LINE, NEXT_LINES, console, say
 
 SHOWN = 3  # variants named in a line of a log file
@@ -29,7 +29,7 @@ class Tally:
             self.first = time.perf_counter()
         self.failed += end.status == FAILED
         self.jobs[variant] = self.jobs.get(variant, 0) + 1
-        value = objective(job.folder)
+        value = search_objective(job.folder)
         if value is not None:
             self.best[variant] = min(value, self.best.get(variant, value))
 

@@ -1,9 +1,10 @@
 """What became of a job of a sweep: `status.json` in its folder."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 from tractexp.files import write_json
 
@@ -36,9 +37,17 @@ def read(folder: Path) -> Status | None:
 
 
 def objective(folder: Path) -> float | None:
-    """The objective where the job's search ended; None where its task writes no `result.json`."""
+    """The objective of the estimate in the job's `result.json`; None where its task writes none."""
+    return _objective(folder, lambda found: found)
+
+
+def search_objective(folder: Path) -> float | None:
+    """The objective where the job's search ended, by which optimizers are told apart."""
+    return _objective(folder, lambda found: found.get("search") or found)
+
+
+def _objective(folder: Path, of: Callable[[Any], Any]) -> float | None:
     try:
-        found = json.loads((folder / "result.json").read_text(encoding="utf-8"))
-        return float((found.get("search") or found)["objective"])
+        return float(of(json.loads((folder / "result.json").read_text(encoding="utf-8")))["objective"])
     except (OSError, ValueError, TypeError, KeyError):
         return None

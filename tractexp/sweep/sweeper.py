@@ -182,7 +182,7 @@ def conclude(jobs: Sequence[SweepJob]) -> None:
     common = shared(jobs)
     found: dict[str, list[float]] = {}
     for job, _ in ends:
-        value = status.objective(job.folder)
+        value = status.search_objective(job.folder)
         if value is not None:
             found.setdefault(job.variant(common), []).append(value)
     if found:

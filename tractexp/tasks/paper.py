@@ -44,7 +44,8 @@ class Paper(Task):
         for claim in made.claims:
             say(f"  {claim.verdict}: {claim.text}")
             say(f"    {claim.measured}")
-        say(f"{len(made.claims)} claims: " + ", ".join(f"{n} {verdict}" for verdict, n in made.counts.items()))
+        if made.claims:
+            say(f"{len(made.claims)} claims: " + ", ".join(f"{n} {verdict}" for verdict, n in made.counts.items()))
         say(f"in {time.perf_counter() - started:.0f} s")
         if self.docs is not None:
             paths.append(publish(paths, Path(self.docs)))
