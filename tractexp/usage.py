@@ -75,7 +75,11 @@ def listed(arguments: list[str]) -> int:
     found = choices()
     for group in asked:
         if group not in found:
-            raise UserError(f"there is no group '{group}'{among(group, found, 'Groups')}")
+            holders = [f"'tractexp list {holder}'" for holder in _ordered(found) if group in found[holder]]
+            told = (
+                f", but there is such a name in {' and '.join(holders)}" if holders else among(group, found, "Groups")
+            )
+            raise UserError(f"there is no group '{group}'{told}")
     found, refused = _tried(found)
     width = min(WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns)
     print("\n\n".join(_told(group, found[group], width) for group in asked or _ordered(found)))
