@@ -97,11 +97,13 @@ def _tried(found: Mapping[str, Mapping[str, Choice]]) -> tuple[dict[str, dict[st
     for group, classes in known.items():
         for name, cls in classes.items():  # made by a program, too, which the files do not tell
             made.setdefault(group, {})[name] = Choice(name, sentence(cls.__doc__ or ""), cls.__module__)
+    placed = set()
     for names in made.values():
         for name, choice in names.items():
             if choice.module in refused:
-                names[name] = Choice(name, f"cannot be used: {refused.pop(choice.module)}")
-    return made, list(refused.values())
+                names[name] = Choice(name, f"cannot be used: {refused[choice.module]}")
+                placed.add(choice.module)
+    return made, [why for module, why in refused.items() if module not in placed]
 
 
 def _told(group: str, names: Mapping[str, Choice], width: int) -> str:
