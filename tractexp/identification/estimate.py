@@ -249,13 +249,15 @@ def with_rivals(known: Uncertainty, units: np.ndarray, deviance: Sequence[float]
         if not height < limit:
             continue
         other = conclude(known.likelihood, unit)
-        reach = np.where(np.isfinite(other.half), other.half, 0.0) * np.sqrt(1 - max(height, 0.0) / limit)
-        spans = np.clip(other.values[:, None] + reach[:, None] * [-1, 1], known.lower[:, None], known.upper[:, None])
-        for name, value, (low, high) in zip(other.names, other.values, spans, strict=True):
-            (a, b), (c, d) = own[name], hull[name]
-            hull[name] = [min(c, low), max(d, high)]
-            if not a <= value <= b:
-                said[name] = _of_two(said[name], value, hull[name], known, name)
+        half = np.where(np.isfinite(other.half), other.half, 0.0) * np.sqrt(1 - max(height, 0.0) / limit)
+        for j, name in enumerate(other.names):
+            (a, b), value = own[name], float(other.values[j])
+            if a <= value <= b:
+                continue  # the same place
+            reach = min(half[j], abs(value - known.values[j]))  # curvature tells little beyond the way between the two
+            low, high = np.clip((value - reach, value + reach), known.lower[j], known.upper[j]).tolist()
+            hull[name] = [min(hull[name][0], low), max(hull[name][1], high)]
+            said[name] = _of_two(said[name], value, hull[name], known, name)
     wider = {n: (a, b) for n, (a, b) in hull.items() if [a, b] != own[n]}
     return replace(known, rivals=wider, verdicts=said)
 

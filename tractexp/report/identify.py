@@ -97,21 +97,38 @@ def _parameters(made: Page, result: Any, known: Uncertainty, adequacy: Adequacy,
     search = {**result.search["parameters"]}
     for name, each in result.search["per_event"].items():
         search |= {f"{name}[{k}]": value for k, value in enumerate(each, start=1)}
-    columns = ["parameter", "meaning", "value", "unit", "bounds"]
-    columns += ["95 % interval", "standard error", "verdict"] if adequacy.good else []
+    good = adequacy.good
+    columns = [
+        "parameter",
+        "meaning",
+        "value",
+        "unit",
+        *["95 % interval", "standard error", "verdict"] * good,
+        "bounds",
+    ]
     values = result.free | {n: v for n, v in result.parameters.items() if n not in result.per_event}
-    made.table([*columns, "search ended at"], [
+    rows = [
         [name, about.get(_base(name), ""), digits(value), result.units.get(_base(name), ""),
-         "{:g} .. {:g}".format(*result.bounds[_base(name)]),
-         *(_sure(known, name) if adequacy.good else []), digits(search[name])]
+         *(_sure(known, name) if good else []), "{:g} .. {:g}".format(*result.bounds[_base(name)]),
+         digits(search[name])]
         for name, value in values.items()
-    ], caption="The estimate is the most likely set: noise whitened, the power before each dip left free. pu: per unit"
-               " of the record's base." + ("" if adequacy.good else " Intervals are withheld: they would tell how far"
-               " noise moves the values, not how far what is missing does."),
-        words=(1, 7) if adequacy.good else (1,))  # fmt: skip
-    if adequacy.good:
-        made.chart(_forest(known, search), "Estimates and 95 % intervals within the bounds of each parameter (0 is the"
-                                           " lower, 1 the upper bound); cross: where the search ended.")  # fmt: skip
+    ]  # fmt: skip
+    withheld = (
+        " Intervals are withheld: they would tell how far noise moves the values, not how far what is missing does."
+    )
+    made.table(
+        [*columns, "search ended at"], rows, words=(1, 6) if good else (1,),
+        caption="The estimate is the most likely set: noise whitened, the power before each dip left free. pu: per unit of"
+        " the record's base." + withheld * (not good),
+    )  # fmt: skip
+    if not good:
+        return
+    made.chart(
+        _forest(known, search),
+        "Estimates and 95 % intervals within the bounds of each parameter (0 is the lower, 1 the upper bound); cross:"
+        " where the search ended.",
+    )
+    made.items([f"{name}: {v}." for name, v in known.verdicts.items() if v.word != IDENTIFIED])
 
 
 def _base(name: str) -> str:
@@ -126,7 +143,13 @@ def _sure(known: Uncertainty, name: str) -> list[str]:
     low, high = known.intervals[j]
     error = known.information.standard_errors[j]
     told = digits(error) if np.isfinite(error) else "none"
-    return [f"{digits(low)} .. {digits(high)}", told, str(known.verdicts[name])]
+    return [f"{digits(low)} .. {digits(high)}", told, brief(str(known.verdicts[name]))]
+
+
+def brief(verdict: str) -> str:
+    """A verdict without what stands behind it."""
+    first = verdict.partition(":")[0].partition(";")[0]
+    return first + ")" * (first.count("(") - first.count(")"))
 
 
 def _forest(known: Uncertainty, search: dict[str, float]) -> Chart:

@@ -55,6 +55,7 @@ def report(fit: "Identification") -> None:
 def estimates(fit: "Identification") -> None:
     """Print the estimates; where the search ended outside an interval, that too."""
     from tractexp.api.identify import FIXED
+    from tractexp.report.identify import brief
 
     astray, trusted, rows = fit.astray, fit.trusted, []
     for e in fit.parameters.values():
@@ -64,11 +65,6 @@ def estimates(fit: "Identification") -> None:
         rows.append([e.name, f"{e.value:.5g}", e.unit, *sure, *[f"{e.search:.4g}" * (e.name in astray)] * bool(astray)])
     columns = ["95 % interval", "verdict"] if trusted else ["bounds", ""]
     table(["parameter", "value", "unit", *columns, *["search ended at"] * bool(astray)], rows)
-
-
-def brief(verdict: str) -> str:
-    """A verdict without what stands behind it."""
-    return verdict.partition(":")[0].partition(";")[0]
 
 
 def sure(fit: "Identification") -> None:
