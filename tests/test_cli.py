@@ -316,6 +316,14 @@ def test_a_group_that_is_none_gets_the_nearest_one(tmp_path):
     assert done.stderr.count("\n") == 1
 
 
+def test_a_name_given_for_a_group_gets_the_groups_that_have_it(tmp_path):
+    done = tractexp("list", "none", cwd=tmp_path)
+    assert done.stderr == (
+        "tractexp: there is no group 'none', but there is such a name in 'tractexp list model/motor' and"
+        " 'tractexp list model/static'\n"
+    )
+
+
 def test_plugins_of_others_are_listed_and_those_that_cannot_be_imported_say_why(tmp_path):
     """Installed as a wheel would be: a base in one module, a plugin by it in another, and two that are broken."""
     package, record = tmp_path / "late_loads", tmp_path / "late_loads-1.dist-info"

@@ -75,7 +75,11 @@ def listed(arguments: list[str]) -> int:
     found = choices()
     for group in asked:
         if group not in found:
-            raise UserError(f"there is no group '{group}'{among(group, found, 'Groups')}")
+            holders = [f"'tractexp list {holder}'" for holder in _ordered(found) if group in found[holder]]
+            told = (
+                f", but there is such a name in {' and '.join(holders)}" if holders else among(group, found, "Groups")
+            )
+            raise UserError(f"there is no group '{group}'{told}")
     found, refused = _tried(found)
     width = min(WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns)
     print("\n\n".join(_told(group, found[group], width) for group in asked or _ordered(found)))
@@ -93,11 +97,13 @@ def _tried(found: Mapping[str, Mapping[str, Choice]]) -> tuple[dict[str, dict[st
     for group, classes in known.items():
         for name, cls in classes.items():  # made by a program, too, which the files do not tell
             made.setdefault(group, {})[name] = Choice(name, sentence(cls.__doc__ or ""), cls.__module__)
+    placed = set()
     for names in made.values():
         for name, choice in names.items():
             if choice.module in refused:
-                names[name] = Choice(name, f"cannot be used: {refused.pop(choice.module)}")
-    return made, list(refused.values())
+                names[name] = Choice(name, f"cannot be used: {refused[choice.module]}")
+                placed.add(choice.module)
+    return made, [why for module, why in refused.items() if module not in placed]
 
 
 def _told(group: str, names: Mapping[str, Choice], width: int) -> str:

@@ -66,9 +66,10 @@ def _settled(drawn: Posterior) -> str:
 def _chart(known: Uncertainty, drawn: Posterior, j: int) -> Chart:
     """The density of one parameter's draws."""
     draws, value, half = drawn.draws[:, j], known.values[j], known.half[j]
+    low, high = drawn.intervals[j]
     density, edges = np.histogram(draws, BINS, density=True)
     chart = Chart(axis(known, drawn.names[j]), ["density"], pixels=250, legend=False)
-    chart.shade(*drawn.intervals[j], PALETTE[5], opacity=0.25)
+    chart.shade(float(low), float(high), PALETTE[5], opacity=0.25)
     if np.isfinite(half):
         at, error = np.linspace(edges[0], edges[-1], 151), half / known.factor
         normal = np.exp(-(((at - value) / error) ** 2) / 2) / (error * np.sqrt(2 * np.pi))
