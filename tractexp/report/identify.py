@@ -98,14 +98,7 @@ def _parameters(made: Page, result: Any, known: Uncertainty, adequacy: Adequacy,
     for name, each in result.search["per_event"].items():
         search |= {f"{name}[{k}]": value for k, value in enumerate(each, start=1)}
     good = adequacy.good
-    columns = [
-        "parameter",
-        "meaning",
-        "value",
-        "unit",
-        *["95 % interval", "standard error", "verdict"] * good,
-        "bounds",
-    ]
+    columns = ["parameter", "meaning", "value", "unit", *["95 % interval", "verdict"] * good, "bounds"]
     values = result.free | {n: v for n, v in result.parameters.items() if n not in result.per_event}
     rows = [
         [name, about.get(_base(name), ""), digits(value), result.units.get(_base(name), ""),
@@ -113,13 +106,11 @@ def _parameters(made: Page, result: Any, known: Uncertainty, adequacy: Adequacy,
          digits(search[name])]
         for name, value in values.items()
     ]  # fmt: skip
-    withheld = (
-        " Intervals are withheld: they would tell how far noise moves the values, not how far what is missing does."
-    )
+    withheld = " Intervals are withheld: they tell how far noise moves the values, not how far what is missing does."
     made.table(
-        [*columns, "search ended at"], rows, words=(1, 6) if good else (1,),
-        caption="The estimate is the most likely set: noise whitened, the power before each dip left free. pu: per unit of"
-        " the record's base." + withheld * (not good),
+        [*columns, "search ended at"], rows, words=(1, 5) if good else (1,),
+        caption="The estimate is the most likely set: noise whitened, the power before each dip left free. pu: per unit"
+        " of the record's base." + withheld * (not good),
     )  # fmt: skip
     if not good:
         return
@@ -136,14 +127,11 @@ def _base(name: str) -> str:
 
 
 def _sure(known: Uncertainty, name: str) -> list[str]:
-    """Interval, standard error and verdict of one parameter; of a fixed one that it is fixed."""
+    """Interval and verdict of one parameter; of a fixed one that it is fixed."""
     if name not in known.names:
-        return ["", "", "fixed"]
-    j = known.names.index(name)
-    low, high = known.intervals[j]
-    error = known.information.standard_errors[j]
-    told = digits(error) if np.isfinite(error) else "none"
-    return [f"{digits(low)} .. {digits(high)}", told, brief(str(known.verdicts[name]))]
+        return ["", "fixed"]
+    low, high = known.intervals[known.names.index(name)]
+    return [f"{digits(low)} .. {digits(high)}", brief(str(known.verdicts[name]))]
 
 
 def brief(verdict: str) -> str:
