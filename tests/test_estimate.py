@@ -109,6 +109,7 @@ def test_nothing_missing_is_graded_adequate_and_a_step_of_the_load_is_not():
     assert "do not use its intervals" in missing.headline
     assert "interval" not in " ".join(missing.table().columns)
     assert missing.advice == ["find the missing effect: task=discrepancy"]
+    assert "interval" not in repr(missing.parameters["M"])
 
 
 def test_a_model_that_is_off_by_more_than_eq_20_allows_is_the_wrong_one():

@@ -59,8 +59,11 @@ class Estimate:
     verdict: str
     bounds: tuple[float, float]
     about: str
+    trusted: bool = True  # whether the model describes the load, so that interval and verdict mean what they say
 
     def __repr__(self) -> str:
+        if not self.trusted:
+            return f"{self.name} = {self.value:.5g} {self.unit}: not sure, for the model does not describe this load"
         span = f", 95 % interval {self.interval[0]:.4g} .. {self.interval[1]:.4g}" if self.interval else ""
         return f"{self.name} = {self.value:.5g} {self.unit}{span}: {self.verdict}"
 
@@ -139,6 +142,7 @@ class Identification(Written):
             made[name] = Estimate(
                 name, value, search[name], r.units.get(of, ""), tuple(interval) if interval else None,  # type: ignore[arg-type]
                 r.standard_errors.get(name), verdict, bounds, about.get(of, ""),  # type: ignore[arg-type]
+                trusted=self.trusted or not self.grade,
             )  # fmt: skip
         return made
 
