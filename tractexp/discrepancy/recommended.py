@@ -4,10 +4,13 @@ Parameters that the events cannot tell are held at the values found, and told: a
 more of them.
 """
 
+from dataclasses import replace
+
 from tractexp.discrepancy.adequacy import channels_of
 from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.discrepancy.gap import Gap
 from tractexp.discrepancy.investigate import Investigation
+from tractexp.discrepancy.verdict import NONE, TIED
 from tractexp.identification.adequacy import Adequacy, Surprise, graded, loudest_stretch
 from tractexp.identification.verdict import UNIDENTIFIED, size
 
@@ -16,10 +19,13 @@ def adequacy(found: Investigation) -> Adequacy:
     """The grade of the extended model, or of the base model where nothing is named, on all events."""
     tests: Disagreement = (found.verdict.chosen.tests or found.last) if found.names else found.first
     ratio, where = loudest_stretch(channels_of(tests.projection, found.bench)[0], found.bench)
-    p = 1.0 if found.verdict.word == "none" else tests.p_left  # no disagreement: by the same false-alarm rate
+    p = 1.0 if found.verdict.word == NONE else tests.p_left  # no disagreement: by the same false-alarm rate
     surprise = Surprise(p, tests.loudest, ratio, where)
     errors = [*_errors("the fitted events", found.train), *_errors("the held-out events", found.validate)]
-    return graded(surprise, errors, found.bench.criteria.adequate_p)
+    grade = graded(surprise, errors, found.bench.criteria.adequate_p)
+    if grade.good and found.verdict.word == TIED:
+        return replace(grade, sentence="it describes these events with any of the sets named; which is missing is open")
+    return grade
 
 
 def _errors(label: str, gap: Gap | None) -> list[tuple[str, float]]:

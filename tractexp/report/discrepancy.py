@@ -60,7 +60,8 @@ def page(path: Path, found: Investigation, title: str) -> Path:
 def _graded(found: Investigation) -> str:
     """What the model that the investigation ends with is good for."""
     which = "extended" if found.names else "base"
-    return f"The {which} model: {adequacy(found).sentence}."
+    grade = adequacy(found)
+    return f"The {which} model is graded {grade.grade.replace('_', ' ')}: {grade.sentence}."
 
 
 def _sentence(text: str) -> str:

@@ -63,7 +63,8 @@ def tell(found: "Investigation", paths: Sequence[Path]) -> None:
     *said, noise, following = shown.said
     for line in said:
         say(f"  {line}")
-    say(f"  the {'extended' if found.names else 'base'} model: {content['adequacy']['sentence']}")
+    grade, which = content["adequacy"], "extended" if found.names else "base"
+    say(f"  the {which} model is graded {grade['grade'].replace('_', ' ')}: {grade['sentence']}")
     columns = shown.columns if found.names else shown.columns[:-1]
     table(columns, [row[: len(columns)] for row in shown.rows])
     if places := content["where"]:
