@@ -163,7 +163,9 @@ def test_a_long_verdict_is_cut_in_the_table_and_whole_below():
 def test_the_model_recommended_is_graded_in_the_verdict(named, unexplained, tmp_path):
     for found, whose in ((named, "The extended model is graded "), (unexplained, "The base model is graded ")):
         words, _ = page(found, tmp_path)
-        assert words.index(f"{whose}{adequacy(found).sentence}") < words.index("Next: ")
+        grade = adequacy(found)
+        told = f"{whose}{grade.grade.replace('_', ' ')}: {grade.sentence}."
+        assert words.index(told) < words.index("Next: ")
     assert adequacy(named).grade == "adequate" != adequacy(unexplained).grade
 
 
