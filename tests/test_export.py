@@ -1,5 +1,6 @@
 """Exports: the T-circuit gives back what was identified, each file is read back, ANDES agrees, refusals are clear."""
 
+import dataclasses
 import itertools
 import json
 import os
@@ -270,3 +271,14 @@ def test_an_exported_load_responds_in_andes_as_it_does_here(motor, static):
     found = andes_check.round_trip(motor, static, 1e-3)
     assert found["swing_P"] > 0.2
     assert max(found["P"], found["Q"]) < 1e-3
+
+
+def test_what_a_model_is_not_good_for_is_said_when_it_is_exported(tmp_path):
+    sentence = "this model does not describe this load: P of dip is off by 9.0%"
+    good = identified().result
+    for grade, told in (("adequate", False), ("wrong_model", True)):
+        graded = dataclasses.replace(good, adequacy={"grade": grade, "sentence": sentence, "p": None})
+        graded.write(tmp_path / "result.json")
+        done = tractexp("task=export", "task.parameters=result.json", f"hydra.run.dir={grade}", cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        assert (f"mind: {sentence}" in done.stdout) == told
