@@ -21,7 +21,7 @@ from tractexp.identification.observed import Observed
 from tractexp.identification.problem import Problem
 from tractexp.identification.uncertainty import Uncertainty, conclude, threshold
 from tractexp.identification.valleys import along_least_known, distinct, explored
-from tractexp.identification.verdict import IDENTIFIED, WEAK, WITHIN, Verdict, size
+from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, WITHIN, Verdict, size
 from tractexp.noise.color import FEWEST, fit_autoregression, stretches, white_noise
 from tractexp.noise.model import Noise, Pair
 
@@ -249,22 +249,22 @@ def with_rivals(known: Uncertainty, units: np.ndarray, deviance: Sequence[float]
         if not height < limit:
             continue
         other = conclude(known.likelihood, unit)
-        half = np.where(np.isfinite(other.half), other.half, 0.0) * np.sqrt(1 - max(height, 0.0) / limit)
-        for j, name in enumerate(other.names):
-            (a, b), value = own[name], float(other.values[j])
-            if a <= value <= b:
-                continue  # the same place
-            reach = min(half[j], abs(value - known.values[j]))  # curvature tells little beyond the way between the two
-            low, high = np.clip((value - reach, value + reach), known.lower[j], known.upper[j]).tolist()
-            hull[name] = [min(hull[name][0], low), max(hull[name][1], high)]
-            said[name] = _of_two(said[name], value, hull[name], known, name)
+        reach = np.where(np.isfinite(other.half), other.half, 0.0) * np.sqrt(1 - max(height, 0.0) / limit)
+        spans = np.clip(other.values[:, None] + reach[:, None] * [-1, 1], known.lower[:, None], known.upper[:, None])
+        for name, value, (low, high) in zip(other.names, other.values, spans.tolist(), strict=True):
+            (a, b), (c, d) = own[name], hull[name]
+            hull[name] = [min(c, low), max(d, high)]
+            if not a <= value <= b:
+                said[name] = _of_two(said[name], float(value), hull[name], known, name)
     wider = {n: (a, b) for n, (a, b) in hull.items() if [a, b] != own[n]}
     return replace(known, rivals=wider, verdicts=said)
 
 
 def _of_two(verdict: Verdict, value: float, hull: Sequence[float], known: Uncertainty, name: str) -> Verdict:
-    """A verdict where another valley fits as well: weak unless the interval over both is narrow still."""
+    """A verdict where another valley fits as well: by the width of the interval over both."""
     j = known.names.index(name)
-    narrow = (hull[1] - hull[0]) / 2 <= WITHIN * size(known.values[j], known.lower[j], known.upper[j])
+    low, high = known.lower[j], known.upper[j]
+    narrow = (hull[1] - hull[0]) / 2 <= WITHIN * size(known.values[j], low, high)
     word = WEAK if verdict.word == IDENTIFIED and not narrow else verdict.word
+    word = UNIDENTIFIED if hull[0] <= low and hull[1] >= high else word
     return Verdict(word, f"{verdict.detail}; another valley, at {value:.4g}, fits as well")
