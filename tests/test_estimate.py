@@ -185,7 +185,7 @@ def test_a_search_that_found_a_better_valley_leads_to_the_estimate(monkeypatch):
     problem = Problem(study.model(), [recorded(seed=77)])
     whole = polished(problem).known
 
-    def one_bad_start(likelihood, apart=()):
+    def one_bad_start(likelihood):
         from tractexp.identification.descent import descend
 
         bad = likelihood.to_unit(TRUTH * np.array([1, 0.4, 0.45, 1, 1, 1, 0.5]))

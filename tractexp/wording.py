@@ -34,6 +34,11 @@ def joined(names: Sequence[str], last: str = "and") -> str:
     return f" {last} ".join(part for part in (", ".join(names[:-1]), *names[-1:]) if part)
 
 
+def as_sentence(text: str) -> str:
+    """A clause as a sentence of its own: with a capital, unless it begins with a parameter's name, and a full stop."""
+    return f"{text if '_' in text.split(' ')[0] else text[:1].upper() + text[1:]}."
+
+
 def _powers(value: float, digits: int) -> str:
     """'2.6e-5' where Python says '2.6e-05'."""
     return f"{value:.{digits}g}".replace("e-0", "e-").replace("e+0", "e")

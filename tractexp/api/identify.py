@@ -15,9 +15,10 @@ from tractexp.api.read import dips_of
 from tractexp.api.response import Response, respond_to
 from tractexp.api.setup import Setup
 from tractexp.errors import UserError
-from tractexp.identification.result import Result
+from tractexp.identification.result import Result, by_event
 from tractexp.outcome import Table
 from tractexp.progress import Progress, tell
+from tractexp.wording import as_sentence
 
 if TYPE_CHECKING:
     from tractexp.identification.adequacy import Adequacy
@@ -132,8 +133,8 @@ class Identification(Written):
     def parameters(self) -> Estimates:
         """The estimates by name; a parameter with a value of its own in each event is there as T_m[1], T_m[2], too."""
         r, about = self.result, {p.name: p.about for p in self.model.model.parameters}
-        values, ended, made = _by_event(r.parameters, r.per_event), r.search, Estimates()
-        search = _by_event(ended["parameters"], ended["per_event"]) if ended else values
+        values, ended, made = by_event(r.parameters, r.per_event), r.search, Estimates()
+        search = by_event(ended["parameters"], ended["per_event"]) if ended else values
         for name, value in values.items():
             of, interval = name.partition("[")[0], r.intervals.get(name)
             without = "mean of its events" if name in r.per_event else FIXED if r.verdicts else ""
@@ -218,7 +219,7 @@ class Identification(Written):
 
     def _said(self) -> list[str]:
         r = self.result
-        said = [f"{self.headline[0].upper()}{self.headline[1:]}."] if self.headline else []
+        said = [as_sentence(self.headline)] if self.headline else []
         said += [
             f"{e['name']} ({e['role']}): epsilon_p {e['epsilon_p']:.3%}, epsilon_q {e['epsilon_q']:.3%}"
             for e in r.events
@@ -306,12 +307,6 @@ def identify(
         optimizer=Choice.of("optimizer", optimizer), check_intervals=check_intervals,
     )  # fmt: skip
     return Identification.of(setup, setup.found(progress))
-
-
-def _by_event(values: Mapping[str, float], per_event: Mapping[str, Sequence[float]]) -> dict[str, float]:
-    """Parameters by name, with T_m[1], T_m[2], ... where each event has its own."""
-    own = {f"{name}[{k}]": value for name, each in per_event.items() for k, value in enumerate(each, start=1)}
-    return {**values, **own}
 
 
 def _judge(setup: Asked, found: "Found") -> tuple[Result, Judged]:

@@ -14,6 +14,7 @@ from tractexp.api.pages import Written
 from tractexp.errors import check_range
 from tractexp.identification.result import Result
 from tractexp.outcome import Table
+from tractexp.wording import as_sentence
 
 if TYPE_CHECKING:
     from tractexp.identification.profile import Profiles
@@ -58,7 +59,7 @@ class Profiled(Written):
             for name, p in self.profiles.items()
         ]
         fit = self.fit
-        said = [f"{fit.headline[0].upper()}{fit.headline[1:]}."] if fit.headline else []
+        said = [as_sentence(fit.headline)] if fit.headline else []
         said += [f"{name}: {p['verdict']}" for name, p in self.profiles.items()] if fit.trusted else []
         return Table(["parameter", "most likely", "by curvature", "by profile"], rows, "95 % intervals", said)
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from tractexp.comparison.runs import Run
 from tractexp.errors import UserError
+from tractexp.identification.result import by_event
 
 TASK = "identify"  # the task whose runs are compared
 FINISHED, RUNNING, INTERRUPTED = "finished", "running", "interrupted"  # what a job's status.json says
@@ -93,8 +94,7 @@ def code_of(result: Mapping[str, Any]) -> str:
 
 def parameters_of(ended: Mapping[str, Any]) -> dict[str, float]:
     """{name: value}, where it differs by event {"T_m[1]": value, ...} as well."""
-    own = {f"{name}[{k}]": v for name, values in ended.get("per_event", {}).items() for k, v in enumerate(values, 1)}
-    return {**ended.get("parameters", {}), **own}
+    return by_event(ended.get("parameters", {}), ended.get("per_event", {}))
 
 
 @contextmanager

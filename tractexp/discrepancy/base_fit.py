@@ -52,7 +52,7 @@ def fitted_from(bench: Bench, starts: Sequence[np.ndarray], valleys: Sequence[np
 def _valleys(bench: Bench) -> list[np.ndarray]:
     """The best fits (D,) of the base model alone, by its own fast kernel."""
     at = bench.coordinates
-    ends = best_fits(Likelihood.of(bench.kernels.bare), bench.apart(0))
+    ends = best_fits(Likelihood.of(bench.kernels.bare))
     starts = np.tile(at.null, (len(ends), 1))
     starts[:, [*at.base, *at.before]] = ends
     return list(starts)

@@ -5,7 +5,6 @@ estimate is the maximum of the likelihood (`likelihood`) under the noise that th
 for one set of records whatever was searched with, unless a search finds a valley that nothing else does.
 """
 
-import hashlib
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -132,11 +131,12 @@ def estimate(problem: Problem, values: np.ndarray) -> Estimated:
 
 def _of_box(problem: Problem) -> tuple[Ends, Estimated | None]:
     """The ends of descents from all over the box, and the estimate that they give; None where none can be simulated."""
-    key = _digest(problem)
+    events = [(e.record.name, e.start, e.end, e.steady, e.noise_P, e.noise_Q) for e in problem.events]
+    key = f"{problem.digest()} {events}"
     if key not in _remembered:
         observed = Observed.of(problem)
         likelihood = Likelihood.of(observed.problem)
-        found = explored(likelihood, likelihood.apart)
+        found = explored(likelihood)
         refined = descend(likelihood.rows, distinct(found, likelihood.free), apart=likelihood.apart)
         ends = Ends(observed, likelihood, found, ("box",) * len(found.unit)).joined(refined, "box")
         if not np.isfinite(ends.lowest):
@@ -146,20 +146,6 @@ def _of_box(problem: Problem) -> tuple[Ends, Estimated | None]:
         if len(_remembered) > REMEMBERED:
             _remembered.popitem(last=False)
     return _remembered[key]
-
-
-def _digest(problem: Problem) -> str:
-    """What the estimate of a problem depends on, in short."""
-    drive, model = problem.drive, problem.model
-    told = [
-        model.source, [m.name for m in model.measurements], problem.space.names, problem.fixed, problem.per_event,
-        [(e.record.name, e.start, e.end, e.steady, e.noise_P, e.noise_Q) for e in problem.events],
-    ]  # fmt: skip
-    made = hashlib.blake2b(repr(told).encode())
-    for array in (drive.inputs, drive.measured, drive.weights, drive.first, drive.event, drive.before, problem.lower,
-                  problem.upper, problem.step.substeps):  # fmt: skip
-        made.update(np.ascontiguousarray(array).tobytes())
-    return made.hexdigest()
 
 
 def _finished(ends: Ends, robust: bool = False) -> Estimated:

@@ -1,6 +1,7 @@
 """The identification problem: free parameters of a model against recorded events, Eq. (8)."""
 
 import copy
+import hashlib
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -139,6 +140,16 @@ class Problem:
         self.drive = Drive.of([replace(excitation(e), **weights) for e in self.events])
         self._scale = self.loss.scales(self.events, self.drive)
         self.step = self._step(substeps)
+
+    def digest(self) -> str:
+        """SHA-256 of the equations, the records and what is known of the parameters: of equal problems the same."""
+        drive, known = self.drive, (self.space.names, sorted(self.fixed.items()), self.per_event)
+        told = self.model.source, [effect.name for effect in self.model.measurements], known
+        made = hashlib.sha256(repr(told).encode())
+        arrays = drive.inputs, drive.measured, drive.weights, drive.first, drive.event, drive.before
+        for array in (*arrays, self.lower, self.upper, self.step.substeps):
+            made.update(np.ascontiguousarray(array).tobytes())
+        return made.hexdigest()
 
     def driven_by(self, events: Sequence[Event]) -> "Problem":
         """The same problem with other voltages of the same lengths; Runge-Kutta steps and scales stay."""

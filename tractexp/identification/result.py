@@ -37,6 +37,12 @@ class Fit:
     epsilon_q: float
 
 
+def by_event(values: Mapping[str, float], per_event: Mapping[str, Sequence[float]]) -> dict[str, float]:
+    """Parameters by name, with T_m[1], T_m[2], ... where each event has its own."""
+    own = {f"{name}[{k}]": value for name, each in per_event.items() for k, value in enumerate(each, start=1)}
+    return {**values, **own}
+
+
 def relative_error(measured: np.ndarray, calculated: np.ndarray) -> float:
     """epsilon of Eq. (20) as a fraction: RMS of the difference over RMS of the measurement, gaps left out."""
     known = np.isfinite(measured)
@@ -96,8 +102,7 @@ class Result:
     @property
     def free(self) -> dict[str, float]:
         """The estimate by the names of intervals and verdicts: T_m[1], T_m[2] where events have values of their own."""
-        own = {f"{n}[{k}]": v for n, values in self.per_event.items() for k, v in enumerate(values, start=1)}
-        values = self.parameters | own
+        values = by_event(self.parameters, self.per_event)
         return {name: values[name] for name in self.verdicts or values}
 
     @property

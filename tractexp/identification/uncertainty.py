@@ -131,11 +131,9 @@ def test(likelihood: Likelihood, rows: np.ndarray) -> list[dict[str, Any]]:
 def describe_noise(likelihood: Likelihood) -> list[dict[str, Any]]:
     """Level [pu] and color of the noise of each event and channel, with the level before the dip beside it."""
     rows, noise = [], likelihood.noise
-    back = np.eye(2) if noise.mix is None else np.linalg.inv(noise.mix)
     for e, event in enumerate(likelihood.problem.events):
         pair = noise.pair(e)
-        variance = np.array([channel.deviation[0] ** 2 for channel in pair])
-        covariance = back @ np.diag(variance) @ back.T
+        covariance = noise.covariance(e)
         cross = covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1])
         for c, (channel, before) in enumerate(zip("PQ", (event.noise_P, event.noise_Q), strict=True)):
             rows.append(

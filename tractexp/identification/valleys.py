@@ -3,11 +3,9 @@
 What a model seems to miss in a wrong valley is not missing, and what is estimated there is not the estimate.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from tractexp.identification.descent import Apart, Descent, descend
+from tractexp.identification.descent import Descent, descend
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.starts import best_distinct, even
 
@@ -19,9 +17,9 @@ KEPT, DISTINCT = 4, 0.2  # of their ends, and how far apart in the unit cube: se
 ALONG = (0.3, 0.6, 0.9)  # of the way to the wall: where other valleys are looked for
 
 
-def explored(likelihood: Likelihood, apart: Sequence[Apart] = ()) -> Descent:
+def explored(likelihood: Likelihood) -> Descent:
     """Where descents from the most promising points of the box end: coordinates (at most 10, free + 2 E)."""
-    problem = likelihood.problem
+    problem, apart = likelihood.problem, likelihood.apart
     points = even(SCREENED, problem.space.dimension)
     points = points[best_distinct(points, problem.objective(problem.space.from_unit(points)), APART, STARTS, norm=2)]
     begin = np.full((len(points), points.shape[1] + 2 * problem.drive.events), 0.5)
@@ -32,12 +30,12 @@ def explored(likelihood: Likelihood, apart: Sequence[Apart] = ()) -> Descent:
     return descend(likelihood.rows, promising, None, MORE, TOLERANCE, apart)
 
 
-def best_fits(likelihood: Likelihood, apart: Sequence[Apart]) -> np.ndarray:
+def best_fits(likelihood: Likelihood) -> np.ndarray:
     """Coordinates (at most 4, free + 2 E) of the best fits of distinct valleys: parameters, P0 and Q0 of each event.
 
     The best of them may not stay so once what the recorder did is free.
     """
-    return distinct(explored(likelihood, apart), likelihood.free)
+    return distinct(explored(likelihood), likelihood.free)
 
 
 def distinct(ends: Descent, free: int) -> np.ndarray:

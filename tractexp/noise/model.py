@@ -131,6 +131,11 @@ class Noise:
     def _unmixing(self) -> np.ndarray:
         return np.eye(2) if self.mix is None else np.linalg.inv(self.mix)
 
+    def covariance(self, event: int) -> np.ndarray:
+        """Covariance (2, 2) of the fast noise of P and Q in one event [pu²]."""
+        back = self._unmixing
+        return back @ np.diag([channel.deviation[0] ** 2 for channel in self.pair(event)]) @ back.T
+
     def _fast_variance(self, event: int) -> np.ndarray:
         """Variance (2,) of the fast noise of P and Q [pu²]."""
         return self._unmixing**2 @ [channel.deviation[0] ** 2 for channel in self.pair(event)]

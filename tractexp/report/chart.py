@@ -1,12 +1,13 @@
 """Charts that let one look: zoomed by dragging, told by hovering, saved as SVG from their corner, printed as drawn.
 
-A `Chart` is data and layout for Plotly.js (MIT), which lies beside this file and travels inside a page that has one.
-Nothing is drawn here, so that a page costs milliseconds and no plotting library is imported.
+A `Chart` is data and layout for Plotly.js (MIT), which the package plotly carries and a page that has a chart takes
+along. Nothing is drawn here and that package is not imported, so that a page costs milliseconds.
 """
 
 import base64
 import functools
 import html
+import importlib.util
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from tractexp.errors import UserError
 from tractexp.report import style
 
-LIBRARY = Path(__file__).parent / "vendor" / "plotly-basic.min.js"
 MOST = 20_000  # points of a line that are kept: beyond, each stretch keeps its lowest and highest
 FONT = 'system-ui, "Segoe UI", "Liberation Sans", sans-serif'
 SETTINGS = {
@@ -54,11 +55,20 @@ addEventListener("beforeprint", () => charts.forEach(chart => chart.data && Plot
 """
 
 
+def library() -> Path:
+    """Plotly.js, where the package plotly is installed. Raises `UserError` where it is not."""
+    spec = importlib.util.find_spec("plotly")
+    for folder in (spec and spec.submodule_search_locations) or ():
+        if (path := Path(folder, "package_data", "plotly.min.js")).is_file():
+            return path
+    raise UserError("pages need the package plotly, which is not installed whole; install it by: pip install plotly")
+
+
 @functools.cache
 def script() -> str:
     """What a page with charts needs once: the library, and what draws the charts."""
     drawing = DRAW.replace("SETTINGS", json.dumps(SETTINGS)).replace("PAPER", str(PAPER))
-    return LIBRARY.read_text(encoding="utf-8") + "\n" + drawing
+    return library().read_text(encoding="utf-8") + "\n" + drawing
 
 
 class Chart:

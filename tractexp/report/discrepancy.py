@@ -26,7 +26,7 @@ from tractexp.discrepancy.verdict import UNEXPLAINED
 from tractexp.report.chart import Chart
 from tractexp.report.overlay import overlaid
 from tractexp.report.page import Page
-from tractexp.wording import in_words, joined, percent, with_error
+from tractexp.wording import as_sentence, in_words, joined, percent, with_error
 
 KIND = {"none": "good", "named": "good", "tied": "plain", "unexplained": "bad"}
 COLORS = {CHOSEN: "#009E73", KEPT: "#E69F00"}
@@ -41,8 +41,8 @@ def page(path: Path, found: Investigation, title: str) -> Path:
     lead = f"{found.bench.model.title}, {events} event{'s' * (events > 1)} fitted, {len(found.withheld)} held out"
     made = Page(f"Missing effect: {title}", lead)
     head = f"{found.verdict.word.upper()} {' or '.join(joined(names) for names in found.verdict.sets)}".strip()
-    left = [_sentence(found.headline)] if found.headline else []
-    said = [_sentence(found.verdict.reason), *left, _graded(found), f"Next: {recommendation(found)}."]
+    left = [as_sentence(found.headline)] if found.headline else []
+    said = [as_sentence(found.verdict.reason), *left, _graded(found), f"Next: {recommendation(found)}."]
     made.verdict(head, *said, kind=KIND[found.verdict.word])
     overlaid(made.heading("Measured, before, after" if found.names else "Measured and calculated"), found.overlays)
     _smaller(made, found)
@@ -62,12 +62,6 @@ def _graded(found: Investigation) -> str:
     which = "extended" if found.names else "base"
     grade = adequacy(found)
     return f"The {which} model is graded {grade.grade.replace('_', ' ')}: {grade.sentence}."
-
-
-def _sentence(text: str) -> str:
-    """A reason as a sentence of its own; names keep their spelling."""
-    first = text if "_" in text.split()[0] else f"{text[0].upper()}{text[1:]}"
-    return f"{first}."
 
 
 def _smaller(made: Page, found: Investigation) -> None:

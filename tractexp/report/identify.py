@@ -8,6 +8,7 @@ import numpy as np
 from tractexp.identification.adequacy import Adequacy
 from tractexp.identification.estimate import Estimated
 from tractexp.identification.residual_tests import LAGS, REJECTED, autocorrelation
+from tractexp.identification.result import by_event
 from tractexp.identification.search import REFUSED, History
 from tractexp.identification.together import Together
 from tractexp.identification.uncertainty import Uncertainty
@@ -16,7 +17,7 @@ from tractexp.report import style
 from tractexp.report.chart import Chart
 from tractexp.report.events import CAPTION, Curve, event_chart
 from tractexp.report.page import Page
-from tractexp.wording import in_words
+from tractexp.wording import as_sentence, in_words
 
 KIND = {"adequate": "good", "effect_missing": "plain", "wrong_model": "bad"}
 SHOWN = 4  # events whose curves are not folded away
@@ -34,8 +35,9 @@ def page(
     """The whole page. `about` {parameter: meaning}; `search` is where the optimizer ended, in words."""
     names = ", ".join(e["name"] for e in result.events if e["role"] == "train")
     made = Page(f"Identification of {names}", f"{result.optimizer}, seed {result.seed}.")
-    sentence = f"{adequacy.sentence[0].upper()}{adequacy.sentence[1:]}."
-    made.verdict(sentence, _acceptance(result), *_identified(known, adequacy), kind=KIND[adequacy.grade])
+    made.verdict(
+        as_sentence(adequacy.sentence), _acceptance(result), *_identified(known, adequacy), kind=KIND[adequacy.grade]
+    )
     made.heading("Measured and calculated")
     _curves(made, fits, known)
     made.heading("Parameters")
@@ -43,7 +45,7 @@ def page(
     made.heading("What to do next").items(advice)
     if together is not None and adequacy.good:
         _events(made, known, together)
-    made.heading("The search and the estimate").text(f"{search[0].upper()}{search[1:]}.")
+    made.heading("The search and the estimate").text(as_sentence(search))
     made.chart(_fitness(history, result), "Best objective of the search; dashed: the estimate's.")
     _starts(made, estimated, known)
     made.heading("What the fit leaves")
@@ -94,9 +96,7 @@ def _curves(made: Page, fits: Sequence[Any], known: Uncertainty) -> None:
 
 def _parameters(made: Page, result: Any, known: Uncertainty, adequacy: Adequacy, about: dict[str, str]) -> None:
     """Table and, where intervals mean something, their picture against the bounds."""
-    search = {**result.search["parameters"]}
-    for name, each in result.search["per_event"].items():
-        search |= {f"{name}[{k}]": value for k, value in enumerate(each, start=1)}
+    search = by_event(result.search["parameters"], result.search["per_event"])
     good = adequacy.good
     columns = ["parameter", "meaning", "value", "unit", *["95 % interval", "verdict"] * good, "bounds"]
     values = result.free | {n: v for n, v in result.parameters.items() if n not in result.per_event}

@@ -12,6 +12,7 @@ from tractexp.identification.problem import Problem
 from tractexp.report.chart import Chart
 from tractexp.report.page import Page
 from tractexp.report.style import PALETTE
+from tractexp.wording import as_sentence
 
 DEPTH, DURATION, RATE, NOISE = "depth", "duration [s]", "samples per second", "noise, of P before the dip"
 AXES = {  # of a scan: what its axis says, and what a value is multiplied by
@@ -53,7 +54,7 @@ def page(path: Path, planned: Planned) -> Path:
     answer = str(needed)
     title = f"How deep a dip tells {needed.parameter}"
     made = Page(title, f"A plan for {planned.problem.model.title}, before anything more is recorded.")
-    made.verdict(f"{answer[0].upper()}{answer[1:]}.", kind="bad" if needed.depth is None else "good")
+    made.verdict(as_sentence(answer), kind="bad" if needed.depth is None else "good")
     by_depth, *others = [_chart(planned, label, legend=label == DEPTH) for label in planned.scans]
     made.chart(by_depth, _caption(needed))
     _asked(made, planned)
@@ -131,7 +132,7 @@ def _asked(made: Page, planned: Planned) -> None:
     made.heading("What was asked").items(
         [
             f"How deep must a dip be for {needed.parameter}{stands} to be known within ± {100 * needed.within:g} %?",
-            f"{planned.dip[0].upper()}{planned.dip[1:]}.",
+            as_sentence(planned.dip),
             f"Recorded already: {', '.join(e.record.name for e in problem.events)}.",
         ]
     )

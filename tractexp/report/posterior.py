@@ -8,8 +8,9 @@ from tractexp.identification.posterior import ENOUGH, Posterior
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.report.chart import Chart
 from tractexp.report.page import Page
-from tractexp.report.profile import ALIKE, NOISE_ALONE, axis, declared, span, upper
+from tractexp.report.profile import ALIKE, NOISE_ALONE, axis, declared, span
 from tractexp.report.style import ACTIVE, FAINT, PALETTE
+from tractexp.wording import as_sentence
 
 BINS = 60  # of a histogram
 DOTS = 1500  # draws shown of a pair
@@ -26,7 +27,7 @@ def page(path: Path, known: Uncertainty, drawn: Posterior, grade: str = "", trus
         f"Posterior: {names}",
         f"A flat prior within the bounds; {len(drawn.draws)} draws of {drawn.steps} steps of emcee's ensemble.",
     )
-    told = [f"{upper(grade)}."] * bool(grade) + [_agreement(known, drawn)] + [NOISE_ALONE] * (not trusted)
+    told = [as_sentence(grade)] * bool(grade) + [_agreement(known, drawn)] + [NOISE_ALONE] * (not trusted)
     made.verdict(*told, _settled(drawn), kind="bad" if not trusted else "good" if drawn.converged else "plain")
     made.charts([_chart(known, drawn, j) for j in range(len(drawn.names))])
     made.text(CAPTION)

@@ -12,6 +12,7 @@ from tractexp.identification.verdict import IDENTIFIED, Verdict, shown
 from tractexp.report.chart import Chart
 from tractexp.report.page import Page
 from tractexp.report.style import ACTIVE, FAINT, PALETTE
+from tractexp.wording import as_sentence
 
 ALIKE = 0.2  # of the half interval by curvature: closer ends are the same interval
 ABOVE = 2.2  # thresholds that a chart shows
@@ -40,8 +41,8 @@ def page(path: Path, found: Profiles, grade: str = "", trusted: bool = True) -> 
     )
     says = {profile.name: meaning(found, profile) for profile in found.profiles}
     told = [*_where(says), *_poor(verdicts)] if trusted else [NOISE_ALONE, *_where(says)]
-    graded = [f"{upper(grade)}."] * bool(grade)
-    made.verdict(*graded, *told, *(f"{upper(note)}." for note in found.notes), kind=_kind(verdicts, trusted))
+    graded = [as_sentence(grade)] * bool(grade)
+    made.verdict(*graded, *told, *(as_sentence(note) for note in found.notes), kind=_kind(verdicts, trusted))
     titles = {name: f"{name}: {verdict.word}" if trusted else "" for name, verdict in verdicts.items()}
     made.charts([_chart(found, profile, titles[profile.name]) for profile in found.profiles])
     made.text(CAPTION.format(threshold=found.threshold))
@@ -88,7 +89,7 @@ def meaning(found: Profiles, profile: Profile) -> str:
         said.append(f"{' and '.join(f'{m:.4g}' for m in profile.minima)} fits about as well as the estimate")
     if not said:
         said.append(_compared(found, profile))
-    return f"{upper('; '.join(said))}."
+    return as_sentence("; ".join(said))
 
 
 def _compared(found: Profiles, profile: Profile) -> str:
@@ -130,7 +131,7 @@ def _kind(verdicts: Mapping[str, Verdict], trusted: bool) -> str:
 def _poor(verdicts: Mapping[str, Verdict]) -> list[str]:
     """Which parameters are not identified."""
     poor = [f"{name} is {verdict.word}" for name, verdict in verdicts.items() if verdict.word != IDENTIFIED]
-    return [f"{upper('; '.join(poor))}." if poor else "Every parameter is identified."]
+    return [as_sentence("; ".join(poor)) if poor else "Every parameter is identified."]
 
 
 def _curvature(found: Profiles, name: str) -> tuple[float, float]:
@@ -185,8 +186,3 @@ def axis(known: Uncertainty, name: str) -> str:
 def span(low: float, high: float) -> str:
     """An interval as text."""
     return f"{low:.4g} .. {high:.4g}"
-
-
-def upper(text: str) -> str:
-    """With a capital, unless it begins with a parameter's name."""
-    return text if "_" in text.split(" ")[0] else text[:1].upper() + text[1:]

@@ -9,6 +9,7 @@ from tractexp.identification.search import REFUSED
 from tractexp.plugin import plugin
 from tractexp.tasks.console import listed, say, table
 from tractexp.tasks.task import Job, Task
+from tractexp.wording import as_sentence
 
 if TYPE_CHECKING:
     from tractexp.api.identify import Identification
@@ -36,7 +37,7 @@ def _wanted(setting: bool | None, job: Job) -> bool:
 def report(fit: "Identification") -> None:
     """Print what the identification is good for, the estimate, how well it fits, and what to do next."""
     say()
-    say(f"{fit.headline[0].upper()}{fit.headline[1:]}.")
+    say(as_sentence(fit.headline))
     estimates(fit)
     rows = [[e["name"], e["role"], f"{e['epsilon_p']:.3%}", f"{e['epsilon_q']:.3%}"] for e in fit.result.events]
     table(["event", "role", "epsilon_p", "epsilon_q"], rows)
