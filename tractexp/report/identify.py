@@ -199,9 +199,7 @@ def _left(made: Page, known: Uncertainty) -> None:
     made.text(_conclusion(colored, len(known.tests)))
     for e, event in enumerate(events[:SHOWN]):
         part = drive.part(e)
-        chart = Chart(
-            "t [s]", ["P", "Q"], pixels=320, title=f"{event.record.name}: whitened residual [standard deviations]"
-        )
+        chart = Chart("t [s]", ["P [σ]", "Q [σ]"], pixels=320)
         lags = Chart("lag [samples]", ["autocorrelation"], pixels=320)
         for c, (name, color) in enumerate(zip("PQ", (style.ACTIVE, style.REACTIVE), strict=True)):
             seen = likelihood.known[c, part]
