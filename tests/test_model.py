@@ -113,6 +113,34 @@ def test_a_slow_record_is_as_accurate_as_a_fast_one(model, step):
     assert error[0] < 1e-7
 
 
+@pytest.mark.parametrize(("integration", "order"), [("classical", 4), ("printed", 1)])
+def test_the_kernel_is_of_the_order_that_its_integration_has(model, integration, order):
+    """Eq. (4) as printed goes h/6 ahead in its second and third stage, which leaves one order of the four.
+
+    The voltage is a smooth one, sampled so finely that the cubic between its samples is not what limits.
+    """
+    t = np.arange(401) * 2.5e-3
+    U = 1 - 0.3 * np.sin(np.pi * t) ** 4
+    drive = Drive.of([Excitation(2.5e-3, U, np.ones(401), np.full(401, 0.6), 1.0, 1.0, 0.6)])
+    exact = model.simulate(drive, TRUTH, 64)
+    made = compose(model.motor, model.static, integration=integration)
+    steps = np.array([1, 2, 4])
+    errors = [np.abs(made.simulate(drive, TRUTH, n).Q - exact.Q).max() for n in steps]
+    assert -np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(order, abs=0.25)
+
+
+def test_integrated_as_printed_a_model_takes_one_step_per_sample_and_says_what_that_leaves(model):
+    printed = compose(model.motor, model.static, integration="printed")
+    drive = Drive.of([dip()])
+    substeps, error = printed.substeps(drive, TRUTH)
+    assert substeps.tolist() == [1]
+    assert error[0] > 1e-4
+    assert model.substeps(drive, TRUTH)[1][0] < 1e-7
+    assert printed.source != model.source
+    with pytest.raises(UserError, match="model.integration=euler is not one of classical, printed"):
+        compose(model.motor, model.static, integration="euler")
+
+
 def test_recorded_frequency_moves_the_synchronous_speed(model):
     """At a constant off-nominal frequency the load is in the same steady state: flat stays flat, slip unchanged."""
     t = np.arange(500) * 1e-3

@@ -5,7 +5,8 @@ array with literal offsets, so that LLVM vectorises it and state, constants and 
 sample is stored unless asked for. Equal lanes give equal bits wherever they stand in a batch.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import sympy
 from sympy.printing.pycode import PythonCodePrinter
@@ -16,7 +17,20 @@ from tractexp.model.template import HEADER, RUN, SETTLE
 
 LANES = 16
 PHASES = ("derivative", "renewal", "output")  # what is evaluated lane by lane
-STAGES = (("k1", "a", None), ("k2", "b", ("0.5 * h", "k1")), ("k3", "b", ("0.5 * h", "k2")), ("k4", "c", ("h", "k3")))
+STAGES = {  # slope, where the voltage is taken, and how far along which slope the states are
+    "classical": (
+        ("k1", "a", None),
+        ("k2", "b", ("0.5 * h", "k1")),
+        ("k3", "b", ("0.5 * h", "k2")),
+        ("k4", "c", ("h", "k3")),
+    ),
+    "printed": (
+        ("k1", "a", None),
+        ("k2", "b", ("h / 6.0", "k1")),
+        ("k3", "b", ("h / 6.0", "k2")),
+        ("k4", "c", ("h", "k3")),
+    ),
+}
 
 
 class _Printer(PythonCodePrinter):
@@ -52,7 +66,7 @@ class _Printer(PythonCodePrinter):
 _printer = _Printer({"fully_qualified_modules": True, "precision": 17})
 
 
-def source(lowered: Lowered, title: str) -> str:
+def source(lowered: Lowered, title: str, integration: str = "classical") -> str:
     """The kernel module's source text. Deterministic: the same equations give the same text."""
     at = _Rows(lowered)
     sample_signals = _sample_signals(lowered)
@@ -82,7 +96,7 @@ def source(lowered: Lowered, title: str) -> str:
         fill_signals=_indent(8, _fill_signals(lowered)),
         start=_indent(16, _load_candidate(lowered, rows, at)),
         sample=_indent(20, _sample(lowered, at)),
-        advance=_indent(24, _advance(lowered, at)),
+        advance=_indent(24, _advance(lowered, at, STAGES[integration])),
     )  # fmt: skip
     return text
 
@@ -168,8 +182,8 @@ def _sample(lowered: Lowered, at: _Rows) -> list[str]:
     return [*lines, f"for l in range({LANES}):", *_nested(body)]
 
 
-def _advance(lowered: Lowered, at: _Rows) -> list[str]:
-    """Classical Runge-Kutta, order 4 (Eq. (4) with its stage steps corrected), the voltage smooth between samples."""
+def _advance(lowered: Lowered, at: _Rows, stages: Sequence[Any]) -> list[str]:
+    """A step of four stages, Eq. (4), the voltage smooth between samples."""
     if not lowered.states:
         return ["pass"]
     inner = []
@@ -179,7 +193,7 @@ def _advance(lowered: Lowered, at: _Rows) -> list[str]:
             inputs = [f"{s}{point}" for s in lowered.inputs]
             inner.append(f"{_targets(f'{s}{point}' for s in signals)} = _drive({_names([*inputs, *lowered.event])})")
     body = at.load([*lowered.states, *lowered.memories, *at.needed["derivative"]])
-    body += [_stage(lowered, at, *stage) for stage in STAGES]
+    body += [_stage(lowered, at, *stage) for stage in stages]
     for s in lowered.states:
         body.append(f"W[{at[s]} + l] = {s} + h / 6.0 * (k1_{s} + 2.0 * (k2_{s} + k3_{s}) + k4_{s})")
     inner += [f"for l in range({LANES}):", *_nested(body)]
