@@ -102,7 +102,7 @@ def compose(
     they replace those of `model`, and one left out is that of the paper's model. `effects` names what is added to the
     equations. `bounds` {name: [lower, upper]} and `fixed` {name: value}, in the parameters' own units, are added to the
     choice's; `per_event` names parameters with a value of their own in each event; `substeps` are Runge-Kutta steps per
-    sample, as many as needed by default; `integration` "printed" takes Eq. (4) of the paper as it stands, of first order.
+    sample, as many as needed by default; `integration` "printed" is Eq. (4) of the paper as it stands.
 
     Raises `UserError` for an unknown name or an effect that does not fit the equations; the values are checked where
     the model is used.
