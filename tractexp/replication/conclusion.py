@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from tractexp.replication import equations, why
-from tractexp.replication.claims import CONFIRMED, PAIRS, Claim, number
+from tractexp.replication.claims import CONFIRMED, DEPENDS, PAIRS, Claim, number, ranked
 from tractexp.replication.printed import COMPARED, LABELS
 from tractexp.replication.study import AT_FLOOR, NARROW, TRADED, WIDE, Study
 from tractexp.wording import joined
@@ -22,7 +22,7 @@ def sentences(study: Study, judged: Sequence[Claim]) -> list[str]:
     if "table3" in parts:
         made.append(_ranking(study))
     if "figure9" in parts:
-        made.append(f"{_lack(study)[0]} {_random(study)}")
+        made.append(f"{_lack(study)} {_random(study)}")
     if "readings" in parts:
         made.append(_readings(parts["readings"]))
     return made
@@ -30,12 +30,14 @@ def sentences(study: Study, judged: Sequence[Claim]) -> list[str]:
 
 def _model(parts: Mapping[str, list[Claim]]) -> str:
     """Whether the errors are acceptable, on the fitted dip and on others."""
-    where = {"table2": ("fitted dip", 2), "table4": ("milder dip", 0), "table5": ("deeper dip", 0)}
-    good = [told for part, (told, k) in where.items() if part in parts and parts[part][k].verdict == CONFIRMED]
-    bad = [told for part, (told, _) in where.items() if part in parts and told not in good]
-    said = [f"describes the {joined(good)} with errors below 5 %, as the paper says"] * bool(good)
-    said += [f"does not describe the {joined(bad)} so well with every reading and seed"] * bool(bad)
-    return f"The load model that ISSA identifies {', but '.join(said)}."
+    where = {"table2": ("fitted", 2), "table4": ("milder", 0), "table5": ("deeper", 0)}
+    good = {part: parts[part][k].verdict == CONFIRMED for part, (_, k) in where.items() if part in parts}
+    said = []
+    for holds, does in ((True, "describes"), (False, "does not describe with every reading and seed")):
+        if chosen := [f"the {where[part][0]}" for part, verdict in good.items() if verdict == holds]:
+            said.append(f"{does} {joined(chosen)} dip with errors below 5 %")
+    agrees = ", as the paper says" if all(good.values()) else ""
+    return f"The load model that ISSA identifies {', but '.join(said)}{agrees}."
 
 
 def _values() -> str:
@@ -56,10 +58,12 @@ def _ranking(study: Study) -> str:
     ):
         order = sorted(COMPARED, key=lambda name: np.median(study.objectives(name, by)))
         medians = ", ".join(f"{LABELS[n]} {number(float(np.median(study.objectives(n, by))))}" for n in order)
-        apart = [f"{LABELS[a]} and {LABELS[b]}" for a, b in PAIRS if not _differ(study, a, b, by)]
-        rest = f" (no significant difference between {joined(apart)})" if apart else " (all differences significant)"
+        apart = [f"between {LABELS[a]} and {LABELS[b]}" for a, b in PAIRS if not _differ(study, a, b, by)]
+        rest = f" (no significant difference {joined(apart)})" if apart else " (all differences significant)"
         made.append(f"{told} the median objectives are {medians} pu²{rest}")
-    return "; ".join(made) + "."
+    verdict, _ = ranked(study, "issa", "ssa", "iterations")
+    reading = f" Whether ISSA ends lower than SSA {verdict}." if verdict.startswith(DEPENDS) else ""
+    return "; ".join(made) + "." + reading
 
 
 def _differ(study: Study, first: str, second: str, by: str) -> bool:
@@ -70,51 +74,61 @@ def _differ(study: Study, first: str, second: str, by: str) -> bool:
     return why.significant(three, PAIRS.index(pair)) or why.significant(flipped, PAIRS.index(pair))
 
 
-def _lack(study: Study) -> tuple[str, list[why.Lack]]:
-    found = why.lacks(study)
-    said = why.answer(found)
-    return f"That the sparrow searches lack convergence at the end and not exploration {said}.", found
+def _lack(study: Study) -> str:
+    said = why.answer(why.lacks(study))
+    return f"That convergence at the end, not exploration, is what the sparrow searches lack {said}."
 
 
 def _random(study: Study) -> str:
     shares, control = {name: study.shares(name) for name in COMPARED}, study.control_shares
     there = ", ".join(f"{LABELS[n]} {s.valley} of {s.n}" for n, s in shares.items())
-    done = ", ".join(f"{LABELS[n]} {s.done} of {s.n}" for n, s in shares.items())
+    above = ", ".join(f"{LABELS[n]} {np.median(study.above_bottom(n)):.2f}" for n in COMPARED)
     return (
-        f"In the valley of the lowest objective end {there}, and {control.valley} of {control.n} random points descend"
-        f" there; at the bottom of whichever valley they are in, {done}."
+        f"In the valley of the lowest objective end {there} searches, and {control.valley} of {control.n} random points"
+        f" descend there; the median objective over that at the bottom of the search's own valley is {above}."
     )
 
 
 def _readings(judged: Sequence[Claim]) -> str:
+    """Which of the claims about readings and ingredients hold."""
     held = [claim.text for claim in judged if claim.verdict == CONFIRMED]
     if held:
-        return f"Of what the improvement is said to rest on holds: {joined(held)}."
-    return "What the improvement is said to rest on does not hold: " + joined(
-        [claim.text[0].lower() + claim.text[1:] if claim.text[1].islower() else claim.text for claim in judged]
-    ) + "."  # fmt: skip
+        return f"Of what the improvement rests on, this holds: {'; '.join(held)}."
+    return f"None of what the improvement rests on holds: {'; '.join(claim.text for claim in judged)}."
 
 
 def reasons(study: Study) -> list[str]:
     """Why the three rank as they do, tested."""
-    told, found = _lack(study)
-    made = [f"Is it convergence at the end, and not exploration, that the sparrows lack? {told} {_random(study)}"]
-    for lack in found:
-        label, ratio = LABELS[lack.name], study.objectives(lack.name) / study.ends[lack.name].objective
-        convergence = "less often than PSO" if lack.convergence else "not significantly less often than PSO"
-        exploration = "less often than PSO or a random point" if lack.exploration else "not significantly less often"
-        made.append(
-            f"{label} is at the bottom of its own valley {convergence} (median {np.median(ratio):.2f} times its"
-            f" objective), and in the right valley {exploration}. Ended by least squares, it is"
-            f" {'not ' if lack.polished >= why.ALPHA else ''}significantly {'lower' if lack.A > 0.5 else 'higher'} than"
-            f" PSO ended so (p = {lack.polished:.2g}, A = {lack.A:.2f})."
-        )
-    best = study.shares("random_search")
+    made = [
+        f"Is it convergence at the end, and not exploration, that the sparrows lack? {_lack(study)} {_random(study)}"
+    ]
+    made += [_lacking(lack) for lack in why.lacks(study)]
+    best, rival, control = study.shares("random_search"), study.shares(why.RIVAL), study.control_shares
+    p = why.fisher(rival, control, "valley")
+    word = "more" if rival.valley * control.n > control.valley * rival.n else "less"
+    word = word if p < why.ALPHA else f"not significantly {word}"
     made.append(
-        f"The best of {study.equal:,} random points, of pure exploration, lies in the right valley"
-        f" in {best.valley} of {best.n} searches."
+        f"PSO is in the right valley {word} often than random points (p = {p:.2g}). The best of {study.equal:,} random"
+        f" points, of exploration alone, is there in {best.valley} of {best.n} searches."
     )
     return made
+
+
+def _lacking(lack: why.Lack) -> str:
+    """What one of the sparrow searches lacks."""
+    farther = "" if lack.convergence.lacks else "not "
+    lost = [told for told, test in (("PSO", lack.valley), ("random points", lack.random)) if test.lacks]
+    often = f"significantly less often than {joined(lost)}" if lost else (
+        "not significantly less often than PSO, nor than random points"
+    )  # fmt: skip
+    ended = "not significantly different from"
+    if lack.polished.p < why.ALPHA:
+        ended = f"significantly {'higher' if lack.polished.less else 'lower'} than"
+    return (
+        f"{LABELS[lack.name]} ends {farther}significantly farther above the bottom of its own valley than PSO"
+        f" (p = {lack.convergence.p:.2g}), and in the right valley {often} (p = {lack.valley.p:.2g} and"
+        f" {lack.random.p:.2g}). Once least squares have ended both, it is {ended} PSO (p = {lack.polished.p:.2g})."
+    )
 
 
 def static_reactive(study: Study, values: np.ndarray) -> np.ndarray | None:
@@ -134,7 +148,7 @@ def valley(study: Study) -> list[str]:
     if len(groups) < 2 or "X_prime" not in names:
         return [f"Random points descend to {number(groups[0][0])} pu²; there is one valley."]
     (lowest, _, right), (second, count, left) = groups[:2]
-    column, reactance = names.index(TRADED), names.index("X_prime")
+    column = names.index(TRADED)
     ended = {n: int(np.sum(np.abs(study.ends[n].objective / second - 1) < AT_FLOOR - 1)) for n in COMPARED}
     at_bound = abs(left[column] - own[0]) < 0.01 * (own[1] - own[0])
     where = f"on the lower bound of {TRADED}, {own[0]:g}" if at_bound else f"at {TRADED} = {left[column]:.3g}"
@@ -146,8 +160,7 @@ def valley(study: Study) -> list[str]:
     ]
     between = (grid > min(left[column], right[column])) & (grid < max(left[column], right[column]))
     ridge = int(np.flatnonzero(between)[np.argmax(path.objective[between])])
-    side = grid < grid[ridge] if left[column] < right[column] else grid > grid[ridge]
-    ratio = path.values[side, reactance] / path.values[side, column]
+    side = (grid < grid[ridge] if left[column] < right[column] else grid > grid[ridge]) & (path.objective < 2 * lowest)
     static = static_reactive(study, np.stack((right, left)))
     told = (
         f" There the static load's part of the reactive power, Q_s0 = Q0 - Q_d0, changes its sign: {static[0]:+.2f} pu"
@@ -159,27 +172,37 @@ def valley(study: Study) -> list[str]:
         f"Between the two lies a ridge: at {TRADED} = {grid[ridge]:.2f} the best fit has"
         f" {path.objective[ridge] / lowest:.1f} times the lowest objective.{told}"
     )
-    ends = side.nonzero()[0][[0, -1]]
-    far = ends[np.argmin(path.objective[ends])]
-    inside = int(np.abs(grid - left[column]).argmin())
-    made.append(
-        f"Along the valley {TRADED} trades against X' and q_v: X'/{TRADED} stays {np.median(ratio):.3f}"
-        f" (within {100 * np.ptp(ratio[np.isfinite(ratio)]) / np.median(ratio) / 2:.1f} %), so that the motor draws the"
-        " same active power, and as the U²/X' of its reactive power grows, the static load takes it off again, its"
-        f" exponent q_v going from {path.values[inside, names.index('q_v')]:.2f} to"
-        f" {path.values[far, names.index('q_v')]:.2f}, ever closer to 2. The objective falls all the way, from"
-        f" {path.objective[inside] / lowest:.2f} to {path.objective[far] / lowest:.2f} times the lowest at {TRADED} ="
-        f" {grid[far]:.2f}, and has no minimum inside: whatever the bound, it attracts."
-        if "q_v" in names
-        else f"Along the valley X'/{TRADED} stays {np.median(ratio):.3f}."
-    )
+    made.append(_traded(study, side, left, lowest))
     wide, narrow = (study.rebounded[bounds] for bounds in (WIDE, NARROW))
     fallen = wide.objective[(wide.objective > AT_FLOOR * lowest) & (wide.objective < 2 * lowest)]
-    there = int(np.sum(np.abs(narrow.objective / second - 1) < AT_FLOOR - 1))
     still = f", with {fallen.min() / lowest:.2f} times the lowest objective" if len(fallen) else ""
     made.append(
         f"Wider bounds do not help: with {TRADED} from {WIDE[0]:g}, {len(fallen)} of {len(wide.objective)} random"
         f" points end at the new bound{still}. Narrower ones do: with {TRADED} from {NARROW[0]:g}, as induction motors"
-        f" have it, {there} do."
+        f" have it, {int(np.sum(narrow.objective <= AT_FLOOR * lowest))} of {len(narrow.objective)} descend to the"
+        " lowest objective."
     )
     return made
+
+
+def _traded(study: Study, side: np.ndarray, left: np.ndarray, lowest: float) -> str:
+    """What trades along the valley, where `side` (len of the path) is True."""
+    grid, path = study.path
+    names = list(study.problem.space.names)
+    column = names.index(TRADED)
+    ratio = path.values[side, names.index("X_prime")] / path.values[side, column]
+    told = (
+        f"Along the valley {TRADED} trades against X': X'/{TRADED} stays {np.median(ratio):.3f} (within"
+        f" {50 * np.ptp(ratio) / np.median(ratio):.1f} %), so that the motor draws the same active power."
+    )
+    if "q_v" in names:
+        near, far = side.nonzero()[0][[-1, 0]] if left[column] < grid[side].max() else side.nonzero()[0][[0, -1]]
+        here, q_v = int(np.abs(grid - left[column]).argmin()), path.values[:, names.index("q_v")]
+        told += (
+            " As the U²/X' of its reactive power grows, the static load takes it off again, with q_v ever closer to 2:"
+            f" {q_v[near]:.2f}, {q_v[here]:.2f} and {q_v[far]:.2f} at {TRADED} = {grid[near]:.2f}, {grid[here]:.2f} and"
+            f" {grid[far]:.2f}. The objective falls all the way, {path.objective[near] / lowest:.2f},"
+            f" {path.objective[here] / lowest:.2f} and {path.objective[far] / lowest:.2f} times the lowest, and has no"
+            " minimum inside: whatever the bound, it attracts."
+        )
+    return told

@@ -21,7 +21,7 @@ TARGETS = (10.0, 2.0)  # of running times, times the floor
 AT_FLOOR = 1.1  # a search within so many times the floor has found it; one so near the bottom of its valley is done
 RANDOM = 200  # points from which the control descends
 TRADED = "C"  # the parameter along which the valleys lie
-WIDE, NARROW = (0.06, 0.99), (0.65, 0.99)  # other bounds of it; below the first X' meets its own bound
+WIDE, NARROW = (0.06, 0.99), (0.75, 0.99)  # other bounds of it; below the first X' meets its own bound
 BUDGETS = ("iterations", "simulations")  # by which searches are compared
 LEVEL = (*COMPARED, *TEN.values(), "pso_limited")  # the readings that search one objective, by 300 iterations
 EQUALLY = ("issa", "ssa", *TEN.values())  # those whose searches are made anew at equal simulations
@@ -193,6 +193,10 @@ class Study:
     @functools.cached_property
     def control(self) -> valleys.Ends:
         return self.random_ends(self.problem)
+
+    def above_bottom(self, name: str) -> np.ndarray:
+        """(seeds,) where the searches of a reading end, over the bottom of the valley that each is in."""
+        return self.objectives(name) / self.ends[name].objective
 
     def shares(self, name: str) -> Shares:
         """Of the searches of a reading."""

@@ -10,7 +10,7 @@ SPARROWS, RIVAL = ("issa", "ssa"), "pso"
 
 
 def fisher(a: Shares, b: Shares, of: str) -> float:
-    """Two-sided p of Fisher's exact test: as many searches of both reach the "valley", the "floor", or are "done"."""
+    """Two-sided p of Fisher's exact test: as many searches of both reach the "valley" or the "floor"."""
     from scipy.stats import fisher_exact
 
     rows = [[getattr(s, of), s.n - getattr(s, of)] for s in (a, b)]
@@ -23,53 +23,56 @@ def significant(pairs: Sequence[Pair], k: int) -> bool:
 
 
 @dataclass(frozen=True)
-class Lack:
-    """What a sparrow search lacks beside PSO: p-values, corrected over the tests of both searches, and effects."""
+class Test:
+    """p of no difference, corrected, and whether what is tested has less than what it is compared with."""
 
-    name: str
-    done: float  # p of as many searches at the bottom of their own valley as PSO's
-    valley: float  # p of as many in the right valley as PSO's
-    random: float  # p of as many there as random points descend to
-    polished: float  # p of equal objectives, paired by seed, once least squares have ended both
-    A: float  # the probability that it is the lower then
-    less_done: bool
-    less_valley: bool
-    less_random: bool
+    p: float
+    less: bool
 
     @property
-    def convergence(self) -> bool:
-        """It gets to the bottom of its valley less often."""
-        return self.less_done and self.done < ALPHA
+    def lacks(self) -> bool:
+        return self.less and self.p < ALPHA
+
+
+@dataclass(frozen=True)
+class Lack:
+    """What a sparrow search lacks beside PSO and beside random points."""
+
+    name: str
+    convergence: Test  # depth in its own valley, paired with PSO's: the objective over that of the bottom
+    valley: Test  # searches in the right valley, beside PSO's
+    random: Test  # searches in the right valley, beside random points that descend there
+    polished: Test  # objectives paired with PSO's, once least squares have ended both
 
     @property
     def exploration(self) -> bool:
-        """It finds the right valley less often than PSO, or than random points do."""
-        return (self.less_valley and self.valley < ALPHA) or (self.less_random and self.random < ALPHA)
+        return self.valley.lacks or self.random.lacks
 
 
 def lacks(study: Study) -> list[Lack]:
-    """ISSA's and SSA's, beside PSO and beside random points."""
-    rival, control = study.shares(RIVAL), study.control_shares
-    shares = {name: study.shares(name) for name in SPARROWS}
-    tests = []
-    for name in SPARROWS:
-        own = shares[name]
-        tests += [fisher(own, rival, "done"), fisher(own, rival, "valley"), fisher(own, control, "valley")]
-        tests.append(wilcoxon(study.ends[name].objective, study.ends[RIVAL].objective)[0])
-    corrected = holm(tests).tolist()
-    made = []
-    for k, name in enumerate(SPARROWS):
-        own, A = shares[name], vargha_delaney(study.ends[name].objective, study.ends[RIVAL].objective)
-        less = own.done < rival.done, own.valley < rival.valley, own.valley * control.n < control.valley * own.n
-        made.append(Lack(name, *corrected[4 * k : 4 * k + 4], A, *less))
-    return made
+    """ISSA's and SSA's; the p-values are corrected over the tests of both."""
+    tests = [test for name in SPARROWS for test in _tests(study, name)]
+    corrected = holm([test.p for test in tests]).tolist()
+    judged = [Test(p, test.less) for p, test in zip(corrected, tests, strict=True)]
+    return [Lack(name, *judged[4 * k : 4 * k + 4]) for k, name in enumerate(SPARROWS)]
+
+
+def _tests(study: Study, name: str) -> list[Test]:
+    """Not yet corrected."""
+    own, rival, control = study.shares(name), study.shares(RIVAL), study.control_shares
+    above, beside = study.above_bottom(name), study.above_bottom(RIVAL)
+    ended, other = study.ends[name].objective, study.ends[RIVAL].objective
+    return [
+        Test(wilcoxon(above, beside)[0], vargha_delaney(above, beside) < 0.5),
+        Test(fisher(own, rival, "valley"), own.valley < rival.valley),
+        Test(fisher(own, control, "valley"), own.valley * control.n < control.valley * own.n),
+        Test(wilcoxon(ended, other)[0], vargha_delaney(ended, other) < 0.5),
+    ]
 
 
 def answer(found: Sequence[Lack]) -> str:
     """Whether "convergence at the end, not exploration, is what the sparrows lack" holds."""
-    if all(lack.convergence and not lack.exploration for lack in found):
-        return "holds"
-    if any(lack.exploration for lack in found):
-        both = all(lack.convergence for lack in found)
-        return "does not hold: they lack exploration" + (" as well" if both else "")
-    return "does not hold: they do not lack convergence"
+    converging, exploring = all(lack.convergence.lacks for lack in found), any(lack.exploration for lack in found)
+    if converging:
+        return "holds only in half, for they lack both" if exploring else "holds"
+    return "does not hold: it is exploration" if exploring else "is not shown: neither test is significant"

@@ -151,7 +151,7 @@ def _one(values: Any, what: str, table: Any = None, name: str = "") -> str:
 def _label(name: str) -> str:
     """ "issa_10_perceivers" -> "ISSA, 10 perceivers (section 4.2)"; the three of the tables are named alone."""
     reading = READINGS[name]
-    return LABELS[reading.optimizer] if name in COMPARED else f"{LABELS[reading.optimizer]}, {reading.told}"
+    return LABELS[name] if name in LABELS else f"{LABELS[reading.optimizer]}, {reading.told}"
 
 
 def _parameters(sheet: Any, study: Study, columns: Sequence[tuple[str, str]], caption: str) -> None:
@@ -326,7 +326,7 @@ def _reasons(sheet: Any, study: Study) -> None:
     for name in (*LEVEL, "random_search"):
         share = study.shares(name)
         rows.append([_label(name), *(f"{k} of {share.n}" for k in (share.valley, share.floor, share.done)),
-                     _middle(study.objectives(name) / study.ends[name].objective)])  # fmt: skip
+                     _middle(study.above_bottom(name))])  # fmt: skip
     control = study.control_shares
     rows.append(["a random point", f"{control.valley} of {control.n}", "-", "-", "-"])
     sheet.table(
@@ -336,14 +336,13 @@ def _reasons(sheet: Any, study: Study) -> None:
         f" within {AT_FLOOR:g} times of it. The control: {RANDOM} random points of the bounds, and the best of"
         f" {study.equal:,} of them.",
     )  # fmt: skip
-    found = why.lacks(study)
     sheet.table(
-        ["beside PSO", "as many at the bottom of their valley", "as many in the right valley",
-         "as many there as random points", "as low once least squares have ended both", "A then"],
-        [[LABELS[k.name], *(f"p = {p:.2g}" for p in (k.done, k.valley, k.random, k.polished)), f"{k.A:.2f}"]
-         for k in found],
-        "Fisher's exact test, two-sided; the last Wilcoxon's over paired seeds; all by Holm's correction. A small p"
-        " says that it is not so. SD = 20, no velocity limit.",
+        ["beside PSO", "as deep in its own valley", "as often in the right valley", "as often there as random points",
+         "as low once least squares have ended both"],
+        [[LABELS[k.name], *(f"p = {t.p:.2g}" for t in (k.convergence, k.valley, k.random, k.polished))]
+         for k in why.lacks(study)],
+        "First and last Wilcoxon's test over paired seeds, the others Fisher's exact test; two-sided, all by Holm's"
+        " correction. SD = 20, no velocity limit.",
     )  # fmt: skip
 
 
