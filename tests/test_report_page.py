@@ -63,8 +63,8 @@ def read(path) -> Reader:
 
 @pytest.fixture
 def drawing(tmp_path):
-    curve = {"issa": (np.arange(50), np.geomspace(1, 1e-5, 50))}
-    return figures.fitness(tmp_path / "fitness.svg", curve, curve, title="search")
+    t, power = np.arange(50.0), np.geomspace(1, 1e-5, 50)
+    return figures.fit(tmp_path / "fit.svg", t, t, (power, power), (power, power), title="a fit", epsilon=(0.0, 0.0))
 
 
 def test_whatever_is_written_is_escaped(tmp_path, drawing):

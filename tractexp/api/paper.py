@@ -49,9 +49,10 @@ class Replicated(Written):
         return Counter(claim.word for claim in self.claims)
 
     def table(self) -> Table:
+        from tractexp.replication.claims import counted
+
         rows = [[claim.part, claim.text, claim.verdict, claim.measured] for claim in self.claims]
-        told = ", ".join(f"{n} {verdict}" for verdict, n in self.counts.items())
-        return Table(["where", "the paper's claim", "verdict", "measured"], rows, f"{len(rows)} claims: {told}")
+        return Table(["where", "the paper's claim", "verdict", "measured"], rows, counted(self.claims))
 
     def _write(self, folder: Path) -> list[Path]:
         """paper.html and paper.md."""

@@ -1,5 +1,6 @@
 """The paper's claims, each with a verdict that the measurements of a `Study` decide."""
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -35,6 +36,16 @@ class Claim:
     def word(self) -> str:
         """The verdict without its reason."""
         return self.verdict.partition(":")[0]
+
+
+def counted(judged: Sequence[Claim]) -> str:
+    """How many there are and how many got which verdict: "38 claims: 7 confirmed, 31 not confirmed"."""
+    counts = Counter(claim.word for claim in judged)
+    told = {CONFIRMED: CONFIRMED, DEPENDS: "depending on the reading", REFUTED: REFUTED, IMPOSSIBLE: IMPOSSIBLE}
+    told |= {word: word for word in counts if word not in told}
+    return f"{len(judged)} claims: " + ", ".join(
+        f"{counts[word]} {said}" for word, said in told.items() if counts[word]
+    )
 
 
 def number(value: float) -> str:

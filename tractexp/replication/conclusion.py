@@ -30,14 +30,13 @@ def sentences(study: Study, judged: Sequence[Claim]) -> list[str]:
 
 def _model(parts: Mapping[str, list[Claim]]) -> str:
     """Whether the errors are acceptable, on the fitted dip and on others."""
-    where = {"table2": ("fitted", 2), "table4": ("milder", 0), "table5": ("deeper", 0)}
-    good = {part: parts[part][k].verdict == CONFIRMED for part, (_, k) in where.items() if part in parts}
-    said = []
-    for holds, does in ((True, "describes"), (False, "does not describe with every reading and seed")):
-        if chosen := [f"the {where[part][0]}" for part, verdict in good.items() if verdict == holds]:
-            said.append(f"{does} {joined(chosen)} dip with errors below 5 %")
-    agrees = ", as the paper says" if all(good.values()) else ""
-    return f"The load model that ISSA identifies {', but '.join(said)}{agrees}."
+    where = {"table2": ("the fitted", 2), "table4": ("the milder", 0), "table5": ("the deeper", 0)}
+    verdicts = {told: parts[part][k].verdict for part, (told, k) in where.items() if part in parts}
+    good = [told for told, verdict in verdicts.items() if verdict == CONFIRMED]
+    said = [f"describes {joined(good)} dip with errors below 5 %, whatever the reading and the seed"] * bool(good)
+    said += [f"of {told} dip this {verdict}" if verdict.startswith(DEPENDS) else f"not {told} dip"
+             for told, verdict in verdicts.items() if verdict != CONFIRMED]  # fmt: skip
+    return f"The load model that ISSA identifies {'; '.join(said)}."
 
 
 def _values() -> str:
@@ -103,13 +102,13 @@ def reasons(study: Study) -> list[str]:
         f"Is it convergence at the end, and not exploration, that the sparrows lack? {_lack(study)} {_random(study)}"
     ]
     made += [_lacking(lack) for lack in why.lacks(study)]
-    best, rival, control = study.shares("random_search"), study.shares(why.RIVAL), study.control_shares
+    rival, limited, control = study.shares(why.RIVAL), study.shares("pso_limited"), study.control_shares
     p = why.fisher(rival, control, "valley")
     word = "more" if rival.valley * control.n > control.valley * rival.n else "less"
     word = word if p < why.ALPHA else f"not significantly {word}"
     made.append(
-        f"PSO is in the right valley {word} often than random points (p = {p:.2g}). The best of {study.equal:,} random"
-        f" points, of exploration alone, is there in {best.valley} of {best.n} searches."
+        f"PSO is in the right valley {word} often than random points (p = {p:.2g}); with its velocity limited to 0.2 in"
+        f" {limited.valley} of {limited.n} searches."
     )
     return made
 
@@ -117,17 +116,18 @@ def reasons(study: Study) -> list[str]:
 def _lacking(lack: why.Lack) -> str:
     """What one of the sparrow searches lacks."""
     farther = "" if lack.convergence.lacks else "not "
-    lost = [told for told, test in (("PSO", lack.valley), ("random points", lack.random)) if test.lacks]
-    often = f"significantly less often than {joined(lost)}" if lost else (
-        "not significantly less often than PSO, nor than random points"
-    )  # fmt: skip
+    others = {"PSO": lack.valley, "random points": lack.random, "the best of as many random points": lack.best}
+    lost = [told for told, test in others.items() if test.lacks]
+    often = "" if lost else "not "
+    tests = ", ".join(f"beside {told} p = {test.p:.2g}" for told, test in others.items())
     ended = "not significantly different from"
     if lack.polished.p < why.ALPHA:
         ended = f"significantly {'higher' if lack.polished.less else 'lower'} than"
     return (
         f"{LABELS[lack.name]} ends {farther}significantly farther above the bottom of its own valley than PSO"
-        f" (p = {lack.convergence.p:.2g}), and in the right valley {often} (p = {lack.valley.p:.2g} and"
-        f" {lack.random.p:.2g}). Once least squares have ended both, it is {ended} PSO (p = {lack.polished.p:.2g})."
+        f" (p = {lack.convergence.p:.2g}), and is {often}significantly less often in the right valley than"
+        f" {joined(lost or list(others), 'and' if lost else 'or')} ({tests}). Once least squares have ended both, it is"
+        f" {ended} PSO (p = {lack.polished.p:.2g})."
     )
 
 

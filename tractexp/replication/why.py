@@ -42,11 +42,12 @@ class Lack:
     convergence: Test  # depth in its own valley, paired with PSO's: the objective over that of the bottom
     valley: Test  # searches in the right valley, beside PSO's
     random: Test  # searches in the right valley, beside random points that descend there
+    best: Test  # the same, beside searches for the best of as many random points
     polished: Test  # objectives paired with PSO's, once least squares have ended both
 
     @property
     def exploration(self) -> bool:
-        return self.valley.lacks or self.random.lacks
+        return self.valley.lacks or self.random.lacks or self.best.lacks
 
 
 def lacks(study: Study) -> list[Lack]:
@@ -54,18 +55,21 @@ def lacks(study: Study) -> list[Lack]:
     tests = [test for name in SPARROWS for test in _tests(study, name)]
     corrected = holm([test.p for test in tests]).tolist()
     judged = [Test(p, test.less) for p, test in zip(corrected, tests, strict=True)]
-    return [Lack(name, *judged[4 * k : 4 * k + 4]) for k, name in enumerate(SPARROWS)]
+    each = len(judged) // len(SPARROWS)
+    return [Lack(name, *judged[each * k : each * (k + 1)]) for k, name in enumerate(SPARROWS)]
 
 
 def _tests(study: Study, name: str) -> list[Test]:
     """Not yet corrected."""
-    own, rival, control = study.shares(name), study.shares(RIVAL), study.control_shares
+    own, control = study.shares(name), study.control_shares
+    rival, best = (study.shares(other) for other in (RIVAL, "random_search"))
     above, beside = study.above_bottom(name), study.above_bottom(RIVAL)
     ended, other = study.ends[name].objective, study.ends[RIVAL].objective
     return [
         Test(wilcoxon(above, beside)[0], vargha_delaney(above, beside) < 0.5),
         Test(fisher(own, rival, "valley"), own.valley < rival.valley),
         Test(fisher(own, control, "valley"), own.valley * control.n < control.valley * own.n),
+        Test(fisher(own, best, "valley"), own.valley < best.valley),
         Test(wilcoxon(ended, other)[0], vargha_delaney(ended, other) < 0.5),
     ]
 

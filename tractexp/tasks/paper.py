@@ -44,7 +44,7 @@ class Paper(Task):
             say(f"  {claim.verdict}: {claim.text}")
             say(f"    {claim.measured}")
         if made.claims:
-            say(f"{len(made.claims)} claims: " + ", ".join(f"{n} {verdict}" for verdict, n in made.counts.items()))
+            say(made.table().title)
         say(f"in {time.perf_counter() - started:.0f} s")
         if self.docs is not None:
             paths.append(publish(paths, Path(self.docs)))
