@@ -443,7 +443,9 @@ def test_a_verdict_that_depends_on_the_reading_says_so():
     study = planted(10, read_alike(2.0, 2.0, 3.0, issa_10_perceivers=1.0))
     verdict, told = claims.ranked(study, "issa", "ssa", "iterations")
     assert verdict == "depends on the reading: confirmed only with the 10 perceivers of section 4.2"
-    assert told.startswith("with SD = 20 (section 4.3) medians 2 and 2 pu², p = 1, A = 0.50; with the 10 perceivers")
+    assert told.startswith(
+        "with SD = 20 (section 4.3) medians 2.01 and 2.01 pu², p = 1, A = 0.50; with the 10 perceivers"
+    )
     limited = planted(10, read_alike(1.0, 2.0, 3.0, pso_limited=0.5))
     assert claims.ranked(limited, "issa", "pso", "iterations")[0].endswith(
         "confirmed only with SD = 20 (section 4.3) and with the 10 perceivers of section 4.2"
@@ -483,7 +485,7 @@ def test_the_faster_reaches_every_target_with_less_beyond_chance():
 
 
 def explored(seeds, ends):
-    """A study in which searches {reading: (where they end, the bottom below)} and half of the random points are right."""
+    """A study in which {reading: (ends, bottoms below)} were searched, and half of the random points are right."""
     study = planted(seeds, {name: 1.0 for name in ends})
     for name, (at, _) in ends.items():
         for seed, found in enumerate(study.seen[name, "iterations"]):
