@@ -363,6 +363,24 @@ def _study(seeds=1, budget=150):
     return Study(_recipe, {}, _recipe().events, (), seeds, workers=1, limits=limits, literal=literal)
 
 
+def test_descents_are_made_once_for_the_same_starts(memory, monkeypatch):
+    """What least squares reach is kept beside the searches; another floor or start is another descent."""
+    made, descend = [], valleys.descended
+    monkeypatch.setattr(valleys, "descended", lambda *a, **k: made.append(len(a[1])) or descend(*a, **k))
+    monkeypatch.setattr("tractexp.replication.study.RANDOM", 4)
+    first, again = (_study() for _ in range(2))
+    for study in (first, again):
+        vars(study)["floor"] = 3e-5
+    np.testing.assert_array_equal(first.control.values, again.control.values)
+    np.testing.assert_array_equal(first.control.objective, again.control.objective)
+    assert made == [4]
+    other, elsewhere = _study(), replace(_study(), seed=1)
+    vars(other)["floor"], vars(elsewhere)["floor"] = 4e-5, 3e-5
+    for study in (other, elsewhere):
+        _ = study.control
+    assert made == [4, 4, 4]
+
+
 def test_equal_budgets_are_laid_out_whole_and_equal_for_all(memory, monkeypatch):
     """A search of 15,050 simulations is not one of 300 iterations cut: its schedules know where they end."""
     asked = []
@@ -638,7 +656,7 @@ def test_bounds_and_every_reading_stand_beside_the_three(page):
     for heading in ("## Table 2", "## Table 3"):
         section = text.split(heading)[1].split("\n## ")[0]
         assert "| C | 0.3 .. 0.99 |" in section
-        for told in ("10 perceivers (section 4.2)", "to the letter"):
+        for told in ("10 perceivers (4.2)", "to the letter"):
             assert told in section
     for told in ("PSO, velocity limit 0.2", "| SSA, to the letter |"):
         assert told in section

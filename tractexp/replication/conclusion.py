@@ -118,16 +118,14 @@ def _lacking(lack: why.Lack) -> str:
     farther = "" if lack.convergence.lacks else "not "
     others = {"PSO": lack.valley, "random points": lack.random, "the best of as many random points": lack.best}
     lost = [told for told, test in others.items() if test.lacks]
-    often = "" if lost else "not "
-    tests = ", ".join(f"beside {told} p = {test.p:.2g}" for told, test in others.items())
+    often, than = ("", joined(lost)) if lost else ("not ", joined(list(others), "or"))
     ended = "not significantly different from"
     if lack.polished.p < why.ALPHA:
         ended = f"significantly {'higher' if lack.polished.less else 'lower'} than"
     return (
-        f"{LABELS[lack.name]} ends {farther}significantly farther above the bottom of its own valley than PSO"
-        f" (p = {lack.convergence.p:.2g}), and is {often}significantly less often in the right valley than"
-        f" {joined(lost or list(others), 'and' if lost else 'or')} ({tests}). Once least squares have ended both, it is"
-        f" {ended} PSO (p = {lack.polished.p:.2g})."
+        f"{LABELS[lack.name]} ends {farther}significantly farther above the bottom of its own valley than PSO, and is"
+        f" {often}significantly less often in the right valley than {than}. Once least squares have ended both, it is"
+        f" {ended} PSO."
     )
 
 

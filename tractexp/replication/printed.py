@@ -62,11 +62,11 @@ LETTER = {"space": "raw", "step": "scalar", "acceptance": "all"}
 
 # By the names that the optimizers have in conf/optimizer. The first three are what Tables 2 to 5 show.
 READINGS: dict[str, Reading] = {
-    "issa": Reading("issa", "SD = 20 of 50 (section 4.3)"),
-    "ssa": Reading("ssa", "SD = 20 of 50 (section 4.3)"),
+    "issa": Reading("issa", "SD = 20 of 50 (4.3)"),
+    "ssa": Reading("ssa", "SD = 20 of 50 (4.3)"),
     "pso": Reading("pso", "no velocity limit"),
-    "issa_10_perceivers": Reading("issa", "10 perceivers (section 4.2)", {"perceivers": 0.2}),
-    "ssa_10_perceivers": Reading("ssa", "10 perceivers (section 4.2)", {"perceivers": 0.2}),
+    "issa_10_perceivers": Reading("issa", "10 perceivers (4.2)", {"perceivers": 0.2}),
+    "ssa_10_perceivers": Reading("ssa", "10 perceivers (4.2)", {"perceivers": 0.2}),
     "pso_limited": Reading("pso", "velocity limit 0.2", {"velocity_limit": 0.2}),
     "issa_to_the_letter": Reading("issa", "to the letter", LETTER | {"levy_formula": "printed"}, literal=True),
     "ssa_to_the_letter": Reading("ssa", "to the letter", LETTER, literal=True),

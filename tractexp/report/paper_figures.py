@@ -29,6 +29,7 @@ def evenness(spread: Mapping[str, np.ndarray]) -> Chart:
         f"{way}: {m:.3g}, 5 to 95 % {a:.3g} .. {b:.3g}" for way, a, m, b in zip(spread, low, middle, high, strict=True)
     ]
     made.points("", middle, rows, PALETTE[0], told=told, spans=np.stack((low, high), axis=1))
+    made.ticks(None, [k * 10.0**n for n in range(-4, 1) for k in (1, 2, 5)])
     return made.ticks(0, rows.tolist(), list(spread)).limits(0, rows[-1] - 0.6, 0.6)
 
 
@@ -43,7 +44,7 @@ def flights(steps: np.ndarray) -> Chart:
 def tails(drawn: Mapping[str, np.ndarray]) -> Chart:
     """Figure 4: the share of steps {formula: (n,)} that are larger than x."""
     names = {"mantegna": "Mantegna, |nu|^(1/beta)", "printed": "as printed, |nu|^beta"}
-    made = Chart("x", ["share of steps with |s| > x"], log_x=True, log_y=True)
+    made = Chart("x", ["share with |s| > x"], log_x=True, log_y=True, pixels=340)
     for k, (formula, steps) in enumerate(drawn.items()):
         size = np.sort(np.abs(steps))
         share = 1 - np.arange(len(size)) / len(size)
