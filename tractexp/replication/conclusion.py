@@ -33,7 +33,7 @@ def _model(parts: Mapping[str, list[Claim]]) -> str:
     where = {"table2": ("the fitted", 2), "table4": ("the milder", 0), "table5": ("the deeper", 0)}
     verdicts = {told: parts[part][k].verdict for part, (told, k) in where.items() if part in parts}
     good = [told for told, verdict in verdicts.items() if verdict == CONFIRMED]
-    said = [f"describes {joined(good)} dip with errors below 5 %, whatever the reading and the seed"] * bool(good)
+    said = [f"describes {joined(good)} dip with errors below 5 %, with every seed and reading tried"] * bool(good)
     said += [f"of {told} dip this {verdict}" if verdict.startswith(DEPENDS) else f"not {told} dip"
              for told, verdict in verdicts.items() if verdict != CONFIRMED]  # fmt: skip
     return f"The load model that ISSA identifies {'; '.join(said)}."

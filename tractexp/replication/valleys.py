@@ -1,6 +1,5 @@
 """The valleys of the objective: where searches and random points descend to, and the way along a parameter between."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,12 +60,12 @@ def within(problem: Problem, name: str, low: float, high: float) -> Problem:
     return Problem(problem.model, problem.events, bounds, problem.fixed, step, problem.per_event, problem.loss)
 
 
-def along(problem: Problem, starts: np.ndarray, name: str, grid: Sequence[float], floor: float) -> Ends:
+def along(problem: Problem, starts: np.ndarray, name: str, grid: np.ndarray, floor: float) -> Ends:
     """The lowest objective at each value of a parameter, all others fitted: followed from each start both ways."""
     column = problem.space.names.index(name)
     best, values = np.full(len(grid), np.inf), np.empty((len(grid), problem.space.dimension))
     for start in starts:
-        nearest = int(np.abs(np.asarray(grid) - start[column]).argmin())
+        nearest = int(np.abs(grid - start[column]).argmin())
         for way in (range(nearest, len(grid)), range(nearest - 1, -1, -1)):
             at = start
             for k in way:

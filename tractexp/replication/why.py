@@ -14,7 +14,7 @@ def fisher(a: Shares, b: Shares, of: str) -> float:
     from scipy.stats import fisher_exact
 
     rows = [[getattr(s, of), s.n - getattr(s, of)] for s in (a, b)]
-    return float(fisher_exact(rows).pvalue)
+    return float(fisher_exact(rows)[1])  # type: ignore[arg-type]
 
 
 def significant(pairs: Sequence[Pair], k: int) -> bool:
