@@ -148,12 +148,12 @@ def _rows(label: str, names: Sequence[str], *, log: bool = False) -> Chart:
     return chart.ticks(0, range(len(names)), names).limits(0, len(names) - 0.4, -0.6)
 
 
-def mean_ranks(ranks: Ranks) -> Chart:
-    """Mean ranks over seeds with half of Nemenyi's critical difference to either side, the best on top."""
+def mean_ranks(ranks: Ranks, label: str = "mean rank over the seeds (1 is best)") -> Chart:
+    """Mean ranks with half of Nemenyi's critical difference to either side, the best on top."""
     order = np.argsort(ranks.mean, kind="stable")
     names, mean = [ranks.names[k] for k in order], np.array(ranks.mean)[order]
     half = ranks.critical_difference / 2
-    chart = _rows("mean rank over the seeds (1 is best)", names)
+    chart = _rows(label, names)
     told = [f"{name}: {rank:.2f}" for name, rank in zip(names, mean, strict=True)]
     spans = np.column_stack((mean - half, mean + half))
     chart.points("", mean, np.arange(len(names)), style.PALETTE[0], told=told, spans=spans)
