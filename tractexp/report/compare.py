@@ -125,12 +125,13 @@ def spread(variants: Sequence[Variant], floor: Floor) -> Chart:
     )  # fmt: skip
     margin = max(ends.max() / floor.value, 1.2) ** 0.04
     low, high = min(floor.value, ends.min()) / margin, ends.max() * margin
-    if high < DECADE * low and len(at := _round(low, high)) > 2:  # Plotly's own are as long as 0.4 times 10 to the -4
+    # Plotly's own are as long as 0.4 times 10 to the -4
+    if high < DECADE * low and len(at := round_numbers(low, high)) > 2:
         chart.ticks(None, at, [f"{value:.1e}".replace(".0", "").replace("e-0", "e-") for value in at])
     return chart.edge(floor.value, dash="dash").limits(None, low, high)
 
 
-def _round(low: float, high: float) -> list[float]:
+def round_numbers(low: float, high: float) -> list[float]:
     """A few round numbers between two."""
     few, more = ([m * 10.0**k for k in range(-20, 5) for m in marks if low <= m * 10.0**k <= high] for marks in ROUND)
     return few if len(few) > 2 else more

@@ -91,9 +91,10 @@ def effects(overall: Overall) -> Chart:
         told = [f"{label}: {claims.of_effect(effect)}" for _, effect, label in own]
         x, y = [effect.factor for _, effect, _ in own], [row for row, *_ in own]
         chart.points(switch, x, y, style.PALETTE[k % len(style.PALETTE)], told=told, spans=spans)
-    chart.ticks(0, range(len(rows)), [f"{e.switches[0]}, {label}" for e, label, _ in rows])
+    chart.ticks(0, range(len(rows)), [label for _, label, _ in rows])
     ends = [bound for effect, *_ in rows for bound in (effect.low, effect.high)]
-    low, high = min(0.95, *ends) / 1.02, max(1.05, *ends) * 1.02
+    low, high = min(0.9, *ends) / 1.02, max(1.1, *ends) * 1.02
+    chart.ticks(None, figures.round_numbers(low, high))
     return chart.limits(0, len(rows) - 0.4, -0.6).edge(1.0, dash="dash").limits(None, low, high)
 
 

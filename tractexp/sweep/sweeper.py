@@ -8,7 +8,7 @@ import signal
 import sys
 import webbrowser
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -44,7 +44,7 @@ class GridConfig:
     params: dict[str, str] | None = None  # as on the command line: {"seed": "range(0,30)"}
     redo: bool = False  # run finished jobs again
     compare: bool = True  # end a sweep of several variants and seeds with the page of task=compare
-    comparison: dict[str, Any] | None = None  # settings of that task for it: {bbob: 3}
+    comparison: dict[str, Any] = field(default_factory=dict)  # settings of that task for it: {bbob: 3}
     open: bool = True  # show that page, where there is a desktop and somebody at it
 
 
@@ -55,11 +55,11 @@ class Grid(Sweeper):
     """
 
     def __init__(
-        self, params: Mapping[str, str] | None, redo: bool, compare: bool, comparison: Mapping[str, Any] | None,
+        self, params: Mapping[str, str] | None, redo: bool, compare: bool, comparison: Mapping[str, Any],
         open: bool,
     ):  # fmt: skip
         self.params, self.redo, self.open = params or {}, redo, open
-        self.comparison = dict(comparison or {}) if compare else None
+        self.comparison = {**comparison} if compare else None
 
     def setup(self, *, hydra_context: Any, task_function: Any, config: Any) -> None:
         self.loader = hydra_context.config_loader
