@@ -10,6 +10,8 @@ from tractexp.replication.printed import COMPARED, LABELS
 from tractexp.replication.study import AT_FLOOR, NARROW, TRADED, WIDE, Study
 from tractexp.wording import joined
 
+NEAR = 2.0  # times the lowest objective: a valley that a search might take for the right one
+
 
 def sentences(study: Study, judged: Sequence[Claim]) -> list[str]:
     """The conclusion of the page, of as many of its parts as there are."""
@@ -139,26 +141,33 @@ def static_reactive(study: Study, values: np.ndarray) -> np.ndarray | None:
 
 
 def valley(study: Study) -> list[str]:
-    """What the second valley is, where it lies and why searches go there."""
-    groups = study.control.grouped()
-    names, grid, path = list(study.problem.space.names), *study.path
-    own = next(p.bounds for p in study.problem.parameters if p.name == TRADED)
-    if len(groups) < 2 or "X_prime" not in names:
-        return [f"Random points descend to {number(groups[0][0])} pu²; there is one valley."]
+    """What the second valley is, where it lies and why searches go there; as much of it as this model shows."""
+    groups, names = study.control.grouped(), study.problem.space.names
+    if len(groups) < 2:
+        return [f"All random points descend to {number(groups[0][0])} pu²: there is one valley."]
     (lowest, _, right), (second, count, left) = groups[:2]
     column = names.index(TRADED)
+    low, high = next(p.bounds for p in study.problem.parameters if p.name == TRADED)
+    at_bound = left[column] - low < 0.01 * (high - low)
     ended = {n: int(np.sum(np.abs(study.ends[n].objective / second - 1) < AT_FLOOR - 1)) for n in COMPARED}
-    at_bound = abs(left[column] - own[0]) < 0.01 * (own[1] - own[0])
-    where = f"on the lower bound of {TRADED}, {own[0]:g}" if at_bound else f"at {TRADED} = {left[column]:.3g}"
+    where = f"on the lower bound of {TRADED}, {low:g}" if at_bound else f"at {TRADED} = {left[column]:.3g}"
     each = ", ".join(f"{LABELS[n]} {k}" for n, k in ended.items())
     made = [
         f"{sum(ended.values())} of {3 * study.seeds} searches ({each}) end in a valley whose bottom lies {where}, with"
         f" {second / lowest:.2f} times the lowest objective, which is at {TRADED} = {right[column]:.3g};"
         f" {count} of {len(study.control.objective)} random points of the bounds descend there."
     ]
-    between = (grid > min(left[column], right[column])) & (grid < max(left[column], right[column]))
-    ridge = int(np.flatnonzero(between)[np.argmax(path.objective[between])])
-    side = (grid < grid[ridge] if left[column] < right[column] else grid > grid[ridge]) & (path.objective < 2 * lowest)
+    if at_bound and second < NEAR * lowest and right[column] > left[column]:
+        made += _attraction(study, lowest, right, left)
+    return [*made, _bounds(study, (low, high), lowest)]
+
+
+def _attraction(study: Study, lowest: float, right: np.ndarray, left: np.ndarray) -> list[str]:
+    """Why the lower bound attracts: what lies between it and the lowest valley, and what trades along its own."""
+    grid, path = study.path
+    column = study.problem.space.names.index(TRADED)
+    between = np.flatnonzero((grid > left[column]) & (grid < right[column]))
+    ridge = int(between[np.argmax(path.objective[between])])
     static = static_reactive(study, np.stack((right, left)))
     told = (
         f" There the static load's part of the reactive power, Q_s0 = Q0 - Q_d0, changes its sign: {static[0]:+.2f} pu"
@@ -166,41 +175,48 @@ def valley(study: Study) -> list[str]:
         if static is not None and static[0] * static[1] < 0
         else ""
     )
-    made.append(
+    made = [
         f"Between the two lies a ridge: at {TRADED} = {grid[ridge]:.2f} the best fit has"
         f" {path.objective[ridge] / lowest:.1f} times the lowest objective.{told}"
-    )
-    made.append(_traded(study, side, left, lowest))
-    wide, narrow = (study.rebounded[bounds] for bounds in (WIDE, NARROW))
-    fallen = wide.objective[(wide.objective > AT_FLOOR * lowest) & (wide.objective < 2 * lowest)]
-    still = f", with {fallen.min() / lowest:.2f} times the lowest objective" if len(fallen) else ""
-    made.append(
-        f"Wider bounds do not help: with {TRADED} from {WIDE[0]:g}, {len(fallen)} of {len(wide.objective)} random"
-        f" points end at the new bound{still}. Narrower ones do: with {TRADED} from {NARROW[0]:g}, as induction motors"
-        f" have it, {int(np.sum(narrow.objective <= AT_FLOOR * lowest))} of {len(narrow.objective)} descend to the"
-        " lowest objective."
-    )
+    ]
+    along = np.flatnonzero((grid < grid[ridge]) & (path.objective < NEAR * lowest))
+    if len(along) > 1 and (np.diff(path.objective[along]) > 0).all():
+        made.append(_traded(study, along, int(np.abs(grid - left[column]).argmin()), lowest))
     return made
 
 
-def _traded(study: Study, side: np.ndarray, left: np.ndarray, lowest: float) -> str:
-    """What trades along the valley, where `side` (len of the path) is True."""
+def _traded(study: Study, along: np.ndarray, here: int, lowest: float) -> str:
+    """What trades along the valley, which `along` are points of the path; its bottom within the bounds is `here`."""
     grid, path = study.path
-    names = list(study.problem.space.names)
-    column = names.index(TRADED)
-    ratio = path.values[side, names.index("X_prime")] / path.values[side, column]
-    told = (
-        f"Along the valley {TRADED} trades against X': X'/{TRADED} stays {np.median(ratio):.3f} (within"
-        f" {50 * np.ptp(ratio) / np.median(ratio):.1f} %), so that the motor draws the same active power."
+    names = study.problem.space.names
+    told = f"Along the valley the objective falls with {TRADED}"
+    far, near = along[[0, -1]]
+    places = [near, here, far]
+    told += (
+        f", {joined([f'{path.objective[k] / lowest:.2f}' for k in places])} times the lowest at"
+        f" {joined([f'{grid[k]:.2f}' for k in places])}, and has no minimum inside: whatever the bound, it attracts."
     )
-    if "q_v" in names:
-        near, far = side.nonzero()[0][[-1, 0]] if left[column] < grid[side].max() else side.nonzero()[0][[0, -1]]
-        here, q_v = int(np.abs(grid - left[column]).argmin()), path.values[:, names.index("q_v")]
+    if "X_prime" in names:
+        ratio = path.values[along, names.index("X_prime")] / path.values[along, names.index(TRADED)]
         told += (
-            " As the U²/X' of its reactive power grows, the static load takes it off again, with q_v ever closer to 2:"
-            f" {q_v[near]:.2f}, {q_v[here]:.2f} and {q_v[far]:.2f} at {TRADED} = {grid[near]:.2f}, {grid[here]:.2f} and"
-            f" {grid[far]:.2f}. The objective falls all the way, {path.objective[near] / lowest:.2f},"
-            f" {path.objective[here] / lowest:.2f} and {path.objective[far] / lowest:.2f} times the lowest, and has no"
-            " minimum inside: whatever the bound, it attracts."
+            f" {TRADED} trades against X': X'/{TRADED} stays {np.median(ratio):.3f}"
+            f" (within {50 * np.ptp(ratio) / np.median(ratio):.1f} %), so that the motor draws the same active power."
+        )
+    if {"X_prime", "q_v"} <= set(names):
+        q_v = path.values[:, names.index("q_v")]
+        told += (
+            " As the U²/X' of its reactive power grows, the static load takes it off again, with its exponent"
+            f" approaching that of the motor's term, 2: q_v is {joined([f'{q_v[k]:.2f}' for k in places])} there."
         )
     return told
+
+
+def _bounds(study: Study, own: tuple[float, float], lowest: float) -> str:
+    """What other bounds change."""
+    shares = {bounds: np.mean(ends.objective <= AT_FLOOR * lowest) for bounds, ends in study.rebounded.items()}
+    told = ", ".join(f"{shares[b]:.0%} from {b[0]:g}" for b in (WIDE, own, NARROW))
+    helps = shares[NARROW] > 1.5 * shares[own] and shares[WIDE] < 1.1 * shares[own]
+    return (
+        f"Of random points, these descend to the lowest objective by the lower bound of {TRADED}: {told}, where"
+        " induction motors have it" + (". Wider bounds do not help, narrower ones do." if helps else ".")
+    )

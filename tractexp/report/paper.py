@@ -350,7 +350,7 @@ def _reasons(sheet: Any, study: Study) -> None:
 
 
 def _valleys(sheet: Any, study: Study) -> None:
-    sheet.heading(f"The valley at the lower bound of {TRADED}", 3)
+    sheet.heading(f"The valleys along {TRADED}", 3)
     sheet.text(*conclusion.valley(study))
     grid, path = study.path
     index = {name: k for k, name in enumerate(study.problem.space.names)}
