@@ -24,7 +24,7 @@ from tractexp.identification.search import Found, History, Limits
 from tractexp.model.kernel import cache_folder
 from tractexp.plugin import build
 
-MOST = 3000  # searches that are kept, of some 20 kB each: beyond, the oldest go
+MOST = 3000  # searches that are kept, of some 20 kB each, four studies of 30 seeds: beyond, the oldest go
 BEHIND = ("numpy", "numba", "scipy", "llvmlite")  # whose versions may change the last digits
 DAMAGED = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile)
 ARRAYS = ("simulations", "objective", "values", "seconds")  # of a history
