@@ -1,6 +1,6 @@
 """Print lowered equations as the source of a Numba kernel that simulates many candidates at once.
 
-Sixteen candidates (lanes) are advanced together: the innermost loop runs over them, branch-free, over one work
+Up to 56 candidates (lanes) are advanced together: the innermost loop runs over them, branch-free, over one work
 array with literal offsets, so that LLVM vectorises it and state, constants and sums stay in cache. Nothing per
 sample is stored unless asked for. Equal lanes give equal bits wherever they stand in a batch.
 """
@@ -12,9 +12,8 @@ from sympy.printing.pycode import PythonCodePrinter
 
 from tractexp.model.drive import INPUTS
 from tractexp.model.lowering import Lowered, Phase, symbols
-from tractexp.model.template import HEADER, RUN, SETTLE
+from tractexp.model.template import FAST, GROUP, HEADER, LANES, RUN, SETTLE, VECTORS
 
-LANES = 16
 PHASES = ("derivative", "renewal", "output")  # what is evaluated lane by lane
 STAGES = (("k1", "a", None), ("k2", "b", ("0.5 * h", "k1")), ("k3", "b", ("0.5 * h", "k2")), ("k4", "c", ("h", "k3")))
 
@@ -59,7 +58,7 @@ def source(lowered: Lowered, title: str) -> str:
     scalars = [*lowered.inputs, *lowered.event]
     rows = [*lowered.parameters, sympy.Symbol("P0"), sympy.Symbol("Q0")]
 
-    text = HEADER.format(title=title)
+    text = HEADER.format(title=title, vectors=VECTORS, fast=FAST)
     text += _start(lowered, rows)
     own = [*rows, *lowered.event, *lowered.starts]
     if lowered.rest is not None:
@@ -71,6 +70,7 @@ def source(lowered: Lowered, title: str) -> str:
         text += _phase(f"_{name}", _arguments(lowered, at, name), getattr(lowered, name))
     text += RUN.format(
         L=LANES,
+        G=GROUP,
         rows=_names(rows),
         event=_names(lowered.event),
         inputs=_names(lowered.inputs),
@@ -165,7 +165,7 @@ def _sample(lowered: Lowered, at: _Rows) -> list[str]:
     body += [f"P, Q = _output({_names(_arguments(lowered, at, 'output'))})"]
     body += [f"W[{at['P']} + l] = P", f"W[{at['Q']} + l] = Q"]
     body += [f"W[{at['sum_P']} + l] += w_p * (p - P) * (p - P)", f"W[{at['sum_Q']} + l] += w_q * (q - Q) * (q - Q)"]
-    return [*lines, f"for l in range({LANES}):", *_nested(body)]
+    return [*lines, "for l in range(lanes):", *_nested(body)]
 
 
 def _advance(lowered: Lowered, at: _Rows) -> list[str]:
@@ -182,7 +182,7 @@ def _advance(lowered: Lowered, at: _Rows) -> list[str]:
     body += [_stage(lowered, at, *stage) for stage in STAGES]
     for s in lowered.states:
         body.append(f"W[{at[s]} + l] = {s} + h / 6.0 * (k1_{s} + 2.0 * (k2_{s} + k3_{s}) + k4_{s})")
-    inner += [f"for l in range({LANES}):", *_nested(body)]
+    inner += ["for l in range(lanes):", *_nested(body)]
     return ["for j in range(substeps[e]):", *_nested(inner)]
 
 

@@ -1,5 +1,11 @@
 """What every generated kernel has in common: its text, with gaps that the code generator fills."""
 
+LANES = 56  # candidates advanced together at most: enough to fill the waits of one step; rows 448 bytes apart do not
+# fall on one another in the cache as those a power of two apart do
+GROUP = 8  # they are rounded up to a multiple of it: whole vectors of up to 512 bits, since a remainder is slow
+FAST = ("contract", "reassoc", "arcp", "nsz")
+VECTORS = "VECTORS = 0"  # the line of a kernel that says how wide its vectors are [bits]; 0: as the compiler likes
+
 HEADER = '''"""Generated from the equations of {title}. Do not edit: the file's name is the hash of its content."""
 
 import math
@@ -7,7 +13,10 @@ import math
 import numpy as np
 from numba import njit
 
-FAST = {{"contract", "reassoc", "arcp", "nsz"}}  # nan and inf keep their meaning: they mark diverged candidates
+from tractexp.doors.numba_vector_width import prefer_vectors
+
+{vectors}
+FAST = set({fast})  # nan and inf keep their meaning: they mark diverged candidates
 compiled = njit(cache=True, fastmath=FAST, error_model="numpy", nogil=True)
 inlined = njit(cache=True, fastmath=FAST, error_model="numpy", nogil=True, forceinline=True)  # a call stops vectors
 
@@ -76,18 +85,22 @@ def run(candidates, event, first, inputs, measured, weights, substeps, sums, mis
     measured, weights (2, N): P, Q; substeps (events,); sums (events, 2, n) and miss (events, n) are written;
     outputs (2, n, N) or empty.
     """
+    prefer_vectors(VECTORS)
     n = candidates.shape[2]
     store = outputs.shape[0] > 0
-    W = np.empty({rows_W} * {L})
+    space = np.empty({rows_W} * {L} + 8)
+    W = space[(64 - space.ctypes.data % 64) // 8 :]  # a vector across two cache lines would take twice the time
     signals = np.empty(({n_signal}, inputs.shape[1]))
     for e in range(candidates.shape[0]):
 {unpack_event}
         h = step / substeps[e]
 {fill_signals}
-        for block in range((n + {L} - 1) // {L}):
+        for begin in range(0, n, {L}):
+            some = min(n - begin, {L})
+            lanes = {G} * ((some + {G} - 1) // {G})
             reachable = False
-            for l in range({L}):
-                k = min(block * {L} + l, n - 1)
+            for l in range(lanes):
+                k = min(begin + l, n - 1)
 {start}
                 reachable = reachable or m <= 0.0
                 W[{row_sum_P} + l] = 0.0
@@ -97,15 +110,15 @@ def run(candidates, event, first, inputs, measured, weights, substeps, sums, mis
                 for i in range(first[e], first[e + 1]):
 {sample}
                     if store:
-                        for l in range(min({L}, n - block * {L})):
-                            outputs[0, block * {L} + l, i] = W[{row_P} + l]
-                            outputs[1, block * {L} + l, i] = W[{row_Q} + l]
+                        for l in range(some):
+                            outputs[0, begin + l, i] = W[{row_P} + l]
+                            outputs[1, begin + l, i] = W[{row_Q} + l]
                     if i + 1 < first[e + 1]:
 {advance}
-            for l in range(min({L}, n - block * {L})):
-                sums[e, 0, block * {L} + l] = W[{row_sum_P} + l]
-                sums[e, 1, block * {L} + l] = W[{row_sum_Q} + l]
-                miss[e, block * {L} + l] = W[{row_miss} + l]
+            for l in range(some):
+                sums[e, 0, begin + l] = W[{row_sum_P} + l]
+                sums[e, 1, begin + l] = W[{row_sum_Q} + l]
+                miss[e, begin + l] = W[{row_miss} + l]
 '''
 
 SETTLE = """
