@@ -12,13 +12,14 @@ Upstream: numba/llvmlite#1348 (attributes that `llvmlite.ir.Function` lacks), op
 When mended: add the attribute with `attributes.add`, and take the features from `llvmlite.binding`.
 """
 
+from typing import Any
+
 from numba import types
 from numba.core.registry import cpu_target
 from numba.extending import intrinsic
 
 
-@intrinsic(prefer_literal=True)
-def prefer_vectors(typing, bits):
+def _prefer_vectors(typing, bits):
     """In a compiled function: ask for vectors of this constant number of bits in it; 0 leaves it to LLVM."""
     if not isinstance(bits, types.IntegerLiteral):
         return None
@@ -32,6 +33,10 @@ def prefer_vectors(typing, bits):
     return types.void(bits), codegen
 
 
+prefer_vectors: Any = intrinsic(prefer_literal=True)(_prefer_vectors)
+
+
 def compiled_for() -> tuple[str, str, str]:
     """What Numba compiles for: the system, the processor, and its features as `+avx512f,-sse4a,...`."""
-    return cpu_target.target_context.codegen().magic_tuple()
+    context: Any = cpu_target.target_context
+    return context.codegen().magic_tuple()

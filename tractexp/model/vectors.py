@@ -15,7 +15,7 @@ from pathlib import Path
 
 from tractexp.model.template import FAST, GROUP, LANES
 
-WIDTHS = (256, 512)  # bits
+WIDTHS: tuple[int, ...] = (256, 512)  # bits
 SAMPLES, ROUNDS = 200, 300  # of the race between them: some 50 ms
 ROWS = 8
 P0, P1, P2, P3, P4, P5, P6, P7, P8, P9 = (1.0 / math.factorial(k) for k in range(10, 0, -1))
@@ -39,7 +39,6 @@ def width(folder: Path) -> int:
     path = folder / f"vectors_{key}.txt"
     chosen = _read(path)
     if chosen is None:
-        path.unlink(missing_ok=True)  # damaged
         _offer(path, faster())
         chosen = _read(path)
     if chosen is None:
@@ -48,18 +47,22 @@ def width(folder: Path) -> int:
 
 
 def _read(path: Path) -> int | None:
+    """What is remembered; a damaged file is removed, so that it is measured again."""
     try:
-        text = path.read_text()
-    except (OSError, UnicodeDecodeError):
+        content = path.read_bytes()
+    except FileNotFoundError:
         return None
-    return next((bits for bits in WIDTHS if text == f"{bits}\n"), None)
+    chosen = next((bits for bits in WIDTHS if content == f"{bits}\n".encode()), None)
+    if chosen is None:
+        path.unlink(missing_ok=True)
+    return chosen
 
 
 def _offer(path: Path, bits: int) -> None:
     """Write whole or not at all, and only where no other process has."""
     handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
-    with os.fdopen(handle, "w") as file:
-        file.write(f"{bits}\n")
+    with os.fdopen(handle, "wb") as file:
+        file.write(f"{bits}\n".encode())
     try:
         os.link(temporary, path)  # fails where the file exists, unlike os.replace
     except FileExistsError:
@@ -76,7 +79,7 @@ def faster() -> int:
 
     U, W = 1.0 - 0.3 * np.sin(np.arange(SAMPLES) / 20), np.empty(ROWS * LANES + 8)
     W = W[(64 - W.ctypes.data % 64) // 8 :]
-    races, best = {bits: _race(bits) for bits in WIDTHS}, dict.fromkeys(WIDTHS, np.inf)
+    races, best = {bits: _race(bits) for bits in WIDTHS}, {bits: np.inf for bits in WIDTHS}
     for _ in range(ROUNDS):
         for bits, race in races.items():
             W.fill(0.5)
