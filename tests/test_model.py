@@ -157,6 +157,16 @@ def test_one_candidate_gives_the_bits_of_a_batch(model):
         assert np.array_equal(alone.Q[0], responses.Q[k])
 
 
+def test_the_exponential_of_kernels_is_the_exponential(model):
+    x = np.concatenate([np.linspace(-699, 699, 20001), np.arange(-1000, 1000) * 0.34657359027997264])  # half powers of 2
+    found = np.array([model.kernel._exp(value) for value in x[abs(x) < 700]])
+    assert np.abs(found / np.exp(x[abs(x) < 700]) - 1).max() < 4e-13
+    assert np.isnan(model.kernel._exp(np.nan))
+    assert model.kernel._exp(800.0) == model.kernel._exp(700.0)
+    assert model.kernel._exp(-np.inf) == model.kernel._exp(-700.0) > 0
+    assert model.kernel._exp(0.0) == 1.0
+
+
 def test_sums_are_those_of_the_responses(model):
     rng = np.random.default_rng(4)
     excitation = dip()
