@@ -158,7 +158,9 @@ def test_one_candidate_gives_the_bits_of_a_batch(model):
 
 
 def test_the_exponential_of_kernels_is_the_exponential(model):
-    x = np.concatenate([np.linspace(-699, 699, 20001), np.arange(-1000, 1000) * 0.34657359027997264])  # half powers of 2
+    x = np.concatenate(
+        [np.linspace(-699, 699, 20001), np.arange(-1000, 1000) * 0.34657359027997264]
+    )  # half powers of 2
     found = np.array([model.kernel._exp(value) for value in x[abs(x) < 700]])
     assert np.abs(found / np.exp(x[abs(x) < 700]) - 1).max() < 4e-13
     assert np.isnan(model.kernel._exp(np.nan))
