@@ -157,6 +157,28 @@ def test_one_candidate_gives_the_bits_of_a_batch(model):
         assert np.array_equal(alone.Q[0], responses.Q[k])
 
 
+def test_a_kernel_just_compiled_gives_the_bits_of_the_same_kernel_loaded(tmp_path):
+    program = """if True:
+        import numpy as np
+        from tractexp.model.drive import Drive, Excitation
+        from tractexp.model.model import compose
+        from tractexp.plugin import get
+        model = compose(get("model/motor", "double_cage")(), get("model/static", "exponential")())
+        values = np.array([p.default for p in model.parameters]) * np.linspace(0.95, 1.05, 20)[:, None]
+        U = 1 - 0.5 * (np.arange(100) // 30 == 1)
+        drive = Drive.of([Excitation(1e-3, U, np.ones(100), np.ones(100), 1.0, 1.0, 0.6)])
+        response = model.simulate(drive, values)
+        assert (response.miss == 0).all()
+        print(response.P.tobytes().hex(), response.Q.tobytes().hex())
+    """
+    environment = os.environ | {"TRACTEXP_CACHE_DIR": str(tmp_path)}
+    told = [
+        subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True)
+        for _ in range(2)
+    ]
+    assert told[0].stdout == told[1].stdout
+
+
 def test_the_exponential_of_kernels_is_the_exponential(model):
     x = np.concatenate(
         [np.linspace(-699, 699, 20001), np.arange(-1000, 1000) * 0.34657359027997264]

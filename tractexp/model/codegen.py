@@ -222,7 +222,7 @@ def _settle(lowered: Lowered, rows: list[sympy.Symbol]) -> str:
     moving = {"f": _targets(f"f[{k}]" for k in range(n)), "g": _targets(f"g[{k}]" for k in range(n))}
     arguments = _names([*rows, *lowered.event, *lowered.starts])
     if not n:
-        return f"\n\n@compiled\ndef _settle({arguments}):\n    return (0.0,)\n"
+        return f"\n\n@inlined\ndef _settle({arguments}):\n    return (0.0,)\n"
     text = SETTLE.format(arguments=arguments, states=_names(states), n=n, known=known, x=x, **moving)
     return text.replace(f"return {x},", f"return {_names(f'x[{k}]' for k in range(n))},")
 
@@ -241,8 +241,7 @@ def _function(name: str, arguments: list, temporaries: Iterable, expressions: It
 
 
 def _text(name: str, arguments: list, lines: list[str]) -> str:
-    mark = "inlined" if name.removeprefix("_") in PHASES else "compiled"
-    return f"\n\n@{mark}\ndef {name}({_names(arguments)}):\n{_indent(4, lines)}\n"
+    return f"\n\n@inlined\ndef {name}({_names(arguments)}):\n{_indent(4, lines)}\n"
 
 
 def _names(symbols: Iterable[object]) -> str:

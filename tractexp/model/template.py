@@ -18,7 +18,9 @@ from tractexp.doors.numba_vector_width import prefer_vectors
 {vectors}
 FAST = set({fast})  # nan and inf keep their meaning: they mark diverged candidates
 compiled = njit(cache=True, fastmath=FAST, error_model="numpy", nogil=True)
-inlined = njit(cache=True, fastmath=FAST, error_model="numpy", nogil=True, forceinline=True)  # a call stops vectors
+# A call would stop the vectoriser, and may reach another copy of the function, with other bits, when it was just
+# compiled than when it was loaded from the cache.
+inlined = njit(cache=True, fastmath=FAST, error_model="numpy", nogil=True, forceinline=True)
 ordered = njit(cache=True, fastmath=FAST - {{"reassoc"}}, error_model="numpy", nogil=True, forceinline=True)
 
 
@@ -124,7 +126,7 @@ def run(candidates, event, first, inputs, measured, weights, substeps, sums, mis
 
 SETTLE = """
 
-@compiled
+@inlined
 def _settle({arguments}):
     \"\"\"Solve for the steady state before the event by Newton's method; last, how far it misses.\"\"\"
     x, f, g, J = np.array([{states}]), np.empty({n}), np.empty({n}), np.empty(({n}, {n}))
