@@ -40,7 +40,7 @@ MODELS = (
     "first_order_exponential", "second_order_exponential", "third_order_zip", "fifth_order_stator_flux",
     "fifth_order_double_cage", "motor_alone", "static_exponential",
 )  # fmt: skip
-OPTIMIZERS = ("issa", "ssa", "pso", "multistart_least_squares", "differential_evolution", "issa_raw_accept_all")
+OPTIMIZERS = ("issa", "ssa", "pso", "multistart_least_squares", "differential_evolution", "issa_to_the_letter")
 KEPT = (
     "verdict", "reason", "effects", "name_sets", "where", "gap", "left", "nearest", "recommendation", "noise",
     "phasor_window", "parameters", "simulations",

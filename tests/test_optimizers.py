@@ -209,7 +209,7 @@ def test_particles_move_as_computed_by_hand():
             return start if len(shape) == 2 else draws.pop(0)
 
     class Evaluate:
-        seen: list = []
+        budget, seen = None, []
 
         def __call__(self, x):
             x = np.clip(x, 0, 1)
@@ -299,10 +299,10 @@ def test_every_variant_composes_builds_and_searches(variant):
 
 def test_there_is_a_variant_for_each_ablation_and_reading():
     ingredients = ("tent_init", "levy", "gaussian", "tent_perturbation")
-    readings = ("raw", "raw_scalar", "raw_accept_all", "scalar", "20_perceivers")
+    readings = ("raw", "raw_scalar", "to_the_letter", "scalar", "10_perceivers")
     wanted = {f"{kind}_{i}" for i in ingredients for kind in ("issa_no", "ssa_plus")}
     wanted |= {f"{name}_{r}" for name in ("ssa", "issa") for r in readings}
-    wanted |= {"issa_by_stage", "issa_printed_levy", "issa_polish"}
+    wanted |= {"issa_by_stage", "issa_printed_levy", "issa_polish", "pso_limited"}
     assert wanted <= set(VARIANTS)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tractexp.identification.optimizer import Box
-from tractexp.identification.search import search
+from tractexp.identification.search import Limits, search
 from tractexp.plugin import build
 from tractexp_plugins.optimizers import _sparrow as sparrow
 from tractexp_plugins.optimizers import issa
@@ -120,6 +120,8 @@ def sphere(x):
 
 class Recorded:
     """A batch objective on the unit square that remembers its batches."""
+
+    budget = None
 
     def __init__(self):
         self.batches = []
@@ -297,10 +299,8 @@ def test_tent_perturbation_is_the_mean_with_a_chaotic_point_of_the_box():
 
 
 def perturbed(schedule, t, **switches):
-    optimizer = build(
-        "optimizer", {"name": "issa", "population": N, "schedule": schedule, "iterations": 10, **switches}
-    )
-    varied, disturbed = optimizer._divide(t, F)
+    optimizer = build("optimizer", {"name": "issa", "population": N, "schedule": schedule, **switches})
+    varied, disturbed = optimizer._divide(t, 10, F)
     return varied.tolist(), disturbed.tolist()
 
 
@@ -315,6 +315,35 @@ def test_by_stage_all_are_disturbed_early_and_the_best_varies_late():
     assert perturbed("stage", 6) == ([0], [])
     assert perturbed("stage", 5, tent_perturbation=False) == ([], [])
     assert perturbed("stage", 6, gaussian=False) == ([], [])
+
+
+@pytest.mark.parametrize("budget", [1000, 6000, 40_000])
+@pytest.mark.parametrize("switches", [{}, {"gaussian": False}, {"tent_perturbation": False}, {"levy": False}])
+def test_a_budget_lets_the_schedule_run_whole(budget, switches, monkeypatch):
+    """The first half of the iterations disturbs all, the second varies the best: the budget ends with the second."""
+    laid_out, steps = [], []
+    whole = issa.ISSA._divide
+
+    def seen(self, t, iterations, f):
+        laid_out.append(iterations)
+        steps.append(t)
+        return whole(self, t, iterations, f)
+
+    monkeypatch.setattr(issa.ISSA, "_divide", seen)
+    optimizer = build("optimizer", {"name": "issa", "schedule": "stage", **switches})
+    assert search(Bowl(), optimizer, 0, Limits(simulations=budget)).simulations == budget
+    assert len({*laid_out}) == 1
+    assert abs(steps[-1] - laid_out[0]) <= max(2, 0.02 * laid_out[0])
+
+
+def test_without_a_budget_there_are_the_papers_iterations_and_with_both_the_first_to_end_counts():
+    def iterations(limit, **settings):
+        return search(Bowl(), build("optimizer", {"name": "issa", **settings}), 0, Limits(simulations=limit)).iterations
+
+    assert iterations(None) == 300
+    assert iterations(100_000) > 900
+    assert iterations(100_000, iterations=12) == 12
+    assert iterations(1000, iterations=300) < 12
 
 
 class Bowl:

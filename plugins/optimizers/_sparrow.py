@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.errors import check_choice, check_range
-from tractexp.identification.optimizer import Box, Evaluate, Optimizer
+from tractexp.identification.optimizer import Box, Evaluate, Iterative
 
 TINY = 1e-50  # epsilon of Eq. (13), the value in the SSA authors' code
 EXP_MAX = 700.0  # exp overflows beyond it; any box ends long before
@@ -84,13 +84,12 @@ class Flock:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sparrow(Optimizer):
+class Sparrow(Iterative):
     """The loop: rank, producers, scroungers and perceivers, and what a subclass adds at three places."""
 
     population: int = 50
-    iterations: int = 300
     producers: float = 0.2  # share of the population, the best
-    perceivers: float = 0.2  # share of the population, drawn anew in each iteration
+    perceivers: float = 0.4  # share of the population, drawn anew in each iteration: SD of section 4.3
     safety_threshold: float = 0.8  # ST of Eq. (11)
     acceptance: str = "better"  # "better": a sparrow moves only to improve; "all": always
     step: str = "elementwise"  # A+ L of Eq. (12): "elementwise" or, as printed, one "scalar" for all coordinates
@@ -98,7 +97,6 @@ class Sparrow(Optimizer):
     def check(self) -> None:
         super().check()
         check_range("optimizer.population", self.population, 2)
-        check_range("optimizer.iterations", self.iterations, 1)
         check_range("optimizer.producers", self.producers, 0, 1)
         check_range("optimizer.perceivers", self.perceivers, 0, 1)
         check_range("optimizer.safety_threshold", self.safety_threshold, 0, 1)
@@ -113,20 +111,32 @@ class Sparrow(Optimizer):
         """The step s of Eq. (16) for each coordinate; Eq. (12) has none."""
         return 1.0
 
-    def perturbation(self, box: Box, rng: np.random.Generator) -> Callable[[int, Flock], None]:
-        """What is done to the flock at the end of iteration t = 1, 2, ...; nothing in the traditional search."""
+    def perturbation(self, box: Box, iterations: int, rng: np.random.Generator) -> Callable[[int, Flock], None]:
+        """What is done to the flock at the end of iteration t = 1, 2, ... of so many; traditionally nothing."""
         return lambda t, flock: None
+
+    @property
+    def perturbed(self) -> float:
+        """The simulations that the perturbation of an iteration costs, on average."""
+        return 0.0
+
+    @property
+    def _foraging(self) -> float:
+        """The simulations of Eqs. (11)-(13) in an iteration, on average: producers who perceive move twice."""
+        return self.population * (1.0 + self.perceivers * self.producers)
 
     def search(self, evaluate: Evaluate, box: Box, rng: np.random.Generator) -> Iterator[None]:
         flock = Flock(self.initial(box, rng), evaluate, self.acceptance == "better")
-        perturb = self.perturbation(box, rng)
+        each = self._foraging + self.perturbed
+        iterations, steps = self.laid_out(evaluate.budget, self.population, each)
+        perturb = self.perturbation(box, iterations, rng)
         yield
-        for t in range(1, self.iterations + 1):
-            self._forage(flock, rng)
+        for t in steps:
+            self._forage(flock, iterations, rng)
             perturb(t, flock)
             yield
 
-    def _forage(self, flock: Flock, rng: np.random.Generator) -> None:
+    def _forage(self, flock: Flock, iterations: int, rng: np.random.Generator) -> None:
         """Eqs. (11)-(13). X_P is the best producer after its move; a perceiver makes that move instead of its own.
 
         The authors' code simulates a scrounger's move even where the perceiver's then replaces it; here it is not,
@@ -138,7 +148,7 @@ class Sparrow(Optimizer):
         flock.sort()
         worst = flock.x[-1], flock.f[-1]
         alarmed = rng.random() >= self.safety_threshold
-        flock.move(np.arange(p), produce(flock.x[:p], alarmed, self.iterations, rng))
+        flock.move(np.arange(p), produce(flock.x[:p], alarmed, iterations, rng))
         leader = flock.x[flock.f[:p].argmin()]
 
         x = flock.x.copy()

@@ -1,12 +1,12 @@
 """CMA-ES, pycma's, with restarts."""
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from tractexp.errors import UserError, check_range
-from tractexp.identification.optimizer import Box, Evaluate, Optimizer
+from tractexp.identification.optimizer import Box, Evaluate, Iterative
 from tractexp.plugin import plugin
 
 
@@ -21,7 +21,7 @@ def _pycma() -> Any:
 
 
 @plugin
-class CMAES(Optimizer):
+class CMAES(Iterative):
     """Covariance matrix adaptation, restarted with a doubled population from a new random point when it stalls.
 
     Source: Hansen and Ostermeier 2001; restarts (IPOP) by Auger and Hansen 2005; the implementation is pycma.
@@ -29,7 +29,7 @@ class CMAES(Optimizer):
     """
 
     population: int = 0  # 0: pycma's 4 + 3 ln d
-    iterations: int = 1000  # of all restarts together
+    usual: ClassVar[int] = 1000  # of all restarts together
     restarts: int = 9
     sigma: float = 0.25  # first standard deviation, of the box's width
 
@@ -37,14 +37,14 @@ class CMAES(Optimizer):
         super().check()
         if self.population != 0:
             check_range("optimizer.population", self.population, 4)
-        check_range("optimizer.iterations", self.iterations, 1)
         check_range("optimizer.restarts", self.restarts, 0)
         check_range("optimizer.sigma", self.sigma, 1e-6, 1)
 
     def search(self, evaluate: Evaluate, box: Box, rng: np.random.Generator) -> Iterator[None]:
         cma = _pycma()
         population = self.population or 4 + int(3 * np.log(box.dimension))
-        left = self.iterations
+        _, steps = self.laid_out(evaluate.budget, 0, population)
+        left = iter(steps)
         for restart in range(self.restarts + 1):
             settings = {
                 "bounds": [0.0, 1.0],
@@ -54,8 +54,7 @@ class CMAES(Optimizer):
                 "verbose": -9,
             }
             strategy = cma.CMAEvolutionStrategy(rng.random(box.dimension), self.sigma, settings)
-            while left and not strategy.stop():
+            while not strategy.stop() and next(left, None) is not None:
                 points = strategy.ask()
                 strategy.tell(points, evaluate(box.from_unit(np.array(points)))[1])
-                left -= 1
                 yield

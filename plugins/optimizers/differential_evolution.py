@@ -1,13 +1,12 @@
 """Differential evolution, SciPy's."""
 
-import itertools
 from collections.abc import Iterator
 
 import numpy as np
 
 from tractexp.doors.scipy_differential_evolution import generations
 from tractexp.errors import check_choice, check_range
-from tractexp.identification.optimizer import Box, Evaluate, Optimizer
+from tractexp.identification.optimizer import Box, Evaluate, Iterative
 from tractexp.plugin import plugin
 
 STRATEGIES = tuple(
@@ -18,7 +17,7 @@ STRATEGIES = tuple(
 
 
 @plugin
-class DifferentialEvolution(Optimizer):
+class DifferentialEvolution(Iterative):
     """SciPy's differential evolution, a generation as one batch, its factor F drawn anew for each (dither).
 
     Ends after `iterations`, or once the spread of the population's objectives is `tolerance` of their mean.
@@ -29,7 +28,6 @@ class DifferentialEvolution(Optimizer):
     """
 
     population: int = 50
-    iterations: int = 300
     strategy: str = "best1bin"
     mutation_low: float = 0.5  # F is drawn between the two
     mutation_high: float = 1.0
@@ -39,7 +37,6 @@ class DifferentialEvolution(Optimizer):
     def check(self) -> None:
         super().check()
         check_range("optimizer.population", self.population, 5)
-        check_range("optimizer.iterations", self.iterations, 1)
         check_choice("optimizer.strategy", self.strategy, STRATEGIES)
         check_range("optimizer.mutation_low", self.mutation_low, 0, self.mutation_high)
         check_range("optimizer.mutation_high", self.mutation_high, 0, 1.99)
@@ -58,4 +55,6 @@ class DifferentialEvolution(Optimizer):
             recombination=self.recombination,
             polish=False,
         )
-        yield from itertools.islice(evolution, self.iterations)
+        _, steps = self.laid_out(evaluate.budget, self.population, self.population)
+        for _ in zip(steps, evolution, strict=False):
+            yield

@@ -12,6 +12,7 @@ from tractexp.plugin import plugin
 from tractexp_plugins.optimizers._sparrow import Flock, Sparrow
 
 LEVY_BETA = 1.5  # beta of Eq. (15)
+BETTER = 2 / 3  # share of a flock that is better than its mean, about
 
 
 def tent(z: np.ndarray, alpha: float) -> np.ndarray:
@@ -88,27 +89,34 @@ class ISSA(Sparrow):
     def flight(self, shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray | float:
         return levy_flight(shape, self.levy_formula, rng) if self.levy else super().flight(shape, rng)
 
-    def perturbation(self, box: Box, rng: np.random.Generator) -> Callable[[int, Flock], None]:
+    def perturbation(self, box: Box, iterations: int, rng: np.random.Generator) -> Callable[[int, Flock], None]:
         if not (self.gaussian or self.tent_perturbation):
-            return super().perturbation(box, rng)
+            return super().perturbation(box, iterations, rng)
         orbit = rng.random((self.population, box.dimension))
 
         def perturb(t: int, flock: Flock) -> None:
             nonlocal orbit
             orbit = tent_orbit(orbit, self.tent_alpha, rng)
-            varied, disturbed = self._divide(t, flock.f)
+            varied, disturbed = self._divide(t, iterations, flock.f)
             x = np.concatenate((vary(flock.x[varied], rng), disturb(flock.x[disturbed], orbit[disturbed], box)))
             if len(x):
                 flock.move(np.concatenate((varied, disturbed)), x)
 
         return perturb
 
-    def _divide(self, t: int, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    @property
+    def perturbed(self) -> float:
+        shares = self.gaussian * BETTER, self.tent_perturbation * (1.0 - BETTER)
+        if self.schedule == "stage":  # all in one half of the iterations, the best alone in the other
+            shares = self.gaussian * 0.5 / self.population, self.tent_perturbation * 0.5
+        return self.population * sum(shares)
+
+    def _divide(self, t: int, iterations: int, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rows to vary and rows to disturb in iteration t; a switch that is off leaves its rows alone."""
         if self.schedule == "fitness":
             better = f < f.mean()
             varied, disturbed = better.nonzero()[0], (~better).nonzero()[0]
-        elif 2 * t <= self.iterations:
+        elif 2 * t <= iterations:
             varied, disturbed = np.arange(0), np.arange(len(f))
         else:
             varied, disturbed = f.argmin(keepdims=True), np.arange(0)

@@ -5,12 +5,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from tractexp.errors import check_range
-from tractexp.identification.optimizer import Box, Evaluate, Optimizer
+from tractexp.identification.optimizer import Box, Evaluate, Iterative
 from tractexp.plugin import plugin
 
 
 @plugin
-class PSO(Optimizer):
+class PSO(Iterative):
     """Global-best particle swarm with an inertia weight, the whole swarm in one step.
 
         v <- omega v + c1 r1 (p - x) + c2 r2 (g - x),    x <- x + v
@@ -19,21 +19,19 @@ class PSO(Optimizer):
 
     Source: Shi and Eberhart 1998, Eqs. (3)-(4); omega, c1, c2, population and iterations from section 4.3 of the
     traction load paper.
-    Departures: the paper is silent on the rest. Velocities start at zero and are limited to a share of the box;
-    a particle stopped by a wall loses the velocity that carried it there.
+    Departures: the paper is silent on the rest. Velocities start at zero; a particle stopped by a wall loses the
+    velocity that carried it there. The paper prints no limit of the velocity: none is felt below 1, the box's width.
     """
 
     population: int = 50
-    iterations: int = 300
     inertia: float = 0.8  # omega
     cognitive: float = 0.5  # c1
     social: float = 1.0  # c2
-    velocity_limit: float = 0.2  # of the box's width, per iteration
+    velocity_limit: float = 1.0  # of the box's width, per iteration
 
     def check(self) -> None:
         super().check()
         check_range("optimizer.population", self.population, 1)
-        check_range("optimizer.iterations", self.iterations, 1)
         check_range("optimizer.inertia", self.inertia, 0)
         check_range("optimizer.cognitive", self.cognitive, 0)
         check_range("optimizer.social", self.social, 0)
@@ -44,7 +42,8 @@ class PSO(Optimizer):
         v, limit = np.zeros_like(x), self.velocity_limit * box.width
         own, own_f = x.copy(), f.copy()
         yield
-        for _ in range(self.iterations):
+        _, steps = self.laid_out(evaluate.budget, self.population, self.population)
+        for _ in steps:
             r1, r2 = rng.random((2, *x.shape))
             swarm = own[own_f.argmin()]
             v = self.inertia * v + self.cognitive * r1 * (own - x) + self.social * r2 * (swarm - x)

@@ -1,16 +1,17 @@
 """Uniform random search, the negative control."""
 
+import itertools
 from collections.abc import Iterator
 
 import numpy as np
 
 from tractexp.errors import check_range
-from tractexp.identification.optimizer import Box, Evaluate, Optimizer
+from tractexp.identification.optimizer import Box, Evaluate, Iterative
 from tractexp.plugin import plugin
 
 
 @plugin
-class RandomSearch(Optimizer):
+class RandomSearch(Iterative):
     """Points drawn uniformly, none better informed than the last: what any other optimizer must beat.
 
     Source: Anderson 1953, "Recent advances in finding best operating conditions".
@@ -18,14 +19,13 @@ class RandomSearch(Optimizer):
     """
 
     population: int = 50
-    iterations: int = 300
 
     def check(self) -> None:
         super().check()
         check_range("optimizer.population", self.population, 1)
-        check_range("optimizer.iterations", self.iterations, 1)
 
     def search(self, evaluate: Evaluate, box: Box, rng: np.random.Generator) -> Iterator[None]:
-        for _ in range(self.iterations + 1):
+        _, steps = self.laid_out(evaluate.budget, self.population, self.population)
+        for _ in itertools.chain((0,), steps):
             evaluate(box.uniform(rng, self.population))
             yield

@@ -98,7 +98,7 @@ class Setup(Given):
         from tractexp.identification.search import search
 
         plugin = optimizer.build("optimizer")
-        with searching(getattr(plugin, "iterations", None), self.budget, progress) as callback:
+        with searching(plugin.end(self.budget), self.budget, progress) as callback:
             return search(self.problem, plugin, seed, self.limits, callback)
 
 

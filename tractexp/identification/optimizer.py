@@ -1,23 +1,29 @@
 """What an optimizer is given and what it must do. Counting, clipping and keeping the best are not its business."""
 
+import itertools
 from abc import abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 import numpy as np
 
-from tractexp.errors import check_choice
+from tractexp.errors import check_choice, check_range
 from tractexp.parameter import Box
 from tractexp.plugin import Plugin
 
-__all__ = ["REFUSED", "Box", "Evaluate", "Optimizer"]
+__all__ = ["REFUSED", "Box", "Evaluate", "Iterative", "Optimizer"]
 
 REFUSED = 1e12  # objectives from here up mark candidates that could not be simulated, ranked by how far they miss
 
 
 class Evaluate(Protocol):
-    """The batch objective. Both calls clip `x` (n, d) into the box and return the points really evaluated."""
+    """The batch objective. Both calls clip `x` (n, d) into the box and return the points really evaluated.
+
+    `budget` is the number of evaluations the search may make, by which a schedule can be laid out; None: any.
+    """
+
+    budget: int | None
 
     def __call__(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points (n, d) -> (evaluated points (n, d), objectives (n,)). Lower is better; never nan."""
@@ -41,6 +47,10 @@ class Optimizer(Plugin):
     space: str = "unit"  # "unit": search in the unit cube; "raw": in the parameters' own units
     polish: bool = False  # end with bounded least squares from the best points, inside the same budget
 
+    def end(self, budget: int | None) -> int | None:
+        """The iterations after which a search ends by itself under a budget of simulations; None where that is open."""
+        return getattr(self, "iterations", None)
+
     def check(self) -> None:
         check_choice("optimizer.space", self.space, ("unit", "raw"))
 
@@ -51,3 +61,31 @@ class Optimizer(Plugin):
         A generator: the search loop runs it until it returns or a budget is spent, in which case `evaluate`
         raises and the generator simply ends. All randomness comes from `rng`.
         """
+
+
+@dataclass(frozen=True, kw_only=True)
+class Iterative(Optimizer):
+    """Base of the optimizers that repeat one step: so often as is set, or as the budget lasts for."""
+
+    usual: ClassVar[int] = 300  # where nothing else says: sections 4.2 and 4.3 of the traction load paper
+    iterations: int | None = None  # null: as many as the budget lasts for; without a budget the usual number
+
+    def check(self) -> None:
+        super().check()
+        if self.iterations is not None:
+            check_range("optimizer.iterations", self.iterations, 1)
+
+    def end(self, budget: int | None) -> int | None:
+        return self.iterations or (self.usual if budget is None else None)
+
+    def laid_out(self, budget: int | None, first: float, each: float) -> tuple[int, Iterable[int]]:
+        """How many iterations the search is laid out for, and their numbers 1, 2, ...
+
+        The first population costs `first` simulations and an iteration `each`, on average: a budget lasts for so many,
+        and then ends them, for the numbers go on.
+        """
+        count = self.end(budget)
+        if count is not None:
+            return count, range(1, count + 1)
+        assert budget is not None
+        return max(1, round((budget - first) / each)), itertools.count(1)

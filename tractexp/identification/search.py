@@ -92,6 +92,10 @@ class _Counter:
     def seconds(self) -> float:
         return time.perf_counter() - self.started
 
+    @property
+    def budget(self) -> int | None:
+        return self.limits.simulations
+
     def _raw(self, x: np.ndarray) -> np.ndarray:
         return self.raw.from_unit(x) if self.unit else x
 
