@@ -17,6 +17,7 @@ from tractexp.model import operations
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
 from tractexp.model.sites import SITES
+from tractexp.model.template import LANES
 from tractexp.plugin import get
 
 OMEGA_S = 2 * np.pi * 50
@@ -194,15 +195,49 @@ def test_steady_state_is_the_equivalent_circuit(model):
 
 
 def test_one_candidate_gives_the_bits_of_a_batch(model):
-    values = candidates(37, np.random.default_rng(3))
+    values = candidates(LANES + 5, np.random.default_rng(3))
     drive = Drive.of([dip()])
     batch = model.errors(drive, values).sums
     responses = model.simulate(drive, values)
-    for k in (0, 15, 16, 36):
+    for k in (0, 7, 8, LANES - 1, LANES, LANES + 4):
         alone = model.simulate(drive, values[k])
         assert np.array_equal(model.errors(drive, values[k]).sums[..., 0], batch[..., k])
         assert np.array_equal(alone.P[0], responses.P[k])
         assert np.array_equal(alone.Q[0], responses.Q[k])
+
+
+def test_a_kernel_just_compiled_gives_the_bits_of_the_same_kernel_loaded(tmp_path):
+    program = """if True:
+        import numpy as np
+        from tractexp.model.drive import Drive, Excitation
+        from tractexp.model.model import compose
+        from tractexp.plugin import get
+        model = compose(get("model/motor", "double_cage")(), get("model/static", "exponential")())
+        values = np.array([p.default for p in model.parameters]) * np.linspace(0.95, 1.05, 20)[:, None]
+        U = 1 - 0.5 * (np.arange(100) // 30 == 1)
+        drive = Drive.of([Excitation(1e-3, U, np.ones(100), np.ones(100), 1.0, 1.0, 0.6)])
+        response = model.simulate(drive, values)
+        assert (response.miss == 0).all()
+        print(response.P.tobytes().hex(), response.Q.tobytes().hex())
+    """
+    environment = os.environ | {"TRACTEXP_CACHE_DIR": str(tmp_path)}
+    told = [
+        subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True)
+        for _ in range(2)
+    ]
+    assert told[0].stdout == told[1].stdout
+
+
+def test_the_exponential_of_kernels_is_the_exponential(model):
+    x = np.concatenate(
+        [np.linspace(-699, 699, 20001), np.arange(-1000, 1000) * 0.34657359027997264]
+    )  # half powers of 2
+    found = np.array([model.kernel._exp(value) for value in x[abs(x) < 700]])
+    assert np.abs(found / np.exp(x[abs(x) < 700]) - 1).max() < 4e-13
+    assert np.isnan(model.kernel._exp(np.nan))
+    assert model.kernel._exp(800.0) == model.kernel._exp(700.0)
+    assert model.kernel._exp(-np.inf) == model.kernel._exp(-700.0) > 0
+    assert model.kernel._exp(0.0) == 1.0
 
 
 def test_sums_are_those_of_the_responses(model):
