@@ -145,12 +145,12 @@ def test_integrated_as_printed_a_model_takes_one_step_per_sample_and_says_what_t
 
 def test_the_operations_of_a_step_are_those_counted_by_hand(model):
     """Eq. (1) in rectangular form: 9 multiplications and 6 additions four times, 9 of each to go ahead in three stages,
-    6 and 12 for the sum. Sixteen lanes share three cubics of 8 and 8, three straight lines of 2 and 1, and 6 divisions.
+    6 and 12 for the sum. All lanes share three cubics of 8 and 8, three straight lines of 2 and 1, and 6 divisions.
     """
     step = operations.count(model.source).step
-    assert step.multiplications == 4 * 9 + 9 + 6 + (3 * 8 + 3 * 1) / 16
-    assert step.additions == 4 * 6 + 9 + 12 + (3 * 8 + 3 * 2 + 2 * 2) / 16
-    assert (step.divisions, step.others) == (6 / 16, 0)
+    assert step.multiplications == 4 * 9 + 9 + 6 + (3 * 8 + 3 * 1) / LANES
+    assert step.additions == 4 * 6 + 9 + 12 + (3 * 8 + 3 * 2 + 2 * 2) / LANES
+    assert (step.divisions, step.others) == (6 / LANES, 0)
 
 
 def test_the_operations_of_a_sample_are_those_of_both_powers_and_the_errors(model):
@@ -158,7 +158,7 @@ def test_the_operations_of_a_sample_are_those_of_both_powers_and_the_errors(mode
     zip_load, none = get("model/static", "zip")(), get("model/motor", "none")()
     powers, polynomial = operations.count(model.source), operations.count(compose(none, zip_load).source)
     assert polynomial.step.total == 0
-    assert powers.sample.others == 2 * 4  # two clamped exponents, rounded, and put into the exponent of a number
+    assert powers.sample.others == 2 * 3  # two exponents, each clamped and put into the exponent of a number
     assert powers.sample.total > polynomial.sample.total + 2 * 26
     assert powers.per_sample(3).total == pytest.approx(powers.sample.total + 3 * powers.step.total)
 

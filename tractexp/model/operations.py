@@ -9,6 +9,8 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import astuple, dataclass
 
+from tractexp.model.template import LANES
+
 KINDS = {ast.Add: "additions", ast.Sub: "additions", ast.Mult: "multiplications", ast.Div: "divisions"}
 Varying = set[str]  # names whose values differ between the lanes, or all that are not known beforehand
 
@@ -75,10 +77,9 @@ def _loops(inside: ast.AST) -> list[_Loop]:
 
 
 def _lanes(statement: ast.stmt) -> int:
-    """The length of a loop over lanes: `for l in range(16)`; 0 for anything else."""
+    """How many lanes a loop over them advances when all are taken: `for l in range(lanes)`; 0 for anything else."""
     if isinstance(statement, ast.For) and _name(statement.target) == "l" and isinstance(statement.iter, ast.Call):
-        length = statement.iter.args[-1]
-        return length.value if isinstance(length, ast.Constant) and isinstance(length.value, int) else 0
+        return LANES if _name(statement.iter.args[-1]) == "lanes" else 0
     return 0
 
 
