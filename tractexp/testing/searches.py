@@ -65,6 +65,8 @@ def yields_once_an_iteration(cls: type[Optimizer]) -> None:
     spent = [0]
 
     class Counted:
+        budget = None
+
         def __call__(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             x, _ = self.residuals(x)
             return x, Bowl().objective(x)
