@@ -1,25 +1,41 @@
 """Time per Runge-Kutta step and candidate, objective included, beside the usual ways of doing it. Run: see --help.
 
-All ways simulate the same record of 1,000 samples with the same model, in turn, within this one run; the smallest
-of several repetitions is reported, which is the figure least disturbed by other work on the machine.
+All ways simulate the same record of 1,000 samples with the base model and sum the squared errors, in turns within this
+one run; the smallest time of each is reported, which is the figure least disturbed by other work on the machine. The
+measured power is the solution to ten digits, so that the objective at the true parameters tells each way's error. Ways
+that control their error by a tolerance take the loosest one that meets the error asked for.
+
+Two ways are there where their packages are: `pip install numbalsoda` (C++ LSODA; MIT; builds with a Fortran compiler)
+and `pip install diffrax` (on JAX; Apache 2.0). So is ANDES (GPL; extra `crosscheck`), which solves more than is asked:
+the network's equations with the load's, one load at a time, without an objective.
 """
 
 import argparse
 import json
 import math
 import platform
+import sys
 import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
+import andes_check
+import arithmetic
 import numpy as np
-from numba import njit
-from scipy.integrate import solve_ivp
+import rivals
 
-from tractexp.model.drive import Drive, Excitation, slopes
-from tractexp.model.model import compose
-from tractexp.plugin import get
+from tractexp.exchange.format import Identified
+from tractexp.model import kernel, vectors
+from tractexp.model.drive import Drive, Excitation
+from tractexp.model.model import Model, compose
+from tractexp.model.template import VECTORS
+from tractexp.plugin import build, get
 
 TRUTH = np.array([0.12, 0.25, 0.9, 0.006, 0.55, 1.4, 3.0])  # T', X', C, M, T_m, p_v, q_v
-SAMPLES, CANDIDATES = 1000, 200
+SAMPLES, CANDIDATES, POPULATION, FEW = 1000, 200, 50, 8
+TOLERANCES = [10.0**-k for k in range(3, 12)]
+LOOSE = 1e-5  # pu, a root mean square error far below any recorder's noise
+SECONDS = 2.0  # at most spent on one way
 
 
 def excitation() -> Excitation:
@@ -29,132 +45,218 @@ def excitation() -> Excitation:
     return Excitation(1e-3, U, np.ones(SAMPLES), np.full(SAMPLES, 0.6), 1.0, 1.0, 0.6)
 
 
-@njit(cache=True)
-def scalar(p, U, middle, P, Q, h):
-    """One candidate: the printed polar equations, RK4, mean squared error."""
-    T_prime, X_prime, C, M, T_m, p_v, q_v = p
-    delta = 0.5 * math.asin(-2 * T_m * X_prime / C)
-    E, omega = C * math.cos(delta), math.tan(delta) / T_prime
-    P_s0, Q_s0 = 1.0 - T_m, 0.6 - (1 - E * math.cos(delta)) / X_prime
-    total = 0.0
-    for i in range(len(U)):
-        u = U[i]
-        p_i = P_s0 * u**p_v - u * E * math.sin(delta) / X_prime
-        q_i = Q_s0 * u**q_v + u * (u - E * math.cos(delta)) / X_prime
-        total += (P[i] - p_i) ** 2 + (Q[i] - q_i) ** 2
-        if i + 1 == len(U):
-            break
-        um, uc = middle[i], U[i + 1]
-        a = _polar(E, delta, omega, u, T_prime, X_prime, C, M, T_m)
-        b = _polar(E + h / 2 * a[0], delta + h / 2 * a[1], omega + h / 2 * a[2], um, T_prime, X_prime, C, M, T_m)
-        c = _polar(E + h / 2 * b[0], delta + h / 2 * b[1], omega + h / 2 * b[2], um, T_prime, X_prime, C, M, T_m)
-        d = _polar(E + h * c[0], delta + h * c[1], omega + h * c[2], uc, T_prime, X_prime, C, M, T_m)
-        E += h / 6 * (a[0] + 2 * b[0] + 2 * c[0] + d[0])
-        delta += h / 6 * (a[1] + 2 * b[1] + 2 * c[1] + d[1])
-        omega += h / 6 * (a[2] + 2 * b[2] + 2 * c[2] + d[2])
-    return total / len(U)
+def candidates(n: int) -> np.ndarray:
+    """The truth, and others around it (n, 7)."""
+    values = TRUTH * np.random.default_rng(0).uniform(0.9, 1.1, (n, len(TRUTH)))
+    values[0] = TRUTH
+    return values
 
 
-@njit(cache=True)
-def _polar(E, delta, omega, U, T_prime, X_prime, C, M, T_m):
-    s, c = math.sin(delta), math.cos(delta)
-    return (-E + C * U * c) / T_prime, -C * U * s / (T_prime * E) + omega, (-U * E * s / X_prime - T_m) / M
+@dataclass
+class Way:
+    """One way of computing the objectives of candidates, and the fastest it was."""
 
+    label: str
+    call: Callable[[np.ndarray], np.ndarray]
+    candidates: int
+    substeps: int = 1
+    seconds: float = math.inf
+    spent: float = 0.0
 
-def vectorized(values, U, middle, P, Q, h):
-    """All candidates at once in NumPy, complex internal voltage."""
-    T_prime, X_prime, C, M, T_m, p_v, q_v = values.T
-    sine = 2 * T_m * X_prime / C
-    E = C / 2 * (1 + np.sqrt(1 - sine**2) - 1j * sine)
-    omega = E.imag / E.real / T_prime
-    P_s0, Q_s0 = 1.0 - T_m, 0.6 - (1 - E.real) / X_prime
-    total = np.zeros(len(values))
+    @property
+    def nanoseconds(self) -> float:
+        """Per Runge-Kutta step, or sample where another method is used, and candidate."""
+        return self.seconds / self.candidates / (SAMPLES - 1) / self.substeps * 1e9
 
-    def slope(E, omega, u):
-        return (C * u - E) / T_prime + 1j * omega * E, (-u * E.imag / X_prime - T_m) / M
+    def error(self) -> float:
+        """Root mean square of the errors of P and Q at the truth [pu]; the call that compiles."""
+        return float(np.sqrt(self.call(candidates(self.candidates))[0] / (2 * SAMPLES)))
 
-    for i, u in enumerate(U):
-        total += (P[i] - P_s0 * u**p_v + u * E.imag / X_prime) ** 2
-        total += (Q[i] - Q_s0 * u**q_v - u * (u - E.real) / X_prime) ** 2
-        if i + 1 == len(U):
-            break
-        um, uc = middle[i], U[i + 1]
-        a = slope(E, omega, u)
-        b = slope(E + h / 2 * a[0], omega + h / 2 * a[1], um)
-        c = slope(E + h / 2 * b[0], omega + h / 2 * b[1], um)
-        d = slope(E + h * c[0], omega + h * c[1], uc)
-        E = E + h / 6 * (a[0] + 2 * b[0] + 2 * c[0] + d[0])
-        omega = omega + h / 6 * (a[1] + 2 * b[1] + 2 * c[1] + d[1])
-    return total / len(U)
-
-
-def scipy_ivp(p, U, h):
-    """One candidate by solve_ivp, LSODA, right-hand side compiled, the accuracy an engineer would ask for."""
-    T_prime, X_prime, C, M, T_m, *_ = p
-    t = np.arange(len(U)) * h
-    delta = 0.5 * math.asin(-2 * T_m * X_prime / C)
-    start = [C * math.cos(delta), delta, math.tan(delta) / T_prime]
-    slope = lambda s, y: _polar(*y, np.interp(s, t, U), T_prime, X_prime, C, M, T_m)  # noqa: E731
-    return solve_ivp(slope, (0, t[-1]), start, method="LSODA", rtol=1e-6, max_step=0.02, t_eval=t)
-
-
-def fastest(call, repeats):
-    """The smallest wall time of several calls [s]; the first, which may compile, does not count."""
-    call()
-    times = []
-    for _ in range(repeats):
+    def time(self, values: np.ndarray) -> None:
         started = time.perf_counter()
-        call()
-        times.append(time.perf_counter() - started)
-    return min(times)
+        self.call(values[: self.candidates])
+        self.seconds = min(self.seconds, time.perf_counter() - started)
+        self.spent += time.perf_counter() - started
 
 
-def measure(repeats):
-    """Nanoseconds per Runge-Kutta step and candidate of each way, and the figures derived from them."""
+def ours(model: Model, drive: Drive, substeps: int = 1) -> Callable[[np.ndarray], np.ndarray]:
+    return lambda values: model.errors(drive, values, substeps).sums.sum(axis=(0, 1))
+
+
+def base(bits: int | None = None) -> Model:
+    """The base model, its kernel as it is used here, or compiled anew with vectors of so many bits."""
     model = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
-    e = excitation()
-    drive = Drive.of([e])
-    values = TRUTH * np.random.default_rng(0).uniform(0.9, 1.1, (CANDIDATES, 7))
-    steps = (SAMPLES - 1) * 1e-9
-    middle = (e.U[:-1] + e.U[1:]) / 2 - np.diff(slopes(e.U)) / 8  # on the cubic that the kernel follows
-    ours = fastest(lambda: model.errors(drive, values), repeats)
-    one = fastest(lambda: [scalar(v, e.U, middle, e.P, e.Q, e.step) for v in values], max(repeats // 4, 3))
-    numpy = fastest(lambda: vectorized(values, e.U, middle, e.P, e.Q, e.step), 3)
-    ivp = fastest(lambda: scipy_ivp(TRUTH, e.U, e.step), 3)
-    figures = {
-        "nanoseconds_per_step": ours / CANDIDATES / steps,
-        "nanoseconds_per_step_numba_one_at_a_time": one / CANDIDATES / steps,
-        "nanoseconds_per_step_numpy": numpy / CANDIDATES / steps,
-        "nanoseconds_per_step_solve_ivp": ivp / steps,
+    if bits is not None:
+        source = model.source.replace(VECTORS, f"VECTORS = {bits}").replace("cache=True", "cache=False")
+        model.__dict__["kernel"] = kernel.load(source)
+    return model
+
+
+def loosest(make: Callable[[float], Callable], most: float) -> tuple[Callable, float] | None:
+    """A way made with the loosest tolerance whose error is at most so large."""
+    for tolerance in TOLERANCES:
+        call = make(tolerance)
+        if np.sqrt(call(TRUTH[None])[0] / (2 * SAMPLES)) <= most:
+            return call, tolerance
+    return None
+
+
+def rival_ways(record: rivals.Record, error: float) -> dict[str, Way]:
+    """Everything that is installed, by the key its figures have."""
+    ways = {
+        "numba_one_at_a_time": Way("Numba, one at a time, the same steps", rivals.OneAtATime(record), CANDIDATES),
+        "numpy": Way("NumPy, all at once, the same steps", rivals.Vectorized(record), CANDIDATES),
     }
-    own = figures["nanoseconds_per_step"]
-    figures |= {f"ratio_to_{k.removeprefix('nanoseconds_per_step_')}": v / own for k, v in list(figures.items())[1:]}
-    difference = np.abs(
-        model.errors(drive, values).sums.sum(axis=(0, 1)) / SAMPLES - vectorized(values, e.U, middle, e.P, e.Q, e.step)
-    )
-    agree = {"simulations_per_second": CANDIDATES / ours, "largest_difference_to_numpy": float(difference.max())}
-    return (
-        figures
-        | agree
-        | {"candidates": CANDIDATES, "samples": SAMPLES, "machine": platform.processor() or platform.machine()}
-    )
+    adaptive = {
+        "solve_ivp": ("SciPy LSODA", lambda rtol: rivals.SciPy(record, "LSODA", rtol), 2),
+        "solve_ivp_dop853": ("SciPy DOP853", lambda rtol: rivals.SciPy(record, "DOP853", rtol), 2),
+        "numbalsoda": ("numbalsoda LSODA", lambda rtol: rivals.NumbaLSODA(record, "LSODA", rtol), 20),
+        "numbalsoda_dop853": ("numbalsoda DOP853", lambda rtol: rivals.NumbaLSODA(record, "DOP853", rtol), 20),
+    }
+    for key, (label, make, count) in adaptive.items():
+        for suffix, most in (("", error), ("_loose", LOOSE)):
+            try:
+                found = loosest(make, most)
+            except (ImportError, OSError) as missing:
+                print(f"{label} left out: {missing}", file=sys.stderr)
+                break
+            if found:
+                ways[key + suffix] = Way(f"{label}, tolerance {found[1]:.0e}", found[0], count)
+    try:
+        ways["diffrax"] = Way("diffrax Tsit5, all at once, a step a sample", rivals.Diffrax(record), CANDIDATES)
+    except ImportError as missing:
+        print(f"diffrax left out: {missing}", file=sys.stderr)
+    return ways
+
+
+def race(ways: list[Way], rounds: int) -> None:
+    """All ways in turn, each until it has had its rounds or its seconds."""
+    values = candidates(CANDIDATES)
+    for _ in range(rounds):
+        for way in ways:
+            if way.spent < SECONDS:
+                way.time(values)
+
+
+def andes_row() -> dict[str, float] | None:
+    """ANDES on the same load behind a line: time per step, and its error at its own terminal voltage."""
+    if andes_check.interpreter() is None:
+        return None
+    step, voltage = 1e-3, excitation().U
+    parameters = dict(zip(base().names, TRUTH, strict=True))
+    settings = {"motor": {"name": "electromechanical"}, "static": {"name": "exponential"}, "effects": []}
+    before = {"U0": 1.0, "P0": 1.0, "Q0": 0.6, "frequency": andes_check.FREQUENCY}
+    load = Identified(andes_check.result(parameters, settings, before))
+    tables = json.loads(build("format", {"name": "andes"}).text(load))
+    runs = [andes_check.andes(tables, voltage, step) for _ in range(2)]
+    P, Q = andes_check.ours(load.model, parameters, runs[0], step)
+    error = np.sqrt(np.mean([(runs[0]["P"] - P) ** 2, (runs[0]["Q"] - Q) ** 2]))
+    seconds = min(float(run["seconds"]) for run in runs)
+    return {"nanoseconds_per_step": seconds / (len(voltage) - 1) * 1e9, "error": float(error)}
+
+
+def kernels(drive: Drive) -> dict[tuple[int, int, int], Way]:
+    """Our public batch call by width, number of candidates and substeps; a width of 0 is the compiler's own."""
+    found = {}
+    for bits in vectors.WIDTHS if vectors.width(kernel.cache_folder()) else (0,):
+        model = base(bits)
+        for n, substeps in ((CANDIDATES, 1), (CANDIDATES, 2), (POPULATION, 1), (FEW, 1)):
+            found[bits, n, substeps] = Way(
+                f"tractexp, vectors of {bits} bits", ours(model, drive, substeps), n, substeps
+            )
+    return found
+
+
+def limits(ways: dict[tuple[int, int, int], Way], rounds: int) -> list[dict]:
+    """What each kernel's arithmetic alone would take, and the share of that reached."""
+    rows, least = [], {}
+    for (bits, n, substeps), way in ways.items():
+        row = {"bits": bits, "candidates": n, "substeps": substeps, "nanoseconds_per_step": way.nanoseconds}
+        try:
+            if (bits, substeps) not in least:
+                run = base(bits).kernel.run
+                least[bits, substeps] = arithmetic.limit(run, 3, substeps, bits or 256, rounds)
+        except ValueError as reason:
+            rows.append(row | {"no_limit": str(reason)})
+            continue
+        found = least[bits, substeps]
+        row |= {"operations_per_step": found.step.all, "operations_per_sample": found.sample.all}
+        row |= {"vector_operations_per_nanosecond": found.rate, "limit": found.nanoseconds}
+        rows.append(row | {"share": found.nanoseconds / way.nanoseconds})
+    return rows
+
+
+def measure(rounds: int) -> dict:
+    """All figures of one run."""
+    P, Q = rivals.Record(excitation()).solution(TRUTH)
+    record = replace(excitation(), P=P, Q=Q)
+    drive, model = Drive.of([record]), base()
+    own = Way("tractexp, public batch call", ours(model, drive), CANDIDATES)
+    halved = Way("tractexp, two steps a sample", ours(model, drive, 2), CANDIDATES)
+    error = own.error()
+    others = rival_ways(rivals.Record(record), 1.01 * error)
+    widths = kernels(drive)
+    everything = {"": own, "two_substeps": halved, **others}
+    errors = {key: way.error() for key, way in everything.items()}
+    for way in widths.values():
+        way.error()  # compiles
+    race([*everything.values(), *widths.values()], rounds)
+    per_sample = {key: way.nanoseconds * way.substeps for key, way in everything.items()}
+    values = candidates(CANDIDATES)
+    difference = np.abs(own.call(values) - others["numpy"].call(values)).max() / SAMPLES
+    figures = {
+        "rows": [
+            {
+                "way": way.label,
+                "nanoseconds": per_sample[key],
+                "ratio": per_sample[key] / own.nanoseconds,
+                "error": errors[key],
+            }
+            for key, way in everything.items()
+        ],
+        "kernel": limits(widths, rounds),
+        "andes": andes_row(),
+        "nanoseconds_per_step": own.nanoseconds,
+    }
+    figures |= {f"nanoseconds_per_step_{key}": per_sample[key] for key in others}
+    figures |= {f"ratio_to_{key}": per_sample[key] / own.nanoseconds for key in others}
+    return figures | {
+        "simulations_per_second": CANDIDATES / own.seconds, "largest_difference_to_numpy": float(difference),
+        "vector_bits_chosen": model.kernel.VECTORS, "candidates": CANDIDATES, "samples": SAMPLES,
+        "machine": platform.processor() or platform.machine(),
+    }  # fmt: skip
+
+
+def tell(figures: dict) -> None:
+    """The tables."""
+    print(f"{SAMPLES} samples, one thread; per sample and candidate; error: RMS of P and Q at the truth\n")
+    for row in figures["rows"]:
+        line = f"{row['way']:<46}{row['nanoseconds']:>10.1f} ns{row['ratio']:>9.1f} x{row['error']:>12.1e} pu"
+        print(line)
+    if row := figures["andes"]:
+        times = row["nanoseconds_per_step"] / figures["nanoseconds_per_step"]
+        print(f"{'ANDES, one load with its network':<46}{row['nanoseconds_per_step']:>10.0f} ns{times:>9.0f} x", end="")
+        print(f"{row['error']:>12.1e} pu, without an objective")
+    print("\nkernel, public batch call; ns per Runge-Kutta step and candidate; floating-point operations per step and")
+    print("vector; limit: these alone, at the rate that operations in registers reach in this run\n")
+    print(f"{'bits':>5}{'candidates':>12}{'substeps':>10}{'ns':>8}{'operations':>12}{'limit':>8}{'share':>7}")
+    for row in figures["kernel"]:
+        line = f"{row['bits'] or '-':>5}{row['candidates']:>12}{row['substeps']:>10}{row['nanoseconds_per_step']:>8.2f}"
+        if "limit" in row:
+            operations = row["operations_per_step"] + row["operations_per_sample"] / row["substeps"]
+            line += f"{operations:>12.1f}{row['limit']:>8.2f}{row['share']:>7.0%}"
+        print(line + row.get("no_limit", ""))
+    print(f"\nwidth chosen here: {figures['vector_bits_chosen'] or 'left to the compiler'}\n")
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", action="store_true", help="print JSON only")
-    parser.add_argument("--repeats", type=int, default=20)
+    parser.add_argument("--repeats", type=int, default=1500)
     chosen = parser.parse_args()
     figures = measure(chosen.repeats)
     if not chosen.json:
-        print(f"{SAMPLES} samples, {CANDIDATES} candidates, one thread; per Runge-Kutta step and candidate\n")
-        rows = [("tractexp, public batch call with objective", "nanoseconds_per_step")]
-        rows += [("Numba, one candidate at a time", "nanoseconds_per_step_numba_one_at_a_time")]
-        rows += [("NumPy, all candidates at once", "nanoseconds_per_step_numpy")]
-        rows += [("SciPy solve_ivp LSODA, compiled right-hand side", "nanoseconds_per_step_solve_ivp")]
-        for label, key in rows:
-            print(f"{label:<50}{figures[key]:>12.1f} ns{figures[key] / figures['nanoseconds_per_step']:>10.0f} x")
-        print()
+        tell(figures)
     print(json.dumps(figures, indent=2))
 
 

@@ -100,12 +100,12 @@ def test_runs_that_all_reach_the_floor_are_equal_whatever_is_left_of_rounding():
     assert claims.answer(result) == "Take a: it ends as low as b, sooner."
 
 
-def test_the_order_of_the_runs_does_not_matter(tmp_path):
-    from tractexp.report.comparison import write_json
+def test_the_order_of_the_runs_does_not_matter():
+    from tractexp.report.comparison import content
 
     runs = [*samples({"good": 1.0, "bad": 2.0, "other": 1.05}), a_failure("bad", 99)]
     shuffled = [runs[i] for i in np.random.default_rng(0).permutation(len(runs))]
-    texts = [write_json(compared(r), tmp_path / "c.json", "x").read_text() for r in (runs, shuffled)]
+    texts = [json.dumps(content(compared(r), "x")) for r in (runs, shuffled)]
     assert texts[0] == texts[1]
 
 
@@ -657,7 +657,12 @@ def test_the_json_holds_the_numbers(swept):
         ((), "there is no sweep under outputs/sweeps to compare; make one, such as tractexp -m"),
         (("task.sweep=missing",), "task.sweep=missing is not a folder"),
         (("task.sweep=empty",), "the sweep empty is empty: none of its folders holds a job"),
-        (("task.sweep=mixed",), "runs on different data (tibet_30pct, tibet_50pct)"),
+        (
+            ("task.sweep=mixed", "task.floor=1e-5"),
+            "task.floor=1e-05 is the floor of one problem, and the sweep mixed has 2",
+        ),
+        (("task.apart=[seed]",), "task.apart=seed is not one of budget, time_limit, target"),
+        (("task.bbob=-1",), "task.bbob=-1 is out of range"),
         (("task.sweep=empty", "task.filter=x"), "task.sweep and task.filter are both given"),
         (("task.floor=0",), "task.floor=0 must be an objective above 0"),
         (("task.targets=[0.5]",), "task.targets=0.5 is out of range: it must be at least 1"),

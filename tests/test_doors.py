@@ -91,6 +91,54 @@ def test_what_the_store_hands_out_is_a_copy():
     assert again == 1, CHANGED.format("hydra_config_store", "ConfigStore.load hands out the schema itself")
 
 
+def compiled_with(bits):
+    """LLVM's code of a loop that prefers vectors of so many bits, and its assembly."""
+    from numba import float64, njit
+
+    from tractexp.doors.numba_vector_width import prefer_vectors
+
+    @njit(float64[::1](float64[::1]))
+    def doubled(x):
+        prefer_vectors(bits)
+        for k in range(len(x)):
+            x[k] += x[k]
+        return x
+
+    (signature,) = doubled.signatures
+    return doubled.inspect_llvm(signature), doubled.inspect_asm(signature)
+
+
+def test_one_function_is_compiled_for_wider_or_narrower_vectors_and_others_are_left_alone():
+    from llvmlite import ir
+
+    from tractexp.doors.numba_vector_width import compiled_for
+
+    wanted = '"prefer-vector-width"="{}"'
+    try:
+        ir.values.FunctionAttributes().add(wanted.format(256))
+        pytest.fail(MENDED.format("numba/llvmlite#1348", "numba_vector_width"))
+    except ValueError:
+        pass
+    features = compiled_for()[-1].split(",")
+    made = {bits: compiled_with(bits) for bits in (0, 256, 512)}
+    assert "prefer-vector-width" not in made[0][0]
+    for bits in (256, 512):
+        assert wanted.format(bits) in made[bits][0], CHANGED.format("numba_vector_width", "the attribute is lost")
+    if "+avx512f" in features:
+        assert [bits for bits in (256, 512) if "zmm" in made[bits][1]] == [512]
+
+
+def test_what_numba_compiles_for_is_what_it_keeps_code_apart_by():
+    from llvmlite import binding
+
+    from tractexp.doors.numba_vector_width import compiled_for
+
+    system, processor, features = compiled_for()
+    assert system == binding.get_process_triple(), CHANGED.format("numba_vector_width", "the triple is not first")
+    assert processor, CHANGED.format("numba_vector_width", "the processor has no name")
+    assert all(f[0] in "+-" for f in features.split(",") if f)
+
+
 def test_differential_evolution_goes_a_generation_at_a_time_as_the_public_function_goes_in_one():
     import numpy as np
     from scipy.optimize import differential_evolution

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from tractexp.errors import UserError
-from tractexp.identification.search import REFUSED
 from tractexp.report import figures, style
 
 
@@ -30,15 +29,6 @@ def draw_fit(path: Path, samples: int = 1000, **more) -> Path:
 
 def texts(path: Path) -> list[str]:
     return ["".join(node.itertext()) for node in ElementTree.parse(path).iter("{http://www.w3.org/2000/svg}text")]
-
-
-def curves(objective: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    return {"issa": (np.arange(len(objective)), objective)}
-
-
-def ticks(path: Path) -> list[float]:
-    """The numbers on the axis of the objective: those in the notation of powers."""
-    return [float(text) for text in texts(path) if re.fullmatch(r"[\d.]+e-?\d+", text)]
 
 
 def test_fit_names_its_axes_units_and_errors(tmp_path):
@@ -61,10 +51,7 @@ def test_fit_names_its_axes_units_and_errors(tmp_path):
 
 def test_the_same_figure_gives_the_same_bytes(tmp_path):
     assert draw_fit(tmp_path / "a.svg").read_bytes() == draw_fit(tmp_path / "b.svg").read_bytes()
-    history = curves(np.geomspace(1.0, 1e-6, 50))
-    first, second = (figures.fitness(tmp_path / name, history, history) for name in ("c.svg", "d.svg"))
-    assert first.read_bytes() == second.read_bytes()
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.svg", "b.svg", "c.svg", "d.svg"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.svg", "b.svg"]
 
 
 @pytest.mark.parametrize("samples", [2, 1000, 60_000])
@@ -104,44 +91,6 @@ def test_a_gap_in_the_measured_power_is_a_gap_in_the_line(tmp_path):
     assert (strokes(whole), strokes(broken)) == (2, 3)
 
 
-def test_fitness_names_its_axes_and_its_curves(tmp_path):
-    x, y = np.arange(30), np.geomspace(1.0, 1e-4, 30)
-    path = figures.fitness(
-        tmp_path / "fitness.svg", {"issa": (x, y), "pso": (x, 2 * y)}, {"issa": (60 * x, y), "pso": (50 * x, 2 * y)}
-    )
-    assert {"iteration", "simulations", "best objective [pu²]", "issa", "pso"} <= set(texts(path))
-
-
-@pytest.mark.parametrize("bad", [REFUSED, 3 * REFUSED, np.inf, np.nan])
-def test_refused_candidates_do_not_stretch_the_axis(tmp_path, bad):
-    objective = np.geomspace(1e-3, 1e-6, 40)
-    objective[:3] = bad
-    path = figures.fitness(tmp_path / "fitness.svg", curves(objective), curves(objective))
-    assert ticks(path)
-    assert max(ticks(path)) <= 1e-2
-
-
-def test_a_narrow_range_of_objectives_still_has_its_scale(tmp_path):
-    objective = np.linspace(8.3e-6, 8.12e-6, 30)
-    path = figures.fitness(tmp_path / "fitness.svg", curves(objective), curves(objective))
-    assert len(ticks(path)) >= 3
-    assert all(8e-6 < tick < 8.5e-6 for tick in ticks(path))
-
-
-def test_a_perfect_fit_can_be_drawn(tmp_path):
-    objective = np.array([1.0, 1e-8, 0.0])
-    assert figures.fitness(tmp_path / "fitness.svg", curves(objective), curves(objective)).stat().st_size > 0
-
-
-def test_a_history_without_a_single_objective_is_refused(tmp_path):
-    for objective in (np.array([]), np.full(5, REFUSED), np.full(5, np.nan)):
-        with pytest.raises(UserError, match=r"fitness\.svg: there is no objective to draw"):
-            figures.fitness(tmp_path / "fitness.svg", curves(objective), curves(objective))
-    with pytest.raises(UserError, match="no objective to draw"):
-        figures.fitness(tmp_path / "fitness.svg", {}, {})
-    assert not list(tmp_path.iterdir())
-
-
 def test_columns_that_cannot_be_drawn_are_refused_by_name(tmp_path):
     t, U, measured, calculated = event(20)
 
@@ -154,8 +103,6 @@ def test_columns_that_cannot_be_drawn_are_refused_by_name(tmp_path):
         draw(U=U[:-1])
     with pytest.raises(UserError, match="calculated_Q has no finite value"):
         draw(calculated=(calculated[0], np.full(20, np.nan)))
-    with pytest.raises(UserError, match="'issa' has 3 steps and 2 objectives"):
-        figures.fitness(tmp_path / "f.svg", {"issa": (np.arange(3), np.ones(2))}, {})
 
 
 def test_a_folder_that_cannot_be_written_is_named(tmp_path):

@@ -13,9 +13,11 @@ from scipy.interpolate import Akima1DInterpolator
 
 import tractexp
 from tractexp.errors import UserError
+from tractexp.model import operations
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
 from tractexp.model.sites import SITES
+from tractexp.model.template import LANES
 from tractexp.plugin import get
 
 OMEGA_S = 2 * np.pi * 50
@@ -113,6 +115,54 @@ def test_a_slow_record_is_as_accurate_as_a_fast_one(model, step):
     assert error[0] < 1e-7
 
 
+@pytest.mark.parametrize(("integration", "order"), [("classical", 4), ("printed", 1)])
+def test_the_kernel_is_of_the_order_that_its_integration_has(model, integration, order):
+    """Eq. (4) as printed goes h/6 ahead in its second and third stage, which leaves one order of the four.
+
+    The voltage is a smooth one, sampled so finely that the cubic between its samples is not what limits.
+    """
+    t = np.arange(401) * 2.5e-3
+    U = 1 - 0.3 * np.sin(np.pi * t) ** 4
+    drive = Drive.of([Excitation(2.5e-3, U, np.ones(401), np.full(401, 0.6), 1.0, 1.0, 0.6)])
+    exact = model.simulate(drive, TRUTH, 64)
+    made = compose(model.motor, model.static, integration=integration)
+    steps = np.array([1, 2, 4])
+    errors = [np.abs(made.simulate(drive, TRUTH, n).Q - exact.Q).max() for n in steps]
+    assert -np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(order, abs=0.25)
+
+
+def test_integrated_as_printed_a_model_takes_one_step_per_sample_and_says_what_that_leaves(model):
+    printed = compose(model.motor, model.static, integration="printed")
+    drive = Drive.of([dip()])
+    substeps, error = printed.substeps(drive, TRUTH)
+    assert substeps.tolist() == [1]
+    assert error[0] > 1e-4
+    assert model.substeps(drive, TRUTH)[1][0] < 1e-7
+    assert printed.source != model.source
+    with pytest.raises(UserError, match=r"model\.integration=euler is not one of classical, printed"):
+        compose(model.motor, model.static, integration="euler")
+
+
+def test_the_operations_of_a_step_are_those_counted_by_hand(model):
+    """Eq. (1) in rectangular form: 9 multiplications and 6 additions four times, 9 of each to go ahead in three stages,
+    6 and 12 for the sum. Sixteen lanes share three cubics of 8 and 8, three straight lines of 2 and 1, and 6 divisions.
+    """
+    step = operations.count(model.source).step
+    assert step.multiplications == 4 * 9 + 9 + 6 + (3 * 8 + 3 * 1) / 16
+    assert step.additions == 4 * 6 + 9 + 12 + (3 * 8 + 3 * 2 + 2 * 2) / 16
+    assert (step.divisions, step.others) == (6 / 16, 0)
+
+
+def test_the_operations_of_a_sample_are_those_of_both_powers_and_the_errors(model):
+    """A ZIP load instead of two powers saves what two exponentials cost; a load without a motor makes no steps."""
+    zip_load, none = get("model/static", "zip")(), get("model/motor", "none")()
+    powers, polynomial = operations.count(model.source), operations.count(compose(none, zip_load).source)
+    assert polynomial.step.total == 0
+    assert powers.sample.others == 2 * 4  # two clamped exponents, rounded, and put into the exponent of a number
+    assert powers.sample.total > polynomial.sample.total + 2 * 26
+    assert powers.per_sample(3).total == pytest.approx(powers.sample.total + 3 * powers.step.total)
+
+
 def test_recorded_frequency_moves_the_synchronous_speed(model):
     """At a constant off-nominal frequency the load is in the same steady state: flat stays flat, slip unchanged."""
     t = np.arange(500) * 1e-3
@@ -145,15 +195,49 @@ def test_steady_state_is_the_equivalent_circuit(model):
 
 
 def test_one_candidate_gives_the_bits_of_a_batch(model):
-    values = candidates(37, np.random.default_rng(3))
+    values = candidates(LANES + 5, np.random.default_rng(3))
     drive = Drive.of([dip()])
     batch = model.errors(drive, values).sums
     responses = model.simulate(drive, values)
-    for k in (0, 15, 16, 36):
+    for k in (0, 7, 8, LANES - 1, LANES, LANES + 4):
         alone = model.simulate(drive, values[k])
         assert np.array_equal(model.errors(drive, values[k]).sums[..., 0], batch[..., k])
         assert np.array_equal(alone.P[0], responses.P[k])
         assert np.array_equal(alone.Q[0], responses.Q[k])
+
+
+def test_a_kernel_just_compiled_gives_the_bits_of_the_same_kernel_loaded(tmp_path):
+    program = """if True:
+        import numpy as np
+        from tractexp.model.drive import Drive, Excitation
+        from tractexp.model.model import compose
+        from tractexp.plugin import get
+        model = compose(get("model/motor", "double_cage")(), get("model/static", "exponential")())
+        values = np.array([p.default for p in model.parameters]) * np.linspace(0.95, 1.05, 20)[:, None]
+        U = 1 - 0.5 * (np.arange(100) // 30 == 1)
+        drive = Drive.of([Excitation(1e-3, U, np.ones(100), np.ones(100), 1.0, 1.0, 0.6)])
+        response = model.simulate(drive, values)
+        assert (response.miss == 0).all()
+        print(response.P.tobytes().hex(), response.Q.tobytes().hex())
+    """
+    environment = os.environ | {"TRACTEXP_CACHE_DIR": str(tmp_path)}
+    told = [
+        subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True)
+        for _ in range(2)
+    ]
+    assert told[0].stdout == told[1].stdout
+
+
+def test_the_exponential_of_kernels_is_the_exponential(model):
+    x = np.concatenate(
+        [np.linspace(-699, 699, 20001), np.arange(-1000, 1000) * 0.34657359027997264]
+    )  # half powers of 2
+    found = np.array([model.kernel._exp(value) for value in x[abs(x) < 700]])
+    assert np.abs(found / np.exp(x[abs(x) < 700]) - 1).max() < 4e-13
+    assert np.isnan(model.kernel._exp(np.nan))
+    assert model.kernel._exp(800.0) == model.kernel._exp(700.0)
+    assert model.kernel._exp(-np.inf) == model.kernel._exp(-700.0) > 0
+    assert model.kernel._exp(0.0) == 1.0
 
 
 def test_sums_are_those_of_the_responses(model):

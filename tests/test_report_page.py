@@ -63,8 +63,8 @@ def read(path) -> Reader:
 
 @pytest.fixture
 def drawing(tmp_path):
-    curve = {"issa": (np.arange(50), np.geomspace(1, 1e-5, 50))}
-    return figures.fitness(tmp_path / "fitness.svg", curve, curve, title="search")
+    t, power = np.arange(50.0), np.geomspace(1, 1e-5, 50)
+    return figures.fit(tmp_path / "fit.svg", t, t, (power, power), (power, power), title="a fit", epsilon=(0.0, 0.0))
 
 
 def test_whatever_is_written_is_escaped(tmp_path, drawing):
@@ -83,7 +83,7 @@ def test_two_copies_of_a_figure_keep_apart(tmp_path, drawing):
     assert reader.tags.count("svg") == 2
     assert any(reference.startswith("#f1-") for reference in reader.references)
     assert any(reference.startswith("#f2-") for reference in reader.references)
-    assert reader.words.count("simulations") == 2
+    assert reader.words.count("t [s]") == 2
 
 
 def test_the_same_page_has_the_same_bytes(tmp_path, drawing):

@@ -61,7 +61,7 @@ def check(*overrides):
         ("task=benchmark model=static_zip", "model=static_zip is not read by task=benchmark; leave it out"),
         ("task=paper optimizer=pso", "optimizer=pso is not read by task=paper; it compares the paper's three"),
         ("experiment=table1 optimizer=pso", "optimizer=pso is not read by task=paper; it compares the paper's three"),
-        ("experiment=ablation task=discrepancy", "budget=15000 is not read by task=discrepancy; leave it out"),
+        ("experiment=to_the_letter task=discrepancy", "optimizer=issa_to_the_letter is not read by task=discrepancy"),
     ],
 )
 def test_a_setting_that_the_task_ignores_is_refused(overrides, sentence):

@@ -10,6 +10,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -131,9 +132,21 @@ def test_workers_print_nothing_and_the_end_is_a_table_of_optimizers(logged):
     _, _, done = logged
     assert "Runge-Kutta" not in done.stdout + done.stderr
     lines = [line.split() for line in done.stdout.splitlines()]
-    assert [line[:2] for line in lines if line[:1] in (["ssa"], ["pso"])] in (
-        [["ssa", "2"], ["pso", "2"]], [["pso", "2"], ["ssa", "2"]],
-    )  # fmt: skip
+    assert sorted(line[:2] for line in lines if line[:1] in (["ssa"], ["pso"])) == [["pso", "0"], ["ssa", "0"]]
+
+
+def test_a_sweep_of_several_variants_and_seeds_ends_with_their_comparison(logged, tmp_path):
+    folder, sweep, done = logged
+    assert "comparison.html" in done.stdout
+    told = json.loads((sweep / "comparison.json").read_text())
+    assert {(run["variant"], run["seed"]) for run in told["runs"]} == {(v, s) for v in ("ssa", "pso") for s in (0, 1)}
+    parent = json.loads((sweep / "sweep.json").read_text())["run"]
+    (uri,) = ask(folder, f"select artifact_uri from runs where run_uuid = '{parent}'")[0]
+    assert "comparison.html" in {path.name for path in Path(uri.removeprefix("file://")).iterdir()}
+    for quiet in (("seed=0",), ("seed=0,1", "hydra.sweeper.compare=false")):
+        done = tractexp("-m", *QUICK, *quiet, "optimizer=ssa,pso", "tracking.enabled=false", HERE, cwd=tmp_path)
+        assert "best objective" in done.stdout
+        assert not (tmp_path / "sweep" / "comparison.html").exists()
 
 
 def test_the_sweep_is_a_finished_parent_run_with_its_jobs_as_children(logged):
@@ -370,17 +383,17 @@ def test_an_unreachable_dask_scheduler_is_named(tmp_path):
     assert sentence in done.stderr
 
 
-@pytest.mark.parametrize(("experiment", "optimizers"), [("ablation", 20), ("table3", 3)])
-def test_an_experiment_is_a_sweep_by_itself_of_thirty_seeds(experiment, optimizers, tmp_path):
+def test_an_experiment_is_a_sweep_by_itself_of_thirty_seeds(tmp_path):
     """No record is named, so that every job is composed, refused, and takes no time."""
-    done = tractexp(f"experiment={experiment}", "tracking.enabled=false", "data=csv", HERE, cwd=tmp_path)
+    asked = ("experiment=ablation", "tracking.enabled=false", "data=csv", "budget=1000", HERE)
+    done = tractexp(*asked, cwd=tmp_path)
     assert done.returncode != 0
     ends = statuses(tmp_path / "sweep").values()
     seeds = {}
     for end in ends:
         seeds.setdefault(end["choices"]["optimizer"], set()).add(end["seed"])
-    assert {"issa", "ssa", "pso"} <= seeds.keys()
-    assert len(seeds) >= optimizers
+    assert {"issa", "ssa"} <= seeds.keys()
+    assert len(seeds) == 16
     assert all(found == set(range(30)) for found in seeds.values())
     assert all("data.train" in end["message"] for end in ends)
 

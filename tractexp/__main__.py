@@ -11,7 +11,8 @@ for library in ("OPENBLAS", "OMP", "MKL"):
 
 from tractexp.errors import UserError  # noqa: E402
 
-OPEN = ("model.bounds.", "model.fixed.", "task.values", "task.criteria.")  # settings that take names of their own
+# settings that take names of their own
+OPEN = ("model.bounds.", "model.fixed.", "task.values", "task.criteria.", "hydra.sweeper.comparison.")
 UNLOGGED = (
     "-",
     "tracking.enabled=",

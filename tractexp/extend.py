@@ -5,7 +5,7 @@ from tractexp.extend import Effect, Parameter, plugin, sites
 
 from tractexp.errors import UserError, check_choice, check_range
 from tractexp.identification.loss import Loss
-from tractexp.identification.optimizer import Optimizer
+from tractexp.identification.optimizer import Iterative, Optimizer
 from tractexp.model import sites
 from tractexp.model.drive import EVENT, INPUTS
 from tractexp.model.parts import Effect, Measurement, Motor, Static
@@ -20,6 +20,7 @@ __all__ = [
     "Base",
     "Effect",
     "Events",
+    "Iterative",
     "Loss",
     "Measurement",
     "Motor",

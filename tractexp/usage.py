@@ -48,7 +48,7 @@ What else can be chosen, by GROUP=NAME (effects by model.effects=[NAME,...])
 
 Values are changed by KEY=VALUE
   tractexp optimizer.population=100 model.bounds.C=[0.8,0.95] budget=5000 seed=7
-  tractexp -m optimizer=issa,ssa,pso 'seed=range(0,30)'        a sweep; then tractexp task=compare
+  tractexp -m optimizer=issa,ssa,pso 'seed=range(0,30)'        a sweep, and which is better
   tractexp --cfg job                                           every setting of the present choice
   tractexp --hydra-help                                        Hydra's options
   eval "$(tractexp -sc install=bash)"                          completion of groups, names and keys
@@ -118,7 +118,7 @@ def _summary(group: str, names: Mapping[str, Choice]) -> str:
     """The names of a group, variants counted beside what they vary; of many, how many."""
     plugins = {name for name, choice in names.items() if choice.module}
     families: dict[str, list[str]] = {name: [] for name in _sorted(group, names) if _of(name, plugins) == name}
-    for name in names:
+    for name in _sorted(group, names):
         families[_of(name, plugins)].append(name)
     told = [f"{name} and {len(own) - 1} variants" if len(own) > 2 else ", ".join(own) for name, own in families.items()]
     more = f" and {len(told) - FEW + 1} others" if len(told) > FEW else ""

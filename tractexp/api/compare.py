@@ -1,6 +1,5 @@
 """Settle which optimizer is better, over the runs of a sweep or of any filter over MLflow."""
 
-import contextlib
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,18 +8,17 @@ from typing import TYPE_CHECKING, Any, Self
 
 from tractexp.api.arguments import public
 from tractexp.api.pages import Written
-from tractexp.errors import UserError, check_range
+from tractexp.errors import UserError, check_choice, check_range
 from tractexp.outcome import Table
-from tractexp.progress import counting
 
 if TYPE_CHECKING:
     from tractexp.comparison.comparison import Comparison
-    from tractexp.comparison.floor import Polished
-    from tractexp.comparison.runs import Gathered, Run
-    from tractexp.identification.problem import Problem
+    from tractexp.comparison.overall import Several
+    from tractexp.comparison.runs import Run
 
 SWEEPS = Path("outputs", "sweeps")
 TARGETS = (10.0, 2.0, 1.01)
+APART = ("budget", "time_limit", "target")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -34,7 +32,7 @@ class Compared(Written):
     content: Mapping[str, Any]
 
     @functools.cached_property
-    def comparison(self) -> "Comparison":
+    def comparison(self) -> "Comparison | Several":
         """What stands behind the page; of a loaded result the runs are read again."""
         return _made(**self.call)[1]
 
@@ -54,23 +52,26 @@ class Compared(Written):
         return self.content["sentences"]
 
     def table(self) -> Table:
-        targets = self.content["targets"]
-        hardest = targets.index(min(targets))
+        several = self.content.get("problems")
+        each = several or {self.content["problem"]: self.content}
         rows = [
-            [v["name"], v["failures"], v["objective"]["median"], v["objective"]["worst"], v["at_floor"],
-             v["ert"]["simulations"][hardest]]
-            for v in self.content["variants"]
+            [*([problem] if several else []), v["name"], v["failures"], v["objective"]["median"],
+             v["objective"]["worst"], v["at_floor"], v["ert"]["simulations"][_hardest(told["targets"])]]
+            for problem, told in each.items() for v in told["variants"]
         ]  # fmt: skip
         columns = ["variant", "failed", "median [pu²]", "worst [pu²]", "share at floor", "ERT [simulations]"]
-        title = f"{self.source}: {self.content['problem']}"
-        return Table(columns, rows, title, [self.answer, *self.sentences, *self.content["notes"]])
+        title = f"{self.source}: {', '.join(each)}"
+        said = [self.answer, *self.sentences, *self.content["notes"]]
+        return Table(["problem", *columns] if several else columns, rows, title, said)
 
     def _write(self, folder: Path) -> list[Path]:
         """comparison.html and comparison.json."""
-        from tractexp.report.comparison import write_json, write_page
+        from tractexp import files
+        from tractexp.report import comparison, overall
 
-        page = write_page(self.comparison, folder / "comparison.html", self.source)
-        return [page, write_json(self.comparison, folder / "comparison.json", self.source)]
+        report: Any = overall if "problems" in self.content else comparison
+        data = files.write_json(folder / "comparison.json", self.content)
+        return [report.write_page(self.comparison, folder / "comparison.html", self.source), data]
 
     def to_dict(self) -> dict[str, Any]:
         return {"call": dict(self.call), **self.content}
@@ -93,35 +94,47 @@ def compare(
     ties: float = 1e-3,
     floor: float | None = None,
     reference: str | None = None,
+    apart: Sequence[str] = (),
+    bbob: int = 0,
+    cores: int | None = None,
     progress: Any = None,
 ) -> Compared:
     """Compare the variants in a sweep's folder (None: the newest under outputs/sweeps), or what a `filter` finds.
 
     The filter is MLflow's, over the store at `uri` (None: the current folder's) and one `experiment` (None: all).
-    `data` keeps the runs on one choice of data. `targets` are those of running times, in multiples of the floor;
-    objectives within the share `ties` of it count as equal; `floor` [pu²] is what the noise leaves (None: what least
-    squares reach from the ends of the runs and from many starts, or the best of all runs where their records cannot be
-    read any more). With a `reference` only its pairs are tested. `progress`: None shows how far that is, False does
-    not; a callable is told. Raises `UserError` where no runs are found, or they are of different problems.
+    `data` keeps the runs on one choice of data; runs on several are compared on each, and over all. So are those that
+    differ in the limits of a search named in `apart`, such as "budget". With `bbob` the variants are run on so many
+    instances of the functions of BBOB as well, on `cores` processes (None: all). `targets` are those of running times,
+    in multiples of the floor; objectives within the share `ties` of it count as equal; `floor` [pu²] is what the noise
+    leaves (None: what least squares reach from the ends of the runs and from many starts, or the best of all runs where
+    their records cannot be read any more). With a `reference` only its pairs are tested. `progress`: None shows how far
+    that is, False does not; a callable is told. Raises `UserError` where no runs are found, or their models differ.
     """
-    check(sweep, filter, targets, ties, floor)
+    check(sweep, filter, targets, ties, floor, apart, bbob)
     if filter is None:
         from tractexp.comparison import load
 
         sweep = str(sweep if sweep is not None else load.newest_sweep(SWEEPS))
     call = {
         "sweep": sweep, "filter": filter, "uri": uri, "experiment": experiment, "data": data,
-        "targets": list(targets), "ties": ties, "floor": floor, "reference": reference,
+        "targets": list(targets), "ties": ties, "floor": floor, "reference": reference, "apart": list(apart),
+        "bbob": bbob,
     }  # fmt: skip
-    source, comparison = _made(**call, progress=progress)
-    from tractexp.report.comparison import content
+    source, comparison = _made(**call, cores=cores, progress=progress)
+    from tractexp.comparison.overall import Several
+    from tractexp.report import comparison as one
+    from tractexp.report import overall
 
+    content = (overall if isinstance(comparison, Several) else one).content
     made = Compared(call, source, content(comparison, source))
     vars(made)["comparison"] = comparison
     return made
 
 
-def check(sweep: Any, filter: str | None, targets: Sequence[float], ties: float, floor: float | None) -> None:
+def check(
+    sweep: Any, filter: str | None, targets: Sequence[float], ties: float, floor: float | None,
+    apart: Sequence[str] = (), bbob: int = 0,
+) -> None:  # fmt: skip
     """Raise `UserError` for settings out of range."""
     if sweep is not None and filter is not None:
         raise UserError("task.sweep and task.filter are both given; the runs come from one or the other")
@@ -132,51 +145,35 @@ def check(sweep: Any, filter: str | None, targets: Sequence[float], ties: float,
     for target in targets:
         check_range("task.targets", target, 1.0)
     check_range("task.ties", ties, 0.0, 1.0)
+    for key in apart:
+        check_choice("task.apart", key, APART)
+    check_range("task.bbob", bbob, 0, 1000)
+
+
+def _hardest(targets: Sequence[float]) -> int:
+    return targets.index(min(targets))
 
 
 def _made(
     *, sweep: str | None, filter: str | None, uri: str | None, experiment: str | None, data: str | None,
-    reference: str | None, progress: Any = False, **judging: Any,
-) -> "tuple[str, Comparison]":  # fmt: skip
-    from tractexp.comparison.comparison import compare
-    from tractexp.comparison.runs import gather
+    apart: Sequence[str] = (), bbob: int = 0, cores: int | None = None, progress: Any = False, **judging: Any,
+) -> "tuple[str, Comparison | Several]":  # fmt: skip
+    """Where the runs are from, and their comparison: of several problems each by itself and all together."""
+    from tractexp.api.judging import judged, several
+    from tractexp.comparison import runs as gathering
 
     runs, source = _runs(sweep, filter, uri, experiment)
-    gathered = gather(runs, source, data)
-    polished, why_not = _polished(gathered, progress)
-    known = {"polished": polished, "why_not": why_not}
-    return source, compare(gathered, reference=reference, plain=_plain(), **known, **judging)
-
-
-def _polished(gathered: "Gathered", progress: Any) -> "tuple[Polished | None, str]":
-    """What polishing found on the problem that the runs' configuration describes; None, and why, where it cannot."""
-    from tractexp.comparison.floor import polish
-
-    runs = [run for variant in gathered.variants for run in variant.runs]
-    try:
-        problem = _problem(next(run for run in runs if run.finished))
-    except UserError as error:
-        return None, f"the problem cannot be put again ({str(error).rstrip('.')})"
-    except (KeyError, TypeError, ValueError) as error:
-        return None, f"the configuration of the runs is not understood any more ({type(error).__name__}: {error})"
-    with contextlib.ExitStack() as stack:
-        found = polish(problem, runs, lambda n: stack.enter_context(counting("groups of descents", n, progress)))
-    return found, "" if found else "the records or the model have changed since: these parameters fit otherwise now"
-
-
-def _problem(run: "Run") -> "Problem":
-    """The problem that a run's configuration describes. Raises `UserError` where its records are not there any more."""
-    from tractexp.api.setup import Setup
-    from tractexp.comparison.load import nested
-    from tractexp.plugin import build
-    from tractexp.record import detect
-
-    config = nested(run.config)
-    home = Path(run.folder) if run.folder else Path()  # relative paths count from where the run was started
-    with contextlib.chdir(home) if home.is_dir() else contextlib.nullcontext():
-        records = build("data", config["data"]).read()
-    train = [detect(record) for record in records.train]
-    return Setup.of(train, config["model"], (), config.get("objective"), {}).problem
+    if data is not None:
+        runs = gathering.on(runs, source, data)
+    groups = gathering.parted(runs, apart)
+    if len(groups) == 1 and not bbob:
+        return source, judged(gathering.gather(runs, source), progress, judging)
+    if judging["floor"] is not None and len(groups) > 1:
+        raise UserError(
+            f"task.floor={judging['floor']:g} is the floor of one problem, and {source} has {len(groups)}; leave it"
+            " out, or choose one by task.data"
+        )
+    return source, several(groups, source, judging, Path(sweep) if sweep else None, bbob, cores, progress)
 
 
 def _runs(
@@ -193,10 +190,3 @@ def _runs(
 
     source = f"the filter {filter}"
     return load.from_logged(find(tracking.address(uri), filter, experiment), source), source
-
-
-def _plain() -> dict[str, str]:
-    """For each optimizer the one that it is with all its switches off, "" where there is none."""
-    from tractexp.plugin import discover, get
-
-    return {name: get("optimizer", name).plain for name in discover()["optimizer"]}

@@ -37,11 +37,13 @@ class LoadModel(Portable, Tabulated):
     fixed: Mapping[str, float] = field(default_factory=dict)
     substeps: int | None = None
     per_event: Sequence[str] = ()
+    integration: str = "classical"
 
     @property
     def node(self) -> dict[str, Any]:
-        """The parts, as `result.json` keeps them."""
-        return {"motor": dict(self.motor), "static": dict(self.static), "effects": list(self.effects)}
+        """The parts, as `result.json` keeps them; and the integration where it is not the classical."""
+        parts = {"motor": dict(self.motor), "static": dict(self.static), "effects": list(self.effects)}
+        return parts if self.integration == "classical" else {**parts, "integration": self.integration}
 
     @functools.cached_property
     def model(self) -> "Model":
@@ -92,6 +94,7 @@ def compose(
     fixed: Mapping[str, float] | None = None,
     substeps: int | None = None,
     per_event: Sequence[str] | None = None,
+    integration: str | None = None,
 ) -> LoadModel:
     """A load model: a choice of `conf/model` (by name, or the path of a YAML file), or a motor beside a static load.
 
@@ -99,15 +102,16 @@ def compose(
     they replace those of `model`, and one left out is that of the paper's model. `effects` names what is added to the
     equations. `bounds` {name: [lower, upper]} and `fixed` {name: value}, in the parameters' own units, are added to the
     choice's; `per_event` names parameters with a value of their own in each event; `substeps` are Runge-Kutta steps per
-    sample, as many as needed by default.
+    sample, as many as needed by default; `integration` "printed" is Eq. (4) of the paper as it stands.
 
     Raises `UserError` for an unknown name or an effect that does not fit the equations; the values are checked where
     the model is used.
     """
     made = model_of(model)
-    given = {"motor": motor, "static": static}
-    parts = {part: Choice.of(f"model/{part}", chosen).node for part, chosen in given.items() if chosen is not None}
-    made = made.with_(effects=effects, bounds=bounds, fixed=fixed, substeps=substeps, per_event=per_event, **parts)
+    chosen_parts = {"motor": motor, "static": static}
+    parts = {part: Choice.of(f"model/{part}", chosen).node for part, chosen in chosen_parts.items() if chosen}
+    given = {"effects": effects, "substeps": substeps, "per_event": per_event, "integration": integration}
+    made = made.with_(bounds=bounds, fixed=fixed, **given, **parts)
     _ = made.parameters
     for key in made.fixed:
         if key not in made.parameters:
@@ -141,7 +145,8 @@ def _node(model: Any) -> dict[str, Any]:
     """The parts of a model composed of plugins."""
     try:
         motor, static = ({"name": p.name, **dataclasses.asdict(p)} for p in (model.motor, model.static))
-        return {"motor": motor, "static": static, "effects": [effect.name for effect in model.effects]}
+        told = {"motor": motor, "static": static, "effects": [effect.name for effect in model.effects]}
+        return told | {"integration": model.integration}
     except AttributeError:
         kind = type(model).__name__
         raise UserError(f"model is of type {kind}; give a name, or what tractexp.compose makes") from None

@@ -4,7 +4,7 @@ import functools
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 PARTS = (
     "table1", "table2", "table3", "table4", "table5", "figure3", "figure4", "figure6", "figure8", "figure9", "figure10",
-    "figure11", "equations",
+    "figure11", "equations", "readings",
 )  # fmt: skip
 HELD_OUT = {"interpolation": {"table4", "figure10"}, "extrapolation": {"table5", "figure11"}}  # what needs which dip
 SEEDS = 30
@@ -46,15 +46,16 @@ class Replicated(Written):
     @property
     def counts(self) -> Counter[str]:
         """How many claims got which verdict."""
-        return Counter(claim.verdict for claim in self.claims)
+        return Counter(claim.word for claim in self.claims)
 
     def table(self) -> Table:
+        from tractexp.replication.claims import counted
+
         rows = [[claim.part, claim.text, claim.verdict, claim.measured] for claim in self.claims]
-        told = ", ".join(f"{n} {verdict}" for verdict, n in self.counts.items())
-        return Table(["where", "the paper's claim", "verdict", "measured"], rows, f"{len(rows)} claims: {told}")
+        return Table(["where", "the paper's claim", "verdict", "measured"], rows, counted(self.claims))
 
     def _write(self, folder: Path) -> list[Path]:
-        """paper.html, paper.md and the figures."""
+        """paper.html and paper.md."""
         from tractexp.report.paper import write
 
         return write(self.study, self.parts, self.claims, folder)
@@ -106,11 +107,12 @@ def paper(
     settings, chosen = {"seeds": seeds, "workers": workers}, [p for p in PARTS if p in parts or not parts]
     with telling(progress) as tell:
         study = _study(setup, **settings, tell=tell, count=_counted(tell))
+        from tractexp.replication.claims import claims
+
         for kind, needing in HELD_OUT.items():
             if needing & set(chosen):
                 study.held(kind)
-        from tractexp.replication.claims import claims
-
+        study.prepare(chosen)
         made = Replicated(setup, settings, chosen, claims(study, chosen))
     vars(made)["study"] = study
     return made
@@ -128,8 +130,10 @@ def check(parts: Sequence[str], seeds: int, workers: int | None) -> None:
 def _study(setup: Setup, seeds: int, workers: int | None, **heard: Any) -> "Study":
     from tractexp.replication.study import Study
 
+    literal = replace(setup, model=setup.model.with_(integration="printed"))
     return Study(
-        recipe=setup.problem_of, node=asdict(setup.model), train=setup.train, held_out=setup.validate, seeds=seeds,
+        recipe=setup.problem_of, literal=literal.problem_of,
+        node=asdict(setup.model), train=setup.train, held_out=setup.validate, seeds=seeds,
         seed=setup.seed, workers=workers, limits=setup.limits, **heard,
     )  # fmt: skip
 

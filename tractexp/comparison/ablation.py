@@ -1,13 +1,13 @@
 """What each switch of an optimizer does, alone and with the others, from whichever variants were run.
 
-Effects are contrasts of runs with the same seed, in log10 of the objective: variants that differ in one switch give
-its main effect, four that differ in two give an interaction. No model is fitted, so what no contrast shows is said to
-be unknown rather than guessed.
+Effects are contrasts within a block, of runs with the same seed or on the same function, in log10 of the objective:
+variants that differ in one switch give its main effect, four that differ in two give an interaction. No model is
+fitted, so what no contrast shows is said to be unknown rather than guessed.
 """
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -30,7 +30,8 @@ class Effect:
     low: float
     high: float
     contrasts: tuple[tuple[str, ...], ...]  # the variants behind it: (with, without) or (both, first, second, neither)
-    seeds: int
+    seeds: int  # or other blocks
+    better: tuple[float, float, float] | None = None  # of a main effect: share of pairs in which it helps, interval
 
     @property
     def shown(self) -> bool:
@@ -50,21 +51,56 @@ class Ablation:
     unknown: tuple[tuple[str, ...], ...]  # switches, or pairs, that these variants cannot tell
 
 
+@dataclass(frozen=True)
+class Family:
+    """Variants of one optimizer that share all settings but switches, by the switches that are on."""
+
+    switches: tuple[str, ...]
+    members: Mapping[On, str]  # names of variants
+
+    def ablation(self, values: Mapping[str, np.ndarray]) -> Ablation | None:
+        """Effects from log10 of the objectives of each variant, (blocks,); None where no contrast can be made."""
+        found = _Contrasts(dict(self.members), {on: values[name] for on, name in self.members.items()}, self.switches)
+        made = found.ablation()
+        return made if made.effects else None
+
+    def cost(self, spent: Mapping[str, float]) -> dict[str, float]:
+        """What each switch adds, on average over its pairs, to what the variants spend."""
+        pairs = {s: [(on | {s}, on) for on in self.members if s not in on and on | {s} in self.members]
+                 for s in self.switches}  # fmt: skip
+        name = self.members
+        return {
+            s: float(np.mean([spent[name[with_]] - spent[name[without]] for with_, without in rows]))
+            for s, rows in pairs.items() if rows
+        }  # fmt: skip
+
+
+def family(variants: Sequence[Variant], plain: Mapping[str, str]) -> Family | None:
+    """The largest family among the variants; None where there is none.
+
+    `plain` says which optimizer another one is with all its switches off.
+    """
+    found = [members for optimizer, without in plain.items() for members in _families(variants, optimizer, without)]
+    largest = max(found, key=len, default={})
+    if len(largest) < 2:
+        return None
+    switches = tuple(sorted({switch for on in largest for switch in on}))
+    return Family(switches, {on: v.name for on, v in largest.items()})
+
+
 def ablate(variants: Sequence[Variant], plain: Mapping[str, str], least: float) -> Ablation | None:
     """Effects from the variants of one optimizer that share all settings but switches; None where there are none.
 
-    `plain` says which optimizer another one is with all its switches off. Objectives count from `least` upwards.
-    Of several such families, the largest is taken. Seeds that not all of its variants finished are left out.
+    Objectives count from `least` upwards. Seeds that not all of the variants finished are left out.
     """
-    families = [family for optimizer, without in plain.items() for family in _families(variants, optimizer, without)]
-    family = max(families, key=len, default={})
-    switches = tuple(sorted({switch for on in family for switch in on}))
-    seeds = sorted(set.intersection(*({run.seed for run in v.finished} for v in family.values()))) if family else []
+    chosen = family(variants, plain)
+    if chosen is None:
+        return None
+    members = [v for v in variants if v.name in chosen.members.values()]
+    seeds = sorted(set.intersection(*({run.seed for run in v.finished} for v in members)))
     if not seeds:
         return None
-    logs = {on: np.log10([max(v.objectives[s], least) for s in seeds]) for on, v in family.items()}
-    found = _Contrasts({on: v.name for on, v in family.items()}, logs, switches).ablation()
-    return found if found.effects else None
+    return chosen.ablation({v.name: np.log10([max(v.objectives[s], least) for s in seeds]) for v in members})
 
 
 def _families(variants: Sequence[Variant], optimizer: str, plain: str) -> list[dict[On, Variant]]:
@@ -111,11 +147,17 @@ class _Contrasts:
 
     def _effect(self, switches: tuple[str, ...], contrasts: list[tuple[On, ...]]) -> Effect:
         """Signs alternate as in a factorial design: with - without, or both - first - second + neither."""
-        signs = np.array((1.0, -1.0) if len(contrasts[0]) == 2 else (1.0, -1.0, -1.0, 1.0))
-        logs = np.mean([signs @ [self.logs[on] for on in row] for row in contrasts], axis=0)
+        simple = len(contrasts[0]) == 2
+        signs = np.array((1.0, -1.0) if simple else (1.0, -1.0, -1.0, 1.0))
+        shifts = np.array([signs @ [self.logs[on] for on in row] for row in contrasts])
+        logs = shifts.mean(axis=0)
         low, high = bootstrap(logs)
         names = tuple(tuple(self.names[on] for on in row) for row in contrasts)
-        return Effect(switches, 10.0 ** float(logs.mean()), 10.0**low, 10.0**high, names, len(logs))
+        effect = Effect(switches, 10.0 ** float(logs.mean()), 10.0**low, 10.0**high, names, len(logs))
+        if not simple:
+            return effect
+        wins = np.mean((shifts < 0) + 0.5 * (shifts == 0), axis=0)
+        return replace(effect, better=(float(wins.mean()), *bootstrap(wins)))
 
     def _pairs(self, switch: str) -> list[tuple[On, ...]]:
         return self._existing([(on | {switch}, on) for on in self.logs if switch not in on])

@@ -89,6 +89,23 @@ class Gathered:
         return found[0]
 
 
+def on(runs: Sequence[Run], source: str, data: str) -> list[Run]:
+    """The runs on one choice of data. Raises `UserError` where there is none."""
+    chosen = [run for run in runs if run.data == data]
+    if not chosen:
+        known = {run.data for run in runs}
+        raise UserError(f"task.data={data}: {source} has no run on these data{among(data, known, 'Data')}")
+    return chosen
+
+
+def parted(runs: Sequence[Run], apart: Sequence[str] = ()) -> dict[tuple[str, ...], list[Run]]:
+    """Runs by their data and by the limits named in `apart`, which make comparisons of their own, as they come."""
+    groups: dict[tuple[str, ...], list[Run]] = defaultdict(list)
+    for run in runs:
+        groups[(run.data, *(repr(run.config.get(key)) for key in apart))].append(run)
+    return groups
+
+
 def gather(runs: Sequence[Run], source: str, data: str | None = None) -> Gathered:
     """Group runs into variants; `data` keeps the runs on that choice of data. Later repeats replace earlier ones.
 
@@ -96,10 +113,7 @@ def gather(runs: Sequence[Run], source: str, data: str | None = None) -> Gathere
     finished, or the runs do not solve the same problem.
     """
     if data is not None:
-        known = {run.data for run in runs}
-        runs = [run for run in runs if run.data == data]
-        if not runs:
-            raise UserError(f"task.data={data}: {source} has no run on these data{among(data, known, 'Data')}")
+        runs = on(runs, source, data)
     _check_same_problem(runs, source)
     _check_any_finished(runs, source)
     ended = [run for run in runs if not run.interruption]

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from tractexp.model.codegen import LANES
+from tractexp.model.template import GROUP
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -17,7 +17,7 @@ def side_by_side(function: Callable[[np.ndarray], np.ndarray], lanes: np.ndarray
     """`function` of lanes (n, ...), on all cores: they do not know of each other, so the bits are the same."""
     from numba import get_num_threads
 
-    parts = min(get_num_threads(), -(-len(lanes) // LANES))
+    parts = min(get_num_threads(), -(-len(lanes) // (2 * GROUP)))
     if parts < 2:
         return function(lanes)
     return np.concatenate(list(_threads().map(function, np.array_split(lanes, parts))))

@@ -38,8 +38,9 @@ class Family:
         """The model with these load effects, every fault of the measurement and, where `pushed`, the pushes."""
         effects = [self.catalogue[n].effect for n in sorted({*names, *self.catalogue.of_measurement})]
         pushes = [Injection()] if pushed else []
-        model = compose(self.model.motor, self.model.static, [*self.model.effects, *effects, *pushes])
-        return model.behind(self.model.recorder)
+        base = self.model
+        model = compose(base.motor, base.static, [*base.effects, *effects, *pushes], base.integration)
+        return model.behind(base.recorder)
 
     @functools.cached_property
     def whole(self) -> Model:

@@ -13,7 +13,7 @@ from tractexp.identification.loss import Loss
 from tractexp.identification.search import REFUSED
 from tractexp.identification.starts import even
 from tractexp.model.drive import Drive, Excitation
-from tractexp.model.model import MOST_SUBSTEPS, Model
+from tractexp.model.model import CLASSICAL, MOST_SUBSTEPS, Model
 from tractexp.model.parts import Effect
 from tractexp.parameter import Box, Parameter
 from tractexp.record import Event
@@ -89,7 +89,8 @@ class Step:
             f"{n} of {size:g} ms" for n, size in dict(zip(self.substeps.tolist(), sizes, strict=True)).items()
         )
         worst = float(np.max(self.error))
-        return f"{text} per sample" + (" (given)" if np.isnan(worst) else f" (largest error {worst:.1e} pu)")
+        error = "with some values in the bounds it diverges" if np.isinf(worst) else f"largest error {worst:.1e} pu"
+        return f"{text} per sample ({'given' if np.isnan(worst) else error})"
 
 
 class Problem:
@@ -224,7 +225,7 @@ class Problem:
             return Step(given, np.full(len(self.events), np.nan))
         probes = self.space.from_unit(even(PROBES, self.space.dimension))
         chosen, error = self.model.substeps(self.drive, self.candidates(probes), FINE)
-        if not (error <= FINE).all():
+        if self.model.integration == CLASSICAL and not (error <= FINE).all():
             worst = int(np.argmax(error))
             raise UserError(
                 f"{self.events[worst].record.name}: {MOST_SUBSTEPS} Runge-Kutta steps per sample of"

@@ -14,15 +14,16 @@ from tractexp.identification.adequacy import ACCEPTED
 from tractexp.identification.problem import Problem, excitation
 from tractexp.identification.search import REFUSED, Found, History
 from tractexp.model.drive import Drive, Excitation
-from tractexp.model.model import Model, compose
+from tractexp.model.model import CLASSICAL, Model, compose
 from tractexp.plugin import build
 from tractexp.record import Event, find_dips
 
 
-def parts(node: Mapping[str, Any]) -> tuple[Any, Any, list[Any]]:
-    """The motor, static load and effects a model configuration names, built."""
+def parts(node: Mapping[str, Any]) -> tuple[Any, Any, list[Any], str]:
+    """The motor, static load and effects a model configuration names, built, and how they are integrated."""
     effects = [build("effect", {"name": name}) for name in node.get("effects", ())]
-    return build("model/motor", node["motor"]), build("model/static", node["static"]), effects
+    motor, static = build("model/motor", node["motor"]), build("model/static", node["static"])
+    return motor, static, effects, node.get("integration", CLASSICAL)
 
 
 @dataclass(frozen=True, eq=False)

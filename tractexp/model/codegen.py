@@ -1,22 +1,35 @@
 """Print lowered equations as the source of a Numba kernel that simulates many candidates at once.
 
-Sixteen candidates (lanes) are advanced together: the innermost loop runs over them, branch-free, over one work
+Up to 56 candidates (lanes) are advanced together: the innermost loop runs over them, branch-free, over one work
 array with literal offsets, so that LLVM vectorises it and state, constants and sums stay in cache. Nothing per
 sample is stored unless asked for. Equal lanes give equal bits wherever they stand in a batch.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import sympy
 from sympy.printing.pycode import PythonCodePrinter
 
 from tractexp.model.drive import INPUTS
 from tractexp.model.lowering import Lowered, Phase, symbols
-from tractexp.model.template import HEADER, RUN, SETTLE
+from tractexp.model.template import FAST, GROUP, HEADER, LANES, RUN, SETTLE, VECTORS
 
-LANES = 16
 PHASES = ("derivative", "renewal", "output")  # what is evaluated lane by lane
-STAGES = (("k1", "a", None), ("k2", "b", ("0.5 * h", "k1")), ("k3", "b", ("0.5 * h", "k2")), ("k4", "c", ("h", "k3")))
+STAGES = {  # slope, where the voltage is taken, and how far along which slope the states are
+    "classical": (
+        ("k1", "a", None),
+        ("k2", "b", ("0.5 * h", "k1")),
+        ("k3", "b", ("0.5 * h", "k2")),
+        ("k4", "c", ("h", "k3")),
+    ),
+    "printed": (
+        ("k1", "a", None),
+        ("k2", "b", ("h / 6.0", "k1")),
+        ("k3", "b", ("h / 6.0", "k2")),
+        ("k4", "c", ("h", "k3")),
+    ),
+}
 
 
 class _Printer(PythonCodePrinter):
@@ -52,14 +65,14 @@ class _Printer(PythonCodePrinter):
 _printer = _Printer({"fully_qualified_modules": True, "precision": 17})
 
 
-def source(lowered: Lowered, title: str) -> str:
+def source(lowered: Lowered, title: str, integration: str = "classical") -> str:
     """The kernel module's source text. Deterministic: the same equations give the same text."""
     at = _Rows(lowered)
     sample_signals = _sample_signals(lowered)
     scalars = [*lowered.inputs, *lowered.event]
     rows = [*lowered.parameters, sympy.Symbol("P0"), sympy.Symbol("Q0")]
 
-    text = HEADER.format(title=title)
+    text = HEADER.format(title=title, vectors=VECTORS, fast=FAST)
     text += _start(lowered, rows)
     own = [*rows, *lowered.event, *lowered.starts]
     if lowered.rest is not None:
@@ -71,6 +84,7 @@ def source(lowered: Lowered, title: str) -> str:
         text += _phase(f"_{name}", _arguments(lowered, at, name), getattr(lowered, name))
     text += RUN.format(
         L=LANES,
+        G=GROUP,
         rows=_names(rows),
         event=_names(lowered.event),
         inputs=_names(lowered.inputs),
@@ -82,7 +96,7 @@ def source(lowered: Lowered, title: str) -> str:
         fill_signals=_indent(8, _fill_signals(lowered)),
         start=_indent(16, _load_candidate(lowered, rows, at)),
         sample=_indent(20, _sample(lowered, at)),
-        advance=_indent(24, _advance(lowered, at)),
+        advance=_indent(24, _advance(lowered, at, STAGES[integration])),
     )  # fmt: skip
     return text
 
@@ -165,11 +179,11 @@ def _sample(lowered: Lowered, at: _Rows) -> list[str]:
     body += [f"P, Q = _output({_names(_arguments(lowered, at, 'output'))})"]
     body += [f"W[{at['P']} + l] = P", f"W[{at['Q']} + l] = Q"]
     body += [f"W[{at['sum_P']} + l] += w_p * (p - P) * (p - P)", f"W[{at['sum_Q']} + l] += w_q * (q - Q) * (q - Q)"]
-    return [*lines, f"for l in range({LANES}):", *_nested(body)]
+    return [*lines, "for l in range(lanes):", *_nested(body)]
 
 
-def _advance(lowered: Lowered, at: _Rows) -> list[str]:
-    """Classical Runge-Kutta, order 4 (Eq. (4) with its stage steps corrected), the voltage smooth between samples."""
+def _advance(lowered: Lowered, at: _Rows, stages: Sequence[Any]) -> list[str]:
+    """A step of four stages, Eq. (4), the voltage smooth between samples."""
     if not lowered.states:
         return ["pass"]
     inner = []
@@ -179,10 +193,10 @@ def _advance(lowered: Lowered, at: _Rows) -> list[str]:
             inputs = [f"{s}{point}" for s in lowered.inputs]
             inner.append(f"{_targets(f'{s}{point}' for s in signals)} = _drive({_names([*inputs, *lowered.event])})")
     body = at.load([*lowered.states, *lowered.memories, *at.needed["derivative"]])
-    body += [_stage(lowered, at, *stage) for stage in STAGES]
+    body += [_stage(lowered, at, *stage) for stage in stages]
     for s in lowered.states:
         body.append(f"W[{at[s]} + l] = {s} + h / 6.0 * (k1_{s} + 2.0 * (k2_{s} + k3_{s}) + k4_{s})")
-    inner += [f"for l in range({LANES}):", *_nested(body)]
+    inner += ["for l in range(lanes):", *_nested(body)]
     return ["for j in range(substeps[e]):", *_nested(inner)]
 
 
@@ -222,7 +236,7 @@ def _settle(lowered: Lowered, rows: list[sympy.Symbol]) -> str:
     moving = {"f": _targets(f"f[{k}]" for k in range(n)), "g": _targets(f"g[{k}]" for k in range(n))}
     arguments = _names([*rows, *lowered.event, *lowered.starts])
     if not n:
-        return f"\n\n@compiled\ndef _settle({arguments}):\n    return (0.0,)\n"
+        return f"\n\n@inlined\ndef _settle({arguments}):\n    return (0.0,)\n"
     text = SETTLE.format(arguments=arguments, states=_names(states), n=n, known=known, x=x, **moving)
     return text.replace(f"return {x},", f"return {_names(f'x[{k}]' for k in range(n))},")
 
@@ -241,8 +255,7 @@ def _function(name: str, arguments: list, temporaries: Iterable, expressions: It
 
 
 def _text(name: str, arguments: list, lines: list[str]) -> str:
-    mark = "inlined" if name.removeprefix("_") in PHASES else "compiled"
-    return f"\n\n@{mark}\ndef {name}({_names(arguments)}):\n{_indent(4, lines)}\n"
+    return f"\n\n@inlined\ndef {name}({_names(arguments)}):\n{_indent(4, lines)}\n"
 
 
 def _names(symbols: Iterable[object]) -> str:

@@ -12,6 +12,9 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import ModuleType
 
+from tractexp.model.template import VECTORS
+from tractexp.model.vectors import width
+
 
 def cache_folder() -> Path:
     """Where kernels are kept: $TRACTEXP_CACHE_DIR, or `tractexp` in the user's cache folder, or a temporary one."""
@@ -62,6 +65,7 @@ def _code(folder: Path) -> bytes:
 @functools.cache
 def load(source: str) -> ModuleType:
     """Import the kernel with this source, writing it first where it is new. Safe in parallel processes."""
+    source = _for_this_machine(source)
     name = _name(source)
     path = cache_folder() / f"{name}.py"
     if not path.exists() or path.read_text() != source:
@@ -90,7 +94,7 @@ def compile_missing(sources: Iterable[str], tell: Callable[[], None] = lambda: N
 
 
 def _compiled(source: str) -> Iterable[Path]:
-    return (cache_folder() / "__pycache__").glob(f"{_name(source)}.run-*.nbc")
+    return (cache_folder() / "__pycache__").glob(f"{_name(_for_this_machine(source))}.run-*.nbc")
 
 
 def _compile(source: str) -> None:
@@ -98,6 +102,11 @@ def _compile(source: str) -> None:
 
     table, cube = float64[:, ::1], float64[:, :, ::1]
     load(source).run.compile((cube, table, int64[::1], table, table, table, int64[::1], cube, table, cube))
+
+
+def _for_this_machine(source: str) -> str:
+    """The source with the width of its vectors chosen, so that kernels of another width are other files."""
+    return source.replace(f"\n{VECTORS}\n", f"\nVECTORS = {width(cache_folder())}\n", 1)
 
 
 def _name(source: str) -> str:

@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.errors import UserError
+from tractexp.errors import UserError, check_choice
 from tractexp.model.drive import EVENT, Drive
 from tractexp.model.parts import Effect, Measurement, Motor, Static
 from tractexp.parameter import Parameter
 
 TOLERANCE = 1e-7  # pu, largest step-doubling error of P or Q an automatic substep may leave
 MOST_SUBSTEPS = 256
+CLASSICAL, PRINTED = INTEGRATIONS = ("classical", "printed")  # Runge-Kutta of order 4, or Eq. (4) as it stands
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,13 +54,15 @@ class Model:
     Candidates are arrays `values` (n, d) in the order of `parameters`, or (E, n, d) where they differ by event.
     """
 
-    def __init__(self, motor: Motor, static: Static, effects: Sequence[Effect] = ()):
-        self.motor, self.static = motor, static
+    def __init__(self, motor: Motor, static: Static, effects: Sequence[Effect] = (), integration: str = CLASSICAL):
+        self.motor, self.static, self.integration = motor, static, integration
         self.effects = tuple(sorted(effects, key=lambda e: (e.order, e.name)))  # the same model in whatever order given
         self.measurements = tuple(e for e in self.effects if isinstance(e, Measurement))
         self.recorder: Measurement | None = None
         load = f"{motor.name} motor and {static.name} static load"
         self.title = " with ".join([load, *(effect.name for effect in self.effects)])
+        if integration == PRINTED:
+            self.title += ", integrated by Eq. (4) as printed"
 
     def behind(self, recorder: Measurement | None) -> "Model":
         """The same load as a known recorder shows it: without parameters, before the faults of the measurement."""
@@ -110,13 +113,14 @@ class Model:
         """Source text of the kernel."""
         from tractexp.model.kernel import remembered
 
-        return remembered((self.motor, self.static, *self.effects), self._generated)
+        what = "source" if self.integration == CLASSICAL else f"source_{self.integration}"
+        return remembered((self.motor, self.static, *self.effects), self._generated, what)
 
     def _generated(self) -> str:
         from tractexp.model.codegen import source
         from tractexp.model.lowering import lower
 
-        return source(lower(self.equations), self.title)
+        return source(lower(self.equations), self.title, self.integration)
 
     @functools.cached_property
     def kernel(self) -> Any:
@@ -160,8 +164,10 @@ class Model:
         """Runge-Kutta steps per sample that each event needs, and the error left [pu], found by step doubling.
 
         The error is the largest difference of P or Q between n and 2 n steps over the candidates that have a
-        steady state. Both results have shape (E,).
+        steady state. Both results have shape (E,). Integrated as printed a model takes one step per sample, as the
+        paper does, whatever error that leaves.
         """
+        most = MOST_SUBSTEPS if self.integration == CLASSICAL else 1
         chosen, left = np.ones(drive.events, dtype=np.int64), np.full(drive.events, np.inf)
         coarse = self.simulate(drive, values, chosen)
         while True:
@@ -169,8 +175,8 @@ class Model:
             for e in range(drive.events):
                 good, part = coarse.miss[e] == 0, drive.part(e)
                 gaps = [np.abs(a[good, part] - b[good, part]) for a, b in ((coarse.P, fine.P), (coarse.Q, fine.Q))]
-                left[e] = np.max(gaps, initial=0.0)
-            short = ~(left <= tolerance) & (chosen < MOST_SUBSTEPS)
+                left[e] = np.nan_to_num(np.max(gaps, initial=0.0), nan=np.inf)
+            short = ~(left <= tolerance) & (chosen < most)
             if not short.any():
                 return chosen, left
             chosen, coarse = np.where(short, 2 * chosen, chosen), fine
@@ -251,9 +257,10 @@ class Model:
         return sums, miss
 
 
-def compose(motor: Motor, static: Static, effects: Sequence[Effect] = ()) -> Model:
-    """A composite load of these parts. Raises `UserError` for an effect named twice."""
+def compose(motor: Motor, static: Static, effects: Sequence[Effect] = (), integration: str = CLASSICAL) -> Model:
+    """A composite load of these parts. Raises `UserError` for an effect named twice or an unknown integration."""
+    check_choice("model.integration", integration, INTEGRATIONS)
     names = [effect.name for effect in effects]
     if twice := next((n for n in names if names.count(n) > 1), None):
         raise UserError(f"model.effects names '{twice}' twice; name each effect once")
-    return Model(motor, static, effects)
+    return Model(motor, static, effects, integration)

@@ -1,5 +1,11 @@
 """What every generated kernel has in common: its text, with gaps that the code generator fills."""
 
+LANES = 56  # candidates advanced together at most: enough to fill the waits of one step; rows 448 bytes apart do not
+# fall on one another in the cache as those a power of two apart do
+GROUP = 8  # they are rounded up to a multiple of it: whole vectors of up to 512 bits, since a remainder is slow
+FAST = ("contract", "reassoc", "arcp", "nsz")
+VECTORS = "VECTORS = 0"  # the line of a kernel that says how wide its vectors are [bits]; 0: as the compiler likes
+
 HEADER = '''"""Generated from the equations of {title}. Do not edit: the file's name is the hash of its content."""
 
 import math
@@ -7,17 +13,23 @@ import math
 import numpy as np
 from numba import njit
 
-FAST = {{"contract", "reassoc", "arcp", "nsz"}}  # nan and inf keep their meaning: they mark diverged candidates
+from tractexp.doors.numba_vector_width import prefer_vectors
+
+{vectors}
+FAST = set({fast})  # nan and inf keep their meaning: they mark diverged candidates
 compiled = njit(cache=True, fastmath=FAST, error_model="numpy", nogil=True)
-inlined = njit(cache=True, fastmath=FAST, error_model="numpy", nogil=True, forceinline=True)  # a call stops vectors
+# A call would stop the vectoriser, and may reach another copy of the function, with other bits, when it was just
+# compiled than when it was loaded from the cache.
+inlined = njit(cache=True, fastmath=FAST, error_model="numpy", nogil=True, forceinline=True)
+ordered = njit(cache=True, fastmath=FAST - {{"reassoc"}}, error_model="numpy", nogil=True, forceinline=True)
 
 
-@inlined
+@ordered
 def _exp(x):
-    """Branch-free exp, relative error below 3e-13 for |x| < 700: a libm call would stop the vectoriser."""
+    """Branch-free exp, relative error below 4e-13 for |x| < 700: a libm call would stop the vectoriser."""
     x = min(max(x, -700.0), 700.0)
-    n = math.floor(x * 1.4426950408889634 + 0.5)
-    r = (x - n * 0.6931471803691238) - n * 1.9082149292705877e-10
+    t = x * 1.4426950408889634 + 6755399441055744.0  # 1.5 * 2**52: rounds, and leaves the integer in the lowest bits
+    r = x - (t - 6755399441055744.0) * 0.6931471805599453
     p = r * 2.7557319223985893e-07 + 2.7557319223985893e-06
     p = p * r + 2.48015873015873e-05
     p = p * r + 0.0001984126984126984
@@ -28,7 +40,7 @@ def _exp(x):
     p = p * r + 0.5
     p = p * r + 1.0
     p = p * r + 1.0
-    return p * np.int64((np.int64(n) + 1023) << 52).view(np.float64)
+    return p * np.int64((np.float64(t).view(np.int64) << 52) + (1023 << 52)).view(np.float64)
 
 
 @inlined
@@ -76,18 +88,22 @@ def run(candidates, event, first, inputs, measured, weights, substeps, sums, mis
     measured, weights (2, N): P, Q; substeps (events,); sums (events, 2, n) and miss (events, n) are written;
     outputs (2, n, N) or empty.
     """
+    prefer_vectors(VECTORS)
     n = candidates.shape[2]
     store = outputs.shape[0] > 0
-    W = np.empty({rows_W} * {L})
+    space = np.empty({rows_W} * {L} + 8)
+    W = space[(64 - space.ctypes.data % 64) // 8 :]  # a vector across two cache lines would take twice the time
     signals = np.empty(({n_signal}, inputs.shape[1]))
     for e in range(candidates.shape[0]):
 {unpack_event}
         h = step / substeps[e]
 {fill_signals}
-        for block in range((n + {L} - 1) // {L}):
+        for begin in range(0, n, {L}):
+            some = min(n - begin, {L})
+            lanes = {G} * ((some + {G} - 1) // {G})
             reachable = False
-            for l in range({L}):
-                k = min(block * {L} + l, n - 1)
+            for l in range(lanes):
+                k = min(begin + l, n - 1)
 {start}
                 reachable = reachable or m <= 0.0
                 W[{row_sum_P} + l] = 0.0
@@ -97,20 +113,20 @@ def run(candidates, event, first, inputs, measured, weights, substeps, sums, mis
                 for i in range(first[e], first[e + 1]):
 {sample}
                     if store:
-                        for l in range(min({L}, n - block * {L})):
-                            outputs[0, block * {L} + l, i] = W[{row_P} + l]
-                            outputs[1, block * {L} + l, i] = W[{row_Q} + l]
+                        for l in range(some):
+                            outputs[0, begin + l, i] = W[{row_P} + l]
+                            outputs[1, begin + l, i] = W[{row_Q} + l]
                     if i + 1 < first[e + 1]:
 {advance}
-            for l in range(min({L}, n - block * {L})):
-                sums[e, 0, block * {L} + l] = W[{row_sum_P} + l]
-                sums[e, 1, block * {L} + l] = W[{row_sum_Q} + l]
-                miss[e, block * {L} + l] = W[{row_miss} + l]
+            for l in range(some):
+                sums[e, 0, begin + l] = W[{row_sum_P} + l]
+                sums[e, 1, begin + l] = W[{row_sum_Q} + l]
+                miss[e, begin + l] = W[{row_miss} + l]
 '''
 
 SETTLE = """
 
-@compiled
+@inlined
 def _settle({arguments}):
     \"\"\"Solve for the steady state before the event by Newton's method; last, how far it misses.\"\"\"
     x, f, g, J = np.array([{states}]), np.empty({n}), np.empty({n}), np.empty(({n}, {n}))

@@ -72,6 +72,11 @@ def flights(formula: str, n: int, d: int, seed: int = 0) -> np.ndarray:
     return issa(levy_formula=formula).flight((n, d), np.random.default_rng(seed))
 
 
+def tails() -> dict[str, np.ndarray]:
+    """Steps of Eq. (15), {formula: (STEPS,)}."""
+    return {formula: flights(formula, STEPS, 1)[:, 0] for formula in ("mantegna", "printed")}
+
+
 def tail_exponent(steps: np.ndarray, share: float = TAIL) -> float:
     """a in P(|s| > x) ~ x^-a, from the largest `share` of the steps (n,). Source: Hill 1975."""
     size = np.sort(np.abs(steps.ravel()))

@@ -14,6 +14,7 @@ from tractexp.identification.search import search
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED
 from tractexp.model.model import compose
+from tractexp.model.operations import Cost, Operations, count
 from tractexp.plugin import build
 from tractexp.record import Event
 
@@ -32,6 +33,17 @@ class Order:
     known: Uncertainty
     nanoseconds: float  # per simulated sample and candidate
     substeps: int
+    cost: Cost  # counted in the kernel
+
+    @property
+    def step(self) -> Operations:
+        """Of one Runge-Kutta step of a candidate."""
+        return self.cost.step
+
+    @property
+    def per_sample(self) -> Operations:
+        """Of a sample of a candidate with all its steps, the errors summed."""
+        return self.cost.per_sample(self.substeps)
 
     @property
     def free(self) -> int:
@@ -71,7 +83,14 @@ def fit(node: Mapping[str, Any], motor: str, train: Sequence[Event], held_out: S
     substeps = int(problem.step.substeps.max())
     known = dict(zip(model.names, values.tolist(), strict=True))
     return Order(
-        motor, known, found.objective, tuple(fits), estimate(problem, found.values).known, duration(problem), substeps
+        motor,
+        known,
+        found.objective,
+        tuple(fits),
+        estimate(problem, found.values).known,
+        duration(problem),
+        substeps,
+        count(model.source),
     )
 
 

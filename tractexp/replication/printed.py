@@ -3,6 +3,10 @@
 Source: Wu, Fan and Zou 2022, Energies 15(14), 5034.
 """
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
 NAMES = ("T_prime", "X_prime", "C", "M", "T_m", "p_v", "q_v")
 
 # Tables 2 (the first column) and 3: parameters, relative errors of Eq. (20) as fractions, objective of Eq. (8).
@@ -27,24 +31,55 @@ TABLE_1 = {
 }
 
 COMPARED = ("issa", "ssa", "pso")
+LABELS = {"issa": "ISSA", "ssa": "SSA", "pso": "PSO", "random_search": "the best of random points"}
 ITERATIONS, POPULATION = 300, 50  # sections 4.2 and 4.3; the optimizers' defaults
+EQUAL = POPULATION * (ITERATIONS + 1)  # simulations of the thriftiest of the three, PSO, in so many iterations
 ALPHA = 0.3  # of Eq. (14), section 3.2.1
-INGREDIENTS = {
-    "tent_initialization": "tent initialization",
-    "levy": "Lévy flight",
-    "gaussian": "Gaussian variation",
-    "tent_perturbation": "tent perturbation",
+INGREDIENTS = {  # as the optimizers without it are called: the switch, and what it is
+    "tent_init": ("tent_initialization", "tent initialization"),
+    "levy": ("levy", "Lévy flight"),
+    "gaussian": ("gaussian", "Gaussian variation"),
+    "tent_perturbation": ("tent_perturbation", "tent perturbation"),
 }
 
-# What the text leaves open, as settings of the two sparrow searches.
-READINGS = {
-    "unit cube, better-only, element-wise (default)": {},
-    "raw units, better-only, element-wise": {"space": "raw"},
-    "raw units, better-only, one scalar for A⁺L": {"space": "raw", "step": "scalar"},
-    "raw units, every move, one scalar (to the letter)": {"space": "raw", "step": "scalar", "acceptance": "all"},
-    "default, 40 % perceivers (SD = 20 of 50)": {"perceivers": 0.4},
-}
-ISSA_READINGS = {
-    "default, perturbation by stage (3.2.3)": {"schedule": "stage"},
-    "default, Eq. (15) as printed": {"levy_formula": "printed"},
-}
+
+@dataclass(frozen=True)
+class Reading:
+    """An optimizer with what the text leaves open settled; a `literal` one searches the model that Eq. (4) integrates
+    as it is printed."""
+
+    optimizer: str
+    told: str
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    literal: bool = False
+
+    @property
+    def node(self) -> dict[str, Any]:
+        return {"name": self.optimizer, **self.settings}
+
+
+LETTER = {"space": "raw", "step": "scalar", "acceptance": "all"}
+
+# By the names that the optimizers have in conf/optimizer. The first three are what Tables 2 to 5 show.
+READINGS: dict[str, Reading] = {
+    "issa": Reading("issa", "SD = 20 of 50 (4.3)"),
+    "ssa": Reading("ssa", "SD = 20 of 50 (4.3)"),
+    "pso": Reading("pso", "no velocity limit"),
+    "issa_10_perceivers": Reading("issa", "10 perceivers (4.2)", {"perceivers": 0.2}),
+    "ssa_10_perceivers": Reading("ssa", "10 perceivers (4.2)", {"perceivers": 0.2}),
+    "pso_limited": Reading("pso", "velocity limit 0.2", {"velocity_limit": 0.2}),
+    "issa_to_the_letter": Reading("issa", "to the letter", LETTER | {"levy_formula": "printed"}, literal=True),
+    "ssa_to_the_letter": Reading("ssa", "to the letter", LETTER, literal=True),
+    "pso_to_the_letter": Reading("pso", "to the letter", literal=True),
+    "issa_raw": Reading("issa", "raw units", {"space": "raw"}),
+    "ssa_raw": Reading("ssa", "raw units", {"space": "raw"}),
+    "issa_raw_scalar": Reading("issa", "raw units, one scalar for A⁺L", {"space": "raw", "step": "scalar"}),
+    "ssa_raw_scalar": Reading("ssa", "raw units, one scalar for A⁺L", {"space": "raw", "step": "scalar"}),
+    "issa_by_stage": Reading("issa", "perturbation by stage (3.2.3)", {"schedule": "stage"}),
+    "issa_printed_levy": Reading("issa", "Eq. (15) as printed", {"levy_formula": "printed"}),
+    **{f"issa_no_{name}": Reading("issa", f"without {told}", {switch: False})
+       for name, (switch, told) in INGREDIENTS.items()},
+    "random_search": Reading("random_search", "the best of random points"),
+}  # fmt: skip
+TEN = {"issa": "issa_10_perceivers", "ssa": "ssa_10_perceivers"}  # section 4.2's reading of the same optimizer
+LITERAL = {name: f"{name}_to_the_letter" for name in COMPARED}

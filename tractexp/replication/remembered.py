@@ -11,7 +11,7 @@ import json
 import platform
 import sys
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ from tractexp.identification.search import Found, History, Limits
 from tractexp.model.kernel import cache_folder
 from tractexp.plugin import build
 
-MOST = 3000  # searches that are kept, of some 20 kB each: beyond, the oldest go
+MOST = 3000  # searches that are kept, of some 20 kB each, four studies of 30 seeds: beyond, the oldest go
 BEHIND = ("numpy", "numba", "scipy", "llvmlite")  # whose versions may change the last digits
 DAMAGED = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile)
 ARRAYS = ("simulations", "objective", "values", "seconds")  # of a history
@@ -61,16 +61,34 @@ class Remembered:
         made = io.BytesIO()
         arrays = {name: getattr(found.history, name) for name in ARRAYS}
         np.savez_compressed(made, told=np.array(json.dumps(files.plain(told))), found=found.values, **arrays)
-        with contextlib.suppress(UserError, OSError):
-            files.write(path, made.getvalue())
-            _forget(path.parent)
+        _keep(path, made.getvalue())
+
+    def arrays(self, told: str, make: Callable[[], tuple[np.ndarray, ...]]) -> tuple[np.ndarray, ...]:
+        """What else was computed for this problem from what is `told`, made only where it was not before."""
+        if not self.on:
+            return make()
+        path = self._file(told)
+        with contextlib.suppress(*DAMAGED), np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as kept:
+            return tuple(kept[name] for name in kept.files)
+        made = make()
+        written = io.BytesIO()
+        np.savez_compressed(written, *made)
+        _keep(path, written.getvalue())
+        return made
 
     def _path(self, settings: Mapping[str, Any], seed: int) -> Path | None:
         optimizer = build("optimizer", dict(settings))
-        if not (self.on and _installed(optimizer)):
-            return None
-        name = hashlib.sha256(f"{self.problem} {optimizer!r} {seed}".encode()).hexdigest()[:40]
+        return self._file(f"{optimizer!r} {seed}") if self.on and _installed(optimizer) else None
+
+    def _file(self, told: str) -> Path:
+        name = hashlib.sha256(f"{self.problem} {told}".encode()).hexdigest()[:40]
         return cache_folder() / "searches" / f"{name}.npz"
+
+
+def _keep(path: Path, content: bytes) -> None:
+    with contextlib.suppress(UserError, OSError):
+        files.write(path, content)
+        _forget(path.parent)
 
 
 def _parts(problem: Problem) -> tuple[Any, ...]:

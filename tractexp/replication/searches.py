@@ -61,12 +61,6 @@ def _chunk(recipe: Recipe, settings: dict[str, Any], seeds: Sequence[int], limit
     return [search(problem, optimizer, seed, limits) for seed in seeds]
 
 
-def best_at(found: Found, simulations: float) -> float:
-    """The best objective [pu²] by the end of the last iteration within so many simulations."""
-    within = np.flatnonzero(found.history.simulations <= simulations)
-    return float(found.history.objective[within[-1] if len(within) else 0])
-
-
 def by_depth(events: Sequence[Event], fitted: Sequence[Event]) -> list[str]:
     """ "interpolation" for a dip no deeper than the deepest that was fitted, else "extrapolation"."""
     deepest = max(event.depth for event in fitted)

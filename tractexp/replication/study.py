@@ -1,8 +1,9 @@
 """What the parts of the page are made of, each measured when first asked for."""
 
 import functools
+import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,13 +14,29 @@ from tractexp.identification.problem import Problem
 from tractexp.identification.result import Fit, respond
 from tractexp.identification.search import Found, Limits
 from tractexp.record import Event
-from tractexp.replication import equations, maps, orders, printed, searches
+from tractexp.replication import equations, maps, orders, printed, searches, valleys
+from tractexp.replication.printed import COMPARED, EQUAL, ITERATIONS, LITERAL, READINGS, TEN
+from tractexp.replication.remembered import Remembered
 
 ALPHAS = (0.1, 0.3, 0.5, 0.7, 0.9)  # of the tent map
 TARGETS = (10.0, 2.0)  # of running times, times the floor
-AT_FLOOR = 1.1  # a search within so many times the floor has found it
-SAME_VALLEY = 1.02  # descents that end within so many times of each other are in one valley
-DESCENT = 1e-3  # of the floor: a descent's step that gains less ends it
+AT_FLOOR = 1.1  # a search within so many times the floor has found it; one so near the bottom of its valley is done
+RANDOM = 200  # points from which the control descends
+TRADED = "C"  # the parameter along which the valleys lie
+WIDE, NARROW = (0.06, 0.99), (0.75, 0.99)  # other bounds of it; below the first X' meets its own bound
+BUDGETS = ("iterations", "simulations")  # by which searches are compared
+LEVEL = (*COMPARED, *TEN.values(), "pso_limited")  # the readings that search one objective, by 300 iterations
+EQUALLY = ("issa", "ssa", *TEN.values())  # those whose searches are made anew at equal simulations
+
+# The searches that each part shows, {by what they end: readings}.
+SHOWN: Mapping[str, Mapping[str, Sequence[str]]] = {
+    "table2": {"iterations": ("issa", TEN["issa"], LITERAL["issa"])},
+    "table3": {"iterations": (*LEVEL, *LITERAL.values()), "simulations": EQUALLY},
+    "table4": {"iterations": (*COMPARED, *TEN.values())},
+    "table5": {"iterations": (*COMPARED, *TEN.values())},
+    "figure9": {"iterations": (*LEVEL, "random_search"), "simulations": EQUALLY},
+    "readings": {"iterations": tuple(name for name in READINGS if name != "random_search")},
+}
 
 
 @dataclass(frozen=True)
@@ -32,9 +49,22 @@ class Pair:
     A: float
 
 
+@dataclass(frozen=True)
+class Shares:
+    """How many of n searches reached what."""
+
+    n: int
+    valley: int  # least squares from where it ended reach the lowest objective
+    floor: int  # it is there
+    done: int  # it is at the bottom of its own valley, whichever that is
+
+
 @dataclass(frozen=True, eq=False)
 class Study:
-    """The paper's experiments on one fitted event and those held out; `recipe` makes the identification problem."""
+    """The paper's experiments on one fitted event and those held out; `recipe` makes the identification problem.
+
+    `literal` makes the same problem with the model integrated by Eq. (4) as printed.
+    """
 
     recipe: Callable[[], Problem]
     node: Mapping[str, Any]  # the model's configuration
@@ -44,12 +74,20 @@ class Study:
     seed: int = 0
     workers: int | None = None
     limits: Limits | None = None  # on each search, beside the 300 iterations
+    literal: Callable[[], Problem] | None = None
     tell: Callable[[str], None] = lambda line: None
     count: Callable[[int, int], None] = lambda done, total: None
+    seen: dict[tuple[str, str], list[Found]] = field(default_factory=dict)  # by reading and budget
 
     @functools.cached_property
     def problem(self) -> Problem:
         return self.recipe()
+
+    @functools.cached_property
+    def printed_problem(self) -> Problem:
+        """The problem to the letter."""
+        assert self.literal is not None
+        return self.literal()
 
     @functools.cached_property
     def orders(self) -> dict[str, orders.Order]:
@@ -63,129 +101,170 @@ class Study:
         name = "multistart_least_squares"
         return searches.run(self.recipe, {name: {"name": name}}, 1, workers=1)[name][0]
 
-    @functools.cached_property
-    def compared(self) -> dict[str, list[Found]]:
-        """Tables 3 to 5: the three optimizers at the paper's settings."""
-        return self._searched(printed.COMPARED, self.seeds)
+    def prepare(self, parts: Sequence[str]) -> None:
+        """Make all searches that the parts show, so that they are told of together."""
+        for by in BUDGETS:
+            wanted = dict.fromkeys(name for part in parts for name in SHOWN.get(part, {}).get(by, ()))
+            self._gather([name for name in wanted if (name, by) not in self.seen], by)
 
-    def searched(self, name: str) -> list[Found]:
-        """The searches of one of the three, which need not those of the others."""
-        return self.compared[name] if "compared" in vars(self) else self._searched((name,), self.seeds)[name]
+    def searched(self, name: str, by: str = "iterations") -> list[Found]:
+        """The searches of a reading, one for each seed: of 300 "iterations", or laid out for equal "simulations"."""
+        if by == "simulations" and READINGS[name].optimizer == "pso":
+            by = "iterations"  # its 300 iterations are what is equal
+        if (name, by) not in self.seen:
+            self._gather([name], by)
+        return self.seen[name, by]
 
     def first(self, name: str) -> list[Fit]:
         """The one run that the paper's figures show, seed 0: the fits of the fitted events, then of those held out."""
-        found = self.compared[name] if "compared" in vars(self) else self._searched((name,), 1)[name]
-        return self.respond(found[0].values)
+        known = self.seen.get((name, "iterations"))
+        return self.respond(known[0] if known else self._run([name], "iterations", 1)[name][0])
 
-    def _searched(self, names: Sequence[str], seeds: int) -> dict[str, list[Found]]:
+    def _gather(self, names: Sequence[str], by: str) -> None:
+        for literal in (False, True):
+            chosen = [name for name in names if READINGS[name].literal == literal]
+            if chosen:
+                found = self._run(chosen, by, self.seeds)
+                self.seen.update({(name, by): several for name, several in found.items()})
+
+    def _run(self, names: Sequence[str], by: str, seeds: int) -> dict[str, list[Found]]:
+        """Search with readings that all search the same problem."""
         several = f"{seeds} seeds" if seeds > 1 else "seed 0"
-        self.tell(f"searches of {', '.join(names)}: {several}, 300 iterations of 50")
-        return self._run({name: {"name": name} for name in names}, seeds)
+        limits = self.limits or Limits()
+        ends = f"{ITERATIONS} iterations" if by == "iterations" else f"{self.equal:,} simulations"
+        own = {"iterations": ITERATIONS} if by == "iterations" else {}
+        if by == "simulations":
+            limits = replace(limits, simulations=self.equal)
+        literal = READINGS[names[0]].literal
+        self.tell(f"searches of {', '.join(names)}: {several}, {ends} of {printed.POPULATION}")
+        recipe = self.literal if literal and self.literal else self.recipe
+        variants = {name: READINGS[name].node | own for name in names}
+        return searches.run(recipe, variants, seeds, limits, self.workers, self.count, note=self.tell)
 
-    @functools.cached_property
-    def readings(self) -> dict[str, dict[str, list[Found]]]:
-        """{reading: {optimizer: searches}} of what the text leaves open; the default is that of the tables."""
-        self.tell("section 5: the readings of the text")
-        both = {(r, n): {"name": n, **s} for r, s in printed.READINGS.items() for n in ("ssa", "issa") if s}
-        alone = {(r, "issa"): {"name": "issa", **s} for r, s in printed.ISSA_READINGS.items()}
-        found = self._run({f"{n}: {r}": s for (r, n), s in (both | alone).items()})
-        made: dict[str, dict[str, list[Found]]] = {r: {} for r in (*printed.READINGS, *printed.ISSA_READINGS)}
-        made[next(iter(printed.READINGS))] = {n: self.compared[n] for n in ("ssa", "issa")}
-        for r, n in both | alone:
-            made[r][n] = found[f"{n}: {r}"]
-        return made
-
-    @functools.cached_property
-    def ablations(self) -> dict[str, list[Found]]:
-        """ISSA without one of its ingredients, {ingredient: searches}."""
-        self.tell("section 5: ISSA without each of its ingredients")
-        return self._run({key: {"name": "issa", key: False} for key in printed.INGREDIENTS})
-
-    def _run(self, variants: Mapping[str, Mapping[str, Any]], seeds: int | None = None) -> dict[str, list[Found]]:
-        seeds = seeds or self.seeds
-        return searches.run(
-            self.recipe, variants, seeds, self.limits, self.workers, self.count, note=self.tell
-        )  # fmt: skip
-
-    @functools.cached_property
+    @property
     def equal(self) -> int:
-        """The simulations at which searches are compared: what the thriftiest of the three spends."""
-        return min(found.simulations for several in self.compared.values() for found in several)
+        """The simulations at which searches are compared: what PSO, the thriftiest of the three, spends."""
+        most = self.limits.simulations if self.limits else None
+        return min(EQUAL, most or EQUAL)
 
     @functools.cached_property
     def floor(self) -> float:
-        """The lowest objective of all searches of this problem [pu²]."""
-        return min(self.reference.objective, *(f.objective for several in self.compared.values() for f in several))
+        """The lowest objective known of this problem [pu²]."""
+        compared = [f.objective for name in COMPARED for f in self.searched(name)]
+        return min(self.reference.objective, *compared)
 
-    def objectives(self, name: str, by: str) -> np.ndarray:
-        """(seeds,) at the end of all "iterations", or where an equal number of "simulations" is spent."""
-        found = self.searched(name)
-        return np.array([f.objective if by == "iterations" else searches.best_at(f, self.equal) for f in found])
+    def objectives(self, name: str, by: str = "iterations") -> np.ndarray:
+        """(seeds,) where the searches end."""
+        return np.array([found.objective for found in self.searched(name, by)])
 
     def pair(self, first: str, second: str, by: str) -> Pair:
         a, b = self.objectives(first, by), self.objectives(second, by)
         return Pair(first, second, wilcoxon(a, b)[0], vargha_delaney(a, b))
 
-    def running_time(self, name: str, target: float, cost: str) -> float:
-        """Expected "iterations" or "simulations" to `target` times the floor."""
+    def spent(self, name: str, target: float, by: str) -> tuple[np.ndarray, np.ndarray]:
+        """What each search spent until `target` times the floor or in all (seeds,), and whether it got there."""
         spent, reached = [], []
-        for found in self.compared[name]:
+        for found in self.searched(name, by):
             hit = found.history.objective <= target * self.floor
             at = int(hit.argmax()) if hit.any() else -1
-            spent.append(range(len(hit))[at] if cost == "iterations" else int(found.history.simulations[at]))
+            spent.append(range(len(hit))[at] if by == "iterations" else int(found.history.simulations[at]))
             reached.append(bool(hit.any()))
-        return expected_running_time(np.array(spent), np.array(reached))
+        return np.array(spent), np.array(reached)
+
+    def running_time(self, name: str, target: float, by: str) -> float:
+        """Expected "iterations" or "simulations" to `target` times the floor."""
+        return expected_running_time(*self.spent(name, target, by))
 
     @functools.cached_property
-    def descents(self) -> dict[str, Any]:
-        """{optimizer: the `Descent` by least squares from where each seed's search ended}; squares are objectives.
+    def ends(self) -> dict[str, valleys.Ends]:
+        """{reading: where least squares lead from the end of each seed's search}.
 
         Where that reaches the floor, the search was not caught in a local optimum: it was not done.
         """
-        from tractexp.identification.descent import descend
+        self.tell("Figure 9: descending from where the searches ended, and from random points")
+        names = (*LEVEL, "random_search")
+        starts = np.array([found.values for name in names for found in self.searched(name)])
+        made = self._kept(self.problem, starts, lambda: valleys.descended(self.problem, starts, self.floor))
+        parts = {name: slice(k * self.seeds, (k + 1) * self.seeds) for k, name in enumerate(names)}
+        return {name: valleys.Ends(made.objective[part], made.values[part]) for name, part in parts.items()}
 
-        space, scale = self.problem.space, 1 / np.sqrt(DESCENT * self.floor)
+    def random_ends(self, problem: Problem) -> valleys.Ends:
+        """The control: where least squares lead from random points of the bounds."""
+        points = valleys.scattered(problem, RANDOM, self.seed)
+        return self._kept(problem, points, lambda: valleys.descended(problem, points, self.floor))
 
-        def rows(unit: np.ndarray, lanes: np.ndarray) -> np.ndarray:
-            return scale * self.problem.residuals(space.from_unit(unit))
+    def _kept(self, problem: Problem, starts: np.ndarray, descend: Callable[[], valleys.Ends]) -> valleys.Ends:
+        """Where descents from these starts (n, free) end, read back where the same code made them before."""
+        told = f"descents {self.floor!r} {hashlib.sha256(starts.tobytes()).hexdigest()}"
 
-        made = {}
-        for name, found in self.compared.items():
-            ends = descend(rows, np.array([space.to_unit(f.values) for f in found]), iterations=200, tolerance=1e-3)
-            made[name] = replace(ends, deviance=ends.deviance / scale**2)
-        return made
+        def made() -> tuple[np.ndarray, ...]:
+            ends = descend()
+            return ends.objective, ends.values
 
-    def valleys(self) -> list[tuple[float, int, np.ndarray]]:
-        """Where the descents of all optimizers end: objective, how many, and the values (free,), the lowest first."""
-        objectives = np.concatenate([d.deviance for d in self.descents.values()])
-        units = np.concatenate([d.unit for d in self.descents.values()])
-        left, found = np.argsort(objectives), []
-        while len(left):
-            same = objectives[left] <= SAME_VALLEY * objectives[left[0]]
-            values = self.problem.space.from_unit(units[left[0]])
-            found.append((float(objectives[left[0]]), int(np.count_nonzero(same)), values))
-            left = left[~same]
-        return found
+        return valleys.Ends(*Remembered(problem, Limits()).arrays(told, made))
+
+    @functools.cached_property
+    def control(self) -> valleys.Ends:
+        return self.random_ends(self.problem)
+
+    def above_bottom(self, name: str) -> np.ndarray:
+        """(seeds,) where the searches of a reading end, over the bottom of the valley that each is in."""
+        return self.objectives(name) / self.ends[name].objective
+
+    def shares(self, name: str) -> Shares:
+        """Of the searches of a reading."""
+        at, bottom = self.objectives(name), self.ends[name].objective
+        counts = (bottom <= AT_FLOOR * self.floor, at <= AT_FLOOR * self.floor, at <= AT_FLOOR * bottom)
+        return Shares(self.seeds, *(int(np.count_nonzero(count)) for count in counts))
+
+    @property
+    def control_shares(self) -> Shares:
+        """Of the random points."""
+        there = int(np.count_nonzero(self.control.objective <= AT_FLOOR * self.floor))
+        return Shares(RANDOM, there, 0, 0)
+
+    @property
+    def traded(self) -> bool:
+        """Whether the model has the parameter along which the paper's valleys lie, and leaves it free."""
+        return TRADED in self.problem.space.names and not self.problem.per_event
+
+    @functools.cached_property
+    def path(self) -> tuple[np.ndarray, valleys.Ends]:
+        """Values of C beyond its bounds, and the best fit at each."""
+        wide = valleys.within(self.problem, TRADED, *WIDE)
+        grid = np.linspace(*WIDE, 63)
+        low = np.array([values for _, _, values in self.control.grouped()[:2]])
+        return grid, self._kept(wide, low, lambda: valleys.along(wide, low, TRADED, grid, self.floor))
+
+    @functools.cached_property
+    def rebounded(self) -> dict[tuple[float, float], valleys.Ends]:
+        """{bounds of C: where random points descend within them}."""
+        own = next(p.bounds for p in self.problem.parameters if p.name == TRADED)
+        others = {bounds: self.random_ends(valleys.within(self.problem, TRADED, *bounds)) for bounds in (WIDE, NARROW)}
+        return {own: self.control, **others}
 
     def found_floor(self, objectives: np.ndarray) -> float:
         """The share of objectives (n,) at the floor."""
         return float(np.mean(objectives <= AT_FLOOR * self.floor))
 
     @functools.cached_property
-    def fitted(self) -> dict[str, list[list[Fit]]]:
-        """{optimizer: for each seed the fits of the fitted events, then of those held out}."""
-        return {name: self.fits(name) for name in self.compared}
+    def _fits(self) -> dict[str, list[list[Fit]]]:
+        return {}
 
     def fits(self, name: str) -> list[list[Fit]]:
-        """Those of one optimizer."""
-        return [self.respond(found.values) for found in self.searched(name)]
+        """For each seed of a reading the fits of the fitted events, then of those held out."""
+        if name not in self._fits:
+            literal = READINGS[name].literal
+            self._fits[name] = [self.respond(found, literal) for found in self.searched(name)]
+        return self._fits[name]
 
-    def respond(self, values: np.ndarray) -> list[Fit]:
-        """All events, played through the model with free `values`."""
-        whole = self.problem.full(values)[0]
+    def respond(self, found: Found, literal: bool = False) -> list[Fit]:
+        """All events, played through the model with what a search found."""
+        problem = self.printed_problem if literal and self.literal else self.problem
+        whole = problem.full(found.values)[0]
         roles = ["train"] * len(self.train) + ["validate"] * len(self.held_out)
         events = (*self.train, *self.held_out)
-        return [respond(self.problem.model, whole, e, role) for e, role in zip(events, roles, strict=True)]
+        return [respond(problem.model, whole, e, role) for e, role in zip(events, roles, strict=True)]
 
     def held(self, kind: str) -> list[int]:
         """Which of `fitted` are the held-out events of an "interpolation" or "extrapolation"."""
@@ -200,18 +279,16 @@ class Study:
         return chosen
 
     def residuals(self, kind: str) -> dict[str, np.ndarray]:
-        """Eq. (21) of P and Q, {optimizer: (seeds, 2)} [pu], a mean over the held-out events of one kind."""
+        """Eq. (21) of P and Q, {reading: (seeds, 2)} [pu], a mean over the held-out events of one kind."""
         events = self.held(kind)
-        return {
-            name: np.array(
-                [
-                    [np.mean([searches.mean_residual(getattr(fits[e].event.record, c), getattr(fits[e], c))
-                              for e in events]) for c in "PQ"]
-                    for fits in several
-                ]
-            )
-            for name, several in self.fitted.items()
-        }  # fmt: skip
+
+        def residual(fits: list[Fit], channel: str) -> float:
+            each = [searches.mean_residual(getattr(fits[e].event.record, channel), getattr(fits[e], channel))
+                    for e in events]  # fmt: skip
+            return float(np.mean(each))
+
+        names = (*COMPARED, *TEN.values())
+        return {name: np.array([[residual(fits, c) for c in "PQ"] for fits in self.fits(name)]) for name in names}
 
     @functools.cached_property
     def uniformity(self) -> dict[str, dict[str, np.ndarray]]:
@@ -223,7 +300,7 @@ class Study:
     @functools.cached_property
     def tails(self) -> dict[str, np.ndarray]:
         """Lévy steps of Eq. (15), {formula: (n,)}."""
-        return {formula: maps.flights(formula, maps.STEPS, 1)[:, 0] for formula in ("mantegna", "printed")}
+        return maps.tails()
 
     @functools.cached_property
     def bias(self) -> dict[str, tuple[float, float]]:

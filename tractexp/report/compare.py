@@ -125,12 +125,13 @@ def spread(variants: Sequence[Variant], floor: Floor) -> Chart:
     )  # fmt: skip
     margin = max(ends.max() / floor.value, 1.2) ** 0.04
     low, high = min(floor.value, ends.min()) / margin, ends.max() * margin
-    if high < DECADE * low and len(at := _round(low, high)) > 2:  # Plotly's own are as long as 0.4 times 10 to the -4
+    # Plotly's own are as long as 0.4 times 10 to the -4
+    if high < DECADE * low and len(at := round_numbers(low, high)) > 2:
         chart.ticks(None, at, [f"{value:.1e}".replace(".0", "").replace("e-0", "e-") for value in at])
     return chart.edge(floor.value, dash="dash").limits(None, low, high)
 
 
-def _round(low: float, high: float) -> list[float]:
+def round_numbers(low: float, high: float) -> list[float]:
     """A few round numbers between two."""
     few, more = ([m * 10.0**k for k in range(-20, 5) for m in marks if low <= m * 10.0**k <= high] for marks in ROUND)
     return few if len(few) > 2 else more
@@ -148,12 +149,12 @@ def _rows(label: str, names: Sequence[str], *, log: bool = False) -> Chart:
     return chart.ticks(0, range(len(names)), names).limits(0, len(names) - 0.4, -0.6)
 
 
-def mean_ranks(ranks: Ranks) -> Chart:
-    """Mean ranks over seeds with half of Nemenyi's critical difference to either side, the best on top."""
+def mean_ranks(ranks: Ranks, label: str = "mean rank over the seeds (1 is best)") -> Chart:
+    """Mean ranks with half of Nemenyi's critical difference to either side, the best on top."""
     order = np.argsort(ranks.mean, kind="stable")
     names, mean = [ranks.names[k] for k in order], np.array(ranks.mean)[order]
     half = ranks.critical_difference / 2
-    chart = _rows("mean rank over the seeds (1 is best)", names)
+    chart = _rows(label, names)
     told = [f"{name}: {rank:.2f}" for name, rank in zip(names, mean, strict=True)]
     spans = np.column_stack((mean - half, mean + half))
     chart.points("", mean, np.arange(len(names)), style.PALETTE[0], told=told, spans=spans)

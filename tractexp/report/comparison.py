@@ -31,12 +31,12 @@ def write_page(comparison: Comparison, path: Path, source: str) -> Path:
     page.verdict(claims.answer(comparison), *(text for claim in told if (text := claim(comparison))))
     if comparison.notes:
         page.heading("Mind").items(comparison.notes)
-    _quality(page, comparison)
+    quality(page, comparison)
     _parameters(page, comparison)
     _speed(page, comparison)
     _differences(page, comparison)
     if comparison.ablation:
-        _switches(page, comparison.ablation)
+        switches(page, comparison.ablation)
     _not_judged(page, comparison)
     _reading(page, comparison)
     return page.write(path)
@@ -47,7 +47,8 @@ def _spread(spread: Spread, scale: float = 1.0) -> list[str]:
     return [number(x * scale, 4) for x in (spread.best, spread.lower, spread.median, spread.upper, spread.worst)]
 
 
-def _quality(page: Page, comparison: Comparison) -> None:
+def quality(page: Page, comparison: Comparison) -> None:
+    """Where the runs ended: every run, and quartiles."""
     page.heading("Where the runs ended")
     drawn = figures.spread(comparison.variants, comparison.floor)
     page.chart(drawn, f"Objective {AT_END} of every run that finished. Dashed: the floor.")
@@ -178,7 +179,8 @@ def _pairs(page: Page, pairs: list[Pair], caption: str) -> None:
     page.table(columns, rows, f"{caption} {said}".strip(), words=(1, 8))
 
 
-def _switches(page: Page, ablation: Ablation) -> None:
+def switches(page: Page, ablation: Ablation) -> None:
+    """The effects of the switches on one problem."""
     page.heading("What each ingredient does")
     page.items([claims.of_effect(effect) for effect in ablation.effects])
     columns = ["switched on", "factor", "from", "to", "seeds", "shown", "contrasts"]
@@ -257,7 +259,7 @@ def content(comparison: Comparison, source: str) -> dict[str, Any]:
         "failures": [dict(zip(keys, row, strict=True)) for row in failed],
         "interrupted": [dict(zip(keys, row, strict=True)) for row in interrupted],
     }
-    return files.plain(_as_dicts(told))
+    return files.plain(as_dicts(told))
 
 
 def _told(variant: Variant, run: Run, comparison: Comparison) -> dict[str, Any]:
@@ -267,15 +269,10 @@ def _told(variant: Variant, run: Run, comparison: Comparison) -> dict[str, Any]:
     return {"variant": variant.name, **kept, "simulations": run.simulations[-1], "in_valley": inside}
 
 
-def write_json(comparison: Comparison, path: Path, source: str) -> Path:
-    """Write `comparison.json`."""
-    return files.write_json(path, content(comparison, source))
-
-
-def _as_dicts(value: Any) -> Any:
+def as_dicts(value: Any) -> Any:
     """Data classes within as dictionaries."""
     if is_dataclass(value) and not isinstance(value, type):
         value = asdict(value)
     if isinstance(value, dict):
-        return {key: _as_dicts(item) for key, item in value.items()}
-    return [_as_dicts(item) for item in value] if isinstance(value, list | tuple) else value
+        return {key: as_dicts(item) for key, item in value.items()}
+    return [as_dicts(item) for item in value] if isinstance(value, list | tuple) else value

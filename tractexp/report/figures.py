@@ -1,18 +1,17 @@
-"""The figures of a run: the fit of a recorded event, and how the search got there. Arrays in, a file out.
+"""The figures of a run: the fit of a recorded event, or its response. Arrays in, a file out.
 
 Matplotlib is used through its objects and imported when the first figure is drawn. Labels avoid mathematical
 typesetting, whose parser costs more than a figure.
 """
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.identification.search import REFUSED
 from tractexp.report import style
 
 if TYPE_CHECKING:
@@ -20,8 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Power = tuple[np.ndarray, np.ndarray]  # P, Q [pu], each (N,)
-SMALLEST = 1e-30  # stands for the objective 0 of a perfect fit, which has no logarithm
-Curves = Mapping[str, tuple[np.ndarray, np.ndarray]]  # label -> (x (n,), objective (n,))
 
 
 def fit(
@@ -82,32 +79,6 @@ def response(
         return style.save(figure, path)
 
 
-def fitness(
-    path: Path, by_iteration: Curves, by_simulations: Curves, *, title: str = "", notes: Sequence[str] = ()
-) -> Path:
-    """Draw the best objective [pu²] by iteration and by simulations, on a logarithmic axis, one curve per label.
-
-    Objectives that are not finite or mark a refused candidate are left out. Raises `UserError` when none is left.
-    """
-    from matplotlib import rc_context
-
-    with rc_context(style.SETTINGS):
-        figure, top = _page(8.0, 3.9, title, notes)
-        panels = figure.subplots(1, 2, sharey=True)
-        figure.subplots_adjust(left=0.1, right=0.975, bottom=0.13, top=top, wspace=0.07)
-        drawn = np.concatenate(
-            [_draw_curves(path, panels[0], by_iteration), _draw_curves(path, panels[1], by_simulations)]
-        )
-        style.logarithmic(panels[0], "y", drawn.min(), drawn.max())
-        _label_axis(panels[0], "best objective [pu²]", -0.18)
-        panels[0].set_xlabel("iteration")
-        panels[1].set_xlabel("simulations")
-        panels[1].locator_params(axis="x", nbins=6)
-        if len(by_iteration) > 1:
-            panels[1].legend(loc="upper right")
-        return style.save(figure, path)
-
-
 def _check_lengths(path: Path, **columns: np.ndarray) -> None:
     samples = len(columns["t"])
     if samples < 2:
@@ -138,22 +109,3 @@ def _label_axis(panel: "Axes", label: str, x: float) -> None:
     """Set the label of the vertical axis at a fixed place, where it lines up with its neighbors'."""
     panel.set_ylabel(label)
     panel.yaxis.set_label_coords(x, 0.5)
-
-
-def _draw_curves(path: Path, panel: "Axes", curves: Curves) -> np.ndarray:
-    """Draw each curve as the steps that a best value takes, and return all objectives drawn."""
-    drawn = []
-    for (label, (x, y)), line in zip(curves.items(), style.lines(), strict=False):
-        x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-        if len(x) != len(y):
-            raise UserError(f"{path}: the curve '{label}' has {len(x)} steps and {len(y)} objectives")
-        shown = np.isfinite(y) & (y >= 0) & (y < REFUSED)
-        x, y = x[shown], np.maximum(y[shown], SMALLEST)
-        panel.plot(*style.thin(x, y), **line, drawstyle="steps-post", label=label)
-        drawn.append(y)
-    if not any(map(len, drawn)):
-        raise UserError(
-            f"{path}: there is no objective to draw: the history is empty or every candidate was refused "
-            f"(objective {REFUSED:g} or more)"
-        )
-    return np.concatenate(drawn)

@@ -5,13 +5,13 @@ from pathlib import Path
 from typing import Any
 
 from tractexp import files
+from tractexp.report.chart import Chart
 
 
 class Markdown:
-    """Collects the parts of a page in order. `figures` is the folder its figures are linked in, "" beside it."""
+    """Collects the parts of a page in order; of its charts the captions."""
 
-    def __init__(self, title: str, lead: str = "", figures: str = ""):
-        self.figures = figures
+    def __init__(self, title: str, lead: str = ""):
         self._parts = [f"# {title}"] + [lead] * bool(lead)
 
     def heading(self, text: str, level: int = 2) -> "Markdown":
@@ -35,9 +35,9 @@ class Markdown:
         told = "\n".join(f"| {' | '.join(_escaped(str(cell)) for cell in line)} |" for line in lines)
         return self._add(told, *([_escaped(caption)] if caption else []))
 
-    def figure(self, path: Path, caption: str = "") -> "Markdown":
-        """A link to an SVG file of this name in the folder of figures."""
-        return self._add(f"![{_escaped(caption or path.stem)}]({self.figures}{path.name})")
+    def chart(self, chart: Chart, caption: str = "") -> "Markdown":
+        """What a chart of the page beside it shows."""
+        return self._add(f"*Chart of the page: {_escaped(caption)}*")
 
     def write(self, path: Path) -> Path:
         """Write the page in one move. Raises `UserError` where that is impossible."""

@@ -38,7 +38,7 @@ figure.table .wide { margin: 0; } figure.table figcaption { font-size: .84rem; p
 th, td { padding: .22rem .6rem; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap; }
 th { vertical-align: bottom; white-space: normal; border-bottom-color: var(--faint); font-weight: 600; }
 th:first-child, td:first-child, .words { text-align: left; }
-td.words { white-space: normal; min-width: 8rem; }
+td.words { white-space: normal; min-width: 8rem; } td.words:last-child { min-width: 14rem; }
 figure { margin: 1rem 0; } figure, tr { break-inside: avoid; }
 figure svg { max-width: 100%; height: auto; }
 figcaption { color: var(--faint); font-size: .88rem; max-width: 46rem; }

@@ -1,8 +1,6 @@
 """How figures look: sizes, colors, the settings that make them small, alike on every machine and reproducible."""
 
 import io
-import itertools
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +9,6 @@ import numpy as np
 from tractexp import files
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 # Okabe and Ito 2008, "Color universal design": told apart by color-blind readers.
@@ -43,11 +40,6 @@ SETTINGS: Any = {
 }
 
 
-def lines() -> Iterator[dict[str, Any]]:
-    """Line styles that differ, one for each curve of a figure: the palette solid, then dashed, then dotted."""
-    return itertools.cycle({"color": color, "linestyle": style} for style in ("-", "--", ":") for color in PALETTE)
-
-
 def thin(x: np.ndarray, y: np.ndarray, points: int = POINTS) -> tuple[np.ndarray, np.ndarray]:
     """At most about `points` of (x, y), both (n,): the lowest and highest of each of `points`/2 stretches, and gaps.
 
@@ -66,27 +58,6 @@ def thin(x: np.ndarray, y: np.ndarray, points: int = POINTS) -> tuple[np.ndarray
     )
     index = np.unique(chosen[chosen < len(y)])
     return x[index], y[index]
-
-
-def logarithmic(panel: "Axes", which: str, lowest: float, highest: float) -> None:
-    """Make the axis `which` ("x" or "y") logarithmic, with ticks at powers of ten.
-
-    Where the values span less than a factor 30, at round numbers between.
-    """
-    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
-
-    def text(value: float, _: int) -> str:
-        """0.01 is 0.01, 0.00001234 is 1.234e-5."""
-        if 1e-2 <= value < 1e4:
-            return f"{value:.4g}"
-        digits, power = f"{value:.3e}".split("e")
-        return f"{digits.rstrip('0').rstrip('.')}e{int(power)}"
-
-    panel.set(**{f"{which}scale": "log"})
-    axis = panel.yaxis if which == "y" else panel.xaxis
-    axis.set_major_locator(MaxNLocator(6) if highest < 30 * lowest else LogLocator(numticks=8))
-    axis.set_minor_locator(NullLocator())
-    axis.set_major_formatter(FuncFormatter(text))
 
 
 def save(figure: "Figure", path: Path) -> Path:

@@ -43,7 +43,8 @@ class SweepJob:
     def variant(self, common: Collection[str]) -> str:
         """What the optimizer is called with the settings that it does not share with all jobs: the `common` ones."""
         own = given((text for text in self.overrides if text not in common), self.choices)
-        return variant(self.choices["optimizer"], own)
+        data = f" on {self.choices['data']}" if "data" in own else ""
+        return variant(self.choices["optimizer"], own) + data
 
     @property
     def status(self) -> Status:

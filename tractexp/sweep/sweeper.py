@@ -2,10 +2,13 @@
 
 import contextlib
 import itertools
+import os
 import shutil
 import signal
+import sys
+import webbrowser
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -25,8 +28,10 @@ from tractexp.sweep.job import SweepJob, shared
 from tractexp.sweep.launcher import Cores
 from tractexp.sweep.parent import parent_run
 from tractexp.sweep.status import FAILED, FINISHED, INTERRUPTED, RUNNING
+from tractexp.tasks.compare import after_sweep
 from tractexp.tasks.console import say, table
 from tractexp.tasks.given import refuse_unread
+from tractexp.tasks.task import Job
 
 REPEAT = "repeat the command to go on with the jobs that are left"
 
@@ -38,6 +43,9 @@ class GridConfig:
     _target_: str = f"{NAMESPACE}.Grid"
     params: dict[str, str] | None = None  # as on the command line: {"seed": "range(0,30)"}
     redo: bool = False  # run finished jobs again
+    compare: bool = True  # end a sweep of several variants and seeds with the page of task=compare
+    comparison: dict[str, Any] = field(default_factory=dict)  # settings of that task for it: {bbob: 3}
+    open: bool = True  # show that page, where there is a desktop and somebody at it
 
 
 class Grid(Sweeper):
@@ -46,8 +54,12 @@ class Grid(Sweeper):
     Raises `UserError` for a sweep without jobs, and at its end where jobs have failed.
     """
 
-    def __init__(self, params: Mapping[str, str] | None, redo: bool):
-        self.params, self.redo = params or {}, redo
+    def __init__(
+        self, params: Mapping[str, str] | None, redo: bool, compare: bool, comparison: Mapping[str, Any],
+        open: bool,
+    ):  # fmt: skip
+        self.params, self.redo, self.open = params or {}, redo, open
+        self.comparison = {**comparison} if compare else None
 
     def setup(self, *, hydra_context: Any, task_function: Any, config: Any) -> None:
         self.loader = hydra_context.config_loader
@@ -69,7 +81,7 @@ class Grid(Sweeper):
             OmegaConf.save(self.config, folder / "multirun.yaml")
             with terminating(), parent_run(folder, jobs, told, afresh=self.redo):
                 self._run(left)
-        conclude(jobs)
+        self._conclude(jobs)
 
     def _composed(self, told: list[str]) -> list[SweepJob]:
         """The jobs of the sweep, composed and without duplicates, not yet placed."""
@@ -82,6 +94,18 @@ class Grid(Sweeper):
             refuse_unread(get("task", job.config["task"]["name"]), job.given)
             made.setdefault(job.configuration, job)
         return list(made.values())
+
+    def _conclude(self, jobs: Sequence[SweepJob]) -> None:
+        """Compare the variants, where there is something to compare, and say which jobs failed."""
+        if self.comparison is None or not comparable(jobs):
+            ended(jobs)
+        else:
+            folder = jobs[0].folder.parent
+            page = after_sweep(Job(jobs[0].config, jobs[0].choices, folder), self.comparison)
+            if self.open:
+                show(page)
+        if failed := failures(jobs):
+            raise UserError(failed)
 
     def _run(self, jobs: Sequence[SweepJob]) -> None:
         for job in jobs:
@@ -176,12 +200,26 @@ def terminating() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
 
 
-def conclude(jobs: Sequence[SweepJob]) -> None:
-    """Print what the sweep found and which jobs failed. Raises `UserError` where any did."""
-    ends = [(job, status.read(job.folder)) for job in jobs]
+def comparable(jobs: Sequence[SweepJob]) -> bool:
+    """Whether a sweep holds several variants under several seeds, of which more than one job has ended well."""
+    common = shared(jobs)
+    variants = {job.variant(common) for job in jobs}
+    ended = sum(status.search_objective(job.folder) is not None for job in jobs)
+    return len(variants) > 1 and len({job.config["seed"] for job in jobs}) > 1 and ended > 1
+
+
+def show(page: Path) -> None:
+    """Open a page in the browser of a desktop; a terminal elsewhere, or none, is left alone."""
+    desktop = sys.platform in ("darwin", "win32") or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
+    if sys.stdout.isatty() and desktop:
+        webbrowser.open(page.absolute().as_uri())
+
+
+def ended(jobs: Sequence[SweepJob]) -> None:
+    """Print where the searches of a sweep ended, by variant and data."""
     common = shared(jobs)
     found: dict[str, list[float]] = {}
-    for job, _ in ends:
+    for job in jobs:
         value = status.search_objective(job.folder)
         if value is not None:
             found.setdefault(job.variant(common), []).append(value)
@@ -191,14 +229,19 @@ def conclude(jobs: Sequence[SweepJob]) -> None:
         cells = [[n, str(len(v)), *(f"{x:.4e}" for x in (v[0], median(v), v[-1])), ""] for v, n in rows]
         table(["optimizer", "jobs", "best objective", "median", "worst", ""], cells)
         say("objectives in pu² at the end of the search, before the estimate is polished")
+
+
+def failures(jobs: Sequence[SweepJob]) -> str:
+    """Print which jobs failed and why; returns what is to be said of them, "" where none did."""
+    common, ends = shared(jobs), [(job, status.read(job.folder)) for job in jobs]
     failed = [(job, end.message) for job, end in ends if end is not None and end.status == FAILED]
     if not failed:
-        return
+        return ""
     say()
     say("failed jobs")
     for job, why in failed:  # not in columns: they would cut the sentences
         say(f"  {job.folder.name:>4}  {' '.join(o for o in job.overrides if o not in common)}: {why}")
-    raise UserError(
+    return (
         f"{len(failed)} of {len(jobs)} jobs failed, as listed; what they printed is in output.txt of their folders in "
         f"{jobs[0].folder.parent}, an unexpected error in traceback.txt; {REPEAT}"
     )

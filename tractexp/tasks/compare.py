@@ -1,11 +1,12 @@
 """Compare the runs of a sweep, or of any filter over MLflow."""
 
 import shutil
+from collections.abc import Mapping
 from dataclasses import field
 from pathlib import Path
 from typing import Any
 
-from tractexp.plugin import plugin
+from tractexp.plugin import build, plugin
 from tractexp.tasks.console import listed, say, table
 from tractexp.tasks.task import Job, Task, call
 
@@ -26,28 +27,71 @@ class Compare(Task):
     targets: list[float] = field(default_factory=lambda: [10.0, 2.0, 1.01])  # of running times, times the floor
     ties: float = 1e-3  # objectives within this share of the floor count as equal in the tests
     reference: str | None = None  # test only against this variant; null: every pair
+    apart: list[str] = field(default_factory=list)  # limits that make comparisons of their own: [budget]
+    bbob: int = 0  # instances of each function of BBOB on which the variants are run as well
+    cores: int | None = None  # processes for these; null: all cores
 
     def check(self) -> None:
         from tractexp.api.compare import check
 
-        check(self.sweep, self.filter, self.targets, self.ties, self.floor)
+        check(self.sweep, self.filter, self.targets, self.ties, self.floor, self.apart, self.bbob)
 
     def run(self, job: Job) -> None:
         from tractexp.api.compare import compare
 
         node = job.config["tracking"]
-        settings = {key: getattr(self, key) for key in ("filter", "data", "targets", "ties", "floor", "reference")}
-        made = call(compare, self.sweep, uri=node["uri"], experiment=node["experiment"], **settings)
-        report(made.comparison, made.source)
+        made = call(compare, self.sweep, uri=node["uri"], experiment=node["experiment"], **self.settings())
+        report(made)
         paths = made.write(job.folder)
         if made.folder is not None:
             paths = [Path(shutil.copy2(path, made.folder / path.name)) for path in paths] + paths
         listed(paths)
-        track(job, made.comparison, made.folder, paths[-2:])
+        track(job, made, paths[-2:])
+
+    def settings(self) -> dict[str, Any]:
+        """The settings as arguments of the call, but for where the runs come from."""
+        told = ("filter", "data", "targets", "ties", "floor", "reference", "apart", "bbob", "cores")
+        return {key: getattr(self, key) for key in told}
 
 
-def report(comparison: Any, source: str) -> None:
-    """Print the table and the sentences."""
+def after_sweep(job: Job, settings: Mapping[str, Any]) -> Path:
+    """Compare the variants of the sweep in the job's folder, with these settings of task=compare; the page's path."""
+    from tractexp.api.compare import compare
+
+    task = build("task", {"name": Compare.name, **settings})
+    made = call(compare, job.folder, **task.settings())
+    say()
+    report(made)
+    paths = made.write(job.folder)
+    listed(paths)
+    track(job, made, paths)
+    return paths[0]
+
+
+def report(made: Any) -> None:
+    """Print the tables and the sentences."""
+    if "problems" in made.content:
+        _several(made)
+    else:
+        _one(made.comparison, made.source)
+
+
+def _several(made: Any) -> None:
+    """What several problems come to under each of the terms."""
+    say(f"{made.source}: {', '.join(made.comparison.comparisons)}")
+    for overall in made.comparison.overall:
+        say()
+        best = list(overall.figures.items())[:SAID]
+        cells = [[name, *(f"{x:.0%}" if overall.share else f"{x:.3g}" for x in values)] for name, values in best]
+        title = f"{overall.terms}, {overall.where}: {overall.measure}"
+        table(["variant", *overall.columns], cells, title)
+    for text in [*made.sentences, *made.content["notes"]]:
+        say(f"- {text}")
+    say()
+
+
+def _one(comparison: Any, source: str) -> None:
+    """The table and the sentences of one problem."""
     from tractexp.comparison import claims
     from tractexp.comparison.claims import number
 
@@ -72,7 +116,7 @@ def report(comparison: Any, source: str) -> None:
     say()
 
 
-def track(job: Job, comparison: Any, folder: Path | None, paths: list[Path]) -> None:
+def track(job: Job, made: Any, paths: list[Path]) -> None:
     """Add the page to the sweep's run; where that is not known, log a run of its own."""
     node = job.config["tracking"]
     if not node["enabled"]:
@@ -81,17 +125,20 @@ def track(job: Job, comparison: Any, folder: Path | None, paths: list[Path]) -> 
     from tractexp.sweep.parent import parent_of
     from tractexp.tracking.attach import attach
 
-    parent = parent_of(folder) if folder is not None else None
-    data = comparison.gathered.variants[0].runs[0].data
+    parent = parent_of(made.folder) if made.folder is not None else None
+    comparisons = getattr(made.comparison, "comparisons", {"": made.comparison})
+    known = {run.data for c in comparisons.values() for variant in c.gathered.variants for run in variant.runs}
+    data = known.pop() if len(known) == 1 else f"{len(known)} records"
     if parent is not None and attach(parent, job.store, paths):
         say(f"logged on the run of the sweep; to see it: {job.look}")
         return
     run = tracking.Run(
         experiment=node["experiment"] or f"compare {data}",
-        name=f"comparison of {len(comparison.summaries)} variants",
+        name=f"comparison of {len(next(iter(comparisons.values())).summaries)} variants",
         parameters=tracking.flatten({"task": job.config["task"]}),
         metrics={
-            tracking.metric_name(f"median {s.name}"): s.objective.median
+            tracking.metric_name(f"median {s.name} {label}".strip()): s.objective.median
+            for label, comparison in comparisons.items()
             for s in comparison.summaries
             if s.runs > s.failures
         },

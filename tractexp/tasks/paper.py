@@ -1,6 +1,5 @@
 """The paper's tables and figures, done again: one page, one verdict for each claim."""
 
-import re
 import time
 from collections import Counter
 from dataclasses import field
@@ -24,7 +23,7 @@ class Paper(Task):
     held_out: dict[str, list[str]] = field(default_factory=dict)  # {choice of data: files}; without data.validate
     seeds: int = SEEDS
     workers: int | None = None  # processes that search; null: one for each core
-    docs: str | None = None  # write paper.md to this file too, without its figures
+    docs: str | None = None  # write paper.md to this file too
 
     def check(self) -> None:
         check(self.parts, self.seeds, self.workers)
@@ -45,7 +44,7 @@ class Paper(Task):
             say(f"  {claim.verdict}: {claim.text}")
             say(f"    {claim.measured}")
         if made.claims:
-            say(f"{len(made.claims)} claims: " + ", ".join(f"{n} {verdict}" for verdict, n in made.counts.items()))
+            say(made.table().title)
         say(f"in {time.perf_counter() - started:.0f} s")
         if self.docs is not None:
             paths.append(publish(paths, Path(self.docs)))
@@ -54,12 +53,12 @@ class Paper(Task):
 
 
 def publish(paths: list[Path], docs: Path) -> Path:
-    """Write the Markdown page to `docs` without its figures, which are named where they stand in the run's page."""
+    """Write the Markdown page to `docs`."""
     text = next(path for path in paths if path.suffix == ".md").read_text(encoding="utf-8")
-    return files.write(docs, re.sub(r"!\[(.*?)\]\((.*?)\)", r"*\2 of the run's folder: \1*", text))
+    return files.write(docs, text)
 
 
 def log(job: Job, paths: list[Path], counts: Counter[str]) -> None:
     """Log the page and how many claims got which verdict."""
-    metrics = {verdict.partition(":")[0].replace(" ", "_"): float(n) for verdict, n in counts.items()}
+    metrics = {verdict.replace(" ", "_"): float(n) for verdict, n in counts.items()}
     job.log(name="the paper", values={}, metrics=metrics, artifacts=paths)

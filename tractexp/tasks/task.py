@@ -12,7 +12,8 @@ from tractexp.plugin import Plugin, build
 from tractexp.tasks.given import variant
 
 SEARCH = ("objective", "optimizer", "budget", "time_limit", "target")  # the settings of a search
-LOAD = ("model.motor", "model.static", "model.effects")  # the parts of a model, without what is known of its parameters
+# The equations of a model, without what is known of its parameters
+LOAD = ("model.motor", "model.static", "model.effects", "model.integration")
 R = TypeVar("R")
 
 

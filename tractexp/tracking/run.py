@@ -198,13 +198,23 @@ def _write(client: Any, run_id: str, run: Run) -> None:
     for some_metrics, some_parameters in chunks:
         client.log_batch(run_id, some_metrics, some_parameters)
     if run.records:
-        client.log_inputs(run_id, datasets=[_input(record) for record in run.records])
+        _log_inputs(client, run_id, [_input(record) for record in run.records])
     for path in run.artifacts:
         client.log_artifact(run_id, str(path))
     if run.model:
         from tractexp.tracking.model import log_model
 
         log_model(client, run_id, run.model)
+
+
+def _log_inputs(client: Any, run_id: str, datasets: list[Any]) -> None:
+    """Say what a run has read. Of two processes that make a record known at once, one is refused, and finds it then."""
+    from mlflow.exceptions import MlflowException
+
+    try:
+        client.log_inputs(run_id, datasets=datasets)
+    except MlflowException:
+        client.log_inputs(run_id, datasets=datasets)
 
 
 def _input(record: Mapping[str, str]) -> Any:

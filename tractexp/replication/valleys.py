@@ -1,0 +1,79 @@
+"""The valleys of the objective: where searches and random points descend to, and the way along a parameter between."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.identification.descent import descend
+from tractexp.identification.problem import Problem
+from tractexp.identification.search import REFUSED
+
+SAME = 1.02  # descents that end within so many times of each other are in one valley
+GAIN = 1e-6  # of the lowest objective: a descent's step that gains less ends it
+STEPS = 200  # of a descent, at most
+
+
+@dataclass(frozen=True, eq=False)
+class Ends:
+    """Where descents by least squares end: objectives (n,) [pu²] and values (n, free)."""
+
+    objective: np.ndarray
+    values: np.ndarray
+
+    def grouped(self) -> list[tuple[float, int, np.ndarray]]:
+        """Objective, count and values of each valley, the lowest first."""
+        left, found = np.argsort(self.objective), []
+        while len(left):
+            lowest = left[0]
+            same = self.objective[left] <= SAME * self.objective[lowest]
+            found.append((float(self.objective[lowest]), int(np.count_nonzero(same)), self.values[lowest]))
+            left = left[~same]
+        return found
+
+
+def descended(problem: Problem, values: np.ndarray, floor: float, held: str = "") -> Ends:
+    """Least squares from each of the values (n, free), all at once, with one parameter `held` where it is."""
+    space, scale = problem.space, 1 / np.sqrt(GAIN * floor)
+
+    def rows(unit: np.ndarray, lanes: np.ndarray) -> np.ndarray:
+        return scale * problem.residuals(space.from_unit(unit))
+
+    unit = np.array([space.to_unit(v) for v in values])
+    frozen = np.tile([name == held for name in space.names], (len(unit), 1))
+    made = descend(rows, unit, frozen, iterations=STEPS, tolerance=1.0)
+    return Ends(made.deviance / scale**2, space.from_unit(made.unit))
+
+
+def scattered(problem: Problem, n: int, seed: int) -> np.ndarray:
+    """n points (n, free), uniform among those of the bounds that have a steady state."""
+    rng, kept = np.random.default_rng(seed), np.empty((0, problem.space.dimension))
+    while len(kept) < n:
+        drawn = problem.space.from_unit(rng.random((n, problem.space.dimension)))
+        kept = np.concatenate((kept, drawn[problem.objective(drawn) < REFUSED]))
+    return kept[:n]
+
+
+def within(problem: Problem, name: str, low: float, high: float) -> Problem:
+    """The same problem with other bounds of one parameter, and the same Runge-Kutta step."""
+    bounds = {p.name: p.bounds for p in problem.parameters} | {name: (low, high)}
+    step = int(problem.step.substeps.max())
+    return Problem(problem.model, problem.events, bounds, problem.fixed, step, problem.per_event, problem.loss)
+
+
+def along(problem: Problem, starts: np.ndarray, name: str, grid: np.ndarray, floor: float) -> Ends:
+    """The lowest objective at each value of a parameter, all others fitted: followed from each start both ways."""
+    column = problem.space.names.index(name)
+    best, values = np.full(len(grid), np.inf), np.empty((len(grid), problem.space.dimension))
+    for start in starts:
+        nearest = int(np.abs(grid - start[column]).argmin())
+        for way in (range(nearest, len(grid)), range(nearest - 1, -1, -1)):
+            at = start
+            for k in way:
+                moved = np.where(np.arange(len(at)) == column, grid[k], at)
+                found = descended(problem, moved[None], floor, held=name)
+                if not np.isfinite(found.objective[0]):
+                    break
+                at = found.values[0]
+                if found.objective[0] < best[k]:
+                    best[k], values[k] = found.objective[0], at
+    return Ends(best, values)
