@@ -79,7 +79,7 @@ SERIES = {
     "choice": Series(161, 12, (), 4, (11, 12), (5, 7), TRIED),
     "final": Series(162, 12, SHIPPED, 4, (1, 2), (5, 7), ALL, left_out=SLOW),
     "readings": Series(
-        163, 0, SHIPPED, 10, (), (), (*(f"{name}{r}" for r in READINGS for name in ("ssa", "issa")), "issa_by_stage",
+        163, 0, SHIPPED, 4, (), (), (*(f"{name}{r}" for r in READINGS for name in ("ssa", "issa")), "issa_by_stage",
         "issa_printed_levy"), (15000,),
     ),
 }  # fmt: skip
@@ -193,16 +193,15 @@ def perform(name: str, processes: int, only: Sequence[str] = ()) -> dict[str, An
     """All runs of a series."""
     from joblib import Parallel, delayed
 
-    series = SERIES[name]
-    started = time.time()
+    series, commit, started = SERIES[name], provenance.commit(), time.time()
     done: Any = Parallel(n_jobs=processes, verbose=5)(
         delayed(run)(series, problem) for problem in series.problems() if not only or problem in only
     )
     return {
-        "commit": provenance.commit(),
+        "commit": commit,
         "versions": {p: version(p) for p in ("tractexp", "numpy", "scipy", "cma", "ioh")},
         "python": platform.python_version(),
-        "plan": {k: v for k, v in vars(series).items()},
+        "plan": vars(series),
         "settings": {optimizer: settings(optimizer) for optimizer in series.optimizers},
         "wall_seconds": round(time.time() - started),
         "problems": dict(done),

@@ -1,15 +1,16 @@
 """The tables of docs/optimizers.md, from the stored result of benchmarks/optimizers.py and nothing else."""
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import marked
 import numpy as np
 
 from tractexp.comparison.statistics import Ranks, friedman, holm, vargha_delaney, wilcoxon
 
 DOCS = Path(__file__).resolve().parents[1] / "docs" / "optimizers.md"
+MAKER = "benchmarks/optimizers.py"
 REFERENCE = "issa"
 NEAR = (0.01, 0.1)  # of the floor
 TARGETS = 10.0 ** np.arange(2, -9, -1)  # distances, as task=benchmark has them
@@ -190,17 +191,13 @@ def blocks(stored: Stored) -> dict[str, str]:
         "answer": answer(final),
         "records": f"{caption(final, of)}\n\n{records(of)}",
         "bbob": f"{caption(final, on)}\n\n{functions(on)}",
-        "choice": f"{records(Kind(stored['choice'], 'record'))}\n\n{functions(Kind(stored['choice'], 'bbob'))}",
         "readings": readings(stored["readings"]),
     }
 
 
 def filled(page: str, stored: Stored) -> str:
-    """The page with the text between `<!-- NAME -->` and `<!-- end -->` made anew for every block."""
+    """The page with the text between the marks of every block made anew."""
     for name, text in blocks(stored).items():
-        page, count = re.subn(
-            rf"(<!-- {name} -->\n).*?(<!-- end -->)", lambda m, t=text: f"{m[1]}{t}\n{m[2]}", page, flags=re.DOTALL
-        )
-        if count != 1:
-            raise SystemExit(f"the page has {count} blocks <!-- {name} --> ... <!-- end -->; it must have one")
+        before, _, after = marked.parted(page, f"{MAKER}, {name}")
+        page = f"{before}\n{text}\n\n{after}"
     return page
