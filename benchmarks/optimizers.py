@@ -79,7 +79,7 @@ SERIES = {
     "choice": Series(161, 12, (), 4, (11, 12), (5, 7), TRIED),
     "final": Series(162, 12, SHIPPED, 4, (1, 2), (5, 7), ALL, left_out=SLOW),
     "readings": Series(
-        163, 0, SHIPPED, 4, (), (), (*(f"{name}{r}" for r in READINGS for name in ("ssa", "issa")), "issa_by_stage",
+        163, 0, SHIPPED, 10, (), (), (*(f"{name}{r}" for r in READINGS for name in ("ssa", "issa")), "issa_by_stage",
         "issa_printed_levy"), (15000,),
     ),
 }  # fmt: skip
