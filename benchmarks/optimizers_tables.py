@@ -159,11 +159,11 @@ def answer(series: Stored) -> str:
     told = [f"`{o}` {at_floor(o)}" for o in ("issa", "ssa", "pso")]
     return "\n".join(
         (
-            f"**To fit a record take `{first}`**: after {budgets} simulations {at_floor(first)} of its searches are within"
-            " 1 % of the floor.",
-            f"**Without a sum of squares take `{free}`**: {at_floor(free)}, and {met(free)} of BBOB's targets; `cobyqa`"
-            f" where simulations are dear: {at_floor('cobyqa')}.",
-            f"**Of the sparrow searches take `covariant_sparrow`**: {at_floor('covariant_sparrow')}, and"
+            f"- **To fit a record take `{first}`**: after {budgets} simulations {at_floor(first)} of its"
+            " searches are within 1 % of the lowest objective known.",
+            f"- **Without a sum of squares take `{free}`**: {at_floor(free)}, and {met(free)} of BBOB's targets;"
+            f" `cobyqa` where simulations are dear: {at_floor('cobyqa')}.",
+            f"- **Of the sparrow searches take `covariant_sparrow`**: {at_floor('covariant_sparrow')}, and"
             f" {met('covariant_sparrow')} of the targets; {', '.join(told)}.",
         )
     )
@@ -194,6 +194,7 @@ def blocks(stored: Stored) -> dict[str, str]:
         "answer": answer(final),
         "records": f"{caption(final, of)}\n\n{records(of)}",
         "bbob": f"{caption(final, on)}\n\n{functions(on)}",
+        "choice": f"{records(Kind(stored['choice'], 'record'))}\n\n{functions(Kind(stored['choice'], 'bbob'))}",
         "readings": readings(stored["readings"]),
     }
 

@@ -37,11 +37,11 @@ def test_the_first_lines_of_the_page_answer_which_optimizer_to_take():
     lines = [
         line for line in PAGE.read_text(encoding="utf-8").splitlines() if line and not line.startswith(("#", "<!"))
     ]
-    assert all(line.startswith("**") for line in lines[:3])
+    assert all(line.startswith("- **") for line in lines[:3])
     assert lines[:3] == optimizers_tables.blocks(STORED)["answer"].splitlines()
 
 
-@pytest.mark.parametrize("name", sorted(STORED))
+@pytest.mark.parametrize("name", ["choice", "final", "readings"])
 def test_a_stored_series_is_whole_and_was_run_from_a_commit(name):
     stored, series = STORED[name], optimizers.SERIES[name]
     plan = json.loads(json.dumps(vars(series)))
