@@ -11,7 +11,7 @@ import optimizers_tables
 import pytest
 
 from tractexp.comparison.statistics import vargha_delaney
-from tractexp.plugin import build
+from tractexp.plugin import build, discover, schema
 
 STORED = json.loads(optimizers.STORED.read_text(encoding="utf-8"))
 PAGE = Path(__file__).parents[1] / "docs" / "optimizers.md"
@@ -64,11 +64,15 @@ def test_the_series_share_no_record_no_instance_and_no_seed():
 
 def test_settings_are_those_that_the_command_line_composes():
     from hydra import compose, initialize_config_dir
+    from hydra.core.config_store import ConfigStore
+    from omegaconf import OmegaConf
 
+    for name, cls in discover()["optimizer"].items():
+        ConfigStore.instance().store(group="optimizer", name=name, node=schema(cls))
     assert optimizers.settings("cobyqa") == {"name": "cobyqa"}
     with initialize_config_dir(str(optimizers.ROOT / "conf"), version_base=None):
         for name in ("issa_polish", "issa_to_the_letter", "ssa_plus_levy"):
-            composed = dict(compose(overrides=[f"+optimizer={name}"]).optimizer)
+            composed = OmegaConf.to_container(compose(overrides=[f"+optimizer={name}"]).optimizer)
             assert build("optimizer", optimizers.settings(name)) == build("optimizer", composed)
 
 
