@@ -47,7 +47,9 @@ def name(request):
     return request.param
 
 
-def run(problem, seed=0, simulations=15000, **chosen):
+def run(problem, seed=0, simulations=None, **chosen):
+    """15,000 simulations where nothing else is said; a thousand for COBYQA, which takes a millisecond for each."""
+    simulations = simulations or {"cobyqa": 1000}.get(chosen["name"], 15000)
     return search(problem, build("optimizer", chosen), seed, Limits(simulations=simulations))
 
 
@@ -243,6 +245,42 @@ def test_particles_move_as_computed_by_hand():
     assert walls > 0
 
 
+class Noted(HalfRefused):
+    """The half-refused cube, with every point evaluated one at a time kept."""
+
+    def __init__(self):
+        self.batches = []
+
+    def objective(self, values):
+        self.batches.append(values)
+        return super().objective(values)
+
+
+def test_cobyqa_starts_only_where_the_scatter_could_be_simulated_and_ends_where_scipy_does():
+    """Its first descent is SciPy's own from the best point of the scatter, simulation by simulation."""
+    from scipy.optimize import minimize
+
+    problem = Noted()
+    run(problem, 0, 400, name="cobyqa")
+    scatter, alone = problem.batches[0], [batch[0] for batch in problem.batches[1:]]
+    f = HalfRefused.objective(problem, scatter)
+    able = f < REFUSED
+    worst, seen = f[able].max(), []
+
+    def lowered(x):
+        seen.append(x.copy())
+        return min(float(HalfRefused.objective(problem, x[None])[0]), worst)
+
+    options = {"initial_tr_radius": 0.1, "final_tr_radius": 1e-7}
+    found = minimize(lowered, scatter[f.argmin()], method="COBYQA", bounds=[(0, 1)] * 4, options=options)
+    assert found.fun < 1e-12
+    assert len(scatter) == 100
+    np.testing.assert_array_equal(alone[: len(seen)], seen)
+    assert 0 < able.sum() < 50
+    following = np.abs(scatter[able] - alone[len(seen)]).max(axis=1)  # SciPy moves a start off a near wall
+    assert following.min() <= options["initial_tr_radius"]
+
+
 def test_cmaes_without_its_package_names_the_pip_line(monkeypatch):
     real = builtins.__import__
 
@@ -271,6 +309,10 @@ def test_cmaes_without_its_package_names_the_pip_line(monkeypatch):
         ({"name": "differential_evolution", "strategy": "rand1bim"}, "optimizer.strategy=rand1bim .*mean 'rand1bin'"),
         ({"name": "differential_evolution", "mutation_low": 1.5}, "optimizer.mutation_low=1.5 .* at most 1"),
         ({"name": "cmaes", "population": 2}, "optimizer.population=2"),
+        ({"name": "cobyqa", "radius": 0.7}, "optimizer.radius=0.7 .* at most 0.5"),
+        ({"name": "cobyqa", "precision": 0.2}, "optimizer.precision=0.2 .* at most 0.1"),
+        ({"name": "covariant_sparrow", "population": 3}, "optimizer.population=3 .* at least 4"),
+        ({"name": "covariant_sparrow", "mixing": 1.5}, "optimizer.mixing=1.5 .* at most 1"),
         ({"name": "multistart_least_squares", "starts": 101}, "optimizer.starts=101 .* at most 100"),
     ],
 )

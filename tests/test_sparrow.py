@@ -9,6 +9,7 @@ from tractexp.identification.optimizer import Box
 from tractexp.identification.search import Limits, search
 from tractexp.plugin import build
 from tractexp_plugins.optimizers import _sparrow as sparrow
+from tractexp_plugins.optimizers import covariant_sparrow as covariant
 from tractexp_plugins.optimizers import issa
 
 N, D = 5, 2
@@ -391,3 +392,89 @@ def test_simulations_of_an_iteration():
     assert spent["ssa"].max() <= 60
     assert spent["issa"].min() >= 100
     assert spent["issa"].max() <= 110
+
+
+def covariant_move(x, seed=3, **settings):
+    optimizer = build("optimizer", {"name": "covariant_sparrow", "population": len(x), **settings})
+    return optimizer._proposed(x, np.random.default_rng(seed))
+
+
+def test_the_covariant_flock_moves_as_computed_by_hand():
+    """Five sparrows: a producer, a scrounger that follows, three that starve; the second and the last perceive."""
+    one, step, led = np.array([1, 3, 0, 2, 4]), np.array([2, 1, 3, 1, 4]), np.zeros(5, dtype=int)
+    q, normal, coins = np.array([[-0.7]]), np.array([[0.5, -1.5], [0.25, 2.0]]), np.full((N, D), 0.5)
+    coins[2, 1] = 0.95  # not below the share of 0.9: the third sparrow keeps its second coordinate
+    asked = iter([(0, N, one), (1, N, step), (0, 1, led), (0, D, np.zeros(N, dtype=int))])
+
+    class Numbers(Drawn):
+        def integers(self, low, high, size):
+            expected_low, expected_high, drawn = next(asked)
+            assert (low, high, size) == (expected_low, expected_high, N)
+            return drawn
+
+    rng = Numbers(normal=[q, normal], permutation=[[1, 4, 0, 2, 3]], random=[coins])
+    settings = {"population": N, "producers": 0.2, "perceivers": 0.4, "factor": 0.6, "mixing": 0.9}
+    got = build("optimizer", {"name": "covariant_sparrow", **settings})._proposed(X, rng)
+
+    other = [(a + b) % N for a, b in zip(one, step, strict=True)]
+    mean = [(X[0, j] + X[1, j]) / 2 for j in range(D)]  # of the better half, two of five
+    for j in range(D):
+        way = [X[one[i], j] - X[other[i], j] for i in range(N)]
+        expected = [X[0, j] - 0.7 * way[0], None, X[0, j] + 0.6 * way[2], X[0, j] + 0.6 * way[3], None]
+        for row, (a, b) in zip((1, 4), normal, strict=True):
+            expected[row] = X[0, j] + (a * (X[0, j] - mean[j]) + b * (X[1, j] - mean[j])) / math.sqrt(2)
+        if j == 1:
+            expected[2] = X[2, 1]
+        np.testing.assert_allclose(got[:, j], expected, rtol=1e-13)
+    assert rng.spent()
+
+
+def test_a_covariant_scrounger_follows_a_producer_and_a_way_between_two_sparrows():
+    x = np.random.default_rng(0).random((20, 3))
+    rng = np.random.default_rng(3)
+    way, leader = covariant.differences(x, rng), x[rng.integers(0, 4, 20)]
+    got = covariant_move(x, 3, perceivers=0.0, mixing=1.0)
+    np.testing.assert_allclose(got[4:10], x[4:10] + 0.6 * (leader - x)[4:10] + 0.6 * way[4:10], rtol=1e-13)
+
+
+def test_a_covariant_flock_may_be_turned_stretched_and_shifted():
+    """With whole positions taken, the moves of the transformed flock are the transformed moves: no axis, no zero."""
+    rng = np.random.default_rng(1)
+    x, turn, shift = rng.random((30, 4)), rng.standard_normal((4, 4)), rng.standard_normal(4)
+    moved = covariant_move(x, mixing=1.0)
+    assert np.abs(moved - x).max() > 0.1
+    np.testing.assert_allclose(covariant_move(x @ turn + shift, mixing=1.0), moved @ turn + shift, atol=1e-12)
+
+
+def test_covariant_perceivers_have_the_covariance_of_the_better_half():
+    better = np.random.default_rng(2).standard_normal((15, 3)) @ [[1, 2, 0], [0, 0.3, 0.1], [0, 0, 2]]
+    best = np.array([5.0, -1.0, 2.0])
+    drawn = covariant.varied(best, better, 200_000, np.random.default_rng(4))
+    np.testing.assert_allclose(drawn.mean(axis=0), best, atol=0.03)
+    np.testing.assert_allclose(np.cov(drawn.T), np.cov(better.T, bias=True), rtol=0.02, atol=0.02)
+
+
+def test_a_way_never_leads_from_a_sparrow_to_itself():
+    x = np.arange(4.0)[:, None]
+    assert (covariant.differences(np.repeat(x, 1, axis=0), np.random.default_rng(0)) != 0).all()
+    ways = np.concatenate([covariant.differences(x, np.random.default_rng(seed)) for seed in range(200)])
+    assert {*ways[:, 0].tolist()} == {-3.0, -2.0, -1.0, 1.0, 2.0, 3.0}
+
+
+def test_a_sparrow_takes_at_least_one_coordinate():
+    x = np.zeros((50, 4))
+    taken = covariant.mixed(x, x + 1, 0.0, np.random.default_rng(0))
+    assert (taken.sum(axis=1) == 1).all()
+    assert (covariant.mixed(x, x + 1, 1.0, np.random.default_rng(0)) == 1).all()
+
+
+def test_a_collapsed_covariant_flock_is_drawn_anew():
+    """In a bowl the flock is soon narrower than allowed; after that points all over the square come again."""
+    evaluate, optimizer = Recorded(), build("optimizer", {"name": "covariant_sparrow", "collapse": 1e-3})
+    steps = optimizer.search(evaluate, Box.unit(2), np.random.default_rng(0))
+    for _ in range(200):
+        next(steps)
+    widths = [np.ptp(batch, axis=0).max() for batch in evaluate.batches]
+    narrow = next(i for i, width in enumerate(widths) if width < 1e-2)
+    assert max(widths[narrow:]) > 0.8
+    assert len({len(batch) for batch in evaluate.batches}) == 1

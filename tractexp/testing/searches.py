@@ -65,7 +65,7 @@ def yields_once_an_iteration(cls: type[Optimizer]) -> None:
     spent = [0]
 
     class Counted:
-        budget = None
+        budget: int | None = None
 
         def __call__(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             x, _ = self.residuals(x)
