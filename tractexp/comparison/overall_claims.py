@@ -36,7 +36,8 @@ def of_switches(overall: Overall) -> str:
     if overall.ablation is None:
         return ""
     told = [of_effect(effect) for effect in overall.ablation.effects]
-    return f"{overall.terms}: {'; '.join(told)}." if overall.terms else f"{'; '.join(told)}."
+    where = [overall.terms] * bool(overall.terms) + ["BBOB"] * overall.share
+    return ", ".join(where) + ": " * bool(where) + "; ".join(told) + "."
 
 
 def of_effect(effect: Effect) -> str:
