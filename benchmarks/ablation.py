@@ -13,7 +13,7 @@ from typing import Any
 
 import marked
 
-from tractexp import files, provenance
+from tractexp import files
 
 ROOT = Path(__file__).resolve().parents[1]
 STORED, PAGE, NAME = ROOT / "benchmarks" / "ablation.json", ROOT / "docs" / "comparison.md", "benchmarks/ablation.py"
@@ -24,7 +24,8 @@ def store(sweep: Path) -> None:
     """Keep what a sweep's `comparison.json` says of all problems together."""
     told = json.loads((sweep / "comparison.json").read_text(encoding="utf-8"))
     overall = [{key: part[key] for key in KEPT} for part in told["overall"]]
-    kept = {"commit": provenance.commit(), "sentences": told["sentences"], "overall": overall}
+    job = json.loads((sweep / "0" / "result.json").read_text(encoding="utf-8"))
+    kept = {"commit": job["commit"], "sentences": told["sentences"], "overall": overall}
     files.write_json(STORED, kept)
 
 
