@@ -5,8 +5,7 @@
 
 Only the command line and the files it writes are used, so that the same script serves before and after any change
 inside. Numbers are compared to `TOLERANCE`: a kernel whose operations are ordered otherwise rounds otherwise, and a
-descent carries that on. For the same reason a run that had to compile a kernel is made again: code that was just
-compiled may round otherwise than the same code loaded from the cache, which an ill-posed fit shows.
+descent carries that on.
 """
 
 import argparse
@@ -27,7 +26,6 @@ from joblib import Parallel, delayed
 from hidden_effects import Case, Noise, write
 from hidden_effects.cases import NOISES
 from hidden_effects.effects import CATALOG
-from tractexp.model.kernel import cache_folder
 
 FILE = Path(__file__).parent / "golden.jsonl"
 TOLERANCE = 1e-5  # relative
@@ -80,11 +78,7 @@ def command(folder: Path, *arguments: str) -> dict[str, Any]:
     """Run tractexp in a folder; what it refuses is a row with its sentence."""
     told = [sys.executable, "-m", "tractexp", *arguments, "tracking.enabled=false", "hydra.run.dir=run"]
     environment = os.environ | {"NUMBA_NUM_THREADS": "1"}
-    while True:
-        compiled = kernels()
-        done = subprocess.run(told, cwd=folder, capture_output=True, text=True, env=environment)
-        if compiled == kernels():
-            break
+    done = subprocess.run(told, cwd=folder, capture_output=True, text=True, env=environment)
     if done.returncode:
         return {"refused": done.stderr.strip().splitlines()[-1]}
     file = folder / "run" / ("discrepancy.json" if "task=discrepancy" in arguments else "result.json")
@@ -93,11 +87,6 @@ def command(folder: Path, *arguments: str) -> dict[str, Any]:
         return {key: made[key] for key in RESULT}
     kept = {key: made[key] for key in KEPT}
     return kept | {"candidates": [[c["effects"], c["status"], c["likelihood_ratio"]] for c in made["candidates"]]}
-
-
-def kernels() -> set[Path]:
-    """The compiled kernels in the cache."""
-    return set(cache_folder().glob("__pycache__/*.nbc"))
 
 
 def investigated(label: str, case: Case, held: int, only: list[str]) -> dict[str, Any]:
@@ -150,27 +139,29 @@ def differences(before: Any, now: Any, at: str = "") -> Iterator[str]:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--write", action="store_true", help="store what is made instead of comparing it")
+    parser.add_argument(
+        "--write", action="store_true", help="store what is made: the rows chosen by --only, and no label that is gone"
+    )
     parser.add_argument("--only", default="", help="labels that contain this")
     parser.add_argument("--jobs", type=int, default=2)
     chosen = parser.parse_args()
     wanted = [job for job in jobs() if chosen.only in job[1][0]]
     rows = []
-    known = {}
-    if not chosen.write:
-        known = {row["label"]: row for row in map(json.loads, FILE.read_text(encoding="utf-8").splitlines())}
+    known = {row["label"]: row for row in map(json.loads, FILE.read_text(encoding="utf-8").splitlines())}
     moved = 0
     for row in Parallel(n_jobs=chosen.jobs, return_as="generator")(wanted):
         rows.append(row)
         said = row.get("refused") or f"{row.get('verdict', row.get('status'))} {' '.join(row.get('effects', []))}"
-        found = list(differences(known[row["label"]], row)) if known else []
+        found = list(differences(known.get(row["label"]), row))
         moved += bool(found)
         print(f"{row['label']}: {said}", *(line[:150] for line in found[:12]), sep="\n    ", flush=True)
-    if chosen.write:
-        FILE.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
-    else:
-        print(f"{len(rows)} compared, {moved} differ")
-    return int(moved > 0)
+    print(f"{len(rows)} compared, {moved} differ")
+    if not chosen.write:
+        return int(moved > 0)
+    known |= {row["label"]: row for row in rows}
+    kept = [known[job[1][0]] for job in jobs() if job[1][0] in known]
+    FILE.write_text("".join(json.dumps(row) + "\n" for row in kept), encoding="utf-8")
+    return 0
 
 
 if __name__ == "__main__":

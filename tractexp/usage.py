@@ -10,7 +10,7 @@ from tractexp.choices import Choice, choices, defaults, sentence
 from tractexp.errors import UserError, among
 
 WIDTH = 100  # columns
-FEW = 8  # names of a group that fit into a line or two of the help
+FEW = 9  # names of a group that fit into two lines of the help, or three
 
 GROUPS = {
     "task": "what to do",
