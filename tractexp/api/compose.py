@@ -109,7 +109,9 @@ def compose(
     """
     made = model_of(model)
     chosen_parts = {"motor": motor, "static": static}
-    parts = {part: Choice.of(f"model/{part}", chosen).node for part, chosen in chosen_parts.items() if chosen}
+    parts = {
+        part: Choice.of(f"model/{part}", chosen).node for part, chosen in chosen_parts.items() if chosen is not None
+    }
     given = {"effects": effects, "substeps": substeps, "per_event": per_event, "integration": integration}
     made = made.with_(bounds=bounds, fixed=fixed, **given, **parts)
     _ = made.parameters
