@@ -5,8 +5,7 @@ array with literal offsets, so that LLVM vectorises it and state, constants and 
 sample is stored unless asked for. Equal lanes give equal bits wherever they stand in a batch.
 """
 
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Iterable
 
 import sympy
 from sympy.printing.pycode import PythonCodePrinter
@@ -16,20 +15,7 @@ from tractexp.model.lowering import Lowered, Phase, symbols
 from tractexp.model.template import FAST, GROUP, HEADER, LANES, RUN, SETTLE, VECTORS
 
 PHASES = ("derivative", "renewal", "output")  # what is evaluated lane by lane
-STAGES = {  # slope, where the voltage is taken, and how far along which slope the states are
-    "classical": (
-        ("k1", "a", None),
-        ("k2", "b", ("0.5 * h", "k1")),
-        ("k3", "b", ("0.5 * h", "k2")),
-        ("k4", "c", ("h", "k3")),
-    ),
-    "printed": (
-        ("k1", "a", None),
-        ("k2", "b", ("h / 6.0", "k1")),
-        ("k3", "b", ("h / 6.0", "k2")),
-        ("k4", "c", ("h", "k3")),
-    ),
-}
+HALF_WAY = {"classical": "0.5 * h", "printed": "h / 6.0"}  # how far along a slope the two stages in the middle are
 
 
 class _Printer(PythonCodePrinter):
@@ -96,7 +82,7 @@ def source(lowered: Lowered, title: str, integration: str = "classical") -> str:
         fill_signals=_indent(8, _fill_signals(lowered)),
         start=_indent(16, _load_candidate(lowered, rows, at)),
         sample=_indent(20, _sample(lowered, at)),
-        advance=_indent(24, _advance(lowered, at, STAGES[integration])),
+        advance=_indent(24, _advance(lowered, at, HALF_WAY[integration])),
     )  # fmt: skip
     return text
 
@@ -182,8 +168,11 @@ def _sample(lowered: Lowered, at: _Rows) -> list[str]:
     return [*lines, "for l in range(lanes):", *_nested(body)]
 
 
-def _advance(lowered: Lowered, at: _Rows, stages: Sequence[Any]) -> list[str]:
+def _advance(lowered: Lowered, at: _Rows, half_way: str) -> list[str]:
     """A step of four stages, Eq. (4), the voltage smooth between samples."""
+    # slope, where the voltage is taken, and how far along which slope the states are
+    middle = ("k2", "b", (half_way, "k1")), ("k3", "b", (half_way, "k2"))
+    stages = ("k1", "a", None), *middle, ("k4", "c", ("h", "k3"))
     if not lowered.states:
         return ["pass"]
     inner = []
