@@ -17,6 +17,7 @@ from tractexp.comparison import claims, load
 from tractexp.comparison.comparison import compare
 from tractexp.comparison.floor import Floor, floor_of, polish
 from tractexp.comparison.runs import PROBLEM, REST, SETTINGS, Run, gather
+from tractexp.comparison.runs import on as on_data
 from tractexp.comparison.summary import ECDF_TARGETS, band, running_time, runtimes, summarize
 from tractexp.errors import UserError
 
@@ -325,9 +326,9 @@ def test_different_problems_are_refused():
     other = [replace(r, data="tibet_30pct") for r in samples({"b": 1.0})]
     with pytest.raises(UserError, match=r"different data \(tibet_30pct, tibet_50pct\).*choose one, such as task.data="):
         gather([*samples({"a": 1.0}), *other], "the sweep x")
-    assert [v.name for v in gather([*samples({"a": 1.0}), *other], "x", "tibet_30pct").variants] == ["b"]
+    assert [v.name for v in gather(on_data([*samples({"a": 1.0}), *other], "x", "tibet_30pct"), "x").variants] == ["b"]
     with pytest.raises(UserError, match=r"task.data=tibet_3: the sweep x has no run.*did you mean 'tibet_30pct'"):
-        gather(other, "the sweep x", "tibet_3")
+        gather(on_data(other, "the sweep x", "tibet_3"), "the sweep x")
     fixed = [replace(r, config=r.config | {"model.fixed.C": 0.7}) for r in samples({"b": 1.0})]
     with pytest.raises(UserError, match=r"differ in model.fixed.C \(0.7, null\)"):
         gather([*samples({"a": 1.0}), *fixed], "x")

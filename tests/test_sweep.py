@@ -149,6 +149,18 @@ def test_a_sweep_of_several_variants_and_seeds_ends_with_their_comparison(logged
         assert not (tmp_path / "sweep" / "comparison.html").exists()
 
 
+@pytest.mark.parametrize(
+    ("setting", "sentence"),
+    [("bob=3", "task 'compare' has no setting 'bob'"), ("bbob=-1", "task.bbob=-1 is out of range")],
+)
+def test_what_the_comparison_would_refuse_is_refused_before_the_jobs(setting, sentence, tmp_path):
+    asked = ("optimizer=ssa,pso", "seed=0,1", "tracking.enabled=false", f"hydra.sweeper.comparison.{setting}")
+    done = tractexp("-m", *QUICK, *asked, HERE, cwd=tmp_path)
+    assert done.returncode == 2
+    assert sentence in done.stderr
+    assert not (tmp_path / "sweep").exists()
+
+
 def test_the_sweep_is_a_finished_parent_run_with_its_jobs_as_children(logged):
     folder, sweep, _ = logged
     parent = json.loads((sweep / "sweep.json").read_text())["run"]

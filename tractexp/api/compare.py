@@ -37,6 +37,11 @@ class Compared(Written):
         return _made(**self.call)[1]
 
     @property
+    def comparisons(self) -> "Mapping[str, Comparison]":
+        """The comparison on each problem, by the problem's name; that of one problem alone is called ""."""
+        return getattr(self.comparison, "comparisons", {"": self.comparison})
+
+    @property
     def folder(self) -> Path | None:
         """The sweep's folder; None where the runs are from MLflow."""
         return Path(self.call["sweep"]) if self.call["filter"] is None else None
@@ -67,11 +72,10 @@ class Compared(Written):
     def _write(self, folder: Path) -> list[Path]:
         """comparison.html and comparison.json."""
         from tractexp import files
-        from tractexp.report import comparison, overall
 
-        report: Any = overall if "problems" in self.content else comparison
         data = files.write_json(folder / "comparison.json", self.content)
-        return [report.write_page(self.comparison, folder / "comparison.html", self.source), data]
+        page = _report(self.comparison).write_page(self.comparison, folder / "comparison.html", self.source)
+        return [page, data]
 
     def to_dict(self) -> dict[str, Any]:
         return {"call": dict(self.call), **self.content}
@@ -121,12 +125,7 @@ def compare(
         "bbob": bbob,
     }  # fmt: skip
     source, comparison = _made(**call, cores=cores, progress=progress)
-    from tractexp.comparison.overall import Several
-    from tractexp.report import comparison as one
-    from tractexp.report import overall
-
-    content = (overall if isinstance(comparison, Several) else one).content
-    made = Compared(call, source, content(comparison, source))
+    made = Compared(call, source, _report(comparison).content(comparison, source))
     vars(made)["comparison"] = comparison
     return made
 
@@ -148,6 +147,15 @@ def check(
     for key in apart:
         check_choice("task.apart", key, APART)
     check_range("task.bbob", bbob, 0, 1000)
+
+
+def _report(comparison: "Comparison | Several") -> Any:
+    """The module that tells of one problem, or of several."""
+    from tractexp.comparison.overall import Several
+    from tractexp.report import comparison as one
+    from tractexp.report import overall
+
+    return overall if isinstance(comparison, Several) else one
 
 
 def _hardest(targets: Sequence[float]) -> int:

@@ -18,8 +18,7 @@ def of_ranks(overall: Overall) -> str:
     """Which variant has the best mean rank, and which are not told from it."""
     where = f"{overall.terms}, {overall.where}" if overall.terms else overall.where
     if overall.ranks is None:
-        best = next(iter(overall.figures), None)
-        return f"{where}: too few variants or seeds to rank." if best is None else f"{where}: not ranked."
+        return f"{where}: too few variants or seeds to rank."
     ranks = overall.ranks
     best, *others = sorted(zip(ranks.mean, ranks.names, strict=True))
     alike = [name for mean, name in others if mean - best[0] < ranks.critical_difference]

@@ -106,14 +106,12 @@ def parted(runs: Sequence[Run], apart: Sequence[str] = ()) -> dict[tuple[str, ..
     return groups
 
 
-def gather(runs: Sequence[Run], source: str, data: str | None = None) -> Gathered:
-    """Group runs into variants; `data` keeps the runs on that choice of data. Later repeats replace earlier ones.
+def gather(runs: Sequence[Run], source: str) -> Gathered:
+    """Group runs into variants. Later repeats replace earlier ones.
 
-    Interrupted runs are told apart from those that are judged. Raises `UserError` where no run is left, none
-    finished, or the runs do not solve the same problem.
+    Interrupted runs are told apart from those that are judged. Raises `UserError` where none finished, or the runs do
+    not solve the same problem.
     """
-    if data is not None:
-        runs = on(runs, source, data)
     _check_same_problem(runs, source)
     _check_any_finished(runs, source)
     ended = [run for run in runs if not run.interruption]

@@ -21,14 +21,13 @@ from omegaconf import OmegaConf
 
 from tractexp.doors.hydra_plugins import NAMESPACE
 from tractexp.errors import UserError
-from tractexp.plugin import get
+from tractexp.plugin import build, get
 from tractexp.sweep import status
 from tractexp.sweep.compose import Composer
 from tractexp.sweep.job import SweepJob, shared
 from tractexp.sweep.launcher import Cores
 from tractexp.sweep.parent import parent_run
 from tractexp.sweep.status import FAILED, FINISHED, INTERRUPTED, RUNNING
-from tractexp.tasks.compare import after_sweep
 from tractexp.tasks.console import say, table
 from tractexp.tasks.given import refuse_unread
 from tractexp.tasks.task import Job
@@ -71,6 +70,7 @@ class Grid(Sweeper):
     def sweep(self, arguments: list[str]) -> None:
         told = [*(f"{key}={values}" for key, values in self.params.items()), *arguments]
         folder = Path(self.config.hydra.sweep.dir).absolute()
+        comparison = self._comparison(folder)  # refused before the jobs, not after
         jobs = place(self._composed(told), folder)
         left = [job for job in jobs if self.redo or not finished(job)]
         say(f"sweep: {len(jobs)} jobs in {folder}")
@@ -81,7 +81,7 @@ class Grid(Sweeper):
             OmegaConf.save(self.config, folder / "multirun.yaml")
             with terminating(), parent_run(folder, jobs, told, afresh=self.redo):
                 self._run(left)
-        self._conclude(jobs)
+        self._conclude(jobs, comparison)
 
     def _composed(self, told: list[str]) -> list[SweepJob]:
         """The jobs of the sweep, composed and without duplicates, not yet placed."""
@@ -95,15 +95,22 @@ class Grid(Sweeper):
             made.setdefault(job.configuration, job)
         return list(made.values())
 
-    def _conclude(self, jobs: Sequence[SweepJob]) -> None:
+    def _comparison(self, folder: Path) -> Any:
+        """The task that compares the variants at the end; None where it is not wanted."""
+        if self.comparison is None:
+            return None
+        return build("task", {"name": "compare", "sweep": str(folder), **self.comparison})
+
+    def _conclude(self, jobs: Sequence[SweepJob], comparison: Any) -> None:
         """Compare the variants, where there is something to compare, and say which jobs failed."""
-        if self.comparison is None or not comparable(jobs):
+        if comparison is None or not comparable(jobs):
             ended(jobs)
         else:
             folder = jobs[0].folder.parent
-            page = after_sweep(Job(jobs[0].config, jobs[0].choices, folder), self.comparison)
+            say()
+            comparison.run(Job(jobs[0].config, jobs[0].choices, folder))
             if self.open:
-                show(page)
+                show(folder / "comparison.html")
         if failed := failures(jobs):
             raise UserError(failed)
 
@@ -204,8 +211,10 @@ def comparable(jobs: Sequence[SweepJob]) -> bool:
     """Whether a sweep holds several variants under several seeds, of which more than one job has ended well."""
     common = shared(jobs)
     variants = {job.variant(common) for job in jobs}
-    ended = sum(status.search_objective(job.folder) is not None for job in jobs)
-    return len(variants) > 1 and len({job.config["seed"] for job in jobs}) > 1 and ended > 1
+    if len(variants) < 2 or len({job.config["seed"] for job in jobs}) < 2:
+        return False
+    ended = (job for job in jobs if status.search_objective(job.folder) is not None)
+    return len(list(itertools.islice(ended, 2))) > 1
 
 
 def show(page: Path) -> None:

@@ -1,12 +1,11 @@
 """Compare the runs of a sweep, or of any filter over MLflow."""
 
 import shutil
-from collections.abc import Mapping
 from dataclasses import field
 from pathlib import Path
 from typing import Any
 
-from tractexp.plugin import build, plugin
+from tractexp.plugin import plugin
 from tractexp.tasks.console import listed, say, table
 from tractexp.tasks.task import Job, Task, call
 
@@ -40,32 +39,15 @@ class Compare(Task):
         from tractexp.api.compare import compare
 
         node = job.config["tracking"]
-        made = call(compare, self.sweep, uri=node["uri"], experiment=node["experiment"], **self.settings())
+        told = ("filter", "data", "targets", "ties", "floor", "reference", "apart", "bbob", "cores")
+        settings = {key: getattr(self, key) for key in told}
+        made = call(compare, self.sweep, uri=node["uri"], experiment=node["experiment"], **settings)
         report(made)
         paths = made.write(job.folder)
-        if made.folder is not None:
+        if made.folder not in (None, job.folder):
             paths = [Path(shutil.copy2(path, made.folder / path.name)) for path in paths] + paths
         listed(paths)
         track(job, made, paths[-2:])
-
-    def settings(self) -> dict[str, Any]:
-        """The settings as arguments of the call, but for where the runs come from."""
-        told = ("filter", "data", "targets", "ties", "floor", "reference", "apart", "bbob", "cores")
-        return {key: getattr(self, key) for key in told}
-
-
-def after_sweep(job: Job, settings: Mapping[str, Any]) -> Path:
-    """Compare the variants of the sweep in the job's folder, with these settings of task=compare; the page's path."""
-    from tractexp.api.compare import compare
-
-    task = build("task", {"name": Compare.name, **settings})
-    made = call(compare, job.folder, **task.settings())
-    say()
-    report(made)
-    paths = made.write(job.folder)
-    listed(paths)
-    track(job, made, paths)
-    return paths[0]
 
 
 def report(made: Any) -> None:
@@ -126,7 +108,7 @@ def track(job: Job, made: Any, paths: list[Path]) -> None:
     from tractexp.tracking.attach import attach
 
     parent = parent_of(made.folder) if made.folder is not None else None
-    comparisons = getattr(made.comparison, "comparisons", {"": made.comparison})
+    comparisons = made.comparisons
     known = {run.data for c in comparisons.values() for variant in c.gathered.variants for run in variant.runs}
     data = known.pop() if len(known) == 1 else f"{len(known)} records"
     if parent is not None and attach(parent, job.store, paths):
