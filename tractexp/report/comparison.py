@@ -19,6 +19,8 @@ from tractexp.report.chart import Chart
 from tractexp.report.page import Page
 
 AT_END = "at the end of the search"
+COMPANY = "With most other switches on against with fewest: the factor by which the effect changes."
+INTERACTIONS = "Interactions: the factor by which one switch's effect changes when the other is on."
 QUOTED = 12  # more sentences than these about pairs are folded away
 
 
@@ -186,8 +188,8 @@ def switches(page: Page, ablation: Ablation) -> None:
     columns = ["switched on", "factor", "from", "to", "seeds", "shown", "contrasts"]
     groups = (
         (ablation.effects, "Main effects: the factor by which the objective is multiplied; below 1 it is lowered."),
-        (ablation.company, "With most other switches on against with fewest: the factor by which the effect changes."),
-        (ablation.interactions, "Interactions: the factor by which one switch's effect changes when the other is on."),
+        (ablation.company, COMPANY),
+        (ablation.interactions, INTERACTIONS),
     )
     for effects, caption in groups:
         rows = [

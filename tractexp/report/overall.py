@@ -46,13 +46,11 @@ def _overall(page: Page, overall: Overall) -> None:
     page.heading(f"{overall.terms}: {overall.where}" if overall.terms else overall.where)
     if overall.ablation:
         page.text(claims.of_switches(overall))
+        what, over = ("distance to the optimum", " over functions") if overall.share else ("objective", "")
         page.chart(
             effects(overall),
-            "The factor by which switching an ingredient on multiplies the objective, with 95 % bootstrap intervals:"
-            " left of 1 it helps."
-            if not overall.share
-            else "The factor by which switching an ingredient on multiplies the distance to the optimum, with 95 %"
-            " bootstrap intervals over functions: left of 1 it helps.",
+            f"The factor by which switching an ingredient on multiplies the {what}, with 95 % bootstrap"
+            f" intervals{over}: left of 1 it helps.",
         )
         _effects(page, overall, overall.ablation)
     if overall.ranks:
@@ -115,20 +113,12 @@ def _effects(page: Page, overall: Overall, ablation: Ablation) -> None:
         " ends lower; 50 % is no difference. 95 % bootstrap intervals."
         + (" Simulations per iteration: what switching on adds to the cost." if cost else ""),
     )  # fmt: skip
-    more = [*ablation.interactions, *ablation.company]
-    if not more:
+    if not (ablation.interactions or ablation.company):
         return
     with page.folded("interactions of pairs of ingredients"):
-        page.table(
-            ["switched on", "factor", "from", "to", "shown"],
-            [[*_factor(effect), "yes" if effect.shown else "no"] for effect in ablation.interactions],
-            "The factor by which one switch's effect changes when the other is on.",
-        )
-        page.table(
-            ["switched on", "factor", "from", "to", "shown"],
-            [[*_factor(effect), "yes" if effect.shown else "no"] for effect in ablation.company],
-            "With most other switches on against with fewest: the factor by which the effect changes.",
-        )
+        for changes, caption in ((ablation.interactions, one.INTERACTIONS), (ablation.company, one.COMPANY)):
+            told = [[*_factor(effect), "yes" if effect.shown else "no"] for effect in changes]
+            page.table(["switched on", "factor", "from", "to", "shown"], told, caption)
 
 
 def _factor(effect: Effect) -> list[str]:
