@@ -7,7 +7,7 @@ from tractexp.errors import UserError
 from tractexp.plugin import build
 from tractexp.record import detect, find_dips
 from tractexp.record.phasor import measure
-from tractexp.record.recording import Recording
+from tractexp.recording import comtrade
 
 KILOVOLT, KILOAMPERE, LAG = 110 / np.sqrt(3), 0.2, np.deg2rad(30)
 S0 = 3 * KILOVOLT * KILOAMPERE * np.exp(1j * LAG)  # MVA
@@ -303,7 +303,7 @@ class TestRealRecordings:
         assert first.base.voltage == pytest.approx(230, abs=1)
 
     def test_negative_sequence_current_reaches_nine_tenths(self, shared_data):
-        recording = Recording.load(shared_data / "dfr220kv-shandong" / "xtz.cfg")
+        recording = comtrade.load(shared_data / "dfr220kv-shandong" / "xtz.cfg")
         segment = recording.waveforms()[0]
         chosen = [("voltages", i) for i in (4, 5, 6)] + [("currents", i) for i in (8, 9, 10)]
         made = measure(np.array([recording.primary(*each, segment) for each in chosen]), segment.rate, 50.0)
@@ -315,7 +315,7 @@ class TestRealRecordings:
         ("currents", "P66", "exponent"), [([15, 16, 17], 4.87, 1.94), ([19, 20, 21], 5.90, 1.89)], ids=["VL2", "VL3"]
     )
     def test_feeders_of_the_110_kv_pole_slip_are_static_loads(self, shared_data, currents, P66, exponent):
-        recording = Recording.load(shared_data / "async110kv-wisp" / "async110.cfg")
+        recording = comtrade.load(shared_data / "async110kv-wisp" / "async110.cfg")
         [segment] = recording.waveforms()
         chosen = [("voltages", i) for i in (0, 1, 2)] + [("currents", i) for i in currents]
         made = measure(np.array([recording.primary(*each, segment) for each in chosen]), segment.rate, 50.0)
@@ -337,7 +337,7 @@ class TestRealRecordings:
         assert "the record is shorter than the dip" in refused[-1]  # and ends within one
 
     def test_low_voltage_feeder_at_60_hz_and_30_khz(self, shared_data):
-        recording = Recording.load(shared_data / "keating-lv" / "keating_1999.cfg")
+        recording = comtrade.load(shared_data / "keating-lv" / "keating_1999.cfg")
         [segment] = recording.waveforms()
         assert (segment.stop, recording.frequency) == (2048, 60.0)
         chosen = [("voltages", i) for i in (4, 5, 6)] + [("currents", i) for i in (0, 1, 2)]

@@ -1,6 +1,7 @@
 """Phasors from sampled waveforms: one-cycle windows at the frequency really present, and what follows from them."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -53,17 +54,18 @@ def turning(angle: np.ndarray, rate: float) -> np.ndarray:
 
 
 def track(voltages: np.ndarray, rate: float, nominal: float, cycles: float = 4.0) -> np.ndarray:
-    """Frequency (N,) [Hz] of three phase voltages (3, N), smoothed over `cycles`, within 10 % of `nominal`.
+    """Frequency (N,) [Hz] of phase voltages (K, N), three or one, smoothed over `cycles`, within 10 % of `nominal`.
 
-    The mean speed of the positive-sequence voltage over the span about each sample. Three passes, each with the
-    frequency found by the one before, remove what the unknown frequency did to the phasors themselves.
+    The mean speed of the positive-sequence voltage (of the one there is) over the span about each sample. Three passes,
+    each with the frequency found by the one before, remove what the unknown frequency did to the phasors themselves.
     """
     n = voltages.shape[-1]
     f = np.full(n, nominal)
     half = int(cycles * rate / nominal / 2)
     for _ in range(3):
         inside, phasors = fundamental(voltages, rate, f)
-        angle = np.unwrap(np.angle(sequences(phasors)[0])) + frame(f, rate)[inside]
+        V1 = sequences(phasors)[0] if len(phasors) == 3 else phasors[0]
+        angle = np.unwrap(np.angle(V1)) + frame(f, rate)[inside]
         k = np.arange(len(angle))
         early, late = np.maximum(k - half, 0), np.minimum(k + half, len(angle) - 1)
         speed = (angle[late] - angle[early]) * rate / (late - early) / (2 * np.pi)
@@ -73,19 +75,47 @@ def track(voltages: np.ndarray, rate: float, nominal: float, cycles: float = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Phasors:
-    """Sequence phasors of one load at uniform times, arrays (M,)."""
+    """RMS phasors of one load at uniform times: of its three phases (K = 3) or of the only one (K = 1)."""
 
-    t: np.ndarray  # s
-    V1: np.ndarray  # kV, phase to ground, RMS, complex
-    V2: np.ndarray  # kV
-    I1: np.ndarray  # kA
-    I2: np.ndarray  # kA
-    f: np.ndarray  # Hz, at which V1 turns
+    t: np.ndarray  # (M,) s
+    V: np.ndarray  # (K, M) kV, phase to ground; of a single-phase load the voltage it is fed with
+    I: np.ndarray  # (K, M) kA, into the load
+    f: np.ndarray  # (M,) Hz, at which the (positive-sequence) voltage turns
+
+    @property
+    def V1(self) -> np.ndarray:
+        """Positive-sequence voltage (M,) [kV]; of a single-phase load its voltage."""
+        return sequences(self.V)[0] if len(self.V) == 3 else self.V[0]
+
+    @property
+    def V2(self) -> np.ndarray:
+        """Negative-sequence voltage (M,) [kV]; zero for a single-phase load."""
+        return sequences(self.V)[1] if len(self.V) == 3 else np.zeros_like(self.V[0])
+
+    @property
+    def I1(self) -> np.ndarray:
+        """Positive-sequence current (M,) [kA]; of a single-phase load its current."""
+        return sequences(self.I)[0] if len(self.I) == 3 else self.I[0]
+
+    @property
+    def I2(self) -> np.ndarray:
+        """Negative-sequence current (M,) [kA]; zero for a single-phase load."""
+        return sequences(self.I)[1] if len(self.I) == 3 else np.zeros_like(self.I[0])
 
     @property
     def S(self) -> np.ndarray:
-        """Positive-sequence power P + jQ [MVA], (M,) complex."""
-        return 3 * self.V1 * self.I1.conj()
+        """Power P + jQ [MVA], (M,) complex: of the positive sequence, 3 V1 I1*; of a single-phase load V I*."""
+        return len(self.V) * self.V1 * self.I1.conj()
+
+    @property
+    def U(self) -> np.ndarray:
+        """Voltage (M,) [kV] as records have it: line to line; of a single-phase load its own."""
+        return np.sqrt(len(self.V)) * np.abs(self.V1)
+
+    @property
+    def U2(self) -> np.ndarray:
+        """Negative-sequence voltage (M,) [kV], line to line."""
+        return np.sqrt(len(self.V)) * np.abs(self.V2)
 
 
 def measure(
@@ -95,23 +125,25 @@ def measure(
     start: float = 0.0,
     step: float = 1e-3,
     skew: np.ndarray | None = None,
+    phasors: Callable[..., tuple[slice, np.ndarray]] = fundamental,
 ) -> Phasors:
-    """Phasors of three voltages [kV] and three currents [kA], `waves` (6, N) sampled at `rate` from `start` [s].
+    """Phasors of voltages [kV] and as many currents [kA], `waves` (2 K, N) sampled at `rate` from `start` [s].
 
-    About one phasor every `step` seconds: the nearest whole number of samples. `skew` (6,) [s] is how much later
-    than the time stamp each channel is sampled. N must span two cycles at least; raises `UserError` otherwise.
+    About one phasor every `step` seconds: the nearest whole number of samples. `skew` (2 K,) [s] is how much later
+    than the time stamp each channel is sampled. `phasors` estimates, with the arguments of `fundamental`. N must span
+    two cycles at least; raises `UserError` otherwise.
     """
     if waves.shape[-1] < 2 * rate / (0.9 * nominal) + 4:
         raise UserError(
             f"{waves.shape[-1]} samples at {rate:g} Hz are too short: phasors need over two cycles of {nominal:g} Hz"
         )
-    tracked = track(waves[:3], rate, nominal)
-    inside, X = fundamental(waves, rate, tracked)
+    K = len(waves) // 2
+    tracked = track(waves[:K], rate, nominal)
+    inside, X = phasors(waves, rate, tracked)
     if skew is not None:
         X = X * np.exp(-2j * np.pi * tracked[inside] * skew[:, None])
     every = max(1, round(step * rate))
     X, f = X[:, ::every], tracked[inside][::every]
-    V1, V2 = sequences(X[:3])
-    I1, I2 = sequences(X[3:])
     t = start + np.arange(waves.shape[-1])[inside][::every] / rate
-    return Phasors(t, V1, V2, I1, I2, f + turning(np.angle(V1), rate / every))
+    made = Phasors(t, X[:K], X[K:], f)
+    return replace(made, f=f + turning(np.angle(made.V1), rate / every))

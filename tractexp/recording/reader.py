@@ -1,0 +1,198 @@
+"""Readers of waveform files: from channels to the dips of one load, numbered in order of time."""
+
+from abc import abstractmethod
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tractexp.errors import UserError, check_range
+from tractexp.plugin import build
+from tractexp.record import Base, Events, Reader, Record, detect, find_dips
+from tractexp.record.event import FEWEST_BEFORE, STEADY
+from tractexp.record.phasor import Phasors, measure
+from tractexp.recording.feeder import Feeder
+from tractexp.recording.recording import Recording, Segment
+
+
+COUNT = {1: "one", 2: "two", 3: "three"}
+
+
+@dataclass(frozen=True, eq=False)
+class Dip:
+    """One dip of the file: samples start to end of the phasors it was found in, with room from `first` to `stop`."""
+
+    phasors: Phasors
+    first: int  # the end of the dip before, or the segment's first sample
+    start: int
+    end: int
+    stop: int  # the start of the next dip, or the segment's end
+
+
+@dataclass(frozen=True, kw_only=True)
+class WaveformReader(Reader):
+    """Base of the readers of waveform files. A plugin reads the file; which load, which dips, is common to all."""
+
+    path: str = ""  # the file
+    voltages: list[Any] = field(default_factory=list)  # channels in the order a, b, c: numbers from 0, or names
+    currents: list[Any] = field(default_factory=list)  # channels, counted positive into the load
+    connection: str = "three_phase"  # how the channels are connected
+    estimator: str = "one_cycle"  # of the phasors
+    train: list[int] | None = None  # dips to fit; null: the first that can be used
+    validate: list[int] | None = None  # dips held out; null: every other one that can be used
+    pre: float = 1.0  # s kept before a dip starts, at most
+    post: float = 10.0  # s kept after a dip starts, at most
+    reverse_current: bool = False  # true where the recorder counts current out of the load as positive
+    skew: bool = False  # true: correct the time skew of each channel given in the file
+
+    @abstractmethod
+    def recording(self) -> Recording:
+        """The file as it was recorded, all channels; raises `UserError` naming the file, the place and the value."""
+
+    def check(self) -> None:
+        if not self.path:
+            raise UserError(f"data.path is missing: give the file, e.g. data.path=station{self.endings[0]}")
+        if self.train is not None and not self.train:
+            raise UserError("data.train is empty: name at least one dip by its number, e.g. data.train=[1]")
+        given = [*(self.train or []), *(self.validate or [])]
+        for number in given:
+            if given.count(number) > 1:
+                raise UserError(f"data.train and data.validate name dip {number} twice; a dip may serve only once")
+        check_range("data.pre", self.pre, 0.05)
+        check_range("data.post", self.post, 0.1)
+
+    def read(self) -> Events:
+        recording = self.recording()
+        feeder = self._feeder(recording)
+        streams = self._streams(recording, feeder)
+        dips = [dip for phasors in streams for dip in _dips(phasors)]
+        if not dips:
+            spans = ", ".join(f"{s.t[0]:.3f} to {s.t[-1]:.3f} s" for s in streams)
+            raise UserError(f"{self.path}: no dip found in the waveforms ({spans}): the voltage never falls by 3 %")
+        base = self._base(dips, recording.frequency)
+        tried = {number: self._record(number, dip, base) for number, dip in enumerate(dips, 1)}
+        usable = [number for number, made in tried.items() if isinstance(made, Record)]
+        fitted = self.train or usable[:1] or [1]
+        first, *rest = [self._pick(number, tried) for number in fitted]
+        notes = self._notes(recording, feeder, dips)  # of the whole file: said once, on the first record
+        if self.validate is not None:
+            held = [self._pick(number, tried) for number in self.validate]
+            return Events([replace(first, notes=notes), *rest], held)
+        others = [made for number, made in tried.items() if number not in fitted]
+        notes += tuple(f"not used for validation: {made}" for made in others if isinstance(made, UserError))
+        return Events([replace(first, notes=notes), *rest], [made for made in others if isinstance(made, Record)])
+
+    def _pick(self, number: int, tried: dict[int, Record | UserError]) -> Record:
+        """Dip `number`; raises `UserError` naming the dips that can be used where this one cannot."""
+        usable = ", ".join(f"{n} at {r.t[0]:.3f} to {r.t[-1]:.3f} s" for n, r in tried.items() if isinstance(r, Record))
+        made = tried.get(number, UserError(f"{self.path}: there is no dip {number}; {len(tried)} are found"))
+        if isinstance(made, UserError):
+            raise UserError(f"{made}; dips that can be used: {usable or 'none'}")
+        return made
+
+    def _feeder(self, recording: Recording) -> Feeder:
+        """The channels asked for."""
+        connection = build("connection", {"name": self.connection})
+        made = {}
+        for key, wanted in (("voltages", connection.voltages), ("currents", connection.currents)):
+            chosen = getattr(self, key)
+            if len(chosen) != wanted:
+                raise UserError(
+                    f"data.{key}={[*chosen]} must name {COUNT[wanted]} channels; {recording.source} has "
+                    + ", ".join(f"{i} '{c.name}' [{c.unit}]" for i, c in enumerate(recording.channels))
+                )
+            made[key] = tuple(recording.number(each, f"data.{key}") for each in chosen)
+            if len(set(made[key])) < wanted:
+                raise UserError(f"data.{key}={[*chosen]} names a channel twice; {wanted} different ones are needed")
+            for i in made[key]:
+                if recording.channels[i].quantity not in (key.removesuffix("s"), ""):
+                    raise UserError(
+                        f"data.{key}: channel {i} '{recording.channels[i].name}' of {recording.source} is in "
+                        f"{recording.channels[i].unit}; choose {key}"
+                    )
+        return Feeder(**made, connection=self.connection, reverse_current=self.reverse_current)
+
+    def _streams(self, recording: Recording, feeder: Feeder) -> list[Phasors]:
+        """The phasors of each segment that holds waveforms."""
+        return [self.phasors(recording, feeder, segment) for segment in recording.waveforms()]
+
+    def phasors(self, recording: Recording, feeder: Feeder, segment: Segment) -> Phasors:
+        """The phasors of a feeder within one segment; raises `UserError` for one that is too short."""
+        connection = build("connection", {"name": feeder.connection})
+        estimator = build("estimator", {"name": self.estimator})
+        V = connection.voltage() @ recording.matrix(feeder.voltages, segment)
+        I = connection.current() @ recording.matrix(feeder.currents, segment) * (-1 if feeder.reverse_current else 1)
+        skew = np.array([recording.channels[i].skew for i in (*feeder.voltages, *feeder.currents)])
+        try:
+            return measure(
+                np.concatenate([V, I]), segment.rate, recording.frequency, segment.start,
+                skew=skew if self.skew else None, phasors=estimator.phasors,
+            )  # fmt: skip
+        except UserError as error:
+            raise UserError(f"{self.path}: segment from {segment.start:.3f} s: {error}") from error
+
+    def _base(self, dips: list[Dip], frequency: float) -> Base:
+        """Voltage and apparent power before the first dip that has a steady state before it."""
+        dip = next((d for d in dips if d.start - d.first >= FEWEST_BEFORE), None)
+        if dip is None:
+            raise UserError(
+                f"{self.path}: none of the {len(dips)} dips has {FEWEST_BEFORE} phasors before it, which the steady "
+                "state needs; give a record with a longer pre-fault time"
+            )
+        before = dip.phasors.t[dip.start] - STEADY <= dip.phasors.t
+        before[: dip.first] = before[dip.start :] = False
+        U = float(dip.phasors.U[before].mean())
+        S = float(np.abs(dip.phasors.S[before].mean()))
+        if S < 1e-6:
+            raise UserError(f"{self.path}: data.currents carry no power before the first dip ({1e6 * S:.2g} VA)")
+        return Base(U, S, frequency)
+
+    def _record(self, number: int, dip: Dip, base: Base) -> Record | UserError:
+        """The record of a dip, or why it cannot be used."""
+        t = dip.phasors.t
+        window = slice(
+            max(dip.first, int(np.searchsorted(t, t[dip.start] - self.pre))),
+            min(dip.stop, int(np.searchsorted(t, t[dip.start] + self.post))),
+        )
+        S = dip.phasors.S[window] / base.power
+        record = Record(
+            name=f"{Path(self.path).stem}_dip{number}",
+            t=t[window],
+            U=dip.phasors.U[window] / base.voltage,
+            P=S.real,
+            Q=S.imag,
+            f=dip.phasors.f[window],
+            U2=dip.phasors.U2[window] / base.voltage,
+            base=base,
+            source=f"{self.path} dip {number}",
+        )
+        try:
+            detect(record.check())
+        except UserError as error:
+            return error
+        return record
+
+    def _notes(self, recording: Recording, feeder: Feeder, dips: list[Dip]) -> tuple[str, ...]:
+        step = dips[0].phasors.t[1] - dips[0].phasors.t[0]
+        notes = [*recording.notes, *feeder.why]
+        notes.append(f"one-cycle phasors every {1000 * step:.3g} ms, {len(dips)} dips found")
+        fast = recording.waveforms()
+        slow = [s for s in recording.segments if s not in fast]
+        if slow:
+            spans = ", ".join(f"{s.rate:g} Hz from {s.start:.3f} s" for s in slow)
+            notes.append(f"segments without waveform left out: {spans}")
+        chosen = [recording.channels[i] for i in (*feeder.voltages, *feeder.currents)]
+        if unknown := [channel for channel in chosen if not channel.quantity]:
+            notes.append(f"unit '{unknown[0].unit}' of channel '{unknown[0].name}' taken as V or A")
+        skew = max(abs(channel.skew) for channel in chosen)
+        if skew > 0 and not self.skew:
+            notes.append(f"time skew of up to {1e6 * skew:.3g} microseconds not corrected (data.skew=true does)")
+        return tuple(notes)
+
+
+def _dips(phasors: Phasors) -> list[Dip]:
+    found = find_dips(phasors.t, np.abs(phasors.V1))
+    firsts = [0, *(end for _, end in found)]
+    stops = [*(start for start, _ in found[1:]), len(phasors.t)]
+    return [Dip(phasors, first, *dip, stop) for first, dip, stop in zip(firsts, found, stops, strict=False)]

@@ -1,0 +1,143 @@
+"""A file as its instrument recorded it: channels, sampling rates, times; primary values on demand.
+
+Readers of files make a `Recording` and nothing else; which channels make up a load, and what happened to it, is told
+from it (`feeder`, `happening`), whatever the format was.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+
+from tractexp.errors import UserError, nearest
+
+# {unit as files write it, in lower case: (quantity, factor to the unit used inside: kV, kA, MW, Mvar, Hz, rad)}
+UNITS: Mapping[str, tuple[str, float]] = {
+    "v": ("voltage", 1e-3), "volt": ("voltage", 1e-3), "volts": ("voltage", 1e-3), "kv": ("voltage", 1.0),
+    "mv": ("voltage", 1e-6), "a": ("current", 1e-3), "amp": ("current", 1e-3), "amps": ("current", 1e-3),
+    "ampere": ("current", 1e-3), "amperes": ("current", 1e-3), "ka": ("current", 1.0), "ma": ("current", 1e-6),
+}  # fmt: skip
+FEWEST_PER_CYCLE = 10  # samples: a slower segment holds no waveform but magnitudes
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Samples of one rate: numbers from `first` up to but not including `stop`, from `start` [s] on."""
+
+    first: int
+    stop: int
+    rate: float  # Hz
+    start: float  # s since the file's first sample
+
+    @property
+    def t(self) -> np.ndarray:
+        """Times of the samples (M,) [s]."""
+        return self.start + np.arange(self.stop - self.first) / self.rate
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One measured quantity: value = (gain raw + offset) in `unit`, times `ratio` on the primary side.
+
+    `raw` (N,) is as the file stores it, a view where possible: ten minutes of waveforms are held once, as integers.
+    """
+
+    name: str
+    raw: np.ndarray
+    unit: str = ""  # as the file writes it
+    quantity: str = ""  # voltage, current, power, reactive_power, frequency, angle; "" for anything else
+    phase: str = ""  # as the file labels it: A, L1, AB, N, ...
+    circuit: str = ""  # what it is measured on, as the file says
+    gain: float = 1.0
+    offset: float = 0.0
+    ratio: float = 1.0  # primary over what is recorded; 1 where primary values are recorded
+    skew: float = 0.0  # s that a sample is taken later than its time stamp
+    limits: tuple[float, float] | None = None  # least and greatest raw value of the converter
+    missing: float | None = None  # the raw value that stands for none; nan always does
+    form: str = "waveform"  # or magnitude (RMS), peak, angle, value: samples that are no waveform
+
+    def values(self, first: int = 0, stop: int | None = None) -> np.ndarray:
+        """Primary values (M,) in kV, kA, MW, Mvar, Hz or rad (another quantity in its own unit); nan where missing."""
+        raw = self.raw[first:stop]
+        made = np.asarray(raw, dtype=np.float64) * self.gain + self.offset
+        made *= self.ratio * self.factor
+        if self.missing is not None:
+            made[raw == self.missing] = np.nan
+        return made
+
+    @property
+    def factor(self) -> float:
+        """From the file's unit to the one used inside."""
+        quantity, factor = UNITS.get(self.unit.strip().lower(), ("", 1.0))
+        return factor if quantity else 1e-3 if self.quantity in ("voltage", "current") else 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Status:
+    """One binary channel: contacts, trips, breaker positions. `raw` (N,) is 0 or 1."""
+
+    name: str
+    raw: np.ndarray
+    phase: str = ""
+    circuit: str = ""
+    normal: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What one file holds. Channels have equal lengths; each segment of them is sampled uniformly."""
+
+    source: str  # the path, as messages name it
+    channels: Sequence[Channel]
+    segments: Sequence[Segment]
+    frequency: float = 50.0  # Hz, nominal, as the file declares it
+    station: str = ""
+    device: str = ""
+    start: datetime | None = None  # of the first sample
+    trigger: float | None = None  # s since the first sample
+    status: Sequence[Status] = ()
+    notes: Sequence[str] = ()  # what was mended while reading, with the line
+    extra: Mapping[str, Any] = field(default_factory=dict)  # what the format has besides, for a round trip
+
+    @property
+    def samples(self) -> int:
+        return len(self.channels[0].raw)
+
+    def waveforms(self) -> list[Segment]:
+        """The segments sampled fast enough to hold a waveform; raises `UserError` when there is none."""
+        fast = [s for s in self.segments if s.rate >= FEWEST_PER_CYCLE * self.frequency]
+        if not fast:
+            rates = ", ".join(f"{s.rate:g} Hz" for s in self.segments)
+            raise UserError(
+                f"{self.source}: sampled at {rates}: no waveform, for which {FEWEST_PER_CYCLE} samples per cycle of "
+                f"{self.frequency:g} Hz are needed"
+            )
+        return fast
+
+    def number(self, each: Any, where: str) -> int:
+        """A channel's number, from 0, from its number or name; `where` is the setting in messages."""
+        names = [channel.name.strip() for channel in self.channels]
+        if isinstance(each, int) and not isinstance(each, bool):
+            if not 0 <= each < len(names):
+                raise UserError(
+                    f"{where}: there is no channel {each} in {self.source}, which has {len(names)}, counted from 0"
+                )
+            return each
+        if str(each) not in names:
+            raise UserError(f"{where}: {self.source} has no analog channel '{each}'{nearest(str(each), names)}")
+        if names.count(str(each)) > 1:
+            raise UserError(f"{where}: {self.source} has several channels '{each}'; give the number, from 0")
+        return names.index(str(each))
+
+    def matrix(self, numbers: Sequence[int], segment: Segment) -> np.ndarray:
+        """Primary values (K, M) of channels within a segment; raises `UserError` where one is missing."""
+        made = np.empty((len(numbers), segment.stop - segment.first))
+        for row, number in zip(made, numbers, strict=True):
+            row[:] = self.channels[number].values(segment.first, segment.stop)
+            if not np.isfinite(row).all():
+                i = segment.first + int(np.argmin(np.isfinite(row)))
+                name = self.channels[number].name
+                raise UserError(f"{self.source}: channel {number} '{name}' has no value at sample {i + 1}")
+        return made
