@@ -15,7 +15,6 @@ from tractexp.record.phasor import Phasors, measure
 from tractexp.recording.feeder import Feeder
 from tractexp.recording.recording import Recording, Segment
 
-
 COUNT = {1: "one", 2: "two", 3: "three"}
 
 
