@@ -11,10 +11,10 @@ from tractexp.errors import UserError, check_range
 from tractexp.plugin import build
 from tractexp.record import Base, Events, Reader, Record, detect, find_dips
 from tractexp.record.event import FEWEST_BEFORE, STEADY
-from tractexp.record.phasor import Phasors, measure
+from tractexp.record.phasor import Phasors
 from tractexp.recording.feeder import Feeder
-from tractexp.recording.recording import Recording, Segment
-
+from tractexp.recording.measure import phasors_of
+from tractexp.recording.recording import Recording
 
 COUNT = {1: "one", 2: "two", 3: "three"}
 
@@ -115,22 +115,7 @@ class WaveformReader(Reader):
 
     def _streams(self, recording: Recording, feeder: Feeder) -> list[Phasors]:
         """The phasors of each segment that holds waveforms."""
-        return [self.phasors(recording, feeder, segment) for segment in recording.waveforms()]
-
-    def phasors(self, recording: Recording, feeder: Feeder, segment: Segment) -> Phasors:
-        """The phasors of a feeder within one segment; raises `UserError` for one that is too short."""
-        connection = build("connection", {"name": feeder.connection})
-        estimator = build("estimator", {"name": self.estimator})
-        V = connection.voltage() @ recording.matrix(feeder.voltages, segment)
-        I = connection.current() @ recording.matrix(feeder.currents, segment) * (-1 if feeder.reverse_current else 1)
-        skew = np.array([recording.channels[i].skew for i in (*feeder.voltages, *feeder.currents)])
-        try:
-            return measure(
-                np.concatenate([V, I]), segment.rate, recording.frequency, segment.start,
-                skew=skew if self.skew else None, phasors=estimator.phasors,
-            )  # fmt: skip
-        except UserError as error:
-            raise UserError(f"{self.path}: segment from {segment.start:.3f} s: {error}") from error
+        return [phasors_of(recording, feeder, segment, self.estimator, self.skew) for segment in recording.waveforms()]
 
     def _base(self, dips: list[Dip], frequency: float) -> Base:
         """Voltage and apparent power before the first dip that has a steady state before it."""
