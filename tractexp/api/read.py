@@ -1,6 +1,6 @@
 """Events from files, frames and arrays, with their dips found."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
@@ -106,9 +106,22 @@ def table(columns: Mapping[str, Any], name: str, settings: Mapping[str, Any]) ->
 
 def _array(values: Any, where: str) -> np.ndarray:
     try:
-        return np.array(values, dtype=float).reshape(len(values))
+        made = np.array(values, dtype=float)
     except (TypeError, ValueError) as error:
-        raise UserError(f"{where} is no column of numbers: {error}") from error
+        raise UserError(f"{where} holds {_odd(values)}, which is no number; give numbers, nan for a gap") from error
+    if made.ndim != 1:
+        raise UserError(f"{where} has shape {made.shape}; one number per sample, (N,), is needed")
+    return made
+
+
+def _odd(values: Any) -> str:
+    """The first value that is no number, and where it stands."""
+    for k, value in enumerate(values if isinstance(values, Iterable) else [values]):
+        try:
+            float(value)
+        except (TypeError, ValueError):
+            return f"{value!r:.40} at sample {k + 1}"
+    return f"a {type(values).__name__}"
 
 
 def _records(source: Any, settings: Mapping[str, Any]) -> Iterator[Record]:
