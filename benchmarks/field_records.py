@@ -149,7 +149,6 @@ def main():
     print(
     refused = sum(bool(row["told"]) for row in rows)
     print(f"{len(rows)} files, {refused} refused, {failed} failed; {len(errors)} loads compared")
-    )
     if errors:
         worst = {key: max(one[key] for one in errors) for key in ("error_U", "error_S")}
         print(f"largest difference: U {worst['error_U']:.3%}, P + jQ {worst['error_S']:.3%} of |S|")
