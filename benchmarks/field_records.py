@@ -146,7 +146,6 @@ def main():
             print(f"    {one['feeder']}: {one.get('told') or numbers} {one.get('independent', '')}")
     errors = [one for row in rows for one in row["feeders"] if "error_U" in one]
     failed = sum("failed" in row for row in rows)
-    print(
     refused = sum(bool(row["told"]) for row in rows)
     print(f"{len(rows)} files, {refused} refused, {failed} failed; {len(errors)} loads compared")
     if errors:
