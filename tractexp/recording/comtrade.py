@@ -14,7 +14,6 @@ from tractexp.errors import UserError, nearest
 from tractexp.recording import timeline
 from tractexp.recording.comtrade_header import Analog, Digital, Header, parse
 from tractexp.recording.comtrade_samples import NONE, Place, Samples, read
-from tractexp.recording.comtrade_writer import even_stamps
 from tractexp.recording.comtrade_writer import write as write
 from tractexp.recording.recording import UNITS, Channel, Recording, Status
 from tractexp.recording.remarks import Remarks
@@ -202,9 +201,7 @@ def _extra(header: Header, samples: Samples, stretches: list[Stretch]) -> dict[s
     count = len(samples.numbers)
     if not np.array_equal(samples.numbers, np.arange(1, count + 1)):
         made["numbers"] = samples.numbers
-    if header.rates[0][0] == 0 or not np.array_equal(
-        samples.stamps, even_stamps([s.segment for s in stretches], header.timemult)
-    ):
+    if header.rates[0][0] == 0 or samples.stamps[0] != samples.stamps[-1]:
         made["stamps"] = samples.stamps
     return made
 

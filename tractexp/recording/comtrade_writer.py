@@ -40,7 +40,7 @@ def write(recording: Recording, path: Path, kind: str = "BINARY", revision: int 
     return [files.write(path, text), files.write(dat, data)]
 
 
-def even_stamps(segments: Sequence[Segment], timemult: float) -> np.ndarray:
+def _even_stamps(segments: Sequence[Segment], timemult: float) -> np.ndarray:
     """The time stamps (N,) of segments that follow one another, in units of `timemult` microseconds."""
     return np.concatenate([np.round(s.t / (1e-6 * timemult)) for s in segments])
 
@@ -112,7 +112,7 @@ def _times(recording: Recording, kind: str) -> tuple[list[tuple[float, int]], np
         last = segments[-1].t[-1] if len(segments) else 0.0
         while not kept and last > 4.29e3 * timemult:  # a counter of 32 bits
             timemult *= 10
-        own = own if kept else even_stamps(segments, timemult)
+        own = own if kept else _even_stamps(segments, timemult)
     return [(s.rate, s.stop) for s in segments], np.asarray(own, float), timemult
 
 
