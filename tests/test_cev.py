@@ -11,6 +11,7 @@ from tractexp.recording import cev
 
 KILOVOLT, AMPERE, LAG, F, PER_CYCLE = 63.5, 200.0, np.deg2rad(30), 49.98, 32
 COLUMNS = ["IA", "IB", "IC", "IG", "VA(kV)", "VB(kV)", "VC(kV)", "*", "VDC", "FREQ"]
+HALF = 1 / np.sqrt(2)  # what SEL multiplies instantaneous values by
 BITS = "50P1 * 51P TRIP 52A RB1 RB2 RB3 RB4"
 
 
@@ -24,8 +25,8 @@ def names(*cells):
     return row(*(f'"{cell}"' for cell in cells))
 
 
-def waves(n, dip=(0.5, 0.7, 0.4), scale=1 / np.sqrt(2)):
-    """(N, 7) columns of instantaneous primary values over the root of two: three currents, their sum, three voltages."""
+def waves(n, dip=(0.5, 0.7, 0.4), scale=HALF):
+    """(N, 7) columns, instantaneous primary values times `scale`: three currents, their sum, three voltages."""
     t = np.arange(n) / (F * PER_CYCLE)
     turn = np.exp(1j * (2 * np.pi * F * t[:, None] - 2 * np.pi / 3 * np.arange(3)))
     depth = np.where((t >= dip[0]) & (t < dip[1]), 1 - dip[2], 1.0)[:, None]

@@ -139,7 +139,7 @@ def recordings(draw):
                 round(draw(st.floats(0, 1e3)), 6) * 1e-6,
                 limits,
                 missing,
-            )  # fmt: skip
+            )
         )
     states = [
         Status(draw(word) or "s", np.array(draw(st.lists(st.integers(0, 1), min_size=n, max_size=n))), normal=k % 2)
@@ -325,7 +325,8 @@ def test_rates_that_the_time_stamps_contradict_are_said(pair):
 
 
 def test_the_standard_of_1991(pair):
-    cfg = "Sub,dev\n2,1A,1D\n1,U,A,Bus,kV,0.01,0,0,-2048,2047\n1,trip,0\n60\n1\n4000,40\n02/29/92,1:2:3.5\n02/29/92,1:2:3.505\nASCII\n"
+    cfg = "Sub,dev\n2,1A,1D\n1,U,A,Bus,kV,0.01,0,0,-2048,2047\n1,trip,0\n60\n1\n4000,40\n"
+    cfg += "02/29/92,1:2:3.5\n02/29/92,1:2:3.505\nASCII\n"
     dat = "".join(f"{k + 1},{250 * k},{k},0\r\n" for k in range(40))
     made = comtrade.load(pair(cfg=cfg, dat=dat))
     assert (made.start, made.channels[0].ratio, made.notes) == (datetime(1992, 2, 29, 1, 2, 3, 500000), 1.0, ())
@@ -363,11 +364,11 @@ def test_either_file_of_the_pair_names_the_record(pair, tmp_path):
 
 def test_a_combined_file_without_a_section(tmp_path):
     (tmp_path / "a.cff").write_text("--- file type: CFG ---\n" + CFG)
-    with pytest.raises(UserError, match="no section DAT: a .cff has headings like '--- file type: DAT ---'"):
+    with pytest.raises(UserError, match=r"no section DAT: a \.cff has headings like '--- file type: DAT ---'"):
         comtrade.load(tmp_path / "a.cff")
     wrong = CFG.replace("\n50\n", "\nx\n")
     (tmp_path / "a.cff").write_text("--- file type: CFG ---\n" + wrong + "--- file type: DAT ASCII ---\n" + rows())
-    with pytest.raises(UserError, match="a.cff: line 12: nominal frequency 'x'"):  # of the file, not of the section
+    with pytest.raises(UserError, match=r"a\.cff: line 12: nominal frequency 'x'"):  # of the file, not of the section
         comtrade.load(tmp_path / "a.cff")
 
 
