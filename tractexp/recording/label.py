@@ -47,7 +47,7 @@ def residual(channel: Channel) -> bool:
 
 
 def kind(channel: Channel) -> str:
-    """voltage or current, by unit, else by the letter that starts a word of the name; "" for what is no wave of them."""
+    """voltage or current, by unit, else by the letter that starts a word of its name; "" for what is no wave."""
     if NO_WAVE.search(plain(channel.name)):
         return ""
     if channel.quantity:
