@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +26,7 @@ class Feeder:
 
     voltages: tuple[int, ...]
     currents: tuple[int, ...]
-    connection: str = "three_phase"  # name of the plugin that makes phase quantities of them
+    connection: Any = "three_phase"  # the plugin that makes phase quantities of them: a name, or name and settings
     reverse_current: bool = False  # the recorder counts current out of the load as positive
     name: str = ""
     why: tuple[str, ...] = ()  # what it was recognised by, and what was changed in the order given, one sentence each

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from tractexp import plugin
 from tractexp.errors import UserError, check_range
-from tractexp.plugin import build
 from tractexp.record import Base, Events, Reader, Record, detect, find_dips
 from tractexp.record.event import FEWEST_BEFORE, STEADY
 from tractexp.record.phasor import Phasors
@@ -38,8 +38,9 @@ class WaveformReader(Reader):
     path: str = ""  # the file
     voltages: list[Any] = field(default_factory=list)  # channels in the order a, b, c: numbers from 0, or names
     currents: list[Any] = field(default_factory=list)  # channels, counted positive into the load
-    connection: str = "three_phase"  # how the channels are connected
-    estimator: str = "one_cycle"  # of the phasors
+    connection: Any = "three_phase"  # how the channels are connected: a name, or a mapping of name and settings
+    estimator: Any = "one_cycle"  # of the phasors: a name, or a mapping of name and settings
+    harmonics: list[int] = field(default_factory=list)  # whose powers P_h, with THD_u and THD_i, the record holds
     train: list[int] | None = None  # dips to fit; null: the first that can be used
     validate: list[int] | None = None  # dips held out; null: every other one that can be used
     pre: float = 1.0  # s kept before a dip starts, at most
@@ -73,10 +74,12 @@ class WaveformReader(Reader):
         notes = self._notes(recording, feeder, dips)  # of the whole file: said once, on the first record
         if self.validate is not None:
             held = [self._pick(number, tried) for number in self.validate]
-            return Events([replace(first, notes=notes), *rest], held)
+            return Events([replace(first, notes=(*first.notes, *notes)), *rest], held)
         others = [made for number, made in tried.items() if number not in fitted]
         notes += tuple(f"not used for validation: {made}" for made in others if isinstance(made, UserError))
-        return Events([replace(first, notes=notes), *rest], [made for made in others if isinstance(made, Record)])
+        return Events(
+            [replace(first, notes=(*first.notes, *notes)), *rest], [made for made in others if isinstance(made, Record)]
+        )
 
     def numbered(self, streams: Sequence[Phasors], frequency: float) -> tuple[list[Dip], dict[int, Record | UserError]]:
         """The dips of one load and, by number, the record that each makes, or why it cannot be used.
@@ -100,7 +103,7 @@ class WaveformReader(Reader):
 
     def _feeder(self, recording: Recording) -> Feeder:
         """The channels asked for."""
-        connection = build("connection", {"name": self.connection})
+        connection = plugin.chosen("connection", self.connection)
         made = {}
         for key, wanted in (("voltages", connection.voltages), ("currents", connection.currents)):
             chosen = getattr(self, key)
@@ -122,7 +125,8 @@ class WaveformReader(Reader):
 
     def _streams(self, recording: Recording, feeder: Feeder) -> list[Phasors]:
         """The phasors of each segment that holds waveforms."""
-        return [phasors_of(recording, feeder, segment, self.estimator, self.skew) for segment in recording.waveforms()]
+        settings = self.estimator, self.skew, self.harmonics
+        return [phasors_of(recording, feeder, segment, *settings) for segment in recording.waveforms()]
 
     def _base(self, dips: list[Dip], frequency: float) -> Base:
         """Voltage and apparent power before the first dip that has a steady state before it."""
@@ -155,9 +159,12 @@ class WaveformReader(Reader):
             P=S.real,
             Q=S.imag,
             f=dip.phasors.f[window],
-            U2=dip.phasors.U2[window] / base.voltage,
+            U2=dip.phasors.U2[window] / base.voltage if len(dip.phasors.V) == 3 else None,
             base=base,
             source=f"{self.path} dip {number}",
+            notes=plugin.chosen("connection", self.connection).notes,
+            window=plugin.chosen("estimator", self.estimator).window(base.frequency),
+            more=base.per_unit({name: values[window] for name, values in dip.phasors.more.items()}),
         )
         try:
             detect(record.check())
@@ -168,7 +175,8 @@ class WaveformReader(Reader):
     def _notes(self, recording: Recording, feeder: Feeder, dips: list[Dip]) -> tuple[str, ...]:
         step = dips[0].phasors.t[1] - dips[0].phasors.t[0]
         notes = [*recording.notes, *feeder.why]
-        notes.append(f"one-cycle phasors every {1000 * step:.3g} ms, {len(dips)} dips found")
+        kind = plugin.chosen("estimator", self.estimator).name.replace("_", "-")
+        notes.append(f"{kind} phasors every {1000 * step:.3g} ms, {len(dips)} dips found")
         fast = recording.waveforms()
         slow = [s for s in recording.segments if s not in fast]
         if slow:
