@@ -21,6 +21,19 @@ def override(argument: str) -> str:
     return f"++{argument}" if argument.startswith(OPEN) else argument
 
 
+def assigned(key: str, value: object) -> str:
+    """KEY=VALUE as `override` and Hydra read it back: numbers, texts, true and false, and lists of them."""
+    if isinstance(value, list | tuple):
+        return f"{key}=[{','.join(map(_plain, value))}]"
+    return f"{key}={value if isinstance(value, str) else _plain(value)}"
+
+
+def _plain(value: object) -> str:
+    if isinstance(value, str):
+        return value if PLAIN.fullmatch(value) else _quoted(value)
+    return "null" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
+
+
 def _read_by_hydra(argument: str, value: str) -> bool:
     """Whether Hydra takes the value as it stands, and what names a file as that name."""
     return PLAIN.fullmatch(value) is not None or (not _names_a_file(value) and _parses(argument))

@@ -141,11 +141,11 @@ def _records(source: Any, settings: Mapping[str, Any]) -> Iterator[Record]:
 
 def _file(path: str, settings: Mapping[str, Any]) -> list[Record]:
     """The records of a file, by the reader its ending names, or of a choice of `conf/data`."""
-    read = plugin.build(GROUP, _node(path, settings)).read()
+    read = plugin.build(GROUP, node_of(path, settings)).read()
     return [*read.train, *read.validate]
 
 
-def _node(path: str, settings: Mapping[str, Any]) -> dict[str, Any]:
+def node_of(path: str, settings: Mapping[str, Any]) -> dict[str, Any]:
     """The reader that a path, or a choice of `conf/data`, asks for, with its settings."""
     if not Path(path).exists() and path in choices(GROUP, files=True):
         return {**Choice.of(GROUP, path).node, **settings}
