@@ -23,6 +23,12 @@ class Dips(Tabulated, list[Event]):
     def __getitem__(self, k: Any) -> Any:
         return Dips(super().__getitem__(k)) if isinstance(k, slice) else super().__getitem__(k)
 
+    def look(self) -> Any:
+        """A look (a `Look`) at the files that the events are from, and at the records that are from none."""
+        from tractexp.api.look import look
+
+        return look(*self)
+
     def table(self) -> Table:
         """One row for each event; below it what a reader or the detection found odd."""
         rows = [

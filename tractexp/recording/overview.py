@@ -124,7 +124,8 @@ def _numbered(
         number = _number(what, dips)
         made = tried.get(number) if number else None
         event = detect(made) if isinstance(made, Record) else None
-        yield Seen(what, number, event, _why(what, event, str(made) if made else refused or "it is no dip"))
+        why = (str(made) if made else refused).removeprefix(f"{reader.path} dip {number}: ")
+        yield Seen(what, number, event, _why(what, event, why or "it is no dip"))
 
 
 def _number(what: Happening, dips: Sequence[Dip]) -> int | None:
@@ -146,7 +147,7 @@ def _common(what: Happening, start: float, end: float) -> float:
 
 def _why(what: Happening, event: Event | None, refused: str) -> str:
     """What makes it (not) worth fitting: what happened, or that no record can be made of it."""
-    return what.why if event is not None or not what.worth else refused
+    return what.why if event is not None or not what.worth else f"no record can be made of it: {refused}"
 
 
 def _settings(feeder: Feeder) -> dict[str, Any]:

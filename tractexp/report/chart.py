@@ -236,7 +236,7 @@ class Chart:
         if text:
             self._notes.append(
                 {"text": html.escape(text), "xref": "x", "x": start, "xanchor": "left", "yref": _height(panel)["yref"],
-                 "y": 1, "yanchor": "top", "showarrow": False, "font": {"size": 11}}
+                 "y": 1, "yanchor": "top", "showarrow": False, "font": {"size": 11}, "bgcolor": "#ffffffcc"}
             )  # fmt: skip
         if name and name not in self._told:
             square = {"color": color, "size": 11, "symbol": "square", "opacity": min(1.0, 2 * opacity)}

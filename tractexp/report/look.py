@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from tractexp.api.look import View
 
 MOST = 400_000  # samples of waveforms that a page holds: a megabyte
+OPEN = 2  # loads whose charts are drawn at once; those of the others when they are opened
 DETAILED = 12  # events that have a chart of their own where the whole is thinned
 AROUND = (0.1, 0.3)  # s before and after an event in such a chart
 LONGEST = 3.0  # s of an event there
@@ -39,14 +40,18 @@ def page(path: Path, views: Sequence["View"], content: Mapping[str, Any]) -> Pat
         if len(told) > 1:
             made.heading(known["file"])
         _conclusion(made, known)
-        for shown, feeder in zip(view.sights, known["feeders"], strict=True):
-            _load(made, view, shown, feeder)
-        made.heading("The file")
         made.table(["", ""], _facts(known), words=(1,))
         if known["notes"]:
-            made.heading("Notes", 3).items(known["notes"])
+            made.items(known["notes"])
+        if len(known["feeders"]) > 1:
+            made.table(
+                ["load", "connected as", "channels", "U [kV]", "P [MW]", "Q [Mvar]", "events", "worth fitting"],
+                [_summary(f) for f in known["feeders"]], words=(1, 2), caption="At the beginning; P and Q consumed.",
+            )  # fmt: skip
+        for k, (shown, feeder) in enumerate(zip(view.sights, known["feeders"], strict=True)):
+            _load(made, view, shown, feeder, folded=k >= OPEN)
         if known["channels"]:
-            made.heading("Channels", 3).table(
+            made.heading("Channels").table(
                 ["number", "name", "phase", "unit", "primary RMS", "quality"],
                 [_channel(c) for c in known["channels"]], words=(1, 2, 3, 5),
                 caption="Numbers count from 0, as data.voltages and data.currents do. RMS of the first cycles.",
@@ -90,7 +95,15 @@ def _channel(c: Mapping[str, Any]) -> list[str]:
     return [str(c["number"]), c["name"], c["phase"], c["unit"], size, c["quality"]]
 
 
-def _load(made: Page, view: "View", shown: Sight, known: Mapping[str, Any]) -> None:
+def _summary(known: Mapping[str, Any]) -> list[str]:
+    """A load in one row."""
+    size = ["" if known[key] is None else f"{known[key]:.4g}" for key in ("U", "P", "Q")]
+    channels = ", ".join(map(str, (*known["voltages"], *known["currents"])))
+    worth = [e for e in known["events"] if e["worth"]]
+    return [known["name"], known["connection"], channels, *size, str(len(known["events"])), str(len(worth))]
+
+
+def _load(made: Page, view: "View", shown: Sight, known: Mapping[str, Any], folded: bool) -> None:
     """One load: what it is, what happened, and charts to look into."""
     made.heading(known["name"])
     made.items([*_described(known), *known["why"], *known["said"]])
@@ -103,6 +116,15 @@ def _load(made: Page, view: "View", shown: Sight, known: Mapping[str, Any]) -> N
         )  # fmt: skip
     else:
         made.text("Nothing happened: the voltage stays within the thresholds of IEC 61000-4-30.")
+    if folded:
+        with made.folded(f"Charts of {known['name']}"):
+            _charts(made, view, shown)
+    else:
+        _charts(made, view, shown)
+
+
+def _charts(made: Page, view: "View", shown: Sight) -> None:
+    """Charts to look into."""
     if shown.record is not None:
         made.chart(_of_record(shown), "As recorded. Drag to zoom, double-click for the whole.")
     elif shown.phasors and view.recording is not None:
