@@ -146,9 +146,8 @@ def main():
             print(f"    {one['feeder']}: {one.get('told') or numbers} {one.get('independent', '')}")
     errors = [one for row in rows for one in row["feeders"] if "error_U" in one]
     failed = sum("failed" in row for row in rows)
-    print(
-        f"{len(rows)} files, {sum(bool(r['told']) for r in rows)} refused, {failed} failed; {len(errors)} loads compared"
-    )
+    refused = sum(bool(row["told"]) for row in rows)
+    print(f"{len(rows)} files, {refused} refused, {failed} failed; {len(errors)} loads compared")
     if errors:
         worst = {key: max(one[key] for one in errors) for key in ("error_U", "error_S")}
         print(f"largest difference: U {worst['error_U']:.3%}, P + jQ {worst['error_S']:.3%} of |S|")

@@ -78,9 +78,7 @@ class WaveformReader(Reader):
         notes += tuple(f"not used for validation: {made}" for made in others if isinstance(made, UserError))
         return Events([replace(first, notes=notes), *rest], [made for made in others if isinstance(made, Record)])
 
-    def numbered(
-        self, streams: Sequence[Phasors], frequency: float
-    ) -> tuple[list[Dip], dict[int, Record | UserError]]:
+    def numbered(self, streams: Sequence[Phasors], frequency: float) -> tuple[list[Dip], dict[int, Record | UserError]]:
         """The dips of one load and, by number, the record that each makes, or why it cannot be used.
 
         Raises `UserError` where there is none, and where none has a steady state before it.
