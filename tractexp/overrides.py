@@ -1,6 +1,8 @@
 """Arguments as people write them, made into overrides that Hydra reads."""
 
 import re
+import shlex
+from collections.abc import Mapping
 from pathlib import Path
 
 # settings that take names of their own
@@ -19,6 +21,13 @@ def override(argument: str) -> str:
     if equals and key.lstrip("+~").startswith(NAMING) and not _read_by_hydra(argument, value):
         argument = f"{key}={_quoted(value)}"
     return f"++{argument}" if argument.startswith(OPEN) else argument
+
+
+def typed(data: Mapping[str, object], *more: str) -> str:
+    """The command, as a shell takes it, that reads records by these settings (`name` and the reader's own)."""
+    settings = dict(data)
+    told = [f"data={settings.pop('name')}", *(assigned(f"data.{key}", value) for key, value in settings.items())]
+    return shlex.join(["tractexp", *more, *told])
 
 
 def assigned(key: str, value: object) -> str:

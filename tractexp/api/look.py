@@ -1,7 +1,6 @@
 """A file looked at without being told anything: what it holds, which loads it shows, what happened, what to fit."""
 
 import functools
-import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
@@ -9,58 +8,18 @@ from typing import Any, Self
 
 import numpy as np
 
-from tractexp import files, plugin
+from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.pages import Written
-from tractexp.api.read import GROUP, node_of, table
+from tractexp.api.read import node_of, table
 from tractexp.errors import UserError
 from tractexp.outcome import Table, Tabulated
-from tractexp.overrides import assigned
+from tractexp.overrides import typed
 from tractexp.progress import Progress, staged
 from tractexp.record import Base, Event, Record
-from tractexp.recording.overview import Seen, Sight, overview, sight, sight_of
-from tractexp.recording.quality import Quality, quality
-from tractexp.recording.reader import WaveformReader
-from tractexp.recording.recording import Recording
+from tractexp.recording.overview import Seen, Sight, View, sight_of, view_of
 
 CYCLES = 10  # of a channel's beginning, whose RMS is its magnitude
-
-
-@dataclass(frozen=True, eq=False)
-class View:
-    """One file as it was looked at. `recording` is None for a table that is a record already."""
-
-    source: str  # the path, or the name of a record
-    node: Mapping[str, Any]  # the choice of `data` that reads it; {} for a record
-    sights: Sequence[Sight]
-    recording: Recording | None = None
-
-    @functools.cached_property
-    def quality(self) -> list[Quality]:
-        """What each channel is fit for."""
-        made = self.recording
-        if made is None:
-            return []
-        segment = max(made.segments, key=lambda s: s.rate)
-        return [quality(made, number, segment) for number in range(len(made.channels))]
-
-    @property
-    def frequency(self) -> float | None:
-        """Measured [Hz], before anything happens to the first load; None where nothing turns."""
-        for shown in self.sights:
-            f = shown.phasors[0].f if shown.phasors else None if shown.record is None else shown.record.f
-            if f is not None:
-                return float(np.median(f[: max(1, len(f) // 4)]))
-        return None
-
-    def command(self, shown: Sight) -> str:
-        """What is to be typed to fit the events of a load that are worth it; "" where none is."""
-        choice = shown.choice()
-        if not choice or not self.node:
-            return ""
-        settings = {**self.node, **choice}
-        told = [f"{GROUP}={settings.pop('name')}", *(assigned(f"{GROUP}.{key}", v) for key, v in settings.items())]
-        return shlex.join(["tractexp", *told])
 
 
 class Listed(Tabulated):
@@ -238,20 +197,7 @@ def _source(given: Any) -> str | Record:
 def _view(source: str | Record, settings: Mapping[str, Any]) -> View:
     if isinstance(source, Record):
         return View(source.name, {}, [sight_of(source, {})])
-    return view(source, settings)
-
-
-def view(path: str, settings: Mapping[str, Any]) -> View:
-    """One file, looked at. Raises `UserError` where it cannot be read."""
-    node = node_of(path, settings)
-    reader = plugin.build(GROUP, node)
-    if not isinstance(reader, WaveformReader):
-        read = reader.read()
-        return View(path, node, [sight_of(record, {}) for record in (*read.train, *read.validate)])
-    recording = reader.recording()
-    if reader.voltages or reader.currents:
-        return View(path, node, [sight(reader, recording, reader.feeder(recording))], recording)
-    return View(path, node, overview(reader, recording), recording)
+    return view_of(source, node_of(source, settings))
 
 
 def series(shown: Sight) -> dict[str, np.ndarray]:
@@ -330,9 +276,15 @@ def _feeder(view: View, shown: Sight) -> dict[str, Any]:
         made |= {"connection": "", "voltages": [], "currents": [], "channels": [], "reverse_current": False, "why": []}
     U, P, Q = told or (None, None, None)
     return made | {
-        "U": U, "P": P, "Q": Q, **_sums(shown), "said": list(shown.said), "command": view.command(shown),
+        "U": U, "P": P, "Q": Q, **_sums(shown), "said": list(shown.said), "command": command(view, shown),
         "events": [event_row(seen) for seen in shown.seen],
     }  # fmt: skip
+
+
+def command(view: View, shown: Sight) -> str:
+    """What is to be typed to fit the events of a load that are worth it; "" where none is."""
+    choice = shown.choice()
+    return typed({**view.node, **choice}) if choice and view.node else ""
 
 
 def _sums(shown: Sight) -> dict[str, Any]:
@@ -365,6 +317,8 @@ def _picked(items: Sequence[Any], k: int, what: str) -> Any:
 
 
 def _record(told: Mapping[str, Any]) -> Record:
-    arrays: Any = {k: None if told[k] is None else np.array(told[k], dtype=float) for k in ("t", "U", "P", "Q", "f", "U2")}
+    arrays: Any = {
+        k: None if told[k] is None else np.array(told[k], dtype=float) for k in ("t", "U", "P", "Q", "f", "U2")
+    }
     plain = {"name": told["name"], "source": told["source"], "notes": tuple(told["notes"])}
     return replace(Record(**plain, **arrays), base=Base(**told["base"]))

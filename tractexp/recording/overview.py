@@ -1,5 +1,6 @@
 """A file looked at without being told anything: which loads it shows, what happened to each, and what can be fitted."""
 
+import functools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -7,15 +8,17 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import UserError
+from tractexp.plugin import build
 from tractexp.record import Event, Record, detect
 from tractexp.record.phasor import Phasors
 from tractexp.recording.feeder import Feeder, propose
 from tractexp.recording.happening import Happening, happenings, happenings_of
 from tractexp.recording.measure import phasors_of, waves_of
+from tractexp.recording.quality import Quality, quality
 from tractexp.recording.reader import Dip, WaveformReader
 from tractexp.recording.recording import Recording
 
-SETTINGS = {"connection": "three_phase", "reverse_current": False}  # of a reader, where nothing else is said
+USUAL = Feeder((), ())  # what a reader takes where nothing else is said
 
 
 @dataclass(frozen=True)
@@ -68,6 +71,46 @@ class Sight:
         before = p.t < (self.seen[0].what.start if self.seen else np.inf)
         first = slice(0, max(1, min(int(np.count_nonzero(before)), len(p.t))))
         return float(np.median(p.U[first])), float(np.median(p.S[first].real)), float(np.median(p.S[first].imag))
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One file as it was looked at. `recording` is None for a table that is a record already."""
+
+    source: str  # the path, or the name of a record
+    node: Mapping[str, Any]  # the choice of `data` that reads it; {} for a record
+    sights: Sequence[Sight]
+    recording: Recording | None = None
+
+    @functools.cached_property
+    def quality(self) -> list[Quality]:
+        """What each channel is fit for."""
+        made = self.recording
+        if made is None:
+            return []
+        segment = max(made.segments, key=lambda s: s.rate)
+        return [quality(made, number, segment) for number in range(len(made.channels))]
+
+    @property
+    def frequency(self) -> float | None:
+        """Measured [Hz], before anything happens to the first load; None where nothing turns."""
+        for shown in self.sights:
+            f = shown.phasors[0].f if shown.phasors else None if shown.record is None else shown.record.f
+            if f is not None:
+                return float(np.median(f[: max(1, len(f) // 4)]))
+        return None
+
+
+def view_of(source: str, node: Mapping[str, Any]) -> View:
+    """One file, looked at by the reader that `node` chooses. Raises `UserError` where it cannot be read."""
+    reader = build("data", node)
+    if not isinstance(reader, WaveformReader):
+        read = reader.read()
+        return View(source, node, [sight_of(record, {}) for record in (*read.train, *read.validate)])
+    recording = reader.recording()
+    if reader.voltages or reader.currents:
+        return View(source, node, [sight(reader, recording, reader.feeder(recording))], recording)
+    return View(source, node, overview(reader, recording), recording)
 
 
 def overview(reader: WaveformReader, recording: Recording) -> list[Sight]:
@@ -152,5 +195,5 @@ def _why(what: Happening, event: Event | None, refused: str) -> str:
 
 def _settings(feeder: Feeder) -> dict[str, Any]:
     """The settings of a reader that reads this load."""
-    told = {key: getattr(feeder, key) for key, usual in SETTINGS.items() if getattr(feeder, key) != usual}
+    told = {k: getattr(feeder, k) for k in ("connection", "reverse_current") if getattr(feeder, k) != getattr(USUAL, k)}
     return {"voltages": list(feeder.voltages), "currents": list(feeder.currents), **told}

@@ -2,20 +2,17 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from tractexp.recording import Recording, Segment
 from tractexp.recording.measure import waves_of
-from tractexp.recording.overview import Sight
+from tractexp.recording.overview import Sight, View
 from tractexp.recording.traces import half_cycle_rms, spectrum
 from tractexp.report.chart import Chart
 from tractexp.report.page import Page
 from tractexp.report.style import ACTIVE, PALETTE, REACTIVE, VOLTAGE
-
-if TYPE_CHECKING:
-    from tractexp.api.look import View
 
 MOST = 400_000  # samples of waveforms that a page holds: a megabyte
 OPEN = 2  # loads whose charts are drawn at once; those of the others when they are opened
@@ -32,7 +29,7 @@ CAPTION = (
 )
 
 
-def page(path: Path, views: Sequence["View"], content: Mapping[str, Any]) -> Path:
+def page(path: Path, views: Sequence[View], content: Mapping[str, Any]) -> Path:
     """Write the page; returns its path."""
     told = content["files"]
     made = Page(f"A look at {', '.join(Path(f['file']).name for f in told)}", _lead(told))
@@ -103,7 +100,7 @@ def _summary(known: Mapping[str, Any]) -> list[str]:
     return [known["name"], known["connection"], channels, *size, str(len(known["events"])), str(len(worth))]
 
 
-def _load(made: Page, view: "View", shown: Sight, known: Mapping[str, Any], folded: bool) -> None:
+def _load(made: Page, view: View, shown: Sight, known: Mapping[str, Any], folded: bool) -> None:
     """One load: what it is, what happened, and charts to look into."""
     made.heading(known["name"])
     made.items([*_described(known), *known["why"], *known["said"]])
@@ -123,7 +120,7 @@ def _load(made: Page, view: "View", shown: Sight, known: Mapping[str, Any], fold
         _charts(made, view, shown)
 
 
-def _charts(made: Page, view: "View", shown: Sight) -> None:
+def _charts(made: Page, view: View, shown: Sight) -> None:
     """Charts to look into."""
     if shown.record is not None:
         made.chart(_of_record(shown), "As recorded. Drag to zoom, double-click for the whole.")
@@ -188,7 +185,7 @@ def _of_record(shown: Sight) -> Chart:
     return _marked(chart, shown)
 
 
-def _every(view: "View") -> int:
+def _every(view: View) -> int:
     """How many samples become one on a page, so that all loads of a file have room."""
     made = view.recording
     assert made is not None
