@@ -18,8 +18,7 @@ from tractexp.overrides import typed
 from tractexp.progress import Progress, staged
 from tractexp.record import Base, Event, Record
 from tractexp.recording.overview import Seen, Sight, View, sight_of, view_of
-
-CYCLES = 10  # of a channel's beginning, whose RMS is its magnitude
+from tractexp.wording import change, figure
 
 
 class Listed(Tabulated):
@@ -251,14 +250,13 @@ def _content(view: View) -> dict[str, Any]:
 
 def _channel(view: View, number: int) -> dict[str, Any]:
     assert view.recording is not None
-    channel, segment = view.recording.channels[number], max(view.recording.segments, key=lambda s: s.rate)
-    stop = min(segment.stop, segment.first + round(CYCLES * segment.rate / view.recording.frequency))
-    values = channel.values(segment.first, stop)
+    channel, told = view.recording.channels[number], view.quality[number]
+    share = told.noise / told.level if told.level > 0 else None
     return {
         "number": number, "name": channel.name, "phase": channel.phase, "unit": channel.unit,
-        "quantity": channel.quantity, "magnitude": float(np.sqrt(np.nanmean(values**2))) if len(values) else None,
+        "quantity": channel.quantity, "magnitude": told.level,
         "primary_unit": {"voltage": "kV", "current": "kA"}.get(channel.quantity, channel.unit),
-        "quality": str(view.quality[number]),
+        "noise_share": share, **asdict(told),
     }  # fmt: skip
 
 
@@ -302,10 +300,11 @@ def _sums(shown: Sight) -> dict[str, Any]:
 
 def _told(where: str, event: Mapping[str, Any]) -> list[Any]:
     """A row of the table that a person sees first."""
-    power = [f"{event[f'{x}_before']:.4g} to {event[f'{x}_after']:.4g}" for x in "PQ"]
+    power = [change(event[f"{x}_before"], event[f"{x}_after"]) for x in "PQ"]
     return [
         "" if event["dip"] is None else event["dip"], where, event["kind"], round(event["start"], 4),
-        round(1000 * event["duration"]), f"{event['depth']:.1%}", round(event["jump"], 1), f"{event['U2']:.1%}",
+        round(1000 * event["duration"]), f"{event['depth']:.1%}", figure(event["jump"], 2),
+        "" if event["U2"] is None else f"{event['U2']:.1%}",
         *power, "yes" if event["worth"] else f"no: {event['why']}",
     ]  # fmt: skip
 

@@ -163,19 +163,22 @@ def _numbered(
             dips, tried = reader.numbered(phasors, frequency)
     except UserError as error:
         refused = str(error)
-    for what in found:
-        number = _number(what, dips)
+    numbers = _numbers(found, dips)
+    for what, number in zip(found, numbers, strict=True):
         made = tried.get(number) if number else None
         event = detect(made) if isinstance(made, Record) else None
         why = (str(made) if made else refused).removeprefix(f"{reader.path} dip {number}: ")
         yield Seen(what, number, event, _why(what, event, why or "it is no dip"))
 
 
-def _number(what: Happening, dips: Sequence[Dip]) -> int | None:
-    """The dip, counted from 1, that shares most of its time with what happened."""
-    shared = [_common(what, *_span(dip)) for dip in dips]
-    best = int(np.argmax(shared)) if shared else -1
-    return best + 1 if shared and shared[best] > 0 else None
+def _numbers(found: Sequence[Happening], dips: Sequence[Dip]) -> list[int | None]:
+    """For each happening the dip, counted from 1, that shares more of its time with it than with any other."""
+    numbers: list[int | None] = [None] * len(found)
+    for number, dip in enumerate(dips, 1):
+        shared = [_common(what, *_span(dip)) for what in found]
+        if shared and max(shared) > 0 and numbers[int(np.argmax(shared))] is None:
+            numbers[int(np.argmax(shared))] = number
+    return numbers
 
 
 def _span(dip: Dip) -> tuple[float, float]:

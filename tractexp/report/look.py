@@ -13,6 +13,7 @@ from tractexp.recording.traces import half_cycle_rms, spectrum
 from tractexp.report.chart import Chart
 from tractexp.report.page import Page
 from tractexp.report.style import ACTIVE, PALETTE, REACTIVE, VOLTAGE
+from tractexp.wording import change, figure
 
 MOST = 400_000  # samples of waveforms that a page holds: a megabyte
 OPEN = 2  # loads whose charts are drawn at once; those of the others when they are opened
@@ -24,8 +25,8 @@ PHASES = {3: ("a", "b", "c"), 1: ("the only phase",)}
 BOUND = 0.1  # of the nominal frequency: what lies further off is that of a dead line
 SHADES = {"dip": PALETTE[5], "swell": PALETTE[4], "interruption": PALETTE[3]}
 CAPTION = (
-    "Waveforms, primary values; RMS of one cycle every half cycle (IEC 61000-4-30); symmetrical components and powers of"
-    " one-cycle phasors, P and Q positive when consumed. Drag to zoom, double-click for the whole."
+    "Waveforms, primary values; RMS of one cycle every half cycle (IEC 61000-4-30); symmetrical components and powers"
+    " of one-cycle phasors, P and Q positive when consumed. Drag to zoom, double-click for the whole."
 )
 
 
@@ -49,9 +50,10 @@ def page(path: Path, views: Sequence[View], content: Mapping[str, Any]) -> Path:
             _load(made, view, shown, feeder, folded=k >= OPEN)
         if known["channels"]:
             made.heading("Channels").table(
-                ["number", "name", "phase", "unit", "primary RMS", "quality"],
-                [_channel(c) for c in known["channels"]], words=(1, 2, 3, 5),
-                caption="Numbers count from 0, as data.voltages and data.currents do. RMS of the first cycles.",
+                ["number", "name", "phase", "unit", "primary RMS", "noise", "colour", "THD", "bits", "fit for what"],
+                [_channel(c) for c in known["channels"]], words=(1, 2, 3, 6, 9),
+                caption="Numbers count from 0, as data.voltages and data.currents do. RMS of the fundamental; noise"
+                " about fundamental and harmonics in the quietest ten cycles, as a share of it.",
             )  # fmt: skip
     return made.write(path)
 
@@ -88,13 +90,16 @@ def _facts(known: Mapping[str, Any]) -> list[list[str]]:
 
 
 def _channel(c: Mapping[str, Any]) -> list[str]:
-    size = "" if c["magnitude"] is None else f"{c['magnitude']:.4g} {c['primary_unit']}"
-    return [str(c["number"]), c["name"], c["phase"], c["unit"], size, c["quality"]]
+    noise, thd = (None if c[key] is None else 100 * c[key] for key in ("noise_share", "thd"))
+    return [
+        str(c["number"]), c["name"], c["phase"], c["unit"], figure(c["magnitude"], 4, c["primary_unit"]),
+        figure(noise, 2, "%"), c["colour"], figure(thd, 2, "%"), figure(c["bits"], 3), c["fit"],
+    ]  # fmt: skip
 
 
 def _summary(known: Mapping[str, Any]) -> list[str]:
     """A load in one row."""
-    size = ["" if known[key] is None else f"{known[key]:.4g}" for key in ("U", "P", "Q")]
+    size = [figure(known[key]) for key in ("U", "P", "Q")]
     channels = ", ".join(map(str, (*known["voltages"], *known["currents"])))
     worth = [e for e in known["events"] if e["worth"]]
     return [known["name"], known["connection"], channels, *size, str(len(known["events"])), str(len(worth))]
@@ -106,7 +111,7 @@ def _load(made: Page, view: View, shown: Sight, known: Mapping[str, Any], folded
     made.items([*_described(known), *known["why"], *known["said"]])
     if known["events"]:
         made.table(
-            ["dip", "kind", "starts [s]", "lasts [ms]", "depth", "phase jump", "U2/U1", "P [MW]", "Q [Mvar]", "fit it?"],
+            ["dip", "kind", "starts [s]", "lasts [ms]", "depth", "jump", "U2/U1", "P [MW]", "Q [Mvar]", "fit it?"],
             [_event(e) for e in known["events"]], words=(1, 9),
             caption="Depth, U2 and jump against the voltage before. P and Q before and after. Dips are numbered as"
             " data.train and data.validate take them.",
@@ -141,7 +146,7 @@ def _described(known: Mapping[str, Any]) -> list[str]:
         reverse = ", current reversed" * known["reverse_current"]
         told.append(f"Channels: {named}; connected as {known['connection']}{reverse}.")
     if known["U"] is not None:
-        told.append(f"At first {known['U']:.4g} kV, {known['P']:.4g} MW, {known['Q']:.4g} Mvar.")
+        told.append(f"At first {figure(known['U'])} kV, {figure(known['P'])} MW, {figure(known['Q'])} Mvar.")
     if known["sum_V"] is not None:
         current = "" if known["sum_I"] is None else f", the currents to {known['sum_I']:.2%}"
         told.append(f"The voltages of the three phases sum to {known['sum_V']:.2%} of one{current}.")
@@ -149,12 +154,16 @@ def _described(known: Mapping[str, Any]) -> list[str]:
 
 
 def _event(e: Mapping[str, Any]) -> list[str]:
-    powers = [f"{e[f'{x}_before']:.4g} → {e[f'{x}_after']:.4g}" for x in "PQ"]
+    powers = [change(e[f"{x}_before"], e[f"{x}_after"]) for x in "PQ"]
     return [
         "" if e["dip"] is None else str(e["dip"]), e["kind"], f"{e['start']:.3f}", f"{1000 * e['duration']:.0f}",
-        f"{e['depth']:.1%}", f"{e['jump']:.1f}°", f"{e['U2']:.1%}", *powers,
+        f"{e['depth']:.1%}", figure(e["jump"], 2, "°"), _share(e["U2"]), *powers,
         f"{'yes' if e['worth'] else 'no'}: {e['why']}",
     ]  # fmt: skip
+
+
+def _share(value: float | None) -> str:
+    return "" if value is None else f"{value:.1%}"
 
 
 def _marked(chart: Chart, shown: Sight) -> Chart:

@@ -8,6 +8,7 @@ from typing import Any
 
 from tractexp.errors import UserError
 from tractexp.tasks.console import listed, say, table
+from tractexp.wording import change, figure
 
 FOLDER = Path("outputs", "looks")
 DOES = "Look at files without saying which channels they have: loads, events, what is worth fitting, and the command."
@@ -49,18 +50,19 @@ def tell(content: Any) -> None:
     for known in content["files"]:
         rates = ", ".join(f"{rate:g} Hz" for rate in dict.fromkeys(known["rates"]))
         measured = known["measured_frequency"]
+        turning = "" if measured is None else f", {measured:.3f} Hz measured"
         said = [known["station"], known["device"], str(known["start"] or ""), f"{known['seconds']:.3f} s at {rates}",
-                f"{known['frequency']:g} Hz nominal" + ("" if measured is None else f", {measured:.3f} Hz measured")]  # fmt: skip
+                f"{known['frequency']:g} Hz nominal{turning}"]  # fmt: skip
         say(f"{known['file']}: {'; '.join(part for part in said if part)}")
         for note in known["notes"]:
             say(f"  note: {note}")
         if known["channels"]:
             rows = [
-                [str(c["number"]), c["name"], c["phase"], c["unit"], f"{c['magnitude'] or 0:.4g} {c['primary_unit']}",
-                 c["quality"]]
+                [str(c["number"]), c["name"], c["phase"], c["unit"], figure(c["magnitude"], 4, c["primary_unit"]),
+                 c["fit"]]
                 for c in known["channels"]
             ]  # fmt: skip
-            table(["channel", "name", "phase", "unit", "primary RMS", "quality"], rows)
+            table(["channel", "name", "phase", "unit", "primary RMS", "fit for what"], rows)
         for feeder in known["feeders"]:
             _tell_load(feeder)
         if not known["feeders"]:
@@ -69,16 +71,16 @@ def tell(content: Any) -> None:
 
 def _tell_load(feeder: Any) -> None:
     numbers = ", ".join(map(str, (*feeder["voltages"], *feeder["currents"])))
-    told = "" if feeder["U"] is None else f": {feeder['U']:.4g} kV, {feeder['P']:.4g} MW, {feeder['Q']:.4g} Mvar"
+    told = ", ".join(figure(feeder[k], 4, unit) for k, unit in (("U", "kV"), ("P", "MW"), ("Q", "Mvar")))
     channels = f" (channels {numbers}, {feeder['connection']})" if numbers else ""
-    say(f"load {feeder['name']}{channels}{told}")
+    say(f"load {feeder['name']}{channels}: {told or 'nothing measured'}")
     for sentence in (*feeder["why"], *feeder["said"]):
         say(f"  {sentence}")
     if feeder["events"]:
         rows = [
             ["" if e["dip"] is None else str(e["dip"]), e["kind"], f"{e['start']:.3f}", f"{1000 * e['duration']:.0f}",
-             f"{e['depth']:.1%}", f"{e['jump']:.1f}", f"{e['U2']:.1%}",
-             *(f"{e[f'{x}_before']:.4g} to {e[f'{x}_after']:.4g}" for x in "PQ"),
+             f"{e['depth']:.1%}", figure(e["jump"], 2), "" if e["U2"] is None else f"{e['U2']:.1%}",
+             *(change(e[f"{x}_before"], e[f"{x}_after"]) for x in "PQ"),
              f"{'yes' if e['worth'] else 'no'}: {e['why']}"]
             for e in feeder["events"]
         ]  # fmt: skip
