@@ -66,7 +66,7 @@ class WaveformReader(Reader):
 
     def read(self) -> Events:
         recording = self.recording()
-        feeder = self._feeder(recording)
+        feeder = self.feeder(recording)
         dips, tried = self.numbered(self._streams(recording, feeder), recording.frequency)
         usable = [number for number, made in tried.items() if isinstance(made, Record)]
         fitted = self.train or usable[:1] or [1]
@@ -101,7 +101,7 @@ class WaveformReader(Reader):
             raise UserError(f"{made}; dips that can be used: {usable or 'none'}")
         return made
 
-    def _feeder(self, recording: Recording) -> Feeder:
+    def feeder(self, recording: Recording) -> Feeder:
         """The channels asked for."""
         connection = plugin.chosen("connection", self.connection)
         made = {}
