@@ -152,10 +152,10 @@ def _quietest(x: np.ndarray, n: int, cycle: int) -> int:
     if len(x) <= n + cycle:
         return 0
     change = np.nan_to_num((x[cycle:] - x[:-cycle]) ** 2, nan=np.inf)
-    energy = np.nan_to_num(x[:-cycle] ** 2)
     starts = np.arange(0, len(change) - n + 1, max(cycle, 1))
-    total = np.array([[change[s : s + n].sum(), energy[s : s + n].sum()] for s in starts])
-    return int(starts[np.argmin(total[:, 0] / np.maximum(total[:, 1], 1e-300))])
+    energy = np.array([n * np.nan_to_num(x[s : s + n]).var() for s in starts])
+    changed = np.array([change[s : s + n].sum() for s in starts])
+    return int(starts[np.argmin(np.where(energy > 0, changed / np.maximum(energy, 1e-300), np.inf))])
 
 
 def _colour(lag: float, count: int, noise: float, step: float) -> str:
