@@ -13,7 +13,7 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.plugin import build
-from tractexp.record.direction import direction
+from tractexp.record.direction import direction, usual
 from tractexp.record.phasor import sequences
 from tractexp.recording.feeder import Feeder
 from tractexp.recording.label import groups, kind, order
@@ -72,6 +72,7 @@ def arranged(recording: Recording, feeder: Feeder) -> Feeder:
         return replace(feeder, why=(*feeder.why, "the order of the channels cannot be checked: nothing is alive"))
     if len(seen.V) < 3:
         return _directed(feeder, seen)
+    _lines(recording, feeder)
     if feeder.connection == "three_phase" and (told := _lines_by_shape(recording, feeder, seen)):
         feeder = replace(feeder, connection="line_voltages", why=(*feeder.why, told))
         seen = _seen(recording, feeder) or seen
@@ -93,6 +94,18 @@ def _lines_by_label(recording: Recording, feeder: Feeder) -> Feeder:
     return replace(feeder, voltages=voltages, connection="line_voltages", why=(*feeder.why, why))
 
 
+def _lines(recording: Recording, feeder: Feeder) -> None:
+    """Refuse phase voltages where line-to-line ones are asked for."""
+    told = order([recording.channels[i] for i in feeder.voltages])
+    if not feeder.connection.endswith("line_voltages") or told is None or told[1]:
+        return
+    names = ", ".join(f"{i} '{recording.channels[i].name}' [{recording.channels[i].unit}]" for i in feeder.voltages)
+    raise UserError(
+        f"data.voltages={[*feeder.voltages]} must name three channels with data.connection=three_phase: {names} are "
+        f"labelled as phases to ground, and data.connection={feeder.connection} takes line-to-line voltages"
+    )
+
+
 def _seen(recording: Recording, feeder: Feeder) -> _Seen | None:
     """The feeder's phasors while voltage and current are alive; None where they never are."""
     numbers = [*feeder.voltages, *feeder.currents]
@@ -111,7 +124,7 @@ def _seen(recording: Recording, feeder: Feeder) -> _Seen | None:
     if not alive.any():
         return None
     V, I, size = V[:, alive], I[:, alive], size[alive]
-    calm = np.abs(size / np.median(size) - 1) < CALM
+    calm = usual(size, CALM)
     if len(V) == 3:
         small, large = np.sort(np.abs(sequences(V)), axis=0)  # whatever the order is
         calm = even if (even := calm & (small < UNBALANCED * large)).any() else calm
@@ -206,8 +219,8 @@ def _labels(recording: Recording, feeder: Feeder, seen: _Seen | None) -> None:
         S, T = _power(seen, (0, 1, 2)), _power(seen, tuple(feeder.currents.index(i) for i in labelled))
         both = f", which gives {_mw(T)} where the order given has {_mw(S)}"
     raise UserError(
-        f"data.currents are the phases {_letters(c)} where data.voltages are {_letters(v)}, says {recording.source}; give "
-        f"both in the same order: {_said(None, labelled)}{both}"
+        f"data.currents are the phases {_letters(c)} where data.voltages are {_letters(v)}, says {recording.source}; "
+        f"give both in the same order: {_said(None, labelled)}{both}"
     )
 
 
