@@ -46,7 +46,7 @@ def direction(U: np.ndarray, P: np.ndarray, Q: np.ndarray, polarity: int = 0) ->
     answer = f"|P| goes as U^{a:.2g} when the voltage falls" if fell else "the voltage is never disturbed"
     if polarity < 0 or (polarity == 0 and fell and _load_like(a, P0, Q0)):
         shown = (
-            "the negative-sequence current is that of a load turned round" if polarity < 0 else answer + " and returns"
+            "the negative-sequence current is that of a load turned round" if polarity < 0 else f"{answer}, as a load's"
         )
         return f"{shown}: its current is counted out of it, or this feeder supplies such loads ({REMEDY})"
     if polarity > 0:

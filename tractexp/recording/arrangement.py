@@ -12,7 +12,7 @@ from itertools import permutations
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.plugin import build
+from tractexp.plugin import chosen
 from tractexp.record.direction import direction, usual
 from tractexp.record.phasor import sequences
 from tractexp.recording.feeder import Feeder
@@ -65,7 +65,7 @@ def arranged(recording: Recording, feeder: Feeder) -> Feeder:
     Raises `UserError` where the order given makes no sense and another does, which is proposed with its P and Q.
     """
     feeder = _lines_by_label(recording, feeder)
-    connection = build("connection", {"name": feeder.connection})
+    connection = chosen("connection", feeder.connection)
     seen = _seen(recording, feeder)
     if seen is None:
         _labels(recording, feeder, None)
@@ -73,11 +73,11 @@ def arranged(recording: Recording, feeder: Feeder) -> Feeder:
     if len(seen.V) < 3:
         return _directed(feeder, seen)
     _lines(recording, feeder)
-    if feeder.connection == "three_phase" and (told := _lines_by_shape(recording, feeder, seen)):
+    if connection.name == "three_phase" and (told := _lines_by_shape(recording, feeder, seen)):
         feeder = replace(feeder, connection="line_voltages", why=(*feeder.why, told))
         seen = _seen(recording, feeder) or seen
     _voltages(recording, feeder, seen)
-    if connection.currents == 3 and feeder.connection in ("three_phase", "line_voltages", "two_line_voltages"):
+    if connection.currents == 3 and connection.name in ("three_phase", "line_voltages", "two_line_voltages"):
         _labels(recording, feeder, seen)
         _currents(recording, feeder, seen)
     return _directed(feeder, seen)
@@ -96,13 +96,13 @@ def _lines_by_label(recording: Recording, feeder: Feeder) -> Feeder:
 
 def _lines(recording: Recording, feeder: Feeder) -> None:
     """Refuse phase voltages where line-to-line ones are asked for."""
-    told = order([recording.channels[i] for i in feeder.voltages])
-    if not feeder.connection.endswith("line_voltages") or told is None or told[1]:
+    told, name = order([recording.channels[i] for i in feeder.voltages]), chosen("connection", feeder.connection).name
+    if name not in ("line_voltages", "two_line_voltages") or told is None or told[1]:
         return
     names = ", ".join(f"{i} '{recording.channels[i].name}' [{recording.channels[i].unit}]" for i in feeder.voltages)
     raise UserError(
         f"data.voltages={[*feeder.voltages]} must name three channels with data.connection=three_phase: {names} are "
-        f"labelled as phases to ground, and data.connection={feeder.connection} takes line-to-line voltages"
+        f"labelled as phases to ground, and data.connection={name} takes line-to-line voltages"
     )
 
 
@@ -112,7 +112,7 @@ def _seen(recording: Recording, feeder: Feeder) -> _Seen | None:
     made = snapshots(recording, numbers, frequency(recording, feeder.voltages))
     if made is None:
         return None
-    connection = build("connection", {"name": feeder.connection})
+    connection = chosen("connection", feeder.connection)
     V = connection.voltage() @ made.of(feeder.voltages)
     I = connection.current() @ made.of(feeder.currents) * (-1 if feeder.reverse_current else 1)
     known = np.isfinite(V).all(axis=0) & np.isfinite(I).all(axis=0)

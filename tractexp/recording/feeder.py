@@ -59,7 +59,7 @@ def _groups(recording: Recording, seen: Snapshots, numbers: Sequence[int]) -> li
     """Groups among the channels of one quantity: by label, and by magnitude and angle among those left."""
     found = [
         g for g in groups({i: recording.channels[i] for i in numbers})
-        if len(g.numbers) == 3 or (g.pairs and g.missing is not None) or (not g.pairs and g.missing == 1)
+        if len(g.numbers) == 3 or g.pairs == (recording.channels[g.numbers[0]].quantity != "current")
     ]  # fmt: skip
     found = [g for g in found if g.certain or all(seen.pure(i) for i in g.numbers)]
     taken = {i for g in found for i in g.numbers}
@@ -102,9 +102,7 @@ def _fits(load: Group, buses: Sequence[Group]) -> bool:
 
 def _feeder(recording: Recording, seen: Snapshots, load: Group, buses: Sequence[Group]) -> Feeder:
     bus, why = _bus(recording, seen, load, buses)
-    connection = "aron" if len(load.numbers) == 2 else "three_phase"
-    if bus.pairs:
-        connection = "line_voltages" if len(bus.numbers) == 3 else "two_line_voltages"
+    voltages, connection = _connection(load, bus)
     said = [
         f"currents {_names(recording, load.numbers)}: {_by(load)}",
         f"voltages {_names(recording, bus.numbers)}: {why}",
@@ -113,7 +111,22 @@ def _feeder(recording: Recording, seen: Snapshots, load: Group, buses: Sequence[
         said.append("the voltages are line to line, as their names say")
     if len(load.numbers) == 2:
         said.append("two currents are recorded: the third is minus their sum, as where no current returns to earth")
-    return Feeder(bus.numbers, load.numbers, connection, name=load.name or bus.name or "the feeder", why=tuple(said))
+    return Feeder(voltages, load.numbers, connection, name=load.name or bus.name or "the feeder", why=tuple(said))
+
+
+def _connection(load: Group, bus: Group) -> tuple[tuple[int, ...], Any]:
+    """(the voltages used, the connection that makes phase quantities of them)."""
+    pairs = [pair for k, pair in enumerate(("ab", "bc", "ca")) if k != bus.missing]
+    phases = "".join(p for k, p in enumerate("abc") if k != load.missing)
+    settings: dict[str, Any] = {"phases": phases} if len(phases) == 2 and phases != "ac" else {}
+    if not bus.pairs:
+        name = "aron" if len(phases) == 2 else "three_phase"
+        return bus.numbers, {"name": name, **settings} if settings else name
+    if len(phases) == 3 and len(pairs) == 3:
+        return bus.numbers, "line_voltages"
+    settings = {"phases": phases} if len(phases) == 2 else {}
+    settings |= {"pairs": pairs} if pairs[:2] != ["ab", "bc"] else {}
+    return bus.numbers[:2], {"name": "two_line_voltages", **settings} if settings else "two_line_voltages"
 
 
 def _by(group: Group) -> str:
