@@ -12,6 +12,7 @@ JITTER = 0.01  # of a step: times closer than this to a uniform grid count as un
 LONGEST_STEP = 0.2  # s: slower sampling cannot show a motor's response
 FEWEST_SAMPLES = 20
 PLAUSIBLE_VOLTAGE = (0.5, 1.5)  # pu, at the start of a record
+DEAD = 0.05  # of the voltage at the start: less is no voltage at all
 PLAUSIBLE_POWER = 20.0  # pu, at the start of a record
 
 
@@ -179,9 +180,13 @@ class Record:
                 f"{self.where}: P or Q reaches {S:g}, which is not per unit (up to {PLAUSIBLE_POWER:g} is expected); "
                 "if it is in MW, give the base as data.base_power (MVA)"
             )
-        if self.f is not None and np.abs(self.f / self.base.frequency - 1).max() > 0.2:
-            i = int(np.argmax(np.abs(self.f - self.base.frequency)))
+        if self.f is None:
+            return
+        alive = self.U > DEAD * U  # what turns while there is no voltage is noise
+        off = np.where(alive, np.abs(self.f / self.base.frequency - 1), 0.0)
+        if off.max() > 0.2:
+            i = int(np.argmax(off))
             raise UserError(
                 f"{self.where}: {self._place(i)}: f = {self.f[i]:g} is more than 20 % off the nominal "
-                f"{self.base.frequency:g} Hz; f must be in Hz and data.frequency the nominal frequency"
+                f"{self.base.frequency:g} Hz at a voltage of {self.U[i]:.3g}; f must be in Hz"
             )
