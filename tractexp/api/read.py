@@ -11,7 +11,7 @@ from tractexp import plugin
 from tractexp.api.arguments import Choice, check_kind, choices, public
 from tractexp.errors import UserError, among
 from tractexp.outcome import Table, Tabulated
-from tractexp.record import Base, Event, Reader, Record, Window, describe, detect
+from tractexp.record import Base, Event, Record, Window, describe, detect, reader_of
 
 REQUIRED, OPTIONAL = ("t", "U", "P", "Q"), ("f", "U2")
 GROUP = "data"
@@ -22,6 +22,12 @@ class Dips(Tabulated, list[Event]):
 
     def __getitem__(self, k: Any) -> Any:
         return Dips(super().__getitem__(k)) if isinstance(k, slice) else super().__getitem__(k)
+
+    def look(self) -> Any:
+        """A look (a `Look`) at the files that the events are from, and at the records that are from none."""
+        from tractexp.api.look import look
+
+        return look(*self)
 
     def table(self) -> Table:
         """One row for each event; below it what a reader or the detection found odd."""
@@ -141,36 +147,20 @@ def _records(source: Any, settings: Mapping[str, Any]) -> Iterator[Record]:
 
 def _file(path: str, settings: Mapping[str, Any]) -> list[Record]:
     """The records of a file, by the reader its ending names, or of a choice of `conf/data`."""
-    read = plugin.build(GROUP, _node(path, settings)).read()
+    read = plugin.build(GROUP, node_of(path, settings)).read()
     return [*read.train, *read.validate]
 
 
-def _node(path: str, settings: Mapping[str, Any]) -> dict[str, Any]:
+def node_of(path: str, settings: Mapping[str, Any]) -> dict[str, Any]:
     """The reader that a path, or a choice of `conf/data`, asks for, with its settings."""
-    if not Path(path).exists() and path in choices(GROUP, files=True):
-        return {**Choice.of(GROUP, path).node, **settings}
+    if not Path(path).exists():
+        shipped = choices(GROUP, files=True)
+        if path in shipped:
+            return {**Choice.of(GROUP, path).node, **settings}
+        if not Path(path).suffix:
+            raise UserError(f"{path} is neither a file with an ending nor a shipped record{among(path, shipped)}")
     cls = reader_of(path)
     return {"name": cls.name, **cls.of(path), **settings}
-
-
-def reader_of(path: str) -> type[Reader]:
-    """The reader of a file, by its ending and, where several share it, by what is inside.
-
-    Raises `UserError` for a folder, and for an ending that no reader takes.
-    """
-    ending = Path(path).suffix.lower()
-    readers: list[Any] = [cls for cls in plugin.discover()[GROUP].values() if ending and ending in cls.endings]
-    if Path(path).is_dir():
-        raise UserError(
-            f"{path} is a folder; give a file of it, or 'tractexp task=survey data.path={path}' for a table"
-        )
-    if not readers and not ending and not Path(path).exists():
-        known = among(path, choices(GROUP, files=True))
-        raise UserError(f"{path} is neither a file with an ending nor a shipped record{known}")
-    if not readers:
-        endings = sorted({e for cls in plugin.discover()[GROUP].values() for e in getattr(cls, "endings", ())})
-        raise UserError(f"{path}: no reader takes files ending in '{ending}'; Endings: {', '.join(endings)}")
-    return next((cls for cls in readers if cls.takes(path)), readers[0])
 
 
 def kept(event: Event) -> dict[str, Any]:
