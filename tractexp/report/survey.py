@@ -20,23 +20,26 @@ LOOKS = """
 body { max-width: 84rem; } th[data-key] { cursor: pointer; user-select: none; } th[data-key]:hover { color: #0058a0; }
 th[aria-sort=ascending]::after { content: " \\25B2"; } th[aria-sort=descending]::after { content: " \\25BC"; }
 td svg { display: block; width: 84px; height: 26px; } td.words { min-width: 6rem; overflow-wrap: anywhere; }
-td.words:last-child { min-width: 16rem; font-size: .8rem; }
+td.words:last-child { min-width: 22rem; font-size: .8rem; }
 tr.worth td:first-child { box-shadow: inset 3px 0 var(--good); }
-td.name { white-space: normal; overflow-wrap: anywhere; min-width: 9rem; max-width: 18rem; }
+td.name { white-space: normal; overflow-wrap: anywhere; min-width: 11rem; max-width: 18rem; }
+td.name span { display: block; color: var(--faint); font-size: .72rem; } td details { margin: .1rem 0; }
 td code { display: block; margin-top: .2rem; font-size: .72rem; white-space: pre-wrap; overflow-wrap: anywhere;
   user-select: all; color: var(--faint); }
-@media print { .sieve, button { display: none; } table { font-size: 6.5pt; } th, td { padding: .15rem .3rem; }
-  .wide { overflow: visible; } td.words:last-child { min-width: 8rem; } td.name { min-width: 5rem; } }
+@page { size: landscape; margin: 10mm; }
+@media print { .sieve, button, td details { display: none; } table { font-size: 6pt; width: 100%; }
+  th, td { padding: .12rem .25rem; } td.words, td.words:last-child, td.name { min-width: 0; font-size: 6pt; }
+  td.name span { font-size: 5pt; } td svg { width: 56px; height: 18px; } }
 """
 COLUMNS = (  # key, heading, kind of cell, digits
-    ("event", "event", "name", 0), ("load", "load", "words", 0), ("kind", "kind", "words", 0),
-    ("U_picture", "U", "picture", 0), ("P_picture", "P", "picture", 0), ("when", "when", "words", 0),
-    ("start", "starts [s]", "number", 3), ("duration", "lasts [ms]", "milli", 0), ("depth", "depth [%]", "share", 1),
-    ("U2", "U2 [%]", "share", 1), ("jump", "jump [deg]", "number", 1), ("P_before", "P before [MW]", "figure", 4),
-    ("P_after", "P after", "figure", 4), ("Q_before", "Q before [Mvar]", "figure", 4),
-    ("Q_after", "Q after", "figure", 4), ("noise", "noise [% of P]", "share", 2), ("rate", "rate [Hz]", "figure", 5),
-    ("why", "worth fitting?", "why", 0),
+    ("event", "event", "name", 0), ("U_picture", "U", "picture", 0), ("P_picture", "P", "picture", 0),
+    ("kind", "kind", "words", 0), ("depth", "depth [%]", "share", 1), ("duration", "lasts [ms]", "milli", 0),
+    ("worth", "fit", "yes", 0), ("P", "P [MW]", "pair", 4), ("Q", "Q [Mvar]", "pair", 4),
+    ("U2", "U2 [%]", "share", 1), ("jump", "jump [deg]", "number", 1), ("noise", "noise [% of P]", "share", 2),
+    ("load", "load", "words", 0), ("start", "starts [s]", "number", 3), ("when", "when", "words", 0),
+    ("rate", "rate [Hz]", "figure", 5), ("why", "why", "why", 0),
 )  # fmt: skip
+KEPT = ("file", "station", "P_before", "P_after", "Q_before", "Q_after", "command")  # of a row, beside the columns
 WORK = """
 const {columns, rows, atOnce, colors} = JSON.parse(document.getElementById("rows").textContent);
 const $ = id => document.getElementById(id);
@@ -58,9 +61,20 @@ const picture = (values, color) => {
 const cell = (row, [name, , kind, digits]) => {
   const value = row[name];
   if (kind === "picture") return `<td>${picture(value, colors[name])}</td>`;
-  if (kind === "name") return `<td class="name">${safe(value || row.file)}</td>`;
-  if (kind === "why") return `<td class="words">${row.worth ? "yes: " : row.event ? "no: " : ""}${safe(row.why || "")}`
-    + (row.command ? `<code>${safe(row.command)}</code>` : "") + "</td>";
+  if (kind === "name") {
+    const whole = value || row.file, cut = whole.lastIndexOf("/") + 1;
+    return `<td class="name"><span>${safe(whole.slice(0, cut))}</span>${safe(whole.slice(cut))}</td>`;
+  }
+  if (kind === "why") {
+    const command = row.command ? `<details><summary>command</summary><code>${safe(row.command)}</code></details>` : "";
+    return `<td class="words">${safe(row.why || "")}${command}</td>`;
+  }
+  if (kind === "yes") return `<td>${value ? "yes" : row.event ? "no" : ""}</td>`;
+  if (kind === "pair") {
+    const figure = v => v === null ? "?" : v && Math.abs(v) < 1e-3 ? v.toExponential(1) : Number(v.toPrecision(digits));
+    const [before, after] = [row[`${name}_before`], row[`${name}_after`]];
+    return `<td>${before === null && after === null ? "" : `${figure(before)} \u2192 ${figure(after)}`}</td>`;
+  }
   if (kind === "words") return `<td class="words">${safe(value ?? "")}</td>`;
   if (value === null || value === undefined) return "<td></td>";
   if (kind === "figure") return `<td>${Number(value.toPrecision(digits))}</td>`;
@@ -109,8 +123,8 @@ sift();
 
 def page(path: Path, content: Mapping[str, Any]) -> Path:
     """Write the page; returns its path."""
-    rows = [{key: row[key] for key in (*(c[0] for c in COLUMNS), "file", "station", "worth", "command")}
-            for row in content["rows"]]  # fmt: skip
+    keys = [key for key in (*(c[0] for c in COLUMNS), *KEPT) if key not in ("P", "Q")]
+    rows = [{key: row[key] for key in keys} for row in content["rows"]]
     data = {
         "columns": COLUMNS, "rows": rows, "atOnce": AT_ONCE, "colors": {"U_picture": VOLTAGE, "P_picture": ACTIVE},
     }  # fmt: skip
