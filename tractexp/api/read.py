@@ -11,7 +11,7 @@ from tractexp import plugin
 from tractexp.api.arguments import Choice, check_kind, choices, public
 from tractexp.errors import UserError, among
 from tractexp.outcome import Table, Tabulated
-from tractexp.record import Base, Event, Record, describe, detect, reader_of
+from tractexp.record import Base, Event, Record, Window, describe, detect, reader_of
 
 REQUIRED, OPTIONAL = ("t", "U", "P", "Q"), ("f", "U2")
 GROUP = "data"
@@ -165,11 +165,16 @@ def node_of(path: str, settings: Mapping[str, Any]) -> dict[str, Any]:
 
 def kept(event: Event) -> dict[str, Any]:
     """A record as plain data, as a saved result holds it."""
-    return {f.name: getattr(event.record, f.name) for f in fields(Record)} | {"base": asdict(event.record.base)}
+    record = event.record
+    plain = {"base": asdict(record.base), "window": record.window and record.window.to_dict(), "more": {**record.more}}
+    return {f.name: getattr(record, f.name) for f in fields(Record)} | plain
 
 
 def again(content: Mapping[str, Any]) -> Event:
     """The event of what `kept` told; its dip is found again."""
     arrays: Any = {k: np.array(content[k], dtype=float) for k in (*REQUIRED, *OPTIONAL) if content[k] is not None}
     base, notes = Base(**content["base"]), tuple(content["notes"])
-    return detect(Record(content["name"], base=base, source=content["source"], notes=notes, **arrays))
+    window = Window.of(content["window"]) if content.get("window") else None
+    more = {name: np.array(values, dtype=float) for name, values in content.get("more", {}).items()}
+    made = Record(content["name"], base=base, source=content["source"], notes=notes, window=window, more=more, **arrays)
+    return detect(made)

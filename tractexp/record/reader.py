@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 from tractexp.errors import UserError
 from tractexp.plugin import Plugin, discover
+from tractexp.record import foreign
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,8 @@ def reader_of(path: str) -> type[Any]:
             f"{path} is a folder; give a file of it, or 'tractexp task=survey data.path={path}' for a table"
         )
     if not readers:
-        raise UserError(f"{path}: no reader takes files ending in '{ending}'; Endings: {', '.join(endings())}")
+        told = foreign.sentence(path) or f"{path}: no reader takes files ending in '{ending}'"
+        raise UserError(f"{told}; endings that can be read: {', '.join(endings())}")
     return next((cls for cls in readers if cls.takes(path)), readers[0])
 
 

@@ -1,5 +1,7 @@
 """Files as instruments recorded them: channels, how they are connected, what happened in them."""
 
+from tractexp.recording.arrangement import arranged as arranged
+from tractexp.recording.arrangement import tuned as tuned
 from tractexp.recording.connection import Connection as Connection
 from tractexp.recording.estimator import Estimator as Estimator
 from tractexp.recording.feeder import Feeder as Feeder

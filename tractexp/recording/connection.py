@@ -7,14 +7,21 @@ import numpy as np
 
 from tractexp.plugin import Plugin
 
+SINGLE = (
+    "a single-phase load: U is its own voltage, P + jQ = V I* of the fundamental; static loads and converters' effects "
+    "apply as they stand, but the models' motors are three-phase on balanced voltages: here they are equivalents, "
+    "whose parameters are those of no machine"
+)
+
 
 class Connection(Plugin):
-    """Base of the connections, chosen by `data.connection=NAME`. Linear and without memory: one matrix per side."""
+    """Base of the connections, chosen by `data.connection=NAME`, or by name and settings.
+
+    Linear and without memory: one matrix for the voltages, one for the currents.
+    """
 
     group: ClassVar[str] = "connection"
     chosen: ClassVar[bool] = False
-    voltages: ClassVar[int] = 3  # channels it takes
-    currents: ClassVar[int] = 3
 
     @abstractmethod
     def voltage(self) -> np.ndarray:
@@ -23,3 +30,18 @@ class Connection(Plugin):
     @abstractmethod
     def current(self) -> np.ndarray:
         """(K, currents): the load's currents from those recorded."""
+
+    @property
+    def voltages(self) -> int:
+        """How many voltage channels it takes."""
+        return self.voltage().shape[1]
+
+    @property
+    def currents(self) -> int:
+        """How many current channels it takes."""
+        return self.current().shape[1]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is said with every record that is connected so, one sentence each."""
+        return (SINGLE,) if len(self.voltage()) == 1 else ()

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
@@ -25,10 +26,11 @@ class Feeder:
 
     voltages: tuple[int, ...]
     currents: tuple[int, ...]
-    connection: str = "three_phase"  # name of the plugin that makes phase quantities of them
+    connection: Any = "three_phase"  # the plugin that makes phase quantities of them: a name, or name and settings
     reverse_current: bool = False  # the recorder counts current out of the load as positive
     name: str = ""
     why: tuple[str, ...] = ()  # what it was recognised by, and what was changed in the order given, one sentence each
+    loaded: bool = True
 
 
 def propose(recording: Recording) -> list[Feeder]:
@@ -50,8 +52,7 @@ def propose(recording: Recording) -> list[Feeder]:
     feeders += _single(recording, seen, volts, amps, [*buses, *loads])
     feeders = _kirchhoff(seen, feeders)
     level = max((_size(seen, f.currents) for f in feeders), default=0.0)
-    marked = [_marked(recording, seen, feeder, level) for feeder in feeders]
-    return [f for f, loaded in marked if loaded] + [f for f, loaded in marked if not loaded]
+    return sorted((_marked(recording, seen, feeder, level) for feeder in feeders), key=lambda f: not f.loaded)
 
 
 def _groups(recording: Recording, seen: Snapshots, numbers: Sequence[int]) -> list[Group]:
@@ -243,12 +244,12 @@ def _said(feeders: list[Feeder], loaded: list[int], signs: np.ndarray, closes: f
     return made
 
 
-def _marked(recording: Recording, seen: Snapshots, feeder: Feeder, level: float) -> tuple[Feeder, bool]:
-    """The feeder with a word on its load, and whether it carries any."""
+def _marked(recording: Recording, seen: Snapshots, feeder: Feeder, level: float) -> Feeder:
+    """The feeder with a word on its load where it carries none."""
     size = _size(seen, feeder.currents)
     step = max(abs(c.gain * c.ratio * c.factor) for c in (recording.channels[i] for i in feeder.currents))
     integral = all(recording.channels[i].raw.dtype.kind in "iu" for i in feeder.currents)
     if size > UNLOADED * level and not (integral and size < STEPS_LOADED * step):
-        return feeder, True
+        return feeder
     said = f"unloaded: {1000 * size:.3g} A where the greatest current of the file is {1000 * level:.3g} A"
-    return replace(feeder, why=(*feeder.why, said)), False
+    return replace(feeder, why=(*feeder.why, said), loaded=False)

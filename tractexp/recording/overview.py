@@ -135,7 +135,7 @@ def sight(reader: WaveformReader, recording: Recording, feeder: Feeder) -> Sight
             continue
         phasors.append(measured)
         found += happenings(waves, segment.rate, segment.start, recording.frequency, measured)
-    seen = _numbered(reader, phasors, recording.frequency, found)
+    seen = _numbered(reader, feeder, phasors, recording.frequency, found)
     return replace(made, phasors=tuple(phasors), seen=tuple(seen), said=tuple(said))
 
 
@@ -154,13 +154,17 @@ def sight_of(record: Record, settings: Mapping[str, Any]) -> Sight:
 
 
 def _numbered(
-    reader: WaveformReader, phasors: Sequence[Phasors], frequency: float, found: Sequence[Happening]
+    reader: WaveformReader,
+    feeder: Feeder,
+    phasors: Sequence[Phasors],
+    frequency: float,
+    found: Sequence[Happening],
 ) -> Iterator[Seen]:
     """What happened, with the dip that the reader makes of it."""
     refused, dips, tried = "", [], {}
     try:
         if phasors:
-            dips, tried = reader.numbered(phasors, frequency)
+            dips, tried = reader.numbered(feeder, phasors, frequency)
     except UserError as error:
         refused = str(error)
     numbers = _numbers(found, dips)

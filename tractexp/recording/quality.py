@@ -50,7 +50,7 @@ def quality(recording: Recording, number: int, segment: Segment) -> Quality:
     colour = _colour(lag, count, noise, step)
     return Quality(
         segment.rate, jitter, gaps, clipped, offset, step, float(np.log2(span / step + 1)) if step > 0 else 0.0,
-        level, noise, lag, colour, thd, _fit(segment, f, channel, gaps, clipped, level, noise, step),
+        level, noise, lag, colour, thd, _fit(segment, f, channel.form, gaps, clipped, level, max(noise, step)),
     )  # fmt: skip
 
 
@@ -148,15 +148,14 @@ def _quiet(x: np.ndarray, rate: float, f: float | None) -> tuple[float, float, f
 
 
 def _quietest(x: np.ndarray, n: int, cycle: int) -> int:
-    """First sample of the span of n in which the wave repeats best from one cycle to the next, among those alive."""
+    """First sample of the span of n in which the wave repeats best from one cycle to the next, for its energy."""
     if len(x) <= n + cycle:
         return 0
     change = np.nan_to_num((x[cycle:] - x[:-cycle]) ** 2, nan=np.inf)
-    energy = np.nan_to_num(x[:-cycle] ** 2)
     starts = np.arange(0, len(change) - n + 1, max(cycle, 1))
-    total = np.array([[change[s : s + n].sum(), energy[s : s + n].sum()] for s in starts])
-    alive = total[:, 1] >= 0.25 * total[:, 1].max()
-    return int(starts[alive][np.argmin(total[alive, 0])])
+    energy = np.array([n * np.nan_to_num(x[s : s + n]).var() for s in starts])
+    changed = np.array([change[s : s + n].sum() for s in starts])
+    return int(starts[np.argmin(np.where(energy > 0, changed / np.maximum(energy, 1e-300), np.inf))])
 
 
 def _colour(lag: float, count: int, noise: float, step: float) -> str:
@@ -168,24 +167,15 @@ def _colour(lag: float, count: int, noise: float, step: float) -> str:
     return "coloured" if lag > 0 else "blue"
 
 
-def _fit(
-    segment: Segment,
-    f: float | None,
-    channel: Channel,
-    gaps: int,
-    clipped: float,
-    level: float,
-    noise: float,
-    step: float,
-) -> str:
+def _fit(segment: Segment, f: float | None, form: str, gaps: int, clipped: float, level: float, noise: float) -> str:
     """What the channel is fit for, one sentence."""
-    if channel.form != "waveform":
-        return f"holds {channel.form} values, no waveform: fit for what they say, not for phasors"
+    if form != "waveform":
+        return f"holds {form} values, no waveform: fit for what they say, not for phasors"
     if f is None or segment.rate < FEWEST_PER_CYCLE * f:
         return f"{segment.rate:g} Hz is no waveform: fit for magnitudes only"
     if not np.isfinite(level):
         return "too short, or with too many gaps, for anything to be told"
-    if level <= max(2 * noise, 2 * step):
+    if level <= 2 * noise:
         return "carries no more than noise or rounding: no signal to fit"
     if gaps:
         return f"{gaps} gaps: fit for phasors where there are none"
