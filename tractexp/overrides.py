@@ -38,6 +38,8 @@ def assigned(key: str, value: object) -> str:
 
 
 def _plain(value: object) -> str:
+    if isinstance(value, Mapping):
+        return f"{{{','.join(f'{key}:{_plain(inner)}' for key, inner in value.items())}}}"
     if isinstance(value, str):
         return value if PLAIN.fullmatch(value) else _quoted(value)
     return "null" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
