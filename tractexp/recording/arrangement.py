@@ -8,13 +8,15 @@ other one, never silently changed, because two orders can both look plausible wh
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations
+from typing import Any
 
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.plugin import build
+from tractexp.plugin import chosen
 from tractexp.record.direction import direction
 from tractexp.record.phasor import sequences
+from tractexp.recording.connection import usual
 from tractexp.recording.feeder import Feeder
 from tractexp.recording.label import groups, kind, order
 from tractexp.recording.recording import Recording
@@ -65,18 +67,18 @@ def arranged(recording: Recording, feeder: Feeder) -> Feeder:
     Raises `UserError` where the order given makes no sense and another does, which is proposed with its P and Q.
     """
     feeder = _lines_by_label(recording, feeder)
-    connection = build("connection", {"name": feeder.connection})
+    connection = chosen("connection", feeder.connection)
     seen = _seen(recording, feeder)
     if seen is None:
         _labels(recording, feeder, None)
         return replace(feeder, why=(*feeder.why, "the order of the channels cannot be checked: nothing is alive"))
     if len(seen.V) < 3:
         return _directed(feeder, seen)
-    if feeder.connection == "three_phase" and (told := _lines_by_shape(recording, feeder, seen)):
-        feeder = replace(feeder, connection="line_voltages", why=(*feeder.why, told))
+    if _to_ground(feeder) and (told := _lines_by_shape(recording, feeder, seen)):
+        feeder = replace(feeder, connection=_between(feeder), why=(*feeder.why, told))
         seen = _seen(recording, feeder) or seen
     _voltages(recording, feeder, seen)
-    if connection.currents == 3 and feeder.connection in ("three_phase", "line_voltages", "two_line_voltages"):
+    if connection.currents == 3 == len(seen.V):
         _labels(recording, feeder, seen)
         _currents(recording, feeder, seen)
     return _directed(feeder, seen)
@@ -85,12 +87,22 @@ def arranged(recording: Recording, feeder: Feeder) -> Feeder:
 def _lines_by_label(recording: Recording, feeder: Feeder) -> Feeder:
     """Voltages that their labels call line to line, put in the order AB, BC, CA."""
     told = order([recording.channels[i] for i in feeder.voltages]) if len(feeder.voltages) == 3 else None
-    if feeder.connection != "three_phase" or told is None or not told[1]:
+    if not _to_ground(feeder) or told is None or not told[1]:
         return feeder
     voltages = tuple(feeder.voltages[told[0].index(k)] for k in range(3))
     names = ", ".join(f"'{recording.channels[i].name}'" for i in voltages)
-    why = f"the voltages {names} are line to line, as their labels say: data.connection=line_voltages is used"
-    return replace(feeder, voltages=voltages, connection="line_voltages", why=(*feeder.why, why))
+    why = f"the voltages {names} are line to line, as their labels say: data.connection={_between(feeder)} is used"
+    return replace(feeder, voltages=voltages, connection=_between(feeder), why=(*feeder.why, why))
+
+
+def _to_ground(feeder: Feeder) -> bool:
+    """Whether three voltages are taken as they stand, to ground."""
+    return len(feeder.voltages) == 3 and feeder.connection == usual(3, len(feeder.currents))
+
+
+def _between(feeder: Feeder) -> Any:
+    """The connection of the same channels with the voltages between phases."""
+    return usual(len(feeder.voltages), len(feeder.currents), lines=True)
 
 
 def _seen(recording: Recording, feeder: Feeder) -> _Seen | None:
@@ -99,7 +111,7 @@ def _seen(recording: Recording, feeder: Feeder) -> _Seen | None:
     made = snapshots(recording, numbers, frequency(recording, feeder.voltages))
     if made is None:
         return None
-    connection = build("connection", {"name": feeder.connection})
+    connection = chosen("connection", feeder.connection)
     V = connection.voltage() @ made.of(feeder.voltages)
     I = connection.current() @ made.of(feeder.currents) * (-1 if feeder.reverse_current else 1)
     known = np.isfinite(V).all(axis=0) & np.isfinite(I).all(axis=0)
@@ -111,7 +123,7 @@ def _seen(recording: Recording, feeder: Feeder) -> _Seen | None:
     if not alive.any():
         return None
     V, I, size = V[:, alive], I[:, alive], size[alive]
-    calm = np.abs(size / np.median(size) - 1) < CALM
+    calm = np.abs(size / np.quantile(size, 0.5, method="lower") - 1) < CALM  # a level that is there: never empty
     if len(V) == 3:
         small, large = np.sort(np.abs(sequences(V)), axis=0)  # whatever the order is
         calm = even if (even := calm & (small < UNBALANCED * large)).any() else calm
@@ -124,7 +136,7 @@ def _zero(x: np.ndarray) -> np.ndarray:
 
 def _lines_by_shape(recording: Recording, feeder: Feeder, seen: _Seen) -> str:
     """Why three voltages must be line to line though no label says so; "" where nothing shows it."""
-    used = "they are line to line, and data.connection=line_voltages is used"
+    used = f"they are line to line, and data.connection={_between(feeder)} is used"
     V1, V2 = (np.abs(x) for x in sequences(seen.V))
     I0, I1 = _zero(seen.I), np.median(np.abs(sequences(seen.I)[0])[seen.calm])
     fault = (V2 > UNBALANCED * V1) & (I0 > EARTH * I1) & (5 * np.median(I0[seen.calm]) < I0)
@@ -156,7 +168,7 @@ def _voltages(recording: Recording, feeder: Feeder, seen: _Seen) -> None:
     V1, V2 = (float(np.median(np.abs(x)[seen.calm])) for x in sequences(seen.V))
     if V2 <= V1:
         return
-    if feeder.connection == "three_phase" and (k := _turned(seen.V[:, seen.calm])) is not None:
+    if _to_ground(feeder) and (k := _turned(seen.V[:, seen.calm])) is not None:
         raise UserError(f"data.voltages={[*feeder.voltages]}: {_called(recording, feeder.voltages[k])} {TURNED}")
     raise UserError(
         f"data.voltages={[*feeder.voltages]}: the phases are not in the order a, b, c: while alive, the negative "
@@ -206,8 +218,8 @@ def _labels(recording: Recording, feeder: Feeder, seen: _Seen | None) -> None:
         S, T = _power(seen, (0, 1, 2)), _power(seen, tuple(feeder.currents.index(i) for i in labelled))
         both = f", which gives {_mw(T)} where the order given has {_mw(S)}"
     raise UserError(
-        f"data.currents are the phases {_letters(c)} where data.voltages are {_letters(v)}, says {recording.source}; give "
-        f"both in the same order: {_said(None, labelled)}{both}"
+        f"data.currents are the phases {_letters(c)} where data.voltages are {_letters(v)}, says {recording.source}; "
+        f"give both in the same order: {_said(None, labelled)}{both}"
     )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.record.phasor import TURN
+from tractexp.recording.connection import usual
 from tractexp.recording.label import Group, groups, kind, residual, words
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import Snapshots, frequency, nearest_nominal, snapshots
@@ -26,7 +27,7 @@ class Feeder:
 
     voltages: tuple[int, ...]
     currents: tuple[int, ...]
-    connection: Any = "three_phase"  # the plugin that makes phase quantities of them: a name, or name and settings
+    connection: Any  # the plugin that makes phase quantities of them: a name, or name and settings
     reverse_current: bool = False  # the recorder counts current out of the load as positive
     name: str = ""
     why: tuple[str, ...] = ()  # what it was recognised by, and what was changed in the order given, one sentence each
@@ -102,9 +103,7 @@ def _fits(load: Group, buses: Sequence[Group]) -> bool:
 
 def _feeder(recording: Recording, seen: Snapshots, load: Group, buses: Sequence[Group]) -> Feeder:
     bus, why = _bus(recording, seen, load, buses)
-    connection = "aron" if len(load.numbers) == 2 else "three_phase"
-    if bus.pairs:
-        connection = "line_voltages" if len(bus.numbers) == 3 else "two_line_voltages"
+    connection = usual(len(bus.numbers), len(load.numbers), bus.pairs)
     said = [
         f"currents {_names(recording, load.numbers)}: {_by(load)}",
         f"voltages {_names(recording, bus.numbers)}: {why}",
@@ -195,7 +194,7 @@ def _single(
         group = Group((i,), False, recording.channels[i].name.strip(), False)
         bus, why = _bus(recording, seen, group, [Group((v,), False, "", False) for v in free])
         said = (f"one current {_names(recording, [i])}", f"one voltage {_names(recording, bus.numbers)}: {why}")
-        made.append(Feeder(bus.numbers, (i,), "single_phase", name=group.name, why=said))
+        made.append(Feeder(bus.numbers, (i,), usual(1, 1), name=group.name, why=said))
     return made
 
 
