@@ -1,8 +1,8 @@
 """Files a second of a survey: `python benchmarks/survey.py [files]` writes benchmarks/survey.json.
 
-The archive is generated: COMTRADE files of 1 s, of 6 to 12 channels at 3.2 to 4 kHz, binary and ASCII, with one dip each.
-Wall seconds are those of the whole call on two processes, their start included; CPU seconds are those of the whole tree
-of processes, so they hold on a shared machine too.
+The archive is generated: COMTRADE files of 1 s, of 6 to 12 channels at 3.2 to 4 kHz, binary and ASCII, with one dip
+each. Wall seconds are those of the whole call on two processes, their start included; CPU seconds are those of the
+whole tree of processes, so they hold on a shared machine too.
 """
 
 import json

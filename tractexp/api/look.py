@@ -265,7 +265,8 @@ def _feeder(view: View, shown: Sight) -> dict[str, Any]:
     made: dict[str, Any] = {"name": shown.name}
     if feeder is not None:
         made |= {
-            "connection": _name(feeder.connection), "voltages": list(feeder.voltages), "currents": list(feeder.currents),
+            "connection": _name(feeder.connection), "voltages": list(feeder.voltages),
+            "currents": list(feeder.currents),
             "channels": [names[i] for i in (*feeder.voltages, *feeder.currents)],
             "reverse_current": feeder.reverse_current, "why": list(feeder.why),
         }  # fmt: skip

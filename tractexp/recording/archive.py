@@ -3,11 +3,12 @@
 import functools
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from tractexp.errors import UserError, nearest
 from tractexp.record import Record, endings, reader_of
+from tractexp.record.foreign import is_record
 from tractexp.recording.overview import Seen, Sight, View, view_of
 from tractexp.recording.reader import WaveformReader
 
@@ -19,28 +20,38 @@ RUN = ".hydra"  # a folder that holds it is that of a run: what lies there was w
 
 
 def files(folder: Path) -> Iterator[Path]:
-    """The files below a folder that a reader takes, in order of name; hidden ones and those of runs are left out.
+    """The records below a folder, in order of name; hidden files and those of runs are left out.
 
     Raises `UserError` where there is no such folder.
     """
     if not folder.is_dir():
         kind = "a file; give the folder it lies in" if folder.exists() else "no folder that is there"
         raise UserError(f"data.path={folder} is {kind}")
-    known = tuple(endings())
+    known = endings()
     for place, below, names in os.walk(folder):
         if RUN in below:
             below.clear()
             continue
         below[:] = sorted(name for name in below if not name.startswith("."))
+        beside = {name.lower() for name in names}
         for name in sorted(names):
-            if name.lower().endswith(known) and not name.startswith(".") and not _prose(Path(place, name)):
+            if not name.startswith(".") and _wanted(Path(place, name), known, beside):
                 yield Path(place, name)
+
+
+def _wanted(path: Path, known: Collection[str], beside: Collection[str]) -> bool:
+    """Whether a file is looked at: it can be read, or is a record of another format; what belongs to one is not."""
+    if path.suffix.lower() not in known:
+        return is_record(path)
+    cls = reader_of(str(path))
+    if not issubclass(cls, WaveformReader):
+        return not _prose(path)
+    before = cls.endings[: cls.endings.index(path.suffix.lower())]  # of the parts of one record the first is read
+    return not any(path.with_suffix(ending).name.lower() in beside for ending in before)
 
 
 def _prose(path: Path) -> bool:
     """Whether a file that would be read as a table holds words: not one row of numbers at its beginning."""
-    if issubclass(reader_of(str(path)), WaveformReader):
-        return False
     try:
         with path.open("rb") as file:
             head = file.read(BEGINNING)

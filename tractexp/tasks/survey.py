@@ -48,16 +48,12 @@ class Survey(Task):
             survey, node["path"], informative=self.informative, model=job.config["model"], values=self.values,
             cores=self.cores, keep=job.folder,
         )  # fmt: skip
-        tell(made)
-        paths = made.write(job.folder)
         if made.informative:
             model = [f"{key}={value}" for key, value in job.given.items() if key.partition(".")[0] == "model"]
             data = {"name": node["name"], "path": node["path"], "train": made.informative}
-            say("most informative together, the best first:")
-            for each in made.content["informative"]:
-                say(f"  {each['event']}: intervals narrower by {each['gain']:.0%}")
-            say("to fit them together:")
-            say(f"  {typed(data, *model)}")
+            made = type(made)({**made.content, "command": typed(data, *model)})
+        tell(made)
+        paths = made.write(job.folder)
         listed(paths)
         rows = made.content["rows"]
         job.log(
@@ -67,7 +63,7 @@ class Survey(Task):
 
 
 def tell(made: "Surveyed") -> None:
-    """Print what is in the archive, and what cannot be read."""
+    """Print what is in the archive, what cannot be read, and the events that tell most where they were asked for."""
     told = made.table()
     looked, whole = made.content["looked_at"], made.content["files"]
     say(f"{whole} files in {made.folder}, {looked} of them new or changed")
@@ -76,3 +72,11 @@ def tell(made: "Surveyed") -> None:
         say(f"  not read: {row['why'] if row['file'] in row['why'] else row['file'] + ': ' + row['why']}")
     if len(made.unread) > 10:
         say(f"  and {len(made.unread) - 10} more, in the table")
+    if not made.informative:
+        return
+    say("most informative together, the best first:")
+    for k, each in enumerate(made.content["informative"]):
+        more = f", which narrows the intervals by {each['gain']:.0%}" if k else ""
+        say(f"  {each['event']}{more}")
+    say("to fit them together:")
+    say(f"  {made.command}")
