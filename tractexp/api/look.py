@@ -286,7 +286,7 @@ def _name(connection: Any) -> str:
 def command(view: View, shown: Sight) -> str:
     """What is to be typed to fit the events of a load that are worth it; "" where none is."""
     choice = shown.choice()
-    return typed({**view.node, **choice}) if choice and view.node else ""
+    return typed({**view.node, **choice}) if choice is not None and view.node else ""
 
 
 def _sums(shown: Sight) -> dict[str, Any]:
