@@ -6,7 +6,7 @@ import shlex
 
 import numpy as np
 import pytest
-from recordings import BASE, RATE, constant, motor_dip, recording, waves
+from recordings import BASE, RATE, constant, recording, waves
 from test_cli import tractexp as command_line
 
 import tractexp
