@@ -105,7 +105,8 @@ def _record(folder: Path, name: str, where: str, see: "functools._lru_cache_wrap
         raise UserError(f"{where}: there is no file '{path.relative_to(folder)}' in {folder}{nearest(name, there)}")
     view = see(path)
     if not 1 <= load <= len(view.sights):
-        raise UserError(f"{where}: {name}: {path} shows {len(view.sights)} loads, counted from 1")
+        loads = f"{len(view.sights)} load{'s' * (len(view.sights) != 1)}"
+        raise UserError(f"{where}: {name}: {path} shows {loads}, and there is no load {load}; the first is 1")
     seen = _seen(view.sights[load - 1], dip, f"{where}: {name}")
     assert seen.event is not None
     made = seen.event.record

@@ -55,7 +55,7 @@ class Sight:
         return [s.dip for s in self.seen if s.worth and s.dip is not None]
 
     def choice(self) -> dict[str, Any] | None:
-        """The reader's settings that fit what is worth it, the first dip, the others held out; None where nothing is."""
+        """The reader's settings that fit what is worth it, first dip first, others held out; None where nothing is."""
         if not any(s.worth for s in self.seen):
             return None
         return {**self.settings, **({"train": self.dips[:1], "validate": self.dips[1:]} if self.dips else {})}
