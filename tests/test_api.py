@@ -262,7 +262,7 @@ REFUSED = {
     "tibet_5pct is neither a file with an ending nor": lambda d: tractexp.read("tibet_5pct"),
     "has no setting 'voltages'": lambda d: tractexp.read("tibet_50pct", voltages=[1, 2, 3]),
     "arrays: Q missing; t, U, P, Q are needed": lambda d: tractexp.read(t=T, U=T, P=T),
-    "arrays: P is no column of numbers": lambda d: tractexp.read(t=T, U=T, P=["a"] * 100, Q=T),
+    "arrays: P holds 'a' at sample 1, which is no number": lambda d: tractexp.read(t=T, U=T, P=["a"] * 100, Q=T),
     "U has shape (99,) where t has 100 samples": lambda d: tractexp.read(t=T, U=T[1:], P=T, Q=T),
     "values.T_prim: this model has no parameter 'T_prim'": lambda d: tractexp.simulate(None, {"T_prim": 1}, depth=0),
     "no value for T_prime": lambda d: tractexp.simulate(depth=0.3),

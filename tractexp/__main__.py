@@ -11,8 +11,6 @@ for library in ("OPENBLAS", "OMP", "MKL"):
 
 from tractexp.errors import UserError  # noqa: E402
 
-# settings that take names of their own
-OPEN = ("model.bounds.", "model.fixed.", "task.values", "task.criteria.", "hydra.sweeper.comparison.")
 UNLOGGED = (
     "-",
     "tracking.enabled=",
@@ -67,13 +65,14 @@ def _run() -> int:
 
     from tractexp.choices import CONF
     from tractexp.config import register
+    from tractexp.overrides import override
     from tractexp.provenance import started
     from tractexp.refusal import explained
 
     register()
     started(sys.argv[1:])
     os.environ[FULL_ERROR] = "1"  # let exceptions through: they are told below, in one sentence
-    sys.argv[1:] = map(opened, sys.argv[1:])
+    sys.argv[1:] = map(override, sys.argv[1:])
     refusals: list[UserError] = []
 
     @hydra.main(version_base="1.3", config_path=str(CONF), config_name="config")
@@ -94,11 +93,6 @@ def _run() -> int:
     for error in refusals:
         raise error
     return 0
-
-
-def opened(argument: str) -> str:
-    """Let `model.bounds.C=[0.5,0.9]` add the entry it names: Hydra would ask for a plus sign."""
-    return f"++{argument}" if argument.startswith(OPEN) else argument
 
 
 if __name__ == "__main__":

@@ -242,3 +242,12 @@ def build(group: str, settings: Mapping[str, Any]) -> Any:
     made = cls(**chosen)
     made.check()
     return made
+
+
+def chosen(group: str, given: Any) -> Any:
+    """The plugin of a setting that is a name, or a mapping of `name` and settings."""
+    if isinstance(given, str):
+        return build(group, {"name": given})
+    if not isinstance(given, Mapping) or "name" not in given:
+        raise UserError(f"data.{group}={given!r:.60} must be a name, or a mapping of 'name' and settings")
+    return build(group, given)

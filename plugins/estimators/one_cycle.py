@@ -3,7 +3,7 @@
 import numpy as np
 
 from tractexp.plugin import plugin
-from tractexp.record.phasor import fundamental
+from tractexp.record.phasor import Averager, one_cycle
 from tractexp.recording import Estimator
 
 
@@ -14,14 +14,16 @@ class OneCycle(Estimator):
         min over X of the sum over the window of (x - sqrt(2) Re(X e^{j phi}))^2
 
     Its two end samples are weighted by what is left over of the cycle, so that the window is one cycle long to a
-    fraction of a sample.
+    fraction of a sample, and harmonics vanish at any frequency.
 
     Source: Phadke and Thorp 2008, Synchronized Phasor Measurements, section 2.4 (weighted least squares).
     """
 
-    def phasors(self, waves: np.ndarray, rate: float, frequency: np.ndarray) -> tuple[slice, np.ndarray]:
-        return fundamental(waves, rate, frequency)
+    def half(self, nominal: float) -> float:
+        return 0.5 / nominal
 
-    def window(self, nominal: float) -> tuple[np.ndarray, np.ndarray]:
-        at = (np.arange(20) - 9.5) / 20 / nominal
-        return np.full(20, 1 / 20), at
+    def weight(self, at: np.ndarray, nominal: float) -> np.ndarray:
+        return np.ones(len(at))
+
+    def averager(self, rate: float, nominal: float) -> Averager:
+        return one_cycle(rate, nominal)

@@ -1,6 +1,6 @@
 """Events from files, frames and arrays, with their dips found."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from tractexp import plugin
 from tractexp.api.arguments import Choice, check_kind, choices, public
 from tractexp.errors import UserError, among
 from tractexp.outcome import Table, Tabulated
-from tractexp.record import Base, Event, Record, describe, detect
+from tractexp.record import Base, Event, Reader, Record, describe, detect
 
 REQUIRED, OPTIONAL = ("t", "U", "P", "Q"), ("f", "U2")
 GROUP = "data"
@@ -106,9 +106,22 @@ def table(columns: Mapping[str, Any], name: str, settings: Mapping[str, Any]) ->
 
 def _array(values: Any, where: str) -> np.ndarray:
     try:
-        return np.array(values, dtype=float).reshape(len(values))
+        made = np.array(values, dtype=float)
     except (TypeError, ValueError) as error:
-        raise UserError(f"{where} is no column of numbers: {error}") from error
+        raise UserError(f"{where} holds {_odd(values)}, which is no number; give numbers, nan for a gap") from error
+    if made.ndim != 1:
+        raise UserError(f"{where} has shape {made.shape}; one number per sample, (N,), is needed")
+    return made
+
+
+def _odd(values: Any) -> str:
+    """The first value that is no number, and where it stands."""
+    for k, value in enumerate(values if isinstance(values, Iterable) else [values]):
+        try:
+            float(value)
+        except (TypeError, ValueError):
+            return f"{value!r:.40} at sample {k + 1}"
+    return f"a {type(values).__name__}"
 
 
 def _records(source: Any, settings: Mapping[str, Any]) -> Iterator[Record]:
@@ -128,22 +141,36 @@ def _records(source: Any, settings: Mapping[str, Any]) -> Iterator[Record]:
 
 def _file(path: str, settings: Mapping[str, Any]) -> list[Record]:
     """The records of a file, by the reader its ending names, or of a choice of `conf/data`."""
-    readers = {ending: cls for cls in _readers() for ending in cls.endings}
-    ending = Path(path).suffix.lower()
-    if ending in readers:
-        node = {"name": readers[ending].name, **readers[ending].of(path), **settings}
-    elif ending or Path(path).exists():
-        raise UserError(f"{path}: no reader takes files ending in '{ending}'; Endings: {', '.join(sorted(readers))}")
-    elif path in (shipped := choices(GROUP, files=True)):
-        node = {**Choice.of(GROUP, path).node, **settings}
-    else:
-        raise UserError(f"{path} is neither a file with an ending nor a shipped record{among(path, shipped)}")
-    read = plugin.build(GROUP, node).read()
+    read = plugin.build(GROUP, _node(path, settings)).read()
     return [*read.train, *read.validate]
 
 
-def _readers() -> list[Any]:
-    return [*plugin.discover()[GROUP].values()]
+def _node(path: str, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """The reader that a path, or a choice of `conf/data`, asks for, with its settings."""
+    if not Path(path).exists() and path in choices(GROUP, files=True):
+        return {**Choice.of(GROUP, path).node, **settings}
+    cls = reader_of(path)
+    return {"name": cls.name, **cls.of(path), **settings}
+
+
+def reader_of(path: str) -> type[Reader]:
+    """The reader of a file, by its ending and, where several share it, by what is inside.
+
+    Raises `UserError` for a folder, and for an ending that no reader takes.
+    """
+    ending = Path(path).suffix.lower()
+    readers: list[Any] = [cls for cls in plugin.discover()[GROUP].values() if ending and ending in cls.endings]
+    if Path(path).is_dir():
+        raise UserError(
+            f"{path} is a folder; give a file of it, or 'tractexp task=survey data.path={path}' for a table"
+        )
+    if not readers and not ending and not Path(path).exists():
+        known = among(path, choices(GROUP, files=True))
+        raise UserError(f"{path} is neither a file with an ending nor a shipped record{known}")
+    if not readers:
+        endings = sorted({e for cls in plugin.discover()[GROUP].values() for e in getattr(cls, "endings", ())})
+        raise UserError(f"{path}: no reader takes files ending in '{ending}'; Endings: {', '.join(endings)}")
+    return next((cls for cls in readers if cls.takes(path)), readers[0])
 
 
 def kept(event: Event) -> dict[str, Any]:

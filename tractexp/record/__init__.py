@@ -8,3 +8,4 @@ from tractexp.record.reader import Events as Events
 from tractexp.record.reader import Reader as Reader
 from tractexp.record.record import Base as Base
 from tractexp.record.record import Record as Record
+from tractexp.record.window import Window as Window

@@ -1,13 +1,73 @@
-"""Phasors from sampled waveforms: one-cycle windows at the frequency really present, and what follows from them."""
+"""Phasors from sampled waveforms: weighted windows at the frequency really present, and what follows from them."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
 
 import numpy as np
 
 from tractexp.errors import UserError
 
 TURN = np.exp(2j * np.pi / 3)  # the operator a of symmetrical components
+SLOWEST, FASTEST = 0.9, 1.1  # of the nominal frequency: what is tracked
+PASSES = 3  # of the tracking, each at the frequency found by the one before
+DEAD = 0.01  # of the highest voltage: a phasor below it has no angle to speak of
+BLOCK = 1 << 15  # samples measured at once, about: what fits into a processor's cache
+
+
+class Waves(Protocol):
+    """Voltages [kV] and as many currents [kA], (2 K, N): an array, or what is read when it is sliced like one."""
+
+    @property
+    def shape(self) -> tuple[int, ...]: ...
+
+    def __getitem__(self, at: Any, /) -> np.ndarray: ...
+
+
+Means = Callable[[np.ndarray, float, np.ndarray, np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Averager:
+    """The window of an estimator at one sampling rate.
+
+    `means(y, rate, frequency, at)` are weighted means (..., M) of y (..., N), sampled at `rate` [Hz], about the
+    samples `at` (M,), the weights of sum 1; `frequency` (N,) [Hz] is that of the waveforms y is made from.
+    """
+
+    reach: int  # samples it needs on either side of its center
+    means: Means
+
+
+def cycle_means(y: np.ndarray, rate: float, frequency: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Means over one cycle, to a fraction of a sample: the two end samples are weighted by what is left over of it."""
+    cycle = rate / frequency[at]  # samples
+    whole = np.floor(cycle / 2 - 0.5).astype(int)  # of full weight on either side of the center
+    total = np.zeros((*y.shape[:-1], y.shape[-1] + 1), dtype=y.dtype)
+    np.cumsum(y, axis=-1, out=total[..., 1:])
+    low, high = at - whole, at + whole + 1
+    made = total.take(high, axis=-1) - total.take(low, axis=-1)
+    made += (cycle / 2 - 0.5 - whole) * (y.take(high, axis=-1) + y.take(low - 1, axis=-1))
+    return made / cycle
+
+
+def one_cycle(rate: float, nominal: float) -> Averager:
+    """The plain mean over one cycle of the frequency really present, down to the lowest that is tracked."""
+    return Averager(int(rate / (SLOWEST * nominal) / 2 + 0.5) + 1, cycle_means)
+
+
+def weighted(weights: np.ndarray) -> Averager:
+    """Means with these weights (2 reach + 1,), symmetric; by the fast Fourier transform, as windows may be long."""
+    reach, weights = len(weights) // 2, weights / weights.sum()
+
+    def means(y: np.ndarray, rate: float, frequency: np.ndarray, at: np.ndarray) -> np.ndarray:
+        from scipy.fft import next_fast_len
+
+        length = next_fast_len(y.shape[-1])  # what wraps around falls where no whole window lies
+        made = np.fft.ifft(np.fft.fft(y, length) * np.fft.fft(weights, length)).take(at + reach, axis=-1)
+        return made if np.iscomplexobj(y) else made.real
+
+    return Averager(reach, means)
 
 
 def frame(f: np.ndarray, rate: float) -> np.ndarray:
@@ -15,31 +75,32 @@ def frame(f: np.ndarray, rate: float) -> np.ndarray:
     return np.concatenate([[0.0], np.cumsum((f[1:] + f[:-1]) * np.pi / rate)])
 
 
-def fundamental(x: np.ndarray, rate: float, frequency: float | np.ndarray) -> tuple[slice, np.ndarray]:
-    """RMS phasors of x (..., N) at each sample whose one-cycle window lies inside.
+def fundamental(
+    x: np.ndarray,
+    rate: float,
+    frequency: float | np.ndarray,
+    at: np.ndarray,
+    means: Means = cycle_means,
+    harmonics: Sequence[int] = (),
+) -> np.ndarray:
+    """RMS phasors (..., M) of x (..., N) at the samples `at` (M,), about which whole windows must lie inside.
 
-    `rate` in samples per second, `frequency` in Hz, a number or (N,). Returns the samples covered and the phasors
-    (..., M), stamped at the window's center, in the `frame` that turns at `frequency`.
+    `rate` in samples per second, `frequency` in Hz, a number or (N,). The phasors are stamped at the window's center,
+    in the `frame` that turns at `frequency`. With `harmonics`, those of each (H, ..., M), in frames as many times
+    as fast.
 
-    The window is one cycle long to a fraction of a sample: its two end samples are weighted by what is left over.
-    In it the least-squares sinusoid is taken, x = sqrt(2) Re(X e^{j phi}), so a phasor is exact at any known
-    frequency, where the plain DFT leaks its mirror image: with S = sum w x e^{-j phi}, G = sum w e^{-2 j phi} and
-    W = sum w, the normal equation sqrt(2) S = W X + G X* is solved for X.
+    In the window the least-squares sinusoid is taken, x = sqrt(2) Re(X e^{j phi}), so a phasor is exact at any known
+    frequency, where the plain DFT leaks its mirror image: with S and G the weighted means of x e^{-j phi} and
+    e^{-2 j phi}, the normal equation sqrt(2) S = X + G X* is solved for X.
     """
-    n = x.shape[-1]
-    f = np.broadcast_to(np.asarray(frequency, dtype=float), n)
-    whole = np.floor(rate / f / 2 - 0.5).astype(int)  # samples of full weight on either side of the center
-    reach = int(whole.max()) + 1
-    k = np.arange(reach, n - reach)
-    h, edge = whole[k], (rate / f[k]) / 2 - 0.5 - whole[k]
-
-    def window(y: np.ndarray) -> np.ndarray:
-        total = np.concatenate([np.zeros((*y.shape[:-1], 1)), np.cumsum(y, axis=-1)], axis=-1)
-        return total[..., k + h + 1] - total[..., k - h] + edge * (y[..., k + h + 1] + y[..., k - h - 1])
-
-    turn = np.exp(-1j * frame(f, rate))
-    S, G, W = window(x * turn), window(turn**2), rate / f[k]
-    return slice(reach, n - reach), np.sqrt(2) * (W * S - G * S.conj()) / (W**2 - np.abs(G) ** 2)
+    f = np.broadcast_to(np.asarray(frequency, dtype=float), x.shape[-1])
+    angle = frame(f, rate)
+    found = []
+    for h in harmonics or (1,):
+        turn = np.exp(-1j * h * angle)
+        S, G = means(x * turn, rate, f, at), means(turn**2, rate, f, at)
+        found.append(np.sqrt(2) * (S - G * S.conj()) / (1 - np.abs(G) ** 2))
+    return np.array(found) if harmonics else found[0]
 
 
 def sequences(phases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -53,24 +114,41 @@ def turning(angle: np.ndarray, rate: float) -> np.ndarray:
     return np.gradient(np.unwrap(angle)) * rate / (2 * np.pi)
 
 
-def track(voltages: np.ndarray, rate: float, nominal: float, cycles: float = 4.0) -> np.ndarray:
+def track(voltages: np.ndarray, rate: float, nominal: float, cycles: float = 4.0, least: float = 0.0) -> np.ndarray:
     """Frequency (N,) [Hz] of phase voltages (K, N), three or one, smoothed over `cycles`, within 10 % of `nominal`.
 
     The mean speed of the positive-sequence voltage (of the one there is) over the span about each sample. Three passes,
     each with the frequency found by the one before, remove what the unknown frequency did to the phasors themselves.
+    A voltage below `least` has no angle: spans end before it, and within the nominal frequency is taken.
     """
-    n = voltages.shape[-1]
+    n, (every, reach, half) = voltages.shape[-1], _tracking(rate, nominal, cycles)
+    at = np.arange(reach, n - reach, every)
     f = np.full(n, nominal)
-    half = int(cycles * rate / nominal / 2)
-    for _ in range(3):
-        inside, phasors = fundamental(voltages, rate, f)
-        V1 = sequences(phasors)[0] if len(phasors) == 3 else phasors[0]
-        angle = np.unwrap(np.angle(V1)) + frame(f, rate)[inside]
-        k = np.arange(len(angle))
-        early, late = np.maximum(k - half, 0), np.minimum(k + half, len(angle) - 1)
-        speed = (angle[late] - angle[early]) * rate / (late - early) / (2 * np.pi)
-        f = np.interp(np.arange(n), np.arange(n)[inside], np.clip(speed, 0.9 * nominal, 1.1 * nominal))
+    for _ in range(PASSES):
+        X = fundamental(voltages, rate, f, at)
+        V1 = sequences(X)[0] if len(X) == 3 else X[0]
+        angle = np.unwrap(np.angle(V1)) + frame(f, rate)[at]
+        speed = _speed(angle, np.abs(V1) < least, half) * rate / every / (2 * np.pi)
+        f = np.interp(
+            np.arange(n), at, np.clip(np.nan_to_num(speed, nan=nominal), SLOWEST * nominal, FASTEST * nominal)
+        )
     return f
+
+
+def _speed(angle: np.ndarray, dead: np.ndarray, half: int) -> np.ndarray:
+    """Mean increase (M,) of an angle over `half` steps either way, or up to where it is dead; nan where it is."""
+    k, last = np.arange(len(angle)), len(angle) - 1
+    early = np.maximum(k - half, np.maximum.accumulate(np.where(dead, k + 1, 0)))
+    late = np.minimum(k + half, np.minimum.accumulate(np.where(dead, k - 1, last)[::-1])[::-1])
+    made = np.full(len(angle), np.nan)
+    np.divide(angle[late] - angle[early.clip(max=last)], late - early, out=made, where=late > early)
+    return made
+
+
+def _tracking(rate: float, nominal: float, cycles: float = 4.0) -> tuple[int, int, int]:
+    """Samples from one tracked phasor to the next, samples a phasor needs on either side, phasors in half a span."""
+    every = max(1, int(rate / nominal / 20))
+    return every, one_cycle(rate, nominal).reach, int(cycles * rate / nominal / 2 / every)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +159,7 @@ class Phasors:
     V: np.ndarray  # (K, M) kV, phase to ground; of a single-phase load the voltage it is fed with
     I: np.ndarray  # (K, M) kA, into the load
     f: np.ndarray  # (M,) Hz, at which the (positive-sequence) voltage turns
+    more: Mapping[str, np.ndarray] = field(default_factory=dict)  # (M,) each: P_3 [MW], ..., THD_u, THD_i
 
     @property
     def V1(self) -> np.ndarray:
@@ -119,31 +198,89 @@ class Phasors:
 
 
 def measure(
-    waves: np.ndarray,
+    waves: Waves,
     rate: float,
     nominal: float,
     start: float = 0.0,
     step: float = 1e-3,
     skew: np.ndarray | None = None,
-    phasors: Callable[..., tuple[slice, np.ndarray]] = fundamental,
+    window: Callable[[float, float], Averager] = one_cycle,
+    harmonics: Sequence[int] = (),
+    block: int = BLOCK,
 ) -> Phasors:
-    """Phasors of voltages [kV] and as many currents [kA], `waves` (2 K, N) sampled at `rate` from `start` [s].
+    """Phasors of `waves` (2 K, N) sampled at `rate` [Hz] from `start` [s], measured `block` samples at a time, about.
 
-    About one phasor every `step` seconds: the nearest whole number of samples. `skew` (2 K,) [s] is how much later
-    than the time stamp each channel is sampled. `phasors` estimates, with the arguments of `fundamental`. N must span
-    two cycles at least; raises `UserError` otherwise.
+    One phasor about every `step` seconds: the nearest whole number of samples. `skew` (2 K,) [s] is how much later
+    than the time stamp each channel is sampled. `window(rate, nominal)` is what the estimator averages over. With
+    `harmonics`, their powers P_h [MW] and the total distortions THD_u and THD_i come with the phasors. N must span two
+    cycles, and the window, at least; raises `UserError` otherwise.
     """
-    if waves.shape[-1] < 2 * rate / (0.9 * nominal) + 4:
+    n, K, over, every = waves.shape[-1], waves.shape[0] // 2, window(rate, nominal), max(1, round(step * rate))
+    needed = max(2 * rate / (SLOWEST * nominal) + 4, 2 * (over.reach + every) + 1)
+    if n < needed:
         raise UserError(
-            f"{waves.shape[-1]} samples at {rate:g} Hz are too short: phasors need over two cycles of {nominal:g} Hz"
+            f"{n} samples at {rate:g} Hz are too short: phasors need {1000 * needed / rate:.0f} ms, over two cycles of "
+            f"{nominal:g} Hz and more than their window"
         )
-    K = len(waves) // 2
-    tracked = track(waves[:K], rate, nominal)
-    inside, X = phasors(waves, rate, tracked)
-    if skew is not None:
-        X = X * np.exp(-2j * np.pi * tracked[inside] * skew[:, None])
-    every = max(1, round(step * rate))
-    X, f = X[:, ::every], tracked[inside][::every]
-    t = start + np.arange(waves.shape[-1])[inside][::every] / rate
-    made = Phasors(t, X[:K], X[K:], f)
-    return replace(made, f=f + turning(np.angle(made.V1), rate / every))
+    least = DEAD * max(float(np.abs(waves[:K, a:b]).max()) for a, b in _blocks(n, block)) / np.sqrt(2)
+    at, angle, found, seen = np.arange(over.reach, n - over.reach, every), 0.0, [], []
+    for (first, stop), (a, b) in _overlapping(n, rate, nominal, over.reach, block):
+        x = waves[:, first:stop]
+        f = track(x[:K], rate, nominal, least=least)
+        here = at[(at >= a) & (at < b)] - first
+        turned = frame(f, rate)
+        X = fundamental(x, rate, f, here, over.means, (1, *harmonics))
+        X *= np.exp(1j * np.array([1, *harmonics])[:, None, None] * (turned[a - first] - angle))
+        angle += turned[min(b, n - 1) - first] - turned[a - first]
+        if skew is not None:
+            X *= np.exp(-2j * np.pi * np.array([1, *harmonics])[:, None, None] * f[here] * skew[:, None])
+        found.append((X[0], f[here]))
+        if harmonics:
+            seen.append(_distortion(X, over.means(x**2, rate, f, here), harmonics))
+    X, f = (np.concatenate([part[k] for part in found], axis=-1) for k in (0, 1))
+    more = {name: np.concatenate([part[name] for part in seen]) for name in (seen[0] if seen else ())}
+    made = Phasors(start + at / rate, X[:K], X[K:], f, more)
+    return replace(made, f=_turned(made, rate / every, least))
+
+
+def _distortion(X: np.ndarray, squares: np.ndarray, harmonics: Sequence[int]) -> dict[str, np.ndarray]:
+    """Powers of the harmonics, and the distortion of phasors X (1 + H, 2 K, M) whose waves have these mean squares.
+
+    Source: IEEE 1459-2010, 3.1.2.1: THD = sqrt((V/V_1)^2 - 1), which counts whatever is not the fundamental; of
+    three phases together as in its effective values, 3.2.2.
+    """
+    K = X.shape[1] // 2
+    made = {f"P_{h}": (V * I.conj()).real.sum(axis=0) for h, V, I in zip(harmonics, X[1:, :K], X[1:, K:], strict=True)}
+    for name, side in (("THD_u", slice(K)), ("THD_i", slice(K, None))):
+        one = (np.abs(X[0, side]) ** 2).sum(axis=0)
+        rest = np.maximum(squares[side].sum(axis=0) - one, 0.0)
+        made[name] = np.sqrt(np.divide(rest, one, out=np.zeros_like(one), where=one > 0))
+    return made
+
+
+def _turned(made: Phasors, rate: float, least: float) -> np.ndarray:
+    """Frequency (M,) [Hz] at which the voltage really turns; where it is dead, that before and after."""
+    dead = np.abs(made.V1) < least
+    alive = ~(dead | np.r_[dead[1:], False] | np.r_[False, dead[:-1]])  # a slope needs both neighbours
+    if not alive.any():
+        return made.f
+    k = np.arange(len(alive))
+    return np.interp(k, k[alive], (made.f + turning(np.angle(made.V1), rate))[alive])
+
+
+def _blocks(n: int, block: int) -> Iterator[tuple[int, int]]:
+    return ((a, min(a + block, n)) for a in range(0, n, block))
+
+
+def _overlapping(
+    n: int, rate: float, nominal: float, reach: int, block: int
+) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
+    """Samples to look at, and those within to give phasors of: wherever a cut lies, it changes nothing.
+
+    A pass of the tracking sees what lies a window and half a span away, and so many times as there are passes. Cuts
+    lie on the grid of tracked phasors.
+    """
+    every, own, half = _tracking(rate, nominal)
+    margin = (PASSES * (own + (half + 2) * every) + max(own, reach)) // every * every + every
+    for a, b in _blocks(n, max(block // every, 1) * every):
+        yield (max(a - margin, 0), min(b + margin, n)), (a, b)

@@ -27,6 +27,11 @@ class Reader(Plugin):
         """The settings that make it read all of one file; for a reader with `endings`."""
         return {"path": path}
 
+    @classmethod
+    def takes(cls, path: str) -> bool:
+        """Whether a file with one of its endings is meant for it: readers that share an ending look inside."""
+        return True
+
     @abstractmethod
     def read(self) -> Events:
         """Read and check everything; raises `UserError` naming the file, the place and the value."""

@@ -3,6 +3,7 @@
 from tractexp.recording.connection import Connection as Connection
 from tractexp.recording.estimator import Estimator as Estimator
 from tractexp.recording.feeder import Feeder as Feeder
+from tractexp.recording.feeder import propose as propose
 from tractexp.recording.happening import Happening as Happening
 from tractexp.recording.recording import Channel as Channel
 from tractexp.recording.recording import Recording as Recording

@@ -1,4 +1,4 @@
-"""What an estimator plugin must do: phasors from sampled waveforms."""
+"""What an estimator plugin must do: say over what window phasors are averaged."""
 
 from abc import abstractmethod
 from typing import ClassVar
@@ -6,22 +6,39 @@ from typing import ClassVar
 import numpy as np
 
 from tractexp.plugin import Plugin
+from tractexp.record.phasor import Averager, weighted
+from tractexp.record.window import Window
+
+SEEN = 1e-3  # s: spacing of the weights a record keeps, as phasors are a millisecond apart
 
 
 class Estimator(Plugin):
-    """Base of the phasor estimators, chosen by `data.estimator=NAME`. Linear in the waveforms."""
+    """Base of the phasor estimators, chosen by `data.estimator=NAME`, or by name and settings.
+
+    An estimator is the window over which the least-squares sinusoid of the frequency really present is taken
+    (`tractexp.record.phasor.fundamental`), so that any is exact in steady state; they differ in what they do to
+    changes, harmonics and noise.
+    """
 
     group: ClassVar[str] = "estimator"
     chosen: ClassVar[bool] = False
 
     @abstractmethod
-    def phasors(self, waves: np.ndarray, rate: float, frequency: np.ndarray) -> tuple[slice, np.ndarray]:
-        """RMS phasors of `waves` (K, N) sampled at `rate` [Hz], whose frequency (N,) [Hz] is known.
-
-        Returns the samples covered and the phasors (K, M) complex there, stamped at the window's center, in the frame
-        that turns at `frequency` (`tractexp.record.phasor.frame`).
-        """
+    def half(self, nominal: float) -> float:
+        """Half of the window's length [s]. Raises `UserError` for a nominal frequency [Hz] it is not made for."""
 
     @abstractmethod
-    def window(self, nominal: float) -> tuple[np.ndarray, np.ndarray]:
-        """The weights (W,) of the window, of sum 1, at times (W,) [s] about its center, at the nominal frequency."""
+    def weight(self, at: np.ndarray, nominal: float) -> np.ndarray:
+        """What counts at times (W,) [s] about the center, none further away than half; of any scale, symmetric."""
+
+    def averager(self, rate: float, nominal: float) -> Averager:
+        """The window on samples taken at `rate` [Hz]."""
+        reach = int(self.half(nominal) * rate + 1e-9)
+        return weighted(self.weight(np.arange(-reach, reach + 1) / rate, nominal))
+
+    def window(self, nominal: float) -> Window:
+        """What a record keeps of it, at the nominal frequency."""
+        half = self.half(nominal)
+        at = (np.arange(max(round(2 * half / SEEN), 2)) + 0.5) / max(round(2 * half / SEEN), 2) * 2 * half - half
+        weights = self.weight(at, nominal)
+        return Window(self.name, at, weights / weights.sum())

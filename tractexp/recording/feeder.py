@@ -1,6 +1,22 @@
 """Which channels show one load, and how they are connected."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from tractexp.record.phasor import TURN
+from tractexp.recording.label import Group, groups, kind, residual, words
+from tractexp.recording.recording import Recording
+from tractexp.recording.snapshot import Snapshots, frequency, nearest_nominal, snapshots
+
+ALIKE = 0.1  # three magnitudes this close, as a share of their mean, may be three phases
+SYMMETRIC = 15.0  # degrees off 120 that three phasors may be
+UNLOADED = 0.005  # of the greatest current in the file: less is an unloaded feeder
+STEPS_LOADED = 3.0  # quantisation steps that a current must exceed
+CLOSES = 0.03  # of the sum of magnitudes: currents that add up to less belong to one bus
+SAME_BUS = 0.02  # voltages that never differ by more are those of one bus, or of two tied ones
 
 
 @dataclass(frozen=True)
@@ -13,3 +29,223 @@ class Feeder:
     reverse_current: bool = False  # the recorder counts current out of the load as positive
     name: str = ""
     why: tuple[str, ...] = ()  # what it was recognised by, and what was changed in the order given, one sentence each
+
+
+def propose(recording: Recording) -> list[Feeder]:
+    """The feeders that a recording of any number of channels shows; loaded ones first, [] where there are none.
+
+    By what the names share, else by magnitudes and angles; each with the voltages its name or its behaviour says.
+    """
+    waves = {i: c for i, c in enumerate(recording.channels) if c.form == "waveform" and kind(c)}
+    volts = [i for i in waves if kind(waves[i]) == "voltage"]
+    amps = [i for i in waves if kind(waves[i]) == "current"]
+    f = frequency(recording, volts) or frequency(recording, amps)
+    f = recording.frequency if f is None or nearest_nominal(f) is None else f
+    seen = snapshots(recording, sorted(waves), f)
+    if not volts or not amps or seen is None:
+        return []
+    buses = _groups(recording, seen, volts)
+    loads = _groups(recording, seen, amps)
+    feeders = [_feeder(recording, seen, load, buses) for load in loads if buses and _fits(load, buses)]
+    feeders += _single(recording, seen, volts, amps, [*buses, *loads])
+    feeders = _kirchhoff(seen, feeders)
+    level = max((_size(seen, f.currents) for f in feeders), default=0.0)
+    marked = [_marked(recording, seen, feeder, level) for feeder in feeders]
+    return [f for f, loaded in marked if loaded] + [f for f, loaded in marked if not loaded]
+
+
+def _groups(recording: Recording, seen: Snapshots, numbers: Sequence[int]) -> list[Group]:
+    """Groups among the channels of one quantity: by label, and by magnitude and angle among those left."""
+    found = [
+        g for g in groups({i: recording.channels[i] for i in numbers})
+        if len(g.numbers) == 3 or (g.pairs and g.missing is not None) or (not g.pairs and g.missing == 1)
+    ]  # fmt: skip
+    found = [g for g in found if g.certain or all(seen.pure(i) for i in g.numbers)]
+    taken = {i for g in found for i in g.numbers}
+    left = [i for i in numbers if i not in taken and not residual(recording.channels[i]) and seen.pure(i)]
+    k = 0
+    while k + 3 <= len(left):
+        ordered = _symmetric(seen, left[k : k + 3])
+        if ordered:
+            found.append(Group(ordered, False, f"channels {', '.join(map(str, ordered))}", False))
+            k += 3
+        else:
+            k += 1
+    return sorted(found, key=lambda g: g.numbers[0])
+
+
+def _symmetric(seen: Snapshots, numbers: Sequence[int]) -> tuple[int, ...]:
+    """The three channels in the order a, b, c where their phasors are equal and 120 degrees apart; else ()."""
+    X = seen.of(numbers)
+    level = np.abs(X).mean(axis=0)
+    if not np.isfinite(level).any() or np.nanmax(level) == 0:
+        return ()
+    X = np.nanmedian(X[:, level > 0.5 * np.nanmax(level)] / _unit(X[0, level > 0.5 * np.nanmax(level)]), axis=1)
+    size = np.abs(X)
+    if size.min() == 0 or np.ptp(size) > ALIKE * size.mean():
+        return ()
+    off = np.abs(np.degrees(np.angle(X[1:] / X[0] * [[TURN, TURN**2], [TURN**2, TURN]])))
+    for angles, order in zip(off, ((0, 1, 2), (0, 2, 1)), strict=True):
+        if angles.max() < SYMMETRIC:
+            return tuple(numbers[i] for i in order)
+    return ()
+
+
+def _unit(x: np.ndarray) -> np.ndarray:
+    return x / np.where(np.abs(x) > 0, np.abs(x), 1)
+
+
+def _fits(load: Group, buses: Sequence[Group]) -> bool:
+    return len(load.numbers) == 3 or any(len(bus.numbers) == 2 or not bus.pairs for bus in buses)
+
+
+def _feeder(recording: Recording, seen: Snapshots, load: Group, buses: Sequence[Group]) -> Feeder:
+    bus, why = _bus(recording, seen, load, buses)
+    connection = "aron" if len(load.numbers) == 2 else "three_phase"
+    if bus.pairs:
+        connection = "line_voltages" if len(bus.numbers) == 3 else "two_line_voltages"
+    said = [f"currents {_names(recording, load.numbers)}: {_by(load)}", f"voltages {_names(recording, bus.numbers)}: {why}"]
+    if bus.pairs:
+        said.append("the voltages are line to line, as their names say")
+    if len(load.numbers) == 2:
+        said.append("two currents are recorded: the third is minus their sum, as where no current returns to earth")
+    return Feeder(bus.numbers, load.numbers, connection, name=load.name or bus.name or "the feeder", why=tuple(said))
+
+
+def _by(group: Group) -> str:
+    if group.certain:
+        return "their names differ in the phase alone"
+    return "the file's phases say so" if not group.name.startswith("channels ") else "equal, 120 degrees apart"
+
+
+def _names(recording: Recording, numbers: Sequence[int]) -> str:
+    return ", ".join(f"{i} '{recording.channels[i].name}'" for i in numbers)
+
+
+def _bus(recording: Recording, seen: Snapshots, load: Group, buses: Sequence[Group]) -> tuple[Group, str]:
+    """The voltages that a group of currents belongs to, and what says so."""
+    if len(buses) == 1:
+        return buses[0], "the only ones in the file"
+    texts = [_text(recording, each) for each in (load, *buses)]
+    own = sorted(texts[0])
+    common = [sum(w in t for t in texts[1:]) for w in own]
+    scores = [
+        sum(1 / n for w, n in zip(own, common, strict=True) if n and w in text) for text in texts[1:]
+    ]  # a word that names one bus only weighs most
+    best = max(scores)
+    ties = [bus for bus, score in zip(buses, scores, strict=True) if score >= best - 1e-9]
+    if len(ties) == 1:
+        shared = sorted(w for w in texts[0] & texts[1 + buses.index(ties[0])] if common[own.index(w)] < len(buses))
+        return ties[0], f"their names share '{' '.join(shared)}' with the currents'"
+    alive = [bus for bus in ties if _size(seen, bus.numbers) > 0.5 * max(_size(seen, b.numbers) for b in ties)]
+    apart = max(_apart(seen, a, b) for a, b in combinations(alive, 2)) if len(alive) > 1 else np.inf
+    if len(alive) == 1:
+        return alive[0], "the only ones alive"
+    if apart < SAME_BUS:
+        return alive[0], f"{len(alive)} groups of voltages differ by at most {100 * apart:.2g} %, the first is taken"
+    return min(alive, key=lambda bus: _stray(seen, bus, load)), "the currents follow these voltages best"
+
+
+def _text(recording: Recording, group: Group) -> set[str]:
+    channels = [recording.channels[i] for i in group.numbers]
+    return set.intersection(*(words(f"{c.name} {c.circuit}") for c in channels)) - {"u", "v", "i"}
+
+
+def _size(seen: Snapshots, numbers: Sequence[int]) -> float:
+    """Magnitude [kV, kA] where it is large: the upper quartile of the mean over the channels."""
+    return float(np.nan_to_num(np.nanpercentile(np.abs(seen.of(numbers)).mean(axis=0), 75)))
+
+
+def _positive(X: np.ndarray, pairs: bool) -> np.ndarray:
+    """Positive sequence (M,) of three phasors; of two line voltages that which they say, to a constant factor."""
+    if len(X) == 3:
+        return (X[0] + TURN * X[1] + TURN**2 * X[2]) / 3
+    return (X[0] - TURN**2 * X[1]) / 3 if pairs else X[0]
+
+
+def _apart(seen: Snapshots, a: Group, b: Group) -> float:
+    """How far two groups of voltages differ at worst, as a share of the larger."""
+    x, y = (_positive(seen.of(g.numbers), g.pairs) for g in (a, b))
+    return float(np.nanmax(np.abs(x - y)) / max(np.nanmax(np.abs(x)), 1e-12))
+
+
+def _stray(seen: Snapshots, bus: Group, load: Group) -> float:
+    """What of the currents is left when a constant admittance to these voltages is taken away."""
+    v, i = _positive(seen.of(bus.numbers), bus.pairs), _positive(seen.of(load.numbers), False)
+    known = np.isfinite(v) & np.isfinite(i)
+    v, i = v[known], i[known]
+    y = np.vdot(v, i) / max(float(np.vdot(v, v).real), 1e-12)
+    return float(np.linalg.norm(i - y * v))
+
+
+def _single(
+    recording: Recording, seen: Snapshots, volts: Sequence[int], amps: Sequence[int], taken: Sequence[Group]
+) -> list[Feeder]:
+    """Single-phase feeders among the channels no group has taken: each current with its voltage."""
+    used = {i for group in taken for i in group.numbers}
+    free = [i for i in volts if i not in used and not residual(recording.channels[i]) and seen.pure(i)]
+    made = []
+    for i in amps:
+        if i in used or residual(recording.channels[i]) or not free or not seen.pure(i):
+            continue
+        group = Group((i,), False, recording.channels[i].name.strip(), False)
+        bus, why = _bus(recording, seen, group, [Group((v,), False, "", False) for v in free])
+        said = (f"one current {_names(recording, [i])}", f"one voltage {_names(recording, bus.numbers)}: {why}")
+        made.append(Feeder(bus.numbers, (i,), "single_phase", name=group.name, why=said))
+    return made
+
+
+def _kirchhoff(seen: Snapshots, feeders: list[Feeder]) -> list[Feeder]:
+    """The feeders, with what the sum of their currents says of them: that it closes, or closes with one reversed."""
+    three = [k for k, f in enumerate(feeders) if len(f.currents) == 3]
+    level = max((_size(seen, feeders[k].currents) for k in three), default=0.0)
+    loaded = [k for k in three if _size(seen, feeders[k].currents) > UNLOADED * level]
+    if len(loaded) < 3:
+        return feeders
+    X = np.array([seen.of(feeders[k].currents) for k in loaded])  # (F, 3, M)
+    X = X[:, :, np.isfinite(X).all(axis=(0, 1))]
+    if not X.size:
+        return feeders
+    plain = np.ones(len(loaded))
+    tried = [plain]
+    for k in range(len(loaded)):
+        tried += [np.where(np.arange(len(loaded)) == k, s, plain) for s in (0, -1)]
+    for pair in combinations(range(len(loaded)), 2):
+        both = np.isin(np.arange(len(loaded)), pair)
+        tried += [np.where(both, 0, plain)] if len(loaded) > 4 else []
+    closes = [_closure(X, signs) for signs in tried]
+    best = next((k for k in np.argsort(closes) if closes[k] < CLOSES), None)
+    if best is None:
+        return feeders
+    simple = next(k for k in range(len(tried)) if closes[k] < max(CLOSES / 3, 2 * closes[best]))
+    return _said(feeders, loaded, tried[simple], closes[simple])
+
+
+def _closure(X: np.ndarray, signs: np.ndarray) -> float:
+    """Sum of the currents over the sum of their magnitudes, root mean square over phases and time."""
+    total = np.tensordot(signs, X, axes=1)
+    return float(np.linalg.norm(total) / np.linalg.norm(np.tensordot(np.abs(signs), np.abs(X), axes=1)))
+
+
+def _said(feeders: list[Feeder], loaded: list[int], signs: np.ndarray, closes: float) -> list[Feeder]:
+    made = list(feeders)
+    out = [feeders[k].name for k, s in zip(loaded, signs, strict=True) if s == 0]
+    for k, sign in zip(loaded, signs, strict=True):
+        said = f"the currents of {np.count_nonzero(signs)} feeders add up to {100 * closes:.2g} % of their magnitudes"
+        if out:
+            said += f", without {' and '.join(out)}" + (": a bus tie, or one of another bus" if sign == 0 else "")
+        if sign < 0:
+            said += " once this one's polarity is reversed"
+        made[k] = replace(made[k], reverse_current=bool(sign < 0), why=(*made[k].why, said))
+    return made
+
+
+def _marked(recording: Recording, seen: Snapshots, feeder: Feeder, level: float) -> tuple[Feeder, bool]:
+    """The feeder with a word on its load, and whether it carries any."""
+    size = _size(seen, feeder.currents)
+    step = max(abs(c.gain * c.ratio * c.factor) for c in (recording.channels[i] for i in feeder.currents))
+    integral = all(recording.channels[i].raw.dtype.kind in "iu" for i in feeder.currents)
+    if size > UNLOADED * level and not (integral and size < STEPS_LOADED * step):
+        return feeder, True
+    said = f"unloaded: {1000 * size:.3g} A where the greatest current of the file is {1000 * level:.3g} A"
+    return replace(feeder, why=(*feeder.why, said)), False

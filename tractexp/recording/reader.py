@@ -1,6 +1,7 @@
 """Readers of waveform files: from channels to the dips of one load, numbered in order of time."""
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -65,13 +66,7 @@ class WaveformReader(Reader):
     def read(self) -> Events:
         recording = self.recording()
         feeder = self._feeder(recording)
-        streams = self._streams(recording, feeder)
-        dips = [dip for phasors in streams for dip in _dips(phasors)]
-        if not dips:
-            spans = ", ".join(f"{s.t[0]:.3f} to {s.t[-1]:.3f} s" for s in streams)
-            raise UserError(f"{self.path}: no dip found in the waveforms ({spans}): the voltage never falls by 3 %")
-        base = self._base(dips, recording.frequency)
-        tried = {number: self._record(number, dip, base) for number, dip in enumerate(dips, 1)}
+        dips, tried = self.numbered(self._streams(recording, feeder), recording.frequency)
         usable = [number for number, made in tried.items() if isinstance(made, Record)]
         fitted = self.train or usable[:1] or [1]
         first, *rest = [self._pick(number, tried) for number in fitted]
@@ -82,6 +77,18 @@ class WaveformReader(Reader):
         others = [made for number, made in tried.items() if number not in fitted]
         notes += tuple(f"not used for validation: {made}" for made in others if isinstance(made, UserError))
         return Events([replace(first, notes=notes), *rest], [made for made in others if isinstance(made, Record)])
+
+    def numbered(self, streams: Sequence[Phasors], frequency: float) -> tuple[list[Dip], dict[int, Record | UserError]]:
+        """The dips of one load and, by number, the record that each makes, or why it cannot be used.
+
+        Raises `UserError` where there is none, and where none has a steady state before it.
+        """
+        dips = [dip for phasors in streams for dip in _dips(phasors)]
+        if not dips:
+            spans = ", ".join(f"{s.t[0]:.3f} to {s.t[-1]:.3f} s" for s in streams)
+            raise UserError(f"{self.path}: no dip found in the waveforms ({spans}): the voltage never falls by 3 %")
+        base = self._base(dips, frequency)
+        return dips, {number: self._record(number, dip, base) for number, dip in enumerate(dips, 1)}
 
     def _pick(self, number: int, tried: dict[int, Record | UserError]) -> Record:
         """Dip `number`; raises `UserError` naming the dips that can be used where this one cannot."""

@@ -1,0 +1,57 @@
+"""Names of files and channels on the command line as they stand: what Hydra reads of them is what was meant."""
+
+import pytest
+from hydra.core.override_parser.overrides_parser import OverridesParser
+
+from tractexp.overrides import override
+
+FILES = [
+    "站北.cfg", "name (1).cfg", "a=b.cfg", "Ф1 #2.cfg", "{x}.cfg", "it's.cfg", "~/x.cfg", "[1].cfg", "a b.cfg",
+    "C:\\x\\y.cfg",
+    'say "so".cfg', "100%.cfg", "back\\'slash.cfg", "plain.cfg", "folder/plain-2.cfg", "null (copy).csv", "ends[1]",
+]  # fmt: skip
+
+
+def read(argument):
+    return OverridesParser.create().parse_override(argument).value()
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_path_is_read_as_it_stands(name):
+    assert read(override(f"data.path={name}")) == name
+
+
+@pytest.mark.parametrize("name", ["a,b.cfg", "[1,2].csv", "{a: b}"])
+def test_a_file_that_is_there_is_meant_though_hydra_would_read_something_else(tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / name).touch()
+    assert str(read(override(f"data.path={name}"))) == name
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["UA(kV)", "UB(kV)", "UC(kV)"], ["母线 Ua", "母线 Ub", "母线 Uc"],
+        ["Ia_2СШ-110_ВЛ_ВЛ2", "x", "y"], ["a b.csv", "站.csv"],
+        ["it's", "5'"], ["Ia [A]", "Ib [A]", "Ic [A]"], ["f(a,b)", "g"],
+    ],
+)  # fmt: skip
+def test_a_list_of_names_is_read_as_it_stands(names):
+    assert read(override(f"data.voltages=[{','.join(names)}]")) == names
+
+
+def test_numbers_of_channels_stay_numbers_beside_names():
+    assert read(override("data.voltages=[4,UA(kV),'5']")) == [4, "UA(kV)", "5"]
+
+
+@pytest.mark.parametrize(
+    "argument",
+    ["seed=3", "data=csv", "data.path='a b.cfg'", "data.train=[a.csv,'b c.csv']", "data.pre=0.5", "-m", "~data.pre",
+     "data.columns={U: 'Voltage (kV)', t: time}", "optimizer=issa,pso", "data.train=[[1],[2]]", "data.path="],
+)  # fmt: skip
+def test_what_hydra_reads_is_left_alone(argument):
+    assert override(argument) == argument
+
+
+def test_a_setting_that_takes_names_of_its_own_is_added():
+    assert override("model.bounds.C=[0.5,0.9]") == "++model.bounds.C=[0.5,0.9]"

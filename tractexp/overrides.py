@@ -1,0 +1,74 @@
+"""Arguments as people write them, made into overrides that Hydra reads."""
+
+import re
+from pathlib import Path
+
+# settings that take names of their own
+OPEN = ("model.bounds.", "model.fixed.", "task.values", "task.criteria.", "hydra.sweeper.comparison.")
+NAMING = ("data.", "task.", "tracking.", "hydra.run.dir", "hydra.sweep.dir")  # settings that name files and channels
+PLAIN = re.compile(r"[A-Za-z0-9_./:\-]*", re.ASCII)  # what Hydra's grammar takes as it stands
+
+
+def override(argument: str) -> str:
+    """An argument as Hydra reads it.
+
+    `model.bounds.C=[0.5,0.9]` adds the entry it names, for which Hydra would ask a plus sign. Names of files and
+    channels with spaces, brackets or letters of any script are quoted, for which Hydra would ask inner quotes.
+    """
+    key, equals, value = argument.partition("=")
+    if equals and key.lstrip("+~").startswith(NAMING) and not _read_by_hydra(argument, value):
+        argument = f"{key}={_quoted(value)}"
+    return f"++{argument}" if argument.startswith(OPEN) else argument
+
+
+def _read_by_hydra(argument: str, value: str) -> bool:
+    """Whether Hydra takes the value as it stands, and what names a file as that name."""
+    return PLAIN.fullmatch(value) is not None or (not _names_a_file(value) and _parses(argument))
+
+
+def _names_a_file(value: str) -> bool:
+    try:
+        return bool(value) and Path(value).exists()
+    except (OSError, ValueError):
+        return False
+
+
+def _parses(argument: str) -> bool:
+    from hydra.core.override_parser.overrides_parser import OverridesParser
+    from hydra.errors import HydraException
+
+    try:
+        OverridesParser.create().parse_override(argument)
+    except HydraException:
+        return False
+    return True
+
+
+def _quoted(value: str) -> str:
+    """A value in quotes; of a list, each of its elements that Hydra would not read."""
+    if value.startswith("[") and value.endswith("]") and not _names_a_file(value):
+        return f"[{','.join(_element(part.strip()) for part in _parts(value[1:-1]))}]"
+    return "'" + value.replace("\\", "\\\\").replace("'", "\\'") + "'"
+
+
+def _element(text: str) -> str:
+    quoted = len(text) > 1 and text[0] == text[-1] and text[0] in "'\""
+    return text if quoted or PLAIN.fullmatch(text) else _quoted(text)
+
+
+def _parts(inner: str) -> list[str]:
+    """What commas outside quotes and brackets part."""
+    parts, depth, mark, start = [], 0, "", 0
+    for i, letter in enumerate(inner):
+        if mark:
+            mark = "" if letter == mark else mark
+        elif letter in "'\"" and not inner[start:i].strip():  # an apostrophe within a name is none
+            mark = letter
+        elif letter in "[({":
+            depth += 1
+        elif letter in "])}":
+            depth -= 1
+        elif letter == "," and depth == 0:
+            parts.append(inner[start:i])
+            start = i + 1
+    return [*parts, inner[start:]] if inner else []

@@ -1,0 +1,39 @@
+"""The window a record was seen through: what its phasors are averages over."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """A linear average: each phasor is the sum of weights times what was there at times about its stamp."""
+
+    name: str  # of the estimator
+    at: np.ndarray  # (W,) s, about the time stamp, increasing
+    weights: np.ndarray  # (W,), of sum 1
+
+    @property
+    def length(self) -> float:
+        """From its first to its last weight [s]."""
+        return float(self.at[-1] - self.at[0]) * len(self.at) / (len(self.at) - 1)
+
+    def on(self, step: float) -> np.ndarray:
+        """Weights (odd,) of samples `step` [s] apart, for what is linear between them."""
+        reach = int(np.ceil(np.abs(self.at).max() / step - 1e-9))
+        made = np.zeros(2 * reach + 2)
+        whole, part = np.divmod(self.at / step, 1)
+        np.add.at(made, whole.astype(int) + reach, (1 - part) * self.weights)
+        np.add.at(made, whole.astype(int) + reach + 1, part * self.weights)
+        return made[:-1]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain data."""
+        return {"name": self.name, "at": self.at.tolist(), "weights": self.weights.tolist()}
+
+    @classmethod
+    def of(cls, content: Mapping[str, Any]) -> "Window":
+        """What `to_dict` told."""
+        return cls(content["name"], np.array(content["at"]), np.array(content["weights"]))

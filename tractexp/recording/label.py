@@ -1,0 +1,187 @@
+"""What the names of channels say: which three (or two) belong together as phases, which one is residual.
+
+A name tells its phase by one mark: `Ia`, `UL1`, `VRS`. Three names that are equal but for that mark are a group, so
+no list of naming schemes is needed: only the alphabets that number phases, and where in a name the mark may stand.
+"""
+
+import re
+import unicodedata
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import zip_longest
+
+from tractexp.recording.recording import Channel
+
+ALPHABETS = ("abc", "rst", "uvw", "123")
+CYRILLIC = str.maketrans("авсеіо", "abceio")  # letters that look like Latin ones, as phases are often typed
+QUANTITY = "uvie"  # letters before a phase's: U, V, E of a voltage, I of a current
+RESIDUAL = re.compile(r"3[uvi][o0]|(?<![a-z])[uvi][_ ]?[ong0](?![a-z])|(?<![a-z])3?[uvi]_?(?:res|gnd|neutral)|零序|нулев")
+COUNTER = re.compile(r"^[a-z]{0,2}\d+[-_. :)]+")  # "12-Ia", "F5-VA": a number of its own before the name
+SURE = 3.0  # score of a mark right after the letter of a quantity: "Ia", "UL1", "U21"
+NO_WAVE = re.compile(r"(?<![a-z])(?:mag|magnitude|rms|ang|angle|diff|bias)(?![a-z])")
+ROMAN = {"i": "1", "ii": "2", "iii": "3", "iv": "4", "v": "5", "vi": "6"}
+
+
+@dataclass(frozen=True)
+class Group:
+    """Channels that belong together, in the order of their phases; of `pairs` AB, BC(, CA)."""
+
+    numbers: tuple[int, ...]
+    pairs: bool  # line-to-line quantities
+    name: str  # what the names share
+    certain: bool  # said by the names, not only by the file's phase column or by geometry
+    missing: int | None = None  # the phase that is not there, of two phases
+
+
+def plain(text: str) -> str:
+    """Lower case, full-width and Roman characters and look-alike Cyrillic letters made Latin."""
+    return unicodedata.normalize("NFKC", text).strip().lower().translate(CYRILLIC)
+
+
+def residual(channel: Channel) -> bool:
+    """Whether the name or the phase says that this is a neutral or zero-sequence quantity."""
+    return bool(RESIDUAL.search(plain(channel.name))) or plain(channel.phase) in ("n", "g", "e", "0", "o", "3i0", "3u0")
+
+
+def kind(channel: Channel) -> str:
+    """voltage or current, by unit, else by the letter that starts a word of the name; "" for what is no wave of them."""
+    if NO_WAVE.search(plain(channel.name)):
+        return ""
+    if channel.quantity:
+        return channel.quantity if channel.quantity in ("voltage", "current") else ""
+    if channel.unit.strip().lower() not in ("", "pu", "p.u.", "none"):
+        return ""
+    found = re.search(r"(?<![a-z])(u|v|i)(?=[_ ]?(?:l?[123]|l?[abcrstuvwn]{1,2})(?![a-z]))", plain(channel.name))
+    return "" if found is None else "current" if found[1] == "i" else "voltage"
+
+
+def phase(channel: Channel) -> str:
+    """The phase that a channel's label gives: one or two of a, b, c; "" where it gives none."""
+    told = re.sub(r"phase|[-_/ ]", "", plain(channel.phase))
+    for text in (told, told.removeprefix("l"), told[1:] if told[:1] in QUANTITY else ""):
+        marks = [*text.replace("l", "")]
+        for letters in ALPHABETS:
+            if 1 <= len(marks) <= 2 and all(m in letters for m in marks) and len(set(marks)) == len(marks):
+                return "".join("abc"[letters.index(m)] for m in marks)
+    return ""
+
+
+def groups(channels: Mapping[int, Channel]) -> list[Group]:
+    """The groups among channels of one quantity, residual ones left aside, by their names and phases."""
+    left = {i: c for i, c in channels.items() if not residual(c)}
+    found: list[Group] = []
+    for full, counters in ((True, True), (False, True), (True, False), (False, False)):
+        for size in (3, 2):
+            made = _by_name(left, full, counters, size)
+            found += made
+            left = {i: c for i, c in left.items() if not any(i in g.numbers for g in made)}
+    for size in (3, 2):
+        made = _by_column(left, size)
+        found += made
+        left = {i: c for i, c in left.items() if not any(i in g.numbers for g in made)}
+    return sorted(found, key=lambda g: g.numbers[0])
+
+
+def _by_name(channels: Mapping[int, Channel], full: bool, counters: bool, size: int) -> list[Group]:
+    """Groups of names that are equal but for the mark; with their circuits where `full`."""
+    buckets: dict[tuple[str, str, bool], dict[int, list[int]]] = defaultdict(lambda: defaultdict(list))
+    worth: dict[tuple[str, str, bool], float] = defaultdict(float)
+    for i, channel in channels.items():
+        text = plain(channel.name)
+        text = text if counters else COUNTER.sub("", text)
+        for key, letters, pairs, place, score in _marks(text):
+            label = (f"{key} {plain(channel.circuit)}" if full else key, letters, pairs)
+            buckets[label][place].append(i)
+            told = phase(channel)
+            agrees = told == ("ab", "bc", "ca")[place] or told == "abc"[place]
+            worth[label] = max(worth[label], score + 4 * agrees - 4 * (bool(told) and not agrees and len(told) == 1))
+    made, used = [], set()
+    for label in sorted(buckets, key=lambda each: -worth[each]):
+        places = buckets[label]
+        if size == 2 and not _two_may_do(label, places):
+            continue
+        for numbers in zip_longest(*(places.get(k, []) for k in range(3))):
+            have = [n for n in numbers if n is not None]
+            if len(have) != size or used & set(have):
+                continue
+            missing = None if size == 3 else next(k for k in range(3) if numbers[k] is None)
+            used |= set(have)
+            made.append(Group(tuple(have), label[2], _shared([channels[n] for n in have]), worth[label] >= SURE, missing))
+    return made
+
+
+def _two_may_do(label: tuple[str, str, bool], places: Mapping[int, list[int]]) -> bool:
+    """Two voltages AB and BC, or two currents a and c, are enough; two numbered things are none."""
+    have = {k for k, numbers in places.items() if numbers}
+    return len(have) == 2 and (label[2] or label[1] != "123")
+
+
+def _marks(text: str) -> Iterable[tuple[str, str, bool, int, float]]:
+    """Every reading of a name: (the name without the mark, alphabet, whether a pair, 0 to 2, how likely)."""
+    for letters in ALPHABETS:
+        digits = letters == "123"
+        one, word = f"[{letters}]", r"\d" if digits else "[a-z]"
+        before = rf"(?:(?<!{word})|(?<=[{QUANTITY}l]))" if not digits else r"(?<!\d)"
+        for found in re.finditer(rf"{before}({one})[-_/ ]?l?({one})(?!{word}(?![ng]))", text):
+            x, y = letters.index(found[1]), letters.index(found[2])
+            if x != y and not (digits and not _quantity_before(text, found.start())):
+                # U21 is V1 - V2 where it is used (an arrow from 2 to 1), as U12 is
+                place = {(0, 1): 0, (1, 2): 1, (2, 0): 2, (1, 0): 0, (2, 1): 1, (0, 2): 2}[x, y]
+                key = f"{text[: found.start()]}**{text[found.end() :]}"
+                yield f"{key}{'-' if (y - x) % 3 == 2 else ''}", letters, True, place, 6.0 - 2 * digits
+        for found in re.finditer(rf"{before}({one})(?!{word}(?<![ng]))", text):
+            score = 3.0 * _quantity_before(text, found.start()) + 2 * (not digits)
+            yield f"{text[: found.start()]}*{text[found.end() :]}", letters, False, letters.index(found[1]), score
+
+
+def _quantity_before(text: str, at: int) -> bool:
+    """Whether the letter of a quantity, standing alone but for an L or a line below, comes right before the mark."""
+    return bool(re.search(rf"(?<![a-z])[{QUANTITY}][_ ]?l?$", text[:at]))
+
+
+def _by_column(channels: Mapping[int, Channel], size: int) -> list[Group]:
+    """Groups by the file's phase column: in order, within a circuit."""
+    rows: dict[tuple[str, bool], dict[int, list[int]]] = defaultdict(lambda: defaultdict(list))
+    for i, channel in channels.items():
+        told = phase(channel)
+        if told:
+            place = "abc".index(told) if len(told) == 1 else {"ab": 0, "ba": 0, "bc": 1, "cb": 1}.get(told, 2)
+            rows[plain(channel.circuit), len(told) == 2][place].append(i)
+    made = []
+    for (_, pairs), places in rows.items():
+        for numbers in zip_longest(*(places.get(k, []) for k in range(3))):
+            have = tuple(n for n in numbers if n is not None)
+            if len(have) == size:
+                missing = None if size == 3 else next(k for k in range(3) if numbers[k] is None)
+                made.append(Group(have, pairs, _shared([channels[n] for n in have]), False, missing))
+    return made
+
+
+def _shared(channels: list[Channel]) -> str:
+    """What the group is called: its circuit where the names say no more, else what the names share."""
+    names = [c.name.strip() for c in channels]
+    start = 0
+    while start < min(map(len, names)) and len({n[start] for n in names}) == 1:
+        start += 1
+    stop = 0
+    while stop < min(map(len, names)) - start and len({n[-1 - stop] for n in names}) == 1:
+        stop += 1
+    head, tail = names[0][:start], names[0][len(names[0]) - stop :]
+    head = "" if COUNTER.match(plain(names[0])) and len({COUNTER.match(plain(n))[0] for n in names}) > 1 else head
+    head = re.sub(r"(?i)(?:^|(?<=[^a-z]))[uvi]l?$", "", head)
+    name = f"{head} {tail}".strip(" _-.:")
+    circuit = channels[0].circuit.strip()
+    if len(name) > 1:
+        return name
+    return circuit if len(circuit) > 1 else ""
+
+
+def words(text: str) -> set[str]:
+    """What a name is made of, to be compared with another: words, numbers, single Chinese characters."""
+    text = plain(text)
+    found = set(re.findall(r"[a-z]+|\d+|[^\W\d_a-z\u2e80-\u9fff]+|[\u2e80-\u9fff]", text))
+    found |= set(re.findall(r"\d+[^\W\d_\u2e80-\u9fff]+|[^\W\d_\u2e80-\u9fff]+\d+", text))  # "2СШ", "T1"
+    single = {"1", "5"} if re.search(r"[\u2e80-\u9fff][iv](?![a-z])", text) else set()  # "母线I"
+    made = {ROMAN.get(word, word) for word in found if len(word) > 1 or word not in ROMAN}
+    return made | {ROMAN[word] for word in found & {"i", "v"} if ROMAN[word] in single}

@@ -1,0 +1,93 @@
+"""Phasors of a load from the channels that show it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.plugin import chosen
+from tractexp.record.phasor import Phasors, measure
+from tractexp.recording.feeder import Feeder
+from tractexp.recording.recording import Recording, Segment
+
+
+@dataclass(frozen=True, eq=False)
+class FeederWaves:
+    """The load's voltages [kV] and as many currents [kA] into it, (2 K, M), read from a segment where sliced.
+
+    K is 3, or 1 for a single-phase load. `waves[:, a:b]` raises `UserError` where a value is missing.
+    """
+
+    recording: Recording
+    feeder: Feeder
+    segment: Segment
+    matrices: tuple[np.ndarray, np.ndarray]  # (K, channels) of voltages and of currents
+
+    @classmethod
+    def of(cls, recording: Recording, feeder: Feeder, segment: Segment) -> "FeederWaves":
+        connection = chosen("connection", feeder.connection)
+        reverse = -1.0 if feeder.reverse_current else 1.0
+        return cls(recording, feeder, segment, (connection.voltage(), reverse * connection.current()))
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        return sum(len(m) for m in self.matrices), self.segment.stop - self.segment.first
+
+    def __getitem__(self, at: tuple[slice, slice]) -> np.ndarray:
+        rows, (first, stop, _) = at[0], at[1].indices(self.shape[1])
+        part = replace(self.segment, first=self.segment.first + first, stop=self.segment.first + stop)
+        sides = zip(self.matrices, (self.feeder.voltages, self.feeder.currents), strict=True)
+        return np.concatenate([m @ self.recording.matrix(numbers, part) for m, numbers in sides])[rows]
+
+    @property
+    def late(self) -> np.ndarray:
+        """Time (2 K,) [s] by which each is sampled later than stamped.
+
+        Raises `UserError` where one is made of channels that differ in it.
+        """
+        made = []
+        for matrix, numbers in zip(self.matrices, (self.feeder.voltages, self.feeder.currents), strict=True):
+            skew = np.array([self.recording.channels[i].skew for i in numbers])
+            for row in matrix:
+                if np.ptp(skew[row != 0]) > 1e-9:
+                    names = ", ".join(self.recording.channels[i].name for i in np.array(numbers)[row != 0])
+                    raise UserError(
+                        f"data.skew=true: the channels {names} are sampled at different times, and the connection "
+                        "needs them at once; leave data.skew out"
+                    )
+                made.append(skew[row != 0][0])
+        return np.array(made)
+
+
+def waves_of(recording: Recording, feeder: Feeder, segment: Segment) -> np.ndarray:
+    """The load's voltages [kV] and as many currents [kA] into it, (2 K, M), all of a segment at once."""
+    return FeederWaves.of(recording, feeder, segment)[:, :]
+
+
+def phasors_of(
+    recording: Recording,
+    feeder: Feeder,
+    segment: Segment,
+    estimator: Any = "one_cycle",
+    skew: bool = False,
+    harmonics: Sequence[int] = (),
+) -> Phasors:
+    """The phasors of a feeder within one segment, by an estimator: its name, or a mapping of name and settings.
+
+    `skew` corrects what the file says of late channels; `harmonics` are measured besides the fundamental. Raises
+    `UserError` for a segment that is too short, and for harmonics the sampling cannot show.
+    """
+    for h in harmonics:
+        if h < 2 or h * 1.1 * recording.frequency >= segment.rate / 2:
+            most = int(segment.rate / 2 / 1.1 / recording.frequency)
+            raise UserError(f"data.harmonics={[*harmonics]}: at {segment.rate:g} Hz they can be 2 to {most}")
+    waves = FeederWaves.of(recording, feeder, segment)
+    try:
+        return measure(
+            waves, segment.rate, recording.frequency, segment.start, skew=waves.late if skew else None,
+            window=chosen("estimator", estimator).averager, harmonics=harmonics,
+        )  # fmt: skip
+    except UserError as error:
+        raise UserError(f"{recording.source}: segment from {segment.start:.3f} s: {error}") from error

@@ -1,0 +1,124 @@
+"""Phasors of many channels at once, one window of a cycle after another: enough to tell what a file holds."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.recording.recording import FEWEST_PER_CYCLE, Recording, Segment
+
+NOMINAL = (50.0, 60.0, 50 / 3)  # Hz, of the networks there are
+TUNED = 0.06  # of a nominal frequency: a network's frequency strays no farther
+MOST_WINDOWS = 1500  # of a segment: half a minute at 50 Hz without a gap; a longer one is sampled
+PURE = 0.8  # of the energy about the mean lies in the fundamental of a channel that holds a wave
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshots:
+    """RMS phasors of channels, one window of about a cycle each, in a frame that turns at `f` since time zero."""
+
+    numbers: tuple[int, ...]  # of the channels, as the recording counts them
+    t: np.ndarray  # (M,) s, centers of the windows
+    X: np.ndarray  # (K, M) kV or kA; nan where samples are missing
+    f: float  # Hz
+    rest: np.ndarray  # (K, M) RMS of what is neither mean nor fundamental
+
+    def of(self, numbers: Sequence[int]) -> np.ndarray:
+        """The phasors (K, M) of some of the channels."""
+        return self.X[[self.numbers.index(n) for n in numbers]]
+
+    def pure(self, number: int) -> bool:
+        """Whether the channel is a wave of this frequency in at least some of the windows where it is largest."""
+        k = self.numbers.index(number)
+        size = np.abs(self.X[k])
+        if not np.isfinite(size).any() or np.nanmax(size) == 0:
+            return False
+        large = size >= 0.5 * np.nanmax(size)
+        return bool(np.nanmedian(self.rest[k][large] ** 2) <= (1 / PURE - 1) * np.nanmedian(size[large] ** 2))
+
+
+def segments(recording: Recording) -> list[Segment]:
+    """The segments that hold waveforms at any nominal frequency the file may really have; none is no error."""
+    least = FEWEST_PER_CYCLE * recording.frequency
+    return [s for s in recording.segments if s.rate >= least and s.stop - s.first >= 2 * s.rate / recording.frequency]
+
+
+def snapshots(recording: Recording, numbers: Sequence[int], frequency: float | None = None) -> Snapshots | None:
+    """Windows of all segments that hold waveforms, one after another; None where there is no such segment.
+
+    In each the least-squares fit of a mean and a sinusoid of `frequency` [Hz] (by default the nominal one).
+    """
+    f = frequency or recording.frequency
+    parts = [_windows(recording, numbers, segment, f) for segment in segments(recording)]
+    if not parts:
+        return None
+    t, X, rest = (np.concatenate(each, axis=-1) for each in zip(*parts, strict=True))
+    return Snapshots(tuple(numbers), t, X, f, rest)
+
+
+def _windows(recording: Recording, numbers: Sequence[int], segment: Segment, f: float) -> tuple[np.ndarray, ...]:
+    n = round(segment.rate / f)
+    count = (segment.stop - segment.first) // n
+    firsts = np.unique(np.linspace(0, count - 1, min(count, MOST_WINDOWS)).astype(int)) * n
+    phase = 2 * np.pi * f * np.arange(n) / segment.rate
+    basis = np.column_stack([np.ones(n), np.sqrt(2) * np.cos(phase), -np.sqrt(2) * np.sin(phase)])
+    inverse = np.linalg.pinv(basis)  # (3, n)
+    X, rest = np.empty((len(numbers), len(firsts)), complex), np.empty((len(numbers), len(firsts)))
+    whole = len(firsts) == count
+    for k, number in enumerate(numbers):
+        channel, begin = recording.channels[number], segment.first
+        if whole:
+            blocks = channel.values(begin, begin + count * n).reshape(count, n)
+        else:
+            blocks = np.array([channel.values(begin + i, begin + i + n) for i in firsts])
+        found = blocks @ inverse.T  # (M, 3)
+        X[k] = found[:, 1] + 1j * found[:, 2]
+        rest[k] = np.sqrt(np.mean((blocks - found @ basis.T) ** 2, axis=1))
+    start = segment.start + firsts / segment.rate
+    return start + (n - 1) / 2 / segment.rate, X * np.exp(-2j * np.pi * f * start), rest
+
+
+def frequency(recording: Recording, numbers: Sequence[int]) -> float | None:
+    """Frequency [Hz] measured on the largest of the channels while it is alive; None where none can be told.
+
+    The strongest line of its spectrum between 10 and 75 Hz, refined by how its phase turns from window to window.
+    """
+    coarse = [made for s in recording.segments if (made := _line(recording, numbers, s)) is not None]
+    if not coarse:
+        return None
+    at = max(coarse)[1]
+    seen = snapshots(recording, numbers, at)
+    if seen is None or seen.X.shape[1] < 3:
+        return at
+    k = int(np.argmax(np.nan_to_num(np.nanmedian(np.abs(seen.X), axis=1))))
+    x = seen.X[k]
+    alive = np.abs(x) > 0.5 * np.nanmax(np.abs(x))
+    pairs = alive[1:] & alive[:-1] & (np.diff(seen.t) < 1.5 * np.median(np.diff(seen.t)))
+    if np.count_nonzero(pairs) < 2:
+        return at
+    turned = (np.angle(x[1:] * x[:-1].conj()) / np.diff(seen.t) / (2 * np.pi))[pairs]
+    return at + float(np.median(turned))
+
+
+def _line(recording: Recording, numbers: Sequence[int], segment: Segment) -> tuple[float, float] | None:
+    """(energy, frequency [Hz]) of the strongest line of a segment's first two seconds; None for a slow or short one."""
+    n = min(segment.stop - segment.first, int(2 * segment.rate))
+    if segment.rate < 10 * 16 or n < 0.05 * segment.rate or not numbers:
+        return None
+    waves = [recording.channels[i].values(segment.first, segment.first + n) for i in numbers]
+    size = [float(np.nanstd(w)) if np.isfinite(w).any() else 0.0 for w in waves]
+    wave = np.nan_to_num(waves[int(np.argmax(size))])
+    if not np.any(wave):
+        return None
+    padded = 8 * n
+    power = np.abs(np.fft.rfft((wave - wave.mean()) * np.hanning(n), padded)) ** 2
+    lines = np.fft.rfftfreq(padded, 1 / segment.rate)
+    power[(lines < 10) | (lines > 75)] = 0
+    best = int(np.argmax(power))
+    return float(power[best]) * n, float(lines[best])
+
+
+def nearest_nominal(f: float) -> float | None:
+    """The nominal frequency [Hz] that a measured one belongs to; None for none."""
+    best = min(NOMINAL, key=lambda each: abs(f / each - 1))
+    return best if abs(f / best - 1) <= TUNED else None
