@@ -1,6 +1,6 @@
 """Cells of a table as numbers and as times, whatever way they are written.
 
-    1.25   -1,25   1.0D-3   nan   #N/A   -         2024-03-31T01:59:59.900+01:00   31.03.2024 14:00:07,250   14:00:07.25
+1.25   -1,25   1.0D-3   nan   #N/A   -         2024-03-31T01:59:59.900+01:00   31.03.2024 14:00:07,250   14:00:07.25
 """
 
 import datetime as dt

@@ -1,6 +1,6 @@
 """What the columns of a table are called, and what that means: quantity, phase, unit.
 
-    t   Time [s]   Zeit in ms   时间     U   Voltage (kV)   Va   UA(kV)   V1   m:u1:bus in p.u.     P [MW]   Active power
+t   Time [s]   Zeit in ms   时间     U   Voltage (kV)   Va   UA(kV)   V1   m:u1:bus in p.u.     P [MW]   Active power
 """
 
 import re

@@ -104,7 +104,10 @@ def _feeder(recording: Recording, seen: Snapshots, load: Group, buses: Sequence[
     connection = "aron" if len(load.numbers) == 2 else "three_phase"
     if bus.pairs:
         connection = "line_voltages" if len(bus.numbers) == 3 else "two_line_voltages"
-    said = [f"currents {_names(recording, load.numbers)}: {_by(load)}", f"voltages {_names(recording, bus.numbers)}: {why}"]
+    said = [
+        f"currents {_names(recording, load.numbers)}: {_by(load)}",
+        f"voltages {_names(recording, bus.numbers)}: {why}",
+    ]
     if bus.pairs:
         said.append("the voltages are line to line, as their names say")
     if len(load.numbers) == 2:

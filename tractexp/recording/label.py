@@ -16,7 +16,9 @@ from tractexp.recording.recording import Channel
 ALPHABETS = ("abc", "rst", "uvw", "123")
 CYRILLIC = str.maketrans("авсеіо", "abceio")  # letters that look like Latin ones, as phases are often typed
 QUANTITY = "uvie"  # letters before a phase's: U, V, E of a voltage, I of a current
-RESIDUAL = re.compile(r"3[uvi][o0]|(?<![a-z])[uvi][_ ]?[ong0](?![a-z])|(?<![a-z])3?[uvi]_?(?:res|gnd|neutral)|零序|нулев")
+RESIDUAL = re.compile(
+    r"3[uvi][o0]|(?<![a-z])[uvi][_ ]?[ong0](?![a-z])|(?<![a-z])3?[uvi]_?(?:res|gnd|neutral)|零序|нулев"
+)
 COUNTER = re.compile(r"^[a-z]{0,2}\d+[-_. :)]+")  # "12-Ia", "F5-VA": a number of its own before the name
 SURE = 3.0  # score of a mark right after the letter of a quantity: "Ia", "UL1", "U21"
 NO_WAVE = re.compile(r"(?<![a-z])(?:mag|magnitude|rms|ang|angle|diff|bias)(?![a-z])")
@@ -107,7 +109,9 @@ def _by_name(channels: Mapping[int, Channel], full: bool, counters: bool, size: 
                 continue
             missing = None if size == 3 else next(k for k in range(3) if numbers[k] is None)
             used |= set(have)
-            made.append(Group(tuple(have), label[2], _shared([channels[n] for n in have]), worth[label] >= SURE, missing))
+            made.append(
+                Group(tuple(have), label[2], _shared([channels[n] for n in have]), worth[label] >= SURE, missing)
+            )
     return made
 
 
