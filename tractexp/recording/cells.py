@@ -24,7 +24,7 @@ CLOCK = re.compile(
     r"\s*(?:(?P<day>\S.*?)[T\s]+)?(?:(?P<h>\d{1,2}):)?(?P<m>\d{1,2}):(?P<s>\d{1,2}(?:[.,]\d*)?)"
     r"(?:\s*(?P<half>[AaPp])[Mm])?\s*(?P<zone>Z|UTC|GMT|[+-]\d{2}:?\d{2}|[+-]\d{2})?\s*"
 )
-DAY = 86400.0  # s
+DAY, HOUR = 86400.0, 3600.0  # s
 
 
 class BadCell(Exception):
@@ -99,7 +99,7 @@ def _comma(cell: str, decimal: str) -> str:
 def times(cells: Sequence[Any]) -> tuple[np.ndarray, dt.datetime | None]:
     """Times (N,) [s] since the first cell, and when that was, where the cells tell the day.
 
-    Times of day run on past midnight. Raises `BadCell` for what is no time.
+    Times of day run on past midnight, those without hours past the full hour. Raises `BadCell` for what is no time.
     """
     made, start = np.empty(len(cells)), None
     for row, cell in enumerate(cells):
@@ -114,7 +114,8 @@ def times(cells: Sequence[Any]) -> tuple[np.ndarray, dt.datetime | None]:
     if len(cells) and first is not None:
         start = dt.datetime.combine(first, dt.time()) + dt.timedelta(seconds=begin)
     elif len(cells):
-        made += DAY * np.cumsum(np.diff(made, prepend=made[0]) < -DAY / 2)
+        turn = HOUR if isinstance(cells[0], str) and cells[0].count(":") == 1 else DAY
+        made += turn * np.cumsum(np.diff(made, prepend=made[0]) < -turn / 2)
     return made - (made[0] if len(made) else 0.0), start
 
 
@@ -123,6 +124,8 @@ def _moment(cell: Any, row: int) -> tuple[dt.date | None, float]:
     if isinstance(cell, dt.datetime | dt.time):
         seconds = cell.hour * 3600 + cell.minute * 60 + cell.second + cell.microsecond * 1e-6
         return (cell.date() if isinstance(cell, dt.datetime) else None), seconds
+    if isinstance(cell, dt.date):
+        return cell, 0.0  # a sheet's midnight
     found = CLOCK.fullmatch(cell) if isinstance(cell, str) else None
     if found is None:
         raise BadCell(row, f"'{cell}' is no time, such as 12:00:00.25 or 2024-03-31T12:00:00.25")

@@ -117,6 +117,8 @@ def factor(unit: str) -> float:
 def role(name: str, unit: str = "") -> Role | None:
     """What a column of that name and unit is; None for what cannot be told."""
     words = _words(name)
+    if not words:
+        return None
     found = next((made for made in (_compound(words), _worded(words)) if made), None)
     if found is None:
         return None

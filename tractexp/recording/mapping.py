@@ -61,7 +61,7 @@ def mapped(table: Table, columns: Mapping[str, Any], units: Mapping[str, str]) -
             )
         chosen[key] = options[key][0]
     chosen = {key: _with_unit(one, units) for key, one in chosen.items()}
-    return Mapped(kind, chosen, (*table.notes, *_notes(table, chosen)))
+    return Mapped(kind, chosen, tuple(_notes(table, chosen)))
 
 
 def check_mapping(columns: Mapping[str, Any], units: Mapping[str, str]) -> None:

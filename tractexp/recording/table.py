@@ -109,11 +109,16 @@ def column(cells: Sequence[Any], kind: str, decimal: str) -> Column:
     return Column(numbers(cells, decimal, gaps=kind == "gaps"))
 
 
-def open_table(path: str, form: Form) -> Table:
-    """Open a table by what the file holds, whatever its ending; raises `UserError` for what is no table."""
-    from tractexp.recording.table_text import open_text
+def open_table(path: str, form: Form, whole: bool = True) -> Table:
+    """Open a table by what the file holds, whatever its ending; raises `UserError` for what is no table.
 
-    data = content(path)
+    Of a text not `whole` only the beginning is read: enough to know its columns.
+    """
+    from tractexp.recording.table_text import HEAD, open_text
+
+    data = content(path, None if whole else HEAD)
+    if not whole and data.startswith((PARQUET, *SPREADSHEETS)):
+        data = content(path)
     if data.startswith(PARQUET):
         return _parquet(path, data)
     if data.startswith(SPREADSHEETS):
@@ -124,8 +129,8 @@ def open_table(path: str, form: Form) -> Table:
     return open_text(path, data, form)
 
 
-def content(path: str) -> bytes:
-    """The bytes of a file, or of one inside an installed package (`pkg://package/file.csv`)."""
+def content(path: str, limit: int | None = None) -> bytes:
+    """The bytes of a file, or of one inside an installed package (`pkg://package/file.csv`); whole lines to a limit."""
     folder, name = located(path)
     file = folder / name
     if not file.is_file():
@@ -135,7 +140,11 @@ def content(path: str) -> bytes:
         hint = "; that folder does not exist" if found is None else nearest(name, found)
         raise UserError(f"{path}: there is no such file in {str(folder) if found is not None else folder}{hint}")
     try:
-        return file.read_bytes()
+        if limit is None:
+            return file.read_bytes()
+        with file.open("rb") as opened:
+            data = opened.read(limit)
+        return data if len(data) < limit else data[: data.rfind(b"\n") + 1] or data
     except OSError as error:
         raise UserError(f"{path} cannot be read: {error.strerror or 'it is no ordinary file'}") from error
 

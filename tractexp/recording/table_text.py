@@ -294,7 +294,7 @@ def _parsed(body: bytes, delimiter: str, source: str, begin: int) -> Iterator[tu
     if delimiter == " ":
         yield from ((begin + k, row) for k, line in enumerate(lines) if (row := line.split()))
         return
-    reader = csv.reader(lines, delimiter=delimiter, skipinitialspace=True)
+    reader = csv.reader(lines, delimiter=delimiter, skipinitialspace=True, strict=True)
     try:
         for row in reader:
             if row and any(cell.strip() for cell in row):

@@ -13,6 +13,7 @@ from tractexp.recording.cells import is_number
 from tractexp.recording.columns import PER_UNIT, factor, role
 from tractexp.recording.mapping import LINES, PHASES, Mapped, check_mapping, mapped
 from tractexp.recording.recording import Channel, Recording, Segment
+from tractexp.recording.sidecar import Sidecar, beside
 from tractexp.recording.table import Form, Table, open_table
 
 TURN = np.exp(2j * np.pi / 3)
@@ -43,16 +44,19 @@ class Tabular:
     def _form(self) -> Form:
         return Form(self.decimal, self.header, self.sheet, self.encoding)
 
-    def opened(self, path: str) -> tuple[Table, Mapped]:
+    def opened(self, path: str, told: Sidecar) -> tuple[Table, Mapped]:
         """A table and what its columns are; raises `UserError` for what is no table, or not to be told."""
         table = open_table(path, self._form)
-        return table, mapped(table, self.columns, self.units)
+        return table, mapped(table, {**told.columns, **self.columns}, {**told.units, **self.units})
 
 
 def kind_of(path: str) -> str:
     """What the table in a file holds: "powers", "phasors" or "waveforms"; "powers" where that cannot be told."""
     try:
-        return Tabular().opened(path)[1].kind
+        told = beside(path)
+        if told.recording is not None:
+            return "waveforms"
+        return mapped(open_table(path, Form(), whole=False), told.columns, told.units).kind
     except UserError:
         return "powers"  # whose reader says what is wrong
 
@@ -100,7 +104,7 @@ def _of_powers(table: Table, found: Mapped, kilovolts: bool) -> Powers:
     absolute = {"U": _absolute(found, first), "P": _absolute(found, next(k for k in found.columns if k[0] == "P"))}
     if absolute["U"] or (absolute["U"] is None and kilovolts):
         notes += _to_lines(made, found.columns[first].role.line, first)
-    return Powers(made, absolute, tuple(notes))
+    return Powers(made, absolute, (*table.notes, *notes))
 
 
 def _to_lines(made: dict[str, np.ndarray], line: bool | None, key: str) -> list[str]:
@@ -109,7 +113,7 @@ def _to_lines(made: dict[str, np.ndarray], line: bool | None, key: str) -> list[
         for name in {"U", "U2"} & set(made):
             made[name] = made[name] * np.sqrt(3)
         return [f"{key} taken as a phase voltage: times sqrt(3) it is line to line"]
-    return [] if line or key == "U" and False else ["U taken as line-to-line voltage"] if line is None else []
+    return ["U taken as line-to-line voltage"] if line is None else []
 
 
 def _absolute(found: Mapped, key: str) -> bool | None:
@@ -165,7 +169,7 @@ def _of_phasors(table: Table, found: Mapped, nominal: float) -> Powers:
     else:
         made["f"] = nominal + np.gradient(np.unwrap(np.angle(V1)), values["t"]) / (2 * np.pi)
         notes.append(f"f from the angle of the voltage, which stands still at {nominal:g} Hz")
-    return Powers(made, {"U": bool(absolute), "P": bool(absolute)}, tuple(notes))
+    return Powers(made, {"U": bool(absolute), "P": bool(absolute)}, (*table.notes, *notes))
 
 
 def _in_units(table: Table, found: Mapped, values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
