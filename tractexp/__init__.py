@@ -26,6 +26,7 @@ PUBLIC = {
     "identify": "tractexp.api.identify",
     "investigate": "tractexp.api.investigate",
     "load": "tractexp.api.load",
+    "look": "tractexp.api.look",
     "paper": "tractexp.api.paper",
     "plan": "tractexp.api.plan",
     "posterior": "tractexp.api.posterior",
@@ -33,6 +34,7 @@ PUBLIC = {
     "read": "tractexp.api.read",
     "simulate": "tractexp.api.simulate",
     "sites": "tractexp.model.site_table",
+    "survey": "tractexp.api.survey",
 }
 __all__ = ["__version__", *PUBLIC]
 

@@ -31,6 +31,10 @@ def main() -> int:
             from tractexp.tasks.ui import ui
 
             return ui(sys.argv[2:])
+        if sys.argv[1:2] == ["look"]:
+            from tractexp.tasks.look import look
+
+            return look(sys.argv[2:])
         if sys.argv[1:2] == ["list"]:
             from tractexp.usage import listed
 

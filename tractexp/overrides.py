@@ -1,6 +1,8 @@
 """Arguments as people write them, made into overrides that Hydra reads."""
 
 import re
+import shlex
+from collections.abc import Mapping
 from pathlib import Path
 
 # settings that take names of their own
@@ -19,6 +21,26 @@ def override(argument: str) -> str:
     if equals and key.lstrip("+~").startswith(NAMING) and not _read_by_hydra(argument, value):
         argument = f"{key}={_quoted(value)}"
     return f"++{argument}" if argument.startswith(OPEN) else argument
+
+
+def typed(data: Mapping[str, object], *more: str) -> str:
+    """The command, as a shell takes it, that reads records by these settings (`name` and the reader's own)."""
+    settings = dict(data)
+    told = [f"data={settings.pop('name')}", *(assigned(f"data.{key}", value) for key, value in settings.items())]
+    return shlex.join(["tractexp", *more, *told])
+
+
+def assigned(key: str, value: object) -> str:
+    """KEY=VALUE as `override` and Hydra read it back: numbers, texts, true and false, and lists of them."""
+    if isinstance(value, list | tuple):
+        return f"{key}=[{','.join(map(_plain, value))}]"
+    return f"{key}={value if isinstance(value, str) else _plain(value)}"
+
+
+def _plain(value: object) -> str:
+    if isinstance(value, str):
+        return value if PLAIN.fullmatch(value) else _quoted(value)
+    return "null" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _read_by_hydra(argument: str, value: str) -> bool:

@@ -107,6 +107,15 @@ def telling(progress: Progress) -> Iterator[Callable[[str], None]]:
         yield lambda line: say(f"  {line}")
 
 
+@contextmanager
+def staged(progress: Progress = None) -> Iterator[Callable[[str], None]]:
+    """As `telling`, but a log file is told of a stage only where the call has taken `FIRST_LINE` seconds already."""
+    started = time.perf_counter()
+    with telling(progress) as told:
+        quick = not _lively() and not callable(progress)
+        yield lambda line: None if quick and time.perf_counter() - started < FIRST_LINE else told(line)
+
+
 def tell(progress: Progress, lines: Iterable[str]) -> None:
     """Tell a callable each line; else only how far a call is shown."""
     if callable(progress):

@@ -21,6 +21,8 @@ GROUPS = {
     "optimizer": "how the parameters are searched",
     "objective": "what the search makes small",
     "data": "the records",
+    "connection": "how the channels of a recording are connected, chosen by data.connection=NAME",
+    "estimator": "how phasors are made of waveforms, chosen by data.estimator=NAME",
     "format": "what task=export writes, chosen by task.format=NAME",
     "experiment": "a task with its settings, such as a table of the paper",
     "hydra/launcher": "where the jobs of a sweep run; by default on the cores of this computer",
@@ -31,6 +33,8 @@ TEXT = """\
 tractexp: identify the parameters of a traction load from recorded voltage dips
 
 The commonest
+  tractexp look station.cfg
+      what a file holds: its loads, what happened, what is worth fitting, and the command that fits it
   tractexp data=csv 'data.train=[dip1.csv]'
       identify a load from a dip (columns t,U,P,Q): how well it fits, how sure each parameter is
   tractexp task=discrepancy data=csv 'data.train=[dip1.csv,dip2.csv]' 'data.validate=[dip3.csv]'

@@ -42,3 +42,13 @@ def as_sentence(text: str) -> str:
 def _powers(value: float, digits: int) -> str:
     """'2.6e-5' where Python says '2.6e-05'."""
     return f"{value:.{digits}g}".replace("e-0", "e-").replace("e+0", "e")
+
+
+def figure(value: float | None, digits: int = 4, unit: str = "") -> str:
+    """A number with so many significant digits and its unit; "" where there is none."""
+    return "" if value is None or value != value else f"{value:.{digits}g}{unit and ' '}{unit}"
+
+
+def change(before: float | None, after: float | None) -> str:
+    """What a number was and what it became; a question mark where it is not known."""
+    return f"{figure(before) or '?'} to {figure(after) or '?'}"

@@ -9,7 +9,7 @@ from tractexp.recording.reader import WaveformReader
 
 @plugin
 class COMTRADE(WaveformReader):
-    """Dips from three phase voltages and currents of a COMTRADE record (.cfg with its .dat).
+    """Dips from three phase voltages and currents of a COMTRADE record (.cfg with its .dat, or .cff).
 
     Channels are counted from 0, or named. Secondary values are taken to the primary side. One-cycle phasors at
     the tracked frequency, stamped at the window's center, about one per millisecond, no window across two sampling
@@ -18,13 +18,13 @@ class COMTRADE(WaveformReader):
     from the steady state before the first dip: its line-to-line voltage and its apparent power. Dips are
     numbered from 1; the first is fitted and the others validate unless said otherwise.
 
-    Source: IEEE C37.111-1999 and -2013 (files); IEEE C37.118.1-2011 (centered phasors); Fortescue 1918.
+    Source: IEEE C37.111-1991, -1999 and -2013 (files); IEEE C37.118.1-2011 (centered phasors); Fortescue 1918.
     Departures: the time skew of channels is corrected on request only.
     """
 
-    endings = (".cfg",)
+    endings = (".cfg", ".cff", ".dat")
 
-    encoding: str | None = None  # of the .cfg; null: the first of utf-8, gbk, cp1251 that fits
+    encoding: str | None = None  # of the .cfg; null: found from its letters among utf-8, gbk, cp1251 and latin-1
 
     def recording(self) -> Recording:
         return comtrade.load(Path(self.path), self.encoding)

@@ -115,7 +115,7 @@ class CSV(Tabular, Reader):
     def _record(self, path: str, base: Base | None = None) -> Record:
         """The whole of one table; `base` is that of the first one read, which all share."""
         told = beside(path)
-        table, found = self.opened(path, told)
+        table, found = self.table_of(path, told)
         given = self.base_voltage or (told.base and told.base.voltage)
         made = powers(table, found, self.frequency, self.reverse_current, kilovolts=given is not None)
         arrays: Any = made.columns

@@ -39,4 +39,4 @@ class Waveforms(Tabular, WaveformReader):
         told = beside(self.path)
         if told.recording is not None:
             return restored(self.path, told.recording)
-        return recording(*self.opened(self.path, told), self.frequency)
+        return recording(*self.table_of(self.path, told), self.frequency)

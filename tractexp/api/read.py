@@ -11,7 +11,7 @@ from tractexp import plugin
 from tractexp.api.arguments import Choice, check_kind, choices, public
 from tractexp.errors import UserError, among
 from tractexp.outcome import Table, Tabulated
-from tractexp.record import Base, Event, Reader, Record, describe, detect
+from tractexp.record import Base, Event, Record, Window, describe, detect, reader_of
 
 REQUIRED, OPTIONAL = ("t", "U", "P", "Q"), ("f", "U2")
 GROUP = "data"
@@ -22,6 +22,12 @@ class Dips(Tabulated, list[Event]):
 
     def __getitem__(self, k: Any) -> Any:
         return Dips(super().__getitem__(k)) if isinstance(k, slice) else super().__getitem__(k)
+
+    def look(self) -> Any:
+        """A look (a `Look`) at the files that the events are from, and at the records that are from none."""
+        from tractexp.api.look import look
+
+        return look(*self)
 
     def table(self) -> Table:
         """One row for each event; below it what a reader or the detection found odd."""
@@ -141,45 +147,34 @@ def _records(source: Any, settings: Mapping[str, Any]) -> Iterator[Record]:
 
 def _file(path: str, settings: Mapping[str, Any]) -> list[Record]:
     """The records of a file, by the reader its ending names, or of a choice of `conf/data`."""
-    read = plugin.build(GROUP, _node(path, settings)).read()
+    read = plugin.build(GROUP, node_of(path, settings)).read()
     return [*read.train, *read.validate]
 
 
-def _node(path: str, settings: Mapping[str, Any]) -> dict[str, Any]:
+def node_of(path: str, settings: Mapping[str, Any]) -> dict[str, Any]:
     """The reader that a path, or a choice of `conf/data`, asks for, with its settings."""
-    if not Path(path).exists() and path in choices(GROUP, files=True):
-        return {**Choice.of(GROUP, path).node, **settings}
+    if not Path(path).exists():
+        shipped = choices(GROUP, files=True)
+        if path in shipped:
+            return {**Choice.of(GROUP, path).node, **settings}
+        if not Path(path).suffix:
+            raise UserError(f"{path} is neither a file with an ending nor a shipped record{among(path, shipped)}")
     cls = reader_of(path)
     return {"name": cls.name, **cls.of(path), **settings}
 
 
-def reader_of(path: str) -> type[Reader]:
-    """The reader of a file, by its ending and, where several share it, by what is inside.
-
-    Raises `UserError` for a folder, and for an ending that no reader takes.
-    """
-    ending = Path(path).suffix.lower()
-    readers: list[Any] = [cls for cls in plugin.discover()[GROUP].values() if ending and ending in cls.endings]
-    if Path(path).is_dir():
-        raise UserError(
-            f"{path} is a folder; give a file of it, or 'tractexp task=survey data.path={path}' for a table"
-        )
-    if not readers and not ending and not Path(path).exists():
-        known = among(path, choices(GROUP, files=True))
-        raise UserError(f"{path} is neither a file with an ending nor a shipped record{known}")
-    if not readers:
-        endings = sorted({e for cls in plugin.discover()[GROUP].values() for e in getattr(cls, "endings", ())})
-        raise UserError(f"{path}: no reader takes files ending in '{ending}'; Endings: {', '.join(endings)}")
-    return next((cls for cls in readers if cls.takes(path)), readers[0])
-
-
 def kept(event: Event) -> dict[str, Any]:
     """A record as plain data, as a saved result holds it."""
-    return {f.name: getattr(event.record, f.name) for f in fields(Record)} | {"base": asdict(event.record.base)}
+    record = event.record
+    plain = {"base": asdict(record.base), "window": record.window and record.window.to_dict(), "more": {**record.more}}
+    return {f.name: getattr(record, f.name) for f in fields(Record)} | plain
 
 
 def again(content: Mapping[str, Any]) -> Event:
     """The event of what `kept` told; its dip is found again."""
     arrays: Any = {k: np.array(content[k], dtype=float) for k in (*REQUIRED, *OPTIONAL) if content[k] is not None}
     base, notes = Base(**content["base"]), tuple(content["notes"])
-    return detect(Record(content["name"], base=base, source=content["source"], notes=notes, **arrays))
+    window = Window.of(content["window"]) if content.get("window") else None
+    more = {name: np.array(values, dtype=float) for name, values in content.get("more", {}).items()}
+    made = Record(content["name"], base=base, source=content["source"], notes=notes, window=window, more=more, **arrays)
+    return detect(made)

@@ -6,6 +6,8 @@ from tractexp.record.event import detect as detect
 from tractexp.record.event import find_dips as find_dips
 from tractexp.record.reader import Events as Events
 from tractexp.record.reader import Reader as Reader
+from tractexp.record.reader import endings as endings
+from tractexp.record.reader import reader_of as reader_of
 from tractexp.record.record import Base as Base
 from tractexp.record.record import Record as Record
 from tractexp.record.window import Window as Window

@@ -3,9 +3,12 @@
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar
 
-from tractexp.plugin import Plugin
+from tractexp.errors import UserError
+from tractexp.plugin import Plugin, discover
+from tractexp.record import foreign
 
 
 @dataclass(frozen=True)
@@ -21,6 +24,7 @@ class Reader(Plugin):
 
     group: ClassVar[str] = "data"
     endings: ClassVar[tuple[str, ...]] = ()  # of the files that `tractexp.read` gives it, in lower case
+    folders: ClassVar[bool] = False  # `data.path` is a folder, and `train` names events of its files
 
     @staticmethod
     def of(path: str) -> dict[str, Any]:
@@ -35,3 +39,25 @@ class Reader(Plugin):
     @abstractmethod
     def read(self) -> Events:
         """Read and check everything; raises `UserError` naming the file, the place and the value."""
+
+
+def reader_of(path: str) -> type[Any]:
+    """The reader of a file, by its ending and, where several share it, by what is inside.
+
+    Raises `UserError` for a folder, and for an ending that no reader takes.
+    """
+    ending = Path(path).suffix.lower()
+    readers: list[Any] = [cls for cls in discover()[Reader.group].values() if ending and ending in cls.endings]
+    if Path(path).is_dir():
+        raise UserError(
+            f"{path} is a folder; give a file of it, or 'tractexp task=survey data.path={path}' for a table"
+        )
+    if not readers:
+        told = foreign.sentence(path) or f"{path}: no reader takes files ending in '{ending}'"
+        raise UserError(f"{told}; endings that can be read: {', '.join(endings())}")
+    return next((cls for cls in readers if cls.takes(path)), readers[0])
+
+
+def endings() -> list[str]:
+    """The endings of the files that can be read."""
+    return sorted({e for cls in discover()[Reader.group].values() for e in getattr(cls, "endings", ())})

@@ -1,11 +1,12 @@
 """A recorded event: the measured voltage and the power the load drew from it."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from tractexp.errors import UserError
+from tractexp.record.window import Window
 
 JITTER = 0.01  # of a step: times closer than this to a uniform grid count as uniform
 # s: coarser sampling leaves a dip of 100 ms fewer than two samples, and a transient time constant T' of 50 to 300 ms
@@ -27,8 +28,9 @@ class Base:
     frequency: float = 50.0  # Hz, nominal
 
     def per_unit(self, columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Columns by name, U and U2 [kV], P [MW] and Q [Mvar] made per unit."""
+        """Columns by name, U and U2 [kV], P and P_3, P_5, ... [MW] and Q [Mvar] made per unit."""
         units = {"U": self.voltage, "U2": self.voltage, "P": self.power, "Q": self.power}
+        units |= {name: self.power for name in columns if name.startswith("P_")}
         return {name: values / units.get(name, 1.0) for name, values in columns.items()}
 
 
@@ -37,7 +39,8 @@ class Record:
     """Positive-sequence voltage and power of one event, P and Q positive when consumed.
 
     Arrays have shape (N,), are finite except where `P` or `Q` is missing (nan: a gap, left out of every sum),
-    and are sampled uniformly. `source` says where the record came from, `notes` what was done to it or found
+    and are sampled uniformly. `window` is what its phasors are averages over, where that is known; `more` are further
+    channels, which no model reads. `source` says where the record came from, `notes` what was done to it or found
     odd about it, one sentence each.
     """
 
@@ -51,6 +54,8 @@ class Record:
     base: Base = Base()
     source: str = ""
     notes: tuple[str, ...] = ()
+    window: Window | None = None
+    more: Mapping[str, np.ndarray] = field(default_factory=dict)  # P_3, P_5, ... [pu], THD_u, THD_i
 
     def __repr__(self) -> str:
         span = f"{self.samples} samples of {', '.join(self.channels)}"
@@ -116,7 +121,13 @@ class Record:
             note = f"times were up to {100 * off:.2g} % of a step off a uniform grid: resampled linearly"
         moved = {name: np.interp(grid, self.t, values) for name, values in self.channels.items()}
         moved["t"] = grid
+<<<<<<< HEAD
         return replace(self, **moved, notes=(*self.notes, note))
+=======
+        more = {name: np.interp(grid, self.t, values) for name, values in self.more.items()}
+        note = f"times were up to {100 * off:.2g} % of a step off a uniform grid: resampled linearly"
+        return replace(self, **moved, more=more, notes=(*self.notes, note))
+>>>>>>> main
 
     def _check_steps(self, steps: np.ndarray, usual: float, place: Callable[[int], str]) -> None:
         """Refuse rows that are missing, and times that stand still other than at an event."""
@@ -162,6 +173,9 @@ class Record:
     def _check_values(self, place: Callable[[int], str], still: bool = False) -> None:
         """Refuse what is no record; times may stand `still` where the record is to be resampled."""
         n = self.samples
+        for name, values in self.more.items():
+            if values.shape != (n,):
+                raise UserError(f"{self.where}: {name} has shape {values.shape} where t has {n} samples")
         for name, values in self.channels.items():
             if values.shape != (n,):
                 raise UserError(f"{self.where}: {name} has shape {values.shape} where t has {n} samples")

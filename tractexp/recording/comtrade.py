@@ -1,125 +1,250 @@
-"""COMTRADE files (IEEE C37.111) read and checked."""
+"""COMTRADE records (IEEE C37.111-1991, -1999, -2013): .cfg with .dat, or both in one .cff, read and written.
 
-import math
+Read here and not by a library: the samples stay views of the file in the type they have there, no time is computed
+per sample, and what is wrong is told by file, line, channel and value.
+"""
+
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tractexp.errors import UserError, nearest
-from tractexp.recording.recording import UNITS, Channel, Recording, Segment
+from tractexp.recording import timeline
+from tractexp.recording.comtrade_header import Analog, Digital, Header, parse
+from tractexp.recording.comtrade_samples import NONE, Place, Samples, read
+from tractexp.recording.comtrade_writer import write as write
+from tractexp.recording.recording import UNITS, Channel, Recording, Status
+from tractexp.recording.remarks import Remarks
+from tractexp.recording.text import decode, lines
+from tractexp.recording.timeline import Stretch
 
-ENCODINGS = ("utf-8", "gbk", "cp1251", "latin-1")  # tried in this order; the last one never fails
-VALUE_BYTES = {"BINARY": 2, "BINARY32": 4, "FLOAT32": 4}  # of one analog value; ASCII has lines instead
+LARGEST_CFG = 64 * 2**20  # bytes: no configuration is longer
+MISSING = {"BINARY": -32768.0, "BINARY32": -2147483648.0}  # raw values that stand for none
+MISSING_TEXT = (99999.0, 999999.0)  # of 1999 and of 1991
+_SECTION = re.compile(
+    rb"^-+[ \t]*file type:[ \t]*(\w+)[ \t]*(\w*)[ \t]*(?::[ \t]*(\d+))?[ \t]*-+[ \t]*\r?\n?", re.I | re.M
+)
 
 
 def load(path: Path, encoding: str | None = None) -> Recording:
-    """Read a .cfg and the .dat beside it; raises `UserError` where they are missing, cut short or disagree."""
-    import comtrade
+    """Read a .cfg and the .dat beside it, or a .cff; raises `UserError` where they are missing, cut short or disagree.
 
-    cfg, dat = _pair(path)
-    encoding = _encoding(cfg, encoding)
-    try:
-        head = comtrade.Cfg(ignore_warnings=True)
-        head.load(str(cfg), encoding=encoding)
-    except (ValueError, IndexError, TypeError, AttributeError, comtrade.ComtradeError) as error:
-        raise UserError(f"{cfg}: not a consistent COMTRADE configuration: {error}") from error
-    _check_header(cfg, head)
-    _check_size(dat, head)
-    file = comtrade.Comtrade(ignore_warnings=True, use_numpy_arrays=True, use_double_precision=True)
-    try:
-        file.load(str(cfg), str(dat), encoding=encoding)
-    except (ValueError, IndexError, TypeError, comtrade.ComtradeError) as error:
-        raise UserError(f"{dat}: does not hold what {cfg.name} announces: {error}") from error
-    channels = [_channel(cfg, k, head.analog_channels[k], file.analog[k]) for k in range(head.analog_count)]
-    return Recording(str(cfg), channels, _segments(dat, head, np.asarray(file.time)), head.frequency or 50.0)
+    `encoding` is that of the configuration; None: found from its letters.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise UserError(f"{path} is a folder; task=survey data.path={path} makes a table of all records in it")
+    if path.suffix.lower() == ".cff":
+        return _combined(_existing(path), encoding)
+    cfg, dat, note = _pair(path)
+    remarks = Remarks(str(cfg))
+    if note:
+        remarks.add(note)
+    text, encoding = decode(_content(cfg), str(cfg), encoding)
+    return _recording(cfg, text, Place(dat, 0, dat.stat().st_size), remarks, {"encoding": encoding})
 
 
-def _channel(cfg: Path, number: int, told: Any, values: Any) -> Channel:
-    ratio = 1.0
-    if told.pors.strip().upper() == "S":
-        if told.primary <= 0 or told.secondary <= 0:
-            raise UserError(
-                f"{cfg}: channel {number} '{told.name}' is in secondary values, but its ratio "
-                f"{told.primary:g}/{told.secondary:g} is not positive"
-            )
-        ratio = told.primary / told.secondary
-    quantity = UNITS.get(told.uu.strip().lower(), ("", 1.0))[0]
+def _combined(path: Path, encoding: str | None) -> Recording:
+    """A .cff: its sections, the data last and by its length where it is binary."""
+    parts = _sections(path)
+    if "CFG" not in parts or "DAT" not in parts:
+        lack = "CFG" if "CFG" not in parts else "DAT"
+        raise UserError(
+            f"{path}: no section {lack}: a .cff has headings like '--- file type: {lack} ---'; if this is only the "
+            "configuration, name it .cfg and put its .dat beside it"
+        )
+    remarks = Remarks(str(path))
+    text, encoding = decode(parts["CFG"].content(LARGEST_CFG), str(path), encoding)
+    extra = {"encoding": encoding}
+    for name, key in (("HDR", "header"), ("INF", "information")):
+        if name in parts and (said := parts[name].content(LARGEST_CFG).strip()):
+            extra[key] = decode(said, str(path))[0]
+    return _recording(path, text, parts["DAT"], remarks, extra, parts["CFG"].line)
+
+
+def _sections(path: Path) -> dict[str, Place]:
+    """Where the sections of a .cff lie; bytes of binary data are not searched for headings."""
+    content = path.read_bytes()
+    made: dict[str, Place] = {}
+    at = 0
+    while (found := _SECTION.search(content, at)) is not None:
+        name, length = found[1].decode().upper(), found[3]
+        begin = found.end()
+        if name == "DAT" and found[2].upper() != b"ASCII":
+            stop = min(len(content), begin + int(length[:15])) if length else len(content)
+        else:
+            following = _SECTION.search(content, begin)
+            stop = following.start() if following else len(content)
+        made[name] = Place(path, begin, stop, content.count(b"\n", 0, begin) + 1)
+        at = stop
+    return made
+
+
+def _recording(
+    path: Path, text: str, data: Place, remarks: Remarks, extra: dict[str, Any], first: int = 1
+) -> Recording:
+    header = parse(str(path), lines(text), remarks, first)
+    samples = read(data, header, remarks)
+    stretches = _stretches(data, header, samples, remarks)
+    if any(s.t is not None for s in stretches):
+        remarks.add("samples at uneven times are interpolated to even ones (cubic splines)")
+    return Recording(
+        source=str(path),
+        channels=[_channel(header, k, samples, stretches) for k in range(len(header.analogs))],
+        segments=timeline.laid_out(stretches),
+        frequency=header.frequency,
+        station=header.station,
+        device=header.device,
+        start=header.start,
+        trigger=_trigger(header, stretches, remarks),
+        status=[_status(header, k, samples, stretches) for k in range(len(header.digitals))],
+        notes=remarks.told(),
+        extra={**extra, **_extra(header, samples, stretches)},
+    )
+
+
+def _channel(header: Header, k: int, samples: Samples, stretches: list[Stretch]) -> Channel:
+    told, raw = header.analogs[k], samples.analogs[k]
+    raw, missing = _missing(header.kind, told, raw)
     return Channel(
-        told.name.strip(), np.asarray(values), told.uu.strip(), quantity, told.ph.strip(), told.ccbm.strip(),
-        ratio=ratio, skew=told.skew * 1e-6,
+        told.name, timeline.evened(raw, stretches, missing), told.unit, UNITS.get(told.unit.lower(), ("", 1.0))[0],
+        told.phase, told.circuit, told.gain, told.offset, told.ratio, told.skew * 1e-6, told.limits, missing,
     )  # fmt: skip
 
 
-def _pair(path: Path) -> tuple[Path, Path]:
-    """The .cfg and .dat files, whatever the case of their endings."""
-    if path.suffix.lower() != ".cfg":
-        raise UserError(f"data.path={path}: give the .cfg file of a COMTRADE record; its .dat is read beside it")
+def _missing(kind: str, told: Analog, raw: np.ndarray) -> tuple[np.ndarray, float | None]:
+    """The raw values, and which of them stands for none: a value that the file declares possible does not."""
+    least, greatest = told.limits or (-np.inf, np.inf)
+    if kind == "BINARY" and least >= 0 and greatest > 32767:  # declared without sign
+        return raw.view("<u2"), 65535.0 if greatest < 65535 else None
+    if kind == "ASCII":
+        if told.limits is None or greatest < MISSING_TEXT[0]:
+            old = raw == MISSING_TEXT[1]
+            raw = np.where(old, raw.dtype.type(MISSING_TEXT[0]), raw) if old.any() else raw
+            return raw, MISSING_TEXT[0]
+        return raw, MISSING_TEXT[1] if greatest < MISSING_TEXT[1] else None
+    missing = MISSING.get(kind)
+    return raw, missing if missing is None or told.limits is None or least > missing else None
+
+
+def _status(header: Header, k: int, samples: Samples, stretches: list[Stretch]) -> Status:
+    told: Digital = header.digitals[k]
+    words = timeline.nearest(samples.words[:, k // 16], stretches)
+    return Status(told.name, words, told.phase, told.circuit, told.normal, bit=k % 16)
+
+
+def _stretches(data: Place, header: Header, samples: Samples, remarks: Remarks) -> list[Stretch]:
+    """Segments from the rates; from the time stamps where there are none."""
+    unit = header.timemult * (1e-9 if all(_digits(date) > 6 for date in header.dates) else 1e-6)
+    if header.rates[0][0] > 0:
+        made = timeline.from_rates(header.rates, _stamped(header, samples.stamps, unit, remarks))
+        if any(s.t is not None for s in made):
+            remarks.add(
+                "sampling rates within 2 % of their neighbours are taken as one waveform", header.lines["rates"]
+            )
+        return made
+    stamps = samples.stamps.astype(np.float64)
+    if header.kind != "ASCII":
+        stamps += 2.0**32 * np.cumsum(np.diff(stamps, prepend=stamps[0]) < -(2.0**31))  # the counter ran over
+    made = timeline.from_stamps((stamps - stamps[0]) * unit, unit, str(data.path))
+    if len(made) > 1:
+        gaps = ", ".join(f"{s.segment.start:.6g}" for s in made[1:6]) + (" ..." if len(made) > 6 else "")
+        remarks.add(f"the steps between time stamps change: a new segment begins at {gaps} s")
+    return made
+
+
+def _digits(date: str) -> int:
+    return len(date.strip().rpartition(".")[2]) if "." in date else 0
+
+
+def _stamped(header: Header, stamps: np.ndarray, unit: float, remarks: Remarks) -> np.ndarray | None:
+    """Times (N,) [s] by the time stamps; None where there are none or they contradict the rates, which is said."""
+    if stamps[-1] in (NONE, 0) or stamps[0] == stamps[-1] or not np.isfinite(stamps).all():
+        return None
+    t = (stamps.astype(np.float64) - float(stamps[0])) * unit
+    if sum(n / rate for n, rate in _lengths(header.rates)) > 2.0**32 * unit or np.any(np.diff(t) < 0):
+        return None  # the counter ran over
+    first = 0
+    for rate, stop in header.rates:
+        told, stamped = (stop - first - 1) / rate, float(t[stop - 1] - t[first])
+        if abs(told - stamped) > 2 * unit + 0.01 * told:
+            at = f"samples {first + 1} to {stop} take {told:.6g} s at {rate:g} Hz"
+            remarks.add(f"{at}, but {stamped:.6g} s by their time stamps; the rate is taken", header.lines["rates"])
+            return None
+        first = stop
+    return t
+
+
+def _lengths(rates: list[tuple[float, int]]) -> list[tuple[int, float]]:
+    return [(stop - first, rate) for first, (rate, stop) in zip([0, *(r[1] for r in rates)], rates, strict=False)]
+
+
+def _trigger(header: Header, stretches: list[Stretch], remarks: Remarks) -> float | None:
+    last = stretches[-1].segment
+    if header.trigger is None or -1e-6 <= header.trigger <= last.start + (last.stop - last.first) / last.rate:
+        return header.trigger
+    remarks.add(f"the trigger, {header.trigger:g} s after the first sample, lies outside the record and is not used")
+    return None
+
+
+def _extra(header: Header, samples: Samples, stretches: list[Stretch]) -> dict[str, Any]:
+    """What a recording has no place for, for a round trip."""
+    made: dict[str, Any] = {
+        "format": "COMTRADE", "revision": header.revision, "kind": header.kind, "dates": header.dates,
+        "timemult": header.timemult, "time_code": header.time_code, "quality": header.quality,
+        "sides": [(told.primary, told.secondary, told.side) for told in header.analogs], "rates": header.rates,
+    }  # fmt: skip
+    if any(s.t is not None for s in stretches):
+        return made  # numbers and stamps of other samples
+    count = len(samples.numbers)
+    if not np.array_equal(samples.numbers, np.arange(1, count + 1)):
+        made["numbers"] = samples.numbers
+    if header.rates[0][0] == 0 or samples.stamps[0] != samples.stamps[-1]:
+        made["stamps"] = samples.stamps
+    return made
+
+
+def _existing(path: Path) -> Path:
     if not path.is_file():
         found = [item.name for item in path.parent.iterdir()] if path.parent.is_dir() else []
         raise UserError(f"{path}: there is no such file{nearest(path.name, found)}")
-    for suffix in (".dat", ".DAT", ".Dat"):
-        if path.with_suffix(suffix).is_file():
-            return path, path.with_suffix(suffix)
-    raise UserError(f"{path.with_suffix('.dat')}: there is no such file; the data must lie beside {path.name}")
+    return path
 
 
-def _encoding(cfg: Path, given: str | None) -> str:
-    content = cfg.read_bytes()
-    for encoding in (given,) if given else ENCODINGS:
-        try:
-            content.decode(encoding)
-        except LookupError as error:
-            raise UserError(f"data.encoding={given}: there is no such text encoding; try utf-8, gbk, cp1251") from error
-        except UnicodeDecodeError:
-            continue
-        return encoding
-    raise UserError(f"{cfg}: not {given} text; leave data.encoding out to have it found")
-
-
-def _check_header(cfg: Path, head: Any) -> None:
-    if head.channels_count != head.analog_count + head.status_count:
+def _pair(path: Path) -> tuple[Path, Path, str]:
+    """The .cfg and .dat files, whatever the case of their endings, and what is to be said about it."""
+    ending = path.suffix.lower()
+    if ending not in (".cfg", ".dat"):
         raise UserError(
-            f"{cfg}: line 2 announces {head.channels_count} channels but {head.analog_count} analog and "
-            f"{head.status_count} status ones"
+            f"data.path={path}: give the .cfg file of a COMTRADE record, whose .dat lies beside it, or a .cff"
         )
-    ends = [end for _, end in head.sample_rates]
-    if not ends or ends[0] < 1 or np.any(np.diff(ends) <= 0):
-        raise UserError(f"{cfg}: the last samples {ends} of the sampling rates must be positive and increase")
-    if any(rate < 0 or (rate == 0 and not head.timestamp_critical) for rate, _ in head.sample_rates):
-        raise UserError(f"{cfg}: sampling rates {[rate for rate, _ in head.sample_rates]} must be above zero")
-    if head.ft.upper() not in (*VALUE_BYTES, "ASCII"):
-        raise UserError(f"{cfg}: data file type '{head.ft}' is not one of ASCII, {', '.join(VALUE_BYTES)}")
+    _existing(path)
+    if ending == ".dat":
+        cfg = _beside(path, ".cfg")
+        if cfg is None:
+            raise UserError(
+                f"{path}: the configuration {path.stem}.cfg is not beside it, and the data mean nothing without"
+            )
+        return cfg, path, f"found beside the {path.name} that was given"
+    dat = _beside(path, ".dat")
+    if dat is None:
+        raise UserError(f"{path.with_suffix('.dat')}: there is no such file; the data must lie beside {path.name}")
+    return path, dat, ""
 
 
-def _check_size(dat: Path, head: Any) -> None:
-    """Refuse a .dat shorter than announced: the package would leave its end zero."""
-    samples = head.sample_rates[-1][1]
-    if head.ft.upper() == "ASCII":
-        with dat.open("rb") as lines:
-            found, expected, unit = sum(1 for line in lines if line.strip(b" \r\n\x1a")), samples, "lines"
-    else:
-        row = 8 + VALUE_BYTES[head.ft.upper()] * head.analog_count + 2 * math.ceil(head.status_count / 16)
-        found, expected, unit = dat.stat().st_size, samples * row, "bytes"
-    if found < expected:
-        raise UserError(
-            f"{dat}: cut short: {samples} samples of {head.analog_count} analog and {head.status_count} status "
-            f"channels take {expected} {unit}, found {found}"
-        )
+def _beside(path: Path, ending: str) -> Path | None:
+    for one in (ending, ending.upper(), ending.capitalize()):
+        if path.with_suffix(one).is_file():
+            return path.with_suffix(one)
+    wanted = path.with_suffix(ending).name.casefold()
+    return next(
+        (item for item in sorted(path.parent.iterdir()) if item.name.casefold() == wanted and item.is_file()), None
+    )
 
 
-def _segments(dat: Path, head: Any, time: np.ndarray) -> tuple[Segment, ...]:
-    """Rates and times from the .cfg; from the time stamps where it gives no rate."""
-    if head.timestamp_critical:
-        steps = np.diff(time)
-        usual = float(np.median(steps))
-        if usual <= 0 or np.abs(steps / usual - 1).max() > 0.05:
-            i = int(np.argmax(np.abs(steps - usual))) + 1
-            raise UserError(f"{dat}: sample {i + 1}: time advances by {steps[i - 1]:g} s where {usual:g} s is usual")
-        return (Segment(0, len(time), (len(time) - 1) / float(time[-1] - time[0]), 0.0),)
-    made, first, start = [], 0, 0.0
-    for rate, stop in head.sample_rates:
-        start += 1 / rate if made else 0.0
-        made.append(Segment(first, stop, rate, start))
-        first, start = stop, start + (stop - first - 1) / rate
-    return tuple(made)
+def _content(cfg: Path) -> bytes:
+    if cfg.stat().st_size > LARGEST_CFG:
+        raise UserError(f"{cfg}: {cfg.stat().st_size} bytes are no COMTRADE configuration; the limit is {LARGEST_CFG}")
+    return cfg.read_bytes()

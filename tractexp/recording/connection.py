@@ -1,20 +1,31 @@
 """What a connection plugin must do: turn the channels that were recorded into the voltages and currents of a load."""
 
 from abc import abstractmethod
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 
-from tractexp.plugin import Plugin
+from tractexp.plugin import Plugin, discover
+
+SINGLE = (
+    "a single-phase load: U is its own voltage, P + jQ = V I* of the fundamental; static loads and converters' effects "
+    "apply as they stand, but the models' motors are three-phase on balanced voltages: here they are equivalents, "
+    "whose parameters are those of no machine"
+)
 
 
 class Connection(Plugin):
-    """Base of the connections, chosen by `data.connection=NAME`. Linear and without memory: one matrix per side."""
+    """Base of the connections, chosen by `data.connection=NAME`, or by name and settings.
+
+    Linear and without memory: one matrix for the voltages, one for the currents.
+    """
 
     group: ClassVar[str] = "connection"
     chosen: ClassVar[bool] = False
-    voltages: ClassVar[int] = 3  # channels it takes
-    currents: ClassVar[int] = 3
+    lines: ClassVar[bool] = False  # its voltages are measured between phases
+    # {(voltages, currents, between phases): settings}: it is taken for so many channels where nothing else is said
+    usual: ClassVar[Mapping[tuple[int, int, bool], Mapping[str, Any]]] = {}
 
     @abstractmethod
     def voltage(self) -> np.ndarray:
@@ -23,3 +34,27 @@ class Connection(Plugin):
     @abstractmethod
     def current(self) -> np.ndarray:
         """(K, currents): the load's currents from those recorded."""
+
+    @property
+    def voltages(self) -> int:
+        """How many voltage channels it takes."""
+        return self.voltage().shape[1]
+
+    @property
+    def currents(self) -> int:
+        """How many current channels it takes."""
+        return self.current().shape[1]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is said with every record that is connected so, one sentence each."""
+        return (SINGLE,) if len(self.voltage()) == 1 else ()
+
+
+def usual(voltages: int, currents: int, lines: bool = False) -> Any:
+    """The connection that so many channels say, voltages between phases or to ground; None where none does."""
+    for name, cls in sorted(discover()[Connection.group].items()):
+        settings = getattr(cls, "usual", {}).get((voltages, currents, lines))
+        if settings is not None:
+            return {"name": name, **settings} if settings else name
+    return None

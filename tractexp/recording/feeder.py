@@ -3,10 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
 from tractexp.record.phasor import TURN
+from tractexp.recording.connection import usual
 from tractexp.recording.label import Group, groups, kind, residual, words
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import Snapshots, frequency, nearest_nominal, snapshots
@@ -25,10 +27,11 @@ class Feeder:
 
     voltages: tuple[int, ...]
     currents: tuple[int, ...]
-    connection: str = "three_phase"  # name of the plugin that makes phase quantities of them
+    connection: Any  # the plugin that makes phase quantities of them: a name, or name and settings
     reverse_current: bool = False  # the recorder counts current out of the load as positive
     name: str = ""
     why: tuple[str, ...] = ()  # what it was recognised by, and what was changed in the order given, one sentence each
+    loaded: bool = True
 
 
 def propose(recording: Recording) -> list[Feeder]:
@@ -50,8 +53,7 @@ def propose(recording: Recording) -> list[Feeder]:
     feeders += _single(recording, seen, volts, amps, [*buses, *loads])
     feeders = _kirchhoff(seen, feeders)
     level = max((_size(seen, f.currents) for f in feeders), default=0.0)
-    marked = [_marked(recording, seen, feeder, level) for feeder in feeders]
-    return [f for f, loaded in marked if loaded] + [f for f, loaded in marked if not loaded]
+    return sorted((_marked(recording, seen, feeder, level) for feeder in feeders), key=lambda f: not f.loaded)
 
 
 def _groups(recording: Recording, seen: Snapshots, numbers: Sequence[int]) -> list[Group]:
@@ -101,9 +103,13 @@ def _fits(load: Group, buses: Sequence[Group]) -> bool:
 
 def _feeder(recording: Recording, seen: Snapshots, load: Group, buses: Sequence[Group]) -> Feeder:
     bus, why = _bus(recording, seen, load, buses)
+<<<<<<< HEAD
     connection = "aron" if len(load.numbers) == 2 else "three_phase"
     if bus.pairs:
         connection = "line_voltages" if len(bus.numbers) == 3 else "two_line_voltages"
+=======
+    connection = usual(len(bus.numbers), len(load.numbers), bus.pairs)
+>>>>>>> main
     said = [
         f"currents {_names(recording, load.numbers)}: {_by(load)}",
         f"voltages {_names(recording, bus.numbers)}: {why}",
@@ -194,7 +200,7 @@ def _single(
         group = Group((i,), False, recording.channels[i].name.strip(), False)
         bus, why = _bus(recording, seen, group, [Group((v,), False, "", False) for v in free])
         said = (f"one current {_names(recording, [i])}", f"one voltage {_names(recording, bus.numbers)}: {why}")
-        made.append(Feeder(bus.numbers, (i,), "single_phase", name=group.name, why=said))
+        made.append(Feeder(bus.numbers, (i,), usual(1, 1), name=group.name, why=said))
     return made
 
 
@@ -243,12 +249,12 @@ def _said(feeders: list[Feeder], loaded: list[int], signs: np.ndarray, closes: f
     return made
 
 
-def _marked(recording: Recording, seen: Snapshots, feeder: Feeder, level: float) -> tuple[Feeder, bool]:
-    """The feeder with a word on its load, and whether it carries any."""
+def _marked(recording: Recording, seen: Snapshots, feeder: Feeder, level: float) -> Feeder:
+    """The feeder with a word on its load where it carries none."""
     size = _size(seen, feeder.currents)
     step = max(abs(c.gain * c.ratio * c.factor) for c in (recording.channels[i] for i in feeder.currents))
     integral = all(recording.channels[i].raw.dtype.kind in "iu" for i in feeder.currents)
     if size > UNLOADED * level and not (integral and size < STEPS_LOADED * step):
-        return feeder, True
+        return feeder
     said = f"unloaded: {1000 * size:.3g} A where the greatest current of the file is {1000 * level:.3g} A"
-    return replace(feeder, why=(*feeder.why, said)), False
+    return replace(feeder, why=(*feeder.why, said), loaded=False)

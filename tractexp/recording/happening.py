@@ -1,10 +1,32 @@
 """What happened to a voltage: its kind, its size, and whether a load model can be fitted to it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tractexp.record.event import FEWEST_BEFORE, SHALLOWEST, STEADY
+from tractexp.record.phasor import Phasors
+from tractexp.record.record import Record
+from tractexp.recording.excursion import DEAD, Excursion, excursions
+from tractexp.recording.trace import Trace, of_record, of_waves
 
 KINDS = (
     "dip", "swell", "interruption", "step", "ramp", "open pole", "dead line", "pole slip", "inrush",
 )  # fmt: skip
+STEP_AT_MOST = 0.15  # of the voltage: a larger change that stays is no tap or switching step
+SWING = 0.1  # of the voltage: how deep the swings of a pole slip are at least
+SWINGS = 2  # so many at least
+SWING_PERIOD = (0.15, 5.0)  # s
+EVEN = 3.0  # the longest period of a pole slip over its shortest, at most
+BALANCED = 0.05  # U2 over U1: swings are balanced, faults are not
+OPEN_CURRENT = 0.05  # of the mean of the other two: a phase that carries less is open
+OPEN_CYCLES = 3.0  # so long at least
+OPEN_U2 = 0.15  # of U1: unbalance of an open pole where no currents are known
+UNCLEARED = 0.5  # s: no protection leaves a fault on so long, so unbalance that lasts longer is an open pole
+SECOND = 0.15  # of the fundamental: second harmonic of an inrush (IEEE C37.91, usual restraint of differential relays)
+INRUSH_CYCLES = 5.0  # so long at least: the offset of a fault current lasts less
+CLEAN = 0.5  # of a current's energy is in its fundamental and second harmonic, or it is noise
+CARRIES = 0.05  # of the record's greatest current: what is less is no load
 
 
 @dataclass(frozen=True)
@@ -21,3 +43,246 @@ class Happening:
     after: tuple[float, float]
     worth: bool  # fitting
     why: str  # what makes it (not) worth fitting, one sentence
+
+
+def happenings(waves: np.ndarray, rate: float, start: float, nominal: float, phasors: Phasors) -> list[Happening]:
+    """The events in waveforms (2 K, N) [kV, kA], voltages first, sampled at `rate` [Hz] from `start` [s] on.
+
+    `phasors` are those measured from the same waveforms, which give sequence components, powers and frequency.
+    """
+    return _happenings(of_waves(waves, rate, start, nominal, phasors))
+
+
+def happenings_of(record: Record) -> list[Happening]:
+    """The events in a record of t, U, P, Q and, where they are there, f and U2."""
+    return _happenings(of_record(record))
+
+
+def _happenings(trace: Trace) -> list[Happening]:
+    if len(trace.t) < 4:
+        return []
+    slips = _pole_slips(trace)
+    outside = [e for e in excursions(trace) if not any(_overlap(e, slip) for slip in slips)]
+    spans = [(kind, part) for e in outside for kind, part in _kinds(trace, e)]
+    spans += [("pole slip", slip) for slip in slips]
+    spans += _open_alone(trace, spans)
+    spans += _inrush(trace)
+    spans.sort(key=lambda each: (each[1].start, each[1].end))
+    return [_told(trace, kind, e, [s for _, s in spans]) for kind, e in spans]
+
+
+def _overlap(a: Excursion, b: Excursion) -> bool:
+    return a.start < b.end and a.end > b.start
+
+
+def _kinds(trace: Trace, e: Excursion) -> list[tuple[str, Excursion]]:
+    """What an excursion is; of a fault that leaves a pole open, both parts."""
+    if e.dead or _all_dead(trace, e):
+        return [("dead line" if e.dead or not e.returned else "interruption", e)]
+    opened = _open(trace, e)
+    if opened is not None:
+        fault = replace(e, end=opened.start, cleared=False)
+        return [("dip", fault), ("open pole", opened)] if fault.end - fault.start >= 3 else [("open pole", opened)]
+    if not e.returned and abs(e.worst) <= STEP_AT_MOST and e.settled:
+        return [("step" if e.sudden else "ramp", e)]
+    if not e.sudden:
+        return [("ramp", e)]
+    if not e.returned and e.settled and e.worst > 0:
+        return [("step", e)]
+    return [("dip" if e.worst < 0 else "swell", e)]
+
+
+def _all_dead(trace: Trace, e: Excursion) -> bool:
+    """Whether every phase is gone at some time of the excursion."""
+    rows = np.concatenate([trace.U[None], trace.phases])[:, e.start : e.end]
+    return bool((rows.max(axis=0) < DEAD * e.reference).any())
+
+
+def _open(trace: Trace, e: Excursion) -> Excursion | None:
+    """The part of an excursion in which one phase carries no current, or is unbalanced too long for a fault."""
+    if len(trace.I) == 3:
+        runs = [r for r in _open_runs(trace) if r[0] < e.end and r[1] > e.start]
+        if not runs:
+            return None
+        first, stop = max(runs[0][0], e.start), min(max(r[1] for r in runs), e.end)
+        return replace(e, start=first, end=max(stop, first + 1)) if stop - first > 0.5 * (e.end - first) else None
+    unbalanced = trace.U2[e.start : e.end] > OPEN_U2 * trace.U[e.start : e.end]
+    if np.count_nonzero(unbalanced) * trace.step > UNCLEARED:
+        return e
+    return None
+
+
+def _open_runs(trace: Trace) -> list[tuple[int, int]]:
+    """Spans in which exactly one of three currents is gone while the other two carry load as it did before."""
+    carries = CARRIES * np.percentile(trace.I, 95)
+    found = []
+    for k in range(3):
+        others = np.delete(trace.I, k, axis=0)
+        gone = (trace.I[k] < OPEN_CURRENT * others.mean(axis=0)) & (others.min(axis=0) > carries)
+        found += [
+            run for run in _runs(gone, max(3, round(OPEN_CYCLES * trace.cycle / trace.step)))
+            if run[0] >= 4 and (trace.I[k, : run[0]] > carries).any()
+        ]  # fmt: skip
+    return sorted(found)
+
+
+def _open_alone(trace: Trace, spans: list[tuple[str, Excursion]]) -> list[tuple[str, Excursion]]:
+    """Open poles that the voltage does not show."""
+    if len(trace.I) != 3:
+        return []
+    return [
+        ("open pole", _beside(trace, a, b))
+        for a, b in _open_runs(trace)
+        if not any(s.start < b and s.end > a for _, s in spans)
+    ]
+
+
+def _runs(mask: np.ndarray, least: int) -> list[tuple[int, int]]:
+    """(start, end) of the runs of true values that are at least so long."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= least]
+
+
+def _inrush(trace: Trace) -> list[tuple[str, Excursion]]:
+    """Spans in which the second harmonic of a current is that of a saturated transformer."""
+    if not len(trace.I):
+        return []
+    carries = CARRIES * np.percentile(trace.I, 99)
+    rich = ((trace.second > SECOND * trace.I) & (carries < trace.I) & _clean(trace)).any(axis=0)
+    least = max(3, round(INRUSH_CYCLES * trace.cycle / trace.step))
+    return [("inrush", _beside(trace, a, b)) for a, b in _runs(rich, least)]
+
+
+def _clean(trace: Trace) -> np.ndarray:
+    """Where (K, M) a current is more than noise: fundamental and second harmonic hold most of its energy."""
+    return trace.I**2 + trace.second**2 > CLEAN * trace.content**2
+
+
+def _beside(trace: Trace, a: int, b: int) -> Excursion:
+    """A span that the currents mark, not the voltage."""
+    return Excursion(a, b, 0.0, True, False, True, float(np.median(trace.U)))
+
+
+def _pole_slips(trace: Trace) -> list[Excursion]:
+    """Spans of two or more smooth balanced swings of the voltage, of about one period each."""
+    width = max(1, round(2 * trace.cycle / trace.step)) | 1
+    U = np.convolve(np.pad(trace.U, width // 2, "edge"), np.full(width, 1 / width), "valid")
+    level = float(np.percentile(U, 90))
+    if level <= 0:
+        return []
+    lows = [k for k in _swings(U / level) if _smooth(U / level, k, trace)]
+    lows = [k for k in lows if not trace.U2[k] > BALANCED * max(trace.U[k], level)]
+    found, first = [], 0
+    while first < len(lows):
+        last = first + 1
+        while last < len(lows) and _even(trace.t[lows[first : last + 1]]):
+            last += 1
+        if last - first >= SWINGS:
+            half = int(np.diff(lows[first:last]).max()) // 2
+            a, b = max(lows[first] - half, 0), min(lows[last - 1] + half + 1, len(U))
+            found.append(Excursion(a, b, float(U[a:b].min() / level - 1), True, False, False, level))
+        first = last
+    return found
+
+
+def _swings(u: np.ndarray) -> list[int]:
+    """Minima of u that lie lower by `SWING` than the maxima on either side."""
+    lows, low, high, falling = [], 0, 0, False
+    for k in range(1, len(u)):
+        if falling:
+            low = k if u[k] < u[low] else low
+            if u[k] > u[low] + SWING:
+                lows.append(low)
+                falling, high = False, k
+        else:
+            high = k if u[k] > u[high] else high
+            if u[k] < u[high] - SWING:
+                falling, low = True, k
+    return lows
+
+
+def _smooth(u: np.ndarray, k: int, trace: Trace) -> bool:
+    """Whether the fall to a minimum and the rise from it both take their time: no fault begins or ends so."""
+    within = max(2, round(2 * trace.cycle / trace.step))
+    reach = round(SWING_PERIOD[1] / 2 / trace.step)
+    for part in (u[max(k - reach, 0) : k + 1][::-1], u[k : k + reach + 1]):
+        top = int(np.argmax(part >= part[0] + SWING)) + within
+        part = part[: top + 1]
+        if len(part) > within and np.abs(part[within:] - part[:-within]).max() > 0.7 * np.ptp(part):
+            return False
+    return True
+
+
+def _even(t: np.ndarray) -> bool:
+    steps = np.diff(t)
+    low, high = SWING_PERIOD
+    return bool(steps.min() >= low and steps.max() <= high and steps.max() <= EVEN * steps.min())
+
+
+def _told(trace: Trace, kind: str, e: Excursion, spans: list[Excursion]) -> Happening:
+    first = max((s.end for s in spans if s.end <= e.start), default=0)
+    stop = min((s.start for s in spans if s.start >= e.end), default=len(trace.t))
+    count = max(2, round(STEADY / trace.step))
+    before = _power(trace, max(first, e.start - count - 1), max(e.start - 1, first))
+    after = _power(trace, min(e.end + 1, stop), min(e.end + 1 + count // 2, stop))
+    inside = slice(e.start, max(e.end, e.start + 1))
+    U2 = trace.U2[inside]
+    depth = -e.worst if e.settled else 1 - _extreme(trace.U[inside], e.worst) / e.reference
+    last = min(e.end, len(trace.t) - 1)
+    worth, why = _worth(trace, kind, e, depth, first, before)
+    return Happening(
+        kind, float(trace.t[e.start]), float(trace.t[last]), float(depth), trace.jump(e.start),
+        float(np.nanmax(U2) / e.reference) if np.isfinite(U2).any() else float("nan"), before, after, worth, why,
+    )  # fmt: skip
+
+
+def _extreme(U: np.ndarray, side: float) -> float:
+    return float(U.max() if side > 0 else U.min())
+
+
+def _power(trace: Trace, first: int, stop: int) -> tuple[float, float]:
+    """Mean P and Q; nan where there is nothing to take it of."""
+    P, Q = trace.P[first:stop], trace.Q[first:stop]
+    known = np.isfinite(P) & np.isfinite(Q)
+    return (float(P[known].mean()), float(Q[known].mean())) if known.any() else (float("nan"), float("nan"))
+
+
+def _worth(
+    trace: Trace, kind: str, e: Excursion, depth: float, first: int, before: tuple[float, float]
+) -> tuple[bool, str]:
+    """Whether a load model can be fitted to it, and why (not)."""
+    if kind != "dip":
+        return False, NO_FIT[kind]
+    lead = (e.start - first) * trace.step
+    lowest = (
+        (trace.phases[:, e.start : e.end] / np.maximum(e.reference, 1e-12)).min() if len(trace.phases) else 1 - depth
+    )
+    size = f"the positive sequence falls by {100 * depth:.2g} %, the lowest phase to {100 * lowest:.2g} %"
+    if lead < FEWEST_BEFORE * 1e-3 or e.start - first < 2:
+        return False, f"{size}, but only {1000 * lead:.0f} ms of steady state come before it"
+    if not e.cleared:
+        return False, f"{size}, but it ends in an open pole, not in the voltage before it"
+    if not e.returned:
+        return False, f"{size}, but the record ends before the voltage is back"
+    if depth < SHALLOWEST:
+        return False, f"{size}: too little for a model that is driven by the positive sequence"
+    noise = len(trace.I) and not np.median(_clean(trace)[:, first : e.start], axis=1).any()
+    if not np.isfinite(before[0]) or np.hypot(*before) == 0 or noise:
+        return False, f"{size}, but no load current flows before it"
+    if not e.sudden:
+        return False, f"{size}, but slowly: only the static part of the load can be told"
+    if before[0] < 0:
+        return True, f"{size}; P is negative before it: reversed current or regeneration"
+    return True, f"{size}, {lead:.2g} s before it and the recovery are recorded"
+
+
+NO_FIT = {
+    "swell": "a swell: loads answer it, but the models here are fitted to dips",
+    "interruption": "an interruption: without voltage there is no load to model, and what follows is a start-up",
+    "step": "the voltage stays at its new level: only the static part of the load can be told from it",
+    "ramp": "the voltage changes slowly: only the static part of the load can be told from it",
+    "open pole": "one phase is open: the unbalance is not that of a fault, and single-phase power decides",
+    "dead line": "the line is dead: there is no voltage to draw a load from",
+    "pole slip": "the voltage swings with machines that have lost synchronism: frequency and angle swing with it",
+    "inrush": "the currents are rich in the second harmonic: a transformer's inrush, not the load",
+}

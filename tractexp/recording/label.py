@@ -7,7 +7,7 @@ no list of naming schemes is needed: only the alphabets that number phases, and 
 import re
 import unicodedata
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 
@@ -20,6 +20,8 @@ RESIDUAL = re.compile(
     r"3[uvi][o0]|(?<![a-z])[uvi][_ ]?[ong0](?![a-z])|(?<![a-z])3?[uvi]_?(?:res|gnd|neutral)|零序|нулев"
 )
 COUNTER = re.compile(r"^[a-z]{0,2}\d+[-_. :)]+")  # "12-Ia", "F5-VA": a number of its own before the name
+# U21 is V1 - V2 where that name is used (an arrow from 2 to 1), as U12 is elsewhere
+PLACE = {"ab": 0, "bc": 1, "ca": 2, "ba": 0, "cb": 1, "ac": 2}
 SURE = 3.0  # score of a mark right after the letter of a quantity: "Ia", "UL1", "U21"
 NO_WAVE = re.compile(r"(?<![a-z])(?:mag|magnitude|rms|ang|angle|diff|bias)(?![a-z])")
 ROMAN = {"i": "1", "ii": "2", "iii": "3", "iv": "4", "v": "5", "vi": "6"}
@@ -47,7 +49,7 @@ def residual(channel: Channel) -> bool:
 
 
 def kind(channel: Channel) -> str:
-    """voltage or current, by unit, else by the letter that starts a word of the name; "" for what is no wave of them."""
+    """voltage or current, by unit, else by the letter that starts a word of its name; "" for what is no wave."""
     if NO_WAVE.search(plain(channel.name)):
         return ""
     if channel.quantity:
@@ -83,6 +85,26 @@ def groups(channels: Mapping[int, Channel]) -> list[Group]:
         found += made
         left = {i: c for i, c in left.items() if not any(i in g.numbers for g in made)}
     return sorted(found, key=lambda g: g.numbers[0])
+
+
+def order(channels: Sequence[Channel]) -> tuple[tuple[int, ...], bool] | None:
+    """Which phase (0, 1, 2) each channel is labelled as, and whether they are line to line; None: not told."""
+    for counters in (True, False):
+        texts = [plain(c.name) if counters else COUNTER.sub("", plain(c.name)) for c in channels]
+        read = [{m[:3]: m[3:] for m in _marks(text)} for text in texts]
+        shared = set.intersection(*(set(each) for each in read))
+        told = [(max(r[s][1] for r in read), tuple(r[s][0] for r in read), s[2]) for s in shared]
+        told = [each for each in told if len(set(each[1])) == len(channels)]
+        if told:
+            _, places, pairs = max(told)
+            return places, pairs
+    marks = [phase(c) for c in channels]
+    if all(len(m) == 1 for m in marks) and len(set(marks)) == len(marks):
+        return tuple("abc".index(m) for m in marks), False
+    pairs = [PLACE.get(m) for m in marks]
+    if None not in pairs and len(set(pairs)) == len(pairs):
+        return tuple(p for p in pairs if p is not None), True
+    return None
 
 
 def _by_name(channels: Mapping[int, Channel], full: bool, counters: bool, size: int) -> list[Group]:
@@ -130,8 +152,7 @@ def _marks(text: str) -> Iterable[tuple[str, str, bool, int, float]]:
         for found in re.finditer(rf"{before}({one})[-_/ ]?l?({one})(?!{word}(?![ng]))", text):
             x, y = letters.index(found[1]), letters.index(found[2])
             if x != y and not (digits and not _quantity_before(text, found.start())):
-                # U21 is V1 - V2 where it is used (an arrow from 2 to 1), as U12 is
-                place = {(0, 1): 0, (1, 2): 1, (2, 0): 2, (1, 0): 0, (2, 1): 1, (0, 2): 2}[x, y]
+                place = PLACE["abc"[x] + "abc"[y]]
                 key = f"{text[: found.start()]}**{text[found.end() :]}"
                 yield f"{key}{'-' if (y - x) % 3 == 2 else ''}", letters, True, place, 6.0 - 2 * digits
         for found in re.finditer(rf"{before}({one})(?!{word}(?<![ng]))", text):
@@ -150,7 +171,7 @@ def _by_column(channels: Mapping[int, Channel], size: int) -> list[Group]:
     for i, channel in channels.items():
         told = phase(channel)
         if told:
-            place = "abc".index(told) if len(told) == 1 else {"ab": 0, "ba": 0, "bc": 1, "cb": 1}.get(told, 2)
+            place = "abc".index(told) if len(told) == 1 else PLACE[told]
             rows[plain(channel.circuit), len(told) == 2][place].append(i)
     made = []
     for (_, pairs), places in rows.items():

@@ -8,13 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from tractexp import plugin
 from tractexp.errors import UserError, check_range
-from tractexp.plugin import build
 from tractexp.record import Base, Events, Reader, Record, detect, find_dips
 from tractexp.record.choice import check_numbers, chosen
 from tractexp.record.event import FEWEST_BEFORE, STEADY
 from tractexp.record.phasor import Phasors
-from tractexp.recording.feeder import Feeder
+from tractexp.recording.arrangement import arranged, tuned
+from tractexp.recording.connection import usual
+from tractexp.recording.feeder import Feeder, propose
+from tractexp.recording.label import order
 from tractexp.recording.measure import phasors_of
 from tractexp.recording.recording import Recording
 
@@ -39,14 +42,22 @@ class WaveformReader(Reader):
     path: str = ""  # the file
     voltages: list[Any] = field(default_factory=list)  # channels in the order a, b, c: numbers from 0, or names
     currents: list[Any] = field(default_factory=list)  # channels, counted positive into the load
-    connection: str = "three_phase"  # how the channels are connected
-    estimator: str = "one_cycle"  # of the phasors
+    connection: Any = None  # how the channels are connected, a name or name and settings; null: by how many they are
+    estimator: Any = "one_cycle"  # of the phasors, a name or name and settings
+    harmonics: list[int] = field(default_factory=list)  # whose powers P_h, with THD_u and THD_i, the record holds
     train: list[int] | None = None  # dips to fit; null: the first that can be used
     validate: list[int] | None = None  # dips held out; null: every other one that can be used
     pre: float = 1.0  # s kept before a dip starts, at most
     post: float = 10.0  # s kept after a dip starts, at most
     reverse_current: bool = False  # true where the recorder counts current out of the load as positive
     skew: bool = False  # true: correct the time skew of each channel given in the file
+
+    def opened(self) -> Recording:
+        """The file, at the nominal frequency that its voltages really have."""
+        recording = self.recording()
+        chosen = [recording.number(each, "data.voltages") for each in self.voltages]
+        every = [i for i, c in enumerate(recording.channels) if c.quantity == "voltage" and c.form == "waveform"]
+        return tuned(recording, chosen or every)
 
     @abstractmethod
     def recording(self) -> Recording:
@@ -60,12 +71,14 @@ class WaveformReader(Reader):
         check_range("data.post", self.post, 0.1)
 
     def read(self) -> Events:
-        recording = self.recording()
-        feeder = self._feeder(recording)
-        dips, tried = self.numbered(self._streams(recording, feeder), recording.frequency)
+        recording = self.opened()
+        feeder = self.feeder(recording)
+        dips, tried = self.numbered(feeder, self._streams(recording, feeder), recording.frequency)
         return chosen(self.path, tried, self.train, self.validate, self._notes(recording, feeder, dips))
 
-    def numbered(self, streams: Sequence[Phasors], frequency: float) -> tuple[list[Dip], dict[int, Record | UserError]]:
+    def numbered(
+        self, feeder: Feeder, streams: Sequence[Phasors], frequency: float
+    ) -> tuple[list[Dip], dict[int, Record | UserError]]:
         """The dips of one load and, by number, the record that each makes, or why it cannot be used.
 
         Raises `UserError` where there is none, and where none has a steady state before it.
@@ -75,33 +88,75 @@ class WaveformReader(Reader):
             spans = ", ".join(f"{s.t[0]:.3f} to {s.t[-1]:.3f} s" for s in streams)
             raise UserError(f"{self.path}: no dip found in the waveforms ({spans}): the voltage never falls by 3 %")
         base = self._base(dips, frequency)
-        return dips, {number: self._record(number, dip, base) for number, dip in enumerate(dips, 1)}
+        return dips, {number: self._record(feeder, number, dip, base) for number, dip in enumerate(dips, 1)}
 
+<<<<<<< HEAD
     def _feeder(self, recording: Recording) -> Feeder:
         """The channels asked for."""
         connection = build("connection", {"name": self.connection})
         made = {}
+=======
+    def _pick(self, number: int, tried: dict[int, Record | UserError]) -> Record:
+        """Dip `number`; raises `UserError` naming the dips that can be used where this one cannot."""
+        usable = ", ".join(f"{n} at {r.t[0]:.3f} to {r.t[-1]:.3f} s" for n, r in tried.items() if isinstance(r, Record))
+        made = tried.get(number, UserError(f"{self.path}: there is no dip {number}; {len(tried)} are found"))
+        if isinstance(made, UserError):
+            raise UserError(f"{made}; dips that can be used: {usable or 'none'}")
+        return made
+
+    def feeder(self, recording: Recording) -> Feeder:
+        """The channels asked for, or those of the only load that the file shows."""
+        if not (self.voltages or self.currents):
+            return self._only(recording)
+        name = self.connection or self._usual(recording)
+        connection, made = plugin.chosen("connection", name), {}
+>>>>>>> main
         for key, wanted in (("voltages", connection.voltages), ("currents", connection.currents)):
-            chosen = getattr(self, key)
-            if len(chosen) != wanted:
+            given = getattr(self, key)
+            if len(given) != wanted:
                 raise UserError(
-                    f"data.{key}={[*chosen]} must name {COUNT[wanted]} channels; {recording.source} has "
+                    f"data.{key}={[*given]} must name {COUNT[wanted]} channels (data.connection={connection.name}); "
+                    f"{recording.source} has "
                     + ", ".join(f"{i} '{c.name}' [{c.unit}]" for i, c in enumerate(recording.channels))
                 )
-            made[key] = tuple(recording.number(each, f"data.{key}") for each in chosen)
+            made[key] = tuple(recording.number(each, f"data.{key}") for each in given)
             if len(set(made[key])) < wanted:
-                raise UserError(f"data.{key}={[*chosen]} names a channel twice; {wanted} different ones are needed")
+                raise UserError(f"data.{key}={[*given]} names a channel twice; {wanted} different ones are needed")
             for i in made[key]:
                 if recording.channels[i].quantity not in (key.removesuffix("s"), ""):
                     raise UserError(
                         f"data.{key}: channel {i} '{recording.channels[i].name}' of {recording.source} is in "
                         f"{recording.channels[i].unit}; choose {key}"
                     )
-        return Feeder(**made, connection=self.connection, reverse_current=self.reverse_current)
+        return arranged(recording, Feeder(**made, connection=name, reverse_current=self.reverse_current))
+
+    def _usual(self, recording: Recording) -> Any:
+        """The connection that the number of channels says; two voltages to ground say none."""
+        counts = len(self.voltages), len(self.currents)
+        channels = [recording.channels[recording.number(each, "data.voltages")] for each in self.voltages]
+        told = order(channels) if counts[0] == 2 else None
+        two = counts[0] == 2 and not (told and not told[1])
+        return usual(*counts, lines=two) or usual(3, 3)
+
+    def _only(self, recording: Recording) -> Feeder:
+        """The only load that the file shows. Raises `UserError` naming all, where there is not one."""
+        found = [feeder for feeder in propose(recording) if feeder.loaded]
+        if len(found) == 1:
+            channels = ", ".join(recording.channels[i].name for i in (*found[0].voltages, *found[0].currents))
+            why = (f"channels chosen by themselves, for they are the only load in the file: {channels}", *found[0].why)
+            reverse = found[0].reverse_current != self.reverse_current
+            return arranged(recording, replace(found[0], reverse_current=reverse, why=why))
+        every = ", ".join(f"{i} '{c.name}' [{c.unit}]" for i, c in enumerate(recording.channels))
+        loads = "; ".join(
+            f"{f.name}: 'data.voltages=[{_listed(f.voltages)}]' 'data.currents=[{_listed(f.currents)}]'" for f in found
+        )
+        shown = f"{len(found)} loads; choose one: {loads}" if found else f"none by itself; its channels: {every}"
+        raise UserError(f"data.voltages and data.currents are missing, and {recording.source} shows {shown}")
 
     def _streams(self, recording: Recording, feeder: Feeder) -> list[Phasors]:
         """The phasors of each segment that holds waveforms."""
-        return [phasors_of(recording, feeder, segment, self.estimator, self.skew) for segment in recording.waveforms()]
+        settings = self.estimator, self.skew, self.harmonics
+        return [phasors_of(recording, feeder, segment, *settings) for segment in recording.waveforms()]
 
     def _base(self, dips: list[Dip], frequency: float) -> Base:
         """Voltage and apparent power before the first dip that has a steady state before it."""
@@ -119,7 +174,7 @@ class WaveformReader(Reader):
             raise UserError(f"{self.path}: data.currents carry no power before the first dip ({1e6 * S:.2g} VA)")
         return Base(U, S, frequency)
 
-    def _record(self, number: int, dip: Dip, base: Base) -> Record | UserError:
+    def _record(self, feeder: Feeder, number: int, dip: Dip, base: Base) -> Record | UserError:
         """The record of a dip, or why it cannot be used."""
         t = dip.phasors.t
         window = slice(
@@ -134,9 +189,12 @@ class WaveformReader(Reader):
             P=S.real,
             Q=S.imag,
             f=dip.phasors.f[window],
-            U2=dip.phasors.U2[window] / base.voltage,
+            U2=dip.phasors.U2[window] / base.voltage if len(dip.phasors.V) == 3 else None,
             base=base,
             source=f"{self.path} dip {number}",
+            notes=plugin.chosen("connection", feeder.connection).notes,
+            window=plugin.chosen("estimator", self.estimator).window(base.frequency),
+            more=base.per_unit({name: values[window] for name, values in dip.phasors.more.items()}),
         )
         try:
             detect(record.check())
@@ -146,8 +204,8 @@ class WaveformReader(Reader):
 
     def _notes(self, recording: Recording, feeder: Feeder, dips: list[Dip]) -> tuple[str, ...]:
         step = dips[0].phasors.t[1] - dips[0].phasors.t[0]
-        notes = [*recording.notes, *feeder.why]
-        notes.append(f"one-cycle phasors every {1000 * step:.3g} ms, {len(dips)} dips found")
+        kind = plugin.chosen("estimator", self.estimator).name.replace("_", "-")
+        notes = [f"{kind} phasors every {1000 * step:.3g} ms, {len(dips)} dips found", *recording.notes, *feeder.why]
         fast = recording.waveforms()
         slow = [s for s in recording.segments if s not in fast]
         if slow:
@@ -167,3 +225,7 @@ def _dips(phasors: Phasors) -> list[Dip]:
     firsts = [0, *(end for _, end in found)]
     stops = [*(start for start, _ in found[1:]), len(phasors.t)]
     return [Dip(phasors, first, *dip, stop) for first, dip, stop in zip(firsts, found, stops, strict=False)]
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    return ",".join(map(str, numbers))

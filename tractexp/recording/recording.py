@@ -76,13 +76,22 @@ class Channel:
 
 @dataclass(frozen=True, eq=False)
 class Status:
-    """One binary channel: contacts, trips, breaker positions. `raw` (N,) is 0 or 1."""
+    """One binary channel: contacts, trips, breaker positions.
+
+    `raw` (N,) is 0 or 1, or the words of which bit `bit` is meant: a hundred channels share the file's few words.
+    """
 
     name: str
     raw: np.ndarray
     phase: str = ""
     circuit: str = ""
     normal: int = 0
+    bit: int | None = None
+
+    def values(self, first: int = 0, stop: int | None = None) -> np.ndarray:
+        """States (M,), 0 or 1."""
+        raw = np.asarray(self.raw[first:stop])
+        return (raw != 0).astype(np.uint8) if self.bit is None else ((raw >> self.bit) & 1).astype(np.uint8)
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,7 +44,7 @@ class Tabular:
     def _form(self) -> Form:
         return Form(self.decimal, self.header, self.sheet, self.encoding)
 
-    def opened(self, path: str, told: Sidecar) -> tuple[Table, Mapped]:
+    def table_of(self, path: str, told: Sidecar) -> tuple[Table, Mapped]:
         """A table and what its columns are; raises `UserError` for what is no table, or not to be told."""
         table = open_table(path, self._form)
         return table, mapped(table, {**told.columns, **self.columns}, {**told.units, **self.units})

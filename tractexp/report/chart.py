@@ -33,11 +33,46 @@ PHONE, ENTRY, LETTER = 240, 45, 7  # pixels: a legend on a phone, one of its ent
 GAP = 0.045  # of the height, between panels
 HOVER = "%{y:.5g}"
 DECADE = 20  # an axis that spans less has its ticks between powers of ten
+SHOWN = 2000  # points of a sampled line that are drawn at once: twice as many as a page is wide
+HELD = 32767  # the greatest of 16 bits; the least stands for a gap
 DRAW = """
 const charts = [...document.querySelectorAll(".chart")];
+const unpack = samples => {
+  const bytes = Uint8Array.from(atob(samples.bdata), letter => letter.charCodeAt(0));
+  samples.raw = new Int16Array(bytes.buffer);
+};
+// The lowest and the highest sample of each stretch between two times; the first and the last of all keep the axis.
+const seen = (samples, from, to) => {
+  const {raw, start, step, offset, scale} = samples, last = raw.length - 1, x = [], y = [];
+  const first = Math.max(0, Math.floor((from - start) / step)), end = Math.min(last, Math.ceil((to - start) / step));
+  const add = i => { x.push(start + i * step); y.push(raw[i] === -32768 ? null : offset + scale * raw[i]); };
+  const stretch = Math.max(1, Math.floor(2 * (end - first + 1) / SHOWN));
+  if (first > 0) add(0);
+  for (let i = first; i <= end; i += stretch) {
+    let low = i, high = i, gap = -1;
+    for (let k = i; k < Math.min(i + stretch, end + 1); k++) {
+      if (raw[k] === -32768) gap = k;
+      else if (raw[k] < raw[low] || raw[low] === -32768) low = k;
+      else if (raw[k] > raw[high]) high = k;
+    }
+    [...new Set(gap < 0 ? [low, high] : [low, gap, high])].sort((a, b) => a - b).forEach(add);
+  }
+  if (end < last) add(last);
+  return {x, y};
+};
+const zoomed = chart => {
+  const picked = chart.data.map((trace, k) => k).filter(k => chart.data[k].samples);
+  const [from, to] = chart.layout.xaxis.range.map(Number);
+  const made = picked.map(k => seen(chart.data[k].samples, from, to));
+  Plotly.restyle(chart, {x: made.map(m => m.x), y: made.map(m => m.y)}, picked);
+};
 const draw = chart => {
   const {data, layout} = JSON.parse(chart.nextElementSibling.textContent);
+  const sampled = data.filter(trace => trace.samples);
+  sampled.forEach(trace => { unpack(trace.samples); Object.assign(trace, seen(trace.samples, -Infinity, Infinity)); });
   Plotly.newPlot(chart, data, layout, SETTINGS);
+  const told = event => Object.keys(event).some(key => key.startsWith("xaxis"));
+  if (sampled.length) chart.on("plotly_relayout", event => told(event) && zoomed(chart));
 };
 const folded = chart => chart.closest("details:not([open])");  // drawn when first opened: many cost seconds
 charts.filter(chart => !folded(chart)).forEach(draw);
@@ -67,7 +102,7 @@ def library() -> Path:
 @functools.cache
 def script() -> str:
     """What a page with charts needs once: the library, and what draws the charts."""
-    drawing = DRAW.replace("SETTINGS", json.dumps(SETTINGS)).replace("PAPER", str(PAPER))
+    drawing = DRAW.replace("SETTINGS", json.dumps(SETTINGS)).replace("PAPER", str(PAPER)).replace("SHOWN", str(SHOWN))
     return library().read_text(encoding="utf-8") + "\n" + drawing
 
 
@@ -132,6 +167,23 @@ class Chart:
         packed: dict[str, Any] = {"x": _packed(x, "f8"), "y": _packed(y, "f4")}
         return self._add(name, panel, mode="lines", line=line, silent=not legend, **packed)
 
+    def samples(
+        self, name: str, start: float, step: float, y: np.ndarray, color: str, panel: int = 0, *,
+        width: float = 1.2, dash: str = "solid",
+    ) -> "Chart":  # fmt: skip
+        """A curve (n,) sampled every `step` from `start` on, all of it kept, in 16 bits; nan is a gap.
+
+        Of what is shown each stretch has its lowest and highest sample, and zoomed in every sample is drawn.
+        """
+        known = np.isfinite(y)
+        low, high = (float(y[known].min()), float(y[known].max())) if known.any() else (0.0, 0.0)
+        offset, scale = (low + high) / 2, max((high - low) / (2 * HELD), 1e-300)
+        held = np.where(known, np.round((np.where(known, y, offset) - offset) / scale), -HELD - 1).astype("<i2")
+        kept = {"bdata": base64.b64encode(held.tobytes()).decode(), "start": start, "step": step}
+        kept |= {"offset": offset, "scale": scale}
+        line = {"color": color, "width": width, "dash": dash}
+        return self._add(name, panel, mode="lines", line=line, samples=kept)
+
     def points(
         self, name: str, x: Sequence[Any] | np.ndarray, y: Sequence[Any] | np.ndarray, color: str, panel: int = 0, *,
         size: float = 7, symbol: str = "circle", told: Sequence[str] = (), spans: np.ndarray | None = None,
@@ -173,13 +225,19 @@ class Chart:
         return self._add(name, panel, y=_packed(upper, "f4"), fill="tonexty", fillcolor=_faint(color), **quiet)
 
     def shade(
-        self, start: float, end: float, color: str, panel: int | None = None, name: str = "", opacity: float = 0.3
-    ) -> "Chart":
-        """A stretch of the axis x, in one panel or in all; `name` stands in the legend once."""
+        self, start: float, end: float, color: str, panel: int | None = None, name: str = "", opacity: float = 0.3,
+        text: str = "",
+    ) -> "Chart":  # fmt: skip
+        """A stretch of the axis x, in one panel or in all; `name` stands in the legend once, `text` at its top."""
         self._shapes.append(
             {"type": "rect", "xref": "x", "x0": start, "x1": end, **_height(panel), "fillcolor": color,
              "opacity": opacity, "line": {"width": 0}, "layer": "below"}
         )  # fmt: skip
+        if text:
+            self._notes.append(
+                {"text": html.escape(text), "xref": "x", "x": start, "xanchor": "left", "yref": _height(panel)["yref"],
+                 "y": 1, "yanchor": "top", "showarrow": False, "font": {"size": 11}, "bgcolor": "#ffffffcc"}
+            )  # fmt: skip
         if name and name not in self._told:
             square = {"color": color, "size": 11, "symbol": "square", "opacity": min(1.0, 2 * opacity)}
             self._add(name, panel or 0, mode="markers", x=[None], y=[None], marker=square, hoverinfo="skip")

@@ -46,6 +46,8 @@ figcaption { color: var(--faint); font-size: .88rem; max-width: 46rem; }
   grid-template-columns: repeat(auto-fit, minmax(min(17rem, 100%), 1fr)); }
 .charts figure { margin: .3rem 0; min-width: 0; }
 .equation { margin: .7rem 0 .7rem 1.5rem; overflow-x: auto; } .equation svg { vertical-align: middle; }
+pre { margin: .5rem 0; padding: .5rem .7rem; background: #f6f6f6; font-size: .84rem; white-space: pre-wrap;
+  overflow-wrap: anywhere; user-select: all; }
 li { margin: .3rem 0; max-width: 46rem; }
 details { margin: .8rem 0; } summary { cursor: pointer; color: #0058a0; }
 @media print { body { margin: 0; max-width: none; font-size: 10.5pt; } .wide { overflow: visible; }
@@ -76,6 +78,10 @@ class Page:
 
     def items(self, texts: Sequence[str]) -> "Page":
         return self._add("<ul>", *(f"<li>{html.escape(text)}</li>" for text in texts), "</ul>")
+
+    def code(self, text: str) -> "Page":
+        """A line to be copied: a click selects it whole."""
+        return self._add(f"<pre>{html.escape(text)}</pre>")
 
     def table(
         self, columns: Sequence[str], rows: Sequence[Sequence[str]], caption: str = "", words: Sequence[int] = ()

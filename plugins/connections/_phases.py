@@ -1,0 +1,44 @@
+"""Pairs of phases and what phase quantities follow from them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tractexp.errors import UserError, check_choice
+
+PHASES = "abc"
+PAIRS = ("ab", "bc", "ca", "ba", "cb", "ac")
+
+
+def line(pair: str) -> np.ndarray:
+    """Row (3,) that makes the line voltage of a pair from three phase voltages: ab is V_a - V_b."""
+    made = np.zeros(3)
+    made[PHASES.index(pair[0])], made[PHASES.index(pair[1])] = 1.0, -1.0
+    return made
+
+
+def check_pairs(where: str, pairs: Sequence[str]) -> None:
+    """Raise `UserError` for what are no pairs of phases, or two of the same phases."""
+    for pair in pairs:
+        check_choice(where, pair, PAIRS)
+    if len({frozenset(pair) for pair in pairs}) < len(pairs):
+        raise UserError(f"{where}={[*pairs]} names a pair of phases twice; give different ones, e.g. [ab, bc]")
+
+
+def from_lines(pairs: Sequence[str]) -> np.ndarray:
+    """(3, pairs): the phase voltages of no zero sequence that these line voltages are differences of."""
+    made = np.linalg.pinv(np.array([line(pair) for pair in pairs]))
+    return np.where(np.abs(made) < 1e-12, 0.0, made)
+
+
+def from_two(phases: str) -> np.ndarray:
+    """(3, 2): three currents of no zero sequence from those of two phases."""
+    made = np.zeros((3, 2))
+    for k, phase in enumerate(PHASES):
+        made[k] = [float(phase == p) for p in phases] if phase in phases else -1.0
+    return made
+
+
+def check_two(where: str, phases: str) -> None:
+    """Raise `UserError` for what are not two phases."""
+    check_choice(where, phases, ("ab", "ac", "ba", "bc", "ca", "cb"))

@@ -1,0 +1,39 @@
+"""Three line voltages and three currents."""
+
+from dataclasses import field
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.plugin import plugin
+from tractexp.recording import Connection
+from tractexp_plugins.connections._phases import check_pairs, from_lines
+
+
+@plugin
+class LineVoltages(Connection):
+    """The line voltages V_ab, V_bc, V_ca and the phase currents a, b, c.
+
+        V_a = (V_ab - V_ca) / 3, and so on round
+
+    Their zero sequence is not recorded and taken as absent; it carries no power into a load without neutral, and the
+    positive and negative sequence do not depend on it.
+
+    Source: IEEE 1459-2010, 3.2.2 (three-wire systems).
+    """
+
+    lines = True
+    usual = {(3, 3, True): {}}
+
+    pairs: list[str] = field(default_factory=lambda: ["ab", "bc", "ca"])  # of phases, in the order of data.voltages
+
+    def check(self) -> None:
+        if len(self.pairs) != 3:
+            raise UserError(f"data.connection.pairs={self.pairs} must be three pairs of phases, e.g. [ab, bc, ca]")
+        check_pairs("data.connection.pairs", self.pairs)
+
+    def voltage(self) -> np.ndarray:
+        return from_lines(self.pairs)
+
+    def current(self) -> np.ndarray:
+        return np.eye(3)

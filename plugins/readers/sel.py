@@ -1,0 +1,25 @@
+"""Records from SEL relays: the dips of one compressed event report."""
+
+from pathlib import Path
+
+from tractexp.plugin import plugin
+from tractexp.recording import Recording, cev
+from tractexp.recording.reader import WaveformReader
+
+
+@plugin
+class SEL(WaveformReader):
+    """Dips from an SEL relay's compressed event report (.cev, command CEV R).
+
+    The report's columns, instantaneous primary values over the root of two, are taken back to instantaneous ones; the
+    rate is the report's samples per cycle times its frequency. A filtered report (4 samples per cycle) has too few.
+
+    Source: SEL instruction manuals, appendix Compressed ASCII and section event reports.
+    """
+
+    endings = (".cev",)
+
+    encoding: str | None = None  # of the file; null: found from its letters
+
+    def recording(self) -> Recording:
+        return cev.load(Path(self.path), self.encoding)

@@ -1,0 +1,323 @@
+"""A file looked at without being told anything: what it holds, which loads it shows, what happened, what to fit."""
+
+import functools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from tractexp import files
+from tractexp.api.arguments import public
+from tractexp.api.pages import Written
+from tractexp.api.read import node_of, table
+from tractexp.errors import UserError
+from tractexp.outcome import Table, Tabulated
+from tractexp.overrides import typed
+from tractexp.progress import Progress, staged
+from tractexp.record import Base, Event, Record
+from tractexp.recording.overview import Seen, Sight, View, sight_of, view_of
+from tractexp.wording import change, figure
+
+
+class Listed(Tabulated):
+    """Rows with names, shown as a table and given as a frame or as the mappings they are."""
+
+    def __init__(self, rows: Sequence[Mapping[str, Any]], title: str = ""):
+        self.rows, self.title = rows, title
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __iter__(self) -> Iterator[Mapping[str, Any]]:
+        return iter(self.rows)
+
+    def table(self) -> Table:
+        columns = list(self.rows[0]) if self.rows else []
+        return Table(columns, [[_cell(row[name]) for name in columns] for row in self.rows], self.title)
+
+    def to_frame(self) -> Any:
+        import pandas
+
+        return pandas.DataFrame(list(self.rows))
+
+
+def _cell(value: Any) -> Any:
+    return "; ".join(map(str, value)) if isinstance(value, list | tuple) else value
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Look(Written):
+    """What files hold. `content` is that of `look.json`; arrays are read again where a look was loaded."""
+
+    kind = "look"
+
+    sources: Sequence[str | Record]
+    settings: Mapping[str, Any]
+    content: Mapping[str, Any]
+
+    @functools.cached_property
+    def views(self) -> list[View]:
+        """What stands behind the tables: recordings, phasors, events."""
+        return [_view(source, self.settings) for source in self.sources]
+
+    @property
+    def files(self) -> Listed:
+        """One row for each file: station, start, rates, nominal and measured frequency, notes."""
+        left_out = ("channels", "feeders", "segments")
+        made = [{k: v for k, v in f.items() if k not in left_out} for f in self.content["files"]]
+        return Listed(made, "files")
+
+    @property
+    def channels(self) -> Listed:
+        """One row for each channel: number, name, phase, unit, primary magnitude, quality."""
+        return Listed([{"file": f["file"], **c} for f in self.content["files"] for c in f["channels"]], "channels")
+
+    @property
+    def feeders(self) -> Listed:
+        """One row for each load: its channels, voltage and power before anything happened, the command that fits."""
+        made = [
+            {"file": f["file"], **{k: v for k, v in feeder.items() if k != "events"}}
+            for f in self.content["files"] for feeder in f["feeders"]
+        ]  # fmt: skip
+        return Listed(made, "loads")
+
+    @property
+    def events(self) -> Listed:
+        """One row for each event of each load: kind, start, depth, duration, jump, U2, P and Q, worth, why."""
+        made = [
+            {"file": f["file"], "feeder": feeder["name"], **event}
+            for f in self.content["files"] for feeder in f["feeders"] for event in feeder["events"]
+        ]  # fmt: skip
+        return Listed(made, "events")
+
+    @property
+    def commands(self) -> list[str]:
+        """The commands that fit what is worth it, one for each load with such an event."""
+        return [feeder["command"] for f in self.content["files"] for feeder in f["feeders"] if feeder["command"]]
+
+    def phasors(self, feeder: int = 0, file: int = 0) -> Any:
+        """A frame of one load: t [s], f [Hz], U, U2 [kV, line to line], I1, I2 [kA], P [MW], Q [Mvar].
+
+        Of a table that is a record: its columns, in the same units. Raises `UserError` where there is no such load.
+        """
+        import pandas
+
+        return pandas.DataFrame(series(_picked(_picked(self.views, file, "file").sights, feeder, "load")))
+
+    def waveforms(self, file: int = 0) -> Any:
+        """A frame of all channels of a file in primary values: t [s], then each channel [kV, kA, ...].
+
+        Raises `UserError` for a file that holds no channels.
+        """
+        import pandas
+
+        recording = _picked(self.views, file, "file").recording
+        if recording is None:
+            raise UserError(f"{self.content['files'][file]['file']} is a table of U, P and Q, without waveforms")
+        t = np.concatenate([s.t for s in recording.segments])
+        names = [c.name for c in recording.channels]
+        labels = [n if names.count(n) == 1 else f"{n} ({i})" for i, n in enumerate(names)]
+        columns = {label: c.values()[: len(t)] for label, c in zip(labels, recording.channels, strict=True)}
+        return pandas.DataFrame({"t": t, **columns})
+
+    def table(self) -> Table:
+        columns = ["event", "load", "kind", "starts [s]", "lasts [ms]", "depth", "jump [deg]", "U2", "P [MW]",
+                   "Q [Mvar]", "fit"]  # fmt: skip
+        several = len(self.content["files"]) > 1
+        rows, said = [], []
+        for f in self.content["files"]:
+            for feeder in f["feeders"]:
+                where = f"{f['file']} {feeder['name']}" if several else feeder["name"]
+                rows += [_told(where, event) for event in feeder["events"]]
+                said += [f"fit {where}: {feeder['command']}"] if feeder["command"] else []
+        title = f"{len(rows)} event{'s' * (len(rows) != 1)} in {', '.join(f['file'] for f in self.content['files'])}"
+        return Table(columns, rows, title, said)
+
+    def to_dict(self) -> dict[str, Any]:
+        kept = [s if isinstance(s, str) else {f.name: getattr(s, f.name) for f in fields(Record)} for s in self.sources]
+        told = [s if isinstance(s, str) else s | {"base": asdict(s["base"])} for s in kept]
+        return {"sources": told, "settings": dict(self.settings), "content": dict(self.content)}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        sources = [s if isinstance(s, str) else _record(s) for s in content["sources"]]
+        return cls(sources, content["settings"], content["content"])
+
+    def _write(self, folder: Path) -> list[Path]:
+        """look.html and look.json."""
+        from tractexp.report import look
+
+        return [look.page(folder / "look.html", self.views, self.content),
+                files.write_json(folder / "look.json", self.content)]  # fmt: skip
+
+
+@public
+def look(*sources: Any, progress: Progress = None, **settings: Any) -> Look:
+    """Look at files without saying which channels they have: what they hold, which loads they show, what happened.
+
+    A source is the path of any file that `tractexp.read` takes, an event or a record, or a frame with the columns
+    t, U, P, Q. `settings` are those of the reader; where `voltages` and `currents` are given, that load is looked at
+    instead of those proposed. Loads count P and Q as positive when consumed; voltages are primary kV line to line,
+    depth, jump and U2 are those of `tractexp.recording.Happening`.
+
+    Raises `UserError` for what cannot be read, naming file, place and value.
+    """
+    flat = [one for source in sources for one in (source if isinstance(source, list | tuple) else [source])]
+    if not flat:
+        raise UserError("nothing to look at: give a file, e.g. look('station.cfg')")
+    told = list(dict.fromkeys(map(_source, flat)))
+    with staged(progress) as stage:
+        views = []
+        for source in told:
+            stage(f"reading {source if isinstance(source, str) else source.name}")
+            views.append(_view(source, settings))
+        stage("measuring the quality of the channels")
+        content = files.plain({"files": [_content(view) for view in views]})
+    made = Look(told, settings, content)
+    made.__dict__["views"] = views
+    return made
+
+
+def _source(given: Any) -> str | Record:
+    """A path, or a record; an event of a file that is there stands for the file."""
+    if isinstance(given, str | Path):
+        return str(given)
+    record = given.record if isinstance(given, Event) else given
+    if isinstance(record, Record):
+        path = record.source.rpartition(" dip ")[0]
+        return path if path and Path(path).is_file() else record
+    if isinstance(given, Mapping) or hasattr(given, "columns"):
+        return table({str(k): given[k] for k in (given if isinstance(given, Mapping) else given.columns)}, "frame", {})
+    raise UserError(f"a {type(given).__name__} cannot be looked at; give a path, an event, a record or a frame")
+
+
+def _view(source: str | Record, settings: Mapping[str, Any]) -> View:
+    if isinstance(source, Record):
+        return View(source.name, {}, [sight_of(source, {})])
+    return view_of(source, node_of(source, settings))
+
+
+def series(shown: Sight) -> dict[str, np.ndarray]:
+    """Columns (M,) of one load: t [s], f [Hz], U, U2 [kV], P [MW], Q [Mvar] and, of channels, I1, I2 [kA]."""
+    if shown.record is not None:
+        made, base = shown.record.channels, shown.record.base
+        units = {"U": base.voltage, "U2": base.voltage, "P": base.power, "Q": base.power}
+        return {name: values * units.get(name, 1.0) for name, values in made.items()}
+    parts = [
+        {"t": p.t, "f": p.f, "U": p.U, "U2": p.U2, "I1": np.abs(p.I1), "I2": np.abs(p.I2), "P": p.S.real, "Q": p.S.imag}
+        for p in shown.phasors
+    ]
+    return {name: np.concatenate([part[name] for part in parts]) for name in (parts[0] if parts else ())}
+
+
+def event_row(seen: Seen) -> dict[str, Any]:
+    """An event as plain data: times in s, powers in MW and Mvar, voltages as shares of that before."""
+    what = seen.what
+    return {
+        "kind": what.kind, "start": what.start, "end": what.end, "duration": what.end - what.start,
+        "depth": what.depth, "jump": what.jump, "U2": what.U2, "P_before": what.before[0], "Q_before": what.before[1],
+        "P_after": what.after[0], "Q_after": what.after[1], "dip": seen.dip, "worth": seen.worth, "why": seen.why,
+    }  # fmt: skip
+
+
+def _content(view: View) -> dict[str, Any]:
+    """What `look.json` holds of a file."""
+    made = view.recording
+    known: dict[str, Any] = {"file": view.source, "reader": view.node.get("name", "")}
+    if made is None:
+        record = view.sights[0].record
+        assert record is not None
+        known |= {
+            "station": "", "device": "", "start": None, "frequency": record.base.frequency,
+            "rates": [record.rate], "seconds": float(record.t[-1] - record.t[0]),
+            "segments": [{"rate": record.rate, "start": float(record.t[0]), "samples": record.samples}],
+            "notes": list(record.notes), "channels": [],
+        }  # fmt: skip
+    else:
+        last = made.segments[-1]
+        known |= {
+            "station": made.station, "device": made.device, "start": made.start and made.start.isoformat(),
+            "frequency": made.frequency, "rates": [s.rate for s in made.segments],
+            "seconds": last.start + (last.stop - last.first) / last.rate,
+            "segments": [{"rate": s.rate, "start": s.start, "samples": s.stop - s.first} for s in made.segments],
+            "notes": list(made.notes), "channels": [_channel(view, number) for number in range(len(made.channels))],
+        }  # fmt: skip
+    known["measured_frequency"] = view.frequency
+    return known | {"feeders": [_feeder(view, shown) for shown in view.sights]}
+
+
+def _channel(view: View, number: int) -> dict[str, Any]:
+    assert view.recording is not None
+    channel, told = view.recording.channels[number], view.quality[number]
+    share = told.noise / told.level if told.level > 0 else None
+    return {
+        "number": number, "name": channel.name, "phase": channel.phase, "unit": channel.unit,
+        "quantity": channel.quantity, "magnitude": told.level,
+        "primary_unit": {"voltage": "kV", "current": "kA"}.get(channel.quantity, channel.unit),
+        "noise_share": share, **asdict(told),
+    }  # fmt: skip
+
+
+def _feeder(view: View, shown: Sight) -> dict[str, Any]:
+    feeder, told = shown.feeder, shown.powers()
+    names = [c.name for c in view.recording.channels] if view.recording else []
+    made: dict[str, Any] = {"name": shown.name}
+    if feeder is not None:
+        made |= {
+            "connection": feeder.connection, "voltages": list(feeder.voltages), "currents": list(feeder.currents),
+            "channels": [names[i] for i in (*feeder.voltages, *feeder.currents)],
+            "reverse_current": feeder.reverse_current, "why": list(feeder.why),
+        }  # fmt: skip
+    else:
+        made |= {"connection": "", "voltages": [], "currents": [], "channels": [], "reverse_current": False, "why": []}
+    U, P, Q = told or (None, None, None)
+    return made | {
+        "U": U, "P": P, "Q": Q, **_sums(shown), "said": list(shown.said), "command": command(view, shown),
+        "events": [event_row(seen) for seen in shown.seen],
+    }  # fmt: skip
+
+
+def command(view: View, shown: Sight) -> str:
+    """What is to be typed to fit the events of a load that are worth it; "" where none is."""
+    choice = shown.choice()
+    return typed({**view.node, **choice}) if choice and view.node else ""
+
+
+def _sums(shown: Sight) -> dict[str, Any]:
+    """Kirchhoff: the sums of the three voltages and of the three currents, as shares of a phase's, at the beginning."""
+    made = {}
+    for key, phases in (("V", "V"), ("I", "I")):
+        value = None
+        if shown.phasors and len(shown.phasors[0].V) == 3:
+            first = getattr(shown.phasors[0], phases)[:, :50]
+            scale = float(np.abs(first).mean())
+            value = float(np.abs(first.sum(axis=0)).mean()) / scale if scale > 0 else None
+        made[f"sum_{key}"] = value
+    return made
+
+
+def _told(where: str, event: Mapping[str, Any]) -> list[Any]:
+    """A row of the table that a person sees first."""
+    power = [change(event[f"{x}_before"], event[f"{x}_after"]) for x in "PQ"]
+    return [
+        "" if event["dip"] is None else event["dip"], where, event["kind"], round(event["start"], 4),
+        round(1000 * event["duration"]), f"{event['depth']:.1%}", figure(event["jump"], 2),
+        "" if event["U2"] is None else f"{event['U2']:.1%}",
+        *power, "yes" if event["worth"] else f"no: {event['why']}",
+    ]  # fmt: skip
+
+
+def _picked(items: Sequence[Any], k: int, what: str) -> Any:
+    if not -len(items) <= k < len(items):
+        raise UserError(f"there is no {what} {k}; there are {len(items)}, counted from 0")
+    return items[k]
+
+
+def _record(told: Mapping[str, Any]) -> Record:
+    arrays: Any = {
+        k: None if told[k] is None else np.array(told[k], dtype=float) for k in ("t", "U", "P", "Q", "f", "U2")
+    }
+    plain = {"name": told["name"], "source": told["source"], "notes": tuple(told["notes"])}
+    return replace(Record(**plain, **arrays), base=Base(**told["base"]))

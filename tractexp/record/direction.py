@@ -1,0 +1,62 @@
+"""Which way power flows where P is negative: a load whose current is counted the wrong way, or a source."""
+
+import numpy as np
+
+DISTURBED = 0.03  # of the voltage: what a load must answer
+CALM = 0.01  # of the voltage: where P is that before
+FEWEST = 3  # samples in either state
+FALLS = 0.5  # exponent of |P| over U from which on power falls with the voltage as a load's does
+IMPEDANCE = 1.3  # exponent above that of a constant current, which a converter may keep as well
+REACTIVE = 0.1  # of |P|: less Q than this tells nothing
+NOISY = 3.0  # times the noise that P must exceed to have a sign
+TURNS = 0.1  # of |P|: positive power of this size, at normal voltage, is a train that motors and brakes
+REMEDY = "set data.reverse_current=true"
+
+
+def direction(U: np.ndarray, P: np.ndarray, Q: np.ndarray, polarity: int = 0) -> str:
+    """Why P is negative before a disturbance, one clause; "" where it is not.
+
+    `polarity` says what the negative sequence has shown, where it is known: 1 the current is counted as a load's, -1
+    the other way. A passive load draws negative-sequence current whatever its power does. Otherwise the answer of P and
+    Q to the voltage decides: a load's |P| falls with U and returns, and so does its inductive Q; a converter keeps P or
+    the current, or reverses.
+    """
+    known = np.isfinite(U) & np.isfinite(P) & np.isfinite(Q)
+    U, P, Q = U[known], P[known], Q[known]
+    if not len(U):
+        return ""
+    level = float(np.median(U))
+    calm = np.abs(U / level - 1) < max(CALM, 3 * float(np.median(np.abs(np.diff(U)))) / level if len(U) > 1 else CALM)
+    P0, Q0 = (float(np.median(x[calm])) if calm.any() else float(np.median(x)) for x in (P, Q))
+    spread = float(np.median(np.abs(np.diff(P)))) if len(P) > 1 else 0.0
+    if not -NOISY * spread > P0:
+        return ""
+    if np.count_nonzero(P[calm] > -TURNS * P0) > max(FEWEST, 0.02 * len(P)):
+        return "P changes its sign at normal voltage, as of a train that brakes and motors: power flows both ways"
+    a, fell = _exponent(U / level, P / P0)
+    answer = f"|P| goes as U^{a:.2g} when the voltage falls" if fell else "the voltage is never disturbed"
+    if polarity < 0 or (polarity == 0 and fell and _load_like(a, P0, Q0)):
+        shown = (
+            "the negative-sequence current is that of a load turned round" if polarity < 0 else answer + " and returns"
+        )
+        return f"{shown}: a load whose current is counted out of it ({REMEDY})"
+    if polarity > 0:
+        return "the negative-sequence current is that of a load: the current is counted rightly, so power is fed back"
+    if fell and a < FALLS:
+        return f"{answer}, as a converter's or a generator's: power is fed back (a braking train), no reversed current"
+    return f"{answer}, which tells no reversed current ({REMEDY}) from power that is fed back"
+
+
+def _load_like(a: float, P0: float, Q0: float) -> bool:
+    """Whether power answers as that of a load with its sign turned: inductive, or as an impedance."""
+    inductive = -Q0 > REACTIVE * -P0
+    return (a >= FALLS and inductive) or (a >= IMPEDANCE and Q0 < REACTIVE * -P0)
+
+
+def _exponent(u: np.ndarray, p: np.ndarray) -> tuple[float, bool]:
+    """(exponent of p over u while u is low, whether u is low long enough for it); p is 1 where u is 1."""
+    low = (u < 1 - DISTURBED) & (u > 0.1)
+    if np.count_nonzero(low) < FEWEST:
+        return float("nan"), False
+    x, y = np.log(u[low]), np.log(np.clip(p[low], 0.05, None))
+    return float(np.median(y / x)), True

@@ -1,0 +1,33 @@
+"""Files that no reader takes although users have them: what they are, and what to do with them."""
+
+from pathlib import Path
+
+PQDIF = (
+    "PQDIF (IEEE 1159.3), for which there is no maintained Python reader: export it as COMTRADE or CSV with the "
+    "recorder's software"
+)
+COMPANION = "a companion of a COMTRADE record that holds no samples: give the .cfg beside it"
+ARCHIVE = "an archive: unpack it, and give a file of it, or its folder to task=survey"
+RECORDER = "a recorder's own format: export it as COMTRADE or CSV with the recorder's software"
+FOREIGN = {
+    ".pqd": PQDIF, ".pqdif": PQDIF, ".hdr": COMPANION, ".inf": COMPANION, ".dmf": COMPANION, ".rio": COMPANION,
+    ".zip": ARCHIVE, ".rar": ARCHIVE, ".7z": ARCHIVE, ".gz": ARCHIVE, ".tar": ARCHIVE,
+    ".mat": "a MATLAB file: write its signals as columns with writetable (.csv) or parquetwrite (.parquet)",
+    ".eve": "an SEL event report as text for people: get the compressed one with the command CEV R (.cev), or the "
+    "relay's COMTRADE file",
+    ".h5": "HDF5, whose layout is everybody's own: write its signals as columns of a .csv or .parquet",
+    ".hdf5": "HDF5, whose layout is everybody's own: write its signals as columns of a .csv or .parquet",
+    ".tdms": "a LabVIEW file: export it as .csv, or write its channels as columns of a .parquet",
+    ".pl4": "ATP's plot file: export it as COMTRADE with PlotXY",
+    ".out": "a simulator's output: export it as .csv",
+    ".rec": RECORDER, ".wfm": RECORDER, ".osc": RECORDER, ".dsr": RECORDER, ".tr0": RECORDER, ".icf": RECORDER,
+    ".dmk": RECORDER, ".sig": RECORDER, ".trc": RECORDER, ".wdf": RECORDER, ".d01": RECORDER,
+    ".pdf": "a document: give the record's data", ".docx": "a document: give the record's data",
+    ".xls": "the Excel format of before 2007: save it as .xlsx or .csv",
+}  # fmt: skip
+
+
+def sentence(path: str | Path) -> str:
+    """What a file of a known foreign ending is and how to go on, a sentence with its path; "" for other endings."""
+    told = FOREIGN.get(Path(path).suffix.lower())
+    return f"{path} is {told}" if told else ""

@@ -1,0 +1,325 @@
+"""Whether the channels chosen are what they are taken for: phases or lines, their order, their direction.
+
+All of it is told while the voltage and the current are alive: a dead line after a trip has no order. What the labels
+say and what the waves say must agree; where the order given makes no sense and another does, it is refused with that
+other one, never silently changed, because two orders can both look plausible where the load is unusual.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.plugin import chosen
+from tractexp.record.direction import direction
+from tractexp.record.phasor import sequences
+from tractexp.recording.connection import usual
+from tractexp.recording.feeder import Feeder
+from tractexp.recording.label import groups, kind, order
+from tractexp.recording.recording import Recording
+from tractexp.recording.snapshot import frequency, nearest_nominal, snapshots
+
+ALIVE = 0.5  # of the upper level of V1: less is a fault, or a dead line
+LOADED = 0.2  # of the upper level of I1, as well
+CALM = 0.05  # of the median V1: the state in which orders are compared
+BALANCED = 0.5  # I2 over I1 of an order that makes sense
+SENSIBLE = 75.0  # degrees between V1 and I1 that a load has at most
+BACKWARD = 135.0  # degrees from which on the current is turned round, or power fed back
+REACTIVE = 2.0  # degrees about 90: a capacitor bank or a reactor, whatever its order
+OTHER_FREQUENCY = 0.06  # of the nominal one: what is farther off belongs to another
+ZERO = 0.02  # V0 over V2 of line voltages in a fault to earth, whose sum is zero whatever happens
+UNBALANCED = 0.05  # V2 over V1 of such a fault
+EARTH = 0.1  # I0 over I1 of such a fault
+ROOT3 = 0.02  # line over phase voltages may be so far from sqrt 3, and 3 degrees from 30
+ANSWERS = (-110.0, 30.0)  # degrees of I2 / V2 of a passive load: inductive, at most a little capacitive
+ADDED = 0.02  # V2 over V1 that must be added for the answer in I2 to be told
+FAULT = 2.5  # times the current before: more feeds a fault behind the current transformer, and says nothing of a load
+TURNED = "has the opposite polarity of the other two; mend its sign in the file (in a .cfg, that of its factor)"
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """Phasors of a feeder while it is alive, (3, M) each, and which of them are calm."""
+
+    V: np.ndarray
+    I: np.ndarray
+    calm: np.ndarray
+
+
+def tuned(recording: Recording, numbers: Sequence[int]) -> Recording:
+    """The recording with the nominal frequency that its voltages `numbers` really have, and a note where it differs."""
+    f = frequency(recording, numbers)
+    if f is None or (nominal := nearest_nominal(f)) is None or abs(nominal / recording.frequency - 1) < OTHER_FREQUENCY:
+        return recording
+    note = (
+        f"the file declares {recording.frequency:g} Hz, but the voltage has {f:.5g} Hz while it is alive: "
+        f"{nominal:.3g} Hz is taken for nominal"
+    )
+    return replace(recording, frequency=nominal, notes=(*recording.notes, note))
+
+
+def arranged(recording: Recording, feeder: Feeder) -> Feeder:
+    """The feeder as given, or with line voltages taken as such, and a sentence for each thing found in `why`.
+
+    Raises `UserError` where the order given makes no sense and another does, which is proposed with its P and Q.
+    """
+    feeder = _lines_by_label(recording, feeder)
+    connection = chosen("connection", feeder.connection)
+    seen = _seen(recording, feeder)
+    if seen is None:
+        _labels(recording, feeder, None)
+        return replace(feeder, why=(*feeder.why, "the order of the channels cannot be checked: nothing is alive"))
+    if len(seen.V) < 3:
+        return _directed(feeder, seen)
+    if _to_ground(feeder) and (told := _lines_by_shape(recording, feeder, seen)):
+        feeder = replace(feeder, connection=_between(feeder), why=(*feeder.why, told))
+        seen = _seen(recording, feeder) or seen
+    _voltages(recording, feeder, seen)
+    if connection.currents == 3 == len(seen.V):
+        _labels(recording, feeder, seen)
+        _currents(recording, feeder, seen)
+    return _directed(feeder, seen)
+
+
+def _lines_by_label(recording: Recording, feeder: Feeder) -> Feeder:
+    """Voltages that their labels call line to line, put in the order AB, BC, CA."""
+    told = order([recording.channels[i] for i in feeder.voltages]) if len(feeder.voltages) == 3 else None
+    if not _to_ground(feeder) or told is None or not told[1]:
+        return feeder
+    voltages = tuple(feeder.voltages[told[0].index(k)] for k in range(3))
+    names = ", ".join(f"'{recording.channels[i].name}'" for i in voltages)
+    why = f"the voltages {names} are line to line, as their labels say: data.connection={_between(feeder)} is used"
+    return replace(feeder, voltages=voltages, connection=_between(feeder), why=(*feeder.why, why))
+
+
+def _to_ground(feeder: Feeder) -> bool:
+    """Whether three voltages are taken as they stand, to ground."""
+    return len(feeder.voltages) == 3 and feeder.connection == usual(3, len(feeder.currents))
+
+
+def _between(feeder: Feeder) -> Any:
+    """The connection of the same channels with the voltages between phases."""
+    return usual(len(feeder.voltages), len(feeder.currents), lines=True)
+
+
+def _seen(recording: Recording, feeder: Feeder) -> _Seen | None:
+    """The feeder's phasors while voltage and current are alive; None where they never are."""
+    numbers = [*feeder.voltages, *feeder.currents]
+    made = snapshots(recording, numbers, frequency(recording, feeder.voltages))
+    if made is None:
+        return None
+    connection = chosen("connection", feeder.connection)
+    V = connection.voltage() @ made.of(feeder.voltages)
+    I = connection.current() @ made.of(feeder.currents) * (-1 if feeder.reverse_current else 1)
+    known = np.isfinite(V).all(axis=0) & np.isfinite(I).all(axis=0)
+    V, I = V[:, known], I[:, known]
+    size, load = (np.linalg.norm(x, axis=0) for x in (V, I))
+    if not V.shape[1] or size.max() == 0 or load.max() == 0:
+        return None
+    alive = (size > ALIVE * np.percentile(size, 90)) & (load > LOADED * np.percentile(load, 50))
+    if not alive.any():
+        return None
+    V, I, size = V[:, alive], I[:, alive], size[alive]
+    calm = np.abs(size / np.quantile(size, 0.5, method="lower") - 1) < CALM  # a level that is there: never empty
+    if len(V) == 3:
+        small, large = np.sort(np.abs(sequences(V)), axis=0)  # whatever the order is
+        calm = even if (even := calm & (small < UNBALANCED * large)).any() else calm
+    return _Seen(V, I, calm)
+
+
+def _zero(x: np.ndarray) -> np.ndarray:
+    return np.abs(x.mean(axis=0))
+
+
+def _lines_by_shape(recording: Recording, feeder: Feeder, seen: _Seen) -> str:
+    """Why three voltages must be line to line though no label says so; "" where nothing shows it."""
+    used = f"they are line to line, and data.connection={_between(feeder)} is used"
+    V1, V2 = (np.abs(x) for x in sequences(seen.V))
+    I0, I1 = _zero(seen.I), np.median(np.abs(sequences(seen.I)[0])[seen.calm])
+    fault = (V2 > UNBALANCED * V1) & (I0 > EARTH * I1) & (5 * np.median(I0[seen.calm]) < I0)
+    if np.count_nonzero(fault) >= 2 and (_zero(seen.V)[fault] < ZERO * V2[fault]).all():
+        return f"the voltages add up to zero even in a fault to earth, where the currents do not: {used}"
+    volts = {i: c for i, c in enumerate(recording.channels) if kind(c) == "voltage" and i not in feeder.voltages}
+    for group in groups(volts):
+        if len(group.numbers) == 3 and not group.pairs and _root3(recording, feeder.voltages, group.numbers):
+            others = ", ".join(_called(recording, i) for i in group.numbers)
+            return f"the voltages are sqrt 3 times, and 30 degrees ahead of, those of {others}: {used}"
+    return ""
+
+
+def _root3(recording: Recording, ours: Sequence[int], theirs: Sequence[int]) -> bool:
+    """Whether three voltages are the differences of three others."""
+    made = snapshots(recording, [*ours, *theirs])
+    if made is None:
+        return False
+    x, y = (sequences(made.of(numbers))[0] for numbers in (ours, theirs))
+    large = np.nan_to_num(np.abs(y)) > ALIVE * np.nanmax(np.abs(y), initial=0)
+    if not large.any():
+        return False
+    ratio = np.median(np.abs(x[large] / y[large])) * np.exp(1j * np.median(np.angle(x[large] / y[large])))
+    return abs(np.abs(ratio) / np.sqrt(3) - 1) < ROOT3 and abs(np.degrees(np.angle(ratio)) - 30) < 3
+
+
+def _voltages(recording: Recording, feeder: Feeder, seen: _Seen) -> None:
+    """Refuse voltages whose negative sequence exceeds the positive one while they are alive."""
+    V1, V2 = (float(np.median(np.abs(x)[seen.calm])) for x in sequences(seen.V))
+    if V2 <= V1:
+        return
+    if _to_ground(feeder) and (k := _turned(seen.V[:, seen.calm])) is not None:
+        raise UserError(f"data.voltages={[*feeder.voltages]}: {_called(recording, feeder.voltages[k])} {TURNED}")
+    raise UserError(
+        f"data.voltages={[*feeder.voltages]}: the phases are not in the order a, b, c: while alive, the negative "
+        f"sequence is {V2 / max(V1, 1e-12):.3g} times the positive one; give {_swapped(feeder)}"
+    )
+
+
+def _swapped(feeder: Feeder) -> str:
+    """The proposal of the other order of phases, in ascending numbers where that is possible."""
+    n = len(feeder.voltages)
+    turns = [(0, 2, 1), (2, 1, 0), (1, 0, 2)] if n == 3 == len(feeder.currents) else [(*range(n)[::-1],)]
+    best = min(turns, key=lambda p: [feeder.voltages[k] for k in p])
+    currents = [feeder.currents[k] for k in best] if len(feeder.currents) == n else feeder.currents[::-1]
+    return _said([feeder.voltages[k] for k in best], currents)
+
+
+def _turned(X: np.ndarray) -> int | None:
+    """The one of three phasors that must be turned round for them to be balanced; None where that does not help."""
+    for k in range(3):
+        tried = X.copy()
+        tried[k] *= -1
+        first, second = (float(np.median(np.abs(x))) for x in sequences(tried))
+        if max(second, float(np.median(_zero(tried)))) < 0.3 * first:
+            return k
+    return None
+
+
+def _said(voltages: Sequence[int] | None, currents: Sequence[int]) -> str:
+    made = f"data.currents=[{', '.join(map(str, currents))}]"
+    return made if voltages is None else f"data.voltages=[{', '.join(map(str, voltages))}] {made}"
+
+
+def _called(recording: Recording, number: int) -> str:
+    return f"channel {number} '{recording.channels[number].name}'"
+
+
+def _labels(recording: Recording, feeder: Feeder, seen: _Seen | None) -> None:
+    """Refuse currents that are labelled in another order than the voltages."""
+    channels = recording.channels
+    volts, amps = (order([channels[i] for i in each]) for each in (feeder.voltages, feeder.currents))
+    if volts is None or amps is None or volts[1] or amps[1] or len(volts[0]) < 3 or volts[0] == amps[0]:
+        return
+    (v, _), (c, _) = volts, amps
+    labelled = tuple(feeder.currents[c.index(k)] for k in v)
+    both = ""
+    if seen is not None:
+        S, T = _power(seen, (0, 1, 2)), _power(seen, tuple(feeder.currents.index(i) for i in labelled))
+        both = f", which gives {_mw(T)} where the order given has {_mw(S)}"
+    raise UserError(
+        f"data.currents are the phases {_letters(c)} where data.voltages are {_letters(v)}, says {recording.source}; "
+        f"give both in the same order: {_said(None, labelled)}{both}"
+    )
+
+
+def _letters(places: Sequence[int]) -> str:
+    return ", ".join("ABC"[k] for k in places)
+
+
+def _power(seen: _Seen, permutation: tuple[int, ...]) -> complex:
+    """P + jQ [MVA] in the calm state with the currents in another order."""
+    S = 3 * sequences(seen.V)[0] * sequences(seen.I[[*permutation]])[0].conj()
+    S = S[seen.calm]
+    return complex(np.median(S.real), np.median(S.imag))
+
+
+def _angle(S: complex) -> float:
+    return float(np.degrees(np.angle(S)))
+
+
+def _sensible(S: complex) -> bool:
+    return abs(_angle(S)) <= SENSIBLE
+
+
+def _mw(S: complex) -> str:
+    return f"P = {S.real:.3g} MW, Q = {S.imag:.3g} Mvar"
+
+
+def _currents(recording: Recording, feeder: Feeder, seen: _Seen) -> None:
+    """Refuse an order of the currents that is impossible, or that makes no sense where another does."""
+    I1, I2 = (float(np.median(np.abs(x)[seen.calm])) for x in sequences(seen.I))
+    S = _power(seen, (0, 1, 2))
+    if I2 > I1:
+        _negative(recording, feeder, seen, S, I2 / max(I1, 1e-12))
+        return
+    labelled = [order([recording.channels[i] for i in each]) for each in (feeder.voltages, feeder.currents)]
+    confirmed = None not in labelled
+    middle = SENSIBLE < abs(_angle(S)) < BACKWARD and abs(abs(_angle(S)) - 90) > REACTIVE
+    if confirmed or not middle or I2 > BALANCED * I1:
+        return
+    better = [p for p in ((1, 2, 0), (2, 0, 1)) if _sensible(_power(seen, p)) and _answers(seen, p) >= 0]
+    if len(better) == 1:
+        _refuse(
+            feeder, seen, better[0], f"P and Q make no sense ({_mw(S)}): the currents are rotated against the voltages"
+        )
+
+
+def _negative(recording: Recording, feeder: Feeder, seen: _Seen, S: complex, ratio: float) -> None:
+    """Refuse currents of the opposite sequence where another order, or one turned round, is balanced."""
+    if (k := _turned(seen.I[:, seen.calm])) is not None:
+        raise UserError(f"data.currents={[*feeder.currents]}: {_called(recording, feeder.currents[k])} {TURNED}")
+    tried = []
+    for p in permutations(range(3)):
+        first, second = (float(np.median(np.abs(x)[seen.calm])) for x in sequences(seen.I[[*p]]))
+        if second < BALANCED * first:
+            tried.append(p)
+    if tried:
+        best = min(tried, key=lambda p: abs(_angle(_power(seen, p))))
+        why = f"the currents' negative sequence is {ratio:.3g} times the positive one ({_mw(S)}): two are swapped"
+        _refuse(feeder, seen, best, why)
+
+
+def _refuse(feeder: Feeder, seen: _Seen, permutation: tuple[int, ...], why: str) -> None:
+    proposal = tuple(feeder.currents[k] for k in permutation)
+    raise UserError(
+        f"data.currents={[*feeder.currents]}: {why}; {_said(None, proposal)} gives {_mw(_power(seen, permutation))}"
+    )
+
+
+def _answers(seen: _Seen, permutation: tuple[int, ...] = (0, 1, 2)) -> int:
+    """1 where the added I2 is what a passive load draws from the added V2, -1 where it is turned round, else 0."""
+    V2, I2 = sequences(seen.V)[1], sequences(seen.I[[*permutation]])[1]
+    V1 = np.abs(sequences(seen.V)[0])
+    V2, I2 = V2 * _still(seen), I2 * _still(seen)
+    dV, dI = V2 - np.median(V2[seen.calm]), I2 - np.median(I2[seen.calm])
+    known = np.abs(dV) > ADDED * np.median(V1)
+    most = np.abs(seen.I).max(axis=0)
+    if np.count_nonzero(known) < 2 or most[known].max() > FAULT * np.median(most[seen.calm]):
+        return 0
+    Y = np.vdot(dV[known], dI[known])
+    low, high = ANSWERS
+    if low <= _angle(Y) <= high:
+        return 1
+    return -1 if low <= _angle(-Y) <= high else 0
+
+
+def _still(seen: _Seen) -> np.ndarray:
+    """What turns phasors so that V1 has angle zero: windows far apart can then be compared."""
+    V1 = sequences(seen.V)[0]
+    return V1.conj() / np.maximum(np.abs(V1), 1e-12)
+
+
+def _directed(feeder: Feeder, seen: _Seen) -> Feeder:
+    """The feeder with a sentence on negative power, where it is."""
+    if len(seen.V) == 3:
+        V1, I1 = sequences(seen.V)[0], sequences(seen.I)[0]
+        polarity = _answers(seen)
+    else:
+        V1, I1, polarity = seen.V[0], seen.I[0], 0
+    S = len(seen.V) * V1 * I1.conj()
+    told = direction(np.abs(V1), S.real, S.imag, polarity)
+    if not told:
+        return feeder
+    middle = complex(np.median(S[seen.calm].real), np.median(S[seen.calm].imag))
+    return replace(feeder, why=(*feeder.why, f"{_mw(middle)}: {told}"))

@@ -1,0 +1,264 @@
+"""SEL compressed event reports (.cev, Compressed ASCII) read into a recording.
+
+Source: the instruction manuals of SEL-351A, -311L, -411L, -421, -751 and -787 (appendix Compressed ASCII, section
+event reports): quoted rows with a checksum each, names above values; the columns are instantaneous primary amperes and
+kilovolts over the root of two; `>` marks the row of the trigger, `*` that of the greatest current; the states of the
+relay word are hexadecimal.
+"""
+
+import csv
+import re
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.recording.comtrade_header import number, quoted
+from tractexp.recording.recording import UNITS, Channel, Recording, Segment, Status
+from tractexp.recording.remarks import Remarks
+from tractexp.recording.text import decode
+
+ROOT = float(np.sqrt(2))
+LARGEST = 256 * 2**20  # bytes: event reports last seconds
+CLOSE = 0.1  # of a current: so well the summary's agrees with the columns
+SLOW = 10  # samples a cycle: fewer are a filtered report, of which nothing but magnitudes can be told
+_COLUMN = re.compile(r"\s*([^(]*?)\s*(?:\(\s*([^)]*?)\s*\))?\s*")
+_WAVE = re.compile(r"[IV](?:([ABCNGQ]|AB|BC|CA)(\w?)|1MEM|S\d?|P)", re.ASCII)
+
+
+@dataclass
+class Report:
+    """Rows of the file by their meaning."""
+
+    about: dict[str, str] = field(default_factory=dict)  # names over values: FID, date, summary
+    columns: list[str] = field(default_factory=list)
+    rows: list[tuple[int, list[str]]] = field(default_factory=list)  # line, cells of a sample
+    settings: str = ""
+
+
+def load(path: Path, encoding: str | None = None) -> Recording:
+    """Read a compressed event report; raises `UserError` naming line, column and value of what is wrong."""
+    path = Path(path)
+    if not path.is_file():
+        raise UserError(f"{path}: there is no such file")
+    if path.stat().st_size > LARGEST:
+        raise UserError(f"{path}: {path.stat().st_size} bytes are no event report; the limit is {LARGEST}")
+    text, encoding = decode(path.read_bytes(), str(path), encoding)
+    remarks = Remarks(str(path))
+    report = _report(path, text, remarks)
+    values, marks, words = _samples(path, report, remarks)
+    per_cycle, frequency = _rate(path, report)
+    rate = per_cycle * frequency
+    marked = next((i for sign in (">", "*") for i, mark in enumerate(marks) if sign in mark), None)
+    if marked is None:
+        remarks.add("no row is marked as the trigger's ('>'); the report's time is taken as that of the first sample")
+    if per_cycle < SLOW:
+        remarks.add(
+            f"{per_cycle:g} samples a cycle: a filtered report; get the raw one of the relay with the command CEV R, "
+            "or its COMTRADE file"
+        )
+    gain = _gain(report, values, marks, per_cycle, remarks)
+    return Recording(
+        source=str(path),
+        channels=[
+            _channel(report, k, values[:, k], gain, remarks) for k in range(values.shape[1]) if _named(report, k)
+        ],
+        segments=[Segment(0, len(values), rate, 0.0)],
+        frequency=50.0 if abs(frequency - 50) < abs(frequency - 60) else 60.0,
+        device=report.about.get("FID", "").removeprefix("FID=").strip(),
+        start=_start(report, (marked or 0) / rate, remarks),
+        trigger=None if marked is None else marked / rate,
+        status=_states(report, words),
+        notes=remarks.told(),
+        extra={"format": "SEL CEV", "encoding": encoding, "about": report.about, "settings": report.settings},
+    )
+
+
+def checksum(text: str) -> str:
+    """Of a row, up to its last comma: the sum of the bytes, four hexadecimal digits."""
+    return f"{sum(text.encode('latin-1', 'replace')) & 0xFFFF:04X}"
+
+
+def _report(path: Path, text: str, remarks: Remarks) -> Report:
+    body, _, rest = re.sub(r"[\x02\x03\x1a\0]", "", text).partition('"SETTINGS"')
+    made = Report(settings=rest.partition("\n")[2].strip())
+    names: list[str] | None = None
+    for line, row in _joined(body):
+        cells = _cells(row)
+        if cells and re.fullmatch(r"[0-9A-Fa-f]{4}", cells[-1].strip()):
+            if checksum(row[: row.rindex(",") + 1]) != cells[-1].strip().upper():
+                remarks.add("the checksum does not fit: the line was altered, or damaged on its way", line)
+            cells = cells[:-1]
+        if made.columns:
+            if not cells or cells[0].strip() == "FID":
+                remarks.add("a second report in the file is not read", line)
+                break
+            made.rows.append((line, cells))
+        elif any(cell.strip() == "TRIG" for cell in cells):
+            made.columns = [cell.strip() for cell in cells]
+        elif names is None and not made.about and "FID" not in [cell.strip() for cell in cells]:
+            remarks.add("text before the report is passed over", line)
+        elif names is None:
+            names = [cell.strip() for cell in cells]
+        else:
+            made.about |= dict(zip(names, map(str.strip, cells), strict=False))
+            names = None
+    if not made.columns or not made.rows:
+        raise UserError(
+            f"{path}: no compressed event report: there is no row of column names with TRIG and samples below it; get "
+            "it from the relay with the command CEV, or its COMTRADE file"
+        )
+    return made
+
+
+def _joined(body: str) -> list[tuple[int, str]]:
+    """Rows with the number of their first line; one with an open quotation goes on in the next line."""
+    made: list[tuple[int, str]] = []
+    held, start = "", 0
+    for line, text in enumerate(re.split(r"\r\n|\n|\r", body), 1):
+        held, start = (held + text, start) if held else (text, line)
+        if held.count('"') % 2 and len(held) < 100_000:
+            continue
+        if held.strip():
+            made.append((start, held.strip()))
+        held = ""
+    return made if not held.strip() else [*made, (start, held.strip())]
+
+
+def _cells(row: str) -> list[str]:
+    return next(csv.reader([row], strict=False), [])
+
+
+def _samples(path: Path, report: Report, remarks: Remarks) -> tuple[np.ndarray, list[str], list[str]]:
+    """Values (N, columns), marks and hexadecimal words of the samples."""
+    at = report.columns.index("TRIG")
+    wanted = len(report.columns)
+    values, marks, words = [], [], []
+    for k, (line, cells) in enumerate(report.rows):
+        if len(cells) not in (wanted, wanted - 1):
+            if k and k == len(report.rows) - 1:
+                remarks.add("the file ends within a line, which is not used", line)
+                break
+            raise UserError(
+                f"{path}: line {line}: {len(cells)} cells, but {wanted} columns are named; correct the line, or get "
+                "the file from the relay again"
+            )
+        values.append([_value(path, line, name, cell) for name, cell in zip(report.columns[:at], cells, strict=False)])
+        marks.append(cells[at])
+        words.append(cells[at + 1].strip() if len(cells) > at + 1 else "")
+    return np.array(values, float).reshape(len(values), at), marks, words
+
+
+def _value(path: Path, line: int, name: str, cell: str) -> float:
+    found = number(cell) if cell.strip() else float("nan")
+    if found is None and (name == "*" or not set(cell.strip()) - {"$", "*", "-"}):
+        return float("nan")  # so the relay writes what it does not know
+    if found is None:
+        raise UserError(f"{path}: line {line}: {name or 'column'} {quoted(cell)} is not a number; correct it")
+    return found
+
+
+def _rate(path: Path, report: Report) -> tuple[float, float]:
+    """Samples a cycle and the frequency that the relay sampled by."""
+    found = {key: number(report.about.get(key, "")) for key in ("SAM/CYC_A", "FREQ")}
+    per_cycle, frequency = found["SAM/CYC_A"], found["FREQ"]
+    if per_cycle is None or not 1 <= per_cycle <= 10_000:
+        raise UserError(
+            f"{path}: SAM/CYC_A, the samples in a cycle, is {quoted(report.about.get('SAM/CYC_A', ''))}, not a number "
+            "from 1 to 10000; correct it in the summary row"
+        )
+    if frequency is None or not 10 <= frequency <= 100:
+        raise UserError(
+            f"{path}: FREQ, the frequency of the summary row, is {quoted(report.about.get('FREQ', ''))}, not a number "
+            "from 10 to 100 Hz; correct it there"
+        )
+    return per_cycle, frequency
+
+
+def _named(report: Report, k: int) -> bool:
+    return report.columns[k] not in ("", "*")
+
+
+def _channel(report: Report, k: int, values: np.ndarray, gain: float, remarks: Remarks) -> Channel:
+    match = _COLUMN.fullmatch(report.columns[k])
+    name, unit = (match[1], match[2] or "") if match else (report.columns[k], "")
+    wave = _WAVE.fullmatch(name.upper())
+    if not unit:
+        unit = "Hz" if name == "FREQ" else "V" if name.startswith(("VDC", "VBAT")) else ""
+        if wave and name[0] in "IV":
+            unit = "A" if name[0] == "I" else "kV"
+            if unit == "kV":
+                remarks.add(f"no unit given for {name}, kV taken")
+    quantity = "frequency" if name == "FREQ" else UNITS.get(unit.lower(), ("", 1.0))[0]
+    ratio = _ratio(report, name, remarks) if wave else 1.0
+    return Channel(
+        name, values, unit, quantity, (wave[1] or "") if wave else "", (wave[2] or "") if wave else "",
+        gain if wave else 1.0, 0.0, ratio, form="waveform" if wave else "value",
+    )  # fmt: skip
+
+
+def _ratio(report: Report, name: str, remarks: Remarks) -> float:
+    """One, unless the summary says that the values are secondary ones (SEL-751)."""
+    if report.about.get("PRIM_VAL", "YES").upper() != "NO":
+        return 1.0
+    told = ("CTR" if name[0] == "I" else "PTR") + "_" + name
+    found = next((r for key in (told, told[:-1] + "A", told[:3]) if (r := number(report.about.get(key, "")))), None)
+    if found is None or found <= 0:
+        remarks.add(f"secondary values (PRIM_VAL is NO), but no ratio {told} for {name}: they stay secondary")
+        return 1.0
+    return found
+
+
+def _gain(report: Report, values: np.ndarray, marks: list[str], per_cycle: float, remarks: Remarks) -> float:
+    """The root of two, unless the summary's currents, RMS, show that the columns hold instantaneous values."""
+    remarks.add("columns are taken as instantaneous values over the root of two, as SEL's manuals say")
+    quarter = round(per_cycle / 4)
+    row = next((i for sign in ("*", ">") for i, mark in enumerate(marks) if sign in mark), None)
+    if row is None or row < quarter or 4 * quarter != per_cycle:
+        return ROOT
+    ratios = []
+    for k, column in enumerate(report.columns[: values.shape[1]]):
+        told = number(report.about.get(column, ""))
+        here = float(np.hypot(values[row, k], values[row - quarter, k]))
+        if column in ("IA", "IB", "IC", "IA(A)", "IB(A)", "IC(A)") and told and here > 0:
+            ratios.append((told, here / told))
+    if not ratios:
+        return ROOT
+    ratio = max(ratios)[1]  # of the greatest current
+    if abs(ratio / ROOT - 1) < CLOSE:
+        remarks.add("but their greatest current, by the summary, says that they are not divided; taken as they are")
+        return 1.0
+    if abs(ratio - 1) > CLOSE:
+        remarks.add(f"the summary's greatest current is {1 / ratio:.2f} times that of the columns: check the scale")
+    return ROOT
+
+
+def _start(report: Report, before: float, remarks: Remarks) -> datetime | None:
+    """Of the first sample; the report's time is that of the trigger."""
+    keys = ("YEAR", "MONTH", "DAY", "HOUR", "MIN", "SEC", "MSEC")
+    told = [number(report.about.get(key, "")) for key in keys]
+    try:
+        year, month, day, hour, minute, second, milli = (int(part) for part in told if part is not None)
+        made = datetime(year + (2000 if year < 100 else 0), month, day, hour, minute, second, 1000 * milli)
+        return made - timedelta(seconds=before)
+    except (ValueError, OverflowError):
+        said = ", ".join(f"{key} {report.about.get(key, '')}" for key in keys)
+        remarks.add(f"{quoted(said)} is not a date and time; not used")
+        return None
+
+
+def _states(report: Report, words: list[str]) -> list[Status]:
+    """One channel for each bit with a name; a row without a word keeps the one before."""
+    at = report.columns.index("TRIG")
+    names = report.columns[at + 1].split() if len(report.columns) > at + 1 else []
+    held, rows = "", []
+    for word in words:
+        held = word if re.fullmatch(r"[0-9A-Fa-f]+", word) else held
+        rows.append(bytes.fromhex(held + "0" * (len(held) % 2)))
+    width = -(-len(names) // 8)
+    packed = np.frombuffer(b"".join(row[:width].ljust(width, b"\0") for row in rows), np.uint8).reshape(-1, width)
+    return [
+        Status(name, packed[:, k // 8], bit=7 - k % 8) for k, name in enumerate(names) if name != "*" and width
+    ]  # fmt: skip

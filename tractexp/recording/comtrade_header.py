@@ -1,0 +1,383 @@
+"""The configuration (.cfg) of a COMTRADE record: what it says, line by line, checked before any data is touched.
+
+Source: IEEE C37.111-1991, -1999 and -2013. Harmless departures are mended and noted with their line.
+"""
+
+import re
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+from math import isfinite
+
+from tractexp.errors import UserError
+from tractexp.recording.recording import UNITS
+from tractexp.recording.remarks import Remarks
+
+VALUE = {"ASCII": "f8", "BINARY": "<i2", "BINARY32": "<i4", "FLOAT32": "<f4"}  # of one analog value
+FREQUENCY = (10.0, 100.0)  # Hz, nominal: 16.7 and 25 Hz railways to 60 Hz, with room
+GREATEST = 1e12  # of a multiplier, an offset or a ratio: beyond it no unit makes sense
+EPOCH = datetime(1970, 1, 1)  # a clock that was not set
+MOST_CHANNELS = 1_000_000
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d{1,4})?", re.ASCII)
+_COUNTS = re.compile(r"(\d{1,12})\s*,\s*(\d{1,12})\s*([AD])\s*,\s*(\d{1,12})\s*([AD])\s*,?", re.ASCII | re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Analog:
+    """An analog channel's line."""
+
+    name: str
+    phase: str
+    circuit: str
+    unit: str
+    gain: float
+    offset: float
+    skew: float  # microseconds
+    limits: tuple[float, float] | None
+    primary: float = 1.0
+    secondary: float = 1.0
+    side: str = ""  # P, S, or "" where the file does not say (1991)
+
+    @property
+    def ratio(self) -> float:
+        """From the values recorded to primary ones."""
+        return self.primary / self.secondary if self.side == "S" else 1.0
+
+
+@dataclass(frozen=True)
+class Digital:
+    """A status channel's line."""
+
+    name: str
+    phase: str
+    circuit: str
+    normal: int
+
+
+@dataclass
+class Header:
+    """All that the configuration says."""
+
+    station: str = ""
+    device: str = ""
+    revision: int = 1991
+    analogs: list[Analog] = field(default_factory=list)
+    digitals: list[Digital] = field(default_factory=list)
+    frequency: float = 50.0
+    rates: list[tuple[float, int]] = field(default_factory=list)  # (Hz, last sample from 1); 0 Hz: see the time stamps
+    dates: tuple[str, str] = ("", "")  # of the first sample and the trigger, as written
+    start: datetime | None = None
+    trigger: float | None = None  # s since the first sample
+    kind: str = "ASCII"
+    timemult: float = 1.0
+    time_code: str = ""  # lines of 2013, as written
+    quality: str = ""
+    lines: dict[str, int] = field(default_factory=dict)  # where things stand, for messages
+
+    @property
+    def samples(self) -> int:
+        return self.rates[-1][1]
+
+
+class _Lines:
+    """The lines that are left, with their numbers."""
+
+    def __init__(self, where: str, lines: list[str], remarks: Remarks, first: int) -> None:
+        self.where, self.remarks = where, remarks
+        while lines and not lines[-1]:
+            lines = lines[:-1]
+        self.left = [(n, line) for n, line in enumerate(lines, first) if line]
+        self.last = first + len(lines) - 1
+        for n, line in enumerate(lines, first):
+            if not line:
+                remarks.add("a blank line is passed over", n)
+
+    def take(self, what: str) -> tuple[int, str]:
+        if not self.left:
+            raise UserError(f"{self.where}: ends after line {self.last}, before {what}; the file is cut short")
+        return self.left.pop(0)
+
+    def peek(self) -> str:
+        return self.left[0][1] if self.left else ""
+
+    def refuse(self, line: int, words: str) -> UserError:
+        return UserError(f"{self.where}: line {line}: {words}")
+
+
+def parse(where: str, lines: list[str], remarks: Remarks, first: int = 1) -> Header:
+    """The header from a file's lines, numbered from `first`.
+
+    Raises `UserError` naming line, channel, value, and what is allowed.
+    """
+    left, header = _Lines(where, lines, remarks, first), Header()
+    _station(left, header)
+    analogs, digitals = _counts(left)
+    header.lines["analog"] = left.left[0][0] if left.left else 0
+    header.analogs = [_analog(left, k, analogs) for k in range(analogs)]
+    header.digitals = [_digital(left, k, digitals) for k in range(digitals)]
+    rows = _frequency(left, header)
+    _rates(left, header, rows)
+    _dates(left, header)
+    _kind(left, header)
+    _trailer(left, header)
+    return header
+
+
+def number(text: str) -> float | None:
+    """A finite number as files write it, or None."""
+    text = text.strip()
+    if not _NUMBER.fullmatch(text):
+        return None
+    value = float(text.replace("d", "e").replace("D", "e"))
+    return value if isfinite(value) else None
+
+
+def quoted(text: str) -> str:
+    """A value of the file for a message: not longer than a line bears."""
+    return f"'{text[:40]}…'" if len(text) > 40 else f"'{text}'"
+
+
+def _station(left: _Lines, header: Header) -> None:
+    if _COUNTS.fullmatch(left.peek()):
+        left.remarks.add("the line of station and device is missing", left.left[0][0])
+        return
+    line, text = left.take("the station's name")
+    fields = [part.strip() for part in text.split(",")]
+    while len(fields) > 3 and not fields[-1]:
+        fields.pop()
+    if len(fields) > 1 and re.fullmatch(r"(19|20)\d\d", fields[-1], re.ASCII):
+        header.revision = int(fields.pop())
+    elif len(fields) > 2:
+        left.remarks.add(f"the standard's year {quoted(fields.pop())} is none of 1991, 1999, 2013; taken as 1999", line)
+        header.revision = 1999
+    header.station, header.device = fields[0], ",".join(fields[1:])
+
+
+def _counts(left: _Lines) -> tuple[int, int]:
+    line, text = left.take("the numbers of channels")
+    match = _COUNTS.fullmatch(text)
+    if match is None or match[3].upper() == match[5].upper():
+        raise left.refuse(line, f"{quoted(text)} is not the numbers of channels, as in 8,6A,2D: all, analog, status")
+    counts = {match[3].upper(): int(match[2]), match[5].upper(): int(match[4])}
+    analogs, digitals = counts["A"], counts["D"]
+    if int(match[1]) != analogs + digitals:
+        raise left.refuse(
+            line, f"announces {match[1]} channels but {analogs} analog and {digitals} status ones; correct the numbers"
+        )
+    if analogs + digitals > len(left.left):
+        raise left.refuse(
+            line, f"announces {analogs + digitals} channels, but only {len(left.left)} lines follow; correct the "
+            "numbers, or the file is cut short",
+        )  # fmt: skip
+    if analogs == 0:
+        raise left.refuse(line, "announces no analog channel; a record of status channels alone has nothing to read")
+    return analogs, digitals
+
+
+def _analog(left: _Lines, k: int, count: int) -> Analog:
+    line, text = left.take(f"analog channel {k + 1} of {count}")
+    fields = [part.strip() for part in text.split(",")]
+    if len(fields) > 13 and not any(fields[13:]):
+        fields = fields[:13]
+    name = fields[1] if len(fields) > 1 else ""
+    channel = f"analog channel {k + 1} of {count} {quoted(name)}"
+    if not 10 <= len(fields) <= 13:
+        raise left.refuse(
+            line, f"{channel} has {len(fields)} fields, but an analog channel has 13, or 10 by the standard of 1991; "
+            "correct the line, or the numbers of channels in line 2",
+        )  # fmt: skip
+
+    def value(i: int, what: str, default: float | None) -> float:
+        if not fields[i] and default is not None:
+            left.remarks.add(f"no {what} given, {default:g} taken", line)
+            return default
+        found = number(fields[i])
+        if found is None or abs(found) > GREATEST:
+            raise left.refuse(
+                line, f"{channel}: {what} {quoted(fields[i])} is not a number between -1e12 and 1e12; correct it"
+            )
+        return found
+
+    fields += [""] * (13 - len(fields))
+    side = fields[12].upper()
+    told = side in ("P", "S")
+    if side and not told:
+        left.remarks.add(f"{quoted(fields[12])} is neither P nor S, primary values taken", line)
+    elif not told and any(fields[10:12]):
+        left.remarks.add("neither P nor S given, primary values taken", line)
+    made = Analog(
+        name, fields[2], fields[3], fields[4],
+        value(5, "multiplier", None), value(6, "offset", 0.0), value(7, "time skew", 0.0) if fields[7] else 0.0,
+        _limits(fields[8], fields[9]),
+        value(10, "primary ratio", 1.0) if told else number(fields[10]) or 1.0,
+        value(11, "secondary ratio", 1.0) if told else number(fields[11]) or 1.0,
+        side if told else "",
+    )  # fmt: skip
+    return _checked_ratio(left, line, channel, made)
+
+
+def _checked_ratio(left: _Lines, line: int, channel: str, made: Analog) -> Analog:
+    """Secondary values need a ratio; a channel that is neither voltage nor current may lack it."""
+    if made.side != "S" or (made.primary > 0 and made.secondary > 0):
+        return made
+    words = f"its ratio {made.primary:g}/{made.secondary:g} is not positive"
+    if made.unit.lower() in UNITS:
+        raise left.refuse(
+            line, f"{channel} is in secondary values, but {words}; write the ratio of its transformer there, or P for "
+            "primary values",
+        )  # fmt: skip
+    left.remarks.add(f"secondary values, but {words}; 1/1 taken", line)
+    return Analog(**{**vars(made), "primary": 1.0, "secondary": 1.0})
+
+
+def _limits(least: str, greatest: str) -> tuple[float, float] | None:
+    low, high = number(least), number(greatest)
+    return (low, high) if low is not None and high is not None and low < high else None
+
+
+def _digital(left: _Lines, k: int, count: int) -> Digital:
+    line, text = left.take(f"status channel {k + 1} of {count}")
+    fields = [part.strip() for part in text.split(",")]
+    while len(fields) > 5 and not fields[-1]:
+        fields.pop()
+    if not 2 <= len(fields) <= 5 or "/" in fields[0]:
+        name = quoted(fields[1]) if len(fields) > 1 else quoted(fields[0])
+        raise left.refuse(
+            line, f"status channel {k + 1} of {count} {name} has {len(fields)} fields, but a status channel has 5, or "
+            "3 by the standard of 1991; correct the line, or the numbers of channels in line 2",
+        )  # fmt: skip
+    if len(fields) == 5:
+        return Digital(*fields[1:4], int(fields[4] == "1"))
+    return Digital(fields[1], "", "", int("1" in fields[2:]))
+
+
+def _frequency(left: _Lines, header: Header) -> int | None:
+    """The nominal frequency; returns the announced number of sampling rates."""
+    line, text = left.take("the nominal frequency")
+    header.lines["frequency"] = line
+    found = number(text.strip(", "))
+    if found is None or not FREQUENCY[0] <= found <= FREQUENCY[1]:
+        low, high = FREQUENCY
+        raise left.refuse(
+            line, f"nominal frequency {quoted(text)} is not a number between {low:g} and {high:g} Hz; write that of "
+            "the network there, 50 or 60",
+        )  # fmt: skip
+    header.frequency = found
+    if "," in left.peek().strip(", "):
+        left.remarks.add("the number of sampling rates is missing", left.left[0][0])
+        return None
+    line, text = left.take("the number of sampling rates")
+    found = number(text.strip(", "))
+    if found is None or found < 0 or found != int(found) or found > MOST_CHANNELS:
+        raise left.refuse(line, f"the number of sampling rates {quoted(text)} is not a whole number from 0 on")
+    return int(found)
+
+
+def _rates(left: _Lines, header: Header, count: int | None) -> None:
+    """Rows of rate and last sample, as many as announced or as there are."""
+    header.lines["rates"] = left.left[0][0] if left.left else 0
+    read = 0
+    while not header.rates or _is_rate(left.peek()):
+        line, text = left.take("the sampling rates")
+        read += 1
+        fields = [number(part) for part in text.strip(", ").split(",")]
+        rate, end = (*fields, None, None)[:2]
+        if len(fields) != 2 or rate is None or end is None or end != int(end) or abs(end) > 1e15:
+            raise left.refuse(line, f"{quoted(text)} is not a sampling rate [Hz] and its last sample, as in 4000,8000")
+        last = header.rates[-1][1] if header.rates else 0
+        if rate < 0 or rate > 1e9:
+            raise left.refuse(line, f"sampling rate {quoted(text.split(',')[0])} is not between 0 and 1e9 Hz")
+        if end == last and last:
+            left.remarks.add("a sampling rate without samples of its own is passed over", line)
+            continue
+        if end < last or end < 1:
+            raise left.refuse(
+                line, f"last sample {end:g} must be above zero, and above {last}, that of the line before"
+            )
+        header.rates.append((rate, int(end)))
+    if count not in (None, 0, read) or (count == 0 and read > 1):
+        left.remarks.add(f"{count} sampling rates announced, {read} found", header.lines["rates"] - 1)
+    if len({rate > 0 for rate, _ in header.rates}) > 1:
+        told = ", ".join(f"{rate:g}" for rate, _ in header.rates)
+        raise left.refuse(
+            header.lines["rates"], f"sampling rates {told} Hz: a rate of 0 means that time stamps are valid, and must "
+            "be the only one",
+        )  # fmt: skip
+
+
+def _is_rate(text: str) -> bool:
+    fields = text.strip(", ").split(",")
+    return len(fields) == 2 and all(number(part) is not None for part in fields)
+
+
+def _dates(left: _Lines, header: Header) -> None:
+    told: list[tuple[int, str]] = []
+    while len(told) < 2 and re.search(r"\d.*[/:.,\-]|[/:,\-].*\d", left.peek()):
+        told.append(left.take("the date of the first sample"))
+    if not told:
+        left.remarks.add("no date of the first sample given")
+        return
+    header.dates = told[0][1], told[1][1] if len(told) > 1 else ""
+    found = []
+    for line, text in told:
+        made, remark = date(text, header.revision < 1997)
+        found.append(made)
+        if remark:
+            left.remarks.add(remark, line)
+    begin, at = (*found, None)[:2]
+    header.start = None if begin == EPOCH else begin
+    if begin == EPOCH:
+        left.remarks.add("the clock was not set (1970); the time of the first sample is not known", told[0][0])
+    if begin is not None and at is not None and at != EPOCH:
+        header.trigger = (at - begin) / timedelta(seconds=1)
+
+
+_DATE = re.compile(
+    r"(\d{1,4})[/.\-](\d{1,2})[/.\-](\d{1,4})\s*[,; T]*\s*(\d{1,2})\s*:\s*(\d{1,2})\s*:\s*(\d{1,2})(?:[.,](\d*))?\s*,?",
+    re.ASCII,
+)
+
+
+def date(text: str, american: bool) -> tuple[datetime | None, str]:
+    """A date in whichever order its numbers allow, and what is to be said about it; None where they allow none.
+
+    `american`: the month is written first (1991).
+    """
+    match = _DATE.fullmatch(text.strip())
+    if match is None:
+        return None, f"{quoted(text)} is not a date and time, as in 31/12/2024,23:59:59.000000; not used"
+    a, b, c, hour, minute, second = map(int, match.groups()[:6])
+    micro = int((match[7] or "0")[:6].ljust(6, "0"))
+    orders = [(c, a, b), (c, b, a)] if american else [(c, b, a), (c, a, b)]  # (year, month, day)
+    if len(match[1]) > 2:
+        orders = [(a, b, c), (a, c, b)]
+    for k, (year, month, day) in enumerate(orders):
+        year += (1900 if year >= 70 else 2000) if year < 100 else 0
+        try:
+            made = datetime(year, month, day, hour, minute, second, micro)
+        except ValueError:
+            continue
+        return made, f"date {quoted(text)} read as {made:%Y-%m-%d}" if k or len(match[1]) > 2 else ""
+    return None, f"{quoted(text)} is not a day of the calendar; not used"
+
+
+def _kind(left: _Lines, header: Header) -> None:
+    line, text = left.take("the type of the data file")
+    header.kind, header.lines["kind"] = text.strip(", ").upper(), line
+    if header.kind not in VALUE:
+        raise left.refuse(line, f"data file type {quoted(text)} is not one of {', '.join(VALUE)}")
+
+
+def _trailer(left: _Lines, header: Header) -> None:
+    """Time multiplier (1999), time codes and clock quality (2013): missing ones have their defaults."""
+    if left.left and "," not in left.peek().strip(", "):
+        line, text = left.take("the time multiplier")
+        found = number(text.strip(", "))
+        if found is None or not 0 < found <= GREATEST:
+            left.remarks.add(f"time multiplier {quoted(text)} is not a number above zero, 1 taken", line)
+            found = 1.0
+        header.timemult = found
+    elif header.revision >= 1999:
+        left.remarks.add("no time multiplier given, 1 taken")
+    header.time_code, header.quality = [left.take("")[1] if left.left else "" for _ in range(2)]
+    if left.left:
+        left.remarks.add("the rest of the file is not used", left.left[0][0])

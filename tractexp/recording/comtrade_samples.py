@@ -1,0 +1,246 @@
+"""The data (.dat) of a COMTRADE record: binary rows as views of the file, text rows parsed block by block.
+
+Nothing is allocated before the size of the file has shown that the announced samples are there.
+"""
+
+import re
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.recording.comtrade_header import VALUE, Header, number, quoted
+from tractexp.recording.remarks import Remarks
+
+LACKING = 0.01  # of the announced samples: so many may be missing at the end, with a note
+LARGE = 256 * 2**20  # bytes: a larger binary file stays on the disk and is mapped
+BLOCK = 8 * 2**20  # bytes of text parsed at once
+NONE = 0xFFFFFFFF  # a time stamp that is not given
+
+
+@dataclass(frozen=True)
+class Place:
+    """Part of a file: bytes `first` to `stop`, of which the first is in line `line`."""
+
+    path: Path
+    first: int
+    stop: int
+    line: int = 1
+
+    @property
+    def size(self) -> int:
+        return self.stop - self.first
+
+    def content(self, length: int | None = None) -> bytes:
+        with self.path.open("rb") as file:
+            file.seek(self.first)
+            return file.read(self.size if length is None else min(length, self.size))
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Columns of N samples as the file holds them."""
+
+    numbers: np.ndarray  # (N,)
+    stamps: np.ndarray  # (N,) in units of the time multiplier; nan or NONE where not given
+    analogs: list[np.ndarray]  # (N,) each
+    words: np.ndarray  # (N, ceil(D/16)) 16 status channels each
+
+
+def row(kind: str, analogs: int, digitals: int) -> np.dtype:
+    """One binary sample."""
+    words = -(-digitals // 16)
+    return np.dtype([("n", "<u4"), ("t", "<u4"), ("a", VALUE[kind], (analogs,)), ("d", "<u2", (words,))])
+
+
+def read(place: Place, header: Header, remarks: Remarks) -> Samples:
+    """The samples that the header announces; raises `UserError` where they are not there or not of that kind."""
+    text = re.fullmatch(rb"[0-9+\-.,eE \t\r\n]*", place.content(4096)) is not None and place.size > 0
+    if header.kind != "ASCII" and text:
+        remarks.add(f"{header.kind} announced, but {place.path.name} is text and read as ASCII", header.lines["kind"])
+        header.kind = "ASCII"
+    if header.kind == "ASCII":
+        if b"\0" in place.content(4096).rstrip(b"\0\x1a"):
+            raise UserError(
+                f"{place.path}: not text, but line {header.lines['kind']} of the configuration says ASCII; write "
+                "BINARY, BINARY32 or FLOAT32 there"
+            )
+        return _text(place, header, remarks)
+    return _binary(place, header, remarks)
+
+
+def _binary(place: Place, header: Header, remarks: Remarks) -> Samples:
+    one = row(header.kind, len(header.analogs), len(header.digitals))
+    found = place.size // one.itemsize
+    _enough(place, header, remarks, found, header.samples * one.itemsize, place.size, "bytes")
+    over = place.size - found * one.itemsize
+    if over > 2:  # a line end or Ctrl-Z behind the data says nothing
+        remarks.add(f"{place.path.name} holds {over} bytes more than whole samples of {one.itemsize} bytes")
+    count = header.samples
+    if place.size > LARGE:
+        table = np.memmap(place.path, one, "r", place.first, (count,))
+    else:
+        table = np.fromfile(place.path, one, count, offset=place.first)
+    _counted(place, header, table["n"])
+    return Samples(table["n"], table["t"], [table["a"][:, k] for k in range(len(header.analogs))], table["d"])
+
+
+def _enough(
+    place: Place, header: Header, remarks: Remarks, found: int, wanted: int, there: int, unit: str
+) -> None:  # fmt: skip
+    """Compare the samples found with those announced: a few too few shorten the record."""
+    told = header.samples
+    if found > told:
+        remarks.add(f"{place.path.name} holds {found - told} samples more than the {told} announced; they are not used")
+    if found >= told:
+        return
+    if found < 1 or told - found > max(1, LACKING * told):
+        raise UserError(
+            f"{place.path}: cut short: {told} samples of {len(header.analogs)} analog and {len(header.digitals)} "
+            f"status channels take {wanted} {unit}, found {there}; get the whole file, or correct the last sample in "
+            f"line {header.lines['rates']} of the configuration"
+        )
+    remarks.add(f"{place.path.name} holds {found} of the {told} samples announced; those are read")
+    kept = [(rate, stop) for rate, stop in header.rates if stop < found]
+    header.rates = [*kept, (header.rates[len(kept)][0], found)]
+
+
+def _counted(place: Place, header: Header, numbers: np.ndarray) -> None:
+    """Sample numbers that do not count up show that the rows are not where the header puts them."""
+    steps = np.diff(numbers.astype(np.int64))
+    if not len(steps):
+        return
+    usual = int(np.median(steps))
+    odd = steps != usual
+    wild = np.flatnonzero(odd[:-2] & odd[1:-1] & odd[2:]) if len(odd) > 2 else np.array([], int)
+    if len(wild) or abs(usual) > 10_000:
+        i = int(wild[0]) if len(wild) else 0
+        raise UserError(
+            f"{place.path}: sample {i + 2}: its number is {numbers[i + 1]} after {numbers[i]}: the rows are not "
+            f"{header.kind} of {len(header.analogs)} analog and {len(header.digitals)} status channels, or bytes were "
+            "lost or added before it; correct the channels or the type of the data file in the configuration, or get "
+            "the file again"
+        )
+
+
+def _text(place: Place, header: Header, remarks: Remarks) -> Samples:
+    width = 2 + len(header.analogs) + len(header.digitals)
+    wanted = header.samples
+    if place.size < 2 * width - 1:
+        raise UserError(f"{place.path}: cut short: there is no sample of {width} cells in its {place.size} bytes")
+    room = min(wanted, place.size // (2 * width - 1) + 1)
+    head = np.empty((room, 2))
+    table = np.empty((room, len(header.analogs)), order="F")
+    words = np.zeros((room, -(-len(header.digitals) // 16)), np.uint16)
+    found = 0
+    for cells in _blocks(place, width, remarks):
+        kept = cells[: room - found]
+        there = slice(found, found + len(kept))
+        head[there], table[there] = kept[:, :2], kept[:, 2 : 2 + len(header.analogs)]
+        words[there] = pack(np.nan_to_num(kept[:, 2 + len(header.analogs) :]) != 0)
+        found += len(cells)
+    _enough(place, header, remarks, found, wanted, found, "lines")
+    count = header.samples
+    if np.isnan(table[:count]).any():
+        remarks.add(f"{int(np.isnan(table[:count]).sum())} empty cells in {place.path.name}: no value there")
+    _steps(place, head[:count, 0], remarks)
+    return Samples(head[:count, 0], head[:count, 1], [_narrow(column[:count]) for column in table.T], words[:count])
+
+
+def _blocks(place: Place, width: int, remarks: Remarks) -> Iterator[np.ndarray]:
+    """Cells (M, width) of one block of lines after the other; nan where a cell is empty."""
+    line, carried, left = place.line, b"", place.size
+    with place.path.open("rb") as file:
+        file.seek(place.first)
+        while left > 0:
+            block = file.read(min(BLOCK, left))
+            left = left - len(block) if block else 0
+            cut = len(block) if left == 0 else block.rfind(b"\n") + 1
+            lines = (carried + block[:cut]).replace(b"\0", b"").splitlines()
+            carried = block[cut:]
+            yield _cells(place, width, lines, line, left == 0, remarks)
+            line += len(lines)
+
+
+def _cells(place: Place, width: int, lines: list[bytes], first: int, last: bool, remarks: Remarks) -> np.ndarray:
+    kept = [(n, text) for n, line in enumerate(lines, first) if (text := line.strip(b" \t\x1a"))]
+    if len(kept) < len(lines) - last:
+        remarks.add(f"blank lines in {place.path.name} are passed over")
+    rows = []
+    for n, text in kept:
+        if text.count(b",") != width - 1:
+            text = text.rstrip(b", \t")
+        if text.count(b",") != width - 1:
+            if last and n == kept[-1][0] and rows:
+                remarks.add(f"{place.path.name} ends within a line, which is not used", None)
+                break
+            raise UserError(
+                f"{place.path}: line {n}: {text.count(b',') + 1} cells, but {width} are announced: number, time, and "
+                "one for each channel; correct the line, or the numbers of channels in the configuration"
+            )
+        rows.append(text)
+    if not rows:
+        return np.empty((0, width))
+    flat = _numbers(b",".join(rows), len(rows) * width)
+    if flat is None:  # empty cells, or something that is no number
+        flat = np.array(
+            [_cell(place, n, k, cell) for n, text in kept for k, cell in enumerate(text.split(b",")[:width])]
+        )
+        flat = flat[: len(rows) * width]
+    return flat.reshape(-1, width)
+
+
+def _numbers(text: bytes, count: int) -> np.ndarray | None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            made = np.fromstring(text, sep=",")
+        except (DeprecationWarning, ValueError):
+            return None
+    return made if len(made) == count and np.isfinite(made).all() else None
+
+
+def _cell(place: Place, line: int, k: int, cell: bytes) -> float:
+    text = cell.decode("latin-1").strip()
+    made = np.nan if not text or text.lower() == "nan" else number(text)
+    if made is None:
+        what = ("sample number", "time stamp")[k] if k < 2 else f"channel {k - 1}"
+        raise UserError(
+            f"{place.path}: line {line}: {what} {quoted(text)} is not a number; correct it, or leave the cell empty "
+            "for a missing value"
+        )
+    return made
+
+
+def _steps(place: Place, numbers: np.ndarray, remarks: Remarks) -> None:
+    """A sample left out or there twice moves all after it: said, not mended."""
+    steps = np.diff(numbers)
+    odd = np.flatnonzero(steps != np.median(steps)) if len(steps) else []
+    if len(odd) and len(odd) < 0.5 * len(steps):
+        i = int(odd[0])
+        remarks.add(
+            f"{place.path.name}: sample number {numbers[i + 1]:g} follows {numbers[i]:g}: a sample may be missing or "
+            "double there, and times after it off by a step"
+        )
+
+
+def _narrow(column: np.ndarray) -> np.ndarray:
+    """Whole numbers as integers of the fewest bytes; the values stay what they are."""
+    if np.isnan(column).any() or (column != np.trunc(column)).any():
+        return column.copy()
+    least, greatest = column.min(), column.max()
+    for kind in (np.int16, np.int32):
+        if np.iinfo(kind).min <= least and greatest <= np.iinfo(kind).max:
+            return column.astype(kind)
+    return column.copy()
+
+
+def pack(states: np.ndarray) -> np.ndarray:
+    """States (N, D) as words (N, ceil(D/16)), the first channel in the lowest bit."""
+    count = -(-states.shape[1] // 16)
+    padded = np.zeros((len(states), 16 * count), bool)
+    padded[:, : states.shape[1]] = states
+    return np.packbits(padded, axis=1, bitorder="little").view("<u2").reshape(len(states), count)

@@ -1,0 +1,230 @@
+"""COMTRADE records written, 1999 or 2013: what is read back is what was written."""
+
+from collections.abc import Sequence
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tractexp import files
+from tractexp.errors import UserError, check_choice
+from tractexp.recording.comtrade_header import EPOCH, VALUE, date
+from tractexp.recording.comtrade_samples import NONE, row
+from tractexp.recording.recording import Channel, Recording, Segment
+
+KINDS = {1999: ("BINARY", "ASCII"), 2013: ("BINARY", "BINARY32", "FLOAT32", "ASCII")}  # ever more values fit
+FULL = {"BINARY": (-32767, 32767), "BINARY32": (-2147483647, 2147483647), "FLOAT32": (-3.4028235e38, 3.4028235e38)}
+FULL["ASCII"] = (-99999, 99998)
+
+
+def write(recording: Recording, path: Path, kind: str = "BINARY", revision: int = 2013) -> list[Path]:
+    """Write a .cfg and .dat, or one .cff where `path` ends so; returns the files, each written whole or not at all.
+
+    `kind` is BINARY (16 bits), BINARY32, FLOAT32 or ASCII (1999: BINARY or ASCII). Raw values that do not fit go to the
+    next kind that holds them exactly; FLOAT32, when asked for, rounds to 24 bits. Commas in names become semicolons.
+    """
+    path = Path(path)
+    check_choice("the ending of a COMTRADE file", path.suffix.lower(), (".cfg", ".cff"))
+    check_choice("revision", revision, KINDS)
+    check_choice("kind", kind, KINDS[revision])
+    if path.suffix.lower() == ".cff" and revision < 2013:
+        raise UserError(f"{path}: a .cff is of the standard of 2013; give revision=2013, or a name that ends in .cfg")
+    kind = _kind(recording, kind, revision)
+    rates, stamps, timemult = _times(recording, kind)
+    data = _ascii(recording, stamps) if kind == "ASCII" else _binary(recording, kind, stamps)
+    text = "\r\n".join(_lines(recording, kind, revision, rates, timemult)) + "\r\n"
+    if path.suffix.lower() == ".cff":
+        return [files.write(path, _combined(recording, text, kind, data))]
+    dat = path.with_suffix(".DAT" if path.suffix.isupper() else ".dat")
+    return [files.write(path, text), files.write(dat, data)]
+
+
+def _even_stamps(segments: Sequence[Segment], timemult: float) -> np.ndarray:
+    """The time stamps (N,) of segments that follow one another, in units of `timemult` microseconds."""
+    return np.concatenate([np.round(s.t / (1e-6 * timemult)) for s in segments])
+
+
+def _kind(recording: Recording, asked: str, revision: int) -> str:
+    """The first kind, from the one asked for on, that holds all values."""
+    if asked == "FLOAT32":
+        return asked
+    kinds = KINDS[revision][KINDS[revision].index(asked) :]
+    return next((kind for kind in kinds if all(_fits(channel, kind) for channel in recording.channels)), "ASCII")
+
+
+def _fits(channel: Channel, kind: str) -> bool:
+    raw, lacking = np.asarray(channel.raw), _lacking(channel)
+    present = raw[~lacking]
+    if kind == "ASCII" or not len(present):
+        return True
+    if kind == "FLOAT32":
+        with np.errstate(over="ignore"):
+            return bool((present.astype(np.float32) == present).all())
+    if raw.dtype.kind == "f" and (present != np.trunc(present)).any():
+        return False
+    least, greatest = (0, 65534) if _unsigned(channel, kind) else FULL[kind]
+    if not lacking.any():  # then the value that stands for none is free
+        least, greatest = (0, 65535) if _unsigned(channel, kind) else (least - 1, greatest)
+    return bool(least <= present.min() and present.max() <= greatest)
+
+
+def _unsigned(channel: Channel, kind: str) -> bool:
+    return kind == "BINARY" and channel.limits is not None and channel.limits[0] >= 0 and channel.limits[1] > 32767
+
+
+def _lacking(channel: Channel) -> np.ndarray:
+    raw = np.asarray(channel.raw)
+    lacking = np.isnan(raw) if raw.dtype.kind == "f" else np.zeros(len(raw), bool)
+    return lacking if channel.missing is None else lacking | (raw == channel.missing)
+
+
+def _limits(channel: Channel, kind: str) -> tuple[float, float]:
+    """Those of the channel, or of the kind; wider where a value would else be taken for a missing one."""
+    raw = np.asarray(channel.raw)[~_lacking(channel)]
+    if not len(raw):
+        return channel.limits or FULL[kind]
+    least, greatest = float(raw.min()), float(raw.max())
+    low, high = channel.limits or FULL[kind]
+    if kind == "ASCII":
+        return (low, high) if greatest < 99999 else (low, max(high, greatest, 999999.0))
+    if kind != "FLOAT32" and least < FULL[kind][0]:
+        low = min(low, least)
+    if _unsigned(channel, kind) and greatest > 65534:
+        high = max(high, 65535)
+    return low, high
+
+
+def _times(recording: Recording, kind: str) -> tuple[list[tuple[float, int]], np.ndarray, float]:
+    """Rates with last samples, time stamps (N,) and their multiplier: the file's own where it had some."""
+    extra, segments = recording.extra, recording.segments
+    own, timemult = extra.get("stamps"), float(extra.get("timemult", 1.0))
+    kept = own is not None and len(own) == recording.samples
+    edges = [0, *(s.stop for s in segments)]
+    if [s.first for s in segments] != edges[:-1] or edges[-1] != recording.samples or _by_stamps(extra):
+        if not kept:
+            raise UserError(
+                f"{recording.source}: its segments leave samples out, and it has no time stamps: it cannot be written "
+                "as COMTRADE; write it as a table"
+            )
+        return [(0.0, recording.samples)], np.asarray(own, float), timemult
+    if not kept or not np.isfinite(np.asarray(own, float)).all():
+        last = segments[-1].t[-1] if len(segments) else 0.0
+        while not kept and last > 4.29e3 * timemult:  # a counter of 32 bits
+            timemult *= 10
+        own = own if kept else _even_stamps(segments, timemult)
+    return [(s.rate, s.stop) for s in segments], np.asarray(own, float), timemult
+
+
+def _by_stamps(extra: Any) -> bool:
+    rates = extra.get("rates")
+    return bool(rates) and rates[0][0] == 0 and "stamps" in extra
+
+
+def _lines(
+    recording: Recording, kind: str, revision: int, rates: list[tuple[float, int]], timemult: float
+) -> list[str]:
+    count, states = len(recording.channels), len(recording.status)
+    sides = recording.extra.get("sides", [])
+    if len(sides) != count:
+        sides = [(1.0, 1.0, "P" if channel.ratio == 1 else "") for channel in recording.channels]
+    lines = [f"{_name(recording.station)},{_name(recording.device)},{revision}", f"{count + states},{count}A,{states}D"]
+    for k, (channel, side) in enumerate(zip(recording.channels, sides, strict=True), 1):
+        primary, secondary, told = _side(channel, side)
+        low, high = _limits(channel, kind)
+        fields = [k, *map(_name, (channel.name, channel.phase, channel.circuit, channel.unit))]
+        numbers = (channel.gain, channel.offset, round(1e6 * channel.skew, 9), low, high, primary, secondary)
+        lines.append(",".join(map(str, [*fields, *map(_number, numbers), told])))
+    for k, status in enumerate(recording.status, 1):
+        lines.append(f"{k},{_name(status.name)},{_name(status.phase)},{_name(status.circuit)},{status.normal}")
+    lines += [_number(recording.frequency), "0" if rates[0][0] == 0 else str(len(rates))]
+    lines += [f"{_number(rate)},{stop}" for rate, stop in rates]
+    lines += [*_dates(recording), kind, _number(timemult)]
+    if revision >= 2013:
+        lines += [recording.extra.get("time_code") or "0,0", recording.extra.get("quality") or "0,0"]
+    return lines
+
+
+def _side(channel: Channel, told: tuple[float, float, str]) -> tuple[float, float, str]:
+    primary, secondary, side = told
+    if channel.ratio == 1 and side != "S":
+        return primary or 1.0, secondary or 1.0, "P"
+    return (
+        (primary, secondary, "S") if side == "S" and primary / secondary == channel.ratio else (channel.ratio, 1.0, "S")
+    )
+
+
+def _dates(recording: Recording) -> tuple[str, str]:
+    """Of the first sample and the trigger: as the file had them, where they still hold."""
+    first, second = recording.extra.get("dates", ("", ""))
+    start, at = date(first, False)[0], date(second, False)[0]
+    own = recording.extra.get("revision", 1991) >= 1999 and start is not None and at is not None
+    if own and start == recording.start and recording.trigger == _between(start, at):
+        return first, second
+    begin = recording.start or EPOCH
+    trigger = EPOCH if recording.trigger is None else begin + timedelta(seconds=recording.trigger)
+    return f"{begin:%d/%m/%Y,%H:%M:%S.%f}", f"{trigger:%d/%m/%Y,%H:%M:%S.%f}"
+
+
+def _between(start: datetime | None, at: datetime | None) -> float | None:
+    return None if start is None or at is None or at == EPOCH else (at - start) / timedelta(seconds=1)
+
+
+def _name(text: str) -> str:
+    return " ".join(text.replace(",", ";").splitlines()).strip()
+
+
+def _number(value: float) -> str:
+    return str(int(value)) if value == int(value) and abs(value) < 1e15 else repr(float(value))
+
+
+def _binary(recording: Recording, kind: str, stamps: np.ndarray) -> bytes:
+    table = np.zeros(recording.samples, row(kind, len(recording.channels), len(recording.status)))
+    table["n"] = _numbers(recording)
+    good = (stamps >= 0) & (stamps < NONE)
+    table["t"] = np.where(good, stamps, NONE).astype(np.uint32)
+    for k, channel in enumerate(recording.channels):
+        none = np.nan if kind == "FLOAT32" else 65535 if _unsigned(channel, kind) else FULL[kind][0] - 1
+        raw, lacking = np.asarray(channel.raw), _lacking(channel)
+        values = np.where(lacking, none, raw) if lacking.any() else raw
+        to = "<u2" if _unsigned(channel, kind) else VALUE[kind]
+        with np.errstate(over="ignore"):
+            table["a"][:, k] = values.astype(to).view(VALUE[kind])
+    for k, status in enumerate(recording.status):
+        table["d"][:, k // 16] |= status.values().astype(np.uint16) << (k % 16)
+    return table.tobytes()
+
+
+def _numbers(recording: Recording) -> np.ndarray:
+    own = recording.extra.get("numbers")
+    count = recording.samples
+    return np.asarray(own) if own is not None and len(own) == count else np.arange(1, count + 1)
+
+
+def _ascii(recording: Recording, stamps: np.ndarray) -> bytes:
+    columns = [_cells(_numbers(recording)), _cells(stamps)]
+    for channel in recording.channels:
+        cells = _cells(np.asarray(channel.raw))
+        for i in np.flatnonzero(_lacking(channel)):
+            cells[i] = ""
+        columns.append(cells)
+    columns += [status.values().astype(str).tolist() for status in recording.status]
+    return ("\r\n".join(map(",".join, zip(*columns, strict=True))) + "\r\n").encode()
+
+
+def _cells(values: np.ndarray) -> list[str]:
+    """The shortest text that reads back as the same number."""
+    if values.dtype.kind in "iu":
+        return values.astype(str).tolist()
+    if values.dtype == np.float32:
+        values = values.astype(np.float64)
+    return ["" if value != value else _number(value) for value in values.tolist()]
+
+
+def _combined(recording: Recording, text: str, kind: str, data: bytes) -> bytes:
+    parts = [b"--- file type: CFG ---\r\n", text.encode()]
+    for name, key in (("INF", "information"), ("HDR", "header")):
+        said = recording.extra.get(key, "")
+        parts += [f"--- file type: {name} ---\r\n".encode(), (said + "\r\n").encode()]
+    told = "DAT ASCII" if kind == "ASCII" else f"DAT {kind}: {len(data)}"
+    return b"".join([*parts, f"--- file type: {told} ---\r\n".encode(), data])

@@ -1,0 +1,208 @@
+"""A file looked at without being told anything: which loads it shows, what happened to each, and what can be fitted."""
+
+import functools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.plugin import build
+from tractexp.record import Event, Record, detect
+from tractexp.record.phasor import Phasors
+from tractexp.recording.connection import usual
+from tractexp.recording.feeder import Feeder, propose
+from tractexp.recording.happening import Happening, happenings, happenings_of
+from tractexp.recording.measure import phasors_of, waves_of
+from tractexp.recording.quality import Quality, quality
+from tractexp.recording.reader import Dip, WaveformReader
+from tractexp.recording.recording import Recording
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What happened to a load, and what a reader makes of it."""
+
+    what: Happening
+    dip: int | None = None  # the number by which the reader knows it
+    event: Event | None = None  # what would be fitted
+    why: str = ""  # what makes it (not) worth fitting, one sentence
+
+    @property
+    def worth(self) -> bool:
+        """Whether it is worth fitting, and a reader makes a record of it."""
+        return self.what.worth and self.event is not None
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """One load that a file shows: its channels and their phasors by segment, or the record that the file is."""
+
+    name: str
+    seen: tuple[Seen, ...] = ()
+    feeder: Feeder | None = None
+    phasors: tuple[Phasors, ...] = ()
+    record: Record | None = None
+    said: tuple[str, ...] = ()  # what could not be told of it, one sentence each
+    settings: Mapping[str, Any] = field(default_factory=dict)  # by which a reader reads it, without the dips
+
+    @property
+    def dips(self) -> list[int]:
+        """The numbers of the dips that are worth fitting."""
+        return [s.dip for s in self.seen if s.worth and s.dip is not None]
+
+    def choice(self) -> dict[str, Any]:
+        """The reader's settings that fit what is worth it: the first dip, the others held out; {} where nothing is."""
+        if not any(s.worth for s in self.seen):
+            return {}
+        return {**self.settings, **({"train": self.dips[:1], "validate": self.dips[1:]} if self.dips else {})}
+
+    def powers(self) -> tuple[float, float, float] | None:
+        """Voltage [kV], P [MW] and Q [Mvar] at the beginning, before anything happened; None where nothing is known."""
+        if self.record is not None:
+            first, base = slice(0, max(1, self.record.samples // 20)), self.record.base
+            U, P, Q = (float(np.nanmedian(v[first])) for v in (self.record.U, self.record.P, self.record.Q))
+            return U * base.voltage, P * base.power, Q * base.power
+        if not self.phasors:
+            return None
+        p = self.phasors[0]
+        before = p.t < (self.seen[0].what.start if self.seen else np.inf)
+        first = slice(0, max(1, min(int(np.count_nonzero(before)), len(p.t))))
+        return float(np.median(p.U[first])), float(np.median(p.S[first].real)), float(np.median(p.S[first].imag))
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One file as it was looked at. `recording` is None for a table that is a record already."""
+
+    source: str  # the path, or the name of a record
+    node: Mapping[str, Any]  # the choice of `data` that reads it; {} for a record
+    sights: Sequence[Sight]
+    recording: Recording | None = None
+
+    @functools.cached_property
+    def quality(self) -> list[Quality]:
+        """What each channel is fit for."""
+        made = self.recording
+        if made is None:
+            return []
+        segment = max(made.segments, key=lambda s: s.rate)
+        return [quality(made, number, segment) for number in range(len(made.channels))]
+
+    @property
+    def frequency(self) -> float | None:
+        """Measured [Hz], before anything happens to the first load; None where nothing turns."""
+        for shown in self.sights:
+            f = shown.phasors[0].f if shown.phasors else None if shown.record is None else shown.record.f
+            if f is not None:
+                return float(np.median(f[: max(1, len(f) // 4)]))
+        return None
+
+
+def view_of(source: str, node: Mapping[str, Any]) -> View:
+    """One file, looked at by the reader that `node` chooses. Raises `UserError` where it cannot be read."""
+    reader = build("data", node)
+    if not isinstance(reader, WaveformReader):
+        read = reader.read()
+        return View(source, node, [sight_of(record, {}) for record in (*read.train, *read.validate)])
+    recording = reader.opened()
+    if reader.voltages or reader.currents:
+        return View(source, node, [sight(reader, recording, reader.feeder(recording))], recording)
+    return View(source, node, overview(reader, recording), recording)
+
+
+def overview(reader: WaveformReader, recording: Recording) -> list[Sight]:
+    """The loads of a recording as they are proposed, each with what happened to it; `reader` is that of its file."""
+    return [sight(reader, recording, feeder) for feeder in propose(recording)]
+
+
+def sight(reader: WaveformReader, recording: Recording, feeder: Feeder) -> Sight:
+    """One load of a recording, looked at. What cannot be told of it is said, and is no error."""
+    made = Sight(feeder.name or "load", feeder=feeder, settings=_settings(feeder))
+    phasors, found, said = [], [], []
+    try:
+        segments = recording.waveforms()
+    except UserError as error:
+        return replace(made, said=(str(error),))
+    for segment in segments:
+        try:
+            measured = phasors_of(recording, feeder, segment)
+            waves = waves_of(recording, feeder, segment)
+        except UserError as error:
+            said.append(str(error))
+            continue
+        phasors.append(measured)
+        found += happenings(waves, segment.rate, segment.start, recording.frequency, measured)
+    seen = _numbered(reader, feeder, phasors, recording.frequency, found)
+    return replace(made, phasors=tuple(phasors), seen=tuple(seen), said=tuple(said))
+
+
+def sight_of(record: Record, settings: Mapping[str, Any]) -> Sight:
+    """The load of a record, looked at; `settings` are those by which a reader reads it."""
+    found = happenings_of(record)
+    try:
+        event, refused = detect(record.check()), ""
+    except UserError as error:
+        event, refused = None, str(error)
+    seen = []
+    for what in found:
+        own = event if event is not None and _common(what, event.t_start, event.t_end) > 0 else None
+        seen.append(Seen(what, None, own, _why(what, own, refused or "the reader takes another dip of this record")))
+    return Sight(record.name, tuple(seen), record=record, settings=settings)
+
+
+def _numbered(
+    reader: WaveformReader,
+    feeder: Feeder,
+    phasors: Sequence[Phasors],
+    frequency: float,
+    found: Sequence[Happening],
+) -> Iterator[Seen]:
+    """What happened, with the dip that the reader makes of it."""
+    refused, dips, tried = "", [], {}
+    try:
+        if phasors:
+            dips, tried = reader.numbered(feeder, phasors, frequency)
+    except UserError as error:
+        refused = str(error)
+    numbers = _numbers(found, dips)
+    for what, number in zip(found, numbers, strict=True):
+        made = tried.get(number) if number else None
+        event = detect(made) if isinstance(made, Record) else None
+        why = (str(made) if made else refused).removeprefix(f"{reader.path} dip {number}: ")
+        yield Seen(what, number, event, _why(what, event, why or "it is no dip"))
+
+
+def _numbers(found: Sequence[Happening], dips: Sequence[Dip]) -> list[int | None]:
+    """For each happening the dip, counted from 1, that shares more of its time with it than with any other."""
+    numbers: list[int | None] = [None] * len(found)
+    for number, dip in enumerate(dips, 1):
+        shared = [_common(what, *_span(dip)) for what in found]
+        if shared and max(shared) > 0 and numbers[int(np.argmax(shared))] is None:
+            numbers[int(np.argmax(shared))] = number
+    return numbers
+
+
+def _span(dip: Dip) -> tuple[float, float]:
+    t = dip.phasors.t
+    return float(t[dip.start]), float(t[min(dip.end, len(t) - 1)])
+
+
+def _common(what: Happening, start: float, end: float) -> float:
+    """Seconds that two spans share; a cycle more on either side, for windows blur them."""
+    return min(what.end, end) - max(what.start, start) + 0.02
+
+
+def _why(what: Happening, event: Event | None, refused: str) -> str:
+    """What makes it (not) worth fitting: what happened, or that no record can be made of it."""
+    return what.why if event is not None or not what.worth else f"no record can be made of it: {refused}"
+
+
+def _settings(feeder: Feeder) -> dict[str, Any]:
+    """The settings of a reader that reads this load."""
+    told = {"reverse_current": True} if feeder.reverse_current else {}
+    counts = len(feeder.voltages), len(feeder.currents)
+    if feeder.connection != usual(*counts, lines=counts[0] == 2):
+        told["connection"] = feeder.connection
+    return {"voltages": list(feeder.voltages), "currents": list(feeder.currents), **told}

@@ -1,0 +1,186 @@
+"""How well a channel was recorded, and what it is fit for."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.recording.recording import FEWEST_PER_CYCLE, Channel, Recording, Segment
+from tractexp.recording.snapshot import frequency, nearest_nominal
+
+CLIPPED = 3  # samples in a row at the greatest or least value
+FLAT_TOP = 1e-4  # of the span: values so near each other are one value
+WAVES = 1000.0  # Hz: slower sampling cannot show a stator transient
+FEW_CLIPPED = 1e-3  # of the samples: more is not fit for waves
+WHITE = 3.0  # standard errors that the lag-1 correlation of white noise stays within
+GAP = 1.5  # steps: time stamps farther apart leave a gap
+HARMONICS = 25  # as many as the rate allows are taken away to see the noise
+QUIET_CYCLES = 10  # whole cycles in which noise and distortion are told
+
+
+@dataclass(frozen=True)
+class Quality:
+    """What can be said of one channel in one segment. Sizes in kV, kA or the channel's own unit; nan: not told."""
+
+    rate: float  # Hz
+    jitter: float  # greatest deviation of a time stamp from a uniform grid, in steps; nan without time stamps
+    gaps: int  # samples that have no value, and time stamps that leave a hole
+    clipped: float  # share of the samples that are stuck at the greatest or least value
+    offset: float  # mean over whole cycles of the quiet part
+    step: float  # least difference of two values
+    bits: float  # log2 of the span of values over the step
+    level: float  # RMS of the fundamental in the quiet part
+    noise: float  # standard deviation about fundamental and harmonics
+    lag: float  # correlation of that noise with itself one sample later: 0 for white noise
+    colour: str  # white, coloured (neighbours alike), blue (neighbours opposite), or "" where it cannot be told
+    thd: float  # of the harmonics up to the 25th over the fundamental
+    fit: str  # what it is fit for, one sentence
+
+
+def quality(recording: Recording, number: int, segment: Segment) -> Quality:
+    """The quality of channel `number` in one segment of a recording."""
+    channel = recording.channels[number]
+    x = channel.values(segment.first, segment.stop)
+    known = np.isfinite(x)
+    jitter, holes = _stamps(recording, segment)
+    gaps = int(np.count_nonzero(~known)) + holes
+    step, span = _step(channel, x[known])
+    clipped = _clipped(channel, x, segment)
+    f = _frequency(recording, number, segment)
+    offset, level, noise, lag, count, thd = _quiet(x, segment.rate, f)
+    colour = _colour(lag, count, noise, step)
+    return Quality(
+        segment.rate, jitter, gaps, clipped, offset, step, float(np.log2(span / step + 1)) if step > 0 else 0.0,
+        level, noise, lag, colour, thd, _fit(segment, f, channel.form, gaps, clipped, level, max(noise, step)),
+    )  # fmt: skip
+
+
+def _stamps(recording: Recording, segment: Segment) -> tuple[float, int]:
+    """(jitter in steps, holes) of the time stamps of a segment; (nan, 0) where the file has none."""
+    stamps = recording.extra.get("stamps")
+    if stamps is None or len(stamps) < segment.stop or segment.stop - segment.first < 3:
+        return float("nan"), 0
+    t = np.asarray(stamps[segment.first : segment.stop], dtype=float)
+    steps = np.diff(t)
+    usual = float(np.median(steps))
+    if not usual > 0:
+        return float("nan"), 0
+    holes = steps > GAP * usual
+    course = t - np.concatenate([[0.0], np.cumsum(np.where(holes, steps - usual, 0.0))])
+    k = np.arange(len(t))
+    line = np.polynomial.Polynomial.fit(k, course, 1)
+    return float(np.abs(course - line(k)).max() / usual), int(np.count_nonzero(holes))
+
+
+def _step(channel: Channel, x: np.ndarray) -> tuple[float, float]:
+    """(least difference of two values, span of the values)."""
+    if len(x) < 2:
+        return 0.0, 0.0
+    span = float(np.ptp(x))
+    if channel.raw.dtype.kind in "iu":
+        return abs(channel.gain * channel.ratio * channel.factor), span
+    steps = np.diff(np.unique(x))
+    steps = steps[steps > 1e-9 * max(span, 1e-300)]
+    return (float(steps.min()) if len(steps) else 0.0), span
+
+
+def _clipped(channel: Channel, x: np.ndarray, segment: Segment) -> float:
+    """Share of samples in runs at a limit: the converter's where it is known, else the greatest and least value."""
+    if len(x) < 10 or not np.isfinite(x).any():
+        return 0.0
+    raw = np.asarray(channel.raw[segment.first : segment.stop], dtype=float)
+    low, high = float(np.nanmin(x)), float(np.nanmax(x))
+    near = FLAT_TOP * (high - low)
+    if near == 0:
+        return 0.0
+    at = (x >= high - near) | (x <= low + near)
+    if channel.limits is not None:
+        least, most = channel.limits
+        at |= (raw <= least) | (raw >= most)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], at, [False]]).astype(int)))
+    lengths = edges[1::2] - edges[::2]
+    usual = _blunt(x, segment, near)
+    return float(lengths[lengths >= max(CLIPPED, usual)].sum() / len(x))
+
+
+def _blunt(x: np.ndarray, segment: Segment, near: float) -> int:
+    """Samples that a sine's own crest spends within `near` of its peak, and one more."""
+    amplitude = max(float(np.nanmax(np.abs(x))), 1e-300)
+    return 2 + int(2 * np.sqrt(2 * near / amplitude) * segment.rate / (2 * np.pi * 50))
+
+
+def _frequency(recording: Recording, number: int, segment: Segment) -> float | None:
+    """The network's frequency [Hz] as this channel shows it, else as the others do; None for magnitudes."""
+    if segment.rate < FEWEST_PER_CYCLE * 16:
+        return None
+    f = frequency(recording, [number])
+    return f if f is not None and nearest_nominal(f) is not None else recording.frequency
+
+
+def _quiet(x: np.ndarray, rate: float, f: float | None) -> tuple[float, float, float, float, int, float]:
+    """(mean, fundamental, noise, lag-1 correlation, samples, THD) in the quietest ten cycles of a wave.
+
+    Mean, fundamental and harmonics are fitted together by least squares over those cycles, each with a slow change
+    of its amplitude, so that neither a drift nor a frequency a little off passes for noise.
+    """
+    none = float("nan")
+    known = np.isfinite(x)
+    if f is None or rate < 2.5 * f:
+        rest = x[known]
+        return (float(rest.mean()) if len(rest) else none), none, none, none, 0, none
+    n = min(round(QUIET_CYCLES * rate / f), len(x))
+    if n < 2 * rate / f:
+        return none, none, none, none, 0, none
+    first = _quietest(x, n, round(rate / f))
+    part = x[first : first + n]
+    if not np.isfinite(part).all():
+        return none, none, none, none, 0, none
+    t = (np.arange(n) - (n - 1) / 2) / rate
+    orders = [h for h in range(1, HARMONICS + 1) if h * f < 0.45 * rate]
+    waves = [wave(2 * np.pi * h * f * t) for h in orders for wave in (np.cos, np.sin)]
+    basis = np.column_stack([np.ones(n), t * rate / n, *waves, *(w * t * rate / n for w in waves[:2])])
+    weights, *_ = np.linalg.lstsq(basis, part, rcond=None)
+    rest = part - basis @ weights
+    size = np.hypot(weights[2 : 2 + 2 * len(orders) : 2], weights[3 : 3 + 2 * len(orders) : 2]) / np.sqrt(2)
+    noise = float(np.sqrt(rest @ rest / max(n - basis.shape[1], 1)))
+    lag = float(rest[1:] @ rest[:-1] / (rest @ rest)) if rest.any() else none
+    thd = float(np.linalg.norm(size[1:]) / size[0]) if size[0] > 0 and len(size) > 1 else none
+    return float(weights[0]), float(size[0]), noise, lag, n, thd
+
+
+def _quietest(x: np.ndarray, n: int, cycle: int) -> int:
+    """First sample of the span of n in which the wave repeats best from one cycle to the next, for its energy."""
+    if len(x) <= n + cycle:
+        return 0
+    change = np.nan_to_num((x[cycle:] - x[:-cycle]) ** 2, nan=np.inf)
+    starts = np.arange(0, len(change) - n + 1, max(cycle, 1))
+    energy = np.array([n * np.nan_to_num(x[s : s + n]).var() for s in starts])
+    changed = np.array([change[s : s + n].sum() for s in starts])
+    return int(starts[np.argmin(np.where(energy > 0, changed / np.maximum(energy, 1e-300), np.inf))])
+
+
+def _colour(lag: float, count: int, noise: float, step: float) -> str:
+    """What the lag-1 correlation says, where there is more noise than the rounding of the converter."""
+    if not np.isfinite(lag) or count < 50 or noise <= 0.2 * step:
+        return ""
+    if abs(lag) * np.sqrt(count) < WHITE:
+        return "white"
+    return "coloured" if lag > 0 else "blue"
+
+
+def _fit(segment: Segment, f: float | None, form: str, gaps: int, clipped: float, level: float, noise: float) -> str:
+    """What the channel is fit for, one sentence."""
+    if form != "waveform":
+        return f"holds {form} values, no waveform: fit for what they say, not for phasors"
+    if f is None or segment.rate < FEWEST_PER_CYCLE * f:
+        return f"{segment.rate:g} Hz is no waveform: fit for magnitudes only"
+    if not np.isfinite(level):
+        return "too short, or with too many gaps, for anything to be told"
+    if level <= 2 * noise:
+        return "carries no more than noise or rounding: no signal to fit"
+    if gaps:
+        return f"{gaps} gaps: fit for phasors where there are none"
+    if clipped > FEW_CLIPPED:
+        return f"{100 * clipped:.2g} % of the samples are clipped: fit for phasors outside those cycles only"
+    if segment.rate < WAVES:
+        return f"fit for phasors; {segment.rate:g} Hz is too slow for waves, which need {WAVES:g} Hz"
+    return "fit for phasors and for waves"

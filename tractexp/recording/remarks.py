@@ -1,0 +1,25 @@
+"""What was mended while a file was read: said once for all its lines."""
+
+
+class Remarks:
+    """Notes about one file, in the order in which they came up; the same words about several lines are one note."""
+
+    def __init__(self, where: str) -> None:
+        self.where = where
+        self._lines: dict[str, list[int]] = {}
+
+    def add(self, words: str, line: int | None = None) -> None:
+        """Note something, about one line of the file (from 1) or about all of it."""
+        self._lines.setdefault(words, []).extend([] if line is None else [line])
+
+    def told(self) -> tuple[str, ...]:
+        return tuple(f"{self.where}{_places(lines)}: {words}" for words, lines in self._lines.items())
+
+
+def _places(lines: list[int]) -> str:
+    if not lines:
+        return ""
+    if len(lines) == 1:
+        return f", line {lines[0]}"
+    most = ", ".join(map(str, lines[:5]))
+    return f", lines {most}" + (f" and {len(lines) - 5} more" if len(lines) > 5 else "")

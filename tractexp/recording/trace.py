@@ -1,0 +1,106 @@
+"""A feeder every half cycle: RMS of each phase (IEC 61000-4-30), sequence components, powers, second harmonic."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.record.phasor import Phasors, frame
+from tractexp.record.record import Record
+
+SETTLED = 1.0  # cycles about a jump left out when the frequency before it is told
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """What a feeder does, every half cycle. Voltages in the record's unit, one row per phase known."""
+
+    t: np.ndarray  # (M,) s, centers of the windows
+    U: np.ndarray  # (M,) positive sequence, phase to ground
+    phases: np.ndarray  # (K, M) RMS of each voltage; K = 0 where only U is known
+    U2: np.ndarray  # (M,) nan where it is not known
+    P: np.ndarray  # (M,) MW; nan where it is not known
+    Q: np.ndarray  # (M,) Mvar
+    f: np.ndarray  # (M,) Hz, at which the voltage turns
+    I: np.ndarray  # (K, M) RMS of each current's fundamental; K = 0 where none is known
+    second: np.ndarray  # (K, M) second harmonic of each current, RMS
+    content: np.ndarray  # (K, M) RMS of each current about its mean: with all harmonics and noise
+    cycle: float  # s, nominal
+
+    @property
+    def step(self) -> float:
+        return float((self.t[-1] - self.t[0]) / (len(self.t) - 1))
+
+    def jump(self, i: int) -> float:
+        """Degrees by which the voltage's angle leaves, at sample i, the course it had before; nan where unknown."""
+        reach = max(2, round(1.5 * self.cycle / self.step))
+        first, stop = max(i - reach, 0), min(i + reach, len(self.t) - 1)
+        before = self.f[max(first - 50, 0) : max(first - 1, 1)]
+        if not np.isfinite(before).any():
+            return float("nan")
+        extra = self.f[first : stop + 1] - np.nanmedian(before)
+        return float(360 * np.trapezoid(np.nan_to_num(extra), self.t[first : stop + 1]))
+
+
+def of_waves(waves: np.ndarray, rate: float, start: float, nominal: float, phasors: Phasors) -> Trace:
+    """The trace of waveforms (2 K, N), voltages first; `phasors` are those measured from them."""
+    K, n = len(waves) // 2, waves.shape[-1]
+    first, last = phasors.t[0], phasors.t[-1]
+    t = np.arange(first, last + 1e-9, 0.5 / nominal)
+    f = _tracked(phasors, nominal)
+    width = rate / np.interp(t, phasors.t, f)  # samples in a window
+    center = (t - start) * rate + 0.5  # sample k lies between k and k + 1
+    low, high = np.clip(center - width / 2, 0, n), np.clip(center + width / 2, 0, n)
+
+    def mean(x: np.ndarray) -> np.ndarray:
+        total = np.concatenate([np.zeros((len(x), 1), x.dtype), np.cumsum(x, axis=1)], axis=1)
+        at = np.arange(n + 1)
+        return np.array([np.interp(high, at, row) - np.interp(low, at, row) for row in total]) / (high - low)
+
+    at_samples = np.interp(start + np.arange(n) / rate, phasors.t, f)
+    turn = np.exp(-1j * frame(at_samples, rate))
+    currents = waves[K:]
+    content = np.sqrt(np.maximum(mean(currents**2) - mean(currents) ** 2, 0))
+    return Trace(
+        t,
+        np.interp(t, phasors.t, np.abs(phasors.V1)),
+        np.sqrt(mean(waves[:K] ** 2)),
+        np.interp(t, phasors.t, np.abs(phasors.V2)) if K == 3 else np.full(len(t), np.nan),
+        np.interp(t, phasors.t, phasors.S.real),
+        np.interp(t, phasors.t, phasors.S.imag),
+        _turning(t, phasors.t, phasors.f),
+        np.sqrt(2) * np.abs(mean(currents * turn)),
+        np.sqrt(2) * np.abs(mean(currents * turn**2)),
+        content,
+        1 / nominal,
+    )
+
+
+def of_record(record: Record) -> Trace:
+    """The trace of a record: U, P, Q and, where they are there, f and U2, thinned to half cycles."""
+    cycle = 1 / record.base.frequency
+    every = max(1, round(0.5 * cycle * record.rate))
+    n, unknown = record.samples // every * every, np.full(record.samples, np.nan)
+
+    def thin(x: np.ndarray | None) -> np.ndarray:
+        return (unknown if x is None else x)[:n].reshape(-1, every).mean(axis=1)
+
+    none = np.empty((0, n // every))
+    U, P, Q = thin(record.U), thin(record.P), thin(record.Q)
+    return Trace(thin(record.t), U, none, thin(record.U2), P, Q, thin(record.f), none, none, none, cycle)
+
+
+def _tracked(phasors: Phasors, nominal: float) -> np.ndarray:
+    """The network's frequency at the phasors: a median over five cycles, within 10 % of nominal."""
+    n = len(phasors.t)
+    step = (phasors.t[-1] - phasors.t[0]) / max(n - 1, 1)
+    half = max(1, round(2.5 / nominal / step)) if step > 0 else 1
+    knots = np.arange(0, n, half)
+    smooth = np.array([np.median(phasors.f[max(k - half, 0) : k + half + 1]) for k in knots])
+    return np.clip(np.interp(np.arange(n), knots, smooth), 0.9 * nominal, 1.1 * nominal)
+
+
+def _turning(t: np.ndarray, at: np.ndarray, f: np.ndarray) -> np.ndarray:
+    """The mean of f between the middles of the steps of t, so that its integral, the angle, is kept."""
+    angle = np.concatenate([[0.0], np.cumsum((f[1:] + f[:-1]) / 2 * np.diff(at))])
+    middles = np.concatenate([[t[0]], (t[1:] + t[:-1]) / 2, [t[-1]]])
+    return np.diff(np.interp(middles, at, angle)) / np.diff(middles) if len(t) > 1 else f[:1]

@@ -1,0 +1,301 @@
+"""The page of a look: the file, each load with what happened to it, zoomable, its command, the channels."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tractexp.recording import Recording, Segment
+from tractexp.recording.measure import waves_of
+from tractexp.recording.overview import Sight, View
+from tractexp.recording.traces import half_cycle_rms, spectrum
+from tractexp.report.chart import Chart
+from tractexp.report.page import Page
+from tractexp.report.style import ACTIVE, PALETTE, REACTIVE, VOLTAGE
+from tractexp.wording import change, figure
+
+MOST = 400_000  # samples of waveforms that a page holds: a megabyte
+OPEN = 2  # loads whose charts are drawn at once; those of the others when they are opened
+DETAILED = 12  # events that have a chart of their own where the whole is thinned
+AROUND = (0.1, 0.3)  # s before and after an event in such a chart
+LONGEST = 3.0  # s of an event there
+CYCLES = 10  # of a spectrum
+PHASES = {3: ("a", "b", "c"), 1: ("the only phase",)}
+BOUND = 0.1  # of the nominal frequency: what lies further off is that of a dead line
+SHADES = {"dip": PALETTE[5], "swell": PALETTE[4], "interruption": PALETTE[3]}
+CAPTION = (
+    "Waveforms, primary values; RMS of one cycle every half cycle (IEC 61000-4-30); symmetrical components and powers"
+    " of one-cycle phasors, P and Q positive when consumed. Drag to zoom, double-click for the whole."
+)
+
+
+def page(path: Path, views: Sequence[View], content: Mapping[str, Any]) -> Path:
+    """Write the page; returns its path."""
+    told = content["files"]
+    made = Page(f"A look at {', '.join(Path(f['file']).name for f in told)}", _lead(told))
+    for view, known in zip(views, told, strict=True):
+        if len(told) > 1:
+            made.heading(known["file"])
+        _conclusion(made, known)
+        made.table(["", ""], _facts(known), words=(1,))
+        if known["notes"]:
+            made.items(known["notes"])
+        if len(known["feeders"]) > 1:
+            made.table(
+                ["load", "connected as", "channels", "U [kV]", "P [MW]", "Q [Mvar]", "events", "worth fitting"],
+                [_summary(f) for f in known["feeders"]], words=(1, 2), caption="At the beginning; P and Q consumed.",
+            )  # fmt: skip
+        for k, (shown, feeder) in enumerate(zip(view.sights, known["feeders"], strict=True)):
+            _load(made, view, shown, feeder, folded=k >= OPEN)
+        if known["channels"]:
+            made.heading("Channels").table(
+                ["number", "name", "phase", "unit", "primary RMS", "noise", "colour", "THD", "bits", "fit for what"],
+                [_channel(c) for c in known["channels"]], words=(1, 2, 3, 6, 9),
+                caption="Numbers count from 0, as data.voltages and data.currents do. RMS of the fundamental; noise"
+                " about fundamental and harmonics in the quietest ten cycles, as a share of it.",
+            )  # fmt: skip
+    return made.write(path)
+
+
+def _lead(files: Sequence[Mapping[str, Any]]) -> str:
+    loads = sum(len(f["feeders"]) for f in files)
+    events = [e for f in files for feeder in f["feeders"] for e in feeder["events"]]
+    worth = sum(e["worth"] for e in events)
+    return f"{_count(loads, 'load')}, {_count(len(events), 'event')}, {worth} worth fitting."
+
+
+def _conclusion(made: Page, known: Mapping[str, Any]) -> None:
+    commands = [(f["name"], f["command"]) for f in known["feeders"] if f["command"]]
+    if not known["feeders"]:
+        made.verdict("No three voltages and currents of one load were recognised; the channels are listed below.")
+    elif not commands:
+        made.verdict("Nothing here is worth fitting: the events below say why.", kind="bad")
+    else:
+        made.verdict(f"To fit {'what is worth it' if len(commands) > 1 else commands[0][0]}:", kind="good")
+        for name, command in commands:
+            if len(commands) > 1:
+                made.text(f"{name}:")
+            made.code(command)
+
+
+def _facts(known: Mapping[str, Any]) -> list[list[str]]:
+    segments = [f"{s['samples']} samples at {s['rate']:g} Hz from {s['start']:.3f} s" for s in known["segments"]]
+    measured = known["measured_frequency"]
+    frequency = f"{known['frequency']:g} Hz nominal" + ("" if measured is None else f", {measured:.3f} Hz measured")
+    rows = [["path", known["file"]], ["read by", known["reader"]], ["station", known["station"]],
+            ["recorder", known["device"]], ["starts", str(known["start"] or "")], ["sampled", "; ".join(segments)],
+            ["lasts", f"{known['seconds']:.3f} s"], ["frequency", frequency]]  # fmt: skip
+    return [row for row in rows if row[1]]
+
+
+def _channel(c: Mapping[str, Any]) -> list[str]:
+    noise, thd = (None if c[key] is None else 100 * c[key] for key in ("noise_share", "thd"))
+    return [
+        str(c["number"]), c["name"], c["phase"], c["unit"], figure(c["magnitude"], 4, c["primary_unit"]),
+        figure(noise, 2, "%"), c["colour"], figure(thd, 2, "%"), figure(c["bits"], 3), c["fit"],
+    ]  # fmt: skip
+
+
+def _summary(known: Mapping[str, Any]) -> list[str]:
+    """A load in one row."""
+    size = [figure(known[key]) for key in ("U", "P", "Q")]
+    channels = ", ".join(map(str, (*known["voltages"], *known["currents"])))
+    worth = [e for e in known["events"] if e["worth"]]
+    return [known["name"], known["connection"], channels, *size, str(len(known["events"])), str(len(worth))]
+
+
+def _load(made: Page, view: View, shown: Sight, known: Mapping[str, Any], folded: bool) -> None:
+    """One load: what it is, what happened, and charts to look into."""
+    made.heading(known["name"])
+    made.items([*_described(known), *known["why"], *known["said"]])
+    if known["events"]:
+        made.table(
+            ["dip", "kind", "starts [s]", "lasts [ms]", "depth", "jump", "U2/U1", "P [MW]", "Q [Mvar]", "fit it?"],
+            [_event(e) for e in known["events"]], words=(1, 9),
+            caption="Depth, U2 and jump against the voltage before. P and Q before and after. Dips are numbered as"
+            " data.train and data.validate take them.",
+        )  # fmt: skip
+    else:
+        made.text("Nothing happened: the voltage stays within the thresholds of IEC 61000-4-30.")
+    if folded:
+        with made.folded(f"Charts of {known['name']}"):
+            _charts(made, view, shown)
+    else:
+        _charts(made, view, shown)
+
+
+def _charts(made: Page, view: View, shown: Sight) -> None:
+    """Charts to look into."""
+    if shown.record is not None:
+        made.chart(_of_record(shown), "As recorded. Drag to zoom, double-click for the whole.")
+    elif shown.phasors and view.recording is not None:
+        every = _every(view)
+        made.chart(_of_waves(view.recording, shown, every), CAPTION)
+        with made.folded("Spectrum before anything happened"):
+            made.chart(_spectrum(view.recording, shown), f"{CYCLES} cycles, Hann window, of phase a.")
+        if every > 1:
+            _details(made, view.recording, shown)
+
+
+def _described(known: Mapping[str, Any]) -> list[str]:
+    told = []
+    if known["channels"]:
+        numbers = [*known["voltages"], *known["currents"]]
+        named = ", ".join(f"{n} {c}" for n, c in zip(numbers, known["channels"], strict=True))
+        reverse = ", current reversed" * known["reverse_current"]
+        told.append(f"Channels: {named}; connected as {known['connection']}{reverse}.")
+    if known["U"] is not None:
+        told.append(f"At first {figure(known['U'])} kV, {figure(known['P'])} MW, {figure(known['Q'])} Mvar.")
+    if known["sum_V"] is not None:
+        current = "" if known["sum_I"] is None else f", the currents to {known['sum_I']:.2%}"
+        told.append(f"The voltages of the three phases sum to {known['sum_V']:.2%} of one{current}.")
+    return told
+
+
+def _event(e: Mapping[str, Any]) -> list[str]:
+    powers = [change(e[f"{x}_before"], e[f"{x}_after"]) for x in "PQ"]
+    return [
+        "" if e["dip"] is None else str(e["dip"]), e["kind"], f"{e['start']:.3f}", f"{1000 * e['duration']:.0f}",
+        f"{e['depth']:.1%}", figure(e["jump"], 2, "°"), _share(e["U2"]), *powers,
+        f"{'yes' if e['worth'] else 'no'}: {e['why']}",
+    ]  # fmt: skip
+
+
+def _share(value: float | None) -> str:
+    return "" if value is None else f"{value:.1%}"
+
+
+def _marked(chart: Chart, shown: Sight) -> Chart:
+    """Events shaded over all panels, each with its number or kind at the top."""
+    for k, seen in enumerate(shown.seen, 1):
+        what = seen.what
+        text = what.kind if seen.dip is None else f"{what.kind} {seen.dip}"
+        crowded = k > 1 and what.start - shown.seen[k - 2].what.start < 0.05
+        chart.shade(what.start, what.end, SHADES.get(what.kind, "#BBBBBB"), opacity=0.25, text="" if crowded else text)
+    return chart
+
+
+def _of_record(shown: Sight) -> Chart:
+    record = shown.record
+    assert record is not None
+    panels = {"U": ("U", "U2"), "P, Q": ("P", "Q"), "f [Hz]": ("f",)}
+    colors = {"U": VOLTAGE, "U2": PALETTE[3], "P": ACTIVE, "Q": REACTIVE, "f": PALETTE[2]}
+    units = {"U": record.base.voltage, "U2": record.base.voltage, "P": record.base.power, "Q": record.base.power}
+    kept = {label: [n for n in names if n in record.channels] for label, names in panels.items()}
+    told = {"U": "[pu]" if record.base.voltage == 1 else "[kV]", "P, Q": "[pu]" if record.base.power == 1 else
+            "[MW, Mvar]"}  # fmt: skip
+    used = [label for label, names in kept.items() if names]
+    chart = Chart("t [s]", [f"{label} {told.get(label, '')}".strip() for label in used])
+    for panel, label in enumerate(used):
+        for name in kept[label]:
+            values = record.channels[name] * units.get(name, 1.0)
+            chart.samples(name, float(record.t[0]), record.step, values, colors[name], panel)
+    return _marked(chart, shown)
+
+
+def _every(view: View) -> int:
+    """How many samples become one on a page, so that all loads of a file have room."""
+    made = view.recording
+    assert made is not None
+    lines = sum(len(s.feeder.voltages) + len(s.feeder.currents) for s in view.sights if s.feeder is not None)
+    return max(1, -(-lines * made.samples // MOST))
+
+
+def _of_waves(recording: Recording, shown: Sight, every: int = 1, span: tuple[float, float] | None = None) -> Chart:
+    """All panels of a load; `every` so many samples become one, within the times `span` [s]."""
+    assert shown.feeder is not None
+    single = len(shown.phasors[0].V) == 1
+    sequences = "|U|, |I| [kV, kA]" if single else "U1, U2, U0 [kV]"
+    panels = ["u [kV]", "i [kA]", "U RMS [kV]", "I RMS [kA]", sequences, "P, Q [MW, Mvar]", "f [Hz]"]
+    chart = Chart("t [s]", panels, heights=(1.4, 1.4, 1, 1, 1, 1.2, 0.8), pixels=1250)
+    for segment in recording.waveforms():
+        _waves(chart, recording, shown, segment, every, span)
+    for p in shown.phasors:
+        part = slice(*np.searchsorted(p.t, span)) if span else slice(None)
+        if len(p.t[part]) > 1:
+            _phasors(chart, p, part, recording.frequency)
+    chart.limits(6, (1 - BOUND / 2) * recording.frequency, (1 + BOUND / 2) * recording.frequency)
+    if span:
+        chart.limits(None, *span)
+    return _marked(chart, shown)
+
+
+def _waves(
+    chart: Chart, recording: Recording, shown: Sight, segment: Segment, every: int, span: tuple[float, float] | None
+) -> None:
+    """The waveforms of a segment and their RMS."""
+    assert shown.feeder is not None
+    waves = waves_of(recording, shown.feeder, segment)
+    first, stop = (0, waves.shape[1]) if span is None else np.searchsorted(segment.t, span)
+    waves, start = waves[:, first:stop], segment.start + first / segment.rate
+    if waves.shape[1] < 2:
+        return
+    K, step = len(waves) // 2, 1 / segment.rate
+    for k, wave in enumerate(waves):
+        y, dt = (wave, step) if every == 1 else (envelope(wave, every), step * every)
+        chart.samples(PHASES[K][k % K], start, dt, y, PALETTE[k % K], panel=k // K, width=1.0)
+    t, rms = half_cycle_rms(waves, segment.rate, recording.frequency)
+    if len(t) > 1:
+        for k, values in enumerate(rms):
+            name, color = PHASES[K][k % K], PALETTE[k % K]
+            chart.samples(name, start + t[0], t[1] - t[0], values, color, panel=2 + k // K)
+
+
+def _phasors(chart: Chart, p: Any, part: slice, nominal: float) -> None:
+    """Symmetrical components, powers and frequency of one segment."""
+    t = p.t[part]
+    step = float(t[-1] - t[0]) / (len(t) - 1)
+    lines = [("P", p.S.real, ACTIVE, 5), ("Q", p.S.imag, REACTIVE, 5)]
+    if len(p.V) == 3:
+        zero = np.abs(p.V.mean(axis=0))
+        lines += [("positive sequence", np.abs(p.V1), VOLTAGE, 4), ("negative sequence", np.abs(p.V2), PALETTE[3], 4),
+                  ("zero sequence", zero, PALETTE[4], 4)]  # fmt: skip
+    else:
+        lines += [("|U|", np.abs(p.V[0]), VOLTAGE, 4), ("|I|", np.abs(p.I[0]), PALETTE[3], 4)]
+    alive = np.abs(p.f / nominal - 1) < BOUND
+    lines.append(("f", np.where(alive, p.f, np.nan), PALETTE[2], 6))
+    for name, values, color, panel in lines:
+        chart.samples(name, float(t[0]), step, values[part], color, panel)
+
+
+def envelope(wave: np.ndarray, every: int) -> np.ndarray:
+    """The lowest and highest (2 M,) of each 2 `every` samples of a wave (N,), in the order in which they came."""
+    rows = np.full(-(-len(wave) // (2 * every)) * 2 * every, wave[-1])
+    rows[: len(wave)] = wave
+    parts = rows.reshape(-1, 2 * every)
+    held = np.where(np.isnan(parts), 0.0, parts)
+    order = np.sort(np.stack([held.argmin(1), held.argmax(1)], axis=1), axis=1)
+    return np.take_along_axis(parts, order, axis=1).ravel()
+
+
+def _spectrum(recording: Recording, shown: Sight) -> Chart:
+    """Of the first voltage and the first current, before the first event."""
+    assert shown.feeder is not None
+    segment = recording.waveforms()[0]
+    waves = waves_of(recording, shown.feeder, segment)
+    length = min(round(CYCLES * segment.rate / recording.frequency), waves.shape[1])
+    first = shown.seen[0].what.start - segment.start if shown.seen else np.inf
+    quiet = int(np.clip(first * segment.rate, length, waves.shape[1]))
+    K = len(waves) // 2
+    chart = Chart("frequency [Hz]", ["of the fundamental [%]"], log_y=True, pixels=320)
+    for name, wave, color in (("voltage", waves[0], REACTIVE), ("current", waves[K], ACTIVE)):
+        f, rms = spectrum(wave[quiet - length : quiet], segment.rate)
+        if rms.max() > 0:
+            chart.line(name, f, np.maximum(100 * rms / rms.max(), 1e-3), color)
+    return chart
+
+
+def _details(made: Page, recording: Recording, shown: Sight) -> None:
+    """A chart with every sample for each event, where the chart of the whole has not all of them."""
+    for seen in shown.seen[:DETAILED]:
+        what = seen.what
+        span = (what.start - AROUND[0], min(what.end, what.start + LONGEST) + AROUND[1])
+        with made.folded(f"Every sample of the {what.kind} at {what.start:.3f} s"):
+            made.chart(_of_waves(recording, shown, span=span), "As above, not thinned.")
+    if len(shown.seen) > DETAILED:
+        made.text(f"The {len(shown.seen) - DETAILED} events after the first {DETAILED} have no such chart.")
+
+
+def _count(n: int, what: str) -> str:
+    return f"{n} {what}{'s' * (n != 1)}"
