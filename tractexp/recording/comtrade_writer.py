@@ -185,11 +185,10 @@ def _binary(recording: Recording, kind: str, stamps: np.ndarray) -> bytes:
     table["t"] = np.where(good, stamps, NONE).astype(np.uint32)
     for k, channel in enumerate(recording.channels):
         none = np.nan if kind == "FLOAT32" else 65535 if _unsigned(channel, kind) else FULL[kind][0] - 1
-        raw, lacking = np.asarray(channel.raw), _lacking(channel)
-        values = np.where(lacking, none, raw) if lacking.any() else raw
-        to = "<u2" if _unsigned(channel, kind) else VALUE[kind]
-        with np.errstate(over="ignore"):
-            table["a"][:, k] = values.astype(to).view(VALUE[kind])
+        with np.errstate(over="ignore", invalid="ignore"):
+            values = np.asarray(channel.raw).astype("<u2" if _unsigned(channel, kind) else VALUE[kind])
+        values[_lacking(channel)] = none
+        table["a"][:, k] = values.view(VALUE[kind])
     for k, status in enumerate(recording.status):
         table["d"][:, k // 16] |= status.values().astype(np.uint16) << (k % 16)
     return table.tobytes()
