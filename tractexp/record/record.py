@@ -121,13 +121,8 @@ class Record:
             note = f"times were up to {100 * off:.2g} % of a step off a uniform grid: resampled linearly"
         moved = {name: np.interp(grid, self.t, values) for name, values in self.channels.items()}
         moved["t"] = grid
-<<<<<<< HEAD
-        return replace(self, **moved, notes=(*self.notes, note))
-=======
         more = {name: np.interp(grid, self.t, values) for name, values in self.more.items()}
-        note = f"times were up to {100 * off:.2g} % of a step off a uniform grid: resampled linearly"
         return replace(self, **moved, more=more, notes=(*self.notes, note))
->>>>>>> main
 
     def _check_steps(self, steps: np.ndarray, usual: float, place: Callable[[int], str]) -> None:
         """Refuse rows that are missing, and times that stand still other than at an event."""

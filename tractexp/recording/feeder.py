@@ -103,13 +103,7 @@ def _fits(load: Group, buses: Sequence[Group]) -> bool:
 
 def _feeder(recording: Recording, seen: Snapshots, load: Group, buses: Sequence[Group]) -> Feeder:
     bus, why = _bus(recording, seen, load, buses)
-<<<<<<< HEAD
-    connection = "aron" if len(load.numbers) == 2 else "three_phase"
-    if bus.pairs:
-        connection = "line_voltages" if len(bus.numbers) == 3 else "two_line_voltages"
-=======
     connection = usual(len(bus.numbers), len(load.numbers), bus.pairs)
->>>>>>> main
     said = [
         f"currents {_names(recording, load.numbers)}: {_by(load)}",
         f"voltages {_names(recording, bus.numbers)}: {why}",

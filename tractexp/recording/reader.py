@@ -90,27 +90,12 @@ class WaveformReader(Reader):
         base = self._base(dips, frequency)
         return dips, {number: self._record(feeder, number, dip, base) for number, dip in enumerate(dips, 1)}
 
-<<<<<<< HEAD
-    def _feeder(self, recording: Recording) -> Feeder:
-        """The channels asked for."""
-        connection = build("connection", {"name": self.connection})
-        made = {}
-=======
-    def _pick(self, number: int, tried: dict[int, Record | UserError]) -> Record:
-        """Dip `number`; raises `UserError` naming the dips that can be used where this one cannot."""
-        usable = ", ".join(f"{n} at {r.t[0]:.3f} to {r.t[-1]:.3f} s" for n, r in tried.items() if isinstance(r, Record))
-        made = tried.get(number, UserError(f"{self.path}: there is no dip {number}; {len(tried)} are found"))
-        if isinstance(made, UserError):
-            raise UserError(f"{made}; dips that can be used: {usable or 'none'}")
-        return made
-
     def feeder(self, recording: Recording) -> Feeder:
         """The channels asked for, or those of the only load that the file shows."""
         if not (self.voltages or self.currents):
             return self._only(recording)
         name = self.connection or self._usual(recording)
         connection, made = plugin.chosen("connection", name), {}
->>>>>>> main
         for key, wanted in (("voltages", connection.voltages), ("currents", connection.currents)):
             given = getattr(self, key)
             if len(given) != wanted:

@@ -45,7 +45,7 @@ def write_recording(recording: Recording, path: Path) -> list[Path]:
     for segment in recording.segments:
         t[segment.first : segment.stop] = segment.t
     named = unique(["t", *(c.name.strip() for c in (*recording.channels, *recording.status))])
-    values = [t, *map(_recorded, recording.channels), *(np.asarray(s.raw) for s in recording.status)]
+    values = [t, *map(_recorded, recording.channels), *(s.values() for s in recording.status)]
     table = _written(dict(zip(named, values, strict=True)), path)
     told = {"source": recording.source, "recording": _told(recording)}
     return [table, files.write_json(path.with_suffix(".json"), told)]
