@@ -104,6 +104,7 @@ class CSV(Tabular, Reader):
         end = whole.t[start] + (POST if self.post is None else self.post)
         window = slice(max(first, int(np.searchsorted(whole.t, begin))), min(stop, int(np.searchsorted(whole.t, end))))
         arrays: Any = {name: values[window] for name, values in whole.channels.items()}
+        arrays["more"] = {name: values[window] for name, values in whole.more.items()}
         source = f"{self.path} dip {number}"
         made = replace(whole, name=f"{whole.name}_dip{number}", source=source, notes=(), **arrays)
         try:
@@ -118,9 +119,9 @@ class CSV(Tabular, Reader):
         table, found = self.table_of(path, told)
         given = self.base_voltage or (told.base and told.base.voltage)
         made = powers(table, found, self.frequency, self.reverse_current, kilovolts=given is not None)
-        arrays: Any = made.columns
+        arrays: Any = {**made.columns, "more": table.numbers(told.more), "window": told.window}
         raw = Record(name=self._name(path, told), source=path, notes=(*told.notes, *made.notes), **arrays)
-        even = raw.uniform(table.place)
+        even = raw if told.uniform else raw.uniform(table.place)
         base, note = self._base(even, made, told, base)
         by = Base(*(
             size if made.absolute[key] or (made.absolute[key] is None and size_given) else 1.0

@@ -1,6 +1,6 @@
 """Which columns of a table are time, voltage, power, ...: as the user says, else as their names tell."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -42,8 +42,10 @@ class Mapped:
     notes: tuple[str, ...]
 
 
-def mapped(table: Table, columns: Mapping[str, Any], units: Mapping[str, str]) -> Mapped:
+def mapped(table: Table, columns: Mapping[str, Any], units: Mapping[str, str], known: Collection[str] = ()) -> Mapped:
     """What the columns of a table are; `columns` {key: name or number from 0} and `units` {quantity: unit} are given.
+
+    Columns `known` are used otherwise, so that nothing need be said of them.
 
     Raises `UserError` for a column that is asked for and not there, for one that is lacking, and for several that
     could be meant.
@@ -61,7 +63,7 @@ def mapped(table: Table, columns: Mapping[str, Any], units: Mapping[str, str]) -
             )
         chosen[key] = options[key][0]
     chosen = {key: _with_unit(one, units) for key, one in chosen.items()}
-    return Mapped(kind, chosen, tuple(_notes(table, chosen)))
+    return Mapped(kind, chosen, tuple(_notes(table, chosen, known)))
 
 
 def check_mapping(columns: Mapping[str, Any], units: Mapping[str, str]) -> None:
@@ -263,10 +265,10 @@ def _with_unit(one: Chosen, units: Mapping[str, str]) -> Chosen:
     return replace(one, role=replace(one.role, unit=str(units[quantity]))) if quantity in units else one
 
 
-def _notes(table: Table, chosen: Mapping[str, Chosen]) -> list[str]:
+def _notes(table: Table, chosen: Mapping[str, Chosen], known: Collection[str]) -> list[str]:
     """What was taken for what, where names alone do not say it; and the columns left over."""
     notes, used = [], {one.number for one in chosen.values()}
-    if any(key != one.name or one.role.unit for key, one in chosen.items()):
+    if any(key != one.name or table.heading.units[one.number] for key, one in chosen.items()):
         notes.append("columns: " + ", ".join(f"{key} = {one.told}" for key, one in chosen.items()))
-    spare = [name for k, name in enumerate(table.heading.names) if name and k not in used]
+    spare = [name for k, name in enumerate(table.heading.names) if name and k not in used and name not in known]
     return [*notes, f"columns not used: {', '.join(spare)}"] if spare else notes

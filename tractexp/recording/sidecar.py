@@ -8,6 +8,7 @@ from typing import Any
 
 from tractexp.errors import UserError
 from tractexp.record.record import Base
+from tractexp.record.window import Window
 from tractexp.recording.table import located
 
 
@@ -20,6 +21,9 @@ class Sidecar:
     base: Base | None = None
     columns: Mapping[str, Any] = field(default_factory=dict)  # as data.columns
     units: Mapping[str, str] = field(default_factory=dict)  # as data.units
+    uniform: bool = False  # its times are those of a record as read: they need no mending
+    window: Window | None = None  # what the phasors of such a record are averages over
+    more: tuple[str, ...] = ()  # further columns of it: P_3, THD_u, ...
     recording: Mapping[str, Any] | None = None  # of a recording that task=convert wrote
 
 
@@ -45,12 +49,24 @@ def beside(path: str) -> Sidecar:
         _base(file, told.get("base")),
         _mapping(told, "columns"),
         {key: str(unit) for key, unit in _mapping(told, "units").items()},
+        told.get("uniform") is True,
+        _window(file, told.get("window")),
+        tuple(str(name) for name in told.get("more") or []),
         _mapping(told, "recording") or None,
     )
 
 
 def _mapping(told: Mapping[str, Any], key: str) -> dict[str, Any]:
     return dict(told[key]) if isinstance(told.get(key), dict) else {}
+
+
+def _window(file: Any, told: Any) -> Window | None:
+    if not isinstance(told, dict):
+        return None
+    try:
+        return Window.of(told)
+    except (KeyError, TypeError, ValueError) as error:
+        raise UserError(f"{file}: window is not as task=convert writes it; leave it out") from error
 
 
 def _base(file: Any, told: Any) -> Base | None:

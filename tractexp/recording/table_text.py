@@ -14,9 +14,10 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.recording.cells import BadCell, is_number, is_time
-from tractexp.recording.columns import role, split_unit
+from tractexp.recording.columns import split_unit
 from tractexp.recording.heading import Heading, heading
 from tractexp.recording.table import Column, Form, Table, column
+from tractexp.recording.text import MARKS, decode
 
 HEAD = 1 << 18  # bytes in which the heading is looked for
 SAMPLE = 400  # lines of them, at most
@@ -184,16 +185,10 @@ class TextTable(Table):
 
 def open_text(path: str, data: bytes, form: Form) -> TextTable:
     """A text file as a table; raises `UserError` for one that is no text, or none that can be told."""
-    codec = _codec(path, data, form.encoding)
-    try:
-        if codec != "utf-8-sig":
-            data = data.decode(codec).encode()
-        else:
-            data.decode()
-    except UnicodeDecodeError as error:
-        told = f"{codec} text; leave data.encoding out" if form.encoding else "UTF-8 text; save the file as UTF-8 CSV"
-        raise UserError(f"{path}: byte {error.start + 1} is not {told}") from error
-    data = data.removeprefix(b"\xef\xbb\xbf")
+    text, codec = decode(data, path, form.encoding or _unmarked(data))
+    plain = codec.startswith("utf-8")
+    data = (data if plain else text.encode()).removeprefix(b"\xef\xbb\xbf")
+    del text
     data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if (nul := data.find(0)) >= 0:
         raise UserError(f"{path}: byte {nul + 1} is zero: this is no text; give a table as CSV, Parquet or Excel")
@@ -202,46 +197,16 @@ def open_text(path: str, data: bytes, form: Form) -> TextTable:
     if len(data) and lengths.max() > LONGEST:
         i = int(lengths.argmax())
         raise UserError(f"{path}: line {i + 1} has {lengths[i]:,} characters; a row of a table has at most {LONGEST:,}")
-    return TextTable(path, data, form, [] if codec == "utf-8-sig" else [f"read as {codec} text"])
+    return TextTable(path, data, form, [] if plain else [f"read as {codec} text"])
 
 
-def _codec(path: str, data: bytes, given: str | None) -> str:
-    """The encoding of a text, as Python calls it: asked for, marked, or the first that makes sense."""
-    if given:
-        try:
-            "".encode(given)
-        except LookupError as error:
-            raise UserError(f"data.encoding={given}: there is no such text encoding; try utf-8, gbk, cp1251") from error
-        return "utf-8-sig" if given.lower().replace("_", "-") in ("utf-8", "utf8", "utf-8-sig") else given
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return "utf-16"
-    head = data[:HEAD]
-    if head[1:400:2].count(0) > 0.9 * len(head[1:400:2]) > 0:
-        return "utf-16-le"
-    if head[:400:2].count(0) > 0.9 * len(head[:400:2]) > 0:
-        return "utf-16-be"
-    try:
-        data.decode()
-    except UnicodeDecodeError:
-        return _national(data, head)
-    return "utf-8-sig"
-
-
-def _national(data: bytes, head: bytes) -> str:
-    """Of the encodings for Chinese, Cyrillic and Western texts the one that makes most known words of a text."""
-    high = re.findall(rb"[\x80-\xff]+", head)
-    if sum(len(run) == 1 for run in high) > len(high) / 2:
-        return "latin-1"  # single accents among plain letters
-
-    def sense(codec: str) -> int:
-        try:
-            text = data.decode(codec)[:HEAD]
-        except UnicodeDecodeError:
-            return -1
-        cells = re.split(r"[,;\t\n]", text[:2000])
-        return sum(role(*split_unit(cell)) is not None for cell in cells if not cell.isascii())
-
-    return max(("gbk", "cp1251", "latin-1"), key=sense)
+def _unmarked(data: bytes) -> str | None:
+    """The UTF-16 of a text without the mark that tells it: every other byte is zero."""
+    for first, codec in ((1, "utf-16-le"), (0, "utf-16-be")):
+        half = data[first:400:2]
+        if not data.startswith(tuple(MARKS)) and len(half) > 10 and half.count(0) > 0.9 * len(half):
+            return codec
+    return None
 
 
 def _lines(head: bytes, whole: bool) -> list[tuple[int, str]]:

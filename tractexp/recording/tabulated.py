@@ -47,7 +47,8 @@ class Tabular:
     def table_of(self, path: str, told: Sidecar) -> tuple[Table, Mapped]:
         """A table and what its columns are; raises `UserError` for what is no table, or not to be told."""
         table = open_table(path, self._form)
-        return table, mapped(table, {**told.columns, **self.columns}, {**told.units, **self.units})
+        columns, units = {**told.columns, **self.columns}, {**told.units, **self.units}
+        return table, mapped(table, columns, units, told.more)
 
 
 def kind_of(path: str) -> str:

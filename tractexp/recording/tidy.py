@@ -23,8 +23,7 @@ from tractexp.record.record import Record
 from tractexp.recording.recording import Channel, Recording, Segment, Status
 from tractexp.recording.table import Form, open_table
 
-KINDS = ("parquet", "csv")
-UNITS = {"t": "s", "U": "pu", "P": "pu", "Q": "pu", "f": "Hz", "U2": "pu"}
+UNITS = {"t": "s", "U": "pu", "P": "pu", "Q": "pu", "f": "Hz"}  # as data.units; U2 is as U
 
 
 def write_record(record: Record, path: Path) -> list[Path]:
@@ -33,10 +32,13 @@ def write_record(record: Record, path: Path) -> list[Path]:
         "name": record.name,
         "source": record.source,
         "base": asdict(record.base),
-        "units": {name: UNITS[name] for name in record.channels if name in ("U", "P", "Q", "t")},
+        "units": {name: unit for name, unit in UNITS.items() if name in record.channels},
         "notes": list(record.notes),
+        "uniform": True,
+        "window": record.window and record.window.to_dict(),
+        "more": list(record.more),
     }
-    return [_written(record.channels, path), files.write_json(path.with_suffix(".json"), told)]
+    return [_written({**record.channels, **record.more}, path), files.write_json(path.with_suffix(".json"), told)]
 
 
 def write_recording(recording: Recording, path: Path) -> list[Path]:
@@ -88,10 +90,16 @@ def restored(path: str, told: Mapping[str, Any]) -> Recording:
                 for k, one in enumerate(status, 1 + len(channels))
             ],
             list(told["notes"]),
-            dict(told["extra"]),
+            {key: _extra(value) for key, value in told["extra"].items()},
         )  # fmt: skip
     except (KeyError, TypeError, ValueError) as error:
         raise UserError(f"{path}: its sidecar is not as task=convert writes it ({error}); remove it") from error
+
+
+def _extra(value: Any) -> Any:
+    """An array again, or what else it was."""
+    marked = isinstance(value, dict) and set(value) == {"array", "type"}
+    return np.array(value["array"], dtype=value["type"]) if marked else value
 
 
 def recording_of(record: Record) -> Recording:
@@ -138,7 +146,10 @@ def _told(recording: Recording) -> dict[str, Any]:
         "start": recording.start.isoformat() if recording.start else None,
         "trigger": recording.trigger,
         "notes": list(recording.notes),
-        "extra": dict(recording.extra),
+        "extra": {
+            key: {"array": value.tolist(), "type": value.dtype.str} if isinstance(value, np.ndarray) else value
+            for key, value in recording.extra.items()
+        },
     }  # fmt: skip
 
 
