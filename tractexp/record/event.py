@@ -117,9 +117,11 @@ def _scan(t: np.ndarray, U: np.ndarray) -> tuple[list[tuple[int, int]], list[tup
 
 
 def _margin(U: np.ndarray) -> float:
-    """The share of the reference by which a dip must fall."""
+    """The share of the reference by which a dip must fall; a line that is dead for long has no say in it."""
+    if (dead := DEAD * float(U.max()) > U).any() and not dead.all():
+        U = U[~dead]
     spread = np.median(np.abs(np.diff(U))) / 0.6745 / np.sqrt(2)
-    return max(SHALLOWEST, NOISE_FACTOR * float(spread / np.median(U)))
+    return max(SHALLOWEST, NOISE_FACTOR * float(spread / max(float(np.median(U)), 1e-12)))
 
 
 def _swell(t: np.ndarray, U: np.ndarray, k: int, reference: float, margin: float) -> tuple[int, int] | None:
