@@ -9,7 +9,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tractexp.errors import UserError
-from tractexp.recording import Channel, Recording, Segment, Status, comtrade, foreign
+from tractexp.record import foreign
+from tractexp.recording import Channel, Recording, Segment, Status, comtrade
 
 CFG = """Substation,device,1999
 8,6A,2D
