@@ -10,7 +10,6 @@ import argparse
 import json
 import multiprocessing
 import re
-import resource
 import sys
 import tempfile
 import time
@@ -23,6 +22,7 @@ import tractexp  # before NumPy: it keeps BLAS to one thread
 tractexp.__version__  # noqa: B018
 
 import numpy as np  # noqa: E402
+from memory import peak, reset  # noqa: E402
 
 from tractexp import files  # noqa: E402
 from tractexp.api.read import reader_of  # noqa: E402
@@ -255,10 +255,9 @@ def outcome(path):
 def _work(pipe):
     """A process that reads the files it is told, and says how it went, with seconds and growth [MB]."""
     while (path := pipe.recv()) is not None:
-        before, start = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.perf_counter()
+        before, start = reset(), time.perf_counter()
         kind, words, figures = outcome(Path(path))
-        growth = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
-        pipe.send((kind, words, figures, time.perf_counter() - start, growth))
+        pipe.send((kind, words, figures, time.perf_counter() - start, peak() - before))
 
 
 class Worker:
