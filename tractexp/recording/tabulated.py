@@ -22,6 +22,7 @@ VOLTS = 1000.0  # a voltage without a unit that is above it is in V
 NEAR_ONE = (0.3, 3.0)  # and within these it is per unit
 GAP = 1.5  # usual steps: a longer one parts two segments
 EPOCH = 1e6  # s: times beyond it are counted from the first
+HUGE = 1e38  # of a value: no unit makes sense of a greater one
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -232,10 +233,19 @@ def recording(table: Table, found: Mapped, nominal: float) -> Recording:
         )
     numbers = {
         k: "number" for k, name in enumerate(table.heading.names)
-        if name and k != found.columns["t"].number and all(is_number(row[k]) or is_number(row[k], ",") for row in table.sample[:20])
+        if name and k != found.columns["t"].number and all(
+            k < len(row) and (is_number(row[k]) or is_number(row[k], ",")) for row in table.sample[:20]
+        )
     }  # fmt: skip
     t = found.columns["t"]
     cells = table.read({t.number: "time", **numbers})
+    for k in numbers:
+        wild = np.abs(cells[k].values) > HUGE
+        if wild.any():
+            i = int(np.argmax(wild))
+            raise table.refuse(
+                i, k, f"{cells[k].values[i]:g} is not a value up to {HUGE:g}; leave the row out, or correct it"
+            )
     time, note = _counted(cells[t.number].values * (1.0 if cells[t.number].clock else factor(t.role.unit)), None)
     segments, odd = _segments(table, time)
     named = {one.number: key for key, one in found.columns.items()}
