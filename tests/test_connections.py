@@ -242,7 +242,7 @@ def test_skew_is_corrected_by_channel_and_refused_where_a_phase_is_made_of_sever
     turned = np.exp(2j * np.pi * 50 * 3e-4)  # sampled 0.3 ms late
     names = dict(zip(("Ua", "Ub", "Uc", "Ia", "Ib", "Ic"), waves([*BALANCED, *(BALANCED * turned)], t), strict=True))
     made = recording(names, skew={name: 3e-4 for name in ("Ia", "Ib", "Ic")})
-    feeder = Feeder((0, 1, 2), (3, 4, 5))
+    feeder = Feeder((0, 1, 2), (3, 4, 5), "three_phase")
     S = phasors_of(made, feeder, made.segments[0], skew=True).S
     assert np.abs(S.imag).max() < 1e-6
     odd = recording(names, skew={"Ia": 3e-4})

@@ -134,14 +134,9 @@ def test_d_currents_in_another_order_never_pass_for_a_load(tmp_path, order):
     V = phasors(t, DIP)
     path = station(tmp_path, V, (Y * V)[[*order]], t, labels=["", "", "", "", "", ""], names=[*"uvwxyz"])
     currents = [3 + order.index(k) for k in range(3)]
-    try:
-        event = only(path, voltages=[0, 1, 2], currents=[3, 4, 5])
-    except UserError as refused:
-        assert str(currents) in str(refused) or str(currents).replace(" ", "") in str(refused)
-        assert "Traceback" not in str(refused)
-    else:
-        is_right(event)
-        assert event.record.notes
+    with pytest.raises(UserError) as refused:
+        only(path, voltages=[0, 1, 2], currents=[3, 4, 5])
+    assert f"; currents={currents} gives P = 71.4 MW" in str(refused.value)
     is_right(only(path, voltages=[0, 1, 2], currents=currents))
 
 

@@ -18,6 +18,8 @@ class Aron(Connection):
     Source: Aron 1892 (two-wattmeter method); IEEE 1459-2010, 3.2.2.
     """
 
+    usual = {(3, 2, False): {}}
+
     phases: str = "ac"  # in the order of data.currents
 
     def check(self) -> None:

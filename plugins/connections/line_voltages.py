@@ -22,6 +22,9 @@ class LineVoltages(Connection):
     Source: IEEE 1459-2010, 3.2.2 (three-wire systems).
     """
 
+    lines = True
+    usual = {(3, 3, True): {}}
+
     pairs: list[str] = field(default_factory=lambda: ["ab", "bc", "ca"])  # of phases, in the order of data.voltages
 
     def check(self) -> None:

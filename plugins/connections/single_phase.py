@@ -17,6 +17,8 @@ class SinglePhase(Connection):
     Source: IEEE 1459-2010, 3.1.2.
     """
 
+    usual = {(1, 1, False): {}}
+
     def voltage(self) -> np.ndarray:
         return np.eye(1)
 

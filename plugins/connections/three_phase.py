@@ -13,6 +13,8 @@ class ThreePhase(Connection):
     Source: IEEE 1459-2010, 3.2.2.
     """
 
+    usual = {(3, 3, False): {}}
+
     def voltage(self) -> np.ndarray:
         return np.eye(3)
 

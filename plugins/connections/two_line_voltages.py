@@ -22,6 +22,9 @@ class TwoLineVoltages(Connection):
     Source: IEEE 1459-2010, 3.2.2 (three-wire systems); Blondel's theorem.
     """
 
+    lines = True
+    usual = {(2, 3, True): {}, (2, 2, True): {"phases": "ac"}}
+
     pairs: list[str] = field(default_factory=lambda: ["ab", "bc"])  # of phases, in the order of data.voltages
     phases: str = "abc"  # in the order of data.currents; two letters, e.g. ac, where there are two current transformers
 

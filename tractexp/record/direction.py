@@ -14,7 +14,7 @@ TURNS = 0.1  # of |P|: positive power of this size, at normal voltage, is a trai
 REMEDY = "set data.reverse_current=true"
 
 
-def usual(x: np.ndarray, share: float) -> np.ndarray:
+def commonest(x: np.ndarray, share: float) -> np.ndarray:
     """Which of the values (N,), positive, lie within `share` of the level that most of them have; the higher of two."""
     ordered = np.sort(x)
     counts = np.searchsorted(ordered, ordered * (1 + share), "right") - np.searchsorted(ordered, ordered * (1 - share))
@@ -35,7 +35,7 @@ def direction(U: np.ndarray, P: np.ndarray, Q: np.ndarray, polarity: int = 0) ->
     if not len(U):
         return ""
     rough = 3 * float(np.median(np.abs(np.diff(U)))) / float(np.median(U)) if len(U) > 1 else 0.0
-    calm = usual(U, max(CALM, rough))
+    calm = commonest(U, max(CALM, rough))
     level, P0, Q0 = (float(np.median(x[calm])) for x in (U, P, Q))
     spread = float(np.median(np.abs(np.diff(P)))) if len(P) > 1 else 0.0
     if not -NOISY * spread > P0:
@@ -50,10 +50,10 @@ def direction(U: np.ndarray, P: np.ndarray, Q: np.ndarray, polarity: int = 0) ->
         )
         return f"{shown}: its current is counted out of it, or this feeder supplies such loads ({REMEDY})"
     if polarity > 0:
-        return "the negative-sequence current is that of a load: the current is counted rightly, so power is fed back"
+        return "the negative-sequence current is that of a load, so its direction is right and this is regeneration"
     if fell and a < FALLS:
-        return f"{answer}, as a converter's or a generator's: power is fed back (a braking train), no reversed current"
-    return f"{answer}, which tells no reversed current ({REMEDY}) from power that is fed back"
+        return f"{answer}, as a converter's or a generator's: regeneration (a braking train), no reversed current"
+    return f"{answer}, which tells no reversed current ({REMEDY}) from regeneration"
 
 
 def _load_like(a: float, P0: float, Q0: float) -> bool:

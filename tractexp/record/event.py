@@ -117,9 +117,12 @@ def _scan(t: np.ndarray, U: np.ndarray) -> tuple[list[tuple[int, int]], list[tup
 
 
 def _margin(U: np.ndarray) -> float:
-    """The share of the reference by which a dip must fall."""
-    spread = np.median(np.abs(np.diff(U))) / 0.6745 / np.sqrt(2)
-    return max(SHALLOWEST, NOISE_FACTOR * float(spread / np.median(U)))
+    """The share of the reference by which a dip must fall; a voltage that is gone has no noise to exceed."""
+    alive = U[DEAD * U.max() < U]
+    if len(alive) < FEWEST_BEFORE:
+        return SHALLOWEST
+    spread = np.median(np.abs(np.diff(alive))) / 0.6745 / np.sqrt(2)
+    return max(SHALLOWEST, NOISE_FACTOR * float(spread / np.median(alive)))
 
 
 def _swell(t: np.ndarray, U: np.ndarray, k: int, reference: float, margin: float) -> tuple[int, int] | None:
@@ -129,6 +132,8 @@ def _swell(t: np.ndarray, U: np.ndarray, k: int, reference: float, margin: float
     if not back.any():
         return None
     end = first + int(np.argmax(back))
+    near = np.flatnonzero(U[:first] <= (1 + margin / 10) * reference)
+    first = int(near[-1]) + 1 if len(near) else first
     landed = float(np.median(U[end : end + FEWEST_BEFORE])) >= (1 - margin) * reference
     return (first, end) if landed or t[end] - t[first] <= STEADY else None
 
@@ -152,7 +157,7 @@ def detect(record: Record) -> Event:
 
     An interruption, an open pole and a step are refused by their names.
     """
-    dips, swells = _scan(record.t, record.U)
+    dips = find_dips(record.t, record.U)
     if not dips:
         raise UserError(_no_dip(record))
     start, end = dips[0]
@@ -163,7 +168,7 @@ def detect(record: Record) -> Event:
         )
     if told := _no_such_dip(record, start, end):
         raise UserError(f"{record.where}: {told}")
-    steady = _steady(record, start, swells)
+    steady = steady_before(record.t, record.U, start)
     t, U, P, Q = (values[steady] for values in (record.t, record.U, record.P, record.Q))
     if np.count_nonzero(np.isfinite(P) & np.isfinite(Q)) < FEWEST_BEFORE:
         raise UserError(
@@ -188,19 +193,23 @@ def detect(record: Record) -> Event:
     )
 
 
-def _steady(record: Record, start: int, swells: list[tuple[int, int]]) -> slice:
-    """The last second before the dip, or before a swell that leaves too little room behind it."""
-    most = max(FEWEST_BEFORE, round(STEADY * record.rate))
-    least = max(FEWEST_BEFORE, round(0.1 * record.rate))
-    stop, first = start, max(0, start - most)
-    for begin, end in reversed([swell for swell in swells if swell[0] < start]):
-        if end <= first:
+def steady_before(t: np.ndarray, U: np.ndarray, start: int, first: int = 0) -> slice:
+    """The last second before a dip at sample `start`, from `first` on at most.
+
+    Where a swell leaves too little room between itself and the dip it is the last second before the swell.
+    """
+    rate = (len(t) - 1) / float(t[-1] - t[0])
+    least, most = (max(FEWEST_BEFORE, round(x * rate)) for x in (STEADY / 10, STEADY))
+    stop, begin = start, max(first, start - most)
+    swells = [(a + first, b + first) for a, b in _scan(t[first:], U[first:])[1] if a + first < start]
+    for rises, falls in reversed(swells):
+        if falls <= begin:
             break
-        if stop - end >= least or begin < FEWEST_BEFORE:
-            first = min(end, stop - FEWEST_BEFORE)
+        if stop - falls >= least or rises - first < FEWEST_BEFORE:
+            begin = min(falls, stop - FEWEST_BEFORE)
             break
-        stop, first = begin, max(0, begin - most)
-    return slice(max(first, 0), stop)
+        stop, begin = rises, max(first, rises - most)
+    return slice(max(begin, first), stop)
 
 
 def _no_such_dip(record: Record, start: int, end: int) -> str:

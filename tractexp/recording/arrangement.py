@@ -8,13 +8,15 @@ other one, never silently changed, because two orders can both look plausible wh
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations
+from typing import Any
 
 import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.plugin import chosen
-from tractexp.record.direction import direction, usual
+from tractexp.record.direction import commonest, direction
 from tractexp.record.phasor import sequences
+from tractexp.recording.connection import usual
 from tractexp.recording.feeder import Feeder
 from tractexp.recording.label import groups, kind, order
 from tractexp.recording.recording import Recording
@@ -73,11 +75,11 @@ def arranged(recording: Recording, feeder: Feeder) -> Feeder:
     if len(seen.V) < 3:
         return _directed(feeder, seen)
     _lines(recording, feeder)
-    if connection.name == "three_phase" and (told := _lines_by_shape(recording, feeder, seen)):
-        feeder = replace(feeder, connection="line_voltages", why=(*feeder.why, told))
+    if _to_ground(feeder) and (told := _lines_by_shape(recording, feeder, seen)):
+        feeder = replace(feeder, connection=_between(feeder), why=(*feeder.why, told))
         seen = _seen(recording, feeder) or seen
     _voltages(recording, feeder, seen)
-    if connection.currents == 3 and connection.name in ("three_phase", "line_voltages", "two_line_voltages"):
+    if connection.currents == 3 == len(seen.V):
         _labels(recording, feeder, seen)
         _currents(recording, feeder, seen)
     return _directed(feeder, seen)
@@ -86,23 +88,33 @@ def arranged(recording: Recording, feeder: Feeder) -> Feeder:
 def _lines_by_label(recording: Recording, feeder: Feeder) -> Feeder:
     """Voltages that their labels call line to line, put in the order AB, BC, CA."""
     told = order([recording.channels[i] for i in feeder.voltages]) if len(feeder.voltages) == 3 else None
-    if feeder.connection != "three_phase" or told is None or not told[1]:
+    if not _to_ground(feeder) or told is None or not told[1]:
         return feeder
     voltages = tuple(feeder.voltages[told[0].index(k)] for k in range(3))
     names = ", ".join(f"'{recording.channels[i].name}'" for i in voltages)
-    why = f"the voltages {names} are line to line, as their labels say: data.connection=line_voltages is used"
-    return replace(feeder, voltages=voltages, connection="line_voltages", why=(*feeder.why, why))
+    why = f"the voltages {names} are line to line, as their labels say: data.connection={_between(feeder)} is used"
+    return replace(feeder, voltages=voltages, connection=_between(feeder), why=(*feeder.why, why))
+
+
+def _to_ground(feeder: Feeder) -> bool:
+    """Whether three voltages are taken as they stand, to ground."""
+    return len(feeder.voltages) == 3 and feeder.connection == usual(3, len(feeder.currents))
+
+
+def _between(feeder: Feeder) -> Any:
+    """The connection of the same channels with the voltages between phases."""
+    return usual(len(feeder.voltages), len(feeder.currents), lines=True)
 
 
 def _lines(recording: Recording, feeder: Feeder) -> None:
     """Refuse phase voltages where line-to-line ones are asked for."""
-    told, name = order([recording.channels[i] for i in feeder.voltages]), chosen("connection", feeder.connection).name
-    if name not in ("line_voltages", "two_line_voltages") or told is None or told[1]:
+    told = order([recording.channels[i] for i in feeder.voltages])
+    if feeder.connection != _between(feeder) or told is None or told[1]:
         return
     names = ", ".join(f"{i} '{recording.channels[i].name}' [{recording.channels[i].unit}]" for i in feeder.voltages)
     raise UserError(
-        f"data.voltages={[*feeder.voltages]} must name three channels with data.connection=three_phase: {names} are "
-        f"labelled as phases to ground, and data.connection={name} takes line-to-line voltages"
+        f"data.voltages={[*feeder.voltages]} must name three channels: {names} are labelled as phases to ground, "
+        f"where data.connection={feeder.connection} takes line-to-line voltages"
     )
 
 
@@ -124,7 +136,7 @@ def _seen(recording: Recording, feeder: Feeder) -> _Seen | None:
     if not alive.any():
         return None
     V, I, size = V[:, alive], I[:, alive], size[alive]
-    calm = usual(size, CALM)
+    calm = commonest(size, CALM)
     if len(V) == 3:
         small, large = np.sort(np.abs(sequences(V)), axis=0)  # whatever the order is
         calm = even if (even := calm & (small < UNBALANCED * large)).any() else calm
@@ -137,7 +149,7 @@ def _zero(x: np.ndarray) -> np.ndarray:
 
 def _lines_by_shape(recording: Recording, feeder: Feeder, seen: _Seen) -> str:
     """Why three voltages must be line to line though no label says so; "" where nothing shows it."""
-    used = "they are line to line, and data.connection=line_voltages is used"
+    used = f"they are line to line, and data.connection={_between(feeder)} is used"
     V1, V2 = (np.abs(x) for x in sequences(seen.V))
     I0, I1 = _zero(seen.I), np.median(np.abs(sequences(seen.I)[0])[seen.calm])
     fault = (V2 > UNBALANCED * V1) & (I0 > EARTH * I1) & (5 * np.median(I0[seen.calm]) < I0)
@@ -169,7 +181,7 @@ def _voltages(recording: Recording, feeder: Feeder, seen: _Seen) -> None:
     V1, V2 = (float(np.median(np.abs(x)[seen.calm])) for x in sequences(seen.V))
     if V2 <= V1:
         return
-    if feeder.connection == "three_phase" and (k := _turned(seen.V[:, seen.calm])) is not None:
+    if _to_ground(feeder) and (k := _turned(seen.V[:, seen.calm])) is not None:
         raise UserError(f"data.voltages={[*feeder.voltages]}: {_called(recording, feeder.voltages[k])} {TURNED}")
     raise UserError(
         f"data.voltages={[*feeder.voltages]}: the phases are not in the order a, b, c: while alive, the negative "

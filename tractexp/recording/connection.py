@@ -1,11 +1,12 @@
 """What a connection plugin must do: turn the channels that were recorded into the voltages and currents of a load."""
 
 from abc import abstractmethod
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 
-from tractexp.plugin import Plugin
+from tractexp.plugin import Plugin, discover
 
 SINGLE = (
     "a single-phase load: U is its own voltage, P + jQ = V I* of the fundamental; static loads and converters' effects "
@@ -22,6 +23,9 @@ class Connection(Plugin):
 
     group: ClassVar[str] = "connection"
     chosen: ClassVar[bool] = False
+    lines: ClassVar[bool] = False  # its voltages are measured between phases
+    # {(voltages, currents, between phases): settings}: it is taken for so many channels where nothing else is said
+    usual: ClassVar[Mapping[tuple[int, int, bool], Mapping[str, Any]]] = {}
 
     @abstractmethod
     def voltage(self) -> np.ndarray:
@@ -45,3 +49,12 @@ class Connection(Plugin):
     def notes(self) -> tuple[str, ...]:
         """What is said with every record that is connected so, one sentence each."""
         return (SINGLE,) if len(self.voltage()) == 1 else ()
+
+
+def usual(voltages: int, currents: int, lines: bool = False) -> Any:
+    """The connection that so many channels say, voltages between phases or to ground; None where none does."""
+    for name, cls in sorted(discover()[Connection.group].items()):
+        settings = getattr(cls, "usual", {}).get((voltages, currents, lines))
+        if settings is not None:
+            return {"name": name, **settings} if settings else name
+    return None

@@ -11,14 +11,13 @@ from tractexp.errors import UserError
 from tractexp.plugin import build
 from tractexp.record import Event, Record, detect
 from tractexp.record.phasor import Phasors
+from tractexp.recording.connection import usual
 from tractexp.recording.feeder import Feeder, propose
 from tractexp.recording.happening import Happening, happenings, happenings_of
 from tractexp.recording.measure import phasors_of, waves_of
 from tractexp.recording.quality import Quality, quality
 from tractexp.recording.reader import Dip, WaveformReader
 from tractexp.recording.recording import Recording
-
-USUAL = Feeder((), ())  # what a reader takes where nothing else is said
 
 
 @dataclass(frozen=True)
@@ -107,7 +106,7 @@ def view_of(source: str, node: Mapping[str, Any]) -> View:
     if not isinstance(reader, WaveformReader):
         read = reader.read()
         return View(source, node, [sight_of(record, {}) for record in (*read.train, *read.validate)])
-    recording = reader.recording()
+    recording = reader.opened()
     if reader.voltages or reader.currents:
         return View(source, node, [sight(reader, recording, reader.feeder(recording))], recording)
     return View(source, node, overview(reader, recording), recording)
@@ -202,5 +201,8 @@ def _why(what: Happening, event: Event | None, refused: str) -> str:
 
 def _settings(feeder: Feeder) -> dict[str, Any]:
     """The settings of a reader that reads this load."""
-    told = {k: getattr(feeder, k) for k in ("connection", "reverse_current") if getattr(feeder, k) != getattr(USUAL, k)}
+    told = {"reverse_current": True} if feeder.reverse_current else {}
+    counts = len(feeder.voltages), len(feeder.currents)
+    if feeder.connection != usual(*counts, lines=counts[0] == 2):
+        told["connection"] = feeder.connection
     return {"voltages": list(feeder.voltages), "currents": list(feeder.currents), **told}

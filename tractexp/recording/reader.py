@@ -11,16 +11,16 @@ import numpy as np
 from tractexp import plugin
 from tractexp.errors import UserError, check_range
 from tractexp.record import Base, Events, Reader, Record, detect, find_dips
-from tractexp.record.event import FEWEST_BEFORE, STEADY
+from tractexp.record.event import FEWEST_BEFORE, steady_before
 from tractexp.record.phasor import Phasors
-from tractexp.recording.arrangement import arranged
+from tractexp.recording.arrangement import arranged, tuned
+from tractexp.recording.connection import usual
 from tractexp.recording.feeder import Feeder, propose
+from tractexp.recording.label import order
 from tractexp.recording.measure import phasors_of
 from tractexp.recording.recording import Recording
 
 COUNT = {1: "one", 2: "two", 3: "three"}
-# {channels of voltage and of current: the connection that they say where none is given}
-USUAL = {(1, 1): "single_phase", (2, 3): "two_line_voltages", (3, 2): "aron", (2, 2): "aron"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +51,13 @@ class WaveformReader(Reader):
     reverse_current: bool = False  # true where the recorder counts current out of the load as positive
     skew: bool = False  # true: correct the time skew of each channel given in the file
 
+    def opened(self) -> Recording:
+        """The file, at the nominal frequency that its voltages really have."""
+        recording = self.recording()
+        chosen = [recording.number(each, "data.voltages") for each in self.voltages]
+        every = [i for i, c in enumerate(recording.channels) if c.quantity == "voltage" and c.form == "waveform"]
+        return tuned(recording, chosen or every)
+
     @abstractmethod
     def recording(self) -> Recording:
         """The file as it was recorded, all channels; raises `UserError` naming the file, the place and the value."""
@@ -68,7 +75,7 @@ class WaveformReader(Reader):
         check_range("data.post", self.post, 0.1)
 
     def read(self) -> Events:
-        recording = self.recording()
+        recording = self.opened()
         feeder = self.feeder(recording)
         dips, tried = self.numbered(feeder, self._streams(recording, feeder), recording.frequency)
         usable = [number for number, made in tried.items() if isinstance(made, Record)]
@@ -110,7 +117,7 @@ class WaveformReader(Reader):
         """The channels asked for, or those of the only load that the file shows."""
         if not (self.voltages or self.currents):
             return self._only(recording)
-        name = self.connection or USUAL.get((len(self.voltages), len(self.currents)), "three_phase")
+        name = self.connection or self._usual(recording)
         connection, made = plugin.chosen("connection", name), {}
         for key, wanted in (("voltages", connection.voltages), ("currents", connection.currents)):
             given = getattr(self, key)
@@ -130,6 +137,14 @@ class WaveformReader(Reader):
                         f"{recording.channels[i].unit}; choose {key}"
                     )
         return arranged(recording, Feeder(**made, connection=name, reverse_current=self.reverse_current))
+
+    def _usual(self, recording: Recording) -> Any:
+        """The connection that the number of channels says; two voltages to ground say none."""
+        counts = len(self.voltages), len(self.currents)
+        channels = [recording.channels[recording.number(each, "data.voltages")] for each in self.voltages]
+        told = order(channels) if counts[0] == 2 else None
+        two = counts[0] == 2 and not (told and not told[1])
+        return usual(*counts, lines=two) or usual(3, 3)
 
     def _only(self, recording: Recording) -> Feeder:
         """The only load that the file shows. Raises `UserError` naming all, where there is not one."""
@@ -159,8 +174,7 @@ class WaveformReader(Reader):
                 f"{self.path}: none of the {len(dips)} dips has {FEWEST_BEFORE} phasors before it, which the steady "
                 "state needs; give a record with a longer pre-fault time"
             )
-        before = dip.phasors.t[dip.start] - STEADY <= dip.phasors.t
-        before[: dip.first] = before[dip.start :] = False
+        before = steady_before(dip.phasors.t, np.abs(dip.phasors.V1), dip.start, dip.first)
         U = float(dip.phasors.U[before].mean())
         S = float(np.abs(dip.phasors.S[before].mean()))
         if S < 1e-6:
@@ -197,9 +211,8 @@ class WaveformReader(Reader):
 
     def _notes(self, recording: Recording, feeder: Feeder, dips: list[Dip]) -> tuple[str, ...]:
         step = dips[0].phasors.t[1] - dips[0].phasors.t[0]
-        notes = [*recording.notes, *feeder.why]
         kind = plugin.chosen("estimator", self.estimator).name.replace("_", "-")
-        notes.append(f"{kind} phasors every {1000 * step:.3g} ms, {len(dips)} dips found")
+        notes = [f"{kind} phasors every {1000 * step:.3g} ms, {len(dips)} dips found", *recording.notes, *feeder.why]
         fast = recording.waveforms()
         slow = [s for s in recording.segments if s not in fast]
         if slow:
