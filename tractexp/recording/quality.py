@@ -45,7 +45,7 @@ def quality(recording: Recording, number: int, segment: Segment) -> Quality:
     gaps = int(np.count_nonzero(~known)) + holes
     step, span = _step(channel, x[known])
     f = _frequency(recording, number, segment)
-    clipped = _clipped(channel, x, segment, f or recording.frequency)
+    clipped = _clipped(channel, x, segment, f or recording.frequency, step)
     offset, level, noise, lag, count, thd = _quiet(x, segment.rate, f)
     colour = _colour(lag, count, noise, step)
     return Quality(
@@ -83,7 +83,7 @@ def _step(channel: Channel, x: np.ndarray) -> tuple[float, float]:
     return (float(steps.min()) if len(steps) else 0.0), span
 
 
-def _clipped(channel: Channel, x: np.ndarray, segment: Segment, f: float) -> float:
+def _clipped(channel: Channel, x: np.ndarray, segment: Segment, f: float, step: float) -> float:
     """Share of samples in runs at a limit: the converter's where it is known, else the greatest and least value."""
     if len(x) < 10 or not np.isfinite(x).any():
         return 0.0
@@ -98,7 +98,7 @@ def _clipped(channel: Channel, x: np.ndarray, segment: Segment, f: float) -> flo
         at |= (raw <= least) | (raw >= most)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], at, [False]]).astype(int)))
     lengths = edges[1::2] - edges[::2]
-    usual = _blunt(x, segment.rate / f, near)
+    usual = _blunt(x, segment.rate / f, near + step)
     return float(lengths[lengths >= max(CLIPPED, usual)].sum() / len(x))
 
 
