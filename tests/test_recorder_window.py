@@ -10,6 +10,7 @@ from test_discrepancy import base, events
 from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.recorder_window import RecorderWindow, averaged, windows_of
+from tractexp.plugin import chosen
 
 FEW = ("stator_resistance", "exponential_recovery", "second_motor_group")
 
@@ -45,9 +46,30 @@ def test_the_voltage_reckoned_back_is_that_which_was_averaged(cycles):
 
 def test_windows_are_whole_cycles_that_the_sampling_resolves():
     (event,) = events(count=1)
-    assert windows_of([event]) == pytest.approx({k: 0.02 * k for k in (1, 2, 3, 4, 5, 6)})
+    assert [w.window for w in windows_of([event])] == pytest.approx([0.02 * k for k in (1, 2, 3, 4, 5, 6)])
     slow = replace(event, record=replace(event.record, t=event.record.t * 10))
-    assert min(windows_of([slow])) * 0.02 >= 2 * slow.record.step
+    assert min(w.window for w in windows_of([slow])) >= 2 * slow.record.step
+
+
+def test_a_window_that_the_records_say_is_the_only_one_tried():
+    (event,) = events(count=1)
+    said = replace(event, record=replace(event.record, window=chosen("estimator", "p_class").window(50.0)))
+    (window,) = windows_of([said, said])
+    assert window.window == pytest.approx(0.04)
+    assert "p_class" in window.describe()
+    assert len(windows_of([said, event])) == 6  # where they contradict each other it is searched for
+
+
+def test_what_a_triangle_did_is_undone():
+    (event,) = events(count=1)
+    known = chosen("estimator", "p_class").window(50.0)
+    recorder = RecorderWindow(known.length, known)
+    weights = recorder.weights(event.record.step)
+    U = np.convolve(np.pad(event.record.U, len(weights) // 2, "edge"), weights, "valid")
+    back = recorder.sharpened(replace(event, record=replace(event.record, U=U))).record.U
+    shows, error = U - event.record.U, back - event.record.U
+    assert np.abs(shows).max() > 0.01
+    assert error @ error < 0.2 * (shows @ shows)
 
 
 def test_a_window_of_phasors_is_no_missing_effect():

@@ -1,5 +1,6 @@
-"""The one door through which files are written: whole, or not at all."""
+"""Where files are, and the one door through which they are written: whole, or not at all."""
 
+import importlib.resources
 import json
 import math
 import os
@@ -8,6 +9,20 @@ from pathlib import Path
 from typing import Any
 
 from tractexp.errors import UserError
+
+
+PACKAGE = "pkg://"  # starts the path of a file inside an installed package
+
+
+def located(path: str) -> Path:
+    """The path of a file that may be named as `pkg://package/file`; raises `UserError` for an unknown package."""
+    if not path.startswith(PACKAGE):
+        return Path(path)
+    package, _, name = path.removeprefix(PACKAGE).partition("/")
+    try:
+        return Path(str(importlib.resources.files(package))) / name
+    except (ImportError, ValueError) as error:
+        raise UserError(f"{path}: there is no installed package '{package}'") from error
 
 
 def write(path: Path | str, content: str | bytes) -> Path:

@@ -1,7 +1,6 @@
 """Records from COMTRADE fault recordings: the dips of one file, numbered in order of time."""
 
-from pathlib import Path
-
+from tractexp.files import located
 from tractexp.plugin import plugin
 from tractexp.recording import Recording, comtrade
 from tractexp.recording.reader import WaveformReader
@@ -27,4 +26,4 @@ class COMTRADE(WaveformReader):
     encoding: str | None = None  # of the .cfg; null: found from its letters among utf-8, gbk, cp1251 and latin-1
 
     def recording(self) -> Recording:
-        return comtrade.load(Path(self.path), self.encoding)
+        return comtrade.load(located(self.path), self.encoding)

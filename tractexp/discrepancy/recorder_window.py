@@ -15,7 +15,7 @@ import numpy as np
 
 from tractexp.model.drive import Drive
 from tractexp.model.parts import Measurement
-from tractexp.record import Event
+from tractexp.record import Event, Window
 
 CYCLES = (1, 2, 3, 4, 5, 6)
 EDGE = 0.05  # s on either side of a window around an edge, in which the voltage may bend
@@ -25,23 +25,29 @@ ERROR = 2e-4  # pu: how exactly the averaged voltage must be the recorded one, i
 
 @dataclass(frozen=True, eq=False)
 class RecorderWindow(Measurement):
-    """A recorder that forms phasors over a window [s]."""
+    """A recorder that forms phasors over a window [s]: a plain mean, or what the records say it was."""
 
     window: float
+    known: Window | None = None
 
     def __repr__(self) -> str:
-        return f"RecorderWindow({self.window})"
+        return f"RecorderWindow({self.window}{f', {self.known.name}' if self.known else ''})"
 
     def describe(self) -> str:
         """The window, as a run tells it."""
-        return f"the recorder averages phasors over {1000 * self.window:.0f} ms"
+        said = f", as the record says ({self.known.name})" if self.known else ""
+        return f"the recorder averages phasors over {1000 * self.window:.0f} ms{said}"
+
+    def weights(self, step: float) -> np.ndarray:
+        """What each sample, `step` [s] apart, counts around the middle one, (odd,)."""
+        return _weights(self.window / step) if self.known is None else self.known.on(step)
 
     def observe(self, power: np.ndarray, drive: Drive, values: dict[str, np.ndarray]) -> np.ndarray:
         shown = np.empty_like(power)
         for e in range(drive.events):
-            part, samples = drive.part(e), self.window / drive.event[e, -1]
+            part, weights = drive.part(e), self.weights(drive.event[e, -1])
             u = drive.inputs[0, part]
-            shown[:, :, part] = averaged(power[:, :, part] / u, samples) * averaged(u, samples)
+            shown[:, :, part] = _mean(power[:, :, part] / u, weights) * _mean(u, weights)
         return shown
 
     def sharpened(self, event: Event) -> Event:
@@ -50,7 +56,7 @@ class RecorderWindow(Measurement):
         from scipy.sparse.linalg import spsolve
 
         samples, U = self.window / event.record.step, event.record.U
-        weights = _weights(samples)
+        weights = self.weights(event.record.step)
         n, wide = len(U), len(U) + len(weights) - 1
         box = diags_array(list(weights), offsets=list(range(len(weights))), shape=(n, wide))
         bend = diags_array([1.0, -2.0, 1.0], offsets=[0, 1, 2], shape=(wide - 2, wide))
@@ -65,7 +71,10 @@ class RecorderWindow(Measurement):
 
 def averaged(y: np.ndarray, samples: float) -> np.ndarray:
     """Mean of y (..., N) over a window around each sample, y linear between samples and constant beyond its ends."""
-    weights = _weights(samples)
+    return _mean(y, _weights(samples))
+
+
+def _mean(y: np.ndarray, weights: np.ndarray) -> np.ndarray:
     ends = [(0, 0)] * (y.ndim - 1) + [(len(weights) // 2,) * 2]
     return np.lib.stride_tricks.sliding_window_view(np.pad(y, ends, "edge"), len(weights), axis=-1) @ weights
 
@@ -80,8 +89,14 @@ def _weights(samples: float) -> np.ndarray:
     return np.r_[half[:0:-1], 2 * half[0], half[1:]] / samples
 
 
-def windows_of(events: Sequence[Event]) -> dict[int, float]:
-    """The windows [s] that recorders of these events may have, by cycles: shorter than what came before the dip."""
+def windows_of(events: Sequence[Event]) -> list[RecorderWindow]:
+    """The windows that recorders of these events may have: the one they say, else whole cycles, shortest first.
+
+    None is longer than what came before the dip, or too short for the sampling to show.
+    """
     cycle, step = 1 / events[0].record.base.frequency, events[0].record.step
     before = min(e.start * e.record.step for e in events)
-    return {k: k * cycle for k in CYCLES if 2 * step <= k * cycle < before}
+    said = {e.record.window.name if e.record.window else "": e.record.window for e in events}
+    (known, *others) = said.values()
+    lengths = [known.length] if known and not others else [k * cycle for k in CYCLES]
+    return [RecorderWindow(w, None if others else known) for w in lengths if 2 * step <= w < before]

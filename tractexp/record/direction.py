@@ -14,7 +14,7 @@ TURNS = 0.1  # of |P|: positive power of this size, at normal voltage, is a trai
 REMEDY = "set data.reverse_current=true"
 
 
-def commonest(x: np.ndarray, share: float) -> np.ndarray:
+def at_level(x: np.ndarray, share: float) -> np.ndarray:
     """Which of the values (N,), positive, lie within `share` of the level that most of them have; the higher of two."""
     ordered = np.sort(x)
     counts = np.searchsorted(ordered, ordered * (1 + share), "right") - np.searchsorted(ordered, ordered * (1 - share))
@@ -35,7 +35,7 @@ def direction(U: np.ndarray, P: np.ndarray, Q: np.ndarray, polarity: int = 0) ->
     if not len(U):
         return ""
     rough = 3 * float(np.median(np.abs(np.diff(U)))) / float(np.median(U)) if len(U) > 1 else 0.0
-    calm = commonest(U, max(CALM, rough))
+    calm = at_level(U, max(CALM, rough))
     level, P0, Q0 = (float(np.median(x[calm])) for x in (U, P, Q))
     spread = float(np.median(np.abs(np.diff(P)))) if len(P) > 1 else 0.0
     if not -NOISY * spread > P0:

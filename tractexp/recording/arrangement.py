@@ -14,7 +14,7 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.plugin import chosen
-from tractexp.record.direction import commonest, direction
+from tractexp.record.direction import at_level, direction
 from tractexp.record.phasor import sequences
 from tractexp.recording.connection import usual
 from tractexp.recording.feeder import Feeder
@@ -108,13 +108,13 @@ def _between(feeder: Feeder) -> Any:
 
 def _lines(recording: Recording, feeder: Feeder) -> None:
     """Refuse phase voltages where line-to-line ones are asked for."""
-    told = order([recording.channels[i] for i in feeder.voltages])
-    if feeder.connection != _between(feeder) or told is None or told[1]:
+    told, connection = order([recording.channels[i] for i in feeder.voltages]), chosen("connection", feeder.connection)
+    if not connection.lines or told is None or told[1]:
         return
     names = ", ".join(f"{i} '{recording.channels[i].name}' [{recording.channels[i].unit}]" for i in feeder.voltages)
     raise UserError(
-        f"data.voltages={[*feeder.voltages]} must name three channels: {names} are labelled as phases to ground, "
-        f"where data.connection={feeder.connection} takes line-to-line voltages"
+        f"data.voltages={[*feeder.voltages]}: {names} are labelled as phases to ground, and "
+        f"data.connection={connection.name} takes line-to-line voltages; give three channels to ground, or lines"
     )
 
 
@@ -136,7 +136,7 @@ def _seen(recording: Recording, feeder: Feeder) -> _Seen | None:
     if not alive.any():
         return None
     V, I, size = V[:, alive], I[:, alive], size[alive]
-    calm = commonest(size, CALM)
+    calm = at_level(size, CALM)
     if len(V) == 3:
         small, large = np.sort(np.abs(sequences(V)), axis=0)  # whatever the order is
         calm = even if (even := calm & (small < UNBALANCED * large)).any() else calm
