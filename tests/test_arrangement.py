@@ -50,6 +50,7 @@ class TestLineVoltages:
         found = arranged(record, GIVEN)
         assert found.connection == "line_voltages"
         assert "line to line, as their labels say" in found.why[0]
+        assert ("U21 as V1 - V2" in found.why[0]) == ("U21" in names)
         assert power(record, found) == pytest.approx(power(made(phase, load(dip(T))), GIVEN), rel=0.002)
 
     def test_given_in_another_order_are_put_right(self):

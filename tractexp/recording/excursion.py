@@ -1,7 +1,7 @@
 """Where a voltage leaves its sliding reference, and when it is back: IEC 61000-4-30, with finer thresholds.
 
 The standard's 10 % would hide dips that a load answers; here a voltage that leaves its reference by 3 % (positive
-sequence, what models are driven by) or 5 % (any phase, the standard's default for a rapid voltage change) has left.
+sequence, what models are driven by) or 5 % (any phase, as for the standard's rapid voltage changes) has left.
 Hysteresis 2 % of the reference as in the standard, which also gives the reference's time constant, a minute.
 """
 
@@ -12,7 +12,7 @@ import numpy as np
 from tractexp.recording.trace import Trace
 
 LEAVES = 0.03  # of the reference, positive sequence
-LEAVES_PHASE = 0.05  # of the reference, any phase (IEC 61000-4-30:2015, 5.11)
+LEAVES_PHASE = 0.05  # of the reference, any phase (of the 1 to 6 % considered in IEC 61000-4-30:2015, 5.11)
 HYSTERESIS = 0.02  # of the reference (IEC 61000-4-30, 5.4.2)
 DIP = 0.1  # of the reference: what the standard calls a dip or a swell (5.4), over once it is within 8 %
 REGAINED = 0.2  # of the deviation: what may be missing when it counts as over, as in `find_dips`

@@ -109,6 +109,11 @@ def order(channels: Sequence[Channel]) -> tuple[tuple[int, ...], bool] | None:
     return None
 
 
+def backward(channels: Sequence[Channel]) -> bool:
+    """Whether the names of line-to-line voltages count down: U21, BA."""
+    return all(any(key.endswith("-") for key, *_ in _marks(plain(f"{c.name}"))) for c in channels)
+
+
 def _by_name(channels: Mapping[int, Channel], full: bool, counters: bool, size: int) -> list[Group]:
     """Groups of names that are equal but for the mark; with their circuits where `full`."""
     buckets: dict[tuple[str, str, bool], dict[int, list[int]]] = defaultdict(lambda: defaultdict(list))
