@@ -15,6 +15,7 @@ from tractexp.record.event import FEWEST_BEFORE, STEADY
 from tractexp.record.phasor import Phasors
 from tractexp.recording.arrangement import arranged, tuned
 from tractexp.recording.connection import usual
+from tractexp.recording.estimator import estimator_of
 from tractexp.recording.feeder import Feeder, propose
 from tractexp.recording.label import order
 from tractexp.recording.measure import phasors_of
@@ -42,7 +43,7 @@ class WaveformReader(Reader):
     voltages: list[Any] = field(default_factory=list)  # channels in the order a, b, c: numbers from 0, or names
     currents: list[Any] = field(default_factory=list)  # channels, counted positive into the load
     connection: Any = None  # how the channels are connected, a name or name and settings; null: by how many they are
-    estimator: Any = "one_cycle"  # of the phasors, a name or name and settings
+    estimator: Any = None  # of the phasors, a name or name and settings; null: one cycle
     harmonics: list[int] = field(default_factory=list)  # whose powers P_h, with THD_u and THD_i, the record holds
     train: list[int] | None = None  # dips to fit; null: the first that can be used
     validate: list[int] | None = None  # dips held out; null: every other one that can be used
@@ -201,7 +202,7 @@ class WaveformReader(Reader):
             base=base,
             source=f"{self.path} dip {number}",
             notes=plugin.chosen("connection", feeder.connection).notes,
-            window=plugin.chosen("estimator", self.estimator).window(base.frequency),
+            window=estimator_of(self.estimator).window(base.frequency),
             more=base.per_unit({name: values[window] for name, values in dip.phasors.more.items()}),
         )
         try:
@@ -212,7 +213,7 @@ class WaveformReader(Reader):
 
     def _notes(self, recording: Recording, feeder: Feeder, dips: list[Dip]) -> tuple[str, ...]:
         step = dips[0].phasors.t[1] - dips[0].phasors.t[0]
-        kind = plugin.chosen("estimator", self.estimator).name.replace("_", "-")
+        kind = estimator_of(self.estimator).name.replace("_", "-")
         notes = [f"{kind} phasors every {1000 * step:.3g} ms, {len(dips)} dips found", *recording.notes, *feeder.why]
         fast = recording.waveforms()
         slow = [s for s in recording.segments if s not in fast]
