@@ -136,7 +136,7 @@ def test_d_currents_in_another_order_never_pass_for_a_load(tmp_path, order):
     currents = [3 + order.index(k) for k in range(3)]
     with pytest.raises(UserError) as refused:
         only(path, voltages=[0, 1, 2], currents=[3, 4, 5])
-    assert f"data.currents={currents}" in str(refused.value)
+    assert f"; currents={currents} gives P = 71.4 MW" in str(refused.value)
     is_right(only(path, voltages=[0, 1, 2], currents=currents))
 
 

@@ -336,7 +336,7 @@ class TestRealRecordings:
         events = read(path, voltages=[0, 1, 2], currents=[15, 16, 17])
         refused = [note for note in events.train[0].notes if note.startswith("not used for validation")]
         said = f"{1 + len(events.validate) + len(refused)} dips found"
-        assert said in events.train[0].notes[0]
+        assert any(said in note for note in events.train[0].notes)
         assert "dip 1: the dip starts at sample" in refused[0]  # the file begins within a swing
         assert "the record is shorter than the dip" in refused[-1]  # and ends within one
 

@@ -105,11 +105,15 @@ class TestWhatIsRefused:
             ("", r"dip.csv: the file is empty; it must start with a line naming the columns t,U,P,Q"),
             ("# only a remark\n", "the file is empty"),
             ("t,U,P,Q\n", "there are no rows below the header line"),
-            (text(header="time,U,P,Q"), "column t is missing; the header line must name t, U, P, Q and names time, U"),
+            (
+                text(header="when,U,P,Q"),
+                "column t is missing; the header line names when, U, P, Q; .*data.columns={t: '",
+            ),
             (text(header="t,U,P,X"), "column Q is missing"),
-            (text(rows()[:, [0, 1, 2, 3, 3]], "t,U,P,Q,Q"), "column Q occurs 2 times; keep one"),
+            (text(rows()[:, [0, 1, 2, 3, 3]], "t,U,P,Q,Q"), "Q could be any of the columns 'Q', 'Q'; say which"),
             (with_cell(5, 2, "abc"), "dip.csv: line 5, column P: 'abc' is not a number"),
-            (with_cell(5, 3, ""), "line 5, column Q: the cell is empty; a gap in P or Q is written nan"),
+            (with_cell(5, 1, ""), "line 5, column U: the cell is empty; only P and Q may have gaps"),
+            (with_cell(5, 1, "#N/A"), "line 5, column U: '#N/A' stands for no value; only P and Q may have gaps"),
             (with_cell(5, 1, "nan"), "dip.csv: line 5: U = nan is not a finite number"),
             (with_cell(5, 0, "0.002"), "line 5: time does not increase: t = 0.002 s after 0.002 s"),
             (with_cell(9, 1, "0"), "line 9: U = 0, but voltage must be above zero everywhere"),
@@ -120,10 +124,10 @@ class TestWhatIsRefused:
                 text(np.delete(rows(), 50, axis=0)),
                 "line 52: t advances by 0.002 s where 0.001 s is usual: rows are missing",
             ),
-            (text().replace(",", ";").replace(".", ","), r"line 2, column P: '0,8' is not a number \(decimals are"),
+            (text().replace(".", ","), "line 2 has 6 cells where the header line names 4 columns; if the decimal mark"),
             (text(rows() * [1, 110, 30, 30]), "U starts at 110, which is not per unit .* data.base_voltage"),
             ("\n".join(line[: line.rfind(",")] for line in text().splitlines()), "column Q is missing"),
-            (text().replace("0.003,1,0.8,0.4", "0.003,1,0.8"), "line 5, column Q: the cell is empty"),
+            (text().replace("0.003,1,0.8,0.4", "0.003,1,0.8"), "line 5 has 3 cells where the others have 4"),
         ],
     )
     def test_a_bad_file_gets_a_sentence_with_the_place(self, content, says):
@@ -141,10 +145,10 @@ class TestWhatIsRefused:
         with pytest.raises(UserError, match="there is no installed package 'no_such_package'"):
             build("data", {"name": "csv", "train": ["pkg://no_such_package/dip.csv"]}).read()
 
-    def test_text_in_another_encoding_is_refused(self, here):
+    def test_text_that_is_not_of_the_encoding_asked_for_is_refused(self, here):
         (here / "dip.csv").write_bytes("t,U,P,Q,Störung\n".encode("latin-1"))
-        with pytest.raises(UserError, match=r"dip.csv: byte 11 is not UTF-8 text"):
-            build("data", {"name": "csv", "train": ["dip.csv"]}).read()
+        with pytest.raises(UserError, match=r"dip.csv: not utf-8 text; leave data.encoding out to have it found"):
+            build("data", {"name": "csv", "train": ["dip.csv"], "encoding": "utf-8"}).read()
 
     def test_a_broken_sidecar_is_refused(self, here):
         (here / "dip.json").write_text("{")
@@ -155,6 +159,7 @@ class TestWhatIsRefused:
         ("settings", "says"),
         [
             ({"train": []}, "data.train is empty"),
+            ({"path": "dip.csv"}, "data.train and data.validate are numbers of its dips, and 'dip.csv' is none"),
             ({"validate": ["dip.csv"]}, "name 'dip.csv' twice"),
             ({"base_voltage": 0.0}, "data.base_voltage=0.0 is out of range"),
             ({"frequency": float("nan")}, "data.frequency=nan is out of range"),

@@ -50,7 +50,10 @@ def test_gaps_in_P_and_Q_are_allowed():
             {"t": spoiled(np.arange(N) * 0.001, 9, 0.0093)},
             "sample 10 .*30 % of a step off the uniform grid; at most 1 %",
         ),
-        ({"t": np.arange(N) * 1.0}, "one sample every 1 is too slow; t must be in seconds"),
+        (
+            {"t": np.arange(N) * 1.0},
+            "one sample every 1 s is too coarse: .* at least 20 samples per second .*t must be in seconds",
+        ),
         ({"U": np.full(N, 27.5)}, r"U starts at 27.5, which is not per unit .* data.base_voltage"),
         ({"P": np.full(N, 29.8)}, r"reaches 29.8, which is not per unit .* data.base_power"),
         ({"f": np.full(N, 314.0)}, "f = 314 is more than 20 % off the nominal 50 Hz"),

@@ -21,6 +21,7 @@ PUBLIC = {
     "benchmark": "tractexp.api.benchmark",
     "compare": "tractexp.api.compare",
     "compose": "tractexp.api.compose",
+    "convert": "tractexp.api.convert",
     "export": "tractexp.api.export",
     "generalise": "tractexp.api.generalise",
     "identify": "tractexp.api.identify",

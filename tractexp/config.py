@@ -1,6 +1,7 @@
 """The door through which plugins and schemas enter Hydra's groups."""
 
 import hashlib
+from pathlib import Path
 from typing import Any
 
 from hydra.core.config_store import ConfigStore
@@ -40,6 +41,7 @@ def register() -> None:
     for cls in (Grid, Cores):
         hydra_plugins.admit(cls)
     OmegaConf.register_new_resolver("fingerprint", _fingerprint, replace=True)
+    OmegaConf.register_new_resolver("folder_name", _folder_name, replace=True)
 
 
 def _configured(group: str, name: str) -> bool:
@@ -50,3 +52,9 @@ def _configured(group: str, name: str) -> bool:
 def _fingerprint(overrides: Any) -> str:
     """Eight letters that stand for a sweep's overrides: the same command writes to the same folder."""
     return hashlib.sha256("\n".join(overrides).encode()).hexdigest()[:8]
+
+
+def _folder_name(path: Any) -> str:
+    """A folder's name, and letters that stand for its whole path: the same folder, the same name."""
+    whole = Path(str(path)).absolute()
+    return f"{whole.name}_{hashlib.sha256(str(whole).encode()).hexdigest()[:8]}"

@@ -8,6 +8,8 @@ from pathlib import Path
 # settings that take names of their own
 OPEN = ("model.bounds.", "model.fixed.", "task.values", "task.criteria.", "hydra.sweeper.comparison.")
 NAMING = ("data.", "task.", "tracking.", "hydra.run.dir", "hydra.sweep.dir")  # settings that name files and channels
+MARKS = set(",'\"[](){}\\")  # which a name within a list cannot have as it stands
+WORD = re.compile(r"[^\W\d_].*[^\W\d_]|[^\w.+\-]")  # in what is no number
 PLAIN = re.compile(r"[A-Za-z0-9_./:\-]*", re.ASCII)  # what Hydra's grammar takes as it stands
 
 
@@ -38,8 +40,10 @@ def assigned(key: str, value: object) -> str:
 
 
 def _plain(value: object) -> str:
+    if isinstance(value, Mapping):
+        return f"{{{','.join(f'{key}:{_plain(inner)}' for key, inner in value.items())}}}"
     if isinstance(value, str):
-        return value if PLAIN.fullmatch(value) else _quoted(value)
+        return _quoted(value) if set(value) & MARKS or not WORD.search(value) else value
     return "null" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
 
 

@@ -21,6 +21,8 @@ GROUPS = {
     "optimizer": "how the parameters are searched",
     "objective": "what the search makes small",
     "data": "the records",
+    "connection": "how the channels of a recording are connected, chosen by data.connection=NAME",
+    "estimator": "how phasors are made of waveforms, chosen by data.estimator=NAME",
     "format": "what task=export writes, chosen by task.format=NAME",
     "experiment": "a task with its settings, such as a table of the paper",
     "hydra/launcher": "where the jobs of a sweep run; by default on the cores of this computer",

@@ -1,170 +1,169 @@
-"""Records from CSV files: one event per file."""
+"""Records from tables: CSV and other text, Parquet, Excel."""
 
-import importlib.resources
-import io
-import json
-from dataclasses import field
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tractexp.errors import UserError, check_range, nearest
+from tractexp.errors import UserError, check_range
 from tractexp.plugin import plugin
-from tractexp.record import Base, Events, Reader, Record
+from tractexp.record import Base, Events, Reader, Record, detect, find_dips
+from tractexp.record.choice import check_numbers, chosen
+from tractexp.record.event import FEWEST_BEFORE, STEADY
+from tractexp.recording.sidecar import Sidecar, beside
+from tractexp.recording.table import PACKAGE
+from tractexp.recording.tabulated import Powers, Tabular, kind_of, powers
 
-REQUIRED = ("t", "U", "P", "Q")
-OPTIONAL = ("f", "U2")
-PACKAGE = "pkg://"
+PRE, POST = 1.0, 10.0  # s kept of a table that holds several dips
 
 
 @plugin
-class CSV(Reader):
-    """CSV files with a header line naming the columns t, U, P, Q and, where recorded, f and U2.
+class CSV(Tabular, Reader):
+    """Tables of t, U, P, Q and, where recorded, f and U2: CSV and other text, Parquet, Excel.
 
-    Any order; further columns are left out with a note; lines starting with # are comments; cells are separated
-    by comma, semicolon or tab, decimals by a point. t in s, f in Hz; U, P, Q, U2 per unit, or in kV (line to
-    line), MW and Mvar where `base_voltage` [kV] and `base_power` [MVA] say what one per unit is. A path
-    `pkg://package/file.csv` reads a file inside an installed package. A file of the same name ending in .json
-    beside the CSV may give its "name" and a "note" on where it comes from.
+    A file named in `train` or `validate` is one record. With `path` the dips of one long table are numbered from 1 in
+    order of time, and `train` and `validate` are numbers: the first is fitted and the others validate unless said
+    otherwise. Names, units, delimiter, decimal mark and encoding are found and said in a note, or given (`columns`,
+    `units`, ...); phasors (magnitudes and angles) become U, P, Q, f, U2. Without units U, P, Q, U2 are per unit, or in
+    kV (line to line), MW and Mvar where `base_voltage` [kV] and `base_power` [MVA] say what one per unit is; with units
+    and no base, the base is the steady state before the first dip. A path `pkg://package/file.csv` reads a file inside
+    an installed package. A file of the same name ending in .json beside the table may give its "name", a "note" on
+    where it comes from, "base", "columns" and "units".
 
-    Source: RFC 4180, with comment lines; the columns are tractexp's own.
-    Departures: quoted cells are not read.
+    Source: RFC 4180, with comment lines; the names t, U, P, Q, f, U2 are tractexp's own. Phasors: Fortescue 1918.
+    Departures: any delimiter, title lines, unit rows.
     """
 
-    endings = (".csv", ".txt", ".tsv")
+    endings = (".csv", ".txt", ".tsv", ".parquet", ".pq", ".xlsx", ".xls", ".xlsb", ".ods")
 
-    train: list[str] = field(default_factory=list)  # files to fit
-    validate: list[str] = field(default_factory=list)  # files held out
+    path: str = ""  # one table with several dips
+    train: list[Any] = field(default_factory=list)  # files to fit; with path, dips by number
+    validate: list[Any] | None = None  # files held out; with path, dips by number, null: every other one
+    pre: float | None = None  # s kept before a dip starts, at most; null: 1 where there are several dips, else all
+    post: float | None = None  # s kept after a dip starts, at most; null: 10 where there are several dips, else all
     base_voltage: float | None = None  # kV, line to line
     base_power: float | None = None  # MVA, three-phase
     frequency: float = 50.0  # Hz, nominal
+    reverse_current: bool = False  # true where P and Q are counted positive out of the load
 
-    @staticmethod
-    def of(path: str) -> dict[str, Any]:
-        return {"train": [path]}
+    @classmethod
+    def takes(cls, path: str) -> bool:
+        return kind_of(path) != "waveforms"
 
     def check(self) -> None:
-        if not self.train:
+        if self.path:
+            self._check_numbers()
+        elif not self.train:
             raise UserError("data.train is empty: name at least one CSV file to fit, e.g. data.train=[dip.csv]")
         seen: set[str] = set()
-        for path in (*self.train, *self.validate):
+        for path in [] if self.path else map(str, (*self.train, *(self.validate or []))):
             if path in seen:
                 raise UserError(f"data.train and data.validate name '{path}' twice; a record may serve only once")
             seen.add(path)
-        for key in ("base_voltage", "base_power", "frequency"):
+        limits = {"base_voltage": 1e-6, "base_power": 1e-6, "frequency": 1e-6, "pre": 0.05, "post": 0.1}
+        for key, least in limits.items():
             value = getattr(self, key)
             if value is not None:
-                check_range(f"data.{key}", value, 1e-6)
+                check_range(f"data.{key}", value, least)
+        self.check_table()
+
+    def _check_numbers(self) -> None:
+        for each in (*self.train, *(self.validate or [])):
+            if not isinstance(each, int) or isinstance(each, bool):
+                raise UserError(
+                    f"data.path={self.path} is given, so data.train and data.validate are numbers of its dips, and "
+                    f"'{each}' is none; leave data.path out to read whole files"
+                )
+        check_numbers(self.train or None, self.validate)
 
     def read(self) -> Events:
-        return Events([self._record(path) for path in self.train], [self._record(path) for path in self.validate])
+        if self.path:
+            return self._numbered()
+        first = self._record(str(self.train[0]))
+        rest = [self._record(str(path), first.base) for path in (*self.train[1:], *(self.validate or []))]
+        return Events([first, *rest[: len(self.train) - 1]], rest[len(self.train) - 1 :])
 
-    def _record(self, path: str) -> Record:
-        text, beside = load(path)
-        table, spare = parse(text, path)
-        base = Base(self.base_voltage or 1.0, self.base_power or 1.0, self.frequency)
-        stem = Path(path.removeprefix(PACKAGE)).stem
-        stems = [Path(p.removeprefix(PACKAGE)).stem for p in (*self.train, *self.validate)]
-        notes = [beside["note"]] if "note" in beside else []
-        if spare:
-            notes.append(f"columns not used: {', '.join(spare)}")
-        record = Record(
-            name=str(beside.get("name", stem)) if stems.count(stem) == 1 else path,
-            base=base,
-            source=path,
-            notes=tuple(notes),
-            **base.per_unit(table),
-        )
+    def _numbered(self) -> Events:
+        """The dips of one table: the whole of it where there is one."""
+        whole = self._record(self.path)
+        dips = find_dips(whole.t, whole.U)
+        if len(dips) < 2 and self.pre is None and self.post is None:
+            return chosen(self.path, {1: whole}, self.train or None, self.validate)
+        firsts, stops = [0, *(end for _, end in dips)], [*(start for start, _ in dips[1:]), whole.samples]
+        tried = {
+            number: self._cut(whole, number, first, start, stop)
+            for number, (first, (start, _), stop) in enumerate(zip(firsts, dips, stops, strict=False), 1)
+        }
+        notes = (*whole.notes, f"{len(dips)} dips found")
+        return chosen(self.path, tried, self.train or None, self.validate, notes)
 
-        def place(i: int) -> str:
-            return f"line {line_of(text, i)}"
-
-        return record.uniform(place).check(place)
-
-
-def load(path: str) -> tuple[str, dict[str, Any]]:
-    """The text of a CSV file and what its sidecar says, {} without one."""
-    if path.startswith(PACKAGE):
-        package, _, name = path.removeprefix(PACKAGE).partition("/")
+    def _cut(self, whole: Record, number: int, first: int, start: int, stop: int) -> Record | UserError:
+        """The record of one dip, with room from sample `first` to `stop`, or why it cannot be used."""
+        begin = whole.t[start] - (PRE if self.pre is None else self.pre)
+        end = whole.t[start] + (POST if self.post is None else self.post)
+        window = slice(max(first, int(np.searchsorted(whole.t, begin))), min(stop, int(np.searchsorted(whole.t, end))))
+        arrays: Any = {name: values[window] for name, values in whole.channels.items()}
+        arrays["more"] = {name: values[window] for name, values in whole.more.items()}
+        source = f"{self.path} dip {number}"
+        made = replace(whole, name=f"{whole.name}_dip{number}", source=source, notes=(), **arrays)
         try:
-            folder: Any = importlib.resources.files(package)
-        except (ImportError, ValueError) as error:
-            raise UserError(f"{path}: there is no installed package '{package}'") from error
-    else:
-        folder, name = Path(path).parent, Path(path).name
-    file = folder / name
-    if not file.is_file():
-        found = [item.name for item in folder.iterdir()] if folder.is_dir() else None
-        hint = "; that folder does not exist" if found is None else nearest(name, found)
-        raise UserError(f"{path}: there is no such file in {str(folder) if found is not None else folder}{hint}")
-    sidecar = folder / (Path(name).stem + ".json")
-    try:
-        text = file.read_bytes().decode("utf-8-sig")
-        beside = json.loads(sidecar.read_bytes()) if sidecar.is_file() else {}
-    except UnicodeDecodeError as error:
-        raise UserError(f"{path}: byte {error.start + 1} is not UTF-8 text; save the file as UTF-8 CSV") from error
-    except json.JSONDecodeError as error:
-        raise UserError(f"{sidecar}: line {error.lineno}: not valid JSON ({error.msg})") from error
-    return text, beside if isinstance(beside, dict) else {}
+            detect(made.check())
+        except UserError as error:
+            return error
+        return made
+
+    def _record(self, path: str, base: Base | None = None) -> Record:
+        """The whole of one table; `base` is that of the first one read, which all share."""
+        told = beside(path)
+        table, found = self.table_of(path, told)
+        given = self.base_voltage or (told.base and told.base.voltage)
+        made = powers(table, found, self.frequency, self.reverse_current, kilovolts=given is not None)
+        arrays: Any = {**made.columns, "more": table.numbers(told.more), "window": told.window}
+        raw = Record(name=self._name(path, told), source=path, notes=(*told.notes, *made.notes), **arrays)
+        even = raw if told.uniform else raw.uniform(table.place)
+        base, note = self._base(even, made, told, base)
+        by = Base(*(
+            size if made.absolute[key] or (made.absolute[key] is None and size_given) else 1.0
+            for key, size, size_given in (("U", base.voltage, given), ("P", base.power, self.base_power or told.base))
+        ))  # fmt: skip
+        arrays = by.per_unit(even.channels)
+        record = replace(even, base=base, notes=(*even.notes, *note), **arrays)
+        return record.check(table.place if record.samples == raw.samples else None)
+
+    def _name(self, path: str, told: Sidecar) -> str:
+        stem = Path(path.removeprefix(PACKAGE)).stem
+        stems = [Path(str(p).removeprefix(PACKAGE)).stem for p in (*self.train, *(self.validate or []))]
+        return told.name or stem if self.path or stems.count(stem) == 1 else path
+
+    def _base(self, record: Record, made: Powers, told: Sidecar, same: Base | None) -> tuple[Base, list[str]]:
+        """What one per unit is: given, that of the record before, or the steady state of values in kV and MW."""
+        frequency = told.base.frequency if told.base else self.frequency
+        voltage = self.base_voltage or (told.base and told.base.voltage) or (same and same.voltage)
+        power = self.base_power or (told.base and told.base.power) or (same and same.power)
+        told_by = []
+        if (voltage is None and made.absolute["U"]) or (power is None and made.absolute["P"]):
+            U, S = _steady(record)
+            if voltage is None and made.absolute["U"]:
+                voltage = U
+                told_by.append(f"{U:.4g} kV line to line")
+            if power is None and made.absolute["P"]:
+                power = S
+                told_by.append(f"{S:.4g} MVA")
+        note = [f"base: {' and '.join(told_by)}, the steady state before the first dip"] if told_by else []
+        return Base(voltage or 1.0, power or 1.0, frequency), note
 
 
-def parse(text: str, path: str) -> tuple[dict[str, np.ndarray], list[str]]:
-    """The columns wanted, each (N,), and the names of those left over."""
-    lines = io.StringIO(text)
-    header = next((line.partition("#")[0] for line in lines if _is_data(line)), "")
-    if not header:
-        raise UserError(f"{path}: the file is empty; it must start with a line naming the columns t,U,P,Q")
-    mark = next((m for m in (";", "\t") if m in header), ",")
-    names = [cell.strip().strip('"') for cell in header.split(mark)]
-    missing = [name for name in REQUIRED if name not in names]
-    if missing:
-        lacks = ", ".join(missing)
+def _steady(record: Record) -> tuple[float, float]:
+    """Voltage and apparent power before the first dip that has a steady state before it."""
+    dips = find_dips(record.t, record.U)
+    stop = next((start for start, _ in dips if start >= FEWEST_BEFORE), record.samples)
+    before = slice(max(0, stop - max(FEWEST_BEFORE, round(STEADY * record.rate))), stop)
+    P, Q = (values[before][np.isfinite(values[before])] for values in (record.P, record.Q))
+    S = float(np.hypot(P.mean(), Q.mean())) if len(P) and len(Q) else 0.0
+    if S < 1e-9:
         raise UserError(
-            f"{path}: column {lacks} is missing; the header line must name {', '.join(REQUIRED)} and names "
-            f"{', '.join(names)}{nearest(missing[0], names)}"
+            f"{record.where}: P and Q are zero or missing before the first dip, so they give no base; say it: "
+            "data.base_power (MVA)"
         )
-    wanted = [name for name in (*REQUIRED, *OPTIONAL) if name in names]
-    twice = [name for name in wanted if names.count(name) > 1]
-    if twice:
-        raise UserError(f"{path}: column {twice[0]} occurs {names.count(twice[0])} times; keep one")
-    columns = [names.index(name) for name in wanted]
-    rest = lines.read()
-    try:
-        if not rest.strip():
-            raise ValueError("no rows")
-        values = np.loadtxt(io.StringIO(rest), delimiter=mark, usecols=columns, comments="#", ndmin=2)
-    except ValueError as error:
-        raise UserError(f"{path}: {_wrong_cell(text, mark, names, columns) or error}") from error
-    table = {name: values[:, i].copy() for i, name in enumerate(wanted)}
-    return table, [name for name in names if name and name not in wanted]
-
-
-def line_of(text: str, row: int) -> int:
-    """The line, from 1, of a data row, from 0."""
-    numbers = (i for i, line in enumerate(io.StringIO(text), 1) if _is_data(line))
-    return next(number for i, number in enumerate(numbers) if i == row + 1)
-
-
-def _is_data(line: str) -> bool:
-    """Whether a line holds more than blanks and a comment."""
-    return bool(line.partition("#")[0].strip())
-
-
-def _wrong_cell(text: str, mark: str, names: list[str], columns: list[int]) -> str:
-    """A sentence on the first cell that is no number, found by reading line by line."""
-    rows = [(i, line) for i, line in enumerate(io.StringIO(text), 1) if _is_data(line)][1:]
-    if not rows:
-        return "there are no rows below the header line"
-    for number, line in rows:
-        cells = [cell.strip() for cell in line.partition("#")[0].split(mark)]
-        for column in sorted(columns):
-            where = f"line {number}, column {names[column]}"
-            if column >= len(cells) or not cells[column]:
-                return f"{where}: the cell is empty; a gap in P or Q is written nan"
-            try:
-                float(cells[column])
-            except ValueError:
-                comma = " (decimals are written with a point)" if "," in cells[column] else ""
-                return f"{where}: '{cells[column]}' is not a number{comma}"
-    return ""
+    return float(record.U[before].mean()), S

@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Self
 
@@ -11,12 +11,12 @@ import numpy as np
 from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.pages import Written
-from tractexp.api.read import node_of, table
+from tractexp.api.read import kept_record, node_of, record_again, table
 from tractexp.errors import UserError
 from tractexp.outcome import Table, Tabulated
 from tractexp.overrides import typed
 from tractexp.progress import Progress, staged
-from tractexp.record import Base, Event, Record
+from tractexp.record import Event, Record
 from tractexp.recording.overview import Seen, Sight, View, sight_of, view_of
 from tractexp.wording import change, figure
 
@@ -136,13 +136,12 @@ class Look(Written):
         return Table(columns, rows, title, said)
 
     def to_dict(self) -> dict[str, Any]:
-        kept = [s if isinstance(s, str) else {f.name: getattr(s, f.name) for f in fields(Record)} for s in self.sources]
-        told = [s if isinstance(s, str) else s | {"base": asdict(s["base"])} for s in kept]
+        told = [s if isinstance(s, str) else kept_record(s) for s in self.sources]
         return {"sources": told, "settings": dict(self.settings), "content": dict(self.content)}
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        sources = [s if isinstance(s, str) else _record(s) for s in content["sources"]]
+        sources = [s if isinstance(s, str) else record_again(s) for s in content["sources"]]
         return cls(sources, content["settings"], content["content"])
 
     def _write(self, folder: Path) -> list[Path]:
@@ -266,7 +265,8 @@ def _feeder(view: View, shown: Sight) -> dict[str, Any]:
     made: dict[str, Any] = {"name": shown.name}
     if feeder is not None:
         made |= {
-            "connection": feeder.connection, "voltages": list(feeder.voltages), "currents": list(feeder.currents),
+            "connection": _name(feeder.connection), "voltages": list(feeder.voltages),
+            "currents": list(feeder.currents),
             "channels": [names[i] for i in (*feeder.voltages, *feeder.currents)],
             "reverse_current": feeder.reverse_current, "why": list(feeder.why),
         }  # fmt: skip
@@ -279,10 +279,14 @@ def _feeder(view: View, shown: Sight) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def _name(connection: Any) -> str:
+    return connection["name"] if isinstance(connection, Mapping) else str(connection)
+
+
 def command(view: View, shown: Sight) -> str:
     """What is to be typed to fit the events of a load that are worth it; "" where none is."""
     choice = shown.choice()
-    return typed({**view.node, **choice}) if choice and view.node else ""
+    return typed({**view.node, **choice}) if choice is not None and view.node else ""
 
 
 def _sums(shown: Sight) -> dict[str, Any]:
@@ -313,11 +317,3 @@ def _picked(items: Sequence[Any], k: int, what: str) -> Any:
     if not -len(items) <= k < len(items):
         raise UserError(f"there is no {what} {k}; there are {len(items)}, counted from 0")
     return items[k]
-
-
-def _record(told: Mapping[str, Any]) -> Record:
-    arrays: Any = {
-        k: None if told[k] is None else np.array(told[k], dtype=float) for k in ("t", "U", "P", "Q", "f", "U2")
-    }
-    plain = {"name": told["name"], "source": told["source"], "notes": tuple(told["notes"])}
-    return replace(Record(**plain, **arrays), base=Base(**told["base"]))

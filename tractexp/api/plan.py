@@ -19,7 +19,7 @@ from tractexp.record import Event
 from tractexp.report.plan import DEPTH, DURATION, NOISE, RATE
 
 if TYPE_CHECKING:
-    from tractexp.identification.plan import Shape
+    from tractexp.identification.plan import Choice, Shape
     from tractexp.noise import Noise
     from tractexp.report.plan import Planned
 
@@ -143,6 +143,28 @@ def _planned(setup: Setup, parameter: str, within: float, values: Any, least: fl
     needed = depth_needed(scans[DEPTH][1], parameter, within)
     best = best_events(problem, at, least, events) if len(recorded) > 1 else []
     return Planned(problem, at, origin, _described(shape), needed, scans, best, least, events)
+
+
+def chosen_events(setup: Setup, values: Any, most: int) -> "list[Choice]":
+    """The events of a setup that tell most about its model together, at most `most`; `values` are those of `plan`.
+
+    Events before which the model has no steady state at these values are left out. Raises `UserError` where that are
+    all of them.
+    """
+    from tractexp.identification.plan import alone, best_of
+
+    if setup.problem_of(setup.train[:1]).per_event:
+        raise UserError("events are chosen for shared parameters; leave model.per_event empty")
+    at, *_ = _guess(setup, max(setup.train, key=lambda e: e.depth), values)
+    told, refused = {}, ""
+    for event in setup.train:
+        try:
+            told[event.record.name] = alone(setup.problem_of([event]), at)
+        except UserError as error:
+            refused = str(error)
+    if not told:
+        raise UserError(refused)
+    return best_of([*told.values()], [*told], 0.0, most)
 
 
 def _shape(event: Event, noise: float | None, seen: "Noise | None" = None, **given: float | None) -> "Shape":

@@ -164,17 +164,25 @@ def node_of(path: str, settings: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def kept(event: Event) -> dict[str, Any]:
-    """A record as plain data, as a saved result holds it."""
-    record = event.record
+    """The record of an event as plain data, as a saved result holds it."""
+    return kept_record(event.record)
+
+
+def kept_record(record: Record) -> dict[str, Any]:
+    """A record as plain data."""
     plain = {"base": asdict(record.base), "window": record.window and record.window.to_dict(), "more": {**record.more}}
     return {f.name: getattr(record, f.name) for f in fields(Record)} | plain
 
 
 def again(content: Mapping[str, Any]) -> Event:
     """The event of what `kept` told; its dip is found again."""
+    return detect(record_again(content))
+
+
+def record_again(content: Mapping[str, Any]) -> Record:
+    """The record of what `kept_record` told."""
     arrays: Any = {k: np.array(content[k], dtype=float) for k in (*REQUIRED, *OPTIONAL) if content[k] is not None}
     base, notes = Base(**content["base"]), tuple(content["notes"])
     window = Window.of(content["window"]) if content.get("window") else None
     more = {name: np.array(values, dtype=float) for name, values in content.get("more", {}).items()}
-    made = Record(content["name"], base=base, source=content["source"], notes=notes, window=window, more=more, **arrays)
-    return detect(made)
+    return Record(content["name"], base=base, source=content["source"], notes=notes, window=window, more=more, **arrays)

@@ -213,13 +213,19 @@ class Choice:
 
 
 def best_events(problem: Problem, values: np.ndarray, least: float, most: int | None = None) -> list[Choice]:
+    """The events of a problem that tell most together at free `values` (d,), as `best_of` chooses them."""
+    return best_of(each(problem, values), [event.record.name for event in problem.events], least, most)
+
+
+def best_of(
+    informations: Sequence[Information], names: Sequence[str], least: float, most: int | None = None
+) -> list[Choice]:
     """The events that tell most together, greedily by the determinant of the information (D-optimal).
 
     Ends before the event whose gain is below `least`, or after `most`. The parameters' bounds count as what is
     known beforehand, so that a set that leaves a parameter open still has a volume.
     """
-    informations = each(problem, values)
-    prior = np.eye(problem.space.dimension) * 12.0  # per range: the variance of a uniform distribution
+    prior = np.eye(len(informations[0].names)) * 12.0  # per range: the variance of a uniform distribution
     matrices = [i.J.T @ i.J for i in informations]
     volume = lambda chosen: np.linalg.slogdet(prior + sum(matrices[e] for e in chosen))[1]  # noqa: E731
     chosen: list[int] = []
@@ -233,6 +239,14 @@ def best_events(problem: Problem, values: np.ndarray, least: float, most: int | 
             break
         chosen.append(best)
         half = normal_quantile() * combined([informations[e] for e in chosen]).standard_errors
-        name = problem.events[best].record.name
-        choices.append(Choice(best, name, gain if len(chosen) > 1 else 1.0, tuple(half.tolist())))
+        choices.append(Choice(best, names[best], gain if len(chosen) > 1 else 1.0, tuple(half.tolist())))
     return choices
+
+
+def alone(problem: Problem, values: np.ndarray) -> Information:
+    """The information of a problem's only event at free `values` (d,), in as few rows as there are parameters.
+
+    Of an archive, event by event: their Jacobian together, with P0 and Q0 of each, would not fit into memory.
+    """
+    (made,) = each(problem, values)
+    return replace(made, J=np.linalg.qr(made.J, mode="r"))

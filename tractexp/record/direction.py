@@ -6,11 +6,20 @@ DISTURBED = 0.03  # of the voltage: what a load must answer
 CALM = 0.01  # of the voltage: where P is that before
 FEWEST = 3  # samples in either state
 FALLS = 0.5  # exponent of |P| over U from which on power falls with the voltage as a load's does
+STEEPEST = 4.0  # exponent that no load exceeds: what falls faster was switched off
 IMPEDANCE = 1.3  # exponent above that of a constant current, which a converter may keep as well
 REACTIVE = 0.1  # of |P|: less Q than this tells nothing
 NOISY = 3.0  # times the noise that P must exceed to have a sign
 TURNS = 0.1  # of |P|: positive power of this size, at normal voltage, is a train that motors and brakes
 REMEDY = "set data.reverse_current=true"
+
+
+def at_level(x: np.ndarray, share: float) -> np.ndarray:
+    """Which of the values (N,), positive, lie within `share` of the level that most of them have; the higher of two."""
+    ordered = np.sort(x)
+    counts = np.searchsorted(ordered, ordered * (1 + share), "right") - np.searchsorted(ordered, ordered * (1 - share))
+    level = ordered[len(ordered) - 1 - int(np.argmax(counts[::-1]))]
+    return np.abs(x - level) <= share * level
 
 
 def direction(U: np.ndarray, P: np.ndarray, Q: np.ndarray, polarity: int = 0) -> str:
@@ -25,9 +34,9 @@ def direction(U: np.ndarray, P: np.ndarray, Q: np.ndarray, polarity: int = 0) ->
     U, P, Q = U[known], P[known], Q[known]
     if not len(U):
         return ""
-    level = float(np.median(U))
-    calm = np.abs(U / level - 1) < max(CALM, 3 * float(np.median(np.abs(np.diff(U)))) / level if len(U) > 1 else CALM)
-    P0, Q0 = (float(np.median(x[calm])) if calm.any() else float(np.median(x)) for x in (P, Q))
+    rough = 3 * float(np.median(np.abs(np.diff(U)))) / float(np.median(U)) if len(U) > 1 else 0.0
+    calm = at_level(U, max(CALM, rough))
+    level, P0, Q0 = (float(np.median(x[calm])) for x in (U, P, Q))
     spread = float(np.median(np.abs(np.diff(P)))) if len(P) > 1 else 0.0
     if not -NOISY * spread > P0:
         return ""
@@ -37,9 +46,9 @@ def direction(U: np.ndarray, P: np.ndarray, Q: np.ndarray, polarity: int = 0) ->
     answer = f"|P| goes as U^{a:.2g} when the voltage falls" if fell else "the voltage is never disturbed"
     if polarity < 0 or (polarity == 0 and fell and _load_like(a, P0, Q0)):
         shown = (
-            "the negative-sequence current is that of a load turned round" if polarity < 0 else answer + " and returns"
+            "the negative-sequence current is that of a load turned round" if polarity < 0 else f"{answer}, as a load's"
         )
-        return f"{shown}: a load whose current is counted out of it ({REMEDY})"
+        return f"{shown}: its current is counted out of it, or this feeder supplies such loads ({REMEDY})"
     if polarity > 0:
         return "the negative-sequence current is that of a load: the current is counted rightly, so power is fed back"
     if fell and a < FALLS:
@@ -50,7 +59,7 @@ def direction(U: np.ndarray, P: np.ndarray, Q: np.ndarray, polarity: int = 0) ->
 def _load_like(a: float, P0: float, Q0: float) -> bool:
     """Whether power answers as that of a load with its sign turned: inductive, or as an impedance."""
     inductive = -Q0 > REACTIVE * -P0
-    return (a >= FALLS and inductive) or (a >= IMPEDANCE and Q0 < REACTIVE * -P0)
+    return a <= STEEPEST and ((a >= FALLS and inductive) or (a >= IMPEDANCE and Q0 < REACTIVE * -P0))
 
 
 def _exponent(u: np.ndarray, p: np.ndarray) -> tuple[float, bool]:

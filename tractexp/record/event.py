@@ -5,13 +5,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.record.record import Record
+from tractexp.record.direction import direction
+from tractexp.record.record import DEAD, Record
 
 SHALLOWEST = 0.03  # of the voltage before: anything less is no dip
 NOISE_FACTOR = 6.0  # standard deviations of noise that a dip must exceed
 RECOVERED = 0.2  # of the depth: the dip ends when no more than this is missing, or the threshold if that is more
 FEWEST_BEFORE = 10  # samples before a dip, for the steady state and the noise
 MERGED = 0.02  # s: dips closer than one cycle are one
+OPEN_POLE = 0.25  # of the voltage: negative sequence of an open pole, of a fault as well
+UNCLEARED = 0.5  # s: no protection leaves a fault on so long
+STEP_AT_MOST = 0.15  # of the voltage: a tap changer or a switched line moves it no farther
+STEP_LASTS = 0.3  # s of a new level before it is one
+COARSE, FEWEST_INSIDE = 20.0, 5  # Hz, samples: a dip of fewer samples at a lower rate shows no response
 STEADY = 1.0  # s: the steady state is the mean over at most so long before the dip
 
 
@@ -73,18 +79,28 @@ def find_dips(t: np.ndarray, U: np.ndarray) -> list[tuple[int, int]]:
     """All dips of a voltage (N,), in order of time, as (start, end) sample numbers; end = N if never recovered.
 
     A dip falls by more than 3 % (or six standard deviations of the sample noise) below a reference that starts at
-    the level of the first samples, follows slow changes, and starts anew after each dip. Rises are not dips.
+    the level of the first samples, follows slow changes, and starts anew after each dip. Rises are not dips, and a
+    swell leaves the reference where it was.
     """
-    spread = np.median(np.abs(np.diff(U))) / 0.6745 / np.sqrt(2)
-    margin = max(SHALLOWEST, NOISE_FACTOR * float(spread / np.median(U)))
+    return _scan(t, U)[0]
+
+
+def _scan(t: np.ndarray, U: np.ndarray) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+    """(dips, swells) of a voltage (N,), both as (start, end) sample numbers."""
+    margin = _margin(U)
     block = max(FEWEST_BEFORE, round(0.1 * (len(t) - 1) / float(t[-1] - t[0])))
     reference = float(np.median(U[:FEWEST_BEFORE]))
     dips: list[tuple[int, int]] = []
+    swells: list[tuple[int, int]] = []
     k = 0
     while k < len(U):
         part = U[k : k + block]
         below = part < (1 - margin) * reference
         if not below.any():
+            if float(np.median(part)) > (1 + margin) * reference and (swell := _swell(t, U, k, reference, margin)):
+                swells.append(swell)
+                k = swell[1]
+                continue
             reference += 0.1 * (float(np.median(part)) - reference)
             k += len(part)
             continue
@@ -97,7 +113,24 @@ def find_dips(t: np.ndarray, U: np.ndarray) -> list[tuple[int, int]]:
         if end < len(U):  # the higher: the short one where another dip follows soon, the long one while U still rises
             reference = max(float(np.median(U[end : end + n])) for n in (FEWEST_BEFORE, block))
         k = end
-    return dips
+    return dips, swells
+
+
+def _margin(U: np.ndarray) -> float:
+    """The share of the reference by which a dip must fall."""
+    spread = np.median(np.abs(np.diff(U))) / 0.6745 / np.sqrt(2)
+    return max(SHALLOWEST, NOISE_FACTOR * float(spread / np.median(U)))
+
+
+def _swell(t: np.ndarray, U: np.ndarray, k: int, reference: float, margin: float) -> tuple[int, int] | None:
+    """The swell in the block from k on; None where the voltage stays at its new level, or falls from it after long."""
+    first = k + int(np.argmax(U[k:] > (1 + margin) * reference))
+    back = U[first:] <= (1 + margin) * reference
+    if not back.any():
+        return None
+    end = first + int(np.argmax(back))
+    landed = float(np.median(U[end : end + FEWEST_BEFORE])) >= (1 - margin) * reference
+    return (first, end) if landed or t[end] - t[first] <= STEADY else None
 
 
 def _onset(U: np.ndarray, first: int, crossing: int, reference: float, margin: float) -> int:
@@ -115,8 +148,11 @@ def _recovery(U: np.ndarray, crossing: int, reference: float, margin: float) -> 
 
 
 def detect(record: Record) -> Event:
-    """The first dip of a record; raises `UserError` for none, one that does not end, or one that comes too early."""
-    dips = find_dips(record.t, record.U)
+    """The first dip of a record; raises `UserError` for none, one that does not end, or one that comes too early.
+
+    An interruption, an open pole and a step are refused by their names.
+    """
+    dips, swells = _scan(record.t, record.U)
     if not dips:
         raise UserError(_no_dip(record))
     start, end = dips[0]
@@ -125,13 +161,9 @@ def detect(record: Record) -> Event:
             f"{record.where}: the dip starts at sample {start + 1} (t = {record.t[start]:g} s): the steady state "
             f"before it needs at least {FEWEST_BEFORE} samples; give a record that starts earlier"
         )
-    if end == record.samples:
-        raise UserError(
-            f"{record.where}: the record is shorter than the dip: it ends at t = {record.t[-1]:g} s with U = "
-            f"{record.U[-1]:.3g} where it was {record.U[:start].mean():.3g} before the dip of t = "
-            f"{record.t[start]:g} s; give a record that shows the recovery"
-        )
-    steady = slice(max(0, start - max(FEWEST_BEFORE, round(STEADY * record.rate))), start)
+    if told := _no_such_dip(record, start, end):
+        raise UserError(f"{record.where}: {told}")
+    steady = _steady(record, start, swells)
     t, U, P, Q = (values[steady] for values in (record.t, record.U, record.P, record.Q))
     if np.count_nonzero(np.isfinite(P) & np.isfinite(Q)) < FEWEST_BEFORE:
         raise UserError(
@@ -156,17 +188,88 @@ def detect(record: Record) -> Event:
     )
 
 
-def _no_dip(record: Record) -> str:
-    reference = float(np.median(record.U[:FEWEST_BEFORE]))
-    low, high = int(np.argmin(record.U)), int(np.argmax(record.U))
-    fall, rise = 1 - record.U[low] / reference, record.U[high] / reference - 1
-    sentence = (
-        f"{record.where}: no dip found: the voltage starts at {reference:.4g} and falls at most {100 * fall:.2g} % "
-        f"below it (t = {record.t[low]:g} s), but a dip must exceed {100 * SHALLOWEST:g} % and the noise"
+def _steady(record: Record, start: int, swells: list[tuple[int, int]]) -> slice:
+    """The last second before the dip, or before a swell that leaves too little room behind it."""
+    most = max(FEWEST_BEFORE, round(STEADY * record.rate))
+    least = max(FEWEST_BEFORE, round(0.1 * record.rate))
+    stop, first = start, max(0, start - most)
+    for begin, end in reversed([swell for swell in swells if swell[0] < start]):
+        if end <= first:
+            break
+        if stop - end >= least or begin < FEWEST_BEFORE:
+            first = min(end, stop - FEWEST_BEFORE)
+            break
+        stop, first = begin, max(0, begin - most)
+    return slice(max(first, 0), stop)
+
+
+def _no_such_dip(record: Record, start: int, end: int) -> str:
+    """What a fall of the voltage is where it is no dip that can be fitted; "" where it is one."""
+    t, U = record.t, record.U
+    before = float(U[:start].mean())
+    inside = U[start:end]
+    lowest, when = float(inside.min()), f"at t = {t[start]:g} s"
+    if lowest < DEAD * before:
+        if end < len(U):
+            return (
+                f"the voltage is gone from t = {t[start]:g} to {t[end]:g} s (U falls to {lowest:.3g}): an "
+                "interruption, no dip, after which loads start anew; choose another event"
+            )
+        return (
+            f"the voltage is gone from t = {t[start]:g} s on (U falls to {lowest:.3g}): the line is dead, which is no "
+            "dip; choose another event"
+        )
+    if record.U2 is not None:
+        unbalanced = record.U2[start:end] > OPEN_POLE * inside
+        if np.count_nonzero(unbalanced) * record.step > UNCLEARED:
+            share = float(np.median(record.U2[start:end][unbalanced] / inside[unbalanced]))
+            return (
+                f"U2 is {100 * share:.2g} % of U for {np.count_nonzero(unbalanced) * record.step:.2g} s {when}, longer "
+                "than a fault lasts: one pole is open, which is no dip of all phases; choose another event"
+            )
+    if end == len(U):
+        return _unfinished(record, start, before)
+    if record.rate < COARSE and end - start < FEWEST_INSIDE:
+        return (
+            f"the dip {when} has {end - start} samples at {record.rate:.3g} Hz: too coarse to show a response; give a "
+            f"record of at least {COARSE:g} Hz"
+        )
+    return ""
+
+
+def _unfinished(record: Record, start: int, before: float) -> str:
+    """What is said of a fall that lasts to the record's end."""
+    t, U = record.t, record.U
+    fall = 1 - float(np.median(U[start:])) / before
+    level = np.abs(U[start:] / float(np.median(U[start:])) - 1) <= _margin(U)
+    lasts = float(t[-1] - t[start])
+    if fall <= STEP_AT_MOST and lasts >= STEP_LASTS and level.mean() > 0.8:
+        return (
+            f"the voltage falls by {100 * fall:.2g} % at t = {t[start]:g} s and stays there for the {lasts:.2g} s that "
+            "are left: a step (a tap changer, or something switched), no dip; choose another event"
+        )
+    return (
+        f"the record is shorter than the dip: it ends at t = {t[-1]:g} s with U = {U[-1]:.3g} where it was "
+        f"{before:.3g} before the dip of t = {t[start]:g} s; give a record that shows the recovery"
     )
-    if rise > SHALLOWEST:
+
+
+def _no_dip(record: Record) -> str:
+    U, t = record.U, record.t
+    reference, margin = float(np.median(U[:FEWEST_BEFORE])), _margin(U)
+    low, high = int(np.argmin(U)), int(np.argmax(U))
+    fall, rise = 1 - U[low] / reference, U[high] / reference - 1
+    start = f"{record.where}: no dip found: the voltage starts at {reference:.4g} and falls"
+    if fall <= margin:
+        sentence = (
+            f"{start} at most {100 * fall:.2g} % below it (t = {t[low]:g} s), but a dip must exceed "
+            f"{100 * SHALLOWEST:g} % and the noise"
+        ) + (f", here {100 * margin:.2g} %" if margin > SHALLOWEST else "")
+    else:
+        sentence = f"{start} by {100 * fall:.2g} % (t = {t[low]:g} s), but slowly: a ramp, no dip"
+    if rise > margin:
         sentence += (
-            f"; it rises by {100 * rise:.2g} % at t = {record.t[high]:g} s: a swell is not fitted, and a record that "
+            f"; it rises by {100 * rise:.2g} % at t = {t[high]:g} s: a swell is not fitted, and a record that "
             "starts inside a dip lacks the steady state before it"
         )
     return sentence
@@ -186,7 +289,8 @@ def describe(event: Event) -> str:
     if event.dips > 1:
         odd.append(f"the record holds {event.dips} dips, and the first is meant")
     if event.P0 <= 0:
-        odd.append(f"P is {event.P0:.3g} before the dip, so this is no load or its current is reversed")
+        told = direction(record.U, record.P, record.Q) or "no power flows, so this is no load"
+        odd.append(f"P is {event.P0:.3g} before the dip: {told}")
     gaps = int(np.count_nonzero(np.isnan(record.P) | np.isnan(record.Q)))
     if gaps:
         odd.append(f"{gaps} samples lack P or Q and are left out")

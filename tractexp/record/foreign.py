@@ -8,6 +8,7 @@ PQDIF = (
 )
 COMPANION = "a companion of a COMTRADE record that holds no samples: give the .cfg beside it"
 ARCHIVE = "an archive: unpack it, and give a file of it, or its folder to task=survey"
+DOCUMENT = "a document: give the record's data"
 RECORDER = "a recorder's own format: export it as COMTRADE or CSV with the recorder's software"
 FOREIGN = {
     ".pqd": PQDIF, ".pqdif": PQDIF, ".hdr": COMPANION, ".inf": COMPANION, ".dmf": COMPANION, ".rio": COMPANION,
@@ -22,7 +23,7 @@ FOREIGN = {
     ".out": "a simulator's output: export it as .csv",
     ".rec": RECORDER, ".wfm": RECORDER, ".osc": RECORDER, ".dsr": RECORDER, ".tr0": RECORDER, ".icf": RECORDER,
     ".dmk": RECORDER, ".sig": RECORDER, ".trc": RECORDER, ".wdf": RECORDER, ".d01": RECORDER,
-    ".pdf": "a document: give the record's data", ".docx": "a document: give the record's data",
+    ".pdf": DOCUMENT, ".docx": DOCUMENT,
     ".xls": "the Excel format of before 2007: save it as .xlsx or .csv",
 }  # fmt: skip
 
@@ -31,3 +32,8 @@ def sentence(path: str | Path) -> str:
     """What a file of a known foreign ending is and how to go on, a sentence with its path; "" for other endings."""
     told = FOREIGN.get(Path(path).suffix.lower())
     return f"{path} is {told}" if told else ""
+
+
+def is_record(path: str | Path) -> bool:
+    """Whether a foreign ending is that of a record, which somebody who gives its folder expects to be read."""
+    return FOREIGN.get(Path(path).suffix.lower(), COMPANION) not in (COMPANION, ARCHIVE, DOCUMENT)

@@ -9,9 +9,14 @@ from tractexp.errors import UserError
 from tractexp.record.window import Window
 
 JITTER = 0.01  # of a step: times closer than this to a uniform grid count as uniform
-LONGEST_STEP = 0.2  # s: slower sampling cannot show a motor's response
+# s: coarser sampling leaves a dip of 100 ms fewer than two samples, and a transient time constant T' of 50 to 300 ms
+# none to tell it by. The slowest phasor units that record dips send 25 per second.
+LONGEST_STEP = 0.05
+SELDOM = 0.05  # of the steps: where more than these are odd, a simulator chose them
+WHOLE = 0.02  # of a step: a step so close to a multiple of the usual one is of missing rows
 FEWEST_SAMPLES = 20
 PLAUSIBLE_VOLTAGE = (0.5, 1.5)  # pu, at the start of a record
+DEAD = 0.05  # of the voltage at the start: less is no voltage at all
 PLAUSIBLE_POWER = 20.0  # pu, at the start of a record
 
 
@@ -94,12 +99,13 @@ class Record:
         return self
 
     def uniform(self, place: Callable[[int], str] | None = None) -> "Record":
-        """The record on a uniform time grid of as many samples; a note says so where more than `JITTER` moved.
+        """The record on a uniform time grid; a note says so where more than `JITTER` of a step was moved.
 
-        Raises `UserError` where a step differs by half from the usual one, which means missing rows, not jitter.
+        Jitter, and the event instants and steps of a simulator, are resampled linearly; of two rows of one time the
+        second holds from then on. Raises `UserError` for missing rows: steps that are multiples of the usual one.
         """
         place = place or self._place
-        self._check_values(place)
+        self._check_values(place, still=True)
         grid = np.linspace(self.t[0], self.t[-1], len(self.t))
         off = float(np.abs(self.t - grid).max() / self.step)
         if off == 0:
@@ -107,24 +113,61 @@ class Record:
         if off <= JITTER:
             return replace(self, t=grid)
         steps = np.diff(self.t)
-        usual = float(np.median(steps))
-        wrong = np.abs(steps - usual) > 0.5 * usual
-        if wrong.any():
-            i = int(np.argmax(wrong)) + 1
-            raise UserError(
-                f"{self.where}: {place(i)}: t advances by {steps[i - 1]:g} s where {usual:g} s is usual: rows are "
-                "missing; fill them in (P and Q may be nan, U may not) or cut the record there"
-            )
+        usual = float(np.median(steps[steps > 0]))
+        self._check_steps(steps, usual, place)
+        if (np.abs(steps - usual) > 0.5 * usual).any():
+            grid = np.linspace(self.t[0], self.t[-1], round((self.t[-1] - self.t[0]) / usual) + 1)
+            note = self._uneven(steps, usual)
+        else:
+            note = f"times were up to {100 * off:.2g} % of a step off a uniform grid: resampled linearly"
         moved = {name: np.interp(grid, self.t, values) for name, values in self.channels.items()}
         moved["t"] = grid
         more = {name: np.interp(grid, self.t, values) for name, values in self.more.items()}
-        note = f"times were up to {100 * off:.2g} % of a step off a uniform grid: resampled linearly"
         return replace(self, **moved, more=more, notes=(*self.notes, note))
+
+    def _check_steps(self, steps: np.ndarray, usual: float, place: Callable[[int], str]) -> None:
+        """Refuse rows that are missing, and times that stand still other than at an event."""
+        still = steps == 0
+        if still.mean() > SELDOM:
+            i = int(np.argmax(still)) + 1
+            raise UserError(
+                f"{self.where}: {place(i)}: time does not increase: t = {self.t[i]:.9g} s after {self.t[i - 1]:.9g} s, "
+                f"and so at {np.count_nonzero(still)} rows: t has too few digits; write it with more"
+            )
+        ratio = steps / usual
+        long = ratio > 1.5
+        multiple = long & (np.abs(ratio - np.round(ratio)) < WHOLE * ratio)
+        seldom = (np.abs(ratio - 1) > 0.5).mean() < SELDOM
+        if not long.any() or not (seldom or multiple.sum() > 0.9 * long.sum()):
+            return
+        i = int(np.argmax(long)) + 1
+        if i > 1 and still[i - 2]:
+            raise UserError(
+                f"{self.where}: {place(i - 1)}: time does not increase: t = {self.t[i - 1]:.9g} s after "
+                f"{self.t[i - 2]:.9g} s, and a step of {steps[i - 1]:g} s follows where {usual:g} s is usual"
+            )
+        more = int(np.count_nonzero(long)) - 1
+        places = f" here and at {more} more place{'s' * (more > 1)}" if more else ""
+        raise UserError(
+            f"{self.where}: {place(i)}: t advances by {steps[i - 1]:g} s where {usual:g} s is usual: rows are "
+            f"missing{places}; fill them in (P and Q may be nan, U may not) or cut the record there"
+        )
+
+    def _uneven(self, steps: np.ndarray, usual: float) -> str:
+        """What is said of times that a simulator chose."""
+        short, long = int(np.count_nonzero(steps < 0.5 * usual)), int(np.count_nonzero(steps > 1.5 * usual))
+        if not long:
+            rows = "1 row lies" if short == 1 else f"{short} rows lie"
+            what = f"{rows} between the usual ones, as a simulator writes the instants of events"
+        else:
+            what = f"times are uneven (steps of {steps.min():.3g} to {steps.max():.3g} s), as a simulator chooses them"
+        return f"{what}: resampled linearly every {usual:.6g} s"
 
     def _place(self, i: int) -> str:
         return f"sample {i + 1} (t = {self.t[i]:g} s)"
 
-    def _check_values(self, place: Callable[[int], str]) -> None:
+    def _check_values(self, place: Callable[[int], str], still: bool = False) -> None:
+        """Refuse what is no record; times may stand `still` where the record is to be resampled."""
         n = self.samples
         for name, values in self.more.items():
             if values.shape != (n,):
@@ -141,7 +184,7 @@ class Record:
                 raise UserError(f"{self.where}: {name} holds no number at all")
         if n < FEWEST_SAMPLES:
             raise UserError(f"{self.where}: only {n} samples; a record needs at least {FEWEST_SAMPLES}")
-        back = np.diff(self.t) <= 0
+        back = np.diff(self.t) < 0 if still and self.t[-1] > self.t[0] else np.diff(self.t) <= 0
         if back.any():
             i = int(np.argmax(back)) + 1
             raise UserError(
@@ -161,8 +204,8 @@ class Record:
             )
         if self.step > LONGEST_STEP:
             raise UserError(
-                f"{self.where}: one sample every {self.step:g} is too slow; t must be in seconds and its step at most "
-                f"{LONGEST_STEP:g} s"
+                f"{self.where}: one sample every {self.step:.3g} s is too coarse: a motor answers a dip within 50 to 300 "
+                f"ms, so at least {1 / LONGEST_STEP:g} samples per second are needed; t must be in seconds"
             )
 
     def _check_per_unit(self) -> None:
@@ -179,9 +222,13 @@ class Record:
                 f"{self.where}: P or Q reaches {S:g}, which is not per unit (up to {PLAUSIBLE_POWER:g} is expected); "
                 "if it is in MW, give the base as data.base_power (MVA)"
             )
-        if self.f is not None and np.abs(self.f / self.base.frequency - 1).max() > 0.2:
-            i = int(np.argmax(np.abs(self.f - self.base.frequency)))
+        if self.f is None:
+            return
+        alive = self.U > DEAD * U  # what turns while there is no voltage is noise
+        off = np.where(alive, np.abs(self.f / self.base.frequency - 1), 0.0)
+        if off.max() > 0.2:
+            i = int(np.argmax(off))
             raise UserError(
                 f"{self.where}: {self._place(i)}: f = {self.f[i]:g} is more than 20 % off the nominal "
-                f"{self.base.frequency:g} Hz; f must be in Hz and data.frequency the nominal frequency"
+                f"{self.base.frequency:g} Hz at a voltage of {self.U[i]:.3g}; f must be in Hz"
             )

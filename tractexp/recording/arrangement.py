@@ -14,7 +14,7 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.plugin import chosen
-from tractexp.record.direction import direction
+from tractexp.record.direction import at_level, direction
 from tractexp.record.phasor import sequences
 from tractexp.recording.connection import usual
 from tractexp.recording.feeder import Feeder
@@ -74,6 +74,7 @@ def arranged(recording: Recording, feeder: Feeder) -> Feeder:
         return replace(feeder, why=(*feeder.why, "the order of the channels cannot be checked: nothing is alive"))
     if len(seen.V) < 3:
         return _directed(feeder, seen)
+    _lines(recording, feeder)
     if _to_ground(feeder) and (told := _lines_by_shape(recording, feeder, seen)):
         feeder = replace(feeder, connection=_between(feeder), why=(*feeder.why, told))
         seen = _seen(recording, feeder) or seen
@@ -105,6 +106,18 @@ def _between(feeder: Feeder) -> Any:
     return usual(len(feeder.voltages), len(feeder.currents), lines=True)
 
 
+def _lines(recording: Recording, feeder: Feeder) -> None:
+    """Refuse phase voltages where line-to-line ones are asked for."""
+    told, connection = order([recording.channels[i] for i in feeder.voltages]), chosen("connection", feeder.connection)
+    if not connection.lines or told is None or told[1]:
+        return
+    names = ", ".join(f"{i} '{recording.channels[i].name}' [{recording.channels[i].unit}]" for i in feeder.voltages)
+    raise UserError(
+        f"data.voltages={[*feeder.voltages]}: {names} are labelled as phases to ground, and "
+        f"data.connection={connection.name} takes line-to-line voltages; give three channels to ground, or lines"
+    )
+
+
 def _seen(recording: Recording, feeder: Feeder) -> _Seen | None:
     """The feeder's phasors while voltage and current are alive; None where they never are."""
     numbers = [*feeder.voltages, *feeder.currents]
@@ -123,7 +136,7 @@ def _seen(recording: Recording, feeder: Feeder) -> _Seen | None:
     if not alive.any():
         return None
     V, I, size = V[:, alive], I[:, alive], size[alive]
-    calm = np.abs(size / np.quantile(size, 0.5, method="lower") - 1) < CALM  # a level that is there: never empty
+    calm = at_level(size, CALM)
     if len(V) == 3:
         small, large = np.sort(np.abs(sequences(V)), axis=0)  # whatever the order is
         calm = even if (even := calm & (small < UNBALANCED * large)).any() else calm

@@ -324,8 +324,9 @@ def _dates(left: _Lines, header: Header) -> None:
         if remark:
             left.remarks.add(remark, line)
     begin, at = (*found, None)[:2]
-    header.start = None if begin == EPOCH else begin
-    if begin == EPOCH:
+    unset = begin is not None and begin.date() == EPOCH.date()
+    header.start = None if unset else begin
+    if unset:
         left.remarks.add("the clock was not set (1970); the time of the first sample is not known", told[0][0])
     if begin is not None and at is not None and at != EPOCH:
         header.trigger = (at - begin) / timedelta(seconds=1)

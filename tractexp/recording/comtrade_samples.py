@@ -94,7 +94,7 @@ def _enough(
     """Compare the samples found with those announced: a few too few shorten the record."""
     told = header.samples
     if found > told:
-        remarks.add(f"{place.path.name} holds {found - told} samples more than the {told} announced; they are not used")
+        remarks.add(f"{place.path.name} holds {found} samples, {told} are announced; those after them are not used")
     if found >= told:
         return
     if found < 1 or told - found > max(1, LACKING * told):

@@ -56,17 +56,19 @@ def _kind(recording: Recording, asked: str, revision: int) -> str:
 def _fits(channel: Channel, kind: str) -> bool:
     raw, lacking = np.asarray(channel.raw), _lacking(channel)
     present = raw[~lacking]
-    if kind == "ASCII" or not len(present):
+    if kind == "ASCII":
         return True
     if kind == "FLOAT32":
         with np.errstate(over="ignore"):
             return bool((present.astype(np.float32) == present).all())
-    if raw.dtype.kind == "f" and (present != np.trunc(present)).any():
-        return False
     least, greatest = (0, 65534) if _unsigned(channel, kind) else FULL[kind]
     if not lacking.any():  # then the value that stands for none is free
         least, greatest = (0, 65535) if _unsigned(channel, kind) else (least - 1, greatest)
-    return bool(least <= present.min() and present.max() <= greatest)
+    elif channel.limits is not None and (channel.limits[0] < least or greatest < channel.limits[1] == 65535):
+        return False  # the file would declare that value possible
+    if raw.dtype.kind == "f" and (present != np.trunc(present)).any():
+        return False
+    return not len(present) or bool(least <= present.min() and present.max() <= greatest)
 
 
 def _unsigned(channel: Channel, kind: str) -> bool:
@@ -185,11 +187,10 @@ def _binary(recording: Recording, kind: str, stamps: np.ndarray) -> bytes:
     table["t"] = np.where(good, stamps, NONE).astype(np.uint32)
     for k, channel in enumerate(recording.channels):
         none = np.nan if kind == "FLOAT32" else 65535 if _unsigned(channel, kind) else FULL[kind][0] - 1
-        raw, lacking = np.asarray(channel.raw), _lacking(channel)
-        values = np.where(lacking, none, raw) if lacking.any() else raw
-        to = "<u2" if _unsigned(channel, kind) else VALUE[kind]
-        with np.errstate(over="ignore"):
-            table["a"][:, k] = values.astype(to).view(VALUE[kind])
+        with np.errstate(over="ignore", invalid="ignore"):
+            values = np.asarray(channel.raw).astype("<u2" if _unsigned(channel, kind) else VALUE[kind])
+        values[_lacking(channel)] = none
+        table["a"][:, k] = values.view(VALUE[kind])
     for k, status in enumerate(recording.status):
         table["d"][:, k // 16] |= status.values().astype(np.uint16) << (k % 16)
     return table.tobytes()

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from tractexp.record.phasor import TURN
-from tractexp.recording.connection import usual
 from tractexp.recording.label import Group, groups, kind, residual, words
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import Snapshots, frequency, nearest_nominal, snapshots
@@ -27,7 +26,7 @@ class Feeder:
 
     voltages: tuple[int, ...]
     currents: tuple[int, ...]
-    connection: Any  # the plugin that makes phase quantities of them: a name, or name and settings
+    connection: Any = "three_phase"  # the plugin that makes phase quantities of them: a name, or name and settings
     reverse_current: bool = False  # the recorder counts current out of the load as positive
     name: str = ""
     why: tuple[str, ...] = ()  # what it was recognised by, and what was changed in the order given, one sentence each
@@ -60,7 +59,7 @@ def _groups(recording: Recording, seen: Snapshots, numbers: Sequence[int]) -> li
     """Groups among the channels of one quantity: by label, and by magnitude and angle among those left."""
     found = [
         g for g in groups({i: recording.channels[i] for i in numbers})
-        if len(g.numbers) == 3 or (g.pairs and g.missing is not None) or (not g.pairs and g.missing == 1)
+        if len(g.numbers) == 3 or g.pairs == (recording.channels[g.numbers[0]].quantity != "current")
     ]  # fmt: skip
     found = [g for g in found if g.certain or all(seen.pure(i) for i in g.numbers)]
     taken = {i for g in found for i in g.numbers}
@@ -103,7 +102,7 @@ def _fits(load: Group, buses: Sequence[Group]) -> bool:
 
 def _feeder(recording: Recording, seen: Snapshots, load: Group, buses: Sequence[Group]) -> Feeder:
     bus, why = _bus(recording, seen, load, buses)
-    connection = usual(len(bus.numbers), len(load.numbers), bus.pairs)
+    voltages, connection = _connection(load, bus)
     said = [
         f"currents {_names(recording, load.numbers)}: {_by(load)}",
         f"voltages {_names(recording, bus.numbers)}: {why}",
@@ -112,7 +111,22 @@ def _feeder(recording: Recording, seen: Snapshots, load: Group, buses: Sequence[
         said.append("the voltages are line to line, as their names say")
     if len(load.numbers) == 2:
         said.append("two currents are recorded: the third is minus their sum, as where no current returns to earth")
-    return Feeder(bus.numbers, load.numbers, connection, name=load.name or bus.name or "the feeder", why=tuple(said))
+    return Feeder(voltages, load.numbers, connection, name=load.name or bus.name or "the feeder", why=tuple(said))
+
+
+def _connection(load: Group, bus: Group) -> tuple[tuple[int, ...], Any]:
+    """(the voltages used, the connection that makes phase quantities of them)."""
+    pairs = [pair for k, pair in enumerate(("ab", "bc", "ca")) if k != bus.missing]
+    phases = "".join(p for k, p in enumerate("abc") if k != load.missing)
+    settings: dict[str, Any] = {"phases": phases} if len(phases) == 2 and phases != "ac" else {}
+    if not bus.pairs:
+        name = "aron" if len(phases) == 2 else "three_phase"
+        return bus.numbers, {"name": name, **settings} if settings else name
+    if len(phases) == 3 and len(pairs) == 3:
+        return bus.numbers, "line_voltages"
+    settings = {"phases": phases} if len(phases) == 2 else {}
+    settings |= {"pairs": pairs} if pairs[:2] != ["ab", "bc"] else {}
+    return bus.numbers[:2], {"name": "two_line_voltages", **settings} if settings else "two_line_voltages"
 
 
 def _by(group: Group) -> str:
@@ -194,7 +208,7 @@ def _single(
         group = Group((i,), False, recording.channels[i].name.strip(), False)
         bus, why = _bus(recording, seen, group, [Group((v,), False, "", False) for v in free])
         said = (f"one current {_names(recording, [i])}", f"one voltage {_names(recording, bus.numbers)}: {why}")
-        made.append(Feeder(bus.numbers, (i,), usual(1, 1), name=group.name, why=said))
+        made.append(Feeder(bus.numbers, (i,), "single_phase", name=group.name, why=said))
     return made
 
 

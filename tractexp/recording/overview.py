@@ -19,6 +19,8 @@ from tractexp.recording.quality import Quality, quality
 from tractexp.recording.reader import Dip, WaveformReader
 from tractexp.recording.recording import Recording
 
+APART = 0.06  # s: three cycles, within which what happened and the dip that is fitted begin
+
 
 @dataclass(frozen=True)
 class Seen:
@@ -52,10 +54,10 @@ class Sight:
         """The numbers of the dips that are worth fitting."""
         return [s.dip for s in self.seen if s.worth and s.dip is not None]
 
-    def choice(self) -> dict[str, Any]:
-        """The reader's settings that fit what is worth it: the first dip, the others held out; {} where nothing is."""
+    def choice(self) -> dict[str, Any] | None:
+        """The reader's settings that fit what is worth it, first dip first, others held out; None where nothing is."""
         if not any(s.worth for s in self.seen):
-            return {}
+            return None
         return {**self.settings, **({"train": self.dips[:1], "validate": self.dips[1:]} if self.dips else {})}
 
     def powers(self) -> tuple[float, float, float] | None:
@@ -171,6 +173,8 @@ def _numbered(
         made = tried.get(number) if number else None
         event = detect(made) if isinstance(made, Record) else None
         why = (str(made) if made else refused).removeprefix(f"{reader.path} dip {number}: ")
+        if event is not None and abs(event.t_start - what.start) > APART:
+            why, event = f"the reader's dip {number} begins at {event.t_start:.3f} s, with something else", None
         yield Seen(what, number, event, _why(what, event, why or "it is no dip"))
 
 

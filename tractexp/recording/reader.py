@@ -11,6 +11,7 @@ import numpy as np
 from tractexp import plugin
 from tractexp.errors import UserError, check_range
 from tractexp.record import Base, Events, Reader, Record, detect, find_dips
+from tractexp.record.choice import check_numbers, chosen
 from tractexp.record.event import FEWEST_BEFORE, STEADY
 from tractexp.record.phasor import Phasors
 from tractexp.recording.arrangement import arranged, tuned
@@ -66,12 +67,7 @@ class WaveformReader(Reader):
     def check(self) -> None:
         if not self.path:
             raise UserError(f"data.path is missing: give the file, e.g. data.path=station{self.endings[0]}")
-        if self.train is not None and not self.train:
-            raise UserError("data.train is empty: name at least one dip by its number, e.g. data.train=[1]")
-        given = [*(self.train or []), *(self.validate or [])]
-        for number in given:
-            if given.count(number) > 1:
-                raise UserError(f"data.train and data.validate name dip {number} twice; a dip may serve only once")
+        check_numbers(self.train, self.validate)
         check_range("data.pre", self.pre, 0.05)
         check_range("data.post", self.post, 0.1)
 
@@ -79,18 +75,7 @@ class WaveformReader(Reader):
         recording = self.opened()
         feeder = self.feeder(recording)
         dips, tried = self.numbered(feeder, self._streams(recording, feeder), recording.frequency)
-        usable = [number for number, made in tried.items() if isinstance(made, Record)]
-        fitted = self.train or usable[:1] or [1]
-        first, *rest = [self._pick(number, tried) for number in fitted]
-        notes = self._notes(recording, feeder, dips)  # of the whole file: said once, on the first record
-        if self.validate is not None:
-            held = [self._pick(number, tried) for number in self.validate]
-            return Events([replace(first, notes=(*first.notes, *notes)), *rest], held)
-        others = [made for number, made in tried.items() if number not in fitted]
-        notes += tuple(f"not used for validation: {made}" for made in others if isinstance(made, UserError))
-        return Events(
-            [replace(first, notes=(*first.notes, *notes)), *rest], [made for made in others if isinstance(made, Record)]
-        )
+        return chosen(self.path, tried, self.train, self.validate, self._notes(recording, feeder, dips))
 
     def numbered(
         self, feeder: Feeder, streams: Sequence[Phasors], frequency: float
@@ -105,14 +90,6 @@ class WaveformReader(Reader):
             raise UserError(f"{self.path}: no dip found in the waveforms ({spans}): the voltage never falls by 3 %")
         base = self._base(dips, frequency)
         return dips, {number: self._record(feeder, number, dip, base) for number, dip in enumerate(dips, 1)}
-
-    def _pick(self, number: int, tried: dict[int, Record | UserError]) -> Record:
-        """Dip `number`; raises `UserError` naming the dips that can be used where this one cannot."""
-        usable = ", ".join(f"{n} at {r.t[0]:.3f} to {r.t[-1]:.3f} s" for n, r in tried.items() if isinstance(r, Record))
-        made = tried.get(number, UserError(f"{self.path}: there is no dip {number}; {len(tried)} are found"))
-        if isinstance(made, UserError):
-            raise UserError(f"{made}; dips that can be used: {usable or 'none'}")
-        return made
 
     def feeder(self, recording: Recording) -> Feeder:
         """The channels asked for, or those of the only load that the file shows."""

@@ -81,10 +81,12 @@ def _tell_load(feeder: Any) -> None:
             ["" if e["dip"] is None else str(e["dip"]), e["kind"], f"{e['start']:.3f}", f"{1000 * e['duration']:.0f}",
              f"{e['depth']:.1%}", figure(e["jump"], 2), "" if e["U2"] is None else f"{e['U2']:.1%}",
              *(change(e[f"{x}_before"], e[f"{x}_after"]) for x in "PQ"),
-             f"{'yes' if e['worth'] else 'no'}: {e['why']}"]
+             "yes" if e["worth"] else "no"]
             for e in feeder["events"]
         ]  # fmt: skip
         table(["dip", "kind", "t [s]", "ms", "depth", "jump", "U2", "P [MW]", "Q [Mvar]", "fit it?"], rows)
+        for e in feeder["events"]:
+            say(f"  {e['kind']} at {e['start']:.3f} s, {'worth fitting' if e['worth'] else 'not fitted'}: {e['why']}")
     else:
         say("  nothing happened: the voltage stays within the thresholds of IEC 61000-4-30")
     if feeder["command"]:

@@ -1,0 +1,42 @@
+"""Records from tables of waveforms: the dips of one file, numbered in order of time."""
+
+from tractexp.errors import check_range
+from tractexp.plugin import plugin
+from tractexp.recording import Recording
+from tractexp.recording.reader import WaveformReader
+from tractexp.recording.sidecar import beside
+from tractexp.recording.tabulated import Tabular, kind_of, recording
+from tractexp.recording.tidy import restored
+
+
+@plugin
+class Waveforms(Tabular, WaveformReader):
+    """Dips from a table of sampled voltages and currents: CSV and other text, Parquet, Excel.
+
+    Columns such as t, ua, ub, uc, ia, ib, ic, or t, u, i of a single-phase feeder; every further column of numbers is
+    a channel too. Names, units, delimiter, decimal mark and encoding are found and said in a note, or given (`columns`,
+    `units`, ...). A gap in time parts the file: no window reaches across it. A table that `task=convert` wrote of a
+    recording is that recording again, ratios and all.
+
+    Source: RFC 4180; the names ua, ub, uc, ia, ib, ic are those of IEC 61869 in small letters.
+    Departures: any delimiter, title lines, unit rows.
+    """
+
+    endings = (".csv", ".txt", ".tsv", ".parquet", ".pq", ".xlsx", ".xls", ".xlsb", ".ods")
+
+    frequency: float = 50.0  # Hz, nominal
+
+    @classmethod
+    def takes(cls, path: str) -> bool:
+        return kind_of(path) == "waveforms"
+
+    def check(self) -> None:
+        super().check()
+        check_range("data.frequency", self.frequency, 1e-6)
+        self.check_table()
+
+    def recording(self) -> Recording:
+        told = beside(self.path)
+        if told.recording is not None:
+            return restored(self.path, told.recording)
+        return recording(*self.table_of(self.path, told), self.frequency)

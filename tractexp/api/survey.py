@@ -1,0 +1,183 @@
+"""A folder of recordings as a table: what happened in each file, to each load, and what is worth fitting."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+from tractexp import files
+from tractexp.api.arguments import public
+from tractexp.api.look import Listed
+from tractexp.api.pages import Written
+from tractexp.api.surveying import QUIET, UNREAD, kept, looked, state, writing
+from tractexp.errors import UserError, check_range
+from tractexp.outcome import Table
+from tractexp.overrides import typed
+from tractexp.plugin import discover
+from tractexp.progress import Progress, counting, staged
+from tractexp.recording import archive
+
+if TYPE_CHECKING:
+    from tractexp.identification.plan import Choice
+
+JOURNAL = "rows.jsonl"  # a line for each file that was looked at: its state then, and its rows
+CANDIDATES = 300  # events that are read again to be ranked: those of the greatest depth over noise
+LEAST_NOISE = 1e-4  # of P: what shows less is not told from what shows so much
+PICTURES = ("U_picture", "P_picture")
+ABOUT = {
+    "event": "FILE#LOAD.DIP, as data.train takes it", "when": "by the recorder's clock", "start": "s in the file",
+    "duration": "s", "depth": "of the voltage before", "U2": "of U1 before", "jump": "degrees", "P_before": "MW",
+    "Q_before": "Mvar", "P_after": "MW", "Q_after": "Mvar", "noise": "of P, before the event", "rate": "Hz, sampled",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Survey(Written):
+    """The table of an archive. `content` is that of `survey.json`."""
+
+    kind = "survey"
+
+    content: Mapping[str, Any]
+
+    @property
+    def folder(self) -> str:
+        """The archive."""
+        return self.content["folder"]
+
+    @property
+    def rows(self) -> Listed:
+        """One row for each event of each load; for a file without any, or that cannot be read, one that says so."""
+        plain = [{k: v for k, v in row.items() if k not in PICTURES} for row in self.content["rows"]]
+        return Listed(plain, f"events in {self.folder}")
+
+    @property
+    def unread(self) -> Listed:
+        """One row for each file that cannot be read: its name and the reason."""
+        found = [{"file": row["file"], "why": row["why"]} for row in self.content["rows"] if row["kind"] == UNREAD]
+        return Listed(found, f"files of {self.folder} that cannot be read")
+
+    @property
+    def informative(self) -> list[str]:
+        """Names of the events that tell most about the model together, the best first; none where not asked for."""
+        return [each["event"] for each in self.content["informative"]]
+
+    @property
+    def command(self) -> str:
+        """What is to be typed to fit them together; "" where not asked for."""
+        return self.content["command"]
+
+    def to_frame(self) -> Any:
+        return self.rows.to_frame()
+
+    def table(self) -> Table:
+        rows = self.content["rows"]
+        kinds = sorted({row["kind"] for row in rows}, key=lambda k: (k in (UNREAD, QUIET), k))
+        told = [
+            [kind, sum(r["kind"] == kind for r in rows), len({r["file"] for r in rows if r["kind"] == kind}),
+             sum(r["kind"] == kind and r["worth"] for r in rows)]
+            for kind in kinds
+        ]  # fmt: skip
+        said = [f"{self.content['files']} files in {self.folder}, {sum(r['worth'] for r in rows)} events worth fitting"]
+        if self.informative:
+            said += [f"most informative: {', '.join(self.informative)}", self.command]
+        return Table(["what", "rows", "files", "worth fitting"], told, f"survey of {self.folder}", said)
+
+    def to_dict(self) -> dict[str, Any]:
+        return {"content": dict(self.content)}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        return cls(content["content"])
+
+    def _write(self, folder: Path) -> list[Path]:
+        """survey.html, survey.csv, survey.parquet and survey.json."""
+        from tractexp.report import survey
+
+        frame = self.to_frame()
+        return [
+            survey.page(folder / "survey.html", self.content),
+            files.write(folder / "survey.csv", frame.to_csv(index=False)),
+            files.write(folder / "survey.parquet", frame.to_parquet(index=False)),
+            files.write_json(folder / "survey.json", self.content),
+        ]
+
+
+@public
+def survey(
+    folder: str | Path,
+    *,
+    informative: int | None = None,
+    model: Any = None,
+    values: Any = "fit",
+    cores: int | None = None,
+    keep: str | Path | None = None,
+    progress: Progress = None,
+    bounds: Mapping[str, Sequence[float]] | None = None,
+    fixed: Mapping[str, float] | None = None,
+    substeps: int | None = None,
+) -> Survey:
+    """Look at every file below a folder that can be read; what cannot be read is a row with the reason.
+
+    `cores` (all) processes look; `keep` is a folder where the rows of each file are kept as they come, so that the
+    next survey with it looks only at files that are new or changed. `informative` asks for so many events that tell
+    most about `model` together (D-optimal), at `values` as `tractexp.plan` takes them. The model is as in
+    `tractexp.identify`. Raises `UserError` for a folder that is not there or holds no file that can be read.
+    """
+    if informative is not None:
+        check_range("task.informative", informative, 1)
+    if cores is not None:
+        check_range("task.cores", cores, 1)
+    place = Path(folder)
+    paths = list(archive.files(place))
+    if not paths:
+        raise UserError(f"data.path={folder} holds no file that can be read")
+    names = {path.relative_to(place).as_posix(): state(path) for path in paths}
+    journal = Path(keep) / JOURNAL if keep else None
+    known = kept(journal)
+    rows = {name: known[name][1] for name, now in names.items() if name in known and known[name][0] == now}
+    fresh = [name for name in names if name not in rows]
+    with counting("files", len(fresh), progress) as count, writing(journal) as write:
+        for name, made in looked(place, fresh, cores or _cores()):
+            rows[name] = made
+            write(name, names[name], made)
+            count()
+    content = {
+        "folder": str(folder), "files": len(names), "looked_at": len(fresh), "about": ABOUT,
+        "rows": [row for name in names for row in rows[name]], "informative": [], "command": "",
+    }  # fmt: skip
+    if informative is None:
+        return Survey(content)
+    worth = sorted((row for row in content["rows"] if row["worth"]), key=_promise, reverse=True)[:CANDIDATES]
+    asked = {"bounds": bounds, "fixed": fixed, "substeps": substeps}
+    with staged(progress) as stage:
+        stage(f"choosing among {len(worth)} events")
+        best = _best(place, [row["event"] for row in worth], informative, model, values, asked)
+    content["informative"] = files.plain([{"event": c.name, "gain": c.gain, "half": c.half} for c in best])
+    reader = next(cls.name for cls in discover()["data"].values() if getattr(cls, "folders", False))
+    content["command"] = typed({"name": reader, "path": str(folder), "train": [c.name for c in best]})
+    return Survey(content)
+
+
+def _promise(row: Mapping[str, Any]) -> float:
+    """How much an event may tell: its depth over its noise."""
+    return (row["depth"] or 0.0) / max(row["noise"] or 0.0, LEAST_NOISE)
+
+
+def _cores() -> int:
+    from joblib import cpu_count
+
+    return cpu_count()
+
+
+def _best(
+    folder: Path, names: Sequence[str], most: int, model: Any, values: Any, known: Mapping[str, Any]
+) -> "list[Choice]":
+    """The events that tell most together. Raises `UserError` where none is worth fitting."""
+    from tractexp.api.plan import chosen_events
+    from tractexp.api.setup import Setup
+    from tractexp.record import detect
+
+    if not names:
+        raise UserError(f"no event in {folder} is worth fitting; the table says why")
+    events = [detect(record) for record in archive.records(folder, list(names), "data.train")]
+    return chosen_events(Setup.of(events, model, (), None, known), values, most)

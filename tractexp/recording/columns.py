@@ -1,0 +1,176 @@
+"""What the columns of a table are called, and what that means: quantity, phase, unit.
+
+t   Time [s]   Zeit in ms   时间     U   Voltage (kV)   Va   UA(kV)   V1   m:u1:bus in p.u.     P [MW]   Active power
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from tractexp.recording.recording import UNITS as ELECTRICAL
+
+# {unit in lower case: (quantity, factor to s, kV, kA, MW, Mvar, Hz, rad, pu)}
+UNITS: Mapping[str, tuple[str, float]] = {
+    **ELECTRICAL,
+    **{unit: ("t", 1.0) for unit in ("s", "sec", "second", "seconds", "sek", "秒", "с", "сек")},
+    **{unit: ("t", 1e-3) for unit in ("ms", "msec", "millisecond", "milliseconds", "毫秒", "мс")},
+    **{unit: ("t", 1e-6) for unit in ("us", "µs", "μs", "usec", "microseconds", "微秒", "мкс")},
+    "ns": ("t", 1e-9), "min": ("t", 60.0), "h": ("t", 3600.0),
+    "кв": ("voltage", 1.0), "в": ("voltage", 1e-3), "ка": ("current", 1.0), "а": ("current", 1e-3),
+    "mw": ("power", 1.0), "kw": ("power", 1e-3), "w": ("power", 1e-6), "gw": ("power", 1e3), "мвт": ("power", 1.0),
+    "квт": ("power", 1e-3),
+    "mvar": ("reactive", 1.0), "kvar": ("reactive", 1e-3), "var": ("reactive", 1e-6), "gvar": ("reactive", 1e3),
+    "mva": ("reactive", 1.0), "kva": ("reactive", 1e-3), "va": ("reactive", 1e-6), "мвар": ("reactive", 1.0),
+    "квар": ("reactive", 1e-3),
+    "hz": ("frequency", 1.0), "mhz": ("frequency", 1e-3), "гц": ("frequency", 1.0),
+    "hz/s": ("rocof", 1.0),
+    "deg": ("angle", 0.017453292519943295), "degree": ("angle", 0.017453292519943295),
+    "degrees": ("angle", 0.017453292519943295), "°": ("angle", 0.017453292519943295),
+    "grad": ("angle", 0.017453292519943295), "度": ("angle", 0.017453292519943295), "rad": ("angle", 1.0),
+    "radian": ("angle", 1.0), "radians": ("angle", 1.0),
+    "pu": ("", 1.0), "p.u.": ("", 1.0), "p.u": ("", 1.0), "per unit": ("", 1.0), "puv": ("", 1.0), "1": ("", 1.0),
+    "%": ("", 1e-2),
+}  # fmt: skip
+PER_UNIT = frozenset(unit for unit, (quantity, _) in UNITS.items() if not quantity)
+BRACKETED = (
+    r"(.+?)[\s_]*[\[(（{<]\s*([^\])）}>]*?)\s*[\])）}>]", r"(.+?)\s*/\s*(\S+)", r"(.+?)\s+in\s+(\S+)",
+)  # fmt: skip
+UNMISTAKABLE = frozenset((  # as units after a space or an underscore, where V and A may be phases
+    "kV", "kA", "MW", "kW", "Mvar", "MVAr", "MVar", "kvar", "kVAr", "Hz", "s", "ms", "us", "pu", "deg", "rad",
+))  # fmt: skip
+
+# {word: quantity}; those of more than one letter are found within a name too, where letters do not part words
+WORDS: Mapping[str, str] = {
+    **dict.fromkeys(("t", "time", "timestamp", "datetime", "zeit", "uhrzeit", "zeitstempel", "clock", "temps", "tiempo",
+                     "tempo", "tnow", "utc", "время", "时间", "时刻"), "t"),
+    **dict.fromkeys(("date", "datum", "日期", "дата"), "day"),
+    **dict.fromkeys(("u", "v", "vm", "um", "voltage", "volt", "volts", "vmag", "umag", "urms", "vrms", "u1l", "spannung",
+                     "напряжение", "电压", "tension", "tensión"), "U"),
+    **dict.fromkeys(("i", "im", "current", "curr", "irms", "strom", "ток", "电流", "courant", "corriente"),
+                    "I"),
+    **dict.fromkeys(("p", "ptot", "psum", "ptotal", "pload", "pl", "pelec", "plod", "powr", "active", "real", "wirkleistung",
+                     "активная", "有功", "有功功率"), "P"),
+    **dict.fromkeys(("q", "qtot", "qsum", "qtotal", "qload", "ql", "qelec", "qlod", "vars", "reactive", "blindleistung",
+                     "реактивная", "无功", "无功功率"), "Q"),
+    **dict.fromkeys(("f", "fe", "freq", "frequency", "fehz", "fq", "frequenz", "frq", "частота", "频率"), "f"),
+    **dict.fromkeys(("dfdt", "df", "rocof", "dfreq"), "dfdt"),
+}  # fmt: skip
+ANGLE = frozenset(("angle", "ang", "winkel", "arg", "phi", "theta", "угол", "相角", "角度", "deg"))
+POSITIVE = frozenset(("pos", "positive", "ps", "1", "正序", "mitsystem"))
+PHASES: Mapping[str, str] = {
+    **dict.fromkeys(("a", "l1", "an", "ag", "а", "a相"), "a"),
+    **dict.fromkeys(("b", "l2", "bn", "bg", "b相"), "b"),
+    **dict.fromkeys(("c", "l3", "cn", "cg", "c相"), "c"),
+    **dict.fromkeys(("ab", "12", "l12", "l1l2", "l1-l2"), "ab"),
+    **dict.fromkeys(("bc", "23", "l23", "l2l3", "l2-l3"), "bc"),
+    **dict.fromkeys(("ca", "31", "l31", "l3l1", "l3-l1"), "ca"),
+    **dict.fromkeys(POSITIVE, "1"),
+    **dict.fromkeys(("neg", "negative", "ns", "2", "负序", "gegensystem"), "2"),
+    **dict.fromkeys(("0", "zero", "zs", "零序"), "0"),
+    "3": "3", "n": "n",
+}  # fmt: skip
+LINE = frozenset(("ll", "line", "l-l", "pp", "ph-ph", "verkettet", "线电压"))
+GROUND = frozenset(("ln", "phase-to-ground", "ph", "lg", "l-n", "ph-g", "strang", "相电压"))
+COMPOUND = re.compile(
+    r"(u|v|i|p|q)(l1l2|l2l3|l3l1|l12|l23|l31|l1|l2|l3|ab|bc|ca|an|bn|cn|ag|bg|cg|12|23|31|pos|neg|zero|ps|ns|a|b|c"
+    r"|0|1|2|3|n)(mag|m|ang|rms)?"
+)
+
+
+@dataclass(frozen=True)
+class Role:
+    """What a column is: `key` as in `data.columns`, the factor to the unit used inside, and what the unit says."""
+
+    key: str  # t, U, U2, P, Q, f, dfdt, day; Ua ... Uca, U1, Ia ..., Pa ...; an angle ends in _angle
+    unit: str = ""
+    line: bool | None = None  # of a voltage: line to line, phase to ground, unsaid
+
+    @property
+    def quantity(self) -> str:
+        """What `data.units` calls it."""
+        return "angle" if self.key.endswith("_angle") else self.key if self.key in ("t", "f", "dfdt") else self.key[0]
+
+
+def split_unit(name: str) -> tuple[str, str]:
+    """A header's name and its unit, "" where it has none: "Voltage [kV]", "U/kV", "Zeit in ms", "P_MW"."""
+    name = name.strip().strip('"').strip("'").strip()
+    for pattern in BRACKETED:
+        if (found := re.fullmatch(pattern, name)) and is_unit(found[2]):
+            return found[1].strip(), found[2]
+    found = re.fullmatch(r"(.+?)(?:\s*,\s*|\s+|_)(\S+)", name)
+    sure = found is not None and (found[2] in UNMISTAKABLE or (not found[2].isascii() and is_unit(found[2])))
+    return (found[1], found[2]) if found and sure else (name, "")
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit that is known."""
+    return text.strip().lower() in UNITS and not text.strip().isdigit()
+
+
+def factor(unit: str) -> float:
+    """From a unit to the one used inside, 1 for none."""
+    if unit.strip() == "mW":
+        return 1e-9
+    return UNITS.get(unit.strip().lower(), ("", 1.0))[1]
+
+
+def role(name: str, unit: str = "") -> Role | None:
+    """What a column of that name and unit is; None for what cannot be told."""
+    words = _words(name)
+    if not words:
+        return None
+    found = next((made for made in (_compound(words), _worded(words)) if made), None)
+    if found is None:
+        return None
+    key, phase = found
+    kind = UNITS.get(unit.strip().lower(), ("",))[0]
+    if (key, kind) in (("U", "current"), ("I", "voltage")):  # "Voltage (A)": a phase, no unit
+        return role(f"{name} {unit}")
+    if key in ("U", "I") and (kind == "angle" or _tells_angle(words)):
+        return Role(f"{key}{phase}_angle", unit)
+    if key not in ("U", "I", "P", "Q"):
+        return Role(key, unit)
+    line = True if LINE & set(words) or len(phase) == 2 else False if phase or GROUND & set(words) else None
+    return Role(key + phase, unit, line if key == "U" else None)
+
+
+def _tells_angle(words: Sequence[str]) -> bool:
+    return bool(ANGLE & set(words)) or words[-1] == "phase" or any(word.endswith("ang") for word in words)
+
+
+def _words(name: str) -> list[str]:
+    """The words of a name, in lower case; numbers of buses and the like are left out."""
+    text = re.sub(r"(?<=[a-z])(?=[A-Z][a-z])", " ", name)
+    text = re.sub(r"[^\w]+|_", " ", text.lower().replace("d/dt", "dt").replace("df/dt", "dfdt"))
+    text = re.sub(r"\b(bus|busbar|node|feeder|gen|substation|to|ckt)\s+\d+\b", " ", text)
+    text = re.sub(r"\b\d{3,}\b", " ", text)
+    text = re.sub(r"([abc]相)", r" \1 ", text)
+    return text.split()
+
+
+def _compound(words: Sequence[str]) -> tuple[str, str] | None:
+    """Quantity and phase of a word such as ua, vl1, i_b, V1."""
+    for word, after in zip(words, [*words[1:], ""], strict=True):
+        if found := COMPOUND.fullmatch(word):
+            return _letter(found[1]), PHASES[found[2]]
+        if (key := WORDS.get(word)) in ("U", "I", "P", "Q") and after in PHASES and (after != "p"):
+            return key, PHASES[after]
+    return None
+
+
+def _letter(letter: str) -> str:
+    return {"v": "U"}.get(letter, letter.upper())
+
+
+def _worded(words: Sequence[str]) -> tuple[str, str] | None:
+    """Quantity and phase of words such as "active power", "phase A voltage", "正序电压"."""
+    found = next((WORDS[word] for word in ("dfdt", "rocof", "reactive", *words) if word in words and word in WORDS), "")
+    text = " ".join(words)
+    if not found:  # where no spaces part the words
+        found = next((key for word, key in WORDS.items() if len(word) > 1 and not word.isascii() and word in text), "")
+    if not found:
+        return None
+    if found not in ("U", "I"):
+        return found, ""
+    spelled = (p for w in words if (p := PHASES.get(w)) and not (w.isascii() and len(w) == 1 and "phase" not in words))
+    return found, next(spelled, "1" if "正序" in text else "2" if "负序" in text else "")

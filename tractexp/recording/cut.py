@@ -1,0 +1,46 @@
+"""A part of a recording: what was recorded between two times."""
+
+from dataclasses import replace
+from datetime import timedelta
+from typing import Any
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.recording.recording import Recording, Segment
+
+
+def cut(recording: Recording, begin: float, end: float) -> Recording:
+    """The samples from `begin` to `end` [s since the first], as a recording of its own that starts at 0.
+
+    Raises `UserError` where nothing was recorded then.
+    """
+    kept: list[Segment] = []
+    parts: list[slice] = []
+    count = 0
+    for segment in recording.segments:
+        t = segment.t
+        first, stop = np.searchsorted(t, [begin - 1e-9, end + 1e-9]).tolist()
+        if stop > first:
+            parts.append(slice(segment.first + first, segment.first + stop))
+            kept.append(Segment(count, count + stop - first, segment.rate, float(t[first])))
+            count += stop - first
+    if not kept:
+        raise UserError(f"{recording.source}: nothing was recorded between {begin:.3f} and {end:.3f} s")
+    origin = kept[0].start
+    trigger = None if recording.trigger is None else recording.trigger - origin
+    return replace(
+        recording,
+        channels=[_part(channel, parts) for channel in recording.channels],
+        status=[_part(status, parts) for status in recording.status],
+        segments=[replace(segment, start=segment.start - origin) for segment in kept],
+        start=recording.start and recording.start + timedelta(seconds=origin),
+        trigger=trigger if trigger is not None and 0 <= trigger <= end - origin else None,
+        notes=[*recording.notes, f"cut from {recording.source}, {begin:.3f} to {end:.3f} s"],
+        extra={key: recording.extra[key] for key in ("format", "revision", "kind", "sides") if key in recording.extra},
+    )
+
+
+def _part(channel: Any, parts: list[slice]) -> Any:
+    raw = np.asarray(channel.raw)
+    return replace(channel, raw=raw[parts[0]] if len(parts) == 1 else np.concatenate([raw[part] for part in parts]))

@@ -1,0 +1,105 @@
+"""Where the rows of a table begin, and what stands above them: titles, names of columns, units."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from tractexp.errors import UserError
+from tractexp.recording.cells import is_date, is_gap, is_number, is_time
+from tractexp.recording.columns import is_unit, split_unit
+
+ALIKE = 3  # rows of numbers of one length make sure that a table has begun
+
+
+@dataclass(frozen=True)
+class Heading:
+    """The columns' names and units ("" where none is told), and the number of the first row of values, from 0."""
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    first: int
+    line: int | None  # number of the row with the names, from 0; None where there is none
+
+
+def heading(rows: Sequence[Sequence[Any]], source: str, header: int | None = None, line: str = "line") -> Heading:
+    """The heading of a table's first rows; `header` is the row of the names, from 0, where it was given.
+
+    Raises `UserError` where there are no rows of numbers, or no names above them.
+    """
+    begin = 0 if header is None else header + 1
+    first = next((i for i in range(begin, len(rows)) if _begins(rows, i)), None)
+    if first is None:
+        above = "" if header is None else f" below the header line {header + 1}"
+        raise UserError(f"{source}: there are no rows below the header line" if _names_only(rows) else
+                        f"{source}: no rows of numbers are found{above}; a table has a line that names its columns, "
+                        "such as t,U,P,Q, and rows of numbers below it")  # fmt: skip
+    named = header if header is not None else _named(rows, first)
+    if named is None:
+        width = len(rows[first])
+        return Heading(("",) * width, ("",) * width, first, None)
+    width = max(len(rows[first]), len(rows[named]))
+    parted = [split_unit(_text(cell)) for cell in rows[named]]
+    below = [_text(cell).strip("[]() ") for cell in rows[named + 1]] if named + 1 < first else []
+    told = below if _are_units(below) else []
+    units = [told[k] if k < len(told) and told[k] else unit for k, (_, unit) in enumerate(parted)]
+    names = _joined(rows, named, [name for name, _ in parted])
+    return Heading(_padded(names, width), _padded(units, width), first, named)
+
+
+def is_value(cell: Any) -> bool:
+    """Whether a cell may stand below a heading: a number in any spelling, a time, or a gap."""
+    return is_number(cell) or is_number(cell, ",") or is_time(cell)
+
+
+def _text(cell: Any) -> str:
+    return "" if cell is None else str(cell).strip()
+
+
+def _numeric(row: Sequence[Any]) -> bool:
+    """Whether a row holds values: two or more, and not fewer than texts."""
+    values = sum(is_value(cell) for cell in row)
+    texts = sum(not (is_value(cell) or is_gap(cell) or is_date(cell)) for cell in row)
+    return values >= 2 and values >= texts
+
+
+def _begins(rows: Sequence[Sequence[Any]], i: int) -> bool:
+    """Whether values begin with row `i`: it and those after it are alike. One bad cell in a row is no heading."""
+    following = [row for row in rows[i : i + ALIKE] if row]
+    return _numeric(rows[i]) and all(_numeric(row) and len(row) >= len(rows[i]) - 1 for row in following)
+
+
+def _names_only(rows: Sequence[Sequence[Any]]) -> bool:
+    return len(rows) == 1 and len(rows[0]) > 1
+
+
+def _named(rows: Sequence[Sequence[Any]], first: int) -> int | None:
+    """The row of names above the values: the nearest with a text for most columns that is no row of units."""
+    for i in range(first - 1, -1, -1):
+        texts = [_text(cell) for cell in rows[i]]
+        filled = [text for text in texts if text]
+        enough = len(filled) >= 2 and 2 * len(filled) >= len(rows[first]) - 1
+        if enough and not (_are_units([text.strip("[]() ") for text in texts]) and i > 0):
+            return i
+    return None
+
+
+def _are_units(texts: Sequence[str]) -> bool:
+    """Whether a row is one of units: most of what is written in it is a known unit, and no name of a column is."""
+    filled = [text for text in texts if text and text != "-"]
+    return len(filled) >= 1 and 2 * sum(map(is_unit, filled)) > len(filled) and not _names_too(filled)
+
+
+def _names_too(filled: Sequence[str]) -> bool:
+    return len(set(filled)) == len(filled) and "t" in (text.lower() for text in filled)
+
+
+def _joined(rows: Sequence[Sequence[Any]], named: int, names: list[str]) -> list[str]:
+    """The names, after those of a row of groups above them ("Bus 1; Bus 1; Load 2") where there is one."""
+    above = [_text(cell) for cell in rows[named - 1]] if named else []
+    if len(above) != len(names) or len(names) < 3 or sum(map(bool, above)) < len(names) - 1:
+        return names
+    return [f"{upper} {name}".strip() for upper, name in zip(above, names, strict=True)]
+
+
+def _padded(texts: Sequence[str], width: int) -> tuple[str, ...]:
+    return (*texts, *[""] * (width - len(texts)))

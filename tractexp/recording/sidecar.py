@@ -1,0 +1,80 @@
+"""The JSON beside a table: its name, where it is from, its base and units, and what its columns are."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from tractexp.errors import UserError
+from tractexp.record.record import Base
+from tractexp.record.window import Window
+from tractexp.recording.table import located
+
+
+@dataclass(frozen=True)
+class Sidecar:
+    """What `name.json` beside `name.csv` says; everything may be left out, and other keys are the user's own."""
+
+    name: str | None = None
+    notes: tuple[str, ...] = ()
+    base: Base | None = None
+    columns: Mapping[str, Any] = field(default_factory=dict)  # as data.columns
+    units: Mapping[str, str] = field(default_factory=dict)  # as data.units
+    uniform: bool = False  # its times are those of a record as read: they need no mending
+    window: Window | None = None  # what the phasors of such a record are averages over
+    more: tuple[str, ...] = ()  # further columns of it: P_3, THD_u, ...
+    recording: Mapping[str, Any] | None = None  # of a recording that task=convert wrote
+
+
+def beside(path: str) -> Sidecar:
+    """The sidecar of a table, an empty one where there is none; raises `UserError` for one that is no JSON."""
+    folder, name = located(path)
+    file = folder / f"{Path(name).stem}.json"
+    if Path(name).suffix.lower() == ".json" or not file.is_file():
+        return Sidecar()
+    try:
+        told = json.loads(file.read_bytes().decode("utf-8-sig"))
+    except json.JSONDecodeError as error:
+        raise UserError(f"{file}: line {error.lineno}: not valid JSON ({error.msg})") from error
+    except UnicodeDecodeError as error:
+        raise UserError(f"{file}: byte {error.start + 1} is not UTF-8 text; JSON is written in UTF-8") from error
+    if not isinstance(told, dict):
+        return Sidecar()
+    notes = [told["note"]] if isinstance(told.get("note"), str) else []
+    notes += [note for note in told.get("notes") or [] if isinstance(note, str)]
+    return Sidecar(
+        str(told["name"]) if "name" in told else None,
+        tuple(notes),
+        _base(file, told.get("base")),
+        _mapping(told, "columns"),
+        {key: str(unit) for key, unit in _mapping(told, "units").items()},
+        told.get("uniform") is True,
+        _window(file, told.get("window")),
+        tuple(str(name) for name in told.get("more") or []),
+        _mapping(told, "recording") or None,
+    )
+
+
+def _mapping(told: Mapping[str, Any], key: str) -> dict[str, Any]:
+    return dict(told[key]) if isinstance(told.get(key), dict) else {}
+
+
+def _window(file: Any, told: Any) -> Window | None:
+    if not isinstance(told, dict):
+        return None
+    try:
+        return Window.of(told)
+    except (KeyError, TypeError, ValueError) as error:
+        raise UserError(f"{file}: window is not as task=convert writes it; leave it out") from error
+
+
+def _base(file: Any, told: Any) -> Base | None:
+    """What one per unit is, where the sidecar says it in numbers."""
+    if not isinstance(told, dict):
+        return None
+    numbers = {key: told[key] for key in ("voltage", "power", "frequency") if key in told}
+    for key, value in numbers.items():
+        if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0:
+            raise UserError(f"{file}: base.{key} = {value!r} must be a number above zero (kV, MVA, Hz)")
+    return Base(**{key: float(value) for key, value in numbers.items()})

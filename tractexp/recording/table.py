@@ -1,0 +1,266 @@
+"""Tables of any shape: text, Parquet, Excel. What columns they have, and the numbers in those that are wanted."""
+
+import io
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tractexp.errors import UserError, among, check_choice, nearest
+from tractexp.recording.cells import BadCell, is_number, is_time, numbers, times
+from tractexp.recording.columns import split_unit
+from tractexp.recording.heading import Heading, heading
+
+PACKAGE = "pkg://"
+SPREADSHEETS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")  # how .xlsx, .ods and .xls begin
+PARQUET = b"PAR1"
+FOREIGN = {  # how files begin that are no table, whatever they are called
+    b"%PDF": "a PDF file", b"\x89PNG": "a picture", b"\x1f\x8b": "compressed; unpack it first", b"{": "JSON",
+    b"\x89HDF": "an HDF5 file", b"SQLite": "a database", b"<": "XML or HTML; save the table as CSV", b"MATLAB": "a MATLAB file",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Form:
+    """What the user said of how a table is written; the rest is found."""
+
+    decimal: str = ""  # "." or ","
+    header: int | None = None  # line of the names, from 1
+    sheet: str | int | None = None  # of a workbook: name, or number from 1
+    encoding: str | None = None
+
+    def check(self) -> None:
+        check_choice("data.decimal", self.decimal, ("", ".", ","))
+        if self.header is not None and self.header < 1:
+            raise UserError(f"data.header={self.header} is no line; lines are counted from 1")
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """The values (N,) of one column; of times, s since the first and when that was, where the day is told."""
+
+    values: np.ndarray
+    start: datetime | None = None
+    clock: bool = False  # times of day or dates, not seconds
+
+
+class Table(ABC):
+    """A file with columns, opened: its names and units are known, its numbers are read on demand."""
+
+    source: str
+    heading: Heading
+    sample: Sequence[Sequence[Any]]  # the first rows of cells
+    notes: tuple[str, ...] = ()
+
+    @abstractmethod
+    def read(self, wanted: Mapping[int, str]) -> dict[int, Column]:
+        """Columns by number; `wanted` says of each "time", "number" or "gaps" (a number that may be missing).
+
+        Raises `UserError` naming the place and the cell.
+        """
+
+    @abstractmethod
+    def place(self, row: int) -> str:
+        """Where a row of values, from 0, stands in the file: "line 17"."""
+
+    def numbers(self, names: Sequence[str]) -> dict[str, np.ndarray]:
+        """The columns (N,) of some names; raises `UserError` for one that is not there."""
+        if missing := [name for name in names if name not in self.heading.names]:
+            raise UserError(f"{self.source}: its sidecar tells of a column {missing[0]}, which is not there")
+        wanted = {name: self.heading.names.index(name) for name in names}
+        cells = self.read(dict.fromkeys(wanted.values(), "gaps")) if wanted else {}
+        return {name: cells[number].values for name, number in wanted.items()}
+
+    def label(self, number: int) -> str:
+        """What messages call a column."""
+        return self.heading.names[number] or f"{number} (from 0)"
+
+    def refuse(self, row: int, number: int, why: str) -> UserError:
+        return UserError(f"{self.source}: {self.place(row)}, column {self.label(number)}: {why}")
+
+
+@dataclass(eq=False)
+class Rows(Table):
+    """A table whose cells are at hand as Python's objects: a sheet, or columns of a Parquet file."""
+
+    source: str
+    heading: Heading
+    columns: Callable[[int], Sequence[Any]]  # the cells of a column
+    sample: Sequence[Sequence[Any]]
+    first: int  # number of the first row of values, from 1
+    word: str = "row"
+    notes: tuple[str, ...] = field(default=())
+
+    def place(self, row: int) -> str:
+        return f"{self.word} {self.first + row}"
+
+    def read(self, wanted: Mapping[int, str]) -> dict[int, Column]:
+        made = {}
+        for number, kind in wanted.items():
+            try:
+                made[number] = column(self.columns(number), kind, ".")
+            except BadCell as bad:
+                raise self.refuse(bad.row, number, bad.why) from None
+        return made
+
+
+def column(cells: Sequence[Any], kind: str, decimal: str) -> Column:
+    """Cells as what is wanted of them; raises `BadCell`."""
+    if isinstance(cells, np.ndarray) and cells.dtype.kind == "f":
+        return Column(cells)
+    if kind == "time" and any(is_time(cell) and not is_number(cell, decimal) for cell in cells[:1]):
+        return Column(*times(cells), clock=True)
+    return Column(numbers(cells, decimal, gaps=kind == "gaps"))
+
+
+def open_table(path: str, form: Form, whole: bool = True) -> Table:
+    """Open a table by what the file holds, whatever its ending; raises `UserError` for what is no table.
+
+    Of a text not `whole` only the beginning is read: enough to know its columns.
+    """
+    from tractexp.recording.table_text import HEAD, open_text
+
+    data = content(path, None if whole else HEAD)
+    if not whole and data.startswith((PARQUET, *SPREADSHEETS)):
+        data = content(path)
+    if data.startswith(PARQUET):
+        return _parquet(path, data)
+    if data.startswith(SPREADSHEETS):
+        return _sheet(path, data, form)
+    for mark, told in FOREIGN.items():
+        if data.startswith(mark):
+            raise UserError(f"{path}: this is no table but {told}")
+    return open_text(path, data, form)
+
+
+def content(path: str, limit: int | None = None) -> bytes:
+    """The bytes of a file, or of one inside an installed package (`pkg://package/file.csv`); whole lines to a limit."""
+    folder, name = located(path)
+    file = folder / name
+    if not file.is_file():
+        if file.is_dir():
+            raise UserError(f"{path} is a folder, not a file; give a file in it, or task=survey data.path={path}")
+        found = [item.name for item in folder.iterdir() if not item.is_dir()] if folder.is_dir() else None
+        hint = "; that folder does not exist" if found is None else nearest(name, found)
+        raise UserError(f"{path}: there is no such file in {str(folder) if found is not None else folder}{hint}")
+    try:
+        if limit is None:
+            return file.read_bytes()
+        with file.open("rb") as opened:
+            data = opened.read(limit)
+        return data if len(data) < limit else data[: data.rfind(b"\n") + 1] or data
+    except OSError as error:
+        raise UserError(f"{path} cannot be read: {error.strerror or 'it is no ordinary file'}") from error
+
+
+def located(path: str) -> tuple[Any, str]:
+    """The folder, in the file system or in an installed package, and the name of a file."""
+    if not path.startswith(PACKAGE):
+        return Path(path).parent, Path(path).name
+    import importlib.resources
+
+    package, _, name = path.removeprefix(PACKAGE).partition("/")
+    try:
+        return importlib.resources.files(package), name
+    except (ImportError, ValueError) as error:
+        raise UserError(f"{path}: there is no installed package '{package}'") from error
+
+
+def _parquet(path: str, data: bytes) -> Table:
+    import pyarrow
+    from pyarrow import parquet
+
+    try:
+        made = parquet.read_table(pyarrow.BufferReader(data))
+    except (pyarrow.ArrowException, OSError) as error:
+        raise UserError(f"{path}: not a whole Parquet file; write it again, or give the table as CSV") from error
+    names = [str(name) for name in made.column_names]
+    parted = [split_unit(name) for name in names]
+    head = Heading(tuple(name for name, _ in parted), tuple(unit for _, unit in parted), 0, 0)
+    columns = [_arrow(made.column(k)) for k in range(len(names))]
+    sample = [list(row) for row in zip(*(c[:200] for c in columns), strict=False)]
+    return Rows(path, head, columns.__getitem__, sample, first=1)
+
+
+def _arrow(chunked: Any) -> Any:
+    """The cells of a column: an array of numbers where it is one, gaps nan."""
+    import pyarrow.types as kinds
+
+    kind = chunked.type
+    if kinds.is_floating(kind) or kinds.is_integer(kind) or kinds.is_boolean(kind) or kinds.is_null(kind):
+        return np.asarray(chunked.cast("float64").to_numpy(), dtype=float)
+    if kinds.is_decimal(kind):
+        return np.asarray(chunked.cast("float64").to_numpy(), dtype=float)
+    if kinds.is_timestamp(kind):
+        return [None if cell is None else cell.replace(tzinfo=None) for cell in _utc(chunked).to_pylist()]
+    return chunked.to_pylist()
+
+
+def _utc(chunked: Any) -> Any:
+    """Times of day as microseconds of UTC: Python's own have no finer ones."""
+    import pyarrow
+
+    return chunked.cast(pyarrow.timestamp("us", tz=chunked.type.tz), safe=False)
+
+
+def _sheet(path: str, data: bytes, form: Form) -> Table:
+    """One sheet of a workbook: the one asked for, else the first with rows of numbers."""
+    import python_calamine
+
+    try:
+        book = python_calamine.CalamineWorkbook.from_filelike(io.BytesIO(data))
+        names = list(book.sheet_names)
+    except (python_calamine.CalamineError, OSError, ValueError) as error:
+        raise UserError(f"{path}: not a workbook that can be read; save it as .xlsx, or the sheet as CSV") from error
+    if form.sheet is not None:
+        return _rows_of(path, book, _asked(path, names, form.sheet), form)
+    refused: list[UserError] = []
+    for name in names:
+        try:
+            made = _rows_of(path, book, name, form)
+        except UserError as error:
+            refused.append(error)
+            continue
+        others = [other for other in names if other != name]
+        made.notes = (f"sheet '{name}' read, not {', '.join(others)} (data.sheet=NAME chooses)",) if others else ()
+        return made
+    raise refused[0] if refused else UserError(f"{path}: the workbook has no sheets")
+
+
+def _asked(path: str, names: Sequence[str], sheet: str | int) -> str:
+    if str(sheet) in names:
+        return str(sheet)
+    if str(sheet).isdigit() and 1 <= int(sheet) <= len(names):
+        return names[int(sheet) - 1]
+    raise UserError(f"data.sheet={sheet}: {path} has no such sheet{among(sheet, names, 'Sheets')}")
+
+
+def _rows_of(path: str, book: Any, name: str, form: Form) -> Rows:
+    import python_calamine
+
+    try:
+        rows = book.get_sheet_by_name(name).to_python(skip_empty_area=False)
+    except (python_calamine.CalamineError, OSError, ValueError) as error:
+        raise UserError(f"{path}: sheet '{name}' cannot be read; save it as CSV") from error
+    source = f"{path}: sheet '{name}'"
+    kept = [i for i, row in enumerate(rows) if any(cell not in ("", None) for cell in row)]
+    if not kept:
+        raise UserError(f"{source} is empty; it must have a line naming the columns, such as t, U, P, Q")
+    given = None if form.header is None else int(np.searchsorted(kept, form.header - 1))
+    head = heading([_trimmed(rows[i]) for i in kept[:200]], source, given)
+    body = kept[head.first :]
+    last = body[-1] + 1
+    return Rows(
+        source, head, lambda number: [rows[i][number] for i in range(body[0], last)],
+        [rows[i] for i in body[:200]], first=body[0] + 1,
+    )  # fmt: skip
+
+
+def _trimmed(row: Sequence[Any]) -> list[Any]:
+    """A row without the empty cells at its end."""
+    filled = [k for k, cell in enumerate(row) if cell not in ("", None)]
+    return list(row[: filled[-1] + 1])

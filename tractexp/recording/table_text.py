@@ -1,0 +1,269 @@
+"""Tables written as text: encoding, delimiter, decimal mark and heading are found; the numbers are read by NumPy.
+
+Where NumPy's reader refuses (times of day, words for gaps, quoted cells, a bad cell), the same rows are read cell by
+cell, which is slower and tells the place.
+"""
+
+import csv
+import io
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.recording.cells import BadCell, is_number, is_time
+from tractexp.recording.columns import split_unit
+from tractexp.recording.heading import Heading, heading
+from tractexp.recording.table import Column, Form, Table, column
+from tractexp.recording.text import MARKS, decode
+
+HEAD = 1 << 18  # bytes in which the heading is looked for
+SAMPLE = 400  # lines of them, at most
+LONGEST = 1 << 20  # bytes of a line
+BLOCK = 20_000  # rows read cell by cell at a time
+DELIMITERS = (";", "\t", "|", ",", " ")  # a comma may be a decimal mark, a space stand within a name: they come last
+REMARK = re.compile(r"(^|\s)#(?!(N/?A|NV|VALUE!|NUM!|DIV/0!|REF!)\b).*", re.IGNORECASE)
+
+
+class TextTable(Table):
+    """A text file with rows of cells."""
+
+    def __init__(self, source: str, data: bytes, form: Form, notes: Sequence[str] = ()) -> None:
+        """`data` is UTF-8. Raises `UserError` where no table is found in it."""
+        self.source, self.data = source, data
+        lines = _lines(data[:HEAD], whole=len(data) <= HEAD)
+        if not lines:
+            raise UserError(f"{source}: the file is empty; it must start with a line naming the columns t,U,P,Q")
+        self.delimiter = _delimiter([text for _, text in lines])
+        rows = [_cells(text, self.delimiter) for _, text in lines]
+        given = None if form.header is None else next((k for k, (n, _) in enumerate(lines) if n >= form.header), 0)
+        self.heading = self._heading(rows, given)
+        self.sample = rows[self.heading.first :]
+        self.decimal = form.decimal or _decimal(self.sample, self.delimiter)
+        self.line = lines[self.heading.first][0]  # of the first row of values, from 1
+        self.width = len(self.sample[0])
+        self._lines: np.ndarray | None = None  # of the rows, where they were read cell by cell
+        self.notes = tuple(notes)
+        self._check_width()
+
+    def _heading(self, rows: Sequence[Sequence[str]], given: int | None) -> Heading:
+        """The heading; the last remark above the values where names stand in a comment, as NumPy writes them."""
+        made = heading(rows, self.source, given)
+        if made.line is not None or made.first:
+            return made
+        remarks = re.findall(rb"^\s*[#%]+[ \t]*(.*?)\r?$", self.data[:HEAD], re.MULTILINE)
+        for remark in reversed(remarks):
+            cells = _cells(remark.decode(errors="replace"), self.delimiter)
+            if len(cells) == len(rows[0]) and not any(map(is_number, cells)):
+                names, units = zip(*map(split_unit, cells), strict=True)
+                return Heading(names, units, 0, 0)
+        return made
+
+    def _check_width(self) -> None:
+        """Refuse rows of more cells than there are names: which belongs to which is not told."""
+        named = len([name for name in self.heading.names if name])
+        spare = [cell for cell in self.sample[0][len(self.heading.names) :] if cell]
+        if self.heading.line is not None and (spare or self._split_decimals(named)):
+            raise UserError(
+                f"{self.source}: line {self.line} has {self.width} cells where the header line names {named} columns"
+                + ("; if the decimal mark is a comma, save the file with another delimiter, such as a semicolon"
+                   if self.delimiter == "," else "")
+            )  # fmt: skip
+
+    def _split_decimals(self, named: int) -> bool:
+        """Whether values seem cut at decimal commas: far more cells than names."""
+        return self.width > named + 1 and self.width >= 1.5 * named
+
+    def place(self, row: int) -> str:
+        if self._lines is not None and row < len(self._lines):
+            return f"line {self._lines[row]}"
+        body = ((n, text) for n, text in enumerate(io.BytesIO(self.data), 1) if n >= self.line)
+        kept = (n for n, text in body if text.partition(b"#")[0].strip())
+        return f"line {next((n for k, n in enumerate(kept) if k == row), row)}"
+
+    def read(self, wanted: Mapping[int, str]) -> dict[int, Column]:
+        texts = [n for n, kind in wanted.items() if kind == "time" and self._is_clock(n)]
+        made = None if texts else self._at_once(list(wanted))
+        return self._cell_by_cell(wanted) if made is None else made
+
+    def _is_clock(self, number: int) -> bool:
+        cell = self.sample[0][number]
+        return is_time(cell) and not is_number(cell, self.decimal)
+
+    def _body(self) -> bytes:
+        """The rows of values."""
+        begin = 0
+        for _ in range(self.line - 1):
+            begin = self.data.index(b"\n", begin) + 1
+        return self.data[begin:]
+
+    def _at_once(self, wanted: Sequence[int]) -> dict[int, Column] | None:
+        """The columns, by NumPy's reader; None where it refuses, or rows differ in length."""
+        body = self._body()
+        cells = body.count(self.delimiter.encode())
+        if self.decimal == ",":
+            body = body.replace(b",", b".")
+        spaced = self.delimiter == " "
+        try:
+            made = np.loadtxt(
+                io.TextIOWrapper(io.BytesIO(body), "utf-8"),
+                delimiter=None if spaced else self.delimiter,
+                usecols=None if spaced else wanted,
+                ndmin=2,
+            )
+        except (ValueError, OverflowError):
+            return None
+        if not len(made) or not (spaced or cells == len(made) * (self.width - 1)):
+            return None
+        if spaced:
+            made = made[:, list(wanted)]
+        return {number: Column(made[:, k].copy()) for k, number in enumerate(wanted)}
+
+    def _cell_by_cell(self, wanted: Mapping[int, str]) -> dict[int, Column]:
+        """The columns, each cell looked at; raises `UserError` naming line, column and cell."""
+        cells: dict[int, list[str]] = {number: [] for number in wanted}
+        done: dict[int, list[np.ndarray]] = {number: [] for number in wanted}
+        clock = {n for n, kind in wanted.items() if kind == "time" and self._is_clock(n)}
+        lines: list[int] = []
+        self._lines = None
+        for line, row in self._rows(max(wanted)):
+            lines.append(line)
+            for number, kept in cells.items():
+                kept.append(row[number])
+            if len(lines) % BLOCK == 0:
+                self._convert(wanted, clock, cells, done, lines)
+        self._convert(wanted, clock, cells, done, lines)
+        self._lines = np.array(lines)
+        made = {n: Column(np.concatenate(parts)) for n, parts in done.items() if n not in clock}
+        for number in clock:
+            try:
+                made[number] = column(cells[number], "time", self.decimal)
+            except BadCell as bad:
+                raise self.refuse(bad.row, number, bad.why) from None
+        return made
+
+    def _convert(self, wanted: Mapping[int, str], clock: set[int], cells: dict[int, list[str]],
+                 done: dict[int, list[np.ndarray]], lines: list[int]) -> None:  # fmt: skip
+        """Turn the cells read since the last time into numbers: of all columns alike, so the first bad line is told."""
+        bad: list[tuple[int, int, str]] = []
+        for number in wanted:
+            if number in clock:
+                continue
+            before = sum(map(len, done[number]))
+            try:
+                done[number].append(column(cells[number], wanted[number], self.decimal).values)
+            except BadCell as one:
+                bad.append((before + one.row, number, one.why))
+            cells[number].clear()
+        if bad:
+            self._lines = np.array(lines)
+            raise self.refuse(*min(bad))
+
+    def _rows(self, last: int) -> Iterator[tuple[int, list[str]]]:
+        """The rows of cells with their lines; the file's last row is left out where it is cut short, with a note."""
+        short: tuple[int, int] | None = None
+        for line, row in _parsed(self._body(), self.delimiter, self.source, self.line):
+            if short is not None:
+                raise self._ragged(*short)
+            if len(row) <= last:
+                short = (line, len(row))
+                continue
+            if len(row) > self.width and any(cell.strip() for cell in row[self.width :]):
+                raise self._ragged(line, len(row))
+            yield line, row
+        if short is not None:
+            self.notes += (f"line {short[0]}, the last one, is cut short and left out",)
+
+    def _ragged(self, line: int, cells: int) -> UserError:
+        return UserError(
+            f"{self.source}: line {line} has {cells} cell{'s' * (cells != 1)} where the others have {self.width}; a "
+            "gap in P or Q is written nan"
+        )
+
+
+def open_text(path: str, data: bytes, form: Form) -> TextTable:
+    """A text file as a table; raises `UserError` for one that is no text, or none that can be told."""
+    text, codec = decode(data, path, form.encoding or _unmarked(data))
+    plain = codec.startswith("utf-8")
+    data = (data if plain else text.encode()).removeprefix(b"\xef\xbb\xbf")
+    del text
+    data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    if (nul := data.find(0)) >= 0:
+        raise UserError(f"{path}: byte {nul + 1} is zero: this is no text; give a table as CSV, Parquet or Excel")
+    breaks = np.flatnonzero(np.frombuffer(data, dtype=np.uint8) == ord("\n"))
+    lengths = np.diff(breaks, prepend=-1, append=len(data))
+    if len(data) and lengths.max() > LONGEST:
+        i = int(lengths.argmax())
+        raise UserError(f"{path}: line {i + 1} has {lengths[i]:,} characters; a row of a table has at most {LONGEST:,}")
+    return TextTable(path, data, form, [] if plain else [f"read as {codec} text"])
+
+
+def _unmarked(data: bytes) -> str | None:
+    """The UTF-16 of a text without the mark that tells it: every other byte is zero."""
+    for first, codec in ((1, "utf-16-le"), (0, "utf-16-be")):
+        half = data[first:400:2]
+        if not data.startswith(tuple(MARKS)) and len(half) > 10 and half.count(0) > 0.9 * len(half):
+            return codec
+    return None
+
+
+def _lines(head: bytes, whole: bool) -> list[tuple[int, str]]:
+    """The first lines that hold more than a remark, with their numbers from 1."""
+    lines = head.decode(errors="replace").split("\n")
+    lines = lines if whole else lines[:-1]
+    told = ((n, REMARK.sub("", line)) for n, line in enumerate(lines, 1))
+    return [(n, text) for n, text in told if text.strip()][:SAMPLE]
+
+
+def _delimiter(lines: Sequence[str]) -> str:
+    """What parts the cells: the mark that cuts most of the last lines into equally many values, two or more."""
+    tail = lines[len(lines) // 2 :][-50:]
+
+    def alike(mark: str) -> tuple[float, int]:
+        rows = [_cells(line, mark) for line in tail]
+        width = max(set(map(len, rows)), key=[len(row) for row in rows].count)
+        share = sum(len(row) == width for row in rows) / len(rows) if width > 1 else 0.0
+        valued = any(sum(is_number(c) or is_number(c, ",") or is_time(c) for c in row) >= 2 for row in rows)
+        return (share if valued else share / 10), -DELIMITERS.index(mark)
+
+    best = max(DELIMITERS, key=alike)
+    return best if alike(best)[0] > 0 else ","
+
+
+def _decimal(sample: Sequence[Sequence[str]], delimiter: str) -> str:
+    """The decimal mark: a comma where cells have one and none has a point."""
+    cells = [cell for row in sample for cell in row]
+    commas = sum(is_number(cell, ",") and "," in cell for cell in cells)
+    points = sum(is_number(cell) and "." in cell for cell in cells)
+    return "," if commas > points and delimiter != "," else "." if commas <= points else ","
+
+
+def _cells(line: str, delimiter: str) -> list[str]:
+    """The cells of one line, bare."""
+    if delimiter == " ":
+        return line.split()
+    if '"' not in line:
+        return [cell.strip() for cell in line.split(delimiter)]
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])]
+    except csv.Error:
+        return [cell.strip().strip('"') for cell in line.split(delimiter)]
+
+
+def _parsed(body: bytes, delimiter: str, source: str, begin: int) -> Iterator[tuple[int, list[str]]]:
+    """The rows of values with their lines, blank lines and remarks left out."""
+    text = io.TextIOWrapper(io.BytesIO(body), "utf-8")
+    lines: Any = (REMARK.sub("", line) if "#" in line else line for line in text)
+    if delimiter == " ":
+        yield from ((begin + k, row) for k, line in enumerate(lines) if (row := line.split()))
+        return
+    reader = csv.reader(lines, delimiter=delimiter, skipinitialspace=True, strict=True)
+    try:
+        for row in reader:
+            if row and any(cell.strip() for cell in row):
+                yield begin + reader.line_num - 1, row
+    except csv.Error as error:
+        line = begin + reader.line_num - 1
+        raise UserError(f"{source}: line {line}: the cells cannot be told apart; is a quote left open?") from error

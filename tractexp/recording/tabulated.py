@@ -1,0 +1,294 @@
+"""What a table holds, made of its columns: a load's powers against time, or a recording of waveforms."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.record.record import JITTER
+from tractexp.recording.cells import is_number
+from tractexp.recording.columns import PER_UNIT, factor, role
+from tractexp.recording.mapping import LINES, PHASES, Mapped, check_mapping, mapped
+from tractexp.recording.recording import Channel, Recording, Segment
+from tractexp.recording.sidecar import Sidecar, beside
+from tractexp.recording.table import Form, Table, open_table
+
+TURN = np.exp(2j * np.pi / 3)
+FORWARD = np.sqrt(3) * np.exp(1j * np.pi / 6)  # the positive sequence of line voltages over that of phase voltages
+VOLTS = 1000.0  # a voltage without a unit that is above it is in V
+NEAR_ONE = (0.3, 3.0)  # and within these it is per unit
+GAP = 1.5  # usual steps: a longer one parts two segments
+EPOCH = 1e6  # s: times beyond it are counted from the first
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tabular:
+    """The settings of readers of tables; what is left out is found, and a note says what it was taken for."""
+
+    columns: dict[str, Any] = field(default_factory=dict)  # {U: name of a column, or its number from 0}
+    units: dict[str, str] = field(default_factory=dict)  # {U: kV, P: MW, t: ms} where the header does not tell them
+    decimal: str = ""  # decimal mark, "." or ","
+    header: int | None = None  # line of the columns' names, from 1
+    sheet: Any = None  # of a workbook, by name or number from 1
+    encoding: str | None = None  # of a text file
+
+    def check_table(self) -> None:
+        """Raise `UserError` for a setting that cannot be."""
+        check_mapping(self.columns, self.units)
+        self._form.check()
+
+    @property
+    def _form(self) -> Form:
+        return Form(self.decimal, self.header, self.sheet, self.encoding)
+
+    def table_of(self, path: str, told: Sidecar) -> tuple[Table, Mapped]:
+        """A table and what its columns are; raises `UserError` for what is no table, or not to be told."""
+        table = open_table(path, self._form)
+        columns, units = {**told.columns, **self.columns}, {**told.units, **self.units}
+        return table, mapped(table, columns, units, told.more)
+
+
+def kind_of(path: str) -> str:
+    """What the table in a file holds: "powers", "phasors" or "waveforms"; "powers" where that cannot be told."""
+    try:
+        told = beside(path)
+        if told.recording is not None:
+            return "waveforms"
+        return mapped(open_table(path, Form(), whole=False), told.columns, told.units).kind
+    except UserError:
+        return "powers"  # whose reader says what is wrong
+
+
+@dataclass(frozen=True, eq=False)
+class Powers:
+    """Columns (N,) by the names of a record; U, P, Q, U2 in kV (line to line), MW, Mvar where `absolute` says so."""
+
+    columns: dict[str, np.ndarray]
+    absolute: dict[str, bool | None]  # of U and of P; None where no unit says
+    notes: tuple[str, ...]
+
+
+def powers(table: Table, found: Mapped, nominal: float, reverse: bool, kilovolts: bool) -> Powers:
+    """What a table of powers or of phasors holds.
+
+    `reverse` negates P and Q; `kilovolts` says that a voltage without a unit is in kV. Raises `UserError` for cells
+    that are no numbers, and for units that cannot be told.
+    """
+    if found.kind == "phasors":
+        made = _of_phasors(table, found, nominal)
+    elif found.kind == "powers":
+        made = _of_powers(table, found, kilovolts)
+    else:
+        raise UserError(
+            f"{table.source} holds waveforms ({', '.join(c.told for c in found.columns.values())}), not powers; read it "
+            f"as such: data=waveforms data.path={table.source}"
+        )
+    if reverse:
+        made.columns["P"], made.columns["Q"] = -made.columns["P"], -made.columns["Q"]
+    return made
+
+
+def _of_powers(table: Table, found: Mapped, kilovolts: bool) -> Powers:
+    values, start = _read(table, found)
+    made, notes = {"t": values["t"]}, [*found.notes, *start]
+    for letter in "UPQ":
+        keys = [key for key in values if key[0] == letter and key != "U2"]
+        made[letter] = values[keys[0]] if len(keys) == 1 else np.add.reduce([values[key] for key in keys])
+        if len(keys) > 1:
+            made[letter] = made[letter] / (len(keys) if letter == "U" else 1)
+            notes.append(f"{letter} is the {'mean' if letter == 'U' else 'sum'} of {', '.join(keys)}")
+    made |= {key: values[key] for key in ("f", "U2") if key in values}
+    first = next(key for key in found.columns if key[0] == "U" and key != "U2")
+    absolute = {"U": _absolute(found, first), "P": _absolute(found, next(k for k in found.columns if k[0] == "P"))}
+    if absolute["U"] or (absolute["U"] is None and kilovolts):
+        notes += _to_lines(made, found.columns[first].role.line, first)
+    return Powers(made, absolute, (*table.notes, *notes))
+
+
+def _to_lines(made: dict[str, np.ndarray], line: bool | None, key: str) -> list[str]:
+    """Make phase voltages line-to-line ones; what was taken for what."""
+    if line is False:
+        for name in {"U", "U2"} & set(made):
+            made[name] = made[name] * np.sqrt(3)
+        return [f"{key} taken as a phase voltage: times sqrt(3) it is line to line"]
+    return ["U taken as line-to-line voltage"] if line is None else []
+
+
+def _absolute(found: Mapped, key: str) -> bool | None:
+    unit = found.columns[key].role.unit.strip().lower()
+    return None if not unit else unit not in PER_UNIT
+
+
+def _read(table: Table, found: Mapped) -> tuple[dict[str, np.ndarray], list[str]]:
+    """The values (N,) by key, in s, kV, MW, Hz, and angles as they are; a note on what the time was counted from."""
+    wanted = {one.number: _wanted(key) for key, one in found.columns.items()}
+    cells = table.read(wanted)
+    values = {key: cells[one.number].values for key, one in found.columns.items()}
+    values |= {
+        key: values[key] * by
+        for key, one in found.columns.items()
+        if not key.endswith("_angle") and (by := factor(one.role.unit)) != 1 and not cells[one.number].clock
+    }
+    time = cells[found.columns["t"].number]
+    values["t"], note = _counted(values["t"], time.start)
+    return values, note
+
+
+def _wanted(key: str) -> str:
+    return "time" if key == "t" else "gaps" if key[0] in "PQ" else "number"
+
+
+def _counted(t: np.ndarray, start: datetime | None) -> tuple[np.ndarray, list[str]]:
+    """Times from the first row on where they tell a day or are seconds since long ago; a note on it."""
+    if start is not None:
+        return t, [f"t counted from {start.isoformat()}, the first row"]
+    if len(t) and abs(t[0]) > EPOCH:
+        return t - t[0], [f"t counted from {t[0]:.6f} s, the first row"]
+    return t, []
+
+
+def _of_phasors(table: Table, found: Mapped, nominal: float) -> Powers:
+    values, note = _read(table, found)
+    values = _in_units(table, found, values)
+    keys = {letter: [k for k in values if k[0] == letter and not k.endswith("_angle")] for letter in "UI"}
+    scale, told = _radians(table, found, values)
+    V, I = (np.array([values[k] * np.exp(1j * scale * values[f"{k}_angle"]) for k in keys[letter]]) for letter in "UI")
+    (V1, V2), (I1, _) = _sequences(V, keys["U"]), _sequences(I, keys["I"])
+    absolute = _absolute(found, keys["U"][0])
+    absolute = absolute if absolute is not None else not NEAR_ONE[0] < np.nanmedian(np.abs(V1)) < NEAR_ONE[1]
+    size, three = (np.sqrt(3), 3.0) if absolute else (1.0, 1.0)
+    S = three * V1 * I1.conj()
+    made = {"t": values["t"], "U": size * np.abs(V1), "P": S.real, "Q": S.imag}
+    if V2 is not None:
+        made["U2"] = size * np.abs(V2)
+    notes = [*found.notes, *note, *told, "U, P, Q from phasors" + (", positive sequence" if V2 is not None else "")]
+    if "f" in values:
+        made["f"] = values["f"] if np.median(values["f"]) > nominal / 2 else nominal + values["f"]
+    else:
+        made["f"] = nominal + np.gradient(np.unwrap(np.angle(V1)), values["t"]) / (2 * np.pi)
+        notes.append(f"f from the angle of the voltage, which stands still at {nominal:g} Hz")
+    return Powers(made, {"U": bool(absolute), "P": bool(absolute)}, (*table.notes, *notes))
+
+
+def _in_units(table: Table, found: Mapped, values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Magnitudes without a unit as V and A where a voltage can be nothing else, as per unit where it is near one."""
+    made = dict(values)
+    for key, one in found.columns.items():
+        if key[0] not in "UI" or key.endswith("_angle") or one.role.unit:
+            continue
+        level = float(np.nanmedian(np.abs(values[next(k for k in values if k[0] == "U")])))
+        if level > VOLTS:
+            made[key] = values[key] * 1e-3
+        elif not NEAR_ONE[0] < level < NEAR_ONE[1]:
+            raise UserError(
+                f"{table.source}: the unit of {one.told} is not told, and its voltage is {level:.4g}: say the units, "
+                "e.g. data.units={U: kV, I: A}"
+            )
+    return made
+
+
+def _radians(table: Table, found: Mapped, values: Mapping[str, np.ndarray]) -> tuple[float, list[str]]:
+    """From the unit of the angles to rad, and a note where it was told by the values."""
+    angles = {key: one for key, one in found.columns.items() if key.endswith("_angle")}
+    unit = next((one.role.unit for one in angles.values() if one.role.unit), "")
+    if unit:
+        return factor(unit), []
+    widest = max(float(np.abs(values[key]).max()) for key in angles)
+    if widest > 2 * np.pi:
+        return np.pi / 180, ["angles taken as degrees, for they exceed 2 pi"]
+    phases = [values[key] for key in angles if key[0] == "U" and len(key) == len("Ua_angle")]
+    if len(phases) == 3:
+        apart = np.median(np.abs(np.mod(phases[1] - phases[0] + np.pi, 2 * np.pi) - np.pi))
+        if abs(apart - 2 * np.pi / 3) < 0.3:
+            return 1.0, ["angles taken as rad, for the phases are 2 pi/3 apart"]
+    raise UserError(
+        f"{table.source}: the unit of {next(iter(angles.values())).told} is not told, and its values suit degrees and "
+        "rad: say data.units={angle: deg} or data.units={angle: rad}"
+    )
+
+
+def _sequences(X: np.ndarray, keys: list[str]) -> tuple[np.ndarray, np.ndarray | None]:
+    """Positive and negative sequence (N,) of phasors (3, N) of phases or lines; of one (1, N), it and None."""
+    if len(X) == 1:
+        return X[0], None
+    positive = (X[0] + TURN * X[1] + TURN**2 * X[2]) / 3
+    negative = (X[0] + TURN**2 * X[1] + TURN * X[2]) / 3
+    if keys[0][1:] in LINES:
+        return positive / FORWARD, negative / FORWARD.conjugate()
+    return positive, negative
+
+
+def recording(table: Table, found: Mapped, nominal: float) -> Recording:
+    """The waveforms of a table: every column of numbers is a channel; gaps in time part segments.
+
+    Raises `UserError` for a table of something else, and for times that are not even within a segment.
+    """
+    if found.kind != "waveforms":
+        raise UserError(
+            f"{table.source} holds {found.kind}, not waveforms; read it as such: data=csv data.path={table.source}"
+        )
+    numbers = {
+        k: "number" for k, name in enumerate(table.heading.names)
+        if name and k != found.columns["t"].number and all(is_number(row[k]) or is_number(row[k], ",") for row in table.sample[:20])
+    }  # fmt: skip
+    t = found.columns["t"]
+    cells = table.read({t.number: "time", **numbers})
+    time, note = _counted(cells[t.number].values * (1.0 if cells[t.number].clock else factor(t.role.unit)), None)
+    segments, odd = _segments(table, time)
+    named = {one.number: key for key, one in found.columns.items()}
+    channels = [_channel(table, found, k, cells[k].values, named.get(k, "")) for k in numbers]
+    bare = [c.name for c in channels if c.quantity and not c.unit]
+    if bare:
+        odd.append(f"unit of {', '.join(bare)} is not told: taken as V and A (data.units={{U: kV, I: kA}} says else)")
+    return Recording(
+        table.source, channels, segments, nominal, start=cells[t.number].start, notes=[*table.notes, *note, *odd]
+    )
+
+
+def _channel(table: Table, found: Mapped, number: int, values: np.ndarray, key: str) -> Channel:
+    """A column as a channel; what it measures is told by its key, else by its name."""
+    name, unit = table.label(number), table.heading.units[number]
+    told = role(name, unit)
+    key = key or (told.key if told else "")
+    unit = found.columns[key].role.unit if key in found.columns else unit
+    quantity = {"U": "voltage", "I": "current"}.get(key[:1], "") if not key.endswith("_angle") else "angle"
+    phase = key[1:].upper() if key[1:] in (*PHASES, *LINES) else ""
+    return Channel(name, values, unit, quantity, phase)
+
+
+def _segments(table: Table, t: np.ndarray) -> tuple[list[Segment], list[str]]:
+    """Runs of even sampling; a note on jitter and on gaps."""
+    steps = np.diff(t)
+    if len(t) < 3 or (steps <= 0).any():
+        i = int(np.argmax(steps <= 0)) + 1 if len(t) > 2 else 0
+        raise UserError(
+            f"{table.source}: {table.place(i)}: time does not increase: t = {t[i]:.9g} s after {t[i - 1]:.9g} s; give the"
+            " unit of time (data.units={t: ms}), or more digits"
+            if len(t) > 2 else f"{table.source}: only {len(t)} rows; waveforms need more"
+        )  # fmt: skip
+    usual = float(np.median(steps))
+    breaks = [0, *(np.flatnonzero(steps > GAP * usual) + 1).tolist(), len(t)]
+    made, widest = [], 0.0
+    for first, stop in zip(breaks, breaks[1:], strict=False):
+        if stop - first < 3:
+            continue
+        grid = np.linspace(t[first], t[stop - 1], stop - first)
+        step = float(grid[1] - grid[0])
+        off = np.abs(t[first:stop] - grid) / step
+        if off.max() > 0.5:
+            i = first + int(off.argmax())
+            raise UserError(
+                f"{table.source}: {table.place(i)}: sampling is not uniform: t = {t[i]:.9g} s is {off.max():.2g} steps off"
+                " the uniform grid; waveforms must be sampled evenly"
+            )
+        widest = max(widest, float(off.max()))
+        made.append(Segment(first, stop, 1 / step, float(t[first] - t[0])))
+    notes = [f"times up to {100 * widest:.2g} % of a step off a uniform grid: taken as even"] if widest > JITTER else []
+    if len(made) > 1:
+        notes.append(
+            f"{len(made) - 1} gaps in time, the first at {table.place(breaks[1])}: each part is read by itself"
+        )
+    return made, notes

@@ -1,0 +1,182 @@
+"""Recordings and records as tidy tables: a column for each quantity, a row for each sample, and a sidecar in JSON.
+
+    dip.csv  t,U,P,Q,f            dip.json  {"name": ..., "base": {...}, "units": {...}, "source": ..., "notes": [...]}
+    rec.csv  t,UA,UB,UC,IA,...    rec.json  {"recording": {"channels": [{"name": "UA", "phase": "A", "ratio": ...}]}}
+
+The values of a channel are as recorded, gain and offset applied, in the unit of the file; `ratio` takes them to the
+primary side. Reading them back gives the same raw numbers, bit by bit.
+"""
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tractexp import files
+from tractexp.errors import UserError
+from tractexp.record.record import Record
+from tractexp.recording.recording import Channel, Recording, Segment, Status
+from tractexp.recording.table import Form, open_table
+
+UNITS = {"t": "s", "U": "pu", "P": "pu", "Q": "pu", "f": "Hz"}  # as data.units; U2 is as U
+
+
+def write_record(record: Record, path: Path) -> list[Path]:
+    """Write a record as a table, by the ending of `path`, and its sidecar; raises `UserError` where it cannot."""
+    told = {
+        "name": record.name,
+        "source": record.source,
+        "base": asdict(record.base),
+        "units": {name: unit for name, unit in UNITS.items() if name in record.channels},
+        "notes": list(record.notes),
+        "uniform": True,
+        "window": record.window and record.window.to_dict(),
+        "more": list(record.more),
+    }
+    return [_written({**record.channels, **record.more}, path), files.write_json(path.with_suffix(".json"), told)]
+
+
+def write_recording(recording: Recording, path: Path) -> list[Path]:
+    """Write a recording as a table, by the ending of `path`, and its sidecar; raises `UserError` where it cannot."""
+    t = np.full(recording.samples, np.nan)
+    for segment in recording.segments:
+        t[segment.first : segment.stop] = segment.t
+    named = unique(["t", *(c.name.strip() for c in (*recording.channels, *recording.status))])
+    values = [t, *map(_recorded, recording.channels), *(s.values() for s in recording.status)]
+    table = _written(dict(zip(named, values, strict=True)), path)
+    told = {"source": recording.source, "recording": _told(recording)}
+    return [table, files.write_json(path.with_suffix(".json"), told)]
+
+
+def unique(names: Sequence[str]) -> list[str]:
+    """The names, those without one or with one that is taken made different."""
+    made: list[str] = []
+    for name in names:
+        stem, k = name or "unnamed", 2
+        name = stem
+        while name in made:
+            name, k = f"{stem} ({k})", k + 1
+        made.append(name)
+    return made
+
+
+def restored(path: str, told: Mapping[str, Any]) -> Recording:
+    """The recording of a table that `write_recording` wrote, from its sidecar; raises `UserError` where they differ."""
+    table = open_table(path, Form())
+    try:
+        channels, status = told["channels"], told["status"]
+        if len(table.heading.names) != 1 + len(channels) + len(status):
+            raise UserError(
+                f"{path}: has {len(table.heading.names)} columns where its sidecar tells of t, {len(channels)} channels "
+                f"and {len(status)} status channels; convert the recording again, or remove the sidecar"
+            )
+        cells = table.read({k: "gaps" for k in range(1, len(table.heading.names))})
+        return Recording(
+            path,
+            [_channel(one, cells[k].values) for k, one in enumerate(channels, 1)],
+            [Segment(**one) for one in told["segments"]],
+            float(told["frequency"]),
+            told["station"],
+            told["device"],
+            datetime.fromisoformat(told["start"]) if told["start"] else None,
+            told["trigger"],
+            [
+                Status(**one, raw=cells[k].values.astype(np.int8))
+                for k, one in enumerate(status, 1 + len(channels))
+            ],
+            list(told["notes"]),
+            {key: _extra(value) for key, value in told["extra"].items()},
+        )  # fmt: skip
+    except (KeyError, TypeError, ValueError) as error:
+        raise UserError(f"{path}: its sidecar is not as task=convert writes it ({error}); remove it") from error
+
+
+def _extra(value: Any) -> Any:
+    """An array again, or what else it was."""
+    marked = isinstance(value, dict) and set(value) == {"array", "type"}
+    return np.array(value["array"], dtype=value["type"]) if marked else value
+
+
+def recording_of(record: Record) -> Recording:
+    """A record as a recording of magnitudes in kV (line to line), MW, Mvar and Hz, for formats that know no other."""
+    base = record.base
+    told = {"U": ("kV", "voltage", base.voltage), "P": ("MW", "power", base.power),
+            "Q": ("Mvar", "reactive_power", base.power), "f": ("Hz", "frequency", 1.0),
+            "U2": ("kV", "voltage", base.voltage)}  # fmt: skip
+    channels = [
+        Channel(name, values * told[name][2], told[name][0], told[name][1], form="value")
+        for name, values in record.channels.items()
+        if name != "t"
+    ]
+    segment = Segment(0, record.samples, record.rate, 0.0)
+    return Recording(record.where, channels, [segment], base.frequency, notes=list(record.notes))
+
+
+def _recorded(channel: Channel) -> np.ndarray:
+    """The values (N,) of a channel as recorded: those of its converter, gain and offset applied; nan for none."""
+    if channel.gain == 1 and channel.offset == 0 and channel.missing is None:
+        return np.asarray(channel.raw)
+    made = np.asarray(channel.raw, dtype=np.float64) * channel.gain + channel.offset
+    if channel.missing is not None:
+        made[channel.raw == channel.missing] = np.nan
+    return made
+
+
+def _told(recording: Recording) -> dict[str, Any]:
+    """What a recording is, apart from its samples."""
+    fields = ("name", "unit", "quantity", "phase", "circuit", "gain", "offset", "ratio", "skew", "missing", "form")
+    return {
+        "channels": [
+            {name: getattr(c, name) for name in fields}
+            | {"limits": c.limits and list(c.limits), "raw": np.asarray(c.raw).dtype.str}
+            for c in recording.channels
+        ],
+        "status": [
+            {"name": s.name, "phase": s.phase, "circuit": s.circuit, "normal": s.normal} for s in recording.status
+        ],
+        "segments": [asdict(segment) for segment in recording.segments],
+        "frequency": recording.frequency,
+        "station": recording.station,
+        "device": recording.device,
+        "start": recording.start.isoformat() if recording.start else None,
+        "trigger": recording.trigger,
+        "notes": list(recording.notes),
+        "extra": {
+            key: {"array": value.tolist(), "type": value.dtype.str} if isinstance(value, np.ndarray) else value
+            for key, value in recording.extra.items()
+        },
+    }  # fmt: skip
+
+
+def _channel(told: Mapping[str, Any], values: np.ndarray) -> Channel:
+    """A channel with the raw numbers that its converter gave."""
+    known = dict(told)
+    kind, limits = np.dtype(known.pop("raw")), known.pop("limits")
+    raw = values if known["gain"] == 1 and known["offset"] == 0 else (values - known["offset"]) / known["gain"]
+    if kind.kind in "iu":
+        missing = known["missing"]
+        raw = np.where(np.isnan(raw), 0 if missing is None else missing, np.rint(raw))
+    return Channel(raw=raw.astype(kind), limits=limits and (limits[0], limits[1]), **known)
+
+
+def _written(columns: Mapping[str, np.ndarray], path: Path) -> Path:
+    """Write columns of numbers; the digits of CSV are those that give the same bits."""
+    import pyarrow
+    from pyarrow import csv as arrow
+    from pyarrow import parquet
+
+    table = pyarrow.table({name: np.ascontiguousarray(values) for name, values in columns.items()})
+    out = io.BytesIO()
+    if path.suffix == ".parquet":
+        parquet.write_table(table, out)
+    else:
+        header = io.StringIO()
+        csv.writer(header, lineterminator="\n").writerow(columns)
+        out.write(header.getvalue().encode())
+        arrow.write_csv(table, out, arrow.WriteOptions(include_header=False))
+    return files.write(path, out.getvalue())
