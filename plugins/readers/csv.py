@@ -86,17 +86,23 @@ class CSV(Tabular, Reader):
 
     def _numbered(self) -> Events:
         """The dips of one table: the whole of it where there is one."""
+        whole, tried = self._dips()
+        notes = (*whole.notes, f"{len(tried)} dips found") if tried.get(1) is not whole else ()
+        return chosen(self.path, tried, self.train or None, self.validate, notes)
+
+    def table(self) -> tuple[Record, dict[int, Record | UserError]] | None:
+        return self._dips() if self.path else None
+
+    def _dips(self) -> tuple[Record, dict[int, Record | UserError]]:
         whole = self._record(self.path)
         dips = find_dips(whole.t, whole.U)
         if len(dips) < 2 and self.pre is None and self.post is None:
-            return chosen(self.path, {1: whole}, self.train or None, self.validate)
+            return whole, {1: whole}
         firsts, stops = [0, *(end for _, end in dips)], [*(start for start, _ in dips[1:]), whole.samples]
-        tried = {
+        return whole, {
             number: self._cut(whole, number, first, start, stop)
             for number, (first, (start, _), stop) in enumerate(zip(firsts, dips, stops, strict=False), 1)
         }
-        notes = (*whole.notes, f"{len(dips)} dips found")
-        return chosen(self.path, tried, self.train or None, self.validate, notes)
 
     def _cut(self, whole: Record, number: int, first: int, start: int, stop: int) -> Record | UserError:
         """The record of one dip, with room from sample `first` to `stop`, or why it cannot be used."""

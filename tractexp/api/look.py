@@ -194,7 +194,7 @@ def _source(given: Any) -> str | Record:
 
 def _view(source: str | Record, settings: Mapping[str, Any]) -> View:
     if isinstance(source, Record):
-        return View(source.name, {}, [sight_of(source, {})])
+        return View(source.name, {}, [sight_of(source)])
     return view_of(source, node_of(source, settings))
 
 

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 from tractexp.errors import UserError
 from tractexp.plugin import Plugin, discover
 from tractexp.record import foreign
+from tractexp.record.record import Record
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,10 @@ class Reader(Plugin):
     @abstractmethod
     def read(self) -> Events:
         """Read and check everything; raises `UserError` naming the file, the place and the value."""
+
+    def table(self) -> tuple[Record, dict[int, Record | UserError]] | None:
+        """Of a reader of one table: all of it, and by number the record of each of its dips, or why it is none."""
+        return None
 
 
 def reader_of(path: str) -> type[Any]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.plugin import build
-from tractexp.record import Event, Record, detect
+from tractexp.record import Event, Record, detect, find_dips
 from tractexp.record.phasor import Phasors
 from tractexp.recording.connection import usual
 from tractexp.recording.feeder import Feeder, propose
@@ -106,8 +106,11 @@ def view_of(source: str, node: Mapping[str, Any]) -> View:
     """One file, looked at by the reader that `node` chooses. Raises `UserError` where it cannot be read."""
     reader = build("data", node)
     if not isinstance(reader, WaveformReader):
+        table = reader.table()
+        if table is not None:
+            return View(source, node, [sight_of(*table)])
         read = reader.read()
-        return View(source, node, [sight_of(record, {}) for record in (*read.train, *read.validate)])
+        return View(source, node, [sight_of(record) for record in (*read.train, *read.validate)])
     recording = reader.opened()
     if reader.voltages or reader.currents:
         return View(source, node, [sight(reader, recording, reader.feeder(recording))], recording)
@@ -136,53 +139,67 @@ def sight(reader: WaveformReader, recording: Recording, feeder: Feeder) -> Sight
             continue
         phasors.append(measured)
         found += happenings(waves, segment.rate, segment.start, recording.frequency, measured)
-    seen = _numbered(reader, feeder, phasors, recording.frequency, found)
+    spans, tried, refused = _dips(reader, feeder, phasors, recording.frequency)
+    seen = _numbered(found, spans, tried, reader.path, refused)
     return replace(made, phasors=tuple(phasors), seen=tuple(seen), said=tuple(said))
 
 
-def sight_of(record: Record, settings: Mapping[str, Any]) -> Sight:
-    """The load of a record, looked at; `settings` are those by which a reader reads it."""
-    found = happenings_of(record)
+def sight_of(record: Record, tried: Mapping[int, Record | UserError] | None = None) -> Sight:
+    """The load of a record, looked at; `tried` are the records that a reader makes of its dips, by number.
+
+    Without them the record is what would be fitted, and its dips have no numbers.
+    """
+    spans = [
+        (float(record.t[a]), float(record.t[min(b, record.samples - 1)])) for a, b in find_dips(record.t, record.U)
+    ]
+    numbers = tried if tried is not None else {1: record}
+    seen = list(_numbered(happenings_of(record), spans, numbers, record.source))
+    if tried is None:
+        seen = [replace(each, dip=None) for each in seen]
+    return Sight(record.name, tuple(seen), record=record)
+
+
+def _dips(
+    reader: WaveformReader, feeder: Feeder, phasors: Sequence[Phasors], frequency: float
+) -> tuple[list[tuple[float, float]], dict[int, Record | UserError], str]:
+    """Start and end [s] of the dips that the reader numbers, the record of each, and why there is none at all."""
     try:
-        event, refused = detect(record.check()), ""
+        dips, tried = reader.numbered(feeder, phasors, frequency) if phasors else ([], {})
     except UserError as error:
-        event, refused = None, str(error)
-    seen = []
-    for what in found:
-        own = event if event is not None and _common(what, event.t_start, event.t_end) > 0 else None
-        seen.append(Seen(what, None, own, _why(what, own, refused or "the reader takes another dip of this record")))
-    return Sight(record.name, tuple(seen), record=record, settings=settings)
+        return [], {}, str(error)
+    return [_span(dip) for dip in dips], tried, ""
 
 
 def _numbered(
-    reader: WaveformReader,
-    feeder: Feeder,
-    phasors: Sequence[Phasors],
-    frequency: float,
     found: Sequence[Happening],
+    spans: Sequence[tuple[float, float]],
+    tried: Mapping[int, Record | UserError],
+    source: str,
+    refused: str = "",
 ) -> Iterator[Seen]:
-    """What happened, with the dip that the reader makes of it."""
-    refused, dips, tried = "", [], {}
-    try:
-        if phasors:
-            dips, tried = reader.numbered(feeder, phasors, frequency)
-    except UserError as error:
-        refused = str(error)
-    numbers = _numbers(found, dips)
-    for what, number in zip(found, numbers, strict=True):
-        made = tried.get(number) if number else None
-        event = detect(made) if isinstance(made, Record) else None
-        why = (str(made) if made else refused).removeprefix(f"{reader.path} dip {number}: ")
+    """What happened, with the dip that the reader makes of it; `spans` are those of the dips, in order of number."""
+    for what, number in zip(found, _numbers(found, spans), strict=True):
+        event, why = _event(tried.get(number) if number else None, refused)
         if event is not None and abs(event.t_start - what.start) > APART:
             why, event = f"the reader's dip {number} begins at {event.t_start:.3f} s, with something else", None
-        yield Seen(what, number, event, _why(what, event, why or "it is no dip"))
+        yield Seen(what, number, event, _why(what, event, why.removeprefix(f"{source} dip {number}: ")))
 
 
-def _numbers(found: Sequence[Happening], dips: Sequence[Dip]) -> list[int | None]:
+def _event(made: Record | UserError | None, refused: str) -> tuple[Event | None, str]:
+    """The event of a record, or why there is none."""
+    if not isinstance(made, Record):
+        return None, str(made or refused or "it is no dip")
+    try:
+        return detect(made), ""
+    except UserError as error:
+        return None, str(error)
+
+
+def _numbers(found: Sequence[Happening], spans: Sequence[tuple[float, float]]) -> list[int | None]:
     """For each happening the dip, counted from 1, that shares more of its time with it than with any other."""
     numbers: list[int | None] = [None] * len(found)
-    for number, dip in enumerate(dips, 1):
-        shared = [_common(what, *_span(dip)) for what in found]
+    for number, span in enumerate(spans, 1):
+        shared = [_common(what, *span) for what in found]
         if shared and max(shared) > 0 and numbers[int(np.argmax(shared))] is None:
             numbers[int(np.argmax(shared))] = number
     return numbers
