@@ -171,7 +171,7 @@ def test_the_page_holds_every_sample_and_marks_the_events(looked, tmp_path):
     np.testing.assert_allclose(values, looked.waveforms()["UA"], atol=1e-4 * np.abs(values).max())
     (shade,) = [shape for shape in whole["layout"]["shapes"] if shape["type"] == "rect"]
     assert shade["x0"] == looked.events.rows[0]["start"]
-    assert {"u [kV]", "i [kA]", "P, Q [MW, Mvar]", "f [Hz]"} <= {
+    assert {"u [kV]", "i [kA]", "P, Q [MW]", "f [Hz]"} <= {
         axis["title"]["text"] for key, axis in whole["layout"].items() if key.startswith("yaxis")
     }
     for command in looked.commands:

@@ -60,6 +60,11 @@ class Sight:
             return None
         return {**self.settings, **({"train": self.dips[:1], "validate": self.dips[1:]} if self.dips else {})}
 
+    @property
+    def per_unit(self) -> bool:
+        """Whether nothing says what one per unit is: then U, P and Q are per unit, not in kV, MW and Mvar."""
+        return self.record is not None and self.record.base.voltage == self.record.base.power == 1
+
     def powers(self) -> tuple[float, float, float] | None:
         """Voltage [kV], P [MW] and Q [Mvar] at the beginning, before anything happened; None where nothing is known."""
         if self.record is not None:
@@ -153,7 +158,13 @@ def sight_of(record: Record, tried: Mapping[int, Record | UserError] | None = No
         (float(record.t[a]), float(record.t[min(b, record.samples - 1)])) for a, b in find_dips(record.t, record.U)
     ]
     numbers = tried if tried is not None else {1: record}
-    seen = list(_numbered(happenings_of(record), spans, numbers, record.source))
+    power = record.base.power
+    found = [
+        replace(what, before=(power * what.before[0], power * what.before[1]),
+                after=(power * what.after[0], power * what.after[1]))
+        for what in happenings_of(record)
+    ]  # fmt: skip
+    seen = list(_numbered(found, spans, numbers, record.source))
     if tried is None:
         seen = [replace(each, dip=None) for each in seen]
     return Sight(record.name, tuple(seen), record=record)
