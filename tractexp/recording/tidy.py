@@ -72,8 +72,8 @@ def restored(path: str, told: Mapping[str, Any]) -> Recording:
         channels, status = told["channels"], told["status"]
         if len(table.heading.names) != 1 + len(channels) + len(status):
             raise UserError(
-                f"{path}: has {len(table.heading.names)} columns where its sidecar tells of t, {len(channels)} channels "
-                f"and {len(status)} status channels; convert the recording again, or remove the sidecar"
+                f"{path}: has {len(table.heading.names)} columns where its sidecar tells of t, {len(channels)} "
+                f"channels and {len(status)} status channels; convert the recording again, or remove the sidecar"
             )
         cells = table.read({k: "gaps" for k in range(1, len(table.heading.names))})
         return Recording(
