@@ -236,6 +236,9 @@ def recording(table: Table, found: Mapped, nominal: float) -> Recording:
     numbers = {k: "number" for k in named if _numeric(table, k)}
     cells = table.read({t.number: "time", **numbers})
     time, note = _counted(cells[t.number].values * (1.0 if cells[t.number].clock else factor(t.role.unit)), None)
+    for k in numbers:
+        if not (finite := np.isfinite(cells[k].values)).all():
+            raise table.refuse(int(np.argmin(finite)), k, "not a finite number")
     segments, odd = _segments(table, time)
     named = {one.number: key for key, one in found.columns.items()}
     channels = [_channel(table, found, k, cells[k].values, named.get(k, "")) for k in numbers]
@@ -266,6 +269,9 @@ def _channel(table: Table, found: Mapped, number: int, values: np.ndarray, key: 
 
 def _segments(table: Table, t: np.ndarray) -> tuple[list[Segment], list[str]]:
     """Runs of even sampling; a note on jitter and on gaps."""
+    if not np.isfinite(t).all():
+        i = int(np.argmin(np.isfinite(t)))
+        raise UserError(f"{table.source}: {table.place(i)}: t = {t[i]} is not a finite number")
     steps = np.diff(t)
     if len(t) < 3 or (steps <= 0).any():
         i = int(np.argmax(steps <= 0)) + 1 if len(t) > 2 else 0
