@@ -15,10 +15,10 @@ from datetime import datetime
 from pathlib import Path
 
 import numpy as np
+from make_tibet import DIPS, LOAD
 
 from independent import Waveforms, simulate
 from independent.recorder import PHASES
-from make_tibet import DIPS, LOAD
 from tractexp.recording import Channel, Recording, Segment, Status
 from tractexp.recording.comtrade import write
 

@@ -163,11 +163,11 @@ def detect(record: Record) -> Event:
         )
     if told := _no_such_dip(record, start, end):
         raise UserError(f"{record.where}: {told}")
-    steady = _steady(record, start, swells)
-    t, U, P, Q = (values[steady] for values in (record.t, record.U, record.P, record.Q))
+    before = _steady(record, start, swells)
+    t, U, P, Q = (values[before] for values in (record.t, record.U, record.P, record.Q))
     if np.count_nonzero(np.isfinite(P) & np.isfinite(Q)) < FEWEST_BEFORE:
         raise UserError(
-            f"{record.where}: P and Q have fewer than {FEWEST_BEFORE} values in the {steady.stop - steady.start} "
+            f"{record.where}: P and Q have fewer than {FEWEST_BEFORE} values in the {before.stop - before.start} "
             f"samples before the dip at t = {record.t[start]:g} s; the steady state cannot be told"
         )
     U0 = float(U.mean())
@@ -179,13 +179,20 @@ def detect(record: Record) -> Event:
         U0=U0,
         P0=float(np.nanmean(P)),
         Q0=float(np.nanmean(Q)),
-        f0=record.base.frequency if record.f is None else float(record.f[steady].mean()),
+        f0=record.base.frequency if record.f is None else float(record.f[before].mean()),
         noise_U=noise(t, U),
         noise_P=noise(t, P),
         noise_Q=noise(t, Q),
-        steady=steady,
+        steady=before,
         dips=len(dips),
     )
+
+
+def steady(record: Record) -> slice:
+    """The samples of the steady state before the first dip; all where there is none, or too little before it."""
+    dips, swells = _scan(record.t, record.U)
+    start = dips[0][0] if dips else 0
+    return _steady(record, start, swells) if start >= FEWEST_BEFORE else slice(0, record.samples)
 
 
 def _steady(record: Record, start: int, swells: list[tuple[int, int]]) -> slice:

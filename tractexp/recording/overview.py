@@ -10,13 +10,14 @@ import numpy as np
 from tractexp.errors import UserError
 from tractexp.plugin import build
 from tractexp.record import Event, Record, detect
+from tractexp.record.dips import Dip
 from tractexp.record.phasor import Phasors
 from tractexp.recording.connection import usual
 from tractexp.recording.feeder import Feeder, propose
 from tractexp.recording.happening import Happening, happenings, happenings_of
 from tractexp.recording.measure import phasors_of, waves_of
 from tractexp.recording.quality import Quality, quality
-from tractexp.recording.reader import Dip, WaveformReader
+from tractexp.recording.reader import WaveformReader
 from tractexp.recording.recording import Recording
 
 APART = 0.06  # s: three cycles, within which what happened and the dip that is fitted begin
@@ -162,13 +163,13 @@ def _numbered(
     found: Sequence[Happening],
 ) -> Iterator[Seen]:
     """What happened, with the dip that the reader makes of it."""
-    refused, dips, tried = "", [], {}
+    refused, dips = "", []
     try:
         if phasors:
-            dips, tried = reader.numbered(feeder, phasors, frequency)
+            dips = reader.dips(feeder, phasors, frequency)
     except UserError as error:
         refused = str(error)
-    numbers = _numbers(found, dips)
+    numbers, tried = _numbers(found, dips), {dip.number: dip.made for dip in dips}
     for what, number in zip(found, numbers, strict=True):
         made = tried.get(number) if number else None
         event = detect(made) if isinstance(made, Record) else None
@@ -181,16 +182,11 @@ def _numbered(
 def _numbers(found: Sequence[Happening], dips: Sequence[Dip]) -> list[int | None]:
     """For each happening the dip, counted from 1, that shares more of its time with it than with any other."""
     numbers: list[int | None] = [None] * len(found)
-    for number, dip in enumerate(dips, 1):
-        shared = [_common(what, *_span(dip)) for what in found]
+    for dip in dips:
+        shared = [_common(what, dip.start, dip.end) for what in found]
         if shared and max(shared) > 0 and numbers[int(np.argmax(shared))] is None:
-            numbers[int(np.argmax(shared))] = number
+            numbers[int(np.argmax(shared))] = dip.number
     return numbers
-
-
-def _span(dip: Dip) -> tuple[float, float]:
-    t = dip.phasors.t
-    return float(t[dip.start]), float(t[min(dip.end, len(t) - 1)])
 
 
 def _common(what: Happening, start: float, end: float) -> float:
