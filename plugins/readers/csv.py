@@ -47,7 +47,7 @@ class CSV(Tabular, Reader):
 
     @classmethod
     def takes(cls, path: str) -> bool:
-        return kind_of(path) != "waveforms"
+        return kind_of(path) != "waves"
 
     def check(self) -> None:
         if self.path:

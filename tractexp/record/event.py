@@ -157,7 +157,7 @@ def detect(record: Record) -> Event:
 
     An interruption, an open pole and a step are refused by their names.
     """
-    dips = find_dips(record.t, record.U)
+    dips, swells = _scan(record.t, record.U)
     if not dips:
         raise UserError(_no_dip(record))
     start, end = dips[0]

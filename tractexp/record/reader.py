@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from tractexp.record.record import Record
 
 
-
 @dataclass(frozen=True)
 class Events:
     """The recorded events of one run, fitted and held out: as records, or with their dips found."""
