@@ -188,6 +188,10 @@ MENDED = {
         "line 14: .* is not a day of the calendar",
     ),
     "no date": ([("01/02/2024,10:00:00.000000\n01/02/2024,10:00:00.005000\n", "")], "no date of the first sample"),
+    "empty dates": (
+        [("01/02/2024,10:00:00.000000\n01/02/2024,10:00:00.005000", ",\n,")],
+        "lines 14, 15: ',' is not a date",
+    ),
     "year first": ([("01/02/2024", "2024/02/01")], "line 14: date '2024/02/01,10:00:00.000000' read as 2024-02-01"),
     "month first": ([("01/02/2024", "02/28/2024")], "line 14: date .* read as 2024-02-28"),
     "clock not set": ([("01/02/2024", "01/01/1970"), ("01/02/2024", "01/01/1970")], "line 14: the clock was not set"),

@@ -22,7 +22,8 @@ from tractexp.recording.remarks import Remarks
 from tractexp.recording.text import decode
 
 ROOT = float(np.sqrt(2))
-LARGEST = 256 * 2**20  # bytes: event reports last seconds
+LARGEST = 32 * 2**20  # bytes: event reports last seconds
+HEAD = 2000  # lines: the names of the columns stand among them
 CLOSE = 0.1  # of a current: so well the summary's agrees with the columns
 SLOW = 10  # samples a cycle: fewer are a filtered report, of which nothing but magnitudes can be told
 _COLUMN = re.compile(r"\s*([^(]*?)\s*(?:\(\s*([^)]*?)\s*\))?\s*")
@@ -46,7 +47,11 @@ def load(path: Path, encoding: str | None = None) -> Recording:
         raise UserError(f"{path}: there is no such file")
     if path.stat().st_size > LARGEST:
         raise UserError(f"{path}: {path.stat().st_size} bytes are no event report; the limit is {LARGEST}")
-    text, encoding = decode(path.read_bytes(), str(path), encoding)
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise UserError(f"{path} cannot be read: {error.strerror or error}") from error
+    text, encoding = decode(content, str(path), encoding)
     remarks = Remarks(str(path))
     report = _report(path, text, remarks)
     values, marks, words = _samples(path, report, remarks)
@@ -87,6 +92,8 @@ def _report(path: Path, text: str, remarks: Remarks) -> Report:
     made = Report(settings=rest.partition("\n")[2].strip())
     names: list[str] | None = None
     for line, row in _joined(body):
+        if line > HEAD and not made.columns:
+            break
         cells = _cells(row)
         if len(cells) > 1 and re.fullmatch(r"[0-9A-Fa-f]{4}", cells[-1].strip()):
             if checksum(row[: row.rindex(",") + 1]) != cells[-1].strip().upper():
@@ -129,7 +136,10 @@ def _joined(body: str) -> list[tuple[int, str]]:
 
 
 def _cells(row: str) -> list[str]:
-    return next(csv.reader([row], strict=False), [])
+    try:
+        return next(csv.reader([row], strict=False), [])
+    except csv.Error:  # a cell without end
+        return [row]
 
 
 def _samples(path: Path, report: Report, remarks: Remarks) -> tuple[np.ndarray, list[str], list[str]]:

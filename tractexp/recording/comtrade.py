@@ -20,7 +20,7 @@ from tractexp.recording.remarks import Remarks
 from tractexp.recording.text import decode, lines
 from tractexp.recording.timeline import Stretch
 
-LARGEST_CFG = 64 * 2**20  # bytes: no configuration is longer
+LARGEST_CFG = 4 * 2**20  # bytes: fifty thousand channels
 MISSING = {"BINARY": -32768.0, "BINARY32": -2147483648.0}  # raw values that stand for none
 MISSING_TEXT = (99999.0, 999999.0)  # of 1999 and of 1991
 _SECTION = re.compile(
@@ -36,14 +36,20 @@ def load(path: Path, encoding: str | None = None) -> Recording:
     path = Path(path)
     if path.is_dir():
         raise UserError(f"{path} is a folder; task=survey data.path={path} makes a table of all records in it")
-    if path.suffix.lower() == ".cff":
-        return _combined(_existing(path), encoding)
+    try:
+        return _combined(_existing(path), encoding) if path.suffix.lower() == ".cff" else _paired(path, encoding)
+    except OSError as error:
+        raise UserError(f"{error.filename or path} cannot be read: {error.strerror or error}") from error
+
+
+def _paired(path: Path, encoding: str | None) -> Recording:
     cfg, dat, note = _pair(path)
     remarks = Remarks(str(cfg))
     if note:
         remarks.add(note)
-    text, encoding = decode(_content(cfg), str(cfg), encoding)
-    return _recording(cfg, text, Place(dat, 0, dat.stat().st_size), remarks, {"encoding": encoding})
+    data = Place(dat, 0, dat.stat().st_size)
+    text, encoding = decode(_configuration(Place(cfg, 0, cfg.stat().st_size)), str(cfg), encoding)
+    return _recording(cfg, text, data, remarks, {"encoding": encoding})
 
 
 def _combined(path: Path, encoding: str | None) -> Recording:
@@ -56,10 +62,10 @@ def _combined(path: Path, encoding: str | None) -> Recording:
             "configuration, name it .cfg and put its .dat beside it"
         )
     remarks = Remarks(str(path))
-    text, encoding = decode(parts["CFG"].content(LARGEST_CFG), str(path), encoding)
+    text, encoding = decode(_configuration(parts["CFG"]), str(path), encoding)
     extra = {"encoding": encoding}
     for name, key in (("HDR", "header"), ("INF", "information")):
-        if name in parts and (said := parts[name].content(LARGEST_CFG).strip()):
+        if name in parts and (said := parts[name].content().strip()):
             extra[key] = decode(said, str(path))[0]
     return _recording(path, text, parts["DAT"], remarks, extra, parts["CFG"].line)
 
@@ -244,7 +250,7 @@ def _beside(path: Path, ending: str) -> Path | None:
     )
 
 
-def _content(cfg: Path) -> bytes:
-    if cfg.stat().st_size > LARGEST_CFG:
-        raise UserError(f"{cfg}: {cfg.stat().st_size} bytes are no COMTRADE configuration; the limit is {LARGEST_CFG}")
-    return cfg.read_bytes()
+def _configuration(place: Place) -> bytes:
+    if place.size > LARGEST_CFG:
+        raise UserError(f"{place.path}: {place.size} bytes are no COMTRADE configuration; the limit is {LARGEST_CFG}")
+    return place.content()

@@ -4,6 +4,7 @@ Source: IEEE C37.111-1991, -1999 and -2013. Harmless departures are mended and n
 """
 
 import re
+from collections import deque
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from math import isfinite
@@ -16,7 +17,6 @@ VALUE = {"ASCII": "f8", "BINARY": "<i2", "BINARY32": "<i4", "FLOAT32": "<f4"}  #
 FREQUENCY = (10.0, 100.0)  # Hz, nominal: 16.7 and 25 Hz railways to 60 Hz, with room
 GREATEST = 1e12  # of a multiplier, an offset or a ratio: beyond it no unit makes sense
 EPOCH = datetime(1970, 1, 1)  # a clock that was not set
-MOST_CHANNELS = 1_000_000
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d{1,4})?", re.ASCII)
 _COUNTS = re.compile(r"(\d{1,12})\s*,\s*(\d{1,12})\s*([AD])\s*,\s*(\d{1,12})\s*([AD])\s*,?", re.ASCII | re.IGNORECASE)
 
@@ -83,9 +83,8 @@ class _Lines:
 
     def __init__(self, where: str, lines: list[str], remarks: Remarks, first: int) -> None:
         self.where, self.remarks = where, remarks
-        while lines and not lines[-1]:
-            lines = lines[:-1]
-        self.left = [(n, line) for n, line in enumerate(lines, first) if line]
+        lines = lines[: max((n for n, line in enumerate(lines, 1) if line), default=0)]
+        self.left = deque((n, line) for n, line in enumerate(lines, first) if line)
         self.last = first + len(lines) - 1
         for n, line in enumerate(lines, first):
             if not line:
@@ -94,7 +93,7 @@ class _Lines:
     def take(self, what: str) -> tuple[int, str]:
         if not self.left:
             raise UserError(f"{self.where}: ends after line {self.last}, before {what}; the file is cut short")
-        return self.left.pop(0)
+        return self.left.popleft()
 
     def peek(self) -> str:
         return self.left[0][1] if self.left else ""
@@ -278,7 +277,7 @@ def _frequency(left: _Lines, header: Header) -> int | None:
         return None
     line, text = left.take("the number of sampling rates")
     found = number(text.strip(", "))
-    if found is None or found < 0 or found != int(found) or found > MOST_CHANNELS:
+    if found is None or found < 0 or found != int(found) or found > 1e6:
         raise left.refuse(line, f"the number of sampling rates {quoted(text)} is not a whole number from 0 on")
     return int(found)
 
@@ -322,7 +321,7 @@ def _is_rate(text: str) -> bool:
 
 def _dates(left: _Lines, header: Header) -> None:
     told: list[tuple[int, str]] = []
-    while len(told) < 2 and re.search(r"\d.*[/:.,\-]|[/:,\-].*\d", left.peek()):
+    while len(told) < 2 and left.left and _LIKE_DATE.search(left.peek()):
         told.append(left.take("the date of the first sample"))
     if not told:
         left.remarks.add("no date of the first sample given")
@@ -343,6 +342,7 @@ def _dates(left: _Lines, header: Header) -> None:
         header.trigger = (at - begin) / timedelta(seconds=1)
 
 
+_LIKE_DATE = re.compile(r"^[\s,]*$|\d.*[/:.,\-]|[/:,\-].*\d", re.ASCII)
 _DATE = re.compile(
     r"(\d{1,4})[/.\-](\d{1,2})[/.\-](\d{1,4})\s*[,; T]*\s*(\d{1,2})\s*:\s*(\d{1,2})\s*:\s*(\d{1,2})(?:[.,](\d*))?\s*,?",
     re.ASCII,
