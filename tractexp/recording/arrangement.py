@@ -224,9 +224,11 @@ def _labels(recording: Recording, feeder: Feeder, seen: _Seen | None) -> None:
     """Refuse currents that are labelled in another order than the voltages."""
     channels = recording.channels
     volts, amps = (order([channels[i] for i in each]) for each in (feeder.voltages, feeder.currents))
-    if volts is None or amps is None or volts[1] or amps[1] or len(volts[0]) < 3 or volts[0] == amps[0]:
+    if volts is None or amps is None or volts[1] or amps[1] or volts[0] == amps[0]:
         return
     (v, _), (c, _) = volts, amps
+    if len(v) < 3 or len(c) < 3:
+        return
     labelled = tuple(feeder.currents[c.index(k)] for k in v)
     both = ""
     if seen is not None:

@@ -84,7 +84,7 @@ def _symmetric(seen: Snapshots, numbers: Sequence[int]) -> tuple[int, ...]:
         return ()
     X = np.nanmedian(X[:, level > 0.5 * np.nanmax(level)] / _unit(X[0, level > 0.5 * np.nanmax(level)]), axis=1)
     size = np.abs(X)
-    if size.min() == 0 or np.ptp(size) > ALIKE * size.mean():
+    if not size.min() > 0 or np.ptp(size) > ALIKE * size.mean():
         return ()
     off = np.abs(np.degrees(np.angle(X[1:] / X[0] * [[TURN, TURN**2], [TURN**2, TURN]])))
     for angles, order in zip(off, ((0, 1, 2), (0, 2, 1)), strict=True):
@@ -171,7 +171,7 @@ def _text(recording: Recording, group: Group) -> set[str]:
 
 def _size(seen: Snapshots, numbers: Sequence[int]) -> float:
     """Magnitude [kV, kA] where it is large: the upper quartile of the mean over the channels."""
-    return float(np.nan_to_num(np.nanpercentile(np.abs(seen.of(numbers)).mean(axis=0), 75)))
+    return float(np.percentile(np.nan_to_num(np.abs(seen.of(numbers))).mean(axis=0), 75))
 
 
 def _positive(X: np.ndarray, pairs: bool) -> np.ndarray:

@@ -162,7 +162,7 @@ def _clean(trace: Trace) -> np.ndarray:
 
 def _beside(trace: Trace, a: int, b: int) -> Excursion:
     """A span that the currents mark, not the voltage."""
-    return Excursion(a, b, 0.0, True, False, True, float(np.median(trace.U)))
+    return Excursion(a, b, 0.0, True, False, True, max(float(np.median(trace.U)), 1e-12))
 
 
 def _pole_slips(trace: Trace) -> list[Excursion]:
