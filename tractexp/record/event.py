@@ -157,7 +157,7 @@ def detect(record: Record) -> Event:
 
     An interruption, an open pole and a step are refused by their names.
     """
-    dips = find_dips(record.t, record.U)
+    dips, swells = _scan(record.t, record.U)
     if not dips:
         raise UserError(_no_dip(record))
     start, end = dips[0]
@@ -168,11 +168,11 @@ def detect(record: Record) -> Event:
         )
     if told := _no_such_dip(record, start, end):
         raise UserError(f"{record.where}: {told}")
-    steady = steady_before(record.t, record.U, start)
-    t, U, P, Q = (values[steady] for values in (record.t, record.U, record.P, record.Q))
+    before = _steady(record, start, swells)
+    t, U, P, Q = (values[before] for values in (record.t, record.U, record.P, record.Q))
     if np.count_nonzero(np.isfinite(P) & np.isfinite(Q)) < FEWEST_BEFORE:
         raise UserError(
-            f"{record.where}: P and Q have fewer than {FEWEST_BEFORE} values in the {steady.stop - steady.start} "
+            f"{record.where}: P and Q have fewer than {FEWEST_BEFORE} values in the {before.stop - before.start} "
             f"samples before the dip at t = {record.t[start]:g} s; the steady state cannot be told"
         )
     U0 = float(U.mean())
@@ -184,32 +184,35 @@ def detect(record: Record) -> Event:
         U0=U0,
         P0=float(np.nanmean(P)),
         Q0=float(np.nanmean(Q)),
-        f0=record.base.frequency if record.f is None else float(record.f[steady].mean()),
+        f0=record.base.frequency if record.f is None else float(record.f[before].mean()),
         noise_U=noise(t, U),
         noise_P=noise(t, P),
         noise_Q=noise(t, Q),
-        steady=steady,
+        steady=before,
         dips=len(dips),
     )
 
 
-def steady_before(t: np.ndarray, U: np.ndarray, start: int, first: int = 0) -> slice:
-    """The last second before a dip at sample `start`, from `first` on at most.
+def steady(record: Record) -> slice:
+    """The samples of the steady state before the first dip; all where there is none, or too little before it."""
+    dips, swells = _scan(record.t, record.U)
+    start = dips[0][0] if dips else 0
+    return _steady(record, start, swells) if start >= FEWEST_BEFORE else slice(0, record.samples)
 
-    Where a swell leaves too little room between itself and the dip it is the last second before the swell.
-    """
-    rate = (len(t) - 1) / float(t[-1] - t[0])
-    least, most = (max(FEWEST_BEFORE, round(x * rate)) for x in (STEADY / 10, STEADY))
-    stop, begin = start, max(first, start - most)
-    swells = [(a + first, b + first) for a, b in _scan(t[first:], U[first:])[1] if a + first < start]
-    for rises, falls in reversed(swells):
-        if falls <= begin:
+
+def _steady(record: Record, start: int, swells: list[tuple[int, int]]) -> slice:
+    """The last second before the dip, or before a swell that leaves too little room behind it."""
+    most = max(FEWEST_BEFORE, round(STEADY * record.rate))
+    least = max(FEWEST_BEFORE, round(0.1 * record.rate))
+    stop, first = start, max(0, start - most)
+    for begin, end in reversed([swell for swell in swells if swell[0] < start]):
+        if end <= first:
             break
-        if stop - falls >= least or rises - first < FEWEST_BEFORE:
-            begin = min(falls, stop - FEWEST_BEFORE)
+        if stop - end >= least or begin < FEWEST_BEFORE:
+            first = min(end, stop - FEWEST_BEFORE)
             break
-        stop, begin = rises, max(first, rises - most)
-    return slice(max(begin, first), stop)
+        stop, first = begin, max(0, begin - most)
+    return slice(max(first, 0), stop)
 
 
 def _no_such_dip(record: Record, start: int, end: int) -> str:
