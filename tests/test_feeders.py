@@ -143,6 +143,13 @@ def test_unloaded_feeders_come_last_and_say_so():
     assert "unloaded" in spare.why[-1]
 
 
+@pytest.mark.parametrize("volts", [np.zeros_like(V), V[[0, 0, 0]], 1e-3 * noise(V.shape, 1.0)])
+def test_voltages_that_are_dead_or_no_three_phases_are_no_load(volts):
+    [feeder] = propose(recording([*volts, *I]))
+    assert not feeder.loaded
+    assert "the line is dead" in feeder.why[-1]
+
+
 def test_nothing_to_propose_is_no_error():
     assert propose(recording(V)) == []
     assert propose(recording(np.zeros((6, 3)))) == []

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.record.phasor import TURN
+from tractexp.record.phasor import TURN, sequences
 from tractexp.recording.connection import usual
 from tractexp.recording.label import Group, groups, kind, residual, words
 from tractexp.recording.recording import Recording
@@ -18,6 +18,7 @@ SYMMETRIC = 15.0  # degrees off 120 that three phasors may be
 UNLOADED = 0.005  # of the greatest current in the file: less is an unloaded feeder
 STEPS_LOADED = 3.0  # quantisation steps that a current must exceed
 CLOSES = 0.03  # of the sum of magnitudes: currents that add up to less belong to one bus
+SYSTEM = 0.75  # of the RMS: what three phases have of one sequence at some time
 SAME_BUS = 0.02  # voltages that never differ by more are those of one bus, or of two tied ones
 
 
@@ -258,8 +259,21 @@ def _said(feeders: list[Feeder], loaded: list[int], signs: np.ndarray, closes: f
     return made
 
 
+def _dead(seen: Snapshots, numbers: Sequence[int]) -> bool:
+    """Whether three voltages never turn as three phases do, in either order."""
+    if len(numbers) < 3:
+        return not any(seen.pure(i) for i in numbers)
+    X = np.nan_to_num(seen.of(numbers))
+    rest = np.nan_to_num(seen.rest[[seen.numbers.index(i) for i in numbers]])
+    size = np.sqrt((np.abs(X) ** 2 + rest**2).mean(axis=0))
+    return not (np.abs(sequences(X)).max(axis=0) > SYSTEM * size).any()
+
+
 def _marked(recording: Recording, seen: Snapshots, feeder: Feeder, level: float) -> Feeder:
     """The feeder with a word on its load where it carries none."""
+    if _dead(seen, feeder.voltages):
+        why = "the voltages are no three phases: the line is dead, or they were named otherwise"
+        return replace(feeder, why=(*feeder.why, why), loaded=False)
     size = _size(seen, feeder.currents)
     step = max(abs(c.gain * c.ratio * c.factor) for c in (recording.channels[i] for i in feeder.currents))
     integral = all(recording.channels[i].raw.dtype.kind in "iu" for i in feeder.currents)
