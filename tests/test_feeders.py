@@ -29,6 +29,16 @@ NAMES = {6: ["Uab", "Ubc", "Uca", "Ia", "Ib", "Ic"], 5: ["Uab", "Ubc", "Ia", "Ib
         (("Uа", "Uв", "Uс"), ("Iа", "Iв", "Iс")),  # Cyrillic letters
         (("1号母线Ua", "1号母线Ub", "1号母线Uc"), ("馈线3_Ia", "馈线3_Ib", "馈线3_Ic")),
         (("BUS 2 Van", "BUS 2 Vbn", "BUS 2 Vcn"), ("LINE Ia [A]", "LINE Ib [A]", "LINE Ic [A]")),
+        (("A相电压", "B相电压", "C相电压"), ("A相电流", "B相电流", "C相电流")),
+        (("UA(kV)", "UB(kV)", "UC(kV)"), ("IA(A)", "IB(A)", "IC(A)")),
+        (
+            ("Phase A Voltage", "Phase B Voltage", "Phase C Voltage"),
+            ("Phase A Current", "Phase B Current", "Phase C Current"),
+        ),
+        (("U_L1-N", "U_L2-N", "U_L3-N"), ("I_L1", "I_L2", "I_L3")),
+        (("PT1_VA", "PT1_VB", "PT1_VC"), ("CT3_IA", "CT3_IB", "CT3_IC")),
+        (("u_a", "u_b", "u_c"), ("i_a", "i_b", "i_c")),
+        (("Фаза A U", "Фаза B U", "Фаза C U"), ("Фаза A I", "Фаза B I", "Фаза C I")),
         (("ch0", "ch1", "ch2"), ("ch3", "ch4", "ch5")),  # nothing but angles
     ],
 )
@@ -105,6 +115,22 @@ def test_one_voltage_and_one_current_are_a_single_phase_feeder():
     made = recording([V[0], I[0]], names=["U contact line", "I feeder 212"])
     [feeder] = propose(made)
     assert (feeder.voltages, feeder.currents, feeder.connection) == ((0,), (1,), "single_phase")
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("Ua", "Ub", "Ia", "Ib"),
+        ("27.5kV Uα", "27.5kV Uβ", "α馈线I", "β馈线I"),
+        ("arm 1 U", "arm 2 U", "arm 1 I", "arm 2 I"),
+    ],
+)
+def test_the_two_arms_of_a_traction_substation_are_two_feeders(names):
+    found = propose(recording([V[0], V[1], I[0], I[1]], names=names, units=["kV", "kV", "kA", "kA"]))
+    assert [(f.voltages, f.currents, f.connection) for f in found] == [
+        ((0,), (2,), "single_phase"),
+        ((1,), (3,), "single_phase"),
+    ]
 
 
 def station(reverse=(), tie=False):

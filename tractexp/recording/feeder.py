@@ -49,7 +49,8 @@ def propose(recording: Recording) -> list[Feeder]:
     if not volts or not amps or seen is None:
         return []
     buses = _groups(recording, seen, volts)
-    loads = _groups(recording, seen, amps)
+    three = any(len(bus.numbers) == 3 or bus.pairs for bus in buses)  # without them two currents are two feeders
+    loads = [g for g in _groups(recording, seen, amps) if len(g.numbers) == 3 or three]
     feeders = [_feeder(recording, seen, load, buses) for load in loads if buses and _fits(load, buses)]
     feeders += _single(recording, seen, volts, amps, [*buses, *loads])
     feeders = _kirchhoff(seen, feeders)
@@ -167,7 +168,10 @@ def _bus(recording: Recording, seen: Snapshots, load: Group, buses: Sequence[Gro
 
 def _text(recording: Recording, group: Group) -> set[str]:
     channels = [recording.channels[i] for i in group.numbers]
-    return set.intersection(*(words(f"{c.name} {c.circuit}") for c in channels)) - {"u", "v", "i"}
+    made = set.intersection(*(words(f"{c.name} {c.circuit}") for c in channels)) - {"u", "v", "i"}
+    if len(channels) == 1:  # a phase is a name of its own there: "Ia" goes with "Ua"
+        made |= {f"phase {word[1:]}" for word in made if word[0] in "uvi" and 1 < len(word) < 4}
+    return made
 
 
 def _size(seen: Snapshots, numbers: Sequence[int]) -> float:
