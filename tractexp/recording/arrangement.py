@@ -138,10 +138,12 @@ def _seen(recording: Recording, feeder: Feeder) -> _Seen | None:
     if not alive.any():
         return None
     V, I, size = V[:, alive], I[:, alive], size[alive]
-    calm = at_level(size, CALM)
+    even = np.ones(len(size), bool)
     if len(V) == 3:
         small, large = np.sort(np.abs(sequences(V)), axis=0)  # whatever the order is
-        calm = even if (even := calm & (small < UNBALANCED * large)).any() else calm
+        even = found if (found := small < UNBALANCED * large).any() else even
+    calm = np.zeros(len(size), bool)
+    calm[even] = at_level(size[even], CALM)
     return _Seen(V, I, calm)
 
 
@@ -335,7 +337,7 @@ def _directed(feeder: Feeder, seen: _Seen) -> Feeder:
     else:
         V1, I1, polarity = seen.V[0], seen.I[0], 0
     S = len(seen.V) * V1 * I1.conj()
-    told = direction(np.abs(V1), S.real, S.imag, polarity)
+    told = direction(np.abs(V1), S.real, S.imag, polarity, seen.calm)
     if not told:
         return feeder
     middle = complex(np.median(S[seen.calm].real), np.median(S[seen.calm].imag))
