@@ -209,6 +209,8 @@ def test_the_transformers_of_the_220_kv_station(shared_data):
 def test_the_feeders_of_the_110_kv_station(shared_data):
     found = {f.currents: f for f in propose(comtrade.load(shared_data / "async110kv-wisp" / "async110.cfg"))}
     assert len(found) == 11
+    assert [names for names, f in found.items() if f.reverse_current] == [(39, 40, 41)]  # AT1, as is known of the file
+    assert "the currents of 5 feeders add up to 1.7 % of their magnitudes once this" in found[39, 40, 41].why[-1]
     assert found[15, 16, 17].voltages == (4, 5, 6)
     assert found[19, 20, 21].voltages == (0, 1, 2)
     assert not found[23, 24, 25].loaded

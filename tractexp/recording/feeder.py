@@ -219,29 +219,40 @@ def _single(
 
 
 def _kirchhoff(seen: Snapshots, feeders: list[Feeder]) -> list[Feeder]:
-    """The feeders, with what the sum of their currents says of them: that it closes, or closes with one reversed."""
+    """The feeders, with what the sum of their currents says of them: that it closes, or closes with one reversed.
+
+    The whole station first, then the feeders of each bus.
+    """
     three = [k for k, f in enumerate(feeders) if len(f.currents) == 3]
     level = max((_size(seen, feeders[k].currents) for k in three), default=0.0)
     loaded = [k for k in three if _size(seen, feeders[k].currents) > UNLOADED * level]
+    if found := _closed(seen, feeders, loaded):
+        return _said(feeders, loaded, *found)
+    for bus in sorted({feeders[k].voltages for k in loaded}):
+        own = [k for k in loaded if feeders[k].voltages == bus]
+        if found := _closed(seen, feeders, own):
+            feeders = _said(feeders, own, *found)
+    return feeders
+
+
+def _closed(seen: Snapshots, feeders: list[Feeder], loaded: list[int]) -> tuple[np.ndarray, float] | None:
+    """(signs, what is left) of the simplest sum of three or more currents that closes; None where none does."""
     if len(loaded) < 3:
-        return feeders
+        return None
     X = np.array([seen.of(feeders[k].currents) for k in loaded])  # (F, 3, M)
     X = X[:, :, np.isfinite(X).all(axis=(0, 1))]
     if not X.size:
-        return feeders
-    plain = np.ones(len(loaded))
-    tried = [plain]
-    for k in range(len(loaded)):
-        tried += [np.where(np.arange(len(loaded)) == k, s, plain) for s in (0, -1)]
-    for pair in combinations(range(len(loaded)), 2):
-        both = np.isin(np.arange(len(loaded)), pair)
-        tried += [np.where(both, 0, plain)] if len(loaded) > 4 else []
+        return None
+    plain, each = np.ones(len(loaded)), np.arange(len(loaded))
+    tried = [plain, *(np.where(each == k, s, plain) for k in each for s in (0, -1))]
+    if len(loaded) > 4:
+        tried += [np.where(np.isin(each, pair), 0, plain) for pair in combinations(each, 2)]
+    tried = [signs for signs in tried if np.count_nonzero(signs) >= 3]
     closes = [_closure(X, signs) for signs in tried]
-    best = next((k for k in np.argsort(closes) if closes[k] < CLOSES), None)
-    if best is None:
-        return feeders
-    simple = next(k for k in range(len(tried)) if closes[k] < max(CLOSES / 3, 2 * closes[best]))
-    return _said(feeders, loaded, tried[simple], closes[simple])
+    if min(closes) >= CLOSES:
+        return None
+    simple = next(k for k in range(len(tried)) if closes[k] < max(CLOSES / 3, 2 * min(closes)))
+    return tried[simple], closes[simple]
 
 
 def _closure(X: np.ndarray, signs: np.ndarray) -> float:
