@@ -111,6 +111,13 @@ def test_line_voltages_and_two_of_them_and_two_transformers():
         np.testing.assert_allclose(seen.S, whole.S, rtol=1e-6)
 
 
+def test_a_phase_column_of_numbers_says_nothing():
+    lines = V - np.roll(V, -1, axis=0)
+    names, labels = ["I1", "I2", "I3", "U21", "U32", "Vo"], ["7", "8", "9", "0", "1", "6"]
+    [feeder] = propose(recording([*I, *lines[:2], 0 * V[0]], names=names, labels=labels))
+    assert (feeder.voltages, feeder.currents, feeder.connection) == ((3, 4), (0, 1, 2), "two_line_voltages")
+
+
 def test_one_voltage_and_one_current_are_a_single_phase_feeder():
     made = recording([V[0], I[0]], names=["U contact line", "I feeder 212"])
     [feeder] = propose(made)
@@ -174,6 +181,12 @@ def test_voltages_that_are_dead_or_no_three_phases_are_no_load(volts):
     [feeder] = propose(recording([*volts, *I]))
     assert not feeder.loaded
     assert "the line is dead" in feeder.why[-1]
+
+
+def test_a_machine_that_runs_free_has_no_networks_frequency():
+    [feeder] = propose(recording([*wave(T, phases(dip(T)), 79.2), *(1e-5 * I)]))
+    assert not feeder.loaded
+    assert "the voltages have 79.2 Hz, which is no network's" in feeder.why[-1]
 
 
 def test_nothing_to_propose_is_no_error():

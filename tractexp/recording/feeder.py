@@ -44,7 +44,8 @@ def propose(recording: Recording) -> list[Feeder]:
     volts = [i for i in waves if kind(waves[i]) == "voltage"]
     amps = [i for i in waves if kind(waves[i]) == "current"]
     f = frequency(recording, volts) or frequency(recording, amps)
-    f = recording.frequency if f is None or nearest_nominal(f) is None else f
+    strange = f"the voltages have {f:.3g} Hz, which is no network's" if f and nearest_nominal(f) is None else ""
+    f = recording.frequency if f is None or strange else f
     seen = snapshots(recording, sorted(waves), f)
     if not volts or not amps or seen is None:
         return []
@@ -55,7 +56,7 @@ def propose(recording: Recording) -> list[Feeder]:
     feeders += _single(recording, seen, volts, amps, [*buses, *loads])
     feeders = _kirchhoff(seen, feeders)
     level = max((_size(seen, f.currents) for f in feeders), default=0.0)
-    return sorted((_marked(recording, seen, feeder, level) for feeder in feeders), key=lambda f: not f.loaded)
+    return sorted((_marked(recording, seen, feeder, level, strange) for feeder in feeders), key=lambda f: not f.loaded)
 
 
 def _groups(recording: Recording, seen: Snapshots, numbers: Sequence[int]) -> list[Group]:
@@ -284,10 +285,10 @@ def _dead(seen: Snapshots, numbers: Sequence[int]) -> bool:
     return not (np.abs(sequences(X)).max(axis=0) > SYSTEM * size).any()
 
 
-def _marked(recording: Recording, seen: Snapshots, feeder: Feeder, level: float) -> Feeder:
+def _marked(recording: Recording, seen: Snapshots, feeder: Feeder, level: float, strange: str) -> Feeder:
     """The feeder with a word on its load where it carries none."""
     if _dead(seen, feeder.voltages):
-        why = "the voltages are no three phases: the line is dead, or they were named otherwise"
+        why = strange or "the voltages are no three phases: the line is dead, or they were named otherwise"
         return replace(feeder, why=(*feeder.why, why), loaded=False)
     size = _size(seen, feeder.currents)
     step = max(abs(c.gain * c.ratio * c.factor) for c in (recording.channels[i] for i in feeder.currents))

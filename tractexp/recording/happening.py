@@ -292,7 +292,7 @@ def _worth(
     return True, f"{size}, {lead:.2g} s before it and the recovery are recorded"
 
 
-NO_SYSTEM = "the voltages are no three phases: the line is dead, or other channels were meant"
+NO_SYSTEM = "the voltages are no three phases of this frequency: the line is dead, or other channels were meant"
 NO_FIT = {
     "swell": "a swell: loads answer it, but the models here are fitted to dips",
     "interruption": "an interruption: without voltage there is no load to model, and what follows is a start-up",
