@@ -44,8 +44,12 @@ def propose(recording: Recording) -> list[Feeder]:
     volts = [i for i in waves if kind(waves[i]) == "voltage"]
     amps = [i for i in waves if kind(waves[i]) == "current"]
     f = frequency(recording, volts) or frequency(recording, amps)
-    strange = f"the voltages have {f:.3g} Hz, which is no network's" if f and nearest_nominal(f) is None else ""
-    f = recording.frequency if f is None or strange else f
+    strange = ""
+    if f is not None and nearest_nominal(f) is None:
+        turning = snapshots(recording, volts, f)
+        if turning is not None and any(turning.pure(i) for i in volts):
+            strange = f"the voltages have {f:.3g} Hz, which is no network's"
+    f = recording.frequency if f is None or nearest_nominal(f) is None else f
     seen = snapshots(recording, sorted(waves), f)
     if not volts or not amps or seen is None:
         return []
