@@ -200,6 +200,13 @@ class TestDirection:
         found = arranged(made(phases(one, two), back + sign * passive), GIVEN)
         assert says in found.why[-1]
 
+    def test_the_state_before_a_long_open_pole_counts(self):
+        volts, amps = phases(np.full(len(T), KV)), -load(np.full(len(T), KV))
+        for x in (volts, amps):
+            x[1, T > 0.4] *= 0.001
+        found = arranged(made(volts, amps), GIVEN)
+        assert found.why[-1].startswith("P = -33 MW, Q = -19.1 Mvar: ")
+
     def test_nothing_is_said_of_noise(self):
         assert arranged(made(phases(dip(T)), 1e-9 * load(dip(T)) + noise((3, len(T)), 0.01)), GIVEN).why == ()
 

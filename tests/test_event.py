@@ -252,3 +252,16 @@ class TestDirection:
         told = describe(detect(Record(name="made", t=made.t, U=made.U, P=-0.5 + 0 * made.P, Q=0.02 + 0 * made.Q)))
         assert "regeneration (a braking train)" in told
         assert "reverse_current" not in told
+
+    def test_a_train_that_motors_again_after_the_dip(self):
+        made = dip(sigma=0.0)
+        P = np.where(made.t < 0.6, -0.4, 0.7)
+        told = describe(detect(Record(name="made", t=made.t, U=made.U, P=P, Q=0.1 * P)))
+        assert "P is -0.4 before the dip: P changes its sign at normal voltage" in told
+
+    def test_noise_is_no_load(self):
+        made = dip(sigma=0.0)
+        P = -1e-4 + 1e-3 * np.random.default_rng(0).standard_normal(made.samples)
+        assert "no more than noise, so this is no load" in describe(
+            detect(Record(name="made", t=made.t, U=made.U, P=P, Q=P))
+        )

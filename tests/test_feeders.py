@@ -29,6 +29,16 @@ NAMES = {6: ["Uab", "Ubc", "Uca", "Ia", "Ib", "Ic"], 5: ["Uab", "Ubc", "Ia", "Ib
         (("Uа", "Uв", "Uс"), ("Iа", "Iв", "Iс")),  # Cyrillic letters
         (("1号母线Ua", "1号母线Ub", "1号母线Uc"), ("馈线3_Ia", "馈线3_Ib", "馈线3_Ic")),
         (("BUS 2 Van", "BUS 2 Vbn", "BUS 2 Vcn"), ("LINE Ia [A]", "LINE Ib [A]", "LINE Ic [A]")),
+        (("A相电压", "B相电压", "C相电压"), ("A相电流", "B相电流", "C相电流")),
+        (("UA(kV)", "UB(kV)", "UC(kV)"), ("IA(A)", "IB(A)", "IC(A)")),
+        (
+            ("Phase A Voltage", "Phase B Voltage", "Phase C Voltage"),
+            ("Phase A Current", "Phase B Current", "Phase C Current"),
+        ),
+        (("U_L1-N", "U_L2-N", "U_L3-N"), ("I_L1", "I_L2", "I_L3")),
+        (("PT1_VA", "PT1_VB", "PT1_VC"), ("CT3_IA", "CT3_IB", "CT3_IC")),
+        (("u_a", "u_b", "u_c"), ("i_a", "i_b", "i_c")),
+        (("Фаза A U", "Фаза B U", "Фаза C U"), ("Фаза A I", "Фаза B I", "Фаза C I")),
         (("ch0", "ch1", "ch2"), ("ch3", "ch4", "ch5")),  # nothing but angles
     ],
 )
@@ -101,10 +111,33 @@ def test_line_voltages_and_two_of_them_and_two_transformers():
         np.testing.assert_allclose(seen.S, whole.S, rtol=1e-6)
 
 
+def test_a_phase_column_of_numbers_says_nothing():
+    lines = V - np.roll(V, -1, axis=0)
+    names, labels = ["I1", "I2", "I3", "U21", "U32", "Vo"], ["7", "8", "9", "0", "1", "6"]
+    [feeder] = propose(recording([*I, *lines[:2], 0 * V[0]], names=names, labels=labels))
+    assert (feeder.voltages, feeder.currents, feeder.connection) == ((3, 4), (0, 1, 2), "two_line_voltages")
+
+
 def test_one_voltage_and_one_current_are_a_single_phase_feeder():
     made = recording([V[0], I[0]], names=["U contact line", "I feeder 212"])
     [feeder] = propose(made)
     assert (feeder.voltages, feeder.currents, feeder.connection) == ((0,), (1,), "single_phase")
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("Ua", "Ub", "Ia", "Ib"),
+        ("27.5kV Uα", "27.5kV Uβ", "α馈线I", "β馈线I"),
+        ("arm 1 U", "arm 2 U", "arm 1 I", "arm 2 I"),
+    ],
+)
+def test_the_two_arms_of_a_traction_substation_are_two_feeders(names):
+    found = propose(recording([V[0], V[1], I[0], I[1]], names=names, units=["kV", "kV", "kA", "kA"]))
+    assert [(f.voltages, f.currents, f.connection) for f in found] == [
+        ((0,), (2,), "single_phase"),
+        ((1,), (3,), "single_phase"),
+    ]
 
 
 def station(reverse=(), tie=False):
@@ -143,6 +176,19 @@ def test_unloaded_feeders_come_last_and_say_so():
     assert "unloaded" in spare.why[-1]
 
 
+@pytest.mark.parametrize("volts", [np.zeros_like(V), V[[0, 0, 0]], 1e-3 * noise(V.shape, 1.0)])
+def test_voltages_that_are_dead_or_no_three_phases_are_no_load(volts):
+    [feeder] = propose(recording([*volts, *I]))
+    assert not feeder.loaded
+    assert "the line is dead" in feeder.why[-1]
+
+
+def test_a_machine_that_runs_free_has_no_networks_frequency():
+    [feeder] = propose(recording([*wave(T, phases(dip(T)), 79.2), *(1e-5 * I)]))
+    assert not feeder.loaded
+    assert "the voltages have 79.2 Hz, which is no network's" in feeder.why[-1]
+
+
 def test_nothing_to_propose_is_no_error():
     assert propose(recording(V)) == []
     assert propose(recording(np.zeros((6, 3)))) == []
@@ -176,6 +222,8 @@ def test_the_transformers_of_the_220_kv_station(shared_data):
 def test_the_feeders_of_the_110_kv_station(shared_data):
     found = {f.currents: f for f in propose(comtrade.load(shared_data / "async110kv-wisp" / "async110.cfg"))}
     assert len(found) == 11
+    assert [names for names, f in found.items() if f.reverse_current] == [(39, 40, 41)]  # AT1, as is known of the file
+    assert "the currents of 5 feeders add up to 1.7 % of their magnitudes once this" in found[39, 40, 41].why[-1]
     assert found[15, 16, 17].voltages == (4, 5, 6)
     assert found[19, 20, 21].voltages == (0, 1, 2)
     assert not found[23, 24, 25].loaded

@@ -240,6 +240,15 @@ def test_single_phase_feeders_have_happenings_too():
     assert np.isnan(event.U2)
 
 
+@pytest.mark.parametrize("volts", [0.0, 1e-6, "same"])
+def test_voltages_that_are_no_three_phases_are_a_dead_line(volts):
+    t = grid(1.0)
+    same = np.ones((3, len(t))) * KV if volts == "same" else phases(volts * np.ones(len(t)))
+    [event] = seen(t, same, load(KV * np.ones(len(t))))
+    assert (event.kind, event.worth) == ("dead line", False)
+    assert "no three phases" in event.why
+
+
 def test_a_feeder_without_load_is_not_worth_fitting():
     t = grid(2.0)
     V = KV * np.where((t >= 0.9) & (t < 1.2), 0.7, 1.0)

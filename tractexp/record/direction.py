@@ -22,25 +22,27 @@ def at_level(x: np.ndarray, share: float) -> np.ndarray:
     return np.abs(x - level) <= share * level
 
 
-def direction(U: np.ndarray, P: np.ndarray, Q: np.ndarray, polarity: int = 0) -> str:
+def direction(U: np.ndarray, P: np.ndarray, Q: np.ndarray, polarity: int = 0, calm: np.ndarray | None = None) -> str:
     """Why P is negative before a disturbance, one clause; "" where it is not.
 
-    `polarity` says what the negative sequence has shown, where it is known: 1 the current is counted as a load's, -1
-    the other way. A passive load draws negative-sequence current whatever its power does. Otherwise the answer of P and
-    Q to the voltage decides: a load's |P| falls with U and returns, and so does its inductive Q; a converter keeps P or
-    the current, or reverses.
+    `calm` (N,) is the state to compare with, by default the one that lasts longest. `polarity` says what the negative
+    sequence has shown, where it is known: 1 the current is counted as a load's, -1 the other way. A passive load draws
+    negative-sequence current whatever its power does. Otherwise the answer of P and Q to the voltage decides: a load's
+    |P| falls with U and returns, and so does its inductive Q; a converter keeps P or the current, or reverses.
     """
     known = np.isfinite(U) & np.isfinite(P) & np.isfinite(Q)
-    U, P, Q = U[known], P[known], Q[known]
-    if not len(U):
+    if not known.any() or (calm is not None and not (calm & known).any()):
         return ""
-    rough = 3 * float(np.median(np.abs(np.diff(U)))) / float(np.median(U)) if len(U) > 1 else 0.0
-    calm = at_level(U, max(CALM, rough))
+    U, P, Q = U[known], P[known], Q[known]
+    rough = 3 * float(np.median(np.abs(np.diff(U)))) / max(float(np.median(U)), 1e-12) if len(U) > 1 else 0.0
+    near = max(CALM, rough)
+    calm = at_level(U, near) if calm is None else calm[known]
     level, P0, Q0 = (float(np.median(x[calm])) for x in (U, P, Q))
+    normal = np.abs(U - level) <= near * level
     spread = float(np.median(np.abs(np.diff(P)))) if len(P) > 1 else 0.0
     if not -NOISY * spread > P0:
         return ""
-    if np.count_nonzero(P[calm] > -TURNS * P0) > max(FEWEST, 0.02 * len(P)):
+    if np.count_nonzero(P[normal] > -TURNS * P0) > max(FEWEST, 0.02 * len(P)):
         return "P changes its sign at normal voltage, as of a train that brakes and motors: power flows both ways"
     a, fell = _exponent(U / level, P / P0)
     answer = f"|P| goes as U^{round(a, 2) + 0.0:g} when the voltage falls" if fell else "the voltage is never disturbed"

@@ -301,7 +301,9 @@ def describe(event: Event) -> str:
     if event.dips > 1:
         odd.append(f"the record holds {event.dips} dips, and the first is meant")
     if event.P0 <= 0:
-        told = direction(record.U, record.P, record.Q) or "no power flows, so this is no load"
+        calm = np.zeros(record.samples, bool)
+        calm[event.steady] = True
+        told = direction(record.U, record.P, record.Q, calm=calm) or "no more than noise, so this is no load"
         odd.append(f"P is {event.P0:.3g} before the dip: {told}")
     gaps = int(np.count_nonzero(np.isnan(record.P) | np.isnan(record.Q)))
     if gaps:

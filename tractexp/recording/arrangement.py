@@ -138,10 +138,12 @@ def _seen(recording: Recording, feeder: Feeder) -> _Seen | None:
     if not alive.any():
         return None
     V, I, size = V[:, alive], I[:, alive], size[alive]
-    calm = at_level(size, CALM)
+    even = np.ones(len(size), bool)
     if len(V) == 3:
         small, large = np.sort(np.abs(sequences(V)), axis=0)  # whatever the order is
-        calm = even if (even := calm & (small < UNBALANCED * large)).any() else calm
+        even = found if (found := small < UNBALANCED * large).any() else even
+    calm = np.zeros(len(size), bool)
+    calm[even] = at_level(size[even], CALM)
     return _Seen(V, I, calm)
 
 
@@ -224,9 +226,11 @@ def _labels(recording: Recording, feeder: Feeder, seen: _Seen | None) -> None:
     """Refuse currents that are labelled in another order than the voltages."""
     channels = recording.channels
     volts, amps = (order([channels[i] for i in each]) for each in (feeder.voltages, feeder.currents))
-    if volts is None or amps is None or volts[1] or amps[1] or len(volts[0]) < 3 or volts[0] == amps[0]:
+    if volts is None or amps is None or volts[1] or amps[1] or volts[0] == amps[0]:
         return
     (v, _), (c, _) = volts, amps
+    if len(v) < 3 or len(c) < 3:
+        return
     labelled = tuple(feeder.currents[c.index(k)] for k in v)
     both = ""
     if seen is not None:
@@ -334,7 +338,7 @@ def _directed(feeder: Feeder, seen: _Seen) -> Feeder:
     else:
         V1, I1, polarity = seen.V[0], seen.I[0], 0
     S = len(seen.V) * V1 * I1.conj()
-    told = direction(np.abs(V1), S.real, S.imag, polarity)
+    told = direction(np.abs(V1), S.real, S.imag, polarity, seen.calm)
     if not told:
         return feeder
     middle = complex(np.median(S[seen.calm].real), np.median(S[seen.calm].imag))

@@ -43,15 +43,15 @@ class Excursion:
 def excursions(trace: Trace) -> list[Excursion]:
     """All excursions, in order of time."""
     levels, limits = _levels(trace)
-    alive = levels.max(axis=0) > DEAD * np.percentile(levels.max(axis=0), 95)
-    if not alive.any() or len(trace.t) < 4:
+    if not levels.any() or len(trace.t) < 4:
         return []
+    alive = levels.max(axis=0) > DEAD * np.percentile(levels.max(axis=0), 95)
     found: list[Excursion] = []
     k = int(np.argmax(alive))
     count = max(2, round(REFERENCE / trace.step))
     if k > 0:
         k = min(k + round(2 * trace.cycle / trace.step), len(trace.t) - 1)
-        found.append(Excursion(0, k, -1.0, True, False, False, float(trace.U[-1]), True))
+        found.append(Excursion(0, k, -1.0, True, False, False, max(float(trace.U.max()), 1e-12), True))
     reference = _reference(levels, k, count)
     share = 1 - np.exp(-trace.step / SLIDING)
     while k < len(trace.t):
@@ -113,7 +113,7 @@ def _one(
     sudden = _fastest(levels[row, max(start - 2, 0) : end + 1] / reference[row], within) > 0.5 * max(
         np.abs(whole[row]).max(), limits[row]
     )
-    return Excursion(start, end, float(most), returned, settled, bool(sudden), float(reference[0]))
+    return Excursion(start, end, float(most), returned, settled, bool(sudden), max(float(reference[0]), 1e-12))
 
 
 def _onset(level: np.ndarray, reference: float, limit: float, k: int, earliest: int) -> int:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.record.phasor import TURN
+from tractexp.record.phasor import TURN, sequences
 from tractexp.recording.connection import usual
 from tractexp.recording.label import Group, groups, kind, residual, words
 from tractexp.recording.recording import Recording
@@ -18,6 +18,7 @@ SYMMETRIC = 15.0  # degrees off 120 that three phasors may be
 UNLOADED = 0.005  # of the greatest current in the file: less is an unloaded feeder
 STEPS_LOADED = 3.0  # quantisation steps that a current must exceed
 CLOSES = 0.03  # of the sum of magnitudes: currents that add up to less belong to one bus
+SYSTEM = 0.75  # of the RMS: what three phases have of one sequence at some time
 SAME_BUS = 0.02  # voltages that never differ by more are those of one bus, or of two tied ones
 
 
@@ -43,17 +44,23 @@ def propose(recording: Recording) -> list[Feeder]:
     volts = [i for i in waves if kind(waves[i]) == "voltage"]
     amps = [i for i in waves if kind(waves[i]) == "current"]
     f = frequency(recording, volts) or frequency(recording, amps)
+    strange = ""
+    if f is not None and nearest_nominal(f) is None:
+        turning = snapshots(recording, volts, f)
+        if turning is not None and any(turning.pure(i) for i in volts):
+            strange = f"the voltages have {f:.3g} Hz, which is no network's"
     f = recording.frequency if f is None or nearest_nominal(f) is None else f
     seen = snapshots(recording, sorted(waves), f)
     if not volts or not amps or seen is None:
         return []
     buses = _groups(recording, seen, volts)
-    loads = _groups(recording, seen, amps)
+    three = any(len(bus.numbers) == 3 or bus.pairs for bus in buses)  # without them two currents are two feeders
+    loads = [g for g in _groups(recording, seen, amps) if len(g.numbers) == 3 or three]
     feeders = [_feeder(recording, seen, load, buses) for load in loads if buses and _fits(load, buses)]
     feeders += _single(recording, seen, volts, amps, [*buses, *loads])
     feeders = _kirchhoff(seen, feeders)
     level = max((_size(seen, f.currents) for f in feeders), default=0.0)
-    return sorted((_marked(recording, seen, feeder, level) for feeder in feeders), key=lambda f: not f.loaded)
+    return sorted((_marked(recording, seen, feeder, level, strange) for feeder in feeders), key=lambda f: not f.loaded)
 
 
 def _groups(recording: Recording, seen: Snapshots, numbers: Sequence[int]) -> list[Group]:
@@ -84,7 +91,7 @@ def _symmetric(seen: Snapshots, numbers: Sequence[int]) -> tuple[int, ...]:
         return ()
     X = np.nanmedian(X[:, level > 0.5 * np.nanmax(level)] / _unit(X[0, level > 0.5 * np.nanmax(level)]), axis=1)
     size = np.abs(X)
-    if size.min() == 0 or np.ptp(size) > ALIKE * size.mean():
+    if not size.min() > 0 or np.ptp(size) > ALIKE * size.mean():
         return ()
     off = np.abs(np.degrees(np.angle(X[1:] / X[0] * [[TURN, TURN**2], [TURN**2, TURN]])))
     for angles, order in zip(off, ((0, 1, 2), (0, 2, 1)), strict=True):
@@ -166,12 +173,15 @@ def _bus(recording: Recording, seen: Snapshots, load: Group, buses: Sequence[Gro
 
 def _text(recording: Recording, group: Group) -> set[str]:
     channels = [recording.channels[i] for i in group.numbers]
-    return set.intersection(*(words(f"{c.name} {c.circuit}") for c in channels)) - {"u", "v", "i"}
+    made = set.intersection(*(words(f"{c.name} {c.circuit}") for c in channels)) - {"u", "v", "i"}
+    if len(channels) == 1:  # a phase is a name of its own there: "Ia" goes with "Ua"
+        made |= {f"phase {word[1:]}" for word in made if word[0] in "uvi" and 1 < len(word) < 4}
+    return made
 
 
 def _size(seen: Snapshots, numbers: Sequence[int]) -> float:
     """Magnitude [kV, kA] where it is large: the upper quartile of the mean over the channels."""
-    return float(np.nan_to_num(np.nanpercentile(np.abs(seen.of(numbers)).mean(axis=0), 75)))
+    return float(np.percentile(np.nan_to_num(np.abs(seen.of(numbers))).mean(axis=0), 75))
 
 
 def _positive(X: np.ndarray, pairs: bool) -> np.ndarray:
@@ -214,29 +224,40 @@ def _single(
 
 
 def _kirchhoff(seen: Snapshots, feeders: list[Feeder]) -> list[Feeder]:
-    """The feeders, with what the sum of their currents says of them: that it closes, or closes with one reversed."""
+    """The feeders, with what the sum of their currents says of them: that it closes, or closes with one reversed.
+
+    The whole station first, then the feeders of each bus.
+    """
     three = [k for k, f in enumerate(feeders) if len(f.currents) == 3]
     level = max((_size(seen, feeders[k].currents) for k in three), default=0.0)
     loaded = [k for k in three if _size(seen, feeders[k].currents) > UNLOADED * level]
+    if found := _closed(seen, feeders, loaded):
+        return _said(feeders, loaded, *found)
+    for bus in sorted({feeders[k].voltages for k in loaded}):
+        own = [k for k in loaded if feeders[k].voltages == bus]
+        if found := _closed(seen, feeders, own):
+            feeders = _said(feeders, own, *found)
+    return feeders
+
+
+def _closed(seen: Snapshots, feeders: list[Feeder], loaded: list[int]) -> tuple[np.ndarray, float] | None:
+    """(signs, what is left) of the simplest sum of three or more currents that closes; None where none does."""
     if len(loaded) < 3:
-        return feeders
+        return None
     X = np.array([seen.of(feeders[k].currents) for k in loaded])  # (F, 3, M)
     X = X[:, :, np.isfinite(X).all(axis=(0, 1))]
     if not X.size:
-        return feeders
-    plain = np.ones(len(loaded))
-    tried = [plain]
-    for k in range(len(loaded)):
-        tried += [np.where(np.arange(len(loaded)) == k, s, plain) for s in (0, -1)]
-    for pair in combinations(range(len(loaded)), 2):
-        both = np.isin(np.arange(len(loaded)), pair)
-        tried += [np.where(both, 0, plain)] if len(loaded) > 4 else []
+        return None
+    plain, each = np.ones(len(loaded)), np.arange(len(loaded))
+    tried = [plain, *(np.where(each == k, s, plain) for k in each for s in (0, -1))]
+    if len(loaded) > 4:
+        tried += [np.where(np.isin(each, pair), 0, plain) for pair in combinations(each, 2)]
+    tried = [signs for signs in tried if np.count_nonzero(signs) >= 3]
     closes = [_closure(X, signs) for signs in tried]
-    best = next((k for k in np.argsort(closes) if closes[k] < CLOSES), None)
-    if best is None:
-        return feeders
-    simple = next(k for k in range(len(tried)) if closes[k] < max(CLOSES / 3, 2 * closes[best]))
-    return _said(feeders, loaded, tried[simple], closes[simple])
+    if min(closes) >= CLOSES:
+        return None
+    simple = next(k for k in range(len(tried)) if closes[k] < max(CLOSES / 3, 2 * min(closes)))
+    return tried[simple], closes[simple]
 
 
 def _closure(X: np.ndarray, signs: np.ndarray) -> float:
@@ -258,8 +279,21 @@ def _said(feeders: list[Feeder], loaded: list[int], signs: np.ndarray, closes: f
     return made
 
 
-def _marked(recording: Recording, seen: Snapshots, feeder: Feeder, level: float) -> Feeder:
+def _dead(seen: Snapshots, numbers: Sequence[int]) -> bool:
+    """Whether three voltages never turn as three phases do, in either order."""
+    if len(numbers) < 3:
+        return not any(seen.pure(i) for i in numbers)
+    X = np.nan_to_num(seen.of(numbers))
+    rest = np.nan_to_num(seen.rest[[seen.numbers.index(i) for i in numbers]])
+    size = np.sqrt((np.abs(X) ** 2 + rest**2).mean(axis=0))
+    return not (np.abs(sequences(X)).max(axis=0) > SYSTEM * size).any()
+
+
+def _marked(recording: Recording, seen: Snapshots, feeder: Feeder, level: float, strange: str) -> Feeder:
     """The feeder with a word on its load where it carries none."""
+    if _dead(seen, feeder.voltages):
+        why = strange or "the voltages are no three phases: the line is dead, or they were named otherwise"
+        return replace(feeder, why=(*feeder.why, why), loaded=False)
     size = _size(seen, feeder.currents)
     step = max(abs(c.gain * c.ratio * c.factor) for c in (recording.channels[i] for i in feeder.currents))
     integral = all(recording.channels[i].raw.dtype.kind in "iu" for i in feeder.currents)

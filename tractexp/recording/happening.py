@@ -14,6 +14,7 @@ KINDS = (
     "dip", "swell", "interruption", "step", "ramp", "open pole", "dead line", "pole slip", "inrush",
 )  # fmt: skip
 STEP_AT_MOST = 0.15  # of the voltage: a larger change that stays is no tap or switching step
+SYSTEM = 0.75  # of the RMS: positive sequence that three phases have at some time; a zero sequence leaves none
 SWING = 0.1  # of the voltage: how deep the swings of a pole slip are at least
 SWINGS = 2  # so many at least
 SWING_PERIOD = (0.15, 5.0)  # s
@@ -61,14 +62,24 @@ def happenings_of(record: Record) -> list[Happening]:
 def _happenings(trace: Trace) -> list[Happening]:
     if len(trace.t) < 4:
         return []
+    if _no_system(trace):
+        whole = Excursion(0, len(trace.t), -1.0, False, False, False, max(float(np.median(trace.U)), 1e-12), True)
+        return [replace(_told(trace, "dead line", whole, [whole]), why=NO_SYSTEM)]
     slips = _pole_slips(trace)
     outside = [e for e in excursions(trace) if not any(_part(trace, e, slip) for slip in slips)]
     spans = [(kind, part) for e in outside for kind, part in _kinds(trace, e)]
     spans += [("pole slip", slip) for slip in slips]
     spans += _open_alone(trace, spans)
-    spans += _inrush(trace)
+    spans += [(kind, e) for kind, e in _inrush(trace) if not any(_part(trace, e, slip) for slip in slips)]
     spans.sort(key=lambda each: (each[1].start, each[1].end))
     return [_told(trace, kind, e, [s for _, s in spans]) for kind, e in spans]
+
+
+def _no_system(trace: Trace) -> bool:
+    """Whether three voltages never turn as three phases do: pick-up on a dead line, or one quantity three times."""
+    if len(trace.phases) < 3:
+        return False
+    return not (np.maximum(trace.U, trace.U2) > SYSTEM * np.sqrt((trace.phases**2).mean(axis=0))).any()
 
 
 def _part(trace: Trace, e: Excursion, slip: Excursion) -> bool:
@@ -162,7 +173,7 @@ def _clean(trace: Trace) -> np.ndarray:
 
 def _beside(trace: Trace, a: int, b: int) -> Excursion:
     """A span that the currents mark, not the voltage."""
-    return Excursion(a, b, 0.0, True, False, True, float(np.median(trace.U)))
+    return Excursion(a, b, 0.0, True, False, True, max(float(np.median(trace.U)), 1e-12))
 
 
 def _pole_slips(trace: Trace) -> list[Excursion]:
@@ -232,7 +243,7 @@ def _told(trace: Trace, kind: str, e: Excursion, spans: list[Excursion]) -> Happ
     inside = slice(e.start, max(e.end, e.start + 1))
     edge = round(trace.cycle / trace.step)  # where a window holds two states, whose difference looks unbalanced
     U2 = trace.U2[inside][edge : -edge or None] if e.end - e.start > 3 * edge else trace.U2[inside]
-    depth = -e.worst if e.settled else 1 - _extreme(trace.U[inside], e.worst) / e.reference
+    depth = -e.worst if e.settled or e.dead else 1 - _extreme(trace.U[inside], e.worst) / e.reference
     last = min(e.end, len(trace.t) - 1)
     worth, why = _worth(trace, kind, e, depth, first, before)
     return Happening(
@@ -259,9 +270,9 @@ def _worth(
     if kind != "dip":
         return False, NO_FIT[kind]
     lead = (e.start - first) * trace.step
-    lowest = (
-        (trace.phases[:, e.start : e.end] / np.maximum(e.reference, 1e-12)).min() if len(trace.phases) else 1 - depth
-    )
+    rows = trace.phases if len(trace.phases) else trace.U[None]
+    usual = np.maximum(np.median(rows[:, first : max(e.start, first + 1)], axis=1), 1e-12)
+    lowest = (rows[:, e.start : e.end] / usual[:, None]).min()
     size = f"the positive sequence falls by {100 * depth:.3g} %, the lowest phase to {100 * lowest:.3g} %"
     if lead < FEWEST_BEFORE * 1e-3 or e.start - first < 2:
         return False, f"{size}, but only {1000 * lead:.0f} ms of steady state come before it"
@@ -281,6 +292,7 @@ def _worth(
     return True, f"{size}, {lead:.2g} s before it and the recovery are recorded"
 
 
+NO_SYSTEM = "the voltages are no three phases of this frequency: the line is dead, or other channels were meant"
 NO_FIT = {
     "swell": "a swell: loads answer it, but the models here are fitted to dips",
     "interruption": "an interruption: without voltage there is no load to model, and what follows is a start-up",

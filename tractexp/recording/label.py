@@ -45,7 +45,7 @@ def plain(text: str) -> str:
 
 def residual(channel: Channel) -> bool:
     """Whether the name or the phase says that this is a neutral or zero-sequence quantity."""
-    return bool(RESIDUAL.search(plain(channel.name))) or plain(channel.phase) in ("n", "g", "e", "0", "o", "3i0", "3u0")
+    return bool(RESIDUAL.search(plain(channel.name))) or plain(channel.phase) in ("n", "g", "e", "3i0", "3u0")
 
 
 def kind(channel: Channel) -> str:
@@ -205,7 +205,7 @@ def _shared(channels: list[Channel]) -> str:
     circuit = channels[0].circuit.strip()
     if len(name) > 1:
         return name
-    return circuit if len(circuit) > 1 else ""
+    return circuit if re.search(r"[^\W\d_]", circuit) else ""
 
 
 def words(text: str) -> set[str]:

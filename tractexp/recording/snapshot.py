@@ -90,9 +90,9 @@ def frequency(recording: Recording, numbers: Sequence[int]) -> float | None:
     seen = snapshots(recording, numbers, at)
     if seen is None or seen.X.shape[1] < 3:
         return at
-    k = int(np.argmax(np.nan_to_num(np.nanmedian(np.abs(seen.X), axis=1))))
-    x = seen.X[k]
-    alive = np.abs(x) > 0.5 * np.nanmax(np.abs(x))
+    X = np.nan_to_num(seen.X)
+    x = X[int(np.argmax(np.median(np.abs(X), axis=1)))]
+    alive = np.abs(x) > 0.5 * np.abs(x).max()
     pairs = alive[1:] & alive[:-1] & (np.diff(seen.t) < 1.5 * np.median(np.diff(seen.t)))
     if np.count_nonzero(pairs) < 2:
         return at
