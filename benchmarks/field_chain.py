@@ -205,18 +205,20 @@ def chain() -> list[dict[str, Any]]:
     import tractexp
 
     rows = []
-    for names in (*([name] for name in DIPS), list(DIPS)):
+    for names, model in (*(([name], THIRD) for name in DIPS), (list(DIPS), THIRD), (list(DIPS), FIFTH)):
         for source, ending in (("CSV", ""), ("COMTRADE", "_comtrade")):
             events = [event for name in names for event in tractexp.read(name + ending)]
             # The COMTRADE records are of a load of 10 MVA, per unit of the apparent power before the dip.
             k = np.mean([e.record.base.power for e in events]) / 10.0 if ending else 1.0
             scale = {"X_prime": 1 / k, "M": k, "T_m": k}
-            found = tractexp.identify(events, optimizer="multistart_least_squares", check_intervals=False, seed=0)
+            search = {"optimizer": "multistart_least_squares", "check_intervals": False, "seed": 0}
+            found = tractexp.identify(events, model, **search)
             for stage, told in (("search", found.result.search), ("estimate", vars(found.result))):
                 record = names[0] if len(names) == 1 else "all three"
-                rows.append({"record": record, "from": source, "stage": stage, "trusted": found.trusted})
-                off = {n: float(v * scale.get(n, 1.0) / LOAD.truth()[n] - 1) for n, v in told["parameters"].items()}
-                rows[-1] |= {n: 100 * one for n, one in off.items()}
+                rows.append({"record": record, "model": model, "from": source, "stage": stage})
+                rows[-1]["trusted"] = found.trusted
+                for n, true in LOAD.truth().items():
+                    rows[-1][n] = float(100 * (told["parameters"][n] * scale.get(n, 1.0) / true - 1))
                 rows[-1] |= {key: told[key] for key in ("epsilon_p", "epsilon_q")}
     return rows
 
@@ -255,11 +257,12 @@ def window_table(rows: list[dict[str, Any]]) -> str:
 def chain_table(rows: list[dict[str, Any]]) -> str:
     names = list(LOAD.truth())
     made = [
-        [r["record"], r["from"], r["stage"], *(f"{r[n]:+.1f}" for n in names),
-         *(f"{100 * r[e]:.2f}" for e in ("epsilon_p", "epsilon_q"))]
+        [r["record"], f"`{r['model']}`", r["from"], r["stage"], *(f"{r[n]:+.1f}" for n in names),
+         *(f"{100 * r[e]:.2f}" for e in ("epsilon_p", "epsilon_q")), "yes" if r["trusted"] else "no"]
         for r in rows
     ]  # fmt: skip
-    return _table(["record", "from", "stage", *(f"`{n}`" for n in names), "ε_P [%]", "ε_Q [%]"], made)
+    ends = ["ε_P [%]", "ε_Q [%]", "trusted"]
+    return _table(["record", "model", "from", "stage", *(f"`{n}`" for n in names), *ends], made)
 
 
 PARTS: dict[str, tuple[Callable[[], list[dict[str, Any]]], Callable[[list[dict[str, Any]]], str]]] = {

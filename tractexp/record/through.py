@@ -7,6 +7,7 @@ dip, where it is free to bend, and the current that a model draws at u is averag
 Source: IEC/IEEE 60255-118-1. Departures: the angle of the voltage is taken as steady over a window.
 """
 
+import functools
 from dataclasses import replace
 
 import numpy as np
@@ -30,18 +31,30 @@ def seen(power: np.ndarray, u: np.ndarray, weights: np.ndarray) -> np.ndarray:
 
 
 def sharpened(event: Event, weights: np.ndarray, window: float) -> Event:
-    """The event with the voltage that the load saw, where the record's was averaged with weights over `window` [s]."""
-    from scipy.sparse import diags_array
-    from scipy.sparse.linalg import spsolve
+    """The event with the voltage that the load saw, where the record's was averaged with weights over `window` [s].
+
+    That which bends least, weighted, among those whose average is the recorded one: least squares.
+    """
+    from scipy.linalg import cho_solve_banded
 
     step, U = event.record.step, event.record.U
-    n, wide = len(U), len(U) + len(weights) - 1
-    box = diags_array(list(weights), offsets=list(range(len(weights))), shape=(n, wide))
-    bend = diags_array([1.0, -2.0, 1.0], offsets=[0, 1, 2], shape=(wide - 2, wide))
-    at = np.arange(1, wide - 1) - len(weights) // 2
-    near = (window + EDGE) / step
+    at, near = np.arange(1 - len(weights) // 2, len(U) + len(weights) // 2 - 1), (window + EDGE) / step
     free = (np.abs(at - event.start) < near) | (np.abs(at - event.end) < near)
     error = max(ERROR, event.noise_U)
-    normal = box.T @ box / error**2 + bend.T @ diags_array(np.where(free, BENT, CALM) ** -2.0) @ bend
-    u = spsolve(normal.tocsc(), box.T @ U / error**2)[len(weights) // 2 :][:n]
-    return replace(event, record=replace(event.record, U=u))
+    factor = _factor(weights.tobytes(), len(U), free.tobytes(), error)
+    u = cho_solve_banded((factor, False), np.convolve(U, weights) / error**2)
+    return replace(event, record=replace(event.record, U=u[len(weights) // 2 :][: len(U)]))
+
+
+@functools.lru_cache(maxsize=32)
+def _factor(weights: bytes, n: int, free: bytes, error: float) -> np.ndarray:
+    """The banded Cholesky factor of the normal equations: the same for every voltage of one event."""
+    from scipy.linalg import cholesky_banded
+    from scipy.sparse import diags_array
+
+    w, bends = np.frombuffer(weights), np.where(np.frombuffer(free, bool), BENT, CALM) ** -2.0
+    wide, most = n + len(w) - 1, max(len(w) - 1, 2)
+    box = diags_array(list(w), offsets=list(range(len(w))), shape=(n, wide))
+    bend = diags_array([1.0, -2.0, 1.0], offsets=[0, 1, 2], shape=(wide - 2, wide))
+    normal = box.T @ box / error**2 + bend.T @ diags_array(bends) @ bend
+    return cholesky_banded(np.array([np.pad(normal.diagonal(k), (k, 0)) for k in range(most, -1, -1)]))
