@@ -114,13 +114,15 @@ TRUTHS: dict[str, Load | None] = {
     "a machine with stator resistance": replace(LOAD, machine=replace(MACHINE, Rs=0.02)),
 }
 WAYS = ("nothing", "output", "both")
+THIRD, FIFTH = "third_order_exponential", "fifth_order_stator_flux"
+FITTED = [*((truth, THIRD) for truth in TRUTHS), ("a machine with stator resistance", FIFTH)]  # by what model
 
 
-def base_model() -> Any:
-    """The model that is fitted."""
+def model_of(name: str) -> Any:
+    """A model as it is chosen by name."""
     from tractexp.api.compose import model_of
 
-    return model_of("third_order_exponential")
+    return model_of(name)
 
 
 def waves_of(load: Load | None, dip: Dip) -> Waveforms:
@@ -130,7 +132,7 @@ def waves_of(load: Load | None, dip: Dip) -> Waveforms:
     t = np.arange(round(2.8 * RATE)) / RATE - 0.2
     if load is not None:
         return simulate(load, dip, t)
-    model, U, truth = base_model().model, dip.magnitude(t), LOAD.truth()
+    model, U, truth = model_of(THIRD).model, dip.magnitude(t), LOAD.truth()
     S = LOAD.steady_power(1.0) + complex(LOAD.static.P, LOAD.static.Q)
     drive = Drive.of([Excitation(1 / RATE, U, 0 * U, 0 * U, 1.0, S.real, S.imag)])
     shown = model.simulate(drive, np.array([[truth[name] for name in model.names]]), 2)
@@ -149,19 +151,27 @@ def seen(waves: Waveforms, estimator: str) -> Event:
     return detect(Record("seen", made.t[kept], np.abs(made.V1[kept]), S.real, S.imag, window=window.window(50.0)))
 
 
-def fitted(event: Event, way: str, truth: Mapping[str, float]) -> dict[str, float]:
+def truth_of(load: Load | None) -> dict[str, float]:
+    """What models call a load, on the record's base."""
+    made = load or LOAD
+    return made.truth() | {"R_s": made.machine.Rs / made.rating}
+
+
+def fitted(event: Event, name: str, way: str, truth: Mapping[str, float]) -> dict[str, float]:
     """Misfit [pu] and error of the parameters [%], root mean squares, of a least-squares fit begun at the truth."""
     from scipy.optimize import least_squares
 
     from tractexp.discrepancy.recorder_window import RecorderWindow
     from tractexp.identification.problem import Problem
 
-    known, asked = event.record.window, base_model()
+    asked, known = model_of(name), event.record.window
     model = asked.model
-    if way != "nothing":
-        recorder = RecorderWindow(known.length, known)
-        model = model.behind(recorder)
-        event = recorder.sharpened(event) if way == "both" else event
+    if not (way == "both" and model.motor.within_a_cycle):  # that one does it by itself
+        event = replace(event, record=replace(event.record, window=None))
+        if way != "nothing":
+            recorder = RecorderWindow(known.length, known)
+            model = model.behind(recorder)
+            event = recorder.sharpened(event) if way == "both" else event
     problem = Problem(model, [event], asked.bounds, asked.fixed)
     goal = np.array([truth[name] for name in problem.space.names])
     span = problem.upper - problem.lower
@@ -177,17 +187,16 @@ def fitted(event: Event, way: str, truth: Mapping[str, float]) -> dict[str, floa
 
 
 def windows() -> list[dict[str, Any]]:
-    """Every truth, shape of dip and estimator, with the window taken into account in each way."""
+    """Every truth and model, shape of dip and estimator, with the window taken into account in each way."""
     rows = []
-    for name, load in TRUTHS.items():
-        truth = (load or LOAD).truth()
+    for truth, name in FITTED:
         for shape, dip in SHAPES.items():
-            waves = waves_of(load, dip)
+            waves = waves_of(TRUTHS[truth], dip)
             for estimator in ESTIMATORS:
                 event = seen(waves, estimator)
                 for way in WAYS:
-                    rows.append({"truth": name, "dip": shape, "estimator": estimator, "way": way})
-                    rows[-1] |= fitted(event, way, truth)
+                    rows.append({"truth": truth, "model": name, "dip": shape, "estimator": estimator, "way": way})
+                    rows[-1] |= fitted(event, name, way, truth_of(TRUTHS[truth]))
     return rows
 
 
@@ -196,18 +205,20 @@ def chain() -> list[dict[str, Any]]:
     import tractexp
 
     rows = []
-    for names in (*([name] for name in DIPS), list(DIPS)):
+    for names, model in (*(([name], THIRD) for name in DIPS), (list(DIPS), THIRD), (list(DIPS), FIFTH)):
         for source, ending in (("CSV", ""), ("COMTRADE", "_comtrade")):
             events = [event for name in names for event in tractexp.read(name + ending)]
             # The COMTRADE records are of a load of 10 MVA, per unit of the apparent power before the dip.
             k = np.mean([e.record.base.power for e in events]) / 10.0 if ending else 1.0
             scale = {"X_prime": 1 / k, "M": k, "T_m": k}
-            found = tractexp.identify(events, optimizer="multistart_least_squares", check_intervals=False, seed=0)
+            search = {"optimizer": "multistart_least_squares", "check_intervals": False, "seed": 0}
+            found = tractexp.identify(events, model, **search)
             for stage, told in (("search", found.result.search), ("estimate", vars(found.result))):
                 record = names[0] if len(names) == 1 else "all three"
-                rows.append({"record": record, "from": source, "stage": stage, "trusted": found.trusted})
-                off = {n: float(v * scale.get(n, 1.0) / LOAD.truth()[n] - 1) for n, v in told["parameters"].items()}
-                rows[-1] |= {n: 100 * one for n, one in off.items()}
+                rows.append({"record": record, "model": model, "from": source, "stage": stage})
+                rows[-1]["trusted"] = found.trusted
+                for n, true in LOAD.truth().items():
+                    rows[-1][n] = float(100 * (told["parameters"][n] * scale.get(n, 1.0) / true - 1))
                 rows[-1] |= {key: told[key] for key in ("epsilon_p", "epsilon_q")}
     return rows
 
@@ -233,23 +244,25 @@ def speed_table(rows: list[dict[str, Any]]) -> str:
 
 def window_table(rows: list[dict[str, Any]]) -> str:
     made = []
-    for truth in TRUTHS:
+    for truth, name in FITTED:
         for shape in SHAPES:
             for estimator in ESTIMATORS:
-                of = [r for r in rows if (r["truth"], r["dip"], r["estimator"]) == (truth, shape, estimator)]
+                key = (truth, name, shape, estimator)
+                of = [r for r in rows if (r["truth"], r["model"], r["dip"], r["estimator"]) == key]
                 cells = [f"{1000 * r['misfit']:.2f} / {r['error']:.1f}" for way in WAYS for r in of if r["way"] == way]
-                made.append([truth, shape, f"`{estimator}`", *cells])
-    return _table(["the load is", "dip", "estimator", "nothing", "output averaged", "both"], made)
+                made.append([truth, f"`{name}`", shape, f"`{estimator}`", *cells])
+    return _table(["the load is", "fitted by", "dip", "estimator", "nothing", "output averaged", "both"], made)
 
 
 def chain_table(rows: list[dict[str, Any]]) -> str:
     names = list(LOAD.truth())
     made = [
-        [r["record"], r["from"], r["stage"], *(f"{r[n]:+.1f}" for n in names),
-         *(f"{100 * r[e]:.2f}" for e in ("epsilon_p", "epsilon_q"))]
+        [r["record"], f"`{r['model']}`", r["from"], r["stage"], *(f"{r[n]:+.1f}" for n in names),
+         *(f"{100 * r[e]:.2f}" for e in ("epsilon_p", "epsilon_q")), "yes" if r["trusted"] else "no"]
         for r in rows
     ]  # fmt: skip
-    return _table(["record", "from", "stage", *(f"`{n}`" for n in names), "ε_P [%]", "ε_Q [%]"], made)
+    ends = ["ε_P [%]", "ε_Q [%]", "trusted"]
+    return _table(["record", "model", "from", "stage", *(f"`{n}`" for n in names), *ends], made)
 
 
 PARTS: dict[str, tuple[Callable[[], list[dict[str, Any]]], Callable[[list[dict[str, Any]]], str]]] = {

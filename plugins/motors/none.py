@@ -16,5 +16,7 @@ class NoMotor(Motor):
     Departures: none.
     """
 
+    within_a_cycle = True
+
     def declare(self, eq):
         return None

@@ -1,26 +1,16 @@
-"""The recorder's own window. Phasors of voltage and current are averages over one or more cycles: the load saw a
-voltage with sharper edges than the record shows, and its power was smoothed as the voltage was.
-
-With a box h over the window, U = h * u and I = h * i are recorded, and P + jQ = U conj(I). A load whose current is
-linear in the voltage would not show it; any other does wherever the voltage bends. u is reckoned back from U near
-the edges of the dip, where it is free to bend, and the model's current at u is averaged as the recorder does.
-
-Source: IEC/IEEE 60255-118-1. Departures: the angle of the voltage is taken as steady over a window.
-"""
+"""A recorder's own window as an investigation looks for it; what a window does is told in `tractexp.record.through`."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from tractexp.model.drive import Drive
 from tractexp.model.parts import Measurement
 from tractexp.record import Event, Window
+from tractexp.record.through import mean, seen, sharpened
 
 CYCLES = (1, 2, 3, 4, 5, 6)
-EDGE = 0.05  # s on either side of a window around an edge, in which the voltage may bend
-BENT, CALM = 0.01, 3e-4  # pu: second differences of the voltage there, and elsewhere
-ERROR = 2e-4  # pu: how exactly the averaged voltage must be the recorded one, if its noise allows
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,36 +37,17 @@ class RecorderWindow(Measurement):
         for e in range(drive.events):
             part, weights = drive.part(e), self.weights(drive.event[e, -1])
             u = drive.inputs[0, part]
-            shown[:, :, part] = _mean(power[:, :, part] / u, weights) * _mean(u, weights)
+            shown[:, :, part] = seen(power[:, :, part], u, weights)
         return shown
 
     def sharpened(self, event: Event) -> Event:
         """The event with the voltage that the load saw."""
-        from scipy.sparse import diags_array
-        from scipy.sparse.linalg import spsolve
-
-        samples, U = self.window / event.record.step, event.record.U
-        weights = self.weights(event.record.step)
-        n, wide = len(U), len(U) + len(weights) - 1
-        box = diags_array(list(weights), offsets=list(range(len(weights))), shape=(n, wide))
-        bend = diags_array([1.0, -2.0, 1.0], offsets=[0, 1, 2], shape=(wide - 2, wide))
-        at = np.arange(1, wide - 1) - len(weights) // 2
-        near = samples + EDGE / event.record.step
-        free = (np.abs(at - event.start) < near) | (np.abs(at - event.end) < near)
-        error = max(ERROR, event.noise_U)
-        normal = box.T @ box / error**2 + bend.T @ diags_array(np.where(free, BENT, CALM) ** -2.0) @ bend
-        u = spsolve(normal.tocsc(), box.T @ U / error**2)[len(weights) // 2 :][:n]
-        return replace(event, record=replace(event.record, U=u))
+        return sharpened(event, self.weights(event.record.step), self.window)
 
 
 def averaged(y: np.ndarray, samples: float) -> np.ndarray:
     """Mean of y (..., N) over a window around each sample, y linear between samples and constant beyond its ends."""
-    return _mean(y, _weights(samples))
-
-
-def _mean(y: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    ends = [(0, 0)] * (y.ndim - 1) + [(len(weights) // 2,) * 2]
-    return np.lib.stride_tricks.sliding_window_view(np.pad(y, ends, "edge"), len(weights), axis=-1) @ weights
+    return mean(y, _weights(samples))
 
 
 def _weights(samples: float) -> np.ndarray:

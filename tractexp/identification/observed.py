@@ -101,7 +101,7 @@ class Observed:
         """Power (shapes, 2, N) under the smoothed voltages, each with one of its errors; all in one simulation."""
         problem, count = self.problem, len(shapes)
         events = [s.event if k is None else s.off_by(k) for k in shapes for s in self.smoothed]
-        drive = Drive.of([excitation(event) for event in events])
+        drive = Drive.of([excitation(event, problem.model) for event in events])
         own = np.tile(problem.by_event(values), (count, 1, 1))
         response = problem.model.simulate(drive, own, np.tile(problem.step.substeps, count))
         return np.stack((response.P[0], response.Q[0])).reshape(2, count, -1).swapaxes(0, 1)

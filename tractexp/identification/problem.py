@@ -17,13 +17,22 @@ from tractexp.model.model import CLASSICAL, MOST_SUBSTEPS, Model
 from tractexp.model.parts import Effect
 from tractexp.parameter import Box, Parameter
 from tractexp.record import Event
+from tractexp.record.through import sharpened
 
 PROBES = 64  # candidates across the box on which the Runge-Kutta step is judged
 FINE = 5e-6  # pu, largest error of the automatic step on those candidates; noise of records starts near 1e-4
 
 
-def excitation(event: Event) -> Excitation:
-    """What drives the model through a recorded event. A recorded frequency sets the synchronous speed."""
+def excitation(event: Event, model: Model | None = None) -> Excitation:
+    """What drives the model through a recorded event. A recorded frequency sets the synchronous speed.
+
+    A model that follows what happens within a cycle is driven by the voltage that the load saw, reckoned back through
+    the record's window where that is known, and looked at through it.
+    """
+    window = event.record.window if model is not None and model.motor.within_a_cycle else None
+    weights = None if window is None else window.on(event.record.step)
+    if window is not None:
+        event = sharpened(event, weights, window.length)
     record, nominal = event.record, 2 * np.pi * event.record.base.frequency
     return Excitation(
         step=record.step,
@@ -38,6 +47,7 @@ def excitation(event: Event) -> Excitation:
         omega_n=nominal,
         U2=record.U2,
         U20=float("nan") if record.U2 is None else float(record.U2[event.steady].mean()),
+        window=weights,
     )
 
 
@@ -138,7 +148,7 @@ class Problem:
         self._rest = np.array([self.fixed.get(name, np.nan) for name in model.names])
         self._columns = np.array([self._sources(e) for e in range(len(self.events))])  # (E, d), -1: fixed
         weights = {"weight_P": self.loss.weight_P, "weight_Q": self.loss.weight_Q}
-        self.drive = Drive.of([replace(excitation(e), **weights) for e in self.events])
+        self.drive = Drive.of([replace(excitation(e, model), **weights) for e in self.events])
         self._scale = self.loss.scales(self.events, self.drive)
         self.step = self._step(substeps)
 
@@ -148,6 +158,7 @@ class Problem:
         told = self.model.source, [effect.name for effect in self.model.measurements], known
         made = hashlib.sha256(repr(told).encode())
         arrays = drive.inputs, drive.measured, drive.weights, drive.first, drive.event, drive.before
+        arrays += tuple(window for window in drive.windows if window is not None)
         for array in (*arrays, self.lower, self.upper, self.step.substeps):
             made.update(np.ascontiguousarray(array).tobytes())
         return made.hexdigest()
@@ -157,7 +168,7 @@ class Problem:
         other = copy.copy(self)
         other.events = tuple(events)
         weights = {"weight_P": self.loss.weight_P, "weight_Q": self.loss.weight_Q}
-        other.drive = Drive.of([replace(excitation(e), **weights) for e in other.events])
+        other.drive = Drive.of([replace(excitation(e, self.model), **weights) for e in other.events])
         return other
 
     def _sources(self, event: int) -> list[int]:

@@ -52,7 +52,7 @@ def relative_error(measured: np.ndarray, calculated: np.ndarray) -> float:
 
 def respond(model: Model, values: np.ndarray, event: Event, role: str) -> Fit:
     """Play one event through the model. Raises `UserError` where these parameters have no steady state there."""
-    drive = Drive.of([excitation(event)])
+    drive = Drive.of([excitation(event, model)])
     if refusal := model.refusal(values, drive):
         raise UserError(f"{event.record.name}: {refusal}")
     substeps, _ = model.substeps(drive, values)

@@ -32,6 +32,7 @@ class Excitation:
     U20: float = float("nan")
     weight_P: float = 1.0
     weight_Q: float = 1.0
+    window: np.ndarray | None = None  # (odd,) weights of the recorder's window, through which power is looked at
 
 
 def slopes(y: np.ndarray) -> np.ndarray:
@@ -64,6 +65,7 @@ class Drive:
     first: np.ndarray  # (E + 1,)
     event: np.ndarray  # (E, 5), columns as in EVENT
     before: np.ndarray  # (E, 2): P0, Q0
+    windows: tuple[np.ndarray | None, ...] = ()  # of each event, where any has one
 
     @classmethod
     def of(cls, events: Sequence[Excitation]) -> "Drive":
@@ -92,6 +94,7 @@ class Drive:
             first=np.concatenate([[0], np.cumsum(lengths)]),
             event=np.array([[getattr(e, name) for name in EVENT] for e in events]),
             before=np.array([[e.P0, e.Q0] for e in events]),
+            windows=tuple(e.window for e in events) if any(e.window is not None for e in events) else (),
         )
 
     @property

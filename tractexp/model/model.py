@@ -13,6 +13,7 @@ from tractexp.errors import UserError, check_choice
 from tractexp.model.drive import EVENT, Drive
 from tractexp.model.parts import Effect, Measurement, Motor, Static
 from tractexp.parameter import Parameter
+from tractexp.record.through import seen
 
 TOLERANCE = 1e-7  # pu, largest step-doubling error of P or Q an automatic substep may leave
 MOST_SUBSTEPS = 256
@@ -141,6 +142,10 @@ class Model:
         outputs = np.empty((2, n, drive.samples))
         outputs.fill(np.nan)
         _, miss = self._run(drive, candidates, substeps, outputs)
+        for e, window in enumerate(drive.windows):
+            if window is not None:
+                part = drive.part(e)
+                outputs[:, :, part] = seen(outputs[:, :, part], drive.inputs[0, part], window)
         for effect in self.measurements:
             columns = {p.name: candidates[:, self.names.index(p.name)] for p in effect.parameters}
             outputs = effect.observe(outputs, drive, columns)
@@ -148,7 +153,7 @@ class Model:
 
     def errors(self, drive: Drive, values: np.ndarray, substeps: Sequence[int] | int = 1) -> Errors:
         """Weighted squared errors of every candidate over every event, in one pass and without storing responses."""
-        if self.measurements:
+        if self.measurements or drive.windows:
             return self._errors_of(self.simulate(drive, values, substeps), drive)
         sums, miss = self._run(drive, self._candidates(drive, values), substeps, np.empty((0, 0, 0)))
         return Errors(sums, miss.sum(axis=0))

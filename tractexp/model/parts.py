@@ -43,6 +43,9 @@ class Motor(Part):
     """Base of the motor plugins, chosen by `model/motor=NAME`."""
 
     group: ClassVar[str] = "model/motor"
+    # It follows what happens within a cycle, as stator transients do: its answer is looked at through the window that a
+    # record's phasors were averaged over. Where it does not, the window on voltage and power keeps out what it lacks.
+    within_a_cycle: ClassVar[bool] = False
 
     @abstractmethod
     def declare(self, eq: "Equations", **parameters: Any) -> Any:

@@ -1,0 +1,60 @@
+"""A window on both sides of a load: the voltage it saw reckoned back, and its answer seen as the record shows it.
+
+With a window h, U = h * u and I = h * i are recorded, and P + jQ = U conj(I). A load whose current is linear in the
+voltage would not show it; any other does wherever the voltage bends. u is reckoned back from U near the edges of the
+dip, where it is free to bend, and the current that a model draws at u is averaged as the recorder does.
+
+Source: IEC/IEEE 60255-118-1. Departures: the angle of the voltage is taken as steady over a window.
+"""
+
+import functools
+from dataclasses import replace
+
+import numpy as np
+
+from tractexp.record.event import Event
+
+EDGE = 0.05  # s on either side of a window around an edge, in which the voltage may bend
+BENT, CALM = 0.01, 3e-4  # pu: second differences of the voltage there, and elsewhere
+ERROR = 2e-4  # pu: how exactly the averaged voltage must be the recorded one, if its noise allows
+
+
+def mean(y: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Mean of y (..., N) with weights (odd,) about each sample, y constant beyond its ends."""
+    ends = [(0, 0)] * (y.ndim - 1) + [(len(weights) // 2,) * 2]
+    return np.lib.stride_tricks.sliding_window_view(np.pad(y, ends, "edge"), len(weights), axis=-1) @ weights
+
+
+def seen(power: np.ndarray, u: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """The power (..., N) that a load draws at the voltage u (N,), as phasors of these weights show it."""
+    return mean(power / u, weights) * mean(u, weights)
+
+
+def sharpened(event: Event, weights: np.ndarray, window: float) -> Event:
+    """The event with the voltage that the load saw, where the record's was averaged with weights over `window` [s].
+
+    That which bends least, weighted, among those whose average is the recorded one: least squares.
+    """
+    from scipy.linalg import cho_solve_banded
+
+    step, U = event.record.step, event.record.U
+    at, near = np.arange(1 - len(weights) // 2, len(U) + len(weights) // 2 - 1), (window + EDGE) / step
+    free = (np.abs(at - event.start) < near) | (np.abs(at - event.end) < near)
+    error = max(ERROR, event.noise_U)
+    factor = _factor(weights.tobytes(), len(U), free.tobytes(), error)
+    u = cho_solve_banded((factor, False), np.convolve(U, weights) / error**2)
+    return replace(event, record=replace(event.record, U=u[len(weights) // 2 :][: len(U)]))
+
+
+@functools.lru_cache(maxsize=32)
+def _factor(weights: bytes, n: int, free: bytes, error: float) -> np.ndarray:
+    """The banded Cholesky factor of the normal equations: the same for every voltage of one event."""
+    from scipy.linalg import cholesky_banded
+    from scipy.sparse import diags_array
+
+    w, bends = np.frombuffer(weights), np.where(np.frombuffer(free, bool), BENT, CALM) ** -2.0
+    wide, most = n + len(w) - 1, max(len(w) - 1, 2)
+    box = diags_array(list(w), offsets=list(range(len(w))), shape=(n, wide))
+    bend = diags_array([1.0, -2.0, 1.0], offsets=[0, 1, 2], shape=(wide - 2, wide))
+    normal = box.T @ box / error**2 + bend.T @ diags_array(bends) @ bend
+    return cholesky_banded(np.array([np.pad(normal.diagonal(k), (k, 0)) for k in range(most, -1, -1)]))
