@@ -119,3 +119,27 @@ def test_a_browser_draws_every_kind_and_complains_of_nothing(tmp_path, width):
     widths = [float(w) for w in re.findall(r'class="main-svg"[^>]*?width="([\d.]+)"', dom)]
     assert widths
     assert max(widths) <= width
+
+
+def test_a_sampled_line_keeps_every_sample_and_its_gaps():
+    y = np.sin(np.arange(50_000) / 7)
+    y[[3, 49_999]] = np.nan
+    (trace,) = Chart("t", ["y"]).samples("y", 0.5, 1e-3, y, BLUE).plain()["data"]
+    kept = trace["samples"]
+    held = np.frombuffer(base64.b64decode(kept["bdata"]), "<i2").astype(float)
+    held[held == -32768] = np.nan
+    assert (kept["start"], kept["step"]) == (0.5, 1e-3)
+    np.testing.assert_allclose(kept["offset"] + kept["scale"] * held, y, atol=2e-5)
+    assert "x" not in trace, "the page makes the points that it draws"
+
+
+def test_a_sampled_line_of_one_value_or_none_is_drawn():
+    for y in (np.full(9, 3.0), np.full(9, np.nan)):
+        (trace,) = Chart("t", ["y"]).samples("y", 0.0, 1.0, y, BLUE).plain()["data"]
+        json.dumps(trace, allow_nan=False)
+
+
+def test_a_shade_may_have_a_word_at_its_top():
+    layout = Chart("t", ["a", "b"]).shade(1.0, 2.0, BLUE, text="dip <1>").plain()["layout"]
+    (note,) = layout["annotations"]
+    assert (note["text"], note["x"], note["yref"]) == ("dip &lt;1&gt;", 1.0, "paper")

@@ -318,7 +318,7 @@ def _told(where: str, event: Mapping[str, Any]) -> list[Any]:
     power = [change(event[f"{x}_before"], event[f"{x}_after"]) for x in "PQ"]
     return [
         "" if event["dip"] is None else event["dip"], where, event["kind"], round(event["start"], 4),
-        round(1000 * event["duration"]), f"{event['depth']:.1%}", figure(event["jump"], 2),
+        round(1000 * event["duration"]), f"{event['depth']:.1%}", "" if event["jump"] is None else f"{event['jump']:.1f}",
         "" if event["U2"] is None else f"{event['U2']:.1%}",
         *power, "yes" if event["worth"] else f"no: {event['why']}",
     ]  # fmt: skip
