@@ -10,7 +10,6 @@ from typing import Any
 
 from tractexp.errors import UserError
 
-
 PACKAGE = "pkg://"  # starts the path of a file inside an installed package
 
 

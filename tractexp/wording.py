@@ -52,3 +52,8 @@ def figure(value: float | None, digits: int = 4, unit: str = "") -> str:
 def change(before: float | None, after: float | None) -> str:
     """What a number was and what it became; a question mark where it is not known."""
     return f"{figure(before) or '?'} to {figure(after) or '?'}"
+
+
+def counted(number: int, noun: str) -> str:
+    """1 dip, 2 dips."""
+    return f"{number} {noun}{'s' * (number != 1)}"

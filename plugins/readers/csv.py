@@ -4,16 +4,14 @@ from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from tractexp.errors import UserError, check_range
 from tractexp.plugin import plugin
-from tractexp.record import Base, Events, Reader, Record, detect, find_dips
-from tractexp.record.choice import check_numbers, chosen
-from tractexp.record.event import FEWEST_BEFORE, STEADY
+from tractexp.record import Base, Events, Reader, Record
+from tractexp.record.dips import Dip, check_numbers, chosen, level, numbered
 from tractexp.recording.sidecar import Sidecar, beside
 from tractexp.recording.table import PACKAGE
 from tractexp.recording.tabulated import Powers, Tabular, kind_of, powers
+from tractexp.wording import counted
 
 PRE, POST = 1.0, 10.0  # s kept of a table that holds several dips
 
@@ -49,7 +47,7 @@ class CSV(Tabular, Reader):
 
     @classmethod
     def takes(cls, path: str) -> bool:
-        return kind_of(path) != "waveforms"
+        return kind_of(path) != "waves"
 
     def check(self) -> None:
         if self.path:
@@ -86,38 +84,20 @@ class CSV(Tabular, Reader):
 
     def _numbered(self) -> Events:
         """The dips of one table: the whole of it where there is one."""
-        whole, tried = self._dips()
-        notes = (*whole.notes, f"{len(tried)} dips found") if tried.get(1) is not whole else ()
-        return chosen(self.path, tried, self.train or None, self.validate, notes)
+        whole, dips = self._dips()
+        notes = () if dips and dips[0].made is whole else (*whole.notes, f"{counted(len(dips), 'dip')} found")
+        return chosen(self.path, dips, self.train or None, self.validate, notes)
 
-    def table(self) -> tuple[Record, dict[int, Record | UserError]] | None:
+    def table(self) -> tuple[Record, list[Dip]] | None:
         return self._dips() if self.path else None
 
-    def _dips(self) -> tuple[Record, dict[int, Record | UserError]]:
+    def _dips(self) -> tuple[Record, list[Dip]]:
         whole = self._record(self.path)
-        dips = find_dips(whole.t, whole.U)
+        pre, post = (usual if given is None else given for given, usual in ((self.pre, PRE), (self.post, POST)))
+        dips = numbered([replace(whole, notes=())], self.path, pre, post)
         if len(dips) < 2 and self.pre is None and self.post is None:
-            return whole, {1: whole}
-        firsts, stops = [0, *(end for _, end in dips)], [*(start for start, _ in dips[1:]), whole.samples]
-        return whole, {
-            number: self._cut(whole, number, first, start, stop)
-            for number, (first, (start, _), stop) in enumerate(zip(firsts, dips, stops, strict=False), 1)
-        }
-
-    def _cut(self, whole: Record, number: int, first: int, start: int, stop: int) -> Record | UserError:
-        """The record of one dip, with room from sample `first` to `stop`, or why it cannot be used."""
-        begin = whole.t[start] - (PRE if self.pre is None else self.pre)
-        end = whole.t[start] + (POST if self.post is None else self.post)
-        window = slice(max(first, int(np.searchsorted(whole.t, begin))), min(stop, int(np.searchsorted(whole.t, end))))
-        arrays: Any = {name: values[window] for name, values in whole.channels.items()}
-        arrays["more"] = {name: values[window] for name, values in whole.more.items()}
-        source = f"{self.path} dip {number}"
-        made = replace(whole, name=f"{whole.name}_dip{number}", source=source, notes=(), **arrays)
-        try:
-            detect(made.check())
-        except UserError as error:
-            return error
-        return made
+            return whole, [Dip(1, float(whole.t[0]), float(whole.t[-1]), whole)]
+        return whole, dips
 
     def _record(self, path: str, base: Base | None = None) -> Record:
         """The whole of one table; `base` is that of the first one read, which all share."""
@@ -149,7 +129,12 @@ class CSV(Tabular, Reader):
         power = self.base_power or (told.base and told.base.power) or (same and same.power)
         told_by = []
         if (voltage is None and made.absolute["U"]) or (power is None and made.absolute["P"]):
-            U, S = _steady(record)
+            U, S = level(record)
+            if S < 1e-9:
+                raise UserError(
+                    f"{record.where}: P and Q are zero or missing before the first dip, so they give no base; say it: "
+                    "data.base_power (MVA)"
+                )
             if voltage is None and made.absolute["U"]:
                 voltage = U
                 told_by.append(f"{U:.4g} kV line to line")
@@ -158,18 +143,3 @@ class CSV(Tabular, Reader):
                 told_by.append(f"{S:.4g} MVA")
         note = [f"base: {' and '.join(told_by)}, the steady state before the first dip"] if told_by else []
         return Base(voltage or 1.0, power or 1.0, frequency), note
-
-
-def _steady(record: Record) -> tuple[float, float]:
-    """Voltage and apparent power before the first dip that has a steady state before it."""
-    dips = find_dips(record.t, record.U)
-    stop = next((start for start, _ in dips if start >= FEWEST_BEFORE), record.samples)
-    before = slice(max(0, stop - max(FEWEST_BEFORE, round(STEADY * record.rate))), stop)
-    P, Q = (values[before][np.isfinite(values[before])] for values in (record.P, record.Q))
-    S = float(np.hypot(P.mean(), Q.mean())) if len(P) and len(Q) else 0.0
-    if S < 1e-9:
-        raise UserError(
-            f"{record.where}: P and Q are zero or missing before the first dip, so they give no base; say it: "
-            "data.base_power (MVA)"
-        )
-    return float(record.U[before].mean()), S

@@ -4,12 +4,15 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from tractexp.errors import UserError
 from tractexp.plugin import Plugin, discover
 from tractexp.record import foreign
-from tractexp.record.record import Record
+
+if TYPE_CHECKING:
+    from tractexp.record.dips import Dip
+    from tractexp.record.record import Record
 
 
 @dataclass(frozen=True)
@@ -41,8 +44,8 @@ class Reader(Plugin):
     def read(self) -> Events:
         """Read and check everything; raises `UserError` naming the file, the place and the value."""
 
-    def table(self) -> tuple[Record, dict[int, Record | UserError]] | None:
-        """Of a reader of one table: all of it, and by number the record of each of its dips, or why it is none."""
+    def table(self) -> tuple["Record", Sequence["Dip"]] | None:
+        """Of a reader of one table: all of it, and its dips."""
         return None
 
 

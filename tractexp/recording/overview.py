@@ -10,13 +10,14 @@ import numpy as np
 from tractexp.errors import UserError
 from tractexp.plugin import build
 from tractexp.record import Event, Record, detect, find_dips
+from tractexp.record.dips import Dip
 from tractexp.record.phasor import Phasors
 from tractexp.recording.connection import usual
 from tractexp.recording.feeder import Feeder, propose
 from tractexp.recording.happening import Happening, happenings, happenings_of
 from tractexp.recording.measure import phasors_of, waves_of
 from tractexp.recording.quality import Quality, quality
-from tractexp.recording.reader import Dip, WaveformReader
+from tractexp.recording.reader import WaveformReader
 from tractexp.recording.recording import Recording
 
 APART = 0.06  # s: three cycles, within which what happened and the dip that is fitted begin
@@ -144,52 +145,45 @@ def sight(reader: WaveformReader, recording: Recording, feeder: Feeder) -> Sight
             continue
         phasors.append(measured)
         found += happenings(waves, segment.rate, segment.start, recording.frequency, measured)
-    spans, tried, refused = _dips(reader, feeder, phasors, recording.frequency)
-    seen = _numbered(found, spans, tried, reader.path, refused)
+    dips, refused = [], ""
+    try:
+        dips = reader.dips(feeder, phasors, recording.frequency) if phasors else []
+    except UserError as error:
+        refused = str(error)
+    seen = _numbered(found, dips, reader.path, refused)
     return replace(made, phasors=tuple(phasors), seen=tuple(seen), said=tuple(said))
 
 
-def sight_of(record: Record, tried: Mapping[int, Record | UserError] | None = None) -> Sight:
-    """The load of a record, looked at; `tried` are the records that a reader makes of its dips, by number.
+def sight_of(record: Record, dips: Sequence[Dip] | None = None) -> Sight:
+    """The load of a record, looked at; `dips` are those that a reader makes of it.
 
     Without them the record is what would be fitted, and its dips have no numbers.
     """
-    spans = [
-        (float(record.t[a]), float(record.t[min(b, record.samples - 1)])) for a, b in find_dips(record.t, record.U)
-    ]
-    numbers = tried if tried is not None else {1: record}
     power = record.base.power
     found = [
         replace(what, before=(power * what.before[0], power * what.before[1]),
                 after=(power * what.after[0], power * what.after[1]))
         for what in happenings_of(record)
     ]  # fmt: skip
-    seen = list(_numbered(found, spans, numbers, record.source))
-    if tried is None:
+    seen = list(_numbered(found, _own(record) if dips is None else dips, record.source))
+    if dips is None:
         seen = [replace(each, dip=None) for each in seen]
     return Sight(record.name, tuple(seen), record=record)
 
 
-def _dips(
-    reader: WaveformReader, feeder: Feeder, phasors: Sequence[Phasors], frequency: float
-) -> tuple[list[tuple[float, float]], dict[int, Record | UserError], str]:
-    """Start and end [s] of the dips that the reader numbers, the record of each, and why there is none at all."""
-    try:
-        dips, tried = reader.numbered(feeder, phasors, frequency) if phasors else ([], {})
-    except UserError as error:
-        return [], {}, str(error)
-    return [_span(dip) for dip in dips], tried, ""
+def _own(record: Record) -> list[Dip]:
+    """The dips of a record that is fitted as it is: its first is the one that is meant."""
+    later, t = UserError("another dip of the record comes first, and is the one that is fitted"), record.t
+    return [
+        Dip(number, float(t[a]), float(t[min(b, record.samples - 1)]), record if number == 1 else later)
+        for number, (a, b) in enumerate(find_dips(t, record.U), 1)
+    ]
 
 
-def _numbered(
-    found: Sequence[Happening],
-    spans: Sequence[tuple[float, float]],
-    tried: Mapping[int, Record | UserError],
-    source: str,
-    refused: str = "",
-) -> Iterator[Seen]:
-    """What happened, with the dip that the reader makes of it; `spans` are those of the dips, in order of number."""
-    for what, number in zip(found, _numbers(found, spans), strict=True):
+def _numbered(found: Sequence[Happening], dips: Sequence[Dip], source: str, refused: str = "") -> Iterator[Seen]:
+    """What happened, with the dip that the reader makes of it."""
+    tried = {dip.number: dip.made for dip in dips}
+    for what, number in zip(found, _numbers(found, dips), strict=True):
         event, why = _event(tried.get(number) if number else None, refused)
         if event is not None and abs(event.t_start - what.start) > APART:
             why, event = f"the reader's dip {number} begins at {event.t_start:.3f} s, with something else", None
@@ -206,19 +200,14 @@ def _event(made: Record | UserError | None, refused: str) -> tuple[Event | None,
         return None, str(error)
 
 
-def _numbers(found: Sequence[Happening], spans: Sequence[tuple[float, float]]) -> list[int | None]:
+def _numbers(found: Sequence[Happening], dips: Sequence[Dip]) -> list[int | None]:
     """For each happening the dip, counted from 1, that shares more of its time with it than with any other."""
     numbers: list[int | None] = [None] * len(found)
-    for number, span in enumerate(spans, 1):
-        shared = [_common(what, *span) for what in found]
+    for dip in dips:
+        shared = [_common(what, dip.start, dip.end) for what in found]
         if shared and max(shared) > 0 and numbers[int(np.argmax(shared))] is None:
-            numbers[int(np.argmax(shared))] = number
+            numbers[int(np.argmax(shared))] = dip.number
     return numbers
-
-
-def _span(dip: Dip) -> tuple[float, float]:
-    t = dip.phasors.t
-    return float(t[dip.start]), float(t[min(dip.end, len(t) - 1)])
 
 
 def _common(what: Happening, start: float, end: float) -> float:

@@ -6,33 +6,21 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from tractexp import plugin
 from tractexp.errors import UserError, check_range
-from tractexp.record import Base, Events, Reader, Record, detect, find_dips
-from tractexp.record.choice import check_numbers, chosen
-from tractexp.record.event import FEWEST_BEFORE, STEADY
+from tractexp.record import Base, Events, Reader, Record
+from tractexp.record.dips import Dip, check_numbers, chosen, level, numbered
 from tractexp.record.phasor import Phasors
 from tractexp.recording.arrangement import arranged, tuned
 from tractexp.recording.connection import usual
+from tractexp.recording.estimator import estimator_of
 from tractexp.recording.feeder import Feeder, propose
 from tractexp.recording.label import order
 from tractexp.recording.measure import phasors_of
 from tractexp.recording.recording import Recording
+from tractexp.wording import counted
 
 COUNT = {1: "one", 2: "two", 3: "three"}
-
-
-@dataclass(frozen=True, eq=False)
-class Dip:
-    """One dip of the file: samples start to end of the phasors it was found in, with room from `first` to `stop`."""
-
-    phasors: Phasors
-    first: int  # the end of the dip before, or the segment's first sample
-    start: int
-    end: int
-    stop: int  # the start of the next dip, or the segment's end
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +31,7 @@ class WaveformReader(Reader):
     voltages: list[Any] = field(default_factory=list)  # channels in the order a, b, c: numbers from 0, or names
     currents: list[Any] = field(default_factory=list)  # channels, counted positive into the load
     connection: Any = None  # how the channels are connected, a name or name and settings; null: by how many they are
-    estimator: Any = "one_cycle"  # of the phasors, a name or name and settings
+    estimator: Any = None  # of the phasors, a name or name and settings; null: one cycle
     harmonics: list[int] = field(default_factory=list)  # whose powers P_h, with THD_u and THD_i, the record holds
     train: list[int] | None = None  # dips to fit; null: the first that can be used
     validate: list[int] | None = None  # dips held out; null: every other one that can be used
@@ -73,22 +61,42 @@ class WaveformReader(Reader):
     def read(self) -> Events:
         recording = self.opened()
         feeder = self.feeder(recording)
-        dips, tried = self.numbered(feeder, self._streams(recording, feeder), recording.frequency)
-        return chosen(self.path, tried, self.train, self.validate, self._notes(recording, feeder, dips))
+        dips = self.dips(feeder, self._streams(recording, feeder), recording.frequency)
+        return chosen(self.path, dips, self.train, self.validate, self._notes(recording, feeder, dips))
 
-    def numbered(
-        self, feeder: Feeder, streams: Sequence[Phasors], frequency: float
-    ) -> tuple[list[Dip], dict[int, Record | UserError]]:
-        """The dips of one load and, by number, the record that each makes, or why it cannot be used.
+    def dips(self, feeder: Feeder, streams: Sequence[Phasors], frequency: float) -> list[Dip]:
+        """The dips of one load, on one base: voltage and apparent power before the first that can be used.
 
-        Raises `UserError` where there is none, and where none has a steady state before it.
+        Raises `UserError` where there is none, and where the load carries no power.
         """
-        dips = [dip for phasors in streams for dip in _dips(phasors)]
-        if not dips:
+        made = numbered([self._whole(feeder, p, frequency) for p in streams], self.path, self.pre, self.post)
+        if not made:
             spans = ", ".join(f"{s.t[0]:.3f} to {s.t[-1]:.3f} s" for s in streams)
             raise UserError(f"{self.path}: no dip found in the waveforms ({spans}): the voltage never falls by 3 %")
-        base = self._base(dips, frequency)
-        return dips, {number: self._record(feeder, number, dip, base) for number, dip in enumerate(dips, 1)}
+        first = next((dip.made for dip in made if isinstance(dip.made, Record)), None)
+        if first is None:
+            return made
+        U, S = level(first)
+        if S < 1e-6:
+            raise UserError(f"{self.path}: data.currents carry no power before the first dip ({1e6 * S:.2g} VA)")
+        return [replace(dip, made=_per_unit(dip.made, Base(U, S, frequency))) for dip in made]
+
+    def _whole(self, feeder: Feeder, phasors: Phasors, frequency: float) -> Record:
+        """All of one segment, in kV, MW and Mvar."""
+        return Record(
+            name=Path(self.path).stem,
+            t=phasors.t,
+            U=phasors.U,
+            P=phasors.S.real,
+            Q=phasors.S.imag,
+            f=phasors.f,
+            U2=phasors.U2 if len(phasors.V) == 3 else None,
+            base=Base(frequency=frequency),
+            source=self.path,
+            notes=plugin.chosen("connection", feeder.connection).notes,
+            window=estimator_of(self.estimator).window(frequency),
+            more=phasors.more,
+        )
 
     def feeder(self, recording: Recording) -> Feeder:
         """The channels asked for, or those of the only load that the file shows."""
@@ -143,54 +151,11 @@ class WaveformReader(Reader):
         settings = self.estimator, self.skew, self.harmonics
         return [phasors_of(recording, feeder, segment, *settings) for segment in recording.waveforms()]
 
-    def _base(self, dips: list[Dip], frequency: float) -> Base:
-        """Voltage and apparent power before the first dip that has a steady state before it."""
-        dip = next((d for d in dips if d.start - d.first >= FEWEST_BEFORE), None)
-        if dip is None:
-            raise UserError(
-                f"{self.path}: none of the {len(dips)} dips has {FEWEST_BEFORE} phasors before it, which the steady "
-                "state needs; give a record with a longer pre-fault time"
-            )
-        before = dip.phasors.t[dip.start] - STEADY <= dip.phasors.t
-        before[: dip.first] = before[dip.start :] = False
-        U = float(dip.phasors.U[before].mean())
-        S = float(np.abs(dip.phasors.S[before].mean()))
-        if S < 1e-6:
-            raise UserError(f"{self.path}: data.currents carry no power before the first dip ({1e6 * S:.2g} VA)")
-        return Base(U, S, frequency)
-
-    def _record(self, feeder: Feeder, number: int, dip: Dip, base: Base) -> Record | UserError:
-        """The record of a dip, or why it cannot be used."""
-        t = dip.phasors.t
-        window = slice(
-            max(dip.first, int(np.searchsorted(t, t[dip.start] - self.pre))),
-            min(dip.stop, int(np.searchsorted(t, t[dip.start] + self.post))),
-        )
-        S = dip.phasors.S[window] / base.power
-        record = Record(
-            name=f"{Path(self.path).stem}_dip{number}",
-            t=t[window],
-            U=dip.phasors.U[window] / base.voltage,
-            P=S.real,
-            Q=S.imag,
-            f=dip.phasors.f[window],
-            U2=dip.phasors.U2[window] / base.voltage if len(dip.phasors.V) == 3 else None,
-            base=base,
-            source=f"{self.path} dip {number}",
-            notes=plugin.chosen("connection", feeder.connection).notes,
-            window=plugin.chosen("estimator", self.estimator).window(base.frequency),
-            more=base.per_unit({name: values[window] for name, values in dip.phasors.more.items()}),
-        )
-        try:
-            detect(record.check())
-        except UserError as error:
-            return error
-        return record
-
-    def _notes(self, recording: Recording, feeder: Feeder, dips: list[Dip]) -> tuple[str, ...]:
-        step = dips[0].phasors.t[1] - dips[0].phasors.t[0]
-        kind = plugin.chosen("estimator", self.estimator).name.replace("_", "-")
-        notes = [f"{kind} phasors every {1000 * step:.3g} ms, {len(dips)} dips found", *recording.notes, *feeder.why]
+    def _notes(self, recording: Recording, feeder: Feeder, dips: Sequence[Dip]) -> tuple[str, ...]:
+        kind = estimator_of(self.estimator).name.replace("_", "-")
+        steps = [dip.made.step for dip in dips if isinstance(dip.made, Record)]
+        every = f" every {1000 * steps[0]:.3g} ms" if steps else ""
+        notes = [f"{kind} phasors{every}, {counted(len(dips), 'dip')} found", *recording.notes, *feeder.why]
         fast = recording.waveforms()
         slow = [s for s in recording.segments if s not in fast]
         if slow:
@@ -205,11 +170,14 @@ class WaveformReader(Reader):
         return tuple(notes)
 
 
-def _dips(phasors: Phasors) -> list[Dip]:
-    found = find_dips(phasors.t, np.abs(phasors.V1))
-    firsts = [0, *(end for _, end in found)]
-    stops = [*(start for start, _ in found[1:]), len(phasors.t)]
-    return [Dip(phasors, first, *dip, stop) for first, dip, stop in zip(firsts, found, stops, strict=False)]
+def _per_unit(made: Record | UserError, base: Base) -> Record | UserError:
+    """A record in kV, MW and Mvar on a base and checked, or why it cannot be used."""
+    if isinstance(made, UserError):
+        return made
+    try:
+        return replace(made, base=base, more=base.per_unit(made.more), **base.per_unit(made.channels)).check()
+    except UserError as error:
+        return error
 
 
 def _listed(numbers: Sequence[int]) -> str:
