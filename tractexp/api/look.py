@@ -18,7 +18,7 @@ from tractexp.overrides import typed
 from tractexp.progress import Progress, staged
 from tractexp.record import Event, Record
 from tractexp.recording.overview import Seen, Sight, View, sight_of, view_of
-from tractexp.wording import change, figure
+from tractexp.wording import change, degrees, share
 
 
 class Listed(Tabulated):
@@ -318,8 +318,7 @@ def _told(where: str, event: Mapping[str, Any]) -> list[Any]:
     power = [change(event[f"{x}_before"], event[f"{x}_after"]) for x in "PQ"]
     return [
         "" if event["dip"] is None else event["dip"], where, event["kind"], round(event["start"], 4),
-        round(1000 * event["duration"]), f"{event['depth']:.1%}", "" if event["jump"] is None else f"{event['jump']:.1f}",
-        "" if event["U2"] is None else f"{event['U2']:.1%}",
+        round(1000 * event["duration"]), f"{event['depth']:.1%}", degrees(event["jump"]), share(event["U2"]),
         *power, "yes" if event["worth"] else f"no: {event['why']}",
     ]  # fmt: skip
 

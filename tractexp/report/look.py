@@ -13,7 +13,7 @@ from tractexp.recording.traces import half_cycle_rms, spectrum
 from tractexp.report.chart import Chart
 from tractexp.report.page import Page
 from tractexp.report.style import ACTIVE, PALETTE, REACTIVE, VOLTAGE
-from tractexp.wording import change, figure
+from tractexp.wording import change, degrees, figure, share
 
 MOST = 400_000  # samples of waveforms that a page holds: a megabyte
 MOST_PHASORS = 200_000  # values of phasors that a page holds
@@ -115,7 +115,7 @@ def _load(made: Page, view: View, shown: Sight, known: Mapping[str, Any], folded
     if known["events"]:
         _, P, Q = known["units"]
         made.table(
-            ["dip", "kind", "starts [s]", "lasts [ms]", "depth", "jump", "U2/U1", f"P [{P}]", f"Q [{Q}]", "fit it?"],
+            ["dip", "kind", "starts [s]", "lasts [ms]", "depth", "jump [°]", "U2", f"P [{P}]", f"Q [{Q}]", "fit it?"],
             [_event(e) for e in known["events"]], words=(1, 9),
             caption="Depth, U2 and jump against the voltage before. P and Q before and after. Dips are numbered as"
             " data.train and data.validate take them.",
@@ -163,17 +163,9 @@ def _event(e: Mapping[str, Any]) -> list[str]:
     powers = [change(e[f"{x}_before"], e[f"{x}_after"]) for x in "PQ"]
     return [
         "" if e["dip"] is None else str(e["dip"]), e["kind"], f"{e['start']:.3f}", f"{1000 * e['duration']:.0f}",
-        f"{e['depth']:.1%}", _angle(e["jump"]), _share(e["U2"]), *powers,
+        f"{e['depth']:.1%}", degrees(e["jump"]), share(e["U2"]), *powers,
         f"{'yes' if e['worth'] else 'no'}: {e['why']}",
     ]  # fmt: skip
-
-
-def _angle(degrees: float | None) -> str:
-    return "" if degrees is None else f"{round(degrees, 1) + 0.0:.1f}°"
-
-
-def _share(value: float | None) -> str:
-    return "" if value is None else f"{value:.1%}"
 
 
 def _marked(chart: Chart, shown: Sight) -> Chart:
