@@ -23,7 +23,7 @@ DETAILED = 12  # events that have a chart of their own where the whole is thinne
 AROUND = (0.1, 0.3)  # s before and after an event in such a chart
 LONGEST = 3.0  # s of an event there
 CYCLES = 10  # of a spectrum
-PHASES = {3: ("a", "b", "c"), 1: ("the only phase",)}
+PHASES = {3: ("a", "b", "c"), 1: ("u, i",)}
 LABEL = 0.12  # of the axis of time: room that an event's label takes on a phone
 BOUND = 0.1  # of the nominal frequency: what lies further off is that of a dead line
 SHADES = {"dip": PALETTE[5], "swell": PALETTE[4], "interruption": PALETTE[3]}
@@ -214,7 +214,7 @@ def _of_waves(
     """All panels of a load; so many samples and phasors become one. Within the times `span` [s] none do."""
     assert shown.feeder is not None
     single = len(shown.phasors[0].V) == 1
-    sequences = "U, I [kV, kA]" if single else "U seq. [kV]"
+    sequences = "|U| [kV]" if single else "U seq. [kV]"
     panels = ["u [kV]", "i [kA]", "U RMS [kV]", "I RMS [kA]", sequences, "P, Q [MW]", "f [Hz]"]
     chart = Chart("t [s]", panels, heights=(1.3, 1.3, 1, 1, 1, 1.2, 0.7), pixels=950)
     for segment in recording.waveforms():
@@ -260,7 +260,7 @@ def _phasors(chart: Chart, p: Any, part: slice, nominal: float, every: int) -> N
         lines += [("positive sequence", np.abs(p.V1), VOLTAGE, 4), ("negative sequence", np.abs(p.V2), PALETTE[3], 4),
                   ("zero sequence", zero, PALETTE[4], 4)]  # fmt: skip
     else:
-        lines += [("|U|", np.abs(p.V[0]), VOLTAGE, 4), ("|I|", np.abs(p.I[0]), PALETTE[3], 4)]
+        lines.append(("phasor of U", np.abs(p.V[0]), VOLTAGE, 4))
     alive = np.abs(p.f / nominal - 1) < BOUND
     lines.append(("f", np.where(alive, p.f, np.nan), PALETTE[2], 6))
     for name, values, color, panel in lines:
