@@ -170,7 +170,7 @@ def _event(e: Mapping[str, Any]) -> list[str]:
 
 def _marked(chart: Chart, shown: Sight) -> Chart:
     """Events shaded over all panels, each with its number or kind at the top."""
-    spans = [p.t for p in shown.phasors] or [shown.record.t] * (shown.record is not None)
+    spans = [shown.record.t] if shown.record is not None else [p.t for p in shown.phasors]
     room = LABEL * float(spans[-1][-1] - spans[0][0])
     last = -np.inf
     for seen in shown.seen:
