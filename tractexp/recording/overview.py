@@ -105,7 +105,7 @@ class View:
         for shown in self.sights:
             source = shown.phasors[0] if shown.phasors else shown.record
             if source is not None and source.f is not None:
-                return float(np.median(source.f[source.U >= ALIVE * source.U.max()]))
+                return float(np.median(source.f[ALIVE * source.U.max() <= source.U]))
         return None
 
 
