@@ -70,7 +70,8 @@ def main() -> None:
         tractexp.survey(folder, cores=CORES, keep=keep, progress=False)
         again = time.perf_counter() - started
     found = {
-        "files": count, "cores": CORES, "load_average": round(os.getloadavg()[0], 1), "wall_seconds": round(wall, 2), "cpu_seconds": round(cpu, 2),
+        "files": count, "cores": CORES, "load_average": round(os.getloadavg()[0], 1),
+        "wall_seconds": round(wall, 2), "cpu_seconds": round(cpu, 2),
         "files_per_second": round(count / wall, 1), "files_per_cpu_second": round(count / cpu, 1),
         "again_seconds": round(again, 3), "rows": len(made.rows), "worth": sum(row["worth"] for row in made.rows),
         "unread": len(made.unread),
