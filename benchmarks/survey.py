@@ -2,10 +2,11 @@
 
 The archive is generated: COMTRADE files of 1 s, of 6 to 12 channels at 3.2 to 4 kHz, binary and ASCII, with one dip
 each. Wall seconds are those of the whole call on two processes, their start included; CPU seconds are those of the
-whole tree of processes, so they hold on a shared machine too.
+whole tree of processes, so they hold on a shared machine too; the load average says how shared it was.
 """
 
 import json
+import os
 import resource
 import sys
 import tempfile
@@ -69,7 +70,8 @@ def main() -> None:
         tractexp.survey(folder, cores=CORES, keep=keep, progress=False)
         again = time.perf_counter() - started
     found = {
-        "files": count, "cores": CORES, "wall_seconds": round(wall, 2), "cpu_seconds": round(cpu, 2),
+        "files": count, "cores": CORES, "load_average": round(os.getloadavg()[0], 1),
+        "wall_seconds": round(wall, 2), "cpu_seconds": round(cpu, 2),
         "files_per_second": round(count / wall, 1), "files_per_cpu_second": round(count / cpu, 1),
         "again_seconds": round(again, 3), "rows": len(made.rows), "worth": sum(row["worth"] for row in made.rows),
         "unread": len(made.unread),

@@ -2,6 +2,7 @@
 
 import base64
 import itertools
+import json
 import re
 import shutil
 import subprocess
@@ -119,3 +120,65 @@ def test_a_browser_draws_every_kind_and_complains_of_nothing(tmp_path, width):
     widths = [float(w) for w in re.findall(r'class="main-svg"[^>]*?width="([\d.]+)"', dom)]
     assert widths
     assert max(widths) <= width
+
+
+def test_a_sampled_line_keeps_every_sample_and_its_gaps():
+    y = np.sin(np.arange(50_000) / 7)
+    y[[3, 49_999]] = np.nan
+    (trace,) = Chart("t", ["y"]).samples("y", 0.5, 1e-3, y, BLUE).plain()["data"]
+    kept = trace["samples"]
+    held = np.frombuffer(base64.b64decode(kept["bdata"]), "<i2").astype(float)
+    held[held == -32768] = np.nan
+    assert (kept["start"], kept["step"]) == (0.5, 1e-3)
+    np.testing.assert_allclose(kept["offset"] + kept["scale"] * held, y, atol=2e-5)
+    assert "x" not in trace, "the page makes the points that it draws"
+
+
+def test_a_sampled_line_of_one_value_or_none_is_drawn():
+    for y in (np.full(9, 3.0), np.full(9, np.nan)):
+        (trace,) = Chart("t", ["y"]).samples("y", 0.0, 1.0, y, BLUE).plain()["data"]
+        json.dumps(trace, allow_nan=False)
+
+
+def test_a_shade_may_have_a_word_at_its_top():
+    layout = Chart("t", ["a", "b"]).shade(1.0, 2.0, BLUE, text="dip <1>").plain()["layout"]
+    (note,) = layout["annotations"]
+    assert (note["text"], note["x"], note["yref"]) == ("dip &lt;1&gt;", 1.0, "paper")
+
+
+class Worked:
+    """A page, and what a person does with it: a script that runs once the page is drawn."""
+
+    def __init__(self, page, script):
+        self.page, self.script = page, script
+
+    def write(self, path):
+        text = self.page.write(path).read_text(encoding="utf-8")
+        path.write_text(text.replace("</body>", f"<p id=told></p><script>{self.script}</script></body>"))
+        return path
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no browser")
+def test_zoomed_in_every_sample_is_drawn_and_zoomed_out_no_spike_is_lost(tmp_path):
+    y = np.sin(np.arange(100_000) / 50)
+    y[[77_777, 20_000]] = 9, -9
+    chart = Chart("t", ["y"]).samples("y", 0.0, 1e-3, y, BLUE)
+    script = """
+    const told = [], tell = () => {
+      const {x, y} = charts[0].data[0];
+      told.push([x.length, Math.max(...y), Math.min(...y), x.filter(v => v >= 50 && v <= 50.5).length, x[0], x.at(-1)]);
+    };
+    tell();
+    Plotly.relayout(charts[0], {"xaxis.range": [50, 50.5]}).then(() => { tell();
+      Plotly.relayout(charts[0], {"xaxis.autorange": true}).then(() => { tell();
+        document.getElementById("told").textContent = JSON.stringify(told); }); });
+    """
+    dom, complaints = drawn(Worked(Page("zoom").chart(chart, "one"), script), tmp_path, "--virtual-time-budget=5000")
+    assert complaints == []
+    whole, near, again = json.loads(re.search(r'id="told">(.*?)</p>', dom)[1])
+    assert whole[0] < 2200
+    assert whole[1:3] == pytest.approx([9, -9], abs=1e-3)
+    assert near[3] == 501
+    assert near[0] < 520
+    assert near[4:] == [0, pytest.approx(99.999)]  # both ends keep the axis of the whole
+    assert again == whole

@@ -11,6 +11,7 @@ from made_recordings import BASE, RATE, constant, recording, waves
 from test_cli import tractexp as command_line
 
 import tractexp
+import tractexp.progress
 from tractexp.errors import UserError
 from tractexp.overrides import assigned, override
 from tractexp.recording.comtrade_writer import write
@@ -205,6 +206,17 @@ def test_the_command_line_prints_all_of_it_and_says_where(station, tmp_path):
     assert refused.returncode == 2
     assert "Traceback" not in refused.stderr
     assert "absent.cfg" in refused.stderr
+
+
+def test_stages_are_told_to_who_listens_and_to_a_log_after_two_seconds(station, capsys, monkeypatch):
+    told = []
+    tractexp.look(station, progress=told.append)
+    assert told == [f"reading {station}", "measuring the quality of the channels"]
+    tractexp.look(station)
+    assert capsys.readouterr().out == ""
+    monkeypatch.setattr(tractexp.progress, "FIRST_LINE", 0.0)
+    tractexp.look(station)
+    assert "measuring the quality" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("name", ["a b.csv", "站.csv", "x,y.csv", "it's.csv", "[1].csv", "5", "1e5", "d/e4_60.cfg#1.1"])

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shlex
 import signal
 import subprocess
@@ -12,6 +13,7 @@ import numpy as np
 import pandas
 import pytest
 from made_recordings import constant, motor_dip, recording
+from test_chart import BROWSER, Worked, drawn
 from test_cli import tractexp as command_line
 
 import tractexp
@@ -96,6 +98,31 @@ def test_the_table_is_written_for_people_and_machines(surveyed, tmp_path):
     assert "http" not in text.replace("http://www.w3.org", "")
     again = tractexp.load(surveyed.save(tmp_path / "saved.json"))
     assert again.content == surveyed.content
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no browser")
+def test_the_page_is_sorted_and_filtered_where_it_is_read(surveyed, tmp_path):
+    from tractexp.report import survey
+
+    class Whole:
+        def write(self, path):
+            return survey.page(path, surveyed.content)
+
+    script = """
+    const names = () => [...document.querySelectorAll("#body tr td:first-child")].map(cell => cell.textContent);
+    const told = [names().length];
+    const click = key => document.querySelector(`th[data-key=${key}]`).click();
+    click("depth"); told.push(names()[0]); click("depth"); told.push(names()[0]);
+    const write = (id, value) => { const field = document.getElementById(id); field.value = value;
+      field.dispatchEvent(new Event("input")); };
+    write("text", "day e4"); told.push(names()); write("text", ""); write("depth", "29"); told.push(names().length);
+    write("depth", ""); document.getElementById("worth").click(); told.push(names().length);
+    document.getElementById("told").textContent = JSON.stringify(told);
+    """
+    dom, complaints = drawn(Worked(Whole(), script), tmp_path)
+    assert complaints == []
+    told = json.loads(re.search(r'id="told">(.*?)</p>', dom)[1])
+    assert told == [9, "day 0/e0.cfg#1.1", "day 1/e5.cfg#1.1", ["day 0/e4.cfg#1.1"], 2, 6]
 
 
 def test_only_what_is_new_or_changed_is_looked_at_again(tmp_path, monkeypatch):

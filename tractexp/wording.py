@@ -57,3 +57,13 @@ def change(before: float | None, after: float | None) -> str:
 def counted(number: int, noun: str) -> str:
     """1 dip, 2 dips."""
     return f"{number} {noun}{'s' * (number != 1)}"
+
+
+def share(value: float | None) -> str:
+    """A share in percent; "" where there is none."""
+    return "" if value is None else f"{value:.1%}"
+
+
+def degrees(value: float | None) -> str:
+    """An angle to a tenth of a degree, without a minus before zero; "" where there is none."""
+    return "" if value is None else f"{round(value, 1) + 0.0:.1f}"

@@ -18,7 +18,7 @@ from tractexp.overrides import typed
 from tractexp.progress import Progress, staged
 from tractexp.record import Event, Record
 from tractexp.recording.overview import Seen, Sight, View, sight_of, view_of
-from tractexp.wording import change, figure
+from tractexp.wording import change, degrees, share
 
 
 class Listed(Tabulated):
@@ -183,12 +183,13 @@ def _source(given: Any) -> str | Record:
     """A path, or a record; an event of a file that is there stands for the file."""
     if isinstance(given, str | Path):
         return str(given)
-    record = given.record if isinstance(given, Event) else given
+    record: Any = given.record if isinstance(given, Event) else given
     if isinstance(record, Record):
         path = record.source.rpartition(" dip ")[0]
         return path if path and Path(path).is_file() else record
-    if isinstance(given, Mapping) or hasattr(given, "columns"):
-        return table({str(k): given[k] for k in (given if isinstance(given, Mapping) else given.columns)}, "frame", {})
+    if isinstance(record, Mapping) or hasattr(record, "columns"):
+        names = record if isinstance(record, Mapping) else record.columns
+        return table({str(name): record[name] for name in names}, "frame", {})
     raise UserError(f"a {type(given).__name__} cannot be looked at; give a path, an event, a record or a frame")
 
 
@@ -205,9 +206,12 @@ def series(shown: Sight) -> dict[str, np.ndarray]:
         units = {"U": base.voltage, "U2": base.voltage, "P": base.power, "Q": base.power}
         return {name: values * units.get(name, 1.0) for name, values in made.items()}
     parts = [
-        {"t": p.t, "f": p.f, "U": p.U, "U2": p.U2, "I1": np.abs(p.I1), "I2": np.abs(p.I2), "P": p.S.real, "Q": p.S.imag}
+        {
+            "t": p.t, "f": p.f, "U": p.U, "U2": p.U2, "I1": np.abs(p.I1), "I2": np.abs(p.I2), "P": np.real(p.S),
+            "Q": np.imag(p.S),
+        }
         for p in shown.phasors
-    ]
+    ]  # fmt: skip
     return {name: np.concatenate([part[name] for part in parts]) for name in (parts[0] if parts else ())}
 
 
@@ -318,8 +322,7 @@ def _told(where: str, event: Mapping[str, Any]) -> list[Any]:
     power = [change(event[f"{x}_before"], event[f"{x}_after"]) for x in "PQ"]
     return [
         "" if event["dip"] is None else event["dip"], where, event["kind"], round(event["start"], 4),
-        round(1000 * event["duration"]), f"{event['depth']:.1%}", figure(event["jump"], 2),
-        "" if event["U2"] is None else f"{event['U2']:.1%}",
+        round(1000 * event["duration"]), f"{event['depth']:.1%}", degrees(event["jump"]), share(event["U2"]),
         *power, "yes" if event["worth"] else f"no: {event['why']}",
     ]  # fmt: skip
 

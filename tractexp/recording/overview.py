@@ -20,6 +20,7 @@ from tractexp.recording.quality import Quality, quality
 from tractexp.recording.reader import WaveformReader
 from tractexp.recording.recording import Recording
 
+ALIVE = 0.5  # of the greatest voltage: what is less does not tell the frequency
 APART = 0.06  # s: three cycles, within which what happened and the dip that is fitted begin
 
 
@@ -77,7 +78,7 @@ class Sight:
         p = self.phasors[0]
         before = p.t < (self.seen[0].what.start if self.seen else np.inf)
         first = slice(0, max(1, min(int(np.count_nonzero(before)), len(p.t))))
-        return float(np.median(p.U[first])), float(np.median(p.S[first].real)), float(np.median(p.S[first].imag))
+        return tuple(float(np.median(v[first])) for v in (p.U, np.real(p.S), np.imag(p.S)))  # type: ignore[return-value]
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,11 +101,11 @@ class View:
 
     @property
     def frequency(self) -> float | None:
-        """Measured [Hz], before anything happens to the first load; None where nothing turns."""
+        """Measured [Hz] while the voltage of the first load is alive; None where nothing turns."""
         for shown in self.sights:
-            f = shown.phasors[0].f if shown.phasors else None if shown.record is None else shown.record.f
-            if f is not None:
-                return float(np.median(f[: max(1, len(f) // 4)]))
+            source = shown.phasors[0] if shown.phasors else shown.record
+            if source is not None and source.f is not None:
+                return float(np.median(source.f[ALIVE * source.U.max() <= source.U]))
         return None
 
 

@@ -7,21 +7,24 @@ from typing import Any
 import numpy as np
 
 from tractexp.recording import Recording, Segment
-from tractexp.recording.measure import waves_of
+from tractexp.recording.measure import FeederWaves
 from tractexp.recording.overview import Sight, View
 from tractexp.recording.traces import half_cycle_rms, spectrum
 from tractexp.report.chart import Chart
 from tractexp.report.page import Page
 from tractexp.report.style import ACTIVE, PALETTE, REACTIVE, VOLTAGE
-from tractexp.wording import change, figure
+from tractexp.wording import change, degrees, figure, share
 
 MOST = 400_000  # samples of waveforms that a page holds: a megabyte
+MOST_PHASORS = 200_000  # values of phasors that a page holds
+LINES = 7  # that a load's phasors make
 OPEN = 2  # loads whose charts are drawn at once; those of the others when they are opened
 DETAILED = 12  # events that have a chart of their own where the whole is thinned
 AROUND = (0.1, 0.3)  # s before and after an event in such a chart
 LONGEST = 3.0  # s of an event there
 CYCLES = 10  # of a spectrum
-PHASES = {3: ("a", "b", "c"), 1: ("the only phase",)}
+PHASES = {3: ("a", "b", "c"), 1: ("u, i",)}
+LABEL = 0.12  # of the axis of time: room that an event's label takes on a phone
 BOUND = 0.1  # of the nominal frequency: what lies further off is that of a dead line
 SHADES = {"dip": PALETTE[5], "swell": PALETTE[4], "interruption": PALETTE[3]}
 CAPTION = (
@@ -112,7 +115,7 @@ def _load(made: Page, view: View, shown: Sight, known: Mapping[str, Any], folded
     if known["events"]:
         _, P, Q = known["units"]
         made.table(
-            ["dip", "kind", "starts [s]", "lasts [ms]", "depth", "jump", "U2/U1", f"P [{P}]", f"Q [{Q}]", "fit it?"],
+            ["dip", "kind", "starts [s]", "lasts [ms]", "depth", "jump [°]", "U2", f"P [{P}]", f"Q [{Q}]", "fit it?"],
             [_event(e) for e in known["events"]], words=(1, 9),
             caption="Depth, U2 and jump against the voltage before. P and Q before and after. Dips are numbered as"
             " data.train and data.validate take them.",
@@ -131,11 +134,11 @@ def _charts(made: Page, view: View, shown: Sight) -> None:
     if shown.record is not None:
         made.chart(_of_record(shown), "As recorded. Drag to zoom, double-click for the whole.")
     elif shown.phasors and view.recording is not None:
-        every = _every(view)
-        made.chart(_of_waves(view.recording, shown, every), CAPTION)
+        every, coarse = _every(view)
+        made.chart(_of_waves(view.recording, shown, every, coarse), CAPTION)
         with made.folded("Spectrum before anything happened"):
             made.chart(_spectrum(view.recording, shown), f"{CYCLES} cycles, Hann window, of phase a.")
-        if every > 1:
+        if max(every, coarse) > 1:
             _details(made, view.recording, shown)
 
 
@@ -160,22 +163,21 @@ def _event(e: Mapping[str, Any]) -> list[str]:
     powers = [change(e[f"{x}_before"], e[f"{x}_after"]) for x in "PQ"]
     return [
         "" if e["dip"] is None else str(e["dip"]), e["kind"], f"{e['start']:.3f}", f"{1000 * e['duration']:.0f}",
-        f"{e['depth']:.1%}", figure(e["jump"], 2, "°"), _share(e["U2"]), *powers,
+        f"{e['depth']:.1%}", degrees(e["jump"]), share(e["U2"]), *powers,
         f"{'yes' if e['worth'] else 'no'}: {e['why']}",
     ]  # fmt: skip
 
 
-def _share(value: float | None) -> str:
-    return "" if value is None else f"{value:.1%}"
-
-
 def _marked(chart: Chart, shown: Sight) -> Chart:
     """Events shaded over all panels, each with its number or kind at the top."""
-    for k, seen in enumerate(shown.seen, 1):
+    spans = [shown.record.t] if shown.record is not None else [p.t for p in shown.phasors]
+    room = LABEL * float(spans[-1][-1] - spans[0][0])
+    last = -np.inf
+    for seen in shown.seen:
         what = seen.what
-        text = what.kind if seen.dip is None else f"{what.kind} {seen.dip}"
-        crowded = k > 1 and what.start - shown.seen[k - 2].what.start < 0.05
-        chart.shade(what.start, what.end, SHADES.get(what.kind, "#BBBBBB"), opacity=0.25, text="" if crowded else text)
+        text = "" if what.start < last + room else what.kind if seen.dip is None else f"{what.kind} {seen.dip}"
+        last = what.start if text else last
+        chart.shade(what.start, what.end, SHADES.get(what.kind, "#BBBBBB"), opacity=0.25, text=text)
     return chart
 
 
@@ -197,19 +199,22 @@ def _of_record(shown: Sight) -> Chart:
     return _marked(chart, shown)
 
 
-def _every(view: View) -> int:
-    """How many samples become one on a page, so that all loads of a file have room."""
+def _every(view: View) -> tuple[int, int]:
+    """How many samples and how many phasors become one on a page, so that all loads of a file have room."""
     made = view.recording
     assert made is not None
     lines = sum(len(s.feeder.voltages) + len(s.feeder.currents) for s in view.sights if s.feeder is not None)
-    return max(1, -(-lines * made.samples // MOST))
+    phasors = LINES * sum(len(p.t) for s in view.sights for p in s.phasors)
+    return max(1, -(-lines * made.samples // MOST)), max(1, -(-phasors // MOST_PHASORS))
 
 
-def _of_waves(recording: Recording, shown: Sight, every: int = 1, span: tuple[float, float] | None = None) -> Chart:
-    """All panels of a load; `every` so many samples become one, within the times `span` [s]."""
+def _of_waves(
+    recording: Recording, shown: Sight, every: int = 1, coarse: int = 1, span: tuple[float, float] | None = None
+) -> Chart:
+    """All panels of a load; so many samples and phasors become one. Within the times `span` [s] none do."""
     assert shown.feeder is not None
     single = len(shown.phasors[0].V) == 1
-    sequences = "U, I [kV, kA]" if single else "U seq. [kV]"
+    sequences = "|U| [kV]" if single else "U seq. [kV]"
     panels = ["u [kV]", "i [kA]", "U RMS [kV]", "I RMS [kA]", sequences, "P, Q [MW]", "f [Hz]"]
     chart = Chart("t [s]", panels, heights=(1.3, 1.3, 1, 1, 1, 1.2, 0.7), pixels=950)
     for segment in recording.waveforms():
@@ -217,7 +222,7 @@ def _of_waves(recording: Recording, shown: Sight, every: int = 1, span: tuple[fl
     for p in shown.phasors:
         part = slice(*np.searchsorted(p.t, span)) if span else slice(None)
         if len(p.t[part]) > 1:
-            _phasors(chart, p, part, recording.frequency)
+            _phasors(chart, p, part, recording.frequency, 1 if span else coarse)
     chart.limits(6, (1 - BOUND / 2) * recording.frequency, (1 + BOUND / 2) * recording.frequency)
     if span:
         chart.limits(None, *span)
@@ -229,9 +234,9 @@ def _waves(
 ) -> None:
     """The waveforms of a segment and their RMS."""
     assert shown.feeder is not None
-    waves = waves_of(recording, shown.feeder, segment)
-    first, stop = (0, waves.shape[1]) if span is None else np.searchsorted(segment.t, span)
-    waves, start = waves[:, first:stop], segment.start + first / segment.rate
+    whole = FeederWaves.of(recording, shown.feeder, segment)
+    first, stop = (0, whole.shape[1]) if span is None else map(int, np.searchsorted(segment.t, span))
+    waves, start = whole[:, first:stop], segment.start + first / segment.rate
     if waves.shape[1] < 2:
         return
     K, step = len(waves) // 2, 1 / segment.rate
@@ -245,7 +250,7 @@ def _waves(
             chart.samples(name, start + t[0], t[1] - t[0], values, color, panel=2 + k // K)
 
 
-def _phasors(chart: Chart, p: Any, part: slice, nominal: float) -> None:
+def _phasors(chart: Chart, p: Any, part: slice, nominal: float, every: int) -> None:
     """Symmetrical components, powers and frequency of one segment."""
     t = p.t[part]
     step = float(t[-1] - t[0]) / (len(t) - 1)
@@ -255,11 +260,12 @@ def _phasors(chart: Chart, p: Any, part: slice, nominal: float) -> None:
         lines += [("positive sequence", np.abs(p.V1), VOLTAGE, 4), ("negative sequence", np.abs(p.V2), PALETTE[3], 4),
                   ("zero sequence", zero, PALETTE[4], 4)]  # fmt: skip
     else:
-        lines += [("|U|", np.abs(p.V[0]), VOLTAGE, 4), ("|I|", np.abs(p.I[0]), PALETTE[3], 4)]
+        lines.append(("phasor of U", np.abs(p.V[0]), VOLTAGE, 4))
     alive = np.abs(p.f / nominal - 1) < BOUND
     lines.append(("f", np.where(alive, p.f, np.nan), PALETTE[2], 6))
     for name, values, color, panel in lines:
-        chart.samples(name, float(t[0]), step, values[part], color, panel)
+        made = values[part] if every == 1 else envelope(values[part], every)
+        chart.samples(name, float(t[0]), step * every, made, color, panel)
 
 
 def envelope(wave: np.ndarray, every: int) -> np.ndarray:
@@ -276,14 +282,15 @@ def _spectrum(recording: Recording, shown: Sight) -> Chart:
     """Of the first voltage and the first current, before the first event."""
     assert shown.feeder is not None
     segment = recording.waveforms()[0]
-    waves = waves_of(recording, shown.feeder, segment)
-    length = min(round(CYCLES * segment.rate / recording.frequency), waves.shape[1])
+    whole = FeederWaves.of(recording, shown.feeder, segment)
+    length = min(round(CYCLES * segment.rate / recording.frequency), whole.shape[1])
     first = shown.seen[0].what.start - segment.start if shown.seen else np.inf
-    quiet = int(np.clip(first * segment.rate, length, waves.shape[1]))
+    quiet = int(np.clip(first * segment.rate, length, whole.shape[1]))
+    waves = whole[:, quiet - length : quiet]
     K = len(waves) // 2
     chart = Chart("frequency [Hz]", ["of the fundamental [%]"], log_y=True, pixels=320)
     for name, wave, color in (("voltage", waves[0], REACTIVE), ("current", waves[K], ACTIVE)):
-        f, rms = spectrum(wave[quiet - length : quiet], segment.rate)
+        f, rms = spectrum(wave, segment.rate)
         if rms.max() > 0:
             chart.line(name, f, np.maximum(100 * rms / rms.max(), 1e-3), color)
     return chart

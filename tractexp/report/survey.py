@@ -36,7 +36,7 @@ COLUMNS = (  # key, heading, kind of cell, digits
     ("kind", "kind", "words", 0), ("depth", "depth [%]", "share", 1), ("duration", "lasts [ms]", "milli", 0),
     ("worth", "fit", "yes", 0), ("P", "P [MW]", "pair", 4), ("Q", "Q [Mvar]", "pair", 4),
     ("U2", "U2 [%]", "share", 1), ("jump", "jump [deg]", "number", 1), ("noise", "noise [% of P]", "share", 2),
-    ("load", "load", "words", 0), ("start", "starts [s]", "number", 3), ("when", "when", "words", 0),
+    ("load", "load", "words", 0), ("start", "starts [s]", "number", 3), ("when", "when", "time", 0),
     ("rate", "rate [Hz]", "figure", 5), ("why", "why", "why", 0),
 )  # fmt: skip
 KEPT = (
@@ -87,8 +87,10 @@ const cell = (row, [name, , kind, digits]) => {
   }
   if (kind === "words") return `<td class="words">${safe(value ?? "")}</td>`;
   if (value === null || value === undefined) return "<td></td>";
+  if (kind === "time") return `<td>${safe(value.replace("T", " ").slice(0, 19))}</td>`;
   if (kind === "figure") return `<td>${Number(value.toPrecision(digits))}</td>`;
-  return `<td>${(value * (kind === "share" ? 100 : kind === "milli" ? 1000 : 1)).toFixed(digits)}</td>`;
+  const text = (value * (kind === "share" ? 100 : kind === "milli" ? 1000 : 1)).toFixed(digits);
+  return `<td>${Number(text) === 0 ? text.replace("-", "") : text}</td>`;
 };
 const draw = () => {
   $("body").innerHTML = shown.slice(0, most)

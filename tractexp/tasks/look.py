@@ -8,7 +8,7 @@ from typing import Any
 
 from tractexp.errors import UserError
 from tractexp.tasks.console import listed, say, table
-from tractexp.wording import change, figure
+from tractexp.wording import change, degrees, figure, share
 
 FOLDER = Path("outputs", "looks")
 DOES = "Look at files without saying which channels they have: loads, events, what is worth fitting, and the command."
@@ -79,7 +79,7 @@ def _tell_load(feeder: Any) -> None:
     if feeder["events"]:
         rows = [
             ["" if e["dip"] is None else str(e["dip"]), e["kind"], f"{e['start']:.3f}", f"{1000 * e['duration']:.0f}",
-             f"{e['depth']:.1%}", figure(e["jump"], 2), "" if e["U2"] is None else f"{e['U2']:.1%}",
+             f"{e['depth']:.1%}", degrees(e["jump"]), share(e["U2"]),
              *(change(e[f"{x}_before"], e[f"{x}_after"]) for x in "PQ"),
              "yes" if e["worth"] else "no"]
             for e in feeder["events"]
