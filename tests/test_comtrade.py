@@ -9,7 +9,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tractexp.errors import UserError
-from tractexp.recording import Channel, Recording, Segment, Status, comtrade, foreign
+from tractexp.record import foreign
+from tractexp.recording import Channel, Recording, Segment, Status, comtrade
 
 CFG = """Substation,device,1999
 8,6A,2D
@@ -194,6 +195,7 @@ MENDED = {
     "Ctrl-Z": ([("ASCII\n1\n", "ASCII\n1\n\x1a\x1a")], None),
     "kind in lower case": ([("ASCII", " ascii ")], None),
     "no side": ([(",600,5,P\n5,", ",600,5,\n5,")], "line 6: neither P nor S given, primary values taken"),
+    "no side, no comma": ([(",600,5,P\n5,", ",600,5\n5,")], "line 6: neither P nor S given, primary values taken"),
     "no skew, no limits": ([("0.5,12.5,-32767,32767", "0.5,,,")], None),
     "Fortran's exponent": ([("kV,0.01,", "kV,1.0D-02,")], None),
     "announced binary": ([("ASCII", "BINARY")], "BINARY announced, but a.dat is text and read as ASCII"),
@@ -216,6 +218,11 @@ def test_harmless_departures_are_mended_and_noted(pair, case):
 
 
 REFUSED = {
+    "a field lost": ([("1,Ua,A,Bus", "1,Ua,Bus")], "line 3: analog channel 1 of 6 'Ua' has 12 fields, but an analog"),
+    "a channel twice": (
+        [("2,close", "2,close,A,Feeder,1\n2,close")],
+        "line 11: '2,close,A,Feeder,1' where the nominal",
+    ),
     "frequency": (
         [("\n50\n", "\n-1\n")],
         "line 11: nominal frequency '-1' is not a number between 10 and 100 Hz; write",

@@ -50,10 +50,10 @@ def direction(U: np.ndarray, P: np.ndarray, Q: np.ndarray, polarity: int = 0) ->
         )
         return f"{shown}: its current is counted out of it, or this feeder supplies such loads ({REMEDY})"
     if polarity > 0:
-        return "the negative-sequence current is that of a load: the current is counted rightly, so power is fed back"
+        return "the negative-sequence current is that of a load, so its direction is right and this is regeneration"
     if fell and a < FALLS:
-        return f"{answer}, as a converter's or a generator's: power is fed back (a braking train), no reversed current"
-    return f"{answer}, which tells no reversed current ({REMEDY}) from power that is fed back"
+        return f"{answer}, as a converter's or a generator's: regeneration (a braking train), no reversed current"
+    return f"{answer}, which tells no reversed current ({REMEDY}) from regeneration"
 
 
 def _load_like(a: float, P0: float, Q0: float) -> bool:

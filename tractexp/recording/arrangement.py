@@ -18,7 +18,7 @@ from tractexp.record.direction import at_level, direction
 from tractexp.record.phasor import sequences
 from tractexp.recording.connection import usual
 from tractexp.recording.feeder import Feeder
-from tractexp.recording.label import groups, kind, order
+from tractexp.recording.label import backward, groups, kind, order
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import frequency, nearest_nominal, snapshots
 
@@ -93,6 +93,8 @@ def _lines_by_label(recording: Recording, feeder: Feeder) -> Feeder:
     voltages = tuple(feeder.voltages[told[0].index(k)] for k in range(3))
     names = ", ".join(f"'{recording.channels[i].name}'" for i in voltages)
     why = f"the voltages {names} are line to line, as their labels say: data.connection={_between(feeder)} is used"
+    if backward([recording.channels[i] for i in voltages]):
+        why += ", U21 as V1 - V2 (where it is V2 - V1, the power is the opposite)"
     return replace(feeder, voltages=voltages, connection=_between(feeder), why=(*feeder.why, why))
 
 

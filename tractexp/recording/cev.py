@@ -16,6 +16,7 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.recording.comtrade_header import number, quoted
+from tractexp.recording.comtrade_samples import HUGE
 from tractexp.recording.recording import UNITS, Channel, Recording, Segment, Status
 from tractexp.recording.remarks import Remarks
 from tractexp.recording.text import decode
@@ -87,7 +88,7 @@ def _report(path: Path, text: str, remarks: Remarks) -> Report:
     names: list[str] | None = None
     for line, row in _joined(body):
         cells = _cells(row)
-        if cells and re.fullmatch(r"[0-9A-Fa-f]{4}", cells[-1].strip()):
+        if len(cells) > 1 and re.fullmatch(r"[0-9A-Fa-f]{4}", cells[-1].strip()):
             if checksum(row[: row.rindex(",") + 1]) != cells[-1].strip().upper():
                 remarks.add("the checksum does not fit: the line was altered, or damaged on its way", line)
             cells = cells[:-1]
@@ -155,8 +156,10 @@ def _value(path: Path, line: int, name: str, cell: str) -> float:
     found = number(cell) if cell.strip() else float("nan")
     if found is None and (name == "*" or not set(cell.strip()) - {"$", "*", "-"}):
         return float("nan")  # so the relay writes what it does not know
-    if found is None:
-        raise UserError(f"{path}: line {line}: {name or 'column'} {quoted(cell)} is not a number; correct it")
+    if found is None or abs(found) > HUGE:
+        raise UserError(
+            f"{path}: line {line}: {name or 'column'} {quoted(cell)} is not a number, up to 1e38; correct it"
+        )
     return found
 
 

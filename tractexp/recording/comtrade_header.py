@@ -180,9 +180,10 @@ def _analog(left: _Lines, k: int, count: int) -> Analog:
         fields = fields[:13]
     name = fields[1] if len(fields) > 1 else ""
     channel = f"analog channel {k + 1} of {count} {quoted(name)}"
-    if not 10 <= len(fields) <= 13:
+    short = len(fields) == 12 and number(fields[4]) is None and number(fields[11]) is not None  # without P or S
+    if len(fields) not in (10, 13) and not short:
         raise left.refuse(
-            line, f"{channel} has {len(fields)} fields, but an analog channel has 13, or 10 by the standard of 1991; "
+            line, f"{channel} has {_fields(fields)}, but an analog channel has 13, or 10 by the standard of 1991; "
             "correct the line, or the numbers of channels in line 2",
         )  # fmt: skip
 
@@ -215,6 +216,10 @@ def _analog(left: _Lines, k: int, count: int) -> Analog:
     return _checked_ratio(left, line, channel, made)
 
 
+def _fields(fields: list[str]) -> str:
+    return f"{len(fields)} field{'s' * (len(fields) != 1)}"
+
+
 def _checked_ratio(left: _Lines, line: int, channel: str, made: Analog) -> Analog:
     """Secondary values need a ratio; a channel that is neither voltage nor current may lack it."""
     if made.side != "S" or (made.primary > 0 and made.secondary > 0):
@@ -242,7 +247,7 @@ def _digital(left: _Lines, k: int, count: int) -> Digital:
     if not 2 <= len(fields) <= 5 or "/" in fields[0]:
         name = quoted(fields[1]) if len(fields) > 1 else quoted(fields[0])
         raise left.refuse(
-            line, f"status channel {k + 1} of {count} {name} has {len(fields)} fields, but a status channel has 5, or "
+            line, f"status channel {k + 1} of {count} {name} has {_fields(fields)}, but a status channel has 5, or "
             "3 by the standard of 1991; correct the line, or the numbers of channels in line 2",
         )  # fmt: skip
     if len(fields) == 5:
@@ -255,6 +260,12 @@ def _frequency(left: _Lines, header: Header) -> int | None:
     line, text = left.take("the nominal frequency")
     header.lines["frequency"] = line
     found = number(text.strip(", "))
+    if "," in text.strip(", "):
+        raise left.refuse(
+            line,
+            f"{quoted(text)} where the nominal frequency should be; more lines of channels may be there than line 2 "
+            "announces, or the frequency is missing",
+        )
     if found is None or not FREQUENCY[0] <= found <= FREQUENCY[1]:
         low, high = FREQUENCY
         raise left.refuse(

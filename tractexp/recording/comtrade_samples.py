@@ -18,6 +18,7 @@ from tractexp.recording.remarks import Remarks
 LACKING = 0.01  # of the announced samples: so many may be missing at the end, with a note
 LARGE = 256 * 2**20  # bytes: a larger binary file stays on the disk and is mapped
 BLOCK = 8 * 2**20  # bytes of text parsed at once
+HUGE = 1e38  # of a value: FLOAT32 holds no greater
 NONE = 0xFFFFFFFF  # a time stamp that is not given
 
 
@@ -114,8 +115,8 @@ def _counted(place: Place, header: Header, numbers: np.ndarray) -> None:
     if not len(steps):
         return
     usual = int(np.median(steps))
-    odd = steps != usual
-    wild = np.flatnonzero(odd[:-2] & odd[1:-1] & odd[2:]) if len(odd) > 2 else np.array([], int)
+    odd = np.append(steps != usual, [True, True])  # what ends the file may be short
+    wild = np.flatnonzero(odd[:-2] & odd[1:-1] & odd[2:])
     if len(wild) or abs(usual) > 10_000:
         i = int(wild[0]) if len(wild) else 0
         raise UserError(
@@ -200,17 +201,17 @@ def _numbers(text: bytes, count: int) -> np.ndarray | None:
             made = np.fromstring(text, sep=",")
         except (DeprecationWarning, ValueError):
             return None
-    return made if len(made) == count and np.isfinite(made).all() else None
+    return made if len(made) == count and (np.abs(made) <= HUGE).all() else None
 
 
 def _cell(place: Place, line: int, k: int, cell: bytes) -> float:
     text = cell.decode("latin-1").strip()
     made = np.nan if not text or text.lower() == "nan" else number(text)
-    if made is None:
+    if made is None or abs(made) > HUGE:
         what = ("sample number", "time stamp")[k] if k < 2 else f"channel {k - 1}"
         raise UserError(
-            f"{place.path}: line {line}: {what} {quoted(text)} is not a number; correct it, or leave the cell empty "
-            "for a missing value"
+            f"{place.path}: line {line}: {what} {quoted(text)} is not a number, up to 1e38; correct it, or leave "
+            "the cell empty for a missing value"
         )
     return made
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.record.phasor import TURN
+from tractexp.recording.connection import usual
 from tractexp.recording.label import Group, groups, kind, residual, words
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import Snapshots, frequency, nearest_nominal, snapshots
@@ -116,17 +117,17 @@ def _feeder(recording: Recording, seen: Snapshots, load: Group, buses: Sequence[
 
 def _connection(load: Group, bus: Group) -> tuple[tuple[int, ...], Any]:
     """(the voltages used, the connection that makes phase quantities of them)."""
-    pairs = [pair for k, pair in enumerate(("ab", "bc", "ca")) if k != bus.missing]
-    phases = "".join(p for k, p in enumerate("abc") if k != load.missing)
-    settings: dict[str, Any] = {"phases": phases} if len(phases) == 2 and phases != "ac" else {}
-    if not bus.pairs:
-        name = "aron" if len(phases) == 2 else "three_phase"
-        return bus.numbers, {"name": name, **settings} if settings else name
-    if len(phases) == 3 and len(pairs) == 3:
-        return bus.numbers, "line_voltages"
-    settings = {"phases": phases} if len(phases) == 2 else {}
-    settings |= {"pairs": pairs} if pairs[:2] != ["ab", "bc"] else {}
-    return bus.numbers[:2], {"name": "two_line_voltages", **settings} if settings else "two_line_voltages"
+    voltages = bus.numbers
+    made = usual(len(voltages), len(load.numbers), bus.pairs)
+    if made is None:  # three line-to-line voltages and two currents: two of them say the same
+        voltages = voltages[:2]
+        made = usual(2, len(load.numbers), bus.pairs)
+    settings: dict[str, Any] = {} if isinstance(made, str) else {**made}
+    if load.missing not in (None, 1):
+        settings["phases"] = "".join(p for k, p in enumerate("abc") if k != load.missing)
+    if bus.missing not in (None, 2):
+        settings["pairs"] = [pair for k, pair in enumerate(("ab", "bc", "ca")) if k != bus.missing]
+    return voltages, {"name": made, **settings} if isinstance(made, str) and settings else settings or made
 
 
 def _by(group: Group) -> str:

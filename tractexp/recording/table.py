@@ -167,7 +167,7 @@ def located(path: str) -> tuple[Any, str]:
     package, _, name = path.removeprefix(PACKAGE).partition("/")
     try:
         return importlib.resources.files(package), name
-    except (ImportError, ValueError) as error:
+    except (ImportError, ValueError, TypeError) as error:
         raise UserError(f"{path}: there is no installed package '{package}'") from error
 
 

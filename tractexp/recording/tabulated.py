@@ -23,6 +23,7 @@ VOLTS = 1000.0  # a voltage without a unit that is above it is in V
 NEAR_ONE = (0.3, 3.0)  # and within these it is per unit
 GAP = 1.5  # usual steps: a longer one parts two segments
 EPOCH = 1e6  # s: times beyond it are counted from the first
+HUGE = 1e38  # of a value: no unit makes sense of a greater one
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -235,10 +236,14 @@ def recording(table: Table, found: Mapped, nominal: float) -> Recording:
     named = [k for k, name in enumerate(table.heading.names) if name and k != t.number]
     numbers = {k: "number" for k in named if _numeric(table, k)}
     cells = table.read({t.number: "time", **numbers})
-    time, note = _counted(cells[t.number].values * (1.0 if cells[t.number].clock else factor(t.role.unit)), None)
     for k in numbers:
-        if not (finite := np.isfinite(cells[k].values)).all():
-            raise table.refuse(int(np.argmin(finite)), k, "not a finite number")
+        wild = ~(np.abs(cells[k].values) <= HUGE)
+        if wild.any():
+            i = int(np.argmax(wild))
+            raise table.refuse(
+                i, k, f"{cells[k].values[i]:g} is not a value up to {HUGE:g}; leave the row out, or correct it"
+            )
+    time, note = _counted(cells[t.number].values * (1.0 if cells[t.number].clock else factor(t.role.unit)), None)
     segments, odd = _segments(table, time)
     named = {one.number: key for key, one in found.columns.items()}
     channels = [_channel(table, found, k, cells[k].values, named.get(k, "")) for k in numbers]
