@@ -278,7 +278,7 @@ class TestRefused:
     def test_a_dip_right_at_the_start(self, tmp_path):
         t = np.arange(3200) / 3200
         path = write(tmp_path, waveforms(t, 50.0, [(0.021, 0.3, 0.4)]), [(3200, 3200)])
-        with pytest.raises(UserError, match="the dip starts at sample .* needs at least 10 samples"):
+        with pytest.raises(UserError, match=r"the dip starts at sample .* needs at least 10 samples"):
             read(path)
 
 

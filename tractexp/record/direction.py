@@ -43,7 +43,7 @@ def direction(U: np.ndarray, P: np.ndarray, Q: np.ndarray, polarity: int = 0) ->
     if np.count_nonzero(P[calm] > -TURNS * P0) > max(FEWEST, 0.02 * len(P)):
         return "P changes its sign at normal voltage, as of a train that brakes and motors: power flows both ways"
     a, fell = _exponent(U / level, P / P0)
-    answer = f"|P| goes as U^{a:.2g} when the voltage falls" if fell else "the voltage is never disturbed"
+    answer = f"|P| goes as U^{round(a, 2) + 0.0:g} when the voltage falls" if fell else "the voltage is never disturbed"
     if polarity < 0 or (polarity == 0 and fell and _load_like(a, P0, Q0)):
         shown = (
             "the negative-sequence current is that of a load turned round" if polarity < 0 else f"{answer}, as a load's"

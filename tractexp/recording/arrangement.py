@@ -258,7 +258,8 @@ def _sensible(S: complex) -> bool:
 
 
 def _mw(S: complex) -> str:
-    return f"P = {S.real:.3g} MW, Q = {S.imag:.3g} Mvar"
+    P, Q = (0.0 if abs(x) < 1e-6 * abs(S) else x for x in (S.real, S.imag))
+    return f"P = {P:.3g} MW, Q = {Q:.3g} Mvar"
 
 
 def _currents(recording: Recording, feeder: Feeder, seen: _Seen) -> None:

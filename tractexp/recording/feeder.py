@@ -27,7 +27,7 @@ class Feeder:
 
     voltages: tuple[int, ...]
     currents: tuple[int, ...]
-    connection: Any = "three_phase"  # the plugin that makes phase quantities of them: a name, or name and settings
+    connection: Any  # the plugin that makes phase quantities of them: a name, or name and settings
     reverse_current: bool = False  # the recorder counts current out of the load as positive
     name: str = ""
     why: tuple[str, ...] = ()  # what it was recognised by, and what was changed in the order given, one sentence each
@@ -209,7 +209,7 @@ def _single(
         group = Group((i,), False, recording.channels[i].name.strip(), False)
         bus, why = _bus(recording, seen, group, [Group((v,), False, "", False) for v in free])
         said = (f"one current {_names(recording, [i])}", f"one voltage {_names(recording, bus.numbers)}: {why}")
-        made.append(Feeder(bus.numbers, (i,), "single_phase", name=group.name, why=said))
+        made.append(Feeder(bus.numbers, (i,), usual(1, 1), name=group.name, why=said))
     return made
 
 

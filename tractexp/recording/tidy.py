@@ -104,7 +104,7 @@ def _check_segments(path: str, segments: Sequence[Segment], rows: int) -> None:
     for one in segments:
         if not (edges[-1] <= one.first < one.stop <= rows and 0 < one.rate < np.inf and np.isfinite(one.start)):
             raise UserError(
-                f"{path}: has {rows} rows, its sidecar tells of samples {one.first} to {one.stop} at {one.rate} Hz; "
+                f"{path}: has {rows} rows, and its sidecar of samples {one.first} to {one.stop} at {one.rate} Hz; "
                 "convert the recording again, or remove the sidecar"
             )
         edges.append(one.stop)
