@@ -47,7 +47,7 @@ def test_numbers_of_channels_stay_numbers_beside_names():
 @pytest.mark.parametrize(
     "argument",
     ["seed=3", "data=csv", "data.path='a b.cfg'", "data.train=[a.csv,'b c.csv']", "data.pre=0.5", "-m", "~data.pre",
-     "data.columns={U: 'Voltage (kV)', t: time}", "optimizer=issa,pso", "data.train=[[1],[2]]", "data.path="],
+     "data.estimator={name: p_class}", "optimizer=issa,pso", "data.train=[[1],[2]]", "data.path="],
 )  # fmt: skip
 def test_what_hydra_reads_is_left_alone(argument):
     assert override(argument) == argument
@@ -55,3 +55,7 @@ def test_what_hydra_reads_is_left_alone(argument):
 
 def test_a_setting_that_takes_names_of_its_own_is_added():
     assert override("model.bounds.C=[0.5,0.9]") == "++model.bounds.C=[0.5,0.9]"
+    columns = "data.columns={U: 'Voltage (kV)', t: time}"
+    assert override(columns) == f"++{columns}"
+    assert override("data.columns.U=Voltage (kV)") == "++data.columns.U='Voltage (kV)'"
+    assert override("data.units.t=ms") == "++data.units.t=ms"

@@ -3,6 +3,7 @@
 import datetime as dt
 import io
 import json
+import random
 import time
 import tracemalloc
 
@@ -85,6 +86,7 @@ class TestNamesAndUnits:
             "Time(s),VOLT 101 [BUS1 132.00],PLOD 101,QLOD 101",
             "t [s],U [pu],P [p.u.],Q (pu)",
             "# t,U,P,Q",
+            "All calculations,Bus 1,Load 1,Load 1\nb:tnow in s,m:u1 in p.u.,m:Psum:bus1 in p.u.,m:Qsum:bus1 in p.u.",
         ],
     )
     def test_columns_are_known_by_many_names(self, header):
@@ -123,6 +125,13 @@ class TestNamesAndUnits:
         record = read(text(in_units()), units={"U": "kV", "P": "MW", "Q": "Mvar"}, base_voltage=25.0)
         assert (record.base.voltage, record.base.power) == pytest.approx((25.0, 20.0))
         same(record, dip() * [1, 1.1, 1, 1])
+
+    def test_power_without_a_unit_beside_kilovolts_is_asked_for(self):
+        content = text(in_units(), "t,U [kV],P,Q")
+        with pytest.raises(UserError, match=r"U is in kV, and the unit of P and Q is not told; .*data.units=\{P: MW"):
+            read(content)
+        same(read(content, units={"P": "MW", "Q": "Mvar"}))
+        same(read(content, base_voltage=27.5, base_power=20.0))
 
     def test_a_phase_voltage_is_said_to_be_taken_as_such(self):
         record = read(text(in_units() / [1, np.sqrt(3), 1, 1], "t,Ua [kV],P [MW],Q [Mvar]"), columns={"U": "Ua"})
@@ -208,6 +217,7 @@ class TestText:
             (text(header="t\tU\tP\tQ", mark="\t", point=","), ""),
             (text(header="t U P Q", mark=" "), ""),
             (text(header="  t     U    P   Q", mark="   "), ""),
+            (text(header="% t U P Q", mark="  "), ""),
             (text(header="t|U|P|Q", mark="|"), ""),
             (text(header='"t","U","P","Q"').replace("\n0.1,", '\n"0.1",'), ""),
             (all_quoted(), ""),
@@ -225,9 +235,9 @@ class TestText:
             ("# remark\n" + text().replace("0.1,1", "# in between\n0.1,1") + "# the end\n", ""),
             (text()[: text().rindex("0.8")], "line 401, the last one, is cut short and left out"),
         ],
-        ids=["semicolons and decimal commas", "tabs and decimal commas", "spaces", "aligned", "bars", "quoted",
-             "all quoted", "dos", "old mac", "blank lines", "marked utf-8", "utf-16", "utf-16 unmarked", "gbk",
-             "cp1251", "latin-1", "trailing comma", "titles", "remarks", "cut short"],
+        ids=["semicolons and decimal commas", "tabs and decimal commas", "spaces", "aligned", "after a percent sign",
+             "bars", "quoted", "all quoted", "dos", "old mac", "blank lines", "marked utf-8", "utf-16",
+             "utf-16 unmarked", "gbk", "cp1251", "latin-1", "trailing comma", "titles", "remarks", "cut short"],
     )  # fmt: skip
     def test_whatever_way_it_is_written_it_is_the_same_record(self, content, note):
         record = read(content)
@@ -622,6 +632,64 @@ class TestManyDips:
         events = build("data", {"name": "csv", "train": ["a.csv"], "validate": ["b.csv"]}).read()
         assert events.validate[0].base == events.train[0].base
         assert events.validate[0].U[0] == pytest.approx(1.1)
+
+
+def mutated(data, rng):
+    """A file with a few bits, marks, lines or its end changed."""
+    data = bytearray(data)
+    for _ in range(rng.choice([1, 1, 2, 5])):
+        i = rng.randrange(len(data)) if rng.random() < 0.6 else rng.randrange(min(len(data), 200))
+        change = rng.randrange(5)
+        if change == 0:
+            data[i] ^= 1 << rng.randrange(8)
+        elif change == 1:
+            data[i : i + rng.choice([0, 1, 3])] = rng.choice(MARKS)
+        elif change == 2:
+            del data[i : i + rng.choice([1, 10, 200])]
+        elif change == 3:
+            data[i:i] = data[i : i + rng.choice([1, 10, 200])]
+        else:
+            lines = bytes(data).split(b"\n")
+            lines.insert(rng.randrange(len(lines)), lines[rng.randrange(len(lines))])
+            data = bytearray(b"\n".join(lines))
+    return bytes(data)
+
+
+MARKS = [b",", b";", b"\n", b"\t", b'"', b"#", b"nan", b"inf", b"-", b"1e308", b"1e999", b"\x00", b"\xff", b"",
+         b"99:99",         b"1_0", b"0x1p3", b"9" * 400, b"\xe2\x80\xa8", b"2024-01-01", b"'", b"%"]  # fmt: skip
+LEAKS = (
+    "Error",
+    "invalid literal",
+    "could not convert",
+    "NoneType",
+    "list index",
+    "codec can't",
+    "Traceback",
+    "Invalid:",
+)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_mutated_file_is_read_or_refused_in_a_sentence(seed):
+    rng = random.Random(seed)
+    stamps = (f"2024-01-31 {_clock(3600 + t)},{U},{P},{Q}" for t, U, P, Q in dip().tolist())
+    sound = [
+        text().encode(), text(in_units(), "t [s];U [kV];P [MW];Q [Mvar]", ";", ",").encode(), text().encode("utf-16"),
+        text(header="时间,电压,有功功率,无功功率").encode("gbk"), text(header="t U P Q", mark=" ").encode(),
+        "\n".join(["Timestamp,U,P,Q", *stamps]).encode(),
+    ]  # fmt: skip
+    for _ in range(25):
+        with open("dip.csv", "wb") as file:
+            file.write(mutated(rng.choice(sound), rng))
+        begin = time.process_time()
+        try:
+            tractexp.read("dip.csv")
+        except UserError as error:
+            said = str(error)
+        else:
+            said = ""
+        assert not [leak for leak in LEAKS if leak in said], said
+        assert time.process_time() - begin < 2
 
 
 def test_a_million_rows_take_about_a_second_and_memory_like_the_file():

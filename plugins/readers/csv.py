@@ -127,6 +127,11 @@ class CSV(Tabular, Reader):
         frequency = told.base.frequency if told.base else self.frequency
         voltage = self.base_voltage or (told.base and told.base.voltage) or (same and same.voltage)
         power = self.base_power or (told.base and told.base.power) or (same and same.power)
+        if voltage is None and power is None and made.absolute["U"] and made.absolute["P"] is None:
+            raise UserError(
+                f"{record.where}: U is in kV, and the unit of P and Q is not told; say data.units={{P: MW, Q: Mvar}} "
+                "or data.units={P: pu, Q: pu}, or the base, data.base_voltage and data.base_power"
+            )
         told_by = []
         if (voltage is None and made.absolute["U"]) or (power is None and made.absolute["P"]):
             U, S = level(record)

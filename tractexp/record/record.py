@@ -205,7 +205,8 @@ class Record:
         if self.step > LONGEST_STEP:
             raise UserError(
                 f"{self.where}: one sample every {self.step:.3g} s is too coarse: a motor answers a dip within 50 to "
-                f"300 ms, so at least {1 / LONGEST_STEP:g} samples per second are needed; t must be in seconds"
+                f"300 ms, so at least {1 / LONGEST_STEP:g} samples per second are needed; t must be in "
+                "seconds (where a table has ms: data.units={t: ms})"
             )
 
     def _check_per_unit(self) -> None:

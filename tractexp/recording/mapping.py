@@ -253,9 +253,10 @@ def _lacking(table: Table, options: Mapping[str, Any], made: Mapping[str, Any]) 
         missing = [key for key in ("t", "P", "Q") if not _has(options, key)]
         missing[len(missing) and missing[0] == "t" : 0] = [] if _set(options, "U", ("U", "U1")) else ["U"]
     hint = nearest(missing[0], names)
+    meant = hint.partition("'")[2].rpartition("'")[0] or names[-1]
     return (
         f"{table.source}: column {', '.join(missing)} is missing; the header line names {', '.join(names)}{hint}; if "
-        f"another name is meant, say so: data.columns={{{missing[0]}: '{names[-1]}'}}"
+        f"another name is meant, say so: data.columns={{{missing[0]}: '{meant}'}}"
     )
 
 

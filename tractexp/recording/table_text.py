@@ -24,6 +24,7 @@ SAMPLE = 400  # lines of them, at most
 LONGEST = 1 << 20  # bytes of a line
 BLOCK = 20_000  # rows read cell by cell at a time
 DELIMITERS = (";", "\t", "|", ",", " ")  # a comma may be a decimal mark, a space stand within a name: they come last
+HEADER_MARK = re.compile(r"^\s*(%|//|!)+")  # before the names, as in a comment of another language
 REMARK = re.compile(r"(^|\s)#(?!(N/?A|NV|VALUE!|NUM!|DIV/0!|REF!)\b).*", re.IGNORECASE)
 
 
@@ -101,6 +102,8 @@ class TextTable(Table):
 
     def _at_once(self, wanted: Sequence[int]) -> dict[int, Column] | None:
         """The columns, by NumPy's reader; None where it refuses, or rows differ in length."""
+        if max(wanted) >= self.width:
+            return None
         body = self._body()
         cells = body.count(self.delimiter.encode())
         if self.decimal == ",":
@@ -213,7 +216,7 @@ def _lines(head: bytes, whole: bool) -> list[tuple[int, str]]:
     """The first lines that hold more than a remark, with their numbers from 1."""
     lines = head.decode(errors="replace").split("\n")
     lines = lines if whole else lines[:-1]
-    told = ((n, REMARK.sub("", line)) for n, line in enumerate(lines, 1))
+    told = ((n, HEADER_MARK.sub("", REMARK.sub("", line))) for n, line in enumerate(lines, 1))
     return [(n, text) for n, text in told if text.strip()][:SAMPLE]
 
 
