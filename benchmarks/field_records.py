@@ -27,6 +27,7 @@ from tractexp.recording.feeder import propose  # noqa: E402
 from tractexp.recording.measure import phasors_of  # noqa: E402
 
 CYCLES = 6  # of the steady stretch that is compared
+STEADY = 1e-3  # of U: what changes more within it is not compared
 TURN = np.exp(2j * np.pi / 3)
 
 
@@ -66,12 +67,16 @@ def elsewhere(path, recording):
 
 
 def steady(phasors, nominal):
-    """The middle [s] of the steadiest stretch of some cycles."""
+    """The middle [s] of the steadiest stretch of some cycles while alive; None where U or S changes within it."""
     span = max(3, round(CYCLES / nominal / (phasors.t[1] - phasors.t[0])))
-    U = phasors.U
-    alive = np.lib.stride_tricks.sliding_window_view(U, min(span, len(U)))
-    spread = np.ptp(alive, axis=1) + 1e9 * (alive.min(axis=1) < 0.5 * U.max())
+    if span >= len(phasors.t) or phasors.U.max() == 0:
+        return None
+    look = np.lib.stride_tricks.sliding_window_view
+    U, S = look(phasors.U, span), look(np.abs(phasors.S), span)
+    spread = np.ptp(U, axis=1) / U.mean(axis=1) + 1e9 * (U.min(axis=1) < 0.5 * phasors.U.max())
     k = int(np.argmin(spread))
+    if spread[k] > STEADY or np.ptp(S[k]) > 10 * STEADY * S[k].mean():
+        return None
     return float(phasors.t[k : k + span].mean())
 
 
@@ -80,6 +85,10 @@ def compared(path, recording, feeder):
     segment = max(recording.waveforms(), key=lambda s: s.stop - s.first)
     phasors = phasors_of(recording, feeder, segment)
     middle = steady(phasors, recording.frequency)
+    if middle is None:
+        k = int(np.argmax(phasors.U))
+        made = {"U": float(phasors.U[k]), "P": float(phasors.S[k].real), "Q": float(phasors.S[k].imag)}
+        return {"feeder": feeder.name, **made, "independent": "never steady: not compared"}
     half = CYCLES / recording.frequency / 2
     k = int(np.argmin(np.abs(phasors.t - middle)))
     here = np.abs(phasors.t - middle) <= 1 / recording.frequency / 2
@@ -118,9 +127,9 @@ def tried(path):
     try:
         cls = reader_of(str(path))
         reader = build("data", {"name": cls.name, **cls.of(str(path))})
-        recording = reader.recording()
+        recording = reader.opened()
         row |= {"channels": len(recording.channels), "samples": recording.samples, "notes": list(recording.notes)}
-        for feeder in propose(recording):
+        for feeder in (each for each in propose(recording) if each.loaded):
             try:
                 row["feeders"].append(compared(path, recording, arranged(recording, feeder)))
             except UserError as error:

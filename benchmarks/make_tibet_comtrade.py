@@ -60,7 +60,8 @@ def recording(seed: int, name: str) -> Recording:
     made = channels(simulate(LOAD, dip, t), np.random.default_rng(seed))
     trip = Status("dip", (dip.shape(t) > 0.1).astype(np.int8))
     return Recording(
-        name, made, [Segment(0, len(t), RATE, 0.0)], 50.0, "synthetic stand-in, not measured", "benchmarks/make_tibet_comtrade.py",
+        name, made, [Segment(0, len(t), RATE, 0.0)], 50.0, "synthetic stand-in; not measured",
+        "benchmarks/make_tibet_comtrade.py",
         datetime(2024, 1, 1), dip.start + 0.02, [trip],
     )  # fmt: skip
 

@@ -229,7 +229,7 @@ def test_one_voltage_and_one_current_make_a_record(monkeypatch):
     assert record.base.voltage == pytest.approx(27.5, rel=1e-4)
     assert (record.base.power, record.P[0]) == pytest.approx((11.0, np.cos(0.5)), rel=1e-4)
     assert record.window.name == "p_class"
-    assert set(record.more) == {"P_3", "THD_u", "THD_i"}
+    assert set(record.more) == {"P_3", "P_H", "THD_u", "THD_i"}
     assert any("p-class phasors every 1 ms" in note for note in record.notes)
     told = kept(detect(record))
     back = again(told).record

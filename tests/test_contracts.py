@@ -5,10 +5,22 @@ import pytest
 
 import tractexp.testing
 from tractexp.errors import UserError
-from tractexp.extend import Effect, Measurement, Optimizer, Parameter, Reader, Static, plugin, sites
+from tractexp.extend import (
+    Connection,
+    Effect,
+    Estimator,
+    Measurement,
+    Optimizer,
+    Parameter,
+    Reader,
+    Static,
+    plugin,
+    sites,
+)
 from tractexp.plugin import _registry as registry
 from tractexp.plugin import get
-from tractexp.testing import loads, readers, searches
+from tractexp.record.phasor import Averager
+from tractexp.testing import channels, loads, readers, searches
 
 TIBET = [f"pkg://tractexp.data/tibet_{depth}pct.csv" for depth in (50, 30)]
 SAMPLES = {"csv": [{"train": TIBET[:1], "validate": TIBET[1:]}]}
@@ -77,6 +89,10 @@ def late(word, initial):
     return edit
 
 
+def half_a_cycle(self, nominal):
+    return 0.5 / nominal
+
+
 def missing(self):
     raise KeyError("file")
 
@@ -107,6 +123,35 @@ def test_a_contract_that_is_broken_says_how(stranger, base, attributes, check, s
 def test_a_reader_that_falls_over_fails_its_contract(stranger):
     with pytest.raises(KeyError):
         readers.refuses_what_is_missing_in_a_sentence(stranger(Reader, read=missing), {})
+
+
+@pytest.mark.parametrize(
+    ("voltage", "sentence"),
+    [
+        (np.eye(3), "3 voltages and 1 currents"),
+        (np.zeros((1, 1)), "a voltage of no channel"),
+        (np.array([[np.nan]]), "a voltage of channels times"),
+    ],
+)
+def test_a_connection_that_makes_no_load_fails_its_contract(stranger, voltage, sentence):
+    made = stranger(Connection, voltage=lambda self: voltage, current=lambda self: np.eye(1))
+    with pytest.raises(AssertionError, match=sentence):
+        channels.makes_three_phases_or_one(made)
+
+
+def test_an_estimator_that_is_late_fails_its_contract(stranger):
+    made = stranger(Estimator, half=half_a_cycle, weight=lambda self, at, nominal: 1 + 10 * at)
+    with pytest.raises(AssertionError, match="ms off its stamp"):
+        channels.keeps_a_window_of_sum_one_about_its_center(made)
+
+
+def test_an_estimator_that_is_off_fails_its_contract(stranger):
+    def averager(self, rate, nominal):
+        return Averager(60, lambda y, rate, f, at: 0.9 * y[..., at])
+
+    made = stranger(Estimator, half=half_a_cycle, weight=lambda self, at, nominal: 1 + 0 * at, averager=averager)
+    with pytest.raises(AssertionError, match=r"off a sinusoid of 48\.7 Hz"):
+        channels.is_exact_in_steady_state(made)
 
 
 def test_an_effect_that_nothing_takes_fails_with_the_reason(stranger):

@@ -30,7 +30,8 @@ def a_recording(**changed):
     n = 2400
     wave = np.sin(2 * np.pi * 50 * np.arange(n) / 1200)
     channels = [
-        Channel("UA", (20000 * wave).astype("<i2"), "V", "voltage", "A", "bus 1", 0.0125, 0.3, 1100.0, 2e-6, (-32767, 32767), -32768),
+        Channel("UA", (20000 * wave).astype("<i2"), "V", "voltage", "A", "bus 1", 0.0125, 0.3, 1100.0,
+                2e-6, (-32767, 32767), -32768),
         Channel("IA, feeder", (2e9 * wave).astype("<i4"), "A", "current", "A", gain=1e-7, ratio=300.0),
         Channel("IA, feeder", rng.normal(size=n), "kA", "current", "B"),
         Channel("电压", rng.normal(size=n).astype("<f4"), "kV", "voltage", "C"),
@@ -125,7 +126,8 @@ class TestTables:
             Channel(
                 data.draw(NAMES),
                 np.array(data.draw(st.lists(st.integers(-32768, 32767), min_size=n, max_size=n)), dtype="<i2"),
-                gain=data.draw(st.floats(1e-9, 1e3)), offset=data.draw(st.floats(-1e3, 1e3)), missing=data.draw(st.sampled_from([None, -32768])),
+                gain=data.draw(st.floats(1e-9, 1e3)), offset=data.draw(st.floats(-1e3, 1e3)),
+                missing=data.draw(st.sampled_from([None, -32768])),
             )
             for _ in range(data.draw(st.integers(1, 4)))
         ]  # fmt: skip
@@ -174,14 +176,14 @@ class TestCOMTRADE:
 
     def test_to_a_table_and_back_gives_the_same_integers(self, station, tmp_path):
         first = comtrade.load(station)
-        table = tractexp.convert(station, "parquet", folder=tmp_path / "a").files[0]
-        made = tractexp.convert(table, "comtrade", folder=tmp_path / "b").files
+        table = tractexp.convert(station, to="parquet", folder=tmp_path / "a").files[0]
+        made = tractexp.convert(table, to="comtrade", folder=tmp_path / "b").files
         same_recording(first, comtrade.load(made[0]))
         assert made[1].read_bytes() == station.with_suffix(".dat").read_bytes()
 
     @pytest.mark.parametrize("to", ["csv", "parquet", "comtrade", "cff"])
     def test_the_dip_is_the_same_in_every_format(self, station, tmp_path, to):
-        converted = tractexp.convert(station, to, folder=tmp_path / "made")
+        converted = tractexp.convert(station, to=to, folder=tmp_path / "made")
         a, b = tractexp.read(station)[0], tractexp.read(converted.files[0])[0]
         for name in a.record.channels:
             np.testing.assert_array_equal(a.record.channels[name], b.record.channels[name])
@@ -190,12 +192,12 @@ class TestCOMTRADE:
     def test_events_as_tables_are_the_records(self, station, tmp_path):
         events = tractexp.read(station)
         for source in (station, events, events[0]):
-            made = tractexp.convert(source, "csv", what="events", folder=tmp_path / "events")
+            made = tractexp.convert(source, to="csv", what="events", folder=tmp_path / "events")
             assert [path.name for path in made.files] == ["station_dip1.csv", "station_dip1.json"]
             same_record(events[0].record, tractexp.read(made.files[0])[0].record)
 
     def test_events_as_comtrade_are_the_waveforms_about_each_dip(self, station, tmp_path):
-        made = tractexp.convert(station, "comtrade", what="events", folder=tmp_path / "cut", pre=0.3, post=0.5)
+        made = tractexp.convert(station, to="comtrade", what="events", folder=tmp_path / "cut", pre=0.3, post=0.5)
         part, whole = comtrade.load(made.files[0]), comtrade.load(station)
         first = round(part.start.microsecond * 1e-6 * 4000)
         np.testing.assert_array_equal(part.channels[4].raw, whole.channels[4].raw[first : first + part.samples])
@@ -205,7 +207,7 @@ class TestCOMTRADE:
 
     def test_a_record_becomes_magnitudes_in_kilovolt_and_megawatt(self, tmp_path):
         record = a_record()
-        path = tractexp.convert(record, "comtrade", folder=tmp_path).files[0]
+        path = tractexp.convert(record, to="comtrade", folder=tmp_path).files[0]
         made = {c.name: c for c in comtrade.load(path).channels}
         assert {name: c.unit for name, c in made.items()} == {"U": "kV", "P": "MW", "Q": "Mvar", "f": "Hz", "U2": "kV"}
         for channel in recording_of(record).channels:
@@ -213,18 +215,19 @@ class TestCOMTRADE:
 
     def test_what_cannot_be_is_refused(self, station, tmp_path):
         table = write_record(a_record(name="dip"), tmp_path / "dip.csv")[0]
-        for arguments, says in [
-            ((station, "xls"), "to=xls is not one of parquet, csv, comtrade, cff"),
+        for (source, to), says in [
+            ((station, "xls"), "there is no writer 'xls'. Available: cff, comtrade, csv, parquet"),
             (
                 (station, "comtrade"),
                 "station.(cfg|dat) belongs to .*station.cfg, which is converted; give another folder",
             ),
             ((table, "parquet"), "dip.json belongs to .*dip.csv, which is converted"),
-            ((tmp_path / "none.cfg",), "none.cfg: there is no such file"),
-            (([3],), "a int cannot be converted"),
+            ((tmp_path / "none.cfg", "csv"), "none.cfg: there is no such file"),
+            (([3], "csv"), "a value of type int cannot be converted"),
+            (("pkg://tractexp.data/tibet_50pct.cfg", "xls"), "there is no writer 'xls'"),
         ]:
             with pytest.raises(UserError, match=says):
-                tractexp.convert(*arguments, folder=tmp_path)
+                tractexp.convert(source, to=to, folder=tmp_path)
         with pytest.raises(UserError, match="what=recording: the file holds U, P, Q, no recording"):
             tractexp.convert(table, what="recording", folder=tmp_path / "x")
         with pytest.raises(UserError, match="events are taken as they are"):

@@ -155,3 +155,100 @@ def test_the_sentence_mentions_what_is_unusual():
     said = describe(detect(Record(name="dip", t=made.t, U=made.U, P=P, Q=made.Q)))
     assert "P is -0.8 before the dip" in said
     assert "1 samples lack P or Q" in said
+
+
+def levels(*changes, length=4.0, sigma=5e-4, U2=None, seed=0):
+    """A record whose voltage is 1 but for (start, end, level)."""
+    t = np.arange(round(length * 1000)) * 1e-3
+    U = np.ones(len(t))
+    for start, end, level in changes:
+        U[(t >= start) & (t < end)] = level
+    U += sigma * np.random.default_rng(seed).standard_normal(len(t))
+    return Record(name="made", t=t, U=U, P=0.8 * U**1.5, Q=0.4 * U**2, U2=U2)
+
+
+class TestSwells:
+    """A swell before a dip is not the level that the dip falls from."""
+
+    @pytest.mark.parametrize("rise", [0.05, 0.15, 0.3])
+    @pytest.mark.parametrize("gap", [0.0, 0.05, 0.6])
+    def test_before_a_dip(self, rise, gap):
+        made = levels((1.0, 1.5, 1 + rise), (1.5 + gap, 1.7 + gap, 0.7))
+        event = detect(made)
+        assert event.depth == pytest.approx(0.3, abs=0.005)
+        assert event.duration == pytest.approx(0.2, abs=0.003)
+        np.testing.assert_allclose([event.U0, event.P0, event.Q0], [1.0, 0.8, 0.4], atol=2e-3)
+
+    def test_a_long_one_that_returns_leaves_no_dip(self):
+        made = levels((1.0, 3.0, 1.1), length=5.0)
+        assert find_dips(made.t, made.U) == []
+
+    def test_a_step_up_becomes_the_level_after_a_second(self):
+        made = levels((1.0, 9.0, 1.1), (4.0, 4.2, 0.66), length=6.0)
+        assert detect(made).depth == pytest.approx(0.4, abs=0.01)
+
+    def test_alone_is_refused_by_its_name(self):
+        with pytest.raises(UserError, match=r"falls at most .* it rises by 15.* % .*: a swell is not fitted"):
+            detect(levels((1.0, 1.5, 1.15)))
+
+
+class TestWhatIsNoDip:
+    """Refused by its true name."""
+
+    def test_an_interruption(self):
+        with pytest.raises(
+            UserError, match=r"the voltage is gone from t = 1 to 1.4 s \(U falls to .*\): an interruption"
+        ):
+            detect(levels((1.0, 1.4, 0.01), sigma=1e-5))
+
+    def test_a_dead_line(self):
+        with pytest.raises(UserError, match=r"the voltage is gone from t = 1 s on .*: the line is dead"):
+            detect(levels((1.0, 9.0, 0.01), sigma=1e-5))
+
+    def test_an_open_pole(self):
+        U2 = np.zeros(8000)
+        U2[1000:6000] = 0.365
+        with pytest.raises(UserError, match=r"U2 is 57.9 % of U for 5 s at t = 1 s, .*: one pole is open"):
+            detect(levels((1.0, 6.0, 0.63), length=8.0, sigma=0.0, U2=U2))
+
+    def test_a_fault_of_one_phase_is_one(self):
+        U2 = np.zeros(4000)
+        U2[1000:1200] = 0.3
+        assert detect(levels((1.0, 1.2, 0.7), U2=U2)).depth == pytest.approx(0.3, abs=0.01)
+
+    def test_a_tap_step_down(self):
+        with pytest.raises(UserError, match=r"falls by 5 % at t = 1 s and stays there for the 3 s .*: a step"):
+            detect(levels((1.0, 9.0, 0.95)))
+
+    def test_a_ramp(self):
+        t = np.arange(20000) * 1e-3
+        U = 1 - 0.005 * t
+        with pytest.raises(UserError, match=r"falls by 10 % .*, but slowly: a ramp, no dip"):
+            detect(Record(name="made", t=t, U=U, P=0.8 * U, Q=0.4 * U))
+
+    def test_a_dip_smaller_than_the_noise_says_how_large_it_must_be(self):
+        with pytest.raises(UserError, match=r"but a dip must exceed 3 % and the noise, here \d"):
+            detect(levels((1.0, 1.2, 0.97), sigma=0.02))
+
+    def test_frequency_is_not_asked_for_while_there_is_no_voltage(self):
+        made = levels((1.0, 9.0, 1e-4), sigma=1e-6)
+        f = np.where(made.U < 0.05, -191.944, 50.0)
+        dead = Record(name="made", t=made.t, U=made.U, P=made.P, Q=made.Q, f=f).check()
+        with pytest.raises(UserError, match="the line is dead"):
+            detect(dead)
+        with pytest.raises(UserError, match=r"f = 70 is more than 20 % off the nominal 50 Hz at a voltage of 1"):
+            Record(name="made", t=made.t, U=made.U, P=made.P, Q=made.Q, f=np.where(made.t < 1, 70.0, f)).check()
+
+
+class TestDirection:
+    def test_a_load_counted_the_wrong_way(self):
+        made = dip(sigma=0.0)
+        told = describe(detect(Record(name="made", t=made.t, U=made.U, P=-made.P, Q=-made.Q)))
+        assert "|P| goes as U^1.5 when the voltage falls, as a load's" in told
+        assert "data.reverse_current=true" in told
+
+    def test_regeneration(self):
+        made = dip(sigma=0.0)
+        told = describe(detect(Record(name="made", t=made.t, U=made.U, P=-0.5 + 0 * made.P, Q=0.02 + 0 * made.Q)))
+        assert "regeneration (a braking train)" in told
+        assert "reverse_current" not in told

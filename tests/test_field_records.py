@@ -144,10 +144,10 @@ def test_d_a_reversed_transformer_is_told_from_regeneration(tmp_path):
     t = seconds()
     V = phasors(t, DIP)
     event = only(station(tmp_path, V, -Y * V, t), voltages=[0, 1, 2], currents=[3, 4, 5])
-    assert any("reverse" in note for note in event.record.notes)
+    assert any("data.reverse_current=true" in note for note in event.record.notes)
     braking = 3 * -70 / (9 * np.conj(V)) * (1 + 0j)  # constant power back into the network, as a converter feeds it
     event = only(station(tmp_path, V, braking, t), voltages=[0, 1, 2], currents=[3, 4, 5])
-    assert any("regenerat" in note for note in event.record.notes)
+    assert any("regeneration (a braking train), no reversed current" in note for note in event.record.notes)
 
 
 class TestNotADip:

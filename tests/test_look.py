@@ -5,8 +5,9 @@ import re
 import shlex
 
 import numpy as np
+import pandas
 import pytest
-from recordings import BASE, RATE, constant, recording, waves
+from made_recordings import BASE, RATE, constant, recording, waves
 from test_cli import tractexp as command_line
 
 import tractexp
@@ -109,10 +110,37 @@ def test_a_table_of_powers_is_looked_at_and_its_command_fits_it(resistive_dips, 
     (event,) = made.events
     assert (event["kind"], event["worth"]) == ("dip", True)
     assert event["depth"] == pytest.approx(0.3, abs=0.01)
-    assert made.commands == [f"tractexp data=csv 'data.train=[{resistive_dips[0]}]'"]
+    assert made.commands == [f"tractexp data=csv data.path={resistive_dips[0]} 'data.train=[1]' 'data.validate=[]'"]
     assert list(made.phasors().columns)[:4] == ["t", "U", "P", "Q"]
     with pytest.raises(UserError, match="without waveforms"):
         made.waveforms()
+
+
+def test_a_long_table_is_one_load_whose_dips_are_numbered(resistive_dips, tmp_path):
+    """Three dips one after the other, and one more that the end of the table cuts short."""
+    parts = [pandas.read_csv(path) for path in resistive_dips]
+    tail = parts[0][parts[0]["t"] < parts[0]["t"].iloc[0] + 0.45]
+    frame = pandas.concat([*parts, tail], ignore_index=True)
+    frame["t"] = np.arange(len(frame)) / 200
+    frame.to_csv(tmp_path / "long.csv", index=False)
+    made = tractexp.look(tmp_path / "long.csv")
+    assert len(made.feeders) == 1
+    assert [e["dip"] for e in made.events if e["worth"]] == [1, 2, 3]
+    np.testing.assert_allclose([e["depth"] for e in made.events if e["worth"]], [0.3, 0.5, 0.4], atol=0.01)
+    words = shlex.split(made.commands[0])
+    assert words[-2:] == ["data.train=[1]", "data.validate=[2,3]"]
+    done = command_line(
+        *words[1:], "optimizer=random_search", "budget=50", "tracking.enabled=false", "hydra.run.dir=run", cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    roles = [e["role"] for e in json.loads((tmp_path / "run" / "result.json").read_text())["events"]]
+    assert roles == ["train", "validate", "validate"]
+
+
+def test_a_shipped_record_is_looked_at_by_its_name():
+    made = tractexp.look("tibet_50pct")
+    assert [e["kind"] for e in made.events if e["worth"]] == ["dip"]
+    assert "pkg://tractexp.data/tibet_50pct" in made.commands[0]
 
 
 def test_what_was_read_can_be_looked_at(station, resistive_dips):
@@ -143,7 +171,7 @@ def test_the_page_holds_every_sample_and_marks_the_events(looked, tmp_path):
     np.testing.assert_allclose(values, looked.waveforms()["UA"], atol=1e-4 * np.abs(values).max())
     (shade,) = [shape for shape in whole["layout"]["shapes"] if shape["type"] == "rect"]
     assert shade["x0"] == looked.events.rows[0]["start"]
-    assert {"u [kV]", "i [kA]", "P, Q [MW, Mvar]", "f [Hz]"} <= {
+    assert {"u [kV]", "i [kA]", "P, Q [MW]", "f [Hz]"} <= {
         axis["title"]["text"] for key, axis in whole["layout"].items() if key.startswith("yaxis")
     }
     for command in looked.commands:

@@ -187,6 +187,7 @@ def test_harmonics_and_distortion_are_those_of_the_waves(f):
     for h, share in ((3, 0.5), (5, 0.7), (7, np.sqrt(1 - 0.25 - 0.49))):
         P = 3 * (0.03 * share) ** 2 * np.cos(0.5)
         np.testing.assert_allclose(made.more[f"P_{h}"], P, rtol=0.02)
+    np.testing.assert_allclose(made.more["P_H"], 3 * 0.03**2 * np.cos(0.5), rtol=0.02)
     np.testing.assert_allclose(made.more["THD_u"], 0.03, rtol=0.01)
     np.testing.assert_allclose(made.more["THD_i"], 0.03, rtol=0.01)
 

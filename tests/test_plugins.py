@@ -119,7 +119,7 @@ def test_the_examples_of_the_documentation_keep_the_contracts(tmp_path):
     blocks = re.findall(r"```python\n# (\w+\.py)\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
     assert {name for name, _ in blocks} == {
         "linear_load.py", "rate_dependence.py", "late_load.py", "channel_gain.py", "acme_motor.py",
-        "shrinking_step.py", "tabbed.py",
+        "shrinking_step.py", "tabbed.py", "open_y.py", "hann.py",
     }  # fmt: skip
     package = tmp_path / "documented"
     package.mkdir()

@@ -237,7 +237,9 @@ class TestRefused:
         path = write(tmp_path, waveforms(t, 50.0, [(0.5, 0.7, 0.4)]), [(3200, 4800)], "ASCII")
         dat = path.with_suffix(".dat")
         dat.write_text(dat.read_text().replace("\n7,", "\n7,x", 1))
-        with pytest.raises(UserError, match=r"station.dat: line 7: time stamp 'x0' is not a number, up to 1e38; correct it"):
+        with pytest.raises(
+            UserError, match=r"station.dat: line 7: time stamp 'x0' is not a number, up to 1e38; correct it"
+        ):
             read(path)
 
     def test_missing_files(self, two_dips):
@@ -276,7 +278,7 @@ class TestRefused:
     def test_a_dip_right_at_the_start(self, tmp_path):
         t = np.arange(3200) / 3200
         path = write(tmp_path, waveforms(t, 50.0, [(0.021, 0.3, 0.4)]), [(3200, 3200)])
-        with pytest.raises(UserError, match="none of the 1 dips has 10 phasors before it"):
+        with pytest.raises(UserError, match=r"the dip starts at sample .* needs at least 10 samples"):
             read(path)
 
 

@@ -80,13 +80,13 @@ class TestWhatIsRead:
         assert record.notes == ("synthetic stand-in",)
 
     def test_a_file_inside_an_installed_package(self, here, monkeypatch):
-        (here / "recordings").mkdir()
-        (here / "recordings" / "__init__.py").touch()
-        (here / "recordings" / "inside.csv").write_text(text())
+        (here / "in_package").mkdir()
+        (here / "in_package" / "__init__.py").touch()
+        (here / "in_package" / "inside.csv").write_text(text())
         monkeypatch.syspath_prepend(here)
-        path = "pkg://recordings/inside.csv"
+        path = "pkg://in_package/inside.csv"
         record = build("data", {"name": "csv", "train": [path]}).read().train[0]
-        sys.modules.pop("recordings")
+        sys.modules.pop("in_package")
         assert (record.name, record.source, record.samples) == ("inside", path, 400)
 
     def test_files_of_one_name_in_two_folders_keep_different_names(self, here):

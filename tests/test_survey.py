@@ -11,7 +11,7 @@ import time
 import numpy as np
 import pandas
 import pytest
-from recordings import constant, motor_dip, recording
+from made_recordings import constant, motor_dip, recording
 from test_cli import tractexp as command_line
 
 import tractexp

@@ -13,12 +13,15 @@ from tractexp.model.unfit import Unfit
 from tractexp.parameter import Parameter
 from tractexp.plugin import plugin
 from tractexp.record import Base, Events, Reader, Record
+from tractexp.recording import Connection, Estimator
 
 __all__ = [
     "EVENT",
     "INPUTS",
     "Base",
+    "Connection",
     "Effect",
+    "Estimator",
     "Events",
     "Iterative",
     "Loss",

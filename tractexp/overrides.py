@@ -6,7 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 # settings that take names of their own
-OPEN = ("model.bounds.", "model.fixed.", "task.values", "task.criteria.", "hydra.sweeper.comparison.")
+OPEN = (
+    "model.bounds.", "model.fixed.", "task.values", "task.criteria.", "hydra.sweeper.comparison.", "data.columns",
+    "data.units",
+)  # fmt: skip
 NAMING = ("data.", "task.", "tracking.", "hydra.run.dir", "hydra.sweep.dir")  # settings that name files and channels
 MARKS = set(",'\"[](){}\\")  # which a name within a list cannot have as it stands
 WORD = re.compile(r"[^\W\d_].*[^\W\d_]|[^\w.+\-]")  # in what is no number

@@ -24,10 +24,11 @@ GROUPS = {
     "connection": "how the channels of a recording are connected, chosen by data.connection=NAME",
     "estimator": "how phasors are made of waveforms, chosen by data.estimator=NAME",
     "format": "what task=export writes, chosen by task.format=NAME",
+    "writer": "what task=convert writes, chosen by task.to=NAME",
     "experiment": "a task with its settings, such as a table of the paper",
     "hydra/launcher": "where the jobs of a sweep run; by default on the cores of this computer",
 }
-LATER = ("task", "format", "hydra/launcher")  # groups that the help has told, or leaves to `tractexp list`
+LATER = ("task", "format", "writer", "hydra/launcher")  # groups that the help has told, or leaves to `tractexp list`
 
 TEXT = """\
 tractexp: identify the parameters of a traction load from recorded voltage dips

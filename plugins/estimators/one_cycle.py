@@ -19,6 +19,8 @@ class OneCycle(Estimator):
     Source: Phadke and Thorp 2008, Synchronized Phasor Measurements, section 2.4 (weighted least squares).
     """
 
+    usual = True
+
     def half(self, nominal: float) -> float:
         return 0.5 / nominal
 

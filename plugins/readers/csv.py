@@ -47,7 +47,7 @@ class CSV(Tabular, Reader):
 
     @classmethod
     def takes(cls, path: str) -> bool:
-        return kind_of(path) != "waveforms"
+        return kind_of(path) != "waves"
 
     def check(self) -> None:
         if self.path:
@@ -84,13 +84,20 @@ class CSV(Tabular, Reader):
 
     def _numbered(self) -> Events:
         """The dips of one table: the whole of it where there is one."""
+        whole, dips = self._dips()
+        notes = () if dips and dips[0].made is whole else (*whole.notes, f"{counted(len(dips), 'dip')} found")
+        return chosen(self.path, dips, self.train or None, self.validate, notes)
+
+    def table(self) -> tuple[Record, list[Dip]] | None:
+        return self._dips() if self.path else None
+
+    def _dips(self) -> tuple[Record, list[Dip]]:
         whole = self._record(self.path)
         pre, post = (usual if given is None else given for given, usual in ((self.pre, PRE), (self.post, POST)))
         dips = numbered([replace(whole, notes=())], self.path, pre, post)
         if len(dips) < 2 and self.pre is None and self.post is None:
-            return chosen(self.path, [Dip(1, whole.t[0], whole.t[-1], whole)], self.train or None, self.validate)
-        notes = (*whole.notes, f"{counted(len(dips), 'dip')} found")
-        return chosen(self.path, dips, self.train or None, self.validate, notes)
+            return whole, [Dip(1, float(whole.t[0]), float(whole.t[-1]), whole)]
+        return whole, dips
 
     def _record(self, path: str, base: Base | None = None) -> Record:
         """The whole of one table; `base` is that of the first one read, which all share."""

@@ -15,8 +15,7 @@ class SEL(WaveformReader):
     rate is the report's samples per cycle times its frequency. A filtered report (4 samples per cycle) has too few.
 
     Source: SEL instruction manuals, appendix Compressed ASCII and section event reports.
-    Departures: the scale is checked against the currents of the report's summary; reports as text for people (.eve)
-    are not read.
+    Departures: the scale is checked against the currents of the report's summary; .eve, for people, is not read.
     """
 
     endings = (".cev",)

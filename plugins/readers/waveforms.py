@@ -28,7 +28,7 @@ class Waveforms(Tabular, WaveformReader):
 
     @classmethod
     def takes(cls, path: str) -> bool:
-        return kind_of(path) == "waveforms"
+        return kind_of(path) == "waves"
 
     def check(self) -> None:
         super().check()

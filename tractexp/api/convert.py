@@ -1,128 +1,119 @@
 """Records and recordings written in another format, with all that is known of them."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from tractexp import plugin
 from tractexp.api.arguments import public
 from tractexp.api.read import GROUP, node_of
 from tractexp.errors import UserError, check_choice
-from tractexp.outcome import Outcome, Table
+from tractexp.outcome import Table, Tabulated
 from tractexp.record import Event, Reader, Record
-from tractexp.recording import Recording, comtrade, tidy
+from tractexp.recording import Recording, Writer
 from tractexp.recording.cut import cut
 from tractexp.recording.reader import WaveformReader
+from tractexp.recording.tidy import unique
 
-ENDINGS = {"parquet": ".parquet", "csv": ".csv", "comtrade": ".cfg", "cff": ".cff"}
 WHAT = ("recording", "events")
 MARGIN = 0.1  # s of waveforms kept about a dip's record, for the windows of its first and last phasors
+Part = tuple[str, Recording | Record]  # what is written, and its name
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Converted(Outcome):
+class Converted(Tabulated):
     """What was written: `files`, each table with its sidecar, each .cfg with its .dat; `said` is a sentence on each."""
-
-    kind = "convert"
 
     files: Sequence[Path]
     said: Sequence[str]
 
     def table(self) -> Table:
-        return Table([], [], f"{len(self.files)} files written", [*self.said, *map(str, self.files)])
-
-    def to_dict(self) -> dict[str, Any]:
-        return {"files": [str(path) for path in self.files], "said": list(self.said)}
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        return cls([Path(path) for path in content["files"]], list(content["said"]))
+        return Table(["file"], [[str(path)] for path in self.files], said=self.said)
 
 
 @public
 def convert(
-    source: str | Path | Event | Record | Sequence[Any],
-    to: str = "parquet",
-    *,
-    what: str | None = None,
-    folder: str | Path = ".",
-    **settings: Any,
+    *sources: Any, to: str | None = None, what: str | None = None, folder: str | Path = ".", **settings: Any
 ) -> Converted:  # fmt: skip
-    """Write a file that can be read, or events that were read, as Parquet, CSV or COMTRADE into `folder`.
+    """Write files that can be read, or events that were read, as Parquet, CSV or COMTRADE into `folder`.
 
-    `to` is "parquet", "csv" (tables of a row per sample, with a sidecar in JSON that says everything else), "comtrade"
-    (.cfg and .dat) or "cff". `what` is "recording", all channels of the file as they were recorded (the default, where
-    the file holds waveforms), or "events", the record of each dip; for COMTRADE those are the waveforms about each dip,
-    or U, P, Q in kV, MW, Mvar where there are none. `settings` are those of the reader, as for `tractexp.read`.
+    `to` is "parquet" (the default), "csv" (tables of a row per sample, with a sidecar in JSON that says everything
+    else), "comtrade" (.cfg and .dat), "cff" or the name of a plugin. `what` is "recording", all channels of a file as
+    they were recorded (the default, where it holds waveforms), or "events", the record of each dip; for COMTRADE those
+    are the waveforms about each dip, or U, P, Q in kV, MW, Mvar where there are none. `settings` are those of the
+    reader, as for `tractexp.read`.
 
-    Reading what was written gives the same: the bits of numbers, the integers of a recorder. Raises `UserError` for what cannot be read, and where the source would be overwritten.
+    Reading what was written gives the same: the bits of numbers, the integers of a recorder. Raises `UserError` for
+    what cannot be read, and where a source would be overwritten.
     """
-    if isinstance(source, str | Path):
-        return converted(plugin.build(GROUP, node_of(str(source), settings)), to, what, Path(folder))
-    if settings or what == "recording":
-        raise UserError(
-            f"{', '.join(settings) or 'what=recording'}: events are taken as they are; give the file to convert its recording"
-        )
-    given = list(source) if isinstance(source, Sequence) else [source]
-    records = [one.record if isinstance(one, Event) else one for one in given]
-    for one in records:
-        if not isinstance(one, Record):
-            raise UserError(
-                f"a {type(one).__name__} cannot be converted; give a file, or events as tractexp.read gives"
-            )
-    check_choice("task.to", to, ENDINGS)
-    return _written([(one.name, one) for one in records], to, Path(folder))
+    if not sources:
+        raise UserError("nothing to read: give a file, or events as tractexp.read gives them")
+    writer = writer_of(to)
+    parts = [part for source in sources for part in _parts(source, writer, what, settings)]
+    return written(parts, writer, Path(folder))
 
 
-def converted(reader: Reader, to: str, what: str | None, folder: Path) -> Converted:
-    """What a reader reads, written into a folder."""
-    check_choice("task.to", to, ENDINGS)
+def writer_of(to: str | None) -> Writer:
+    """The writer of that name, or the usual one."""
+    known = plugin.discover()["writer"]
+    return plugin.build(
+        "writer", {"name": to or next(name for name, cls in known.items() if getattr(cls, "usual", False))}
+    )
+
+
+def parts_of(reader: Any, writer: Writer, what: str | None) -> list[Part]:
+    """What a reader reads, by the names it is written under."""
     if what is not None:
         check_choice("task.what", what, WHAT)
     waves = isinstance(reader, WaveformReader)
-    if what == "recording" and not waves:
+    if what == WHAT[0] and not waves:
         raise UserError("task.what=recording: the file holds U, P, Q, no recording of waveforms; use task.what=events")
-    return _written(_parts(reader, to, what or ("recording" if waves else "events")), to, folder)
-
-
-def _parts(reader: Any, to: str, what: str) -> list[tuple[str, Recording | Record]]:
-    """What is to be written, by name."""
-    if what == "recording":
+    if waves and what in (None, WHAT[0]):
         return [(Path(reader.path).stem, reader.recording())]
     read = reader.read()
     records = [*read.train, *read.validate]
-    if isinstance(reader, WaveformReader) and to in ("comtrade", "cff"):
+    if waves and writer.waves:
         whole = reader.recording()
         return [(one.name, cut(whole, one.t[0] - MARGIN, one.t[-1] + MARGIN)) for one in records]
     return [(one.name, one) for one in records]
 
 
-def _written(parts: Sequence[tuple[str, Recording | Record]], to: str, folder: Path) -> Converted:
-    names = tidy.unique(["".join("_" if c in '/\\:*?"<>|' else c for c in name) for name, _ in parts])
+def written(parts: Sequence[Part], writer: Writer, folder: Path) -> Converted:
+    """Write everything into a folder; raises `UserError` before anything is written over what was read."""
+    names = unique(["".join("_" if c in '/\\:*?"<>|' else c for c in name) for name, _ in parts])
+    paths = [folder / f"{name}{writer.endings[0]}" for name in names]
+    for path, (_, part) in zip(paths, parts, strict=True):
+        _check_source(path, part.source, writer)
     files: list[Path] = []
-    said: list[str] = []
-    for name, (_, part) in zip(names, parts, strict=True):
-        path = folder / f"{name}{ENDINGS[to]}"
-        _check_source(path, part.source, to)
-        files += _write(part, path, to)
-        said.append(_said(part, path))
-    return Converted(files, said)
+    for path, (_, part) in zip(paths, parts, strict=True):
+        files += writer.recording(part, path) if isinstance(part, Recording) else writer.record(part, path)
+    return Converted(files, [_said(part, path) for path, (_, part) in zip(paths, parts, strict=True)])
 
 
-def _write(part: Recording | Record, path: Path, to: str) -> list[Path]:
-    if to in ("comtrade", "cff"):
-        return comtrade.write(part if isinstance(part, Recording) else tidy.recording_of(part), path)
-    return tidy.write_recording(part, path) if isinstance(part, Recording) else tidy.write_record(part, path)
+def _parts(source: Any, writer: Writer, what: str | None, settings: dict[str, Any]) -> list[Part]:
+    """What a file, an event, or a list of such is written as."""
+    if isinstance(source, str | Path):
+        reader: Reader = plugin.build(GROUP, node_of(str(source), settings))
+        return parts_of(reader, writer, what)
+    if isinstance(source, Sequence):
+        return [part for one in source for part in _parts(one, writer, what, settings)]
+    if not isinstance(source, Record | Event):
+        kind = type(source).__name__
+        raise UserError(f"a value of type {kind} cannot be converted; give a file, or events as tractexp.read gives")
+    if settings or what == WHAT[0]:
+        told = ", ".join(settings) or "task.what=recording"
+        raise UserError(f"{told}: events are taken as they are; give the file, whose recording or settings are meant")
+    record = source.record if isinstance(source, Event) else source
+    return [(record.name, record)]
 
 
-def _check_source(path: Path, source: str, to: str) -> None:
+def _check_source(path: Path, source: str, writer: Writer) -> None:
     """Raise `UserError` where a file to be written is one that was read, or would be taken for its sidecar."""
-    beside = ".dat" if to == "comtrade" else ".json"
     for own in _read_from(source):
-        written = {path.resolve(), *([] if to == "cff" else [path.with_suffix(beside).resolve()])}
+        files = {path.with_suffix(ending).resolve() for ending in writer.endings}
         taken = {own.resolve(), own.with_suffix(".dat" if own.suffix.lower() == ".cfg" else ".json").resolve()}
-        if both := written & taken:
+        if both := files & taken:
             raise UserError(f"{min(both).name} belongs to {own}, which is converted; give another folder")
 
 

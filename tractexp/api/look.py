@@ -2,13 +2,13 @@
 
 import functools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import MISSING, asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
-from tractexp import files
+from tractexp import files, plugin
 from tractexp.api.arguments import public
 from tractexp.api.pages import Written
 from tractexp.api.read import kept_record, node_of, record_again, table
@@ -194,7 +194,7 @@ def _source(given: Any) -> str | Record:
 
 def _view(source: str | Record, settings: Mapping[str, Any]) -> View:
     if isinstance(source, Record):
-        return View(source.name, {}, [sight_of(source, {})])
+        return View(source.name, {}, [sight_of(source)])
     return view_of(source, node_of(source, settings))
 
 
@@ -273,8 +273,10 @@ def _feeder(view: View, shown: Sight) -> dict[str, Any]:
     else:
         made |= {"connection": "", "voltages": [], "currents": [], "channels": [], "reverse_current": False, "why": []}
     U, P, Q = told or (None, None, None)
+    units = ("pu", "pu", "pu") if shown.per_unit else ("kV", "MW", "Mvar")
     return made | {
-        "U": U, "P": P, "Q": Q, **_sums(shown), "said": list(shown.said), "command": command(view, shown),
+        "U": U, "P": P, "Q": Q, "units": units, **_sums(shown),
+        "said": list(shown.said), "command": command(view, shown),
         "events": [event_row(seen) for seen in shown.seen],
     }  # fmt: skip
 
@@ -286,7 +288,16 @@ def _name(connection: Any) -> str:
 def command(view: View, shown: Sight) -> str:
     """What is to be typed to fit the events of a load that are worth it; "" where none is."""
     choice = shown.choice()
-    return typed({**view.node, **choice}) if choice is not None and view.node else ""
+    if choice is None or not view.node:
+        return ""
+    usual = {f.name: f for f in fields(plugin.get("data", view.node["name"]))}
+    settings = {**view.node, **choice}
+    return typed({key: value for key, value in settings.items() if key == "name" or not _is_usual(usual[key], value)})
+
+
+def _is_usual(setting: Any, value: Any) -> bool:
+    """Whether a value is what a setting (a dataclass field) is without it."""
+    return value == (setting.default if setting.default is not MISSING else setting.default_factory())
 
 
 def _sums(shown: Sight) -> dict[str, Any]:

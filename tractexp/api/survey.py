@@ -27,7 +27,8 @@ PICTURES = ("U_picture", "P_picture")
 ABOUT = {
     "event": "FILE#LOAD.DIP, as data.train takes it", "when": "by the recorder's clock", "start": "s in the file",
     "duration": "s", "depth": "of the voltage before", "U2": "of U1 before", "jump": "degrees", "P_before": "MW",
-    "Q_before": "Mvar", "P_after": "MW", "Q_after": "Mvar", "noise": "of P, before the event", "rate": "Hz, sampled",
+    "Q_before": "Mvar", "P_after": "MW", "Q_after": "Mvar", "unit": "of P: MW, or pu where no base is known",
+    "noise": "of P, before the event", "rate": "Hz, sampled",
 }  # fmt: skip
 
 

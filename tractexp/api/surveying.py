@@ -23,7 +23,7 @@ Rows = list[dict[str, Any]]
 UNREAD, QUIET = "not read", "nothing"  # what stands as the kind of a file without events
 COLUMNS = (
     "event", "file", "station", "load", "kind", "when", "start", "duration", "depth", "U2", "jump", "P_before",
-    "Q_before", "P_after", "Q_after", "noise", "rate", "worth", "why", "command", "U_picture", "P_picture",
+    "Q_before", "P_after", "Q_after", "unit", "noise", "rate", "worth", "why", "command", "U_picture", "P_picture",
 )  # fmt: skip
 AHEAD = 4  # files given to each worker at a time
 POINTS = 48  # of a small picture
@@ -70,7 +70,7 @@ def _event(view: View, file: str, number: int, shown: Sight, seen: Seen) -> dict
     noise = event.noise_P / max(abs(event.P0), 1e-9) if event is not None else None
     return {
         **_common(view), **{key: value for key, value in told.items() if key in COLUMNS},
-        "event": archive.event_name(file, number, seen), "load": shown.name,
+        "event": archive.event_name(file, number, seen), "load": shown.name, "unit": "pu" if shown.per_unit else "MW",
         "when": (begun + timedelta(seconds=told["start"])).isoformat() if begun else None, "noise": noise,
         "command": command(view, shown) if seen.worth else "", **_pictures(shown, seen),
     }  # fmt: skip

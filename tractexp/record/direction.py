@@ -43,17 +43,17 @@ def direction(U: np.ndarray, P: np.ndarray, Q: np.ndarray, polarity: int = 0) ->
     if np.count_nonzero(P[calm] > -TURNS * P0) > max(FEWEST, 0.02 * len(P)):
         return "P changes its sign at normal voltage, as of a train that brakes and motors: power flows both ways"
     a, fell = _exponent(U / level, P / P0)
-    answer = f"|P| goes as U^{a:.2g} when the voltage falls" if fell else "the voltage is never disturbed"
+    answer = f"|P| goes as U^{round(a, 2) + 0.0:g} when the voltage falls" if fell else "the voltage is never disturbed"
     if polarity < 0 or (polarity == 0 and fell and _load_like(a, P0, Q0)):
         shown = (
             "the negative-sequence current is that of a load turned round" if polarity < 0 else f"{answer}, as a load's"
         )
         return f"{shown}: its current is counted out of it, or this feeder supplies such loads ({REMEDY})"
     if polarity > 0:
-        return "the negative-sequence current is that of a load: the current is counted rightly, so power is fed back"
+        return "the negative-sequence current is that of a load, so its direction is right and this is regeneration"
     if fell and a < FALLS:
-        return f"{answer}, as a converter's or a generator's: power is fed back (a braking train), no reversed current"
-    return f"{answer}, which tells no reversed current ({REMEDY}) from power that is fed back"
+        return f"{answer}, as a converter's or a generator's: regeneration (a braking train), no reversed current"
+    return f"{answer}, which tells no reversed current ({REMEDY}) from regeneration"
 
 
 def _load_like(a: float, P0: float, Q0: float) -> bool:

@@ -117,9 +117,12 @@ def _scan(t: np.ndarray, U: np.ndarray) -> tuple[list[tuple[int, int]], list[tup
 
 
 def _margin(U: np.ndarray) -> float:
-    """The share of the reference by which a dip must fall."""
-    spread = np.median(np.abs(np.diff(U))) / 0.6745 / np.sqrt(2)
-    return max(SHALLOWEST, NOISE_FACTOR * float(spread / np.median(U)))
+    """The share of the reference by which a dip must fall; a voltage that is gone has no noise to exceed."""
+    alive = U[DEAD * U.max() < U]
+    if len(alive) < FEWEST_BEFORE:
+        return SHALLOWEST
+    spread = np.median(np.abs(np.diff(alive))) / 0.6745 / np.sqrt(2)
+    return max(SHALLOWEST, NOISE_FACTOR * float(spread / np.median(alive)))
 
 
 def _swell(t: np.ndarray, U: np.ndarray, k: int, reference: float, margin: float) -> tuple[int, int] | None:
@@ -129,6 +132,8 @@ def _swell(t: np.ndarray, U: np.ndarray, k: int, reference: float, margin: float
     if not back.any():
         return None
     end = first + int(np.argmax(back))
+    near = np.flatnonzero(U[:first] <= (1 + margin / 10) * reference)
+    first = int(near[-1]) + 1 if len(near) else first
     landed = float(np.median(U[end : end + FEWEST_BEFORE])) >= (1 - margin) * reference
     return (first, end) if landed or t[end] - t[first] <= STEADY else None
 
@@ -231,7 +236,7 @@ def _no_such_dip(record: Record, start: int, end: int) -> str:
         if np.count_nonzero(unbalanced) * record.step > UNCLEARED:
             share = float(np.median(record.U2[start:end][unbalanced] / inside[unbalanced]))
             return (
-                f"U2 is {100 * share:.2g} % of U for {np.count_nonzero(unbalanced) * record.step:.2g} s {when}, longer "
+                f"U2 is {100 * share:.3g} % of U for {np.count_nonzero(unbalanced) * record.step:.2g} s {when}, longer "
                 "than a fault lasts: one pole is open, which is no dip of all phases; choose another event"
             )
     if end == len(U):
@@ -252,7 +257,7 @@ def _unfinished(record: Record, start: int, before: float) -> str:
     lasts = float(t[-1] - t[start])
     if fall <= STEP_AT_MOST and lasts >= STEP_LASTS and level.mean() > 0.8:
         return (
-            f"the voltage falls by {100 * fall:.2g} % at t = {t[start]:g} s and stays there for the {lasts:.2g} s that "
+            f"the voltage falls by {100 * fall:.3g} % at t = {t[start]:g} s and stays there for the {lasts:.2g} s that "
             "are left: a step (a tap changer, or something switched), no dip; choose another event"
         )
     return (
@@ -269,14 +274,14 @@ def _no_dip(record: Record) -> str:
     start = f"{record.where}: no dip found: the voltage starts at {reference:.4g} and falls"
     if fall <= margin:
         sentence = (
-            f"{start} at most {100 * fall:.2g} % below it (t = {t[low]:g} s), but a dip must exceed "
+            f"{start} at most {100 * fall:.3g} % below it (t = {t[low]:g} s), but a dip must exceed "
             f"{100 * SHALLOWEST:g} % and the noise"
-        ) + (f", here {100 * margin:.2g} %" if margin > SHALLOWEST else "")
+        ) + (f", here {100 * margin:.3g} %" if margin > SHALLOWEST else "")
     else:
-        sentence = f"{start} by {100 * fall:.2g} % (t = {t[low]:g} s), but slowly: a ramp, no dip"
+        sentence = f"{start} by {100 * fall:.3g} % (t = {t[low]:g} s), but slowly: a ramp, no dip"
     if rise > margin:
         sentence += (
-            f"; it rises by {100 * rise:.2g} % at t = {t[high]:g} s: a swell is not fitted, and a record that "
+            f"; it rises by {100 * rise:.3g} % at t = {t[high]:g} s: a swell is not fitted, and a record that "
             "starts inside a dip lacks the steady state before it"
         )
     return sentence

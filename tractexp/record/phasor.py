@@ -159,7 +159,7 @@ class Phasors:
     V: np.ndarray  # (K, M) kV, phase to ground; of a single-phase load the voltage it is fed with
     I: np.ndarray  # (K, M) kA, into the load
     f: np.ndarray  # (M,) Hz, at which the (positive-sequence) voltage turns
-    more: Mapping[str, np.ndarray] = field(default_factory=dict)  # (M,) each: P_3 [MW], ..., THD_u, THD_i
+    more: Mapping[str, np.ndarray] = field(default_factory=dict)  # (M,) each: P_3, ..., P_H [MW], THD_u, THD_i
 
     @property
     def V1(self) -> np.ndarray:
@@ -212,8 +212,8 @@ def measure(
 
     One phasor about every `step` seconds: the nearest whole number of samples. `skew` (2 K,) [s] is how much later
     than the time stamp each channel is sampled. `window(rate, nominal)` is what the estimator averages over. With
-    `harmonics`, their powers P_h [MW] and the total distortions THD_u and THD_i come with the phasors. N must span two
-    cycles, and the window, at least; raises `UserError` otherwise.
+    `harmonics`, `more` has their powers P_3, ..., that of all but the fundamental, P_H [MW], and the total distortions
+    THD_u and THD_i. N must span two cycles, and the window, at least; raises `UserError` otherwise.
     """
     n, K, over, every = waves.shape[-1], waves.shape[0] // 2, window(rate, nominal), max(1, round(step * rate))
     needed = max(2 * rate / (SLOWEST * nominal) + 4, 2 * (over.reach + every) + 1)
@@ -236,21 +236,25 @@ def measure(
             X *= np.exp(-2j * np.pi * np.array([1, *harmonics])[:, None, None] * f[here] * skew[:, None])
         found.append((X[0], f[here]))
         if harmonics:
-            seen.append(_distortion(X, over.means(x**2, rate, f, here), harmonics))
+            products = over.means(np.concatenate([x**2, x[:K] * x[K:]]), rate, f, here)
+            seen.append(_distortion(X, products[: 2 * K], products[2 * K :], harmonics))
     X, f = (np.concatenate([part[k] for part in found], axis=-1) for k in (0, 1))
     more = {name: np.concatenate([part[name] for part in seen]) for name in (seen[0] if seen else ())}
     made = Phasors(start + at / rate, X[:K], X[K:], f, more)
     return replace(made, f=_turned(made, rate / every, least))
 
 
-def _distortion(X: np.ndarray, squares: np.ndarray, harmonics: Sequence[int]) -> dict[str, np.ndarray]:
-    """Powers of the harmonics, and the distortion of phasors X (1 + H, 2 K, M) whose waves have these mean squares.
+def _distortion(
+    X: np.ndarray, squares: np.ndarray, power: np.ndarray, harmonics: Sequence[int]
+) -> dict[str, np.ndarray]:
+    """Powers and distortion of phasors X (1 + H, 2 K, M), of waves with these mean `squares` and products (`power`).
 
-    Source: IEEE 1459-2010, 3.1.2.1: THD = sqrt((V/V_1)^2 - 1), which counts whatever is not the fundamental; of
-    three phases together as in its effective values, 3.2.2.
+    Source: IEEE 1459-2010, 3.1.2: P_H = P - P_1 and THD = sqrt((V/V_1)^2 - 1), which count whatever is not the
+    fundamental; of three phases together as in its effective values, 3.2.2.
     """
     K = X.shape[1] // 2
-    made = {f"P_{h}": (V * I.conj()).real.sum(axis=0) for h, V, I in zip(harmonics, X[1:, :K], X[1:, K:], strict=True)}
+    made = {"P_H": power.sum(axis=0) - (X[0, :K] * X[0, K:].conj()).real.sum(axis=0)}
+    made |= {f"P_{h}": (V * I.conj()).real.sum(axis=0) for h, V, I in zip(harmonics, X[1:, :K], X[1:, K:], strict=True)}
     for name, side in (("THD_u", slice(K)), ("THD_i", slice(K, None))):
         one = (np.abs(X[0, side]) ** 2).sum(axis=0)
         rest = np.maximum(squares[side].sum(axis=0) - one, 0.0)

@@ -4,11 +4,15 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from tractexp.errors import UserError
 from tractexp.plugin import Plugin, discover
 from tractexp.record import foreign
+
+if TYPE_CHECKING:
+    from tractexp.record.dips import Dip
+    from tractexp.record.record import Record
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,10 @@ class Reader(Plugin):
     @abstractmethod
     def read(self) -> Events:
         """Read and check everything; raises `UserError` naming the file, the place and the value."""
+
+    def table(self) -> tuple["Record", Sequence["Dip"]] | None:
+        """Of a reader of one table: all of it, and its dips."""
+        return None
 
 
 def reader_of(path: str) -> type[Any]:

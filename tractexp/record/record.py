@@ -204,8 +204,8 @@ class Record:
             )
         if self.step > LONGEST_STEP:
             raise UserError(
-                f"{self.where}: one sample every {self.step:.3g} s is too coarse: a motor answers a dip within 50 to 300 "
-                f"ms, so at least {1 / LONGEST_STEP:g} samples per second are needed; t must be in seconds"
+                f"{self.where}: one sample every {self.step:.3g} s is too coarse: a motor answers a dip within 50 to "
+                f"300 ms, so at least {1 / LONGEST_STEP:g} samples per second are needed; t must be in seconds"
             )
 
     def _check_per_unit(self) -> None:

@@ -15,3 +15,4 @@ from tractexp.recording.recording import Channel as Channel
 from tractexp.recording.recording import Recording as Recording
 from tractexp.recording.recording import Segment as Segment
 from tractexp.recording.recording import Status as Status
+from tractexp.recording.writer import Writer as Writer

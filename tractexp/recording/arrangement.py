@@ -18,7 +18,7 @@ from tractexp.record.direction import at_level, direction
 from tractexp.record.phasor import sequences
 from tractexp.recording.connection import usual
 from tractexp.recording.feeder import Feeder
-from tractexp.recording.label import groups, kind, order
+from tractexp.recording.label import backward, groups, kind, order
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import frequency, nearest_nominal, snapshots
 
@@ -93,6 +93,8 @@ def _lines_by_label(recording: Recording, feeder: Feeder) -> Feeder:
     voltages = tuple(feeder.voltages[told[0].index(k)] for k in range(3))
     names = ", ".join(f"'{recording.channels[i].name}'" for i in voltages)
     why = f"the voltages {names} are line to line, as their labels say: data.connection={_between(feeder)} is used"
+    if backward([recording.channels[i] for i in voltages]):
+        why += ", U21 as V1 - V2 (where it is V2 - V1, the power is the opposite)"
     return replace(feeder, voltages=voltages, connection=_between(feeder), why=(*feeder.why, why))
 
 
@@ -256,7 +258,8 @@ def _sensible(S: complex) -> bool:
 
 
 def _mw(S: complex) -> str:
-    return f"P = {S.real:.3g} MW, Q = {S.imag:.3g} Mvar"
+    P, Q = (0.0 if abs(x) < 1e-6 * abs(S) else x for x in (S.real, S.imag))
+    return f"P = {P:.3g} MW, Q = {Q:.3g} Mvar"
 
 
 def _currents(recording: Recording, feeder: Feeder, seen: _Seen) -> None:

@@ -1,11 +1,11 @@
 """What an estimator plugin must do: say over what window phasors are averaged."""
 
 from abc import abstractmethod
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
-from tractexp.plugin import Plugin
+from tractexp.plugin import Plugin, chosen, discover
 from tractexp.record.phasor import Averager, weighted
 from tractexp.record.window import Window
 
@@ -22,6 +22,7 @@ class Estimator(Plugin):
 
     group: ClassVar[str] = "estimator"
     chosen: ClassVar[bool] = False
+    usual: ClassVar[bool] = False  # taken where none is asked for
 
     @abstractmethod
     def half(self, nominal: float) -> float:
@@ -42,3 +43,9 @@ class Estimator(Plugin):
         at = (np.arange(max(round(2 * half / SEEN), 2)) + 0.5) / max(round(2 * half / SEEN), 2) * 2 * half - half
         weights = self.weight(at, nominal)
         return Window(self.name, at, weights / weights.sum())
+
+
+def estimator_of(given: Any = None) -> Estimator:
+    """The estimator of a setting: a name, a mapping of name and settings, or None for the usual one."""
+    usual = (name for name, cls in sorted(discover()[Estimator.group].items()) if getattr(cls, "usual", False))
+    return chosen(Estimator.group, next(usual) if given is None else given)

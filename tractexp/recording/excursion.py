@@ -1,7 +1,7 @@
 """Where a voltage leaves its sliding reference, and when it is back: IEC 61000-4-30, with finer thresholds.
 
 The standard's 10 % would hide dips that a load answers; here a voltage that leaves its reference by 3 % (positive
-sequence, what models are driven by) or 5 % (any phase, the standard's default for a rapid voltage change) has left.
+sequence, what models are driven by) or 5 % (any phase, as for the standard's rapid voltage changes) has left.
 Hysteresis 2 % of the reference as in the standard, which also gives the reference's time constant, a minute.
 """
 
@@ -12,8 +12,9 @@ import numpy as np
 from tractexp.recording.trace import Trace
 
 LEAVES = 0.03  # of the reference, positive sequence
-LEAVES_PHASE = 0.05  # of the reference, any phase (IEC 61000-4-30:2015, 5.11)
+LEAVES_PHASE = 0.05  # of the reference, any phase (of the 1 to 6 % considered in IEC 61000-4-30:2015, 5.11)
 HYSTERESIS = 0.02  # of the reference (IEC 61000-4-30, 5.4.2)
+DIP = 0.1  # of the reference: what the standard calls a dip or a swell (5.4), over once it is within 8 %
 REGAINED = 0.2  # of the deviation: what may be missing when it counts as over, as in `find_dips`
 SLIDING = 60.0  # s, time constant of the reference (IEC 61000-4-30, 5.4.4)
 NOISE_FACTOR = 6.0  # standard deviations of noise that a deviation must exceed
@@ -89,6 +90,7 @@ def _one(
     side = np.sign(off[row, 0])
     worst = np.maximum.accumulate(np.abs(off).max(axis=0))
     allowed = np.maximum(np.maximum(limits - HYSTERESIS, limits / 3)[:, None], REGAINED * worst)
+    allowed = np.where(worst > DIP, np.maximum(allowed, DIP - HYSTERESIS), allowed)
     inside = (np.abs(off) <= allowed).all(axis=0)
     crossed = (side * off[row] < -limits[row]) & (side * off < 0).any(axis=0)
     back = np.flatnonzero(inside | crossed)
@@ -150,6 +152,8 @@ def _after(
     worse = np.flatnonzero((np.abs(off) > np.abs(off[:, :1]) + limits[:, None]).any(axis=0))
     if len(inside) and (not len(worse) or inside[0] < worse[0]):
         return k + int(inside[0]), reference
+    if len(worse) and worse[0] * trace.step < FLAT:
+        return k + int(worse[0]), reference
     return k, _reference(levels, k, count)
 
 

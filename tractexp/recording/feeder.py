@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.record.phasor import TURN
+from tractexp.recording.connection import usual
 from tractexp.recording.label import Group, groups, kind, residual, words
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import Snapshots, frequency, nearest_nominal, snapshots
@@ -26,7 +27,7 @@ class Feeder:
 
     voltages: tuple[int, ...]
     currents: tuple[int, ...]
-    connection: Any = "three_phase"  # the plugin that makes phase quantities of them: a name, or name and settings
+    connection: Any  # the plugin that makes phase quantities of them: a name, or name and settings
     reverse_current: bool = False  # the recorder counts current out of the load as positive
     name: str = ""
     why: tuple[str, ...] = ()  # what it was recognised by, and what was changed in the order given, one sentence each
@@ -116,17 +117,17 @@ def _feeder(recording: Recording, seen: Snapshots, load: Group, buses: Sequence[
 
 def _connection(load: Group, bus: Group) -> tuple[tuple[int, ...], Any]:
     """(the voltages used, the connection that makes phase quantities of them)."""
-    pairs = [pair for k, pair in enumerate(("ab", "bc", "ca")) if k != bus.missing]
-    phases = "".join(p for k, p in enumerate("abc") if k != load.missing)
-    settings: dict[str, Any] = {"phases": phases} if len(phases) == 2 and phases != "ac" else {}
-    if not bus.pairs:
-        name = "aron" if len(phases) == 2 else "three_phase"
-        return bus.numbers, {"name": name, **settings} if settings else name
-    if len(phases) == 3 and len(pairs) == 3:
-        return bus.numbers, "line_voltages"
-    settings = {"phases": phases} if len(phases) == 2 else {}
-    settings |= {"pairs": pairs} if pairs[:2] != ["ab", "bc"] else {}
-    return bus.numbers[:2], {"name": "two_line_voltages", **settings} if settings else "two_line_voltages"
+    voltages = bus.numbers
+    made = usual(len(voltages), len(load.numbers), bus.pairs)
+    if made is None:  # three line-to-line voltages and two currents: two of them say the same
+        voltages = voltages[:2]
+        made = usual(2, len(load.numbers), bus.pairs)
+    settings: dict[str, Any] = {} if isinstance(made, str) else {**made}
+    if load.missing not in (None, 1):
+        settings["phases"] = "".join(p for k, p in enumerate("abc") if k != load.missing)
+    if bus.missing not in (None, 2):
+        settings["pairs"] = [pair for k, pair in enumerate(("ab", "bc", "ca")) if k != bus.missing]
+    return voltages, {"name": made, **settings} if isinstance(made, str) and settings else settings or made
 
 
 def _by(group: Group) -> str:
@@ -208,7 +209,7 @@ def _single(
         group = Group((i,), False, recording.channels[i].name.strip(), False)
         bus, why = _bus(recording, seen, group, [Group((v,), False, "", False) for v in free])
         said = (f"one current {_names(recording, [i])}", f"one voltage {_names(recording, bus.numbers)}: {why}")
-        made.append(Feeder(bus.numbers, (i,), "single_phase", name=group.name, why=said))
+        made.append(Feeder(bus.numbers, (i,), usual(1, 1), name=group.name, why=said))
     return made
 
 

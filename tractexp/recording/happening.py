@@ -62,7 +62,7 @@ def _happenings(trace: Trace) -> list[Happening]:
     if len(trace.t) < 4:
         return []
     slips = _pole_slips(trace)
-    outside = [e for e in excursions(trace) if not any(_overlap(e, slip) for slip in slips)]
+    outside = [e for e in excursions(trace) if not any(_part(trace, e, slip) for slip in slips)]
     spans = [(kind, part) for e in outside for kind, part in _kinds(trace, e)]
     spans += [("pole slip", slip) for slip in slips]
     spans += _open_alone(trace, spans)
@@ -71,8 +71,10 @@ def _happenings(trace: Trace) -> list[Happening]:
     return [_told(trace, kind, e, [s for _, s in spans]) for kind, e in spans]
 
 
-def _overlap(a: Excursion, b: Excursion) -> bool:
-    return a.start < b.end and a.end > b.start
+def _part(trace: Trace, e: Excursion, slip: Excursion) -> bool:
+    """Whether an excursion is a swing of a pole slip: in it, or a smaller one right beside it."""
+    near = round(SWING_PERIOD[1] / 5 / trace.step) if abs(e.worst) < STEP_AT_MOST else 0
+    return e.start < slip.end + near and e.end > slip.start - near
 
 
 def _kinds(trace: Trace, e: Excursion) -> list[tuple[str, Excursion]]:
@@ -180,6 +182,8 @@ def _pole_slips(trace: Trace) -> list[Excursion]:
         if last - first >= SWINGS:
             half = int(np.diff(lows[first:last]).max()) // 2
             a, b = max(lows[first] - half, 0), min(lows[last - 1] + half + 1, len(U))
+            if found and a - found[-1].end < 2 * half:
+                a = found.pop().start
             found.append(Excursion(a, b, float(U[a:b].min() / level - 1), True, False, False, level))
         first = last
     return found
@@ -226,7 +230,8 @@ def _told(trace: Trace, kind: str, e: Excursion, spans: list[Excursion]) -> Happ
     before = _power(trace, max(first, e.start - count - 1), max(e.start - 1, first))
     after = _power(trace, min(e.end + 1, stop), min(e.end + 1 + count // 2, stop))
     inside = slice(e.start, max(e.end, e.start + 1))
-    U2 = trace.U2[inside]
+    edge = round(trace.cycle / trace.step)  # where a window holds two states, whose difference looks unbalanced
+    U2 = trace.U2[inside][edge : -edge or None] if e.end - e.start > 3 * edge else trace.U2[inside]
     depth = -e.worst if e.settled else 1 - _extreme(trace.U[inside], e.worst) / e.reference
     last = min(e.end, len(trace.t) - 1)
     worth, why = _worth(trace, kind, e, depth, first, before)
@@ -257,7 +262,7 @@ def _worth(
     lowest = (
         (trace.phases[:, e.start : e.end] / np.maximum(e.reference, 1e-12)).min() if len(trace.phases) else 1 - depth
     )
-    size = f"the positive sequence falls by {100 * depth:.2g} %, the lowest phase to {100 * lowest:.2g} %"
+    size = f"the positive sequence falls by {100 * depth:.3g} %, the lowest phase to {100 * lowest:.3g} %"
     if lead < FEWEST_BEFORE * 1e-3 or e.start - first < 2:
         return False, f"{size}, but only {1000 * lead:.0f} ms of steady state come before it"
     if not e.cleared:

@@ -88,23 +88,30 @@ def groups(channels: Mapping[int, Channel]) -> list[Group]:
 
 
 def order(channels: Sequence[Channel]) -> tuple[tuple[int, ...], bool] | None:
-    """Which phase (0, 1, 2) each channel is labelled as, and whether they are line to line; None: not told."""
+    """Which phase (0, 1, 2) each channel is labelled as, and whether they are line to line; None: not told.
+
+    What the file's phases say comes first, then what the names share.
+    """
+    told = [phase(c) for c in channels]
+    for pairs, reading in ((False, "abc".find), (True, lambda mark: PLACE.get(mark, -1))):
+        places = tuple(reading(mark) for mark in told)
+        if all(len(mark) == 1 + pairs for mark in told) and len(set(places)) == len(places):
+            return places, pairs
     for counters in (True, False):
         texts = [plain(c.name) if counters else COUNTER.sub("", plain(c.name)) for c in channels]
         read = [{m[:3]: m[3:] for m in _marks(text)} for text in texts]
         shared = set.intersection(*(set(each) for each in read))
-        told = [(max(r[s][1] for r in read), tuple(r[s][0] for r in read), s[2]) for s in shared]
-        told = [each for each in told if len(set(each[1])) == len(channels)]
-        if told:
-            _, places, pairs = max(told)
+        found = [(max(r[s][1] for r in read), tuple(r[s][0] for r in read), s[2]) for s in shared]
+        found = [each for each in found if len(set(each[1])) == len(channels)]
+        if found:
+            _, places, pairs = max(found)
             return places, pairs
-    marks = [phase(c) for c in channels]
-    if all(len(m) == 1 for m in marks) and len(set(marks)) == len(marks):
-        return tuple("abc".index(m) for m in marks), False
-    pairs = [PLACE.get(m) for m in marks]
-    if None not in pairs and len(set(pairs)) == len(pairs):
-        return tuple(p for p in pairs if p is not None), True
     return None
+
+
+def backward(channels: Sequence[Channel]) -> bool:
+    """Whether the names of line-to-line voltages count down: U21, BA."""
+    return all(any(key.endswith("-") for key, *_ in _marks(plain(f"{c.name}"))) for c in channels)
 
 
 def _by_name(channels: Mapping[int, Channel], full: bool, counters: bool, size: int) -> list[Group]:
@@ -131,9 +138,8 @@ def _by_name(channels: Mapping[int, Channel], full: bool, counters: bool, size: 
                 continue
             missing = None if size == 3 else next(k for k in range(3) if numbers[k] is None)
             used |= set(have)
-            made.append(
-                Group(tuple(have), label[2], _shared([channels[n] for n in have]), worth[label] >= SURE, missing)
-            )
+            pairs = label[2] or all(len(phase(channels[n])) == 2 for n in have)
+            made.append(Group(tuple(have), pairs, _shared([channels[n] for n in have]), worth[label] >= SURE, missing))
     return made
 
 

@@ -37,7 +37,7 @@ class Chosen:
 class Mapped:
     """The columns of a table by key, and what kind of table they make."""
 
-    kind: str  # powers, phasors, waveforms
+    kind: str  # powers, phasors, waves
     columns: Mapping[str, Chosen]
     notes: tuple[str, ...]
 
@@ -168,21 +168,21 @@ def _kind(table: Table, options: Mapping[str, Any], given: Iterable[str]) -> tup
     made: dict[str, list[str]] = {}
     wave = _waveform(options)
     if wave and (not _powers(options) or (_has(keys, "P") and _oscillates(table, options, wave))):
-        made["waveforms"] = wave
+        made["waves"] = wave
     if powers := _powers(options):
         made["powers"] = powers
     if phasors := _phasors(options):
         made["phasors"] = phasors
-    order = [kind for kind in ("phasors", "waveforms", "powers") if kind in made]
-    if "powers" in made and not ("waveforms" in made and _oscillates(table, options, wave)):
+    order = [kind for kind in ("phasors", "waves", "powers") if kind in made]
+    if "powers" in made and not ("waves" in made and _oscillates(table, options, wave)):
         order.remove("powers")
         order.insert(0, "powers")
     for kind in order:
         if asked <= {"t", *made[kind]} and "t" in keys:
-            if kind == "waveforms" and not _oscillates(table, options, wave):
+            if kind == "waves" and not _oscillates(table, options, wave):
                 raise UserError(
-                    f"{table.source}: the columns {_named(options, wave)} hold magnitudes without angles, and there are "
-                    "none of P and Q: the load's power cannot be told from them; add P and Q, or the angles"
+                    f"{table.source}: the columns {_named(options, wave)} hold magnitudes without angles, and "
+                    "there are none of P and Q: the load's power cannot be told from them; add P and Q, or the angles"
                 )
             return kind, ["t", *made[kind]]
     raise UserError(_lacking(table, options, made))

@@ -9,6 +9,7 @@ import numpy as np
 from tractexp.errors import UserError
 from tractexp.plugin import chosen
 from tractexp.record.phasor import Phasors, measure
+from tractexp.recording.estimator import estimator_of
 from tractexp.recording.feeder import Feeder
 from tractexp.recording.recording import Recording, Segment
 
@@ -70,11 +71,11 @@ def phasors_of(
     recording: Recording,
     feeder: Feeder,
     segment: Segment,
-    estimator: Any = "one_cycle",
+    estimator: Any = None,
     skew: bool = False,
     harmonics: Sequence[int] = (),
 ) -> Phasors:
-    """The phasors of a feeder within one segment, by an estimator: its name, or a mapping of name and settings.
+    """The phasors of a feeder within one segment, by an estimator: its name, or name and settings; None: the usual one.
 
     `skew` corrects what the file says of late channels; `harmonics` are measured besides the fundamental. Raises
     `UserError` for a segment that is too short, and for harmonics the sampling cannot show.
@@ -87,7 +88,7 @@ def phasors_of(
     try:
         return measure(
             waves, segment.rate, recording.frequency, segment.start, skew=waves.late if skew else None,
-            window=chosen("estimator", estimator).averager, harmonics=harmonics,
+            window=estimator_of(estimator).averager, harmonics=harmonics,
         )  # fmt: skip
     except UserError as error:
         raise UserError(f"{recording.source}: segment from {segment.start:.3f} s: {error}") from error

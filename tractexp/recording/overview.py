@@ -9,7 +9,7 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.plugin import build
-from tractexp.record import Event, Record, detect
+from tractexp.record import Event, Record, detect, find_dips
 from tractexp.record.dips import Dip
 from tractexp.record.phasor import Phasors
 from tractexp.recording.connection import usual
@@ -61,6 +61,11 @@ class Sight:
             return None
         return {**self.settings, **({"train": self.dips[:1], "validate": self.dips[1:]} if self.dips else {})}
 
+    @property
+    def per_unit(self) -> bool:
+        """Whether nothing says what one per unit is: then U, P and Q are per unit, not in kV, MW and Mvar."""
+        return self.record is not None and self.record.base.voltage == self.record.base.power == 1
+
     def powers(self) -> tuple[float, float, float] | None:
         """Voltage [kV], P [MW] and Q [Mvar] at the beginning, before anything happened; None where nothing is known."""
         if self.record is not None:
@@ -107,8 +112,11 @@ def view_of(source: str, node: Mapping[str, Any]) -> View:
     """One file, looked at by the reader that `node` chooses. Raises `UserError` where it cannot be read."""
     reader = build("data", node)
     if not isinstance(reader, WaveformReader):
+        table = reader.table()
+        if table is not None:
+            return View(source, node, [sight_of(*table)])
         read = reader.read()
-        return View(source, node, [sight_of(record, {}) for record in (*read.train, *read.validate)])
+        return View(source, node, [sight_of(record) for record in (*read.train, *read.validate)])
     recording = reader.opened()
     if reader.voltages or reader.currents:
         return View(source, node, [sight(reader, recording, reader.feeder(recording))], recording)
@@ -137,46 +145,59 @@ def sight(reader: WaveformReader, recording: Recording, feeder: Feeder) -> Sight
             continue
         phasors.append(measured)
         found += happenings(waves, segment.rate, segment.start, recording.frequency, measured)
-    seen = _numbered(reader, feeder, phasors, recording.frequency, found)
+    dips, refused = [], ""
+    try:
+        dips = reader.dips(feeder, phasors, recording.frequency) if phasors else []
+    except UserError as error:
+        refused = str(error)
+    seen = _numbered(found, dips, reader.path, refused)
     return replace(made, phasors=tuple(phasors), seen=tuple(seen), said=tuple(said))
 
 
-def sight_of(record: Record, settings: Mapping[str, Any]) -> Sight:
-    """The load of a record, looked at; `settings` are those by which a reader reads it."""
-    found = happenings_of(record)
-    try:
-        event, refused = detect(record.check()), ""
-    except UserError as error:
-        event, refused = None, str(error)
-    seen = []
-    for what in found:
-        own = event if event is not None and _common(what, event.t_start, event.t_end) > 0 else None
-        seen.append(Seen(what, None, own, _why(what, own, refused or "the reader takes another dip of this record")))
-    return Sight(record.name, tuple(seen), record=record, settings=settings)
+def sight_of(record: Record, dips: Sequence[Dip] | None = None) -> Sight:
+    """The load of a record, looked at; `dips` are those that a reader makes of it.
+
+    Without them the record is what would be fitted, and its dips have no numbers.
+    """
+    power = record.base.power
+    found = [
+        replace(what, before=(power * what.before[0], power * what.before[1]),
+                after=(power * what.after[0], power * what.after[1]))
+        for what in happenings_of(record)
+    ]  # fmt: skip
+    seen = list(_numbered(found, _own(record) if dips is None else dips, record.source))
+    if dips is None:
+        seen = [replace(each, dip=None) for each in seen]
+    return Sight(record.name, tuple(seen), record=record)
 
 
-def _numbered(
-    reader: WaveformReader,
-    feeder: Feeder,
-    phasors: Sequence[Phasors],
-    frequency: float,
-    found: Sequence[Happening],
-) -> Iterator[Seen]:
+def _own(record: Record) -> list[Dip]:
+    """The dips of a record that is fitted as it is: its first is the one that is meant."""
+    later, t = UserError("another dip of the record comes first, and is the one that is fitted"), record.t
+    return [
+        Dip(number, float(t[a]), float(t[min(b, record.samples - 1)]), record if number == 1 else later)
+        for number, (a, b) in enumerate(find_dips(t, record.U), 1)
+    ]
+
+
+def _numbered(found: Sequence[Happening], dips: Sequence[Dip], source: str, refused: str = "") -> Iterator[Seen]:
     """What happened, with the dip that the reader makes of it."""
-    refused, dips = "", []
-    try:
-        if phasors:
-            dips = reader.dips(feeder, phasors, frequency)
-    except UserError as error:
-        refused = str(error)
-    numbers, tried = _numbers(found, dips), {dip.number: dip.made for dip in dips}
-    for what, number in zip(found, numbers, strict=True):
-        made = tried.get(number) if number else None
-        event = detect(made) if isinstance(made, Record) else None
-        why = (str(made) if made else refused).removeprefix(f"{reader.path} dip {number}: ")
+    tried = {dip.number: dip.made for dip in dips}
+    for what, number in zip(found, _numbers(found, dips), strict=True):
+        event, why = _event(tried.get(number) if number else None, refused)
         if event is not None and abs(event.t_start - what.start) > APART:
             why, event = f"the reader's dip {number} begins at {event.t_start:.3f} s, with something else", None
-        yield Seen(what, number, event, _why(what, event, why or "it is no dip"))
+        yield Seen(what, number, event, _why(what, event, why.removeprefix(f"{source} dip {number}: ")))
+
+
+def _event(made: Record | UserError | None, refused: str) -> tuple[Event | None, str]:
+    """The event of a record, or why there is none."""
+    if not isinstance(made, Record):
+        return None, str(made or refused or "it is no dip")
+    try:
+        return detect(made), ""
+    except UserError as error:
+        return None, str(error)
 
 
 def _numbers(found: Sequence[Happening], dips: Sequence[Dip]) -> list[int | None]:

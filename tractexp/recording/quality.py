@@ -44,8 +44,8 @@ def quality(recording: Recording, number: int, segment: Segment) -> Quality:
     jitter, holes = _stamps(recording, segment)
     gaps = int(np.count_nonzero(~known)) + holes
     step, span = _step(channel, x[known])
-    clipped = _clipped(channel, x, segment)
     f = _frequency(recording, number, segment)
+    clipped = _clipped(channel, x, segment, f or recording.frequency, step)
     offset, level, noise, lag, count, thd = _quiet(x, segment.rate, f)
     colour = _colour(lag, count, noise, step)
     return Quality(
@@ -83,7 +83,7 @@ def _step(channel: Channel, x: np.ndarray) -> tuple[float, float]:
     return (float(steps.min()) if len(steps) else 0.0), span
 
 
-def _clipped(channel: Channel, x: np.ndarray, segment: Segment) -> float:
+def _clipped(channel: Channel, x: np.ndarray, segment: Segment, f: float, step: float) -> float:
     """Share of samples in runs at a limit: the converter's where it is known, else the greatest and least value."""
     if len(x) < 10 or not np.isfinite(x).any():
         return 0.0
@@ -98,14 +98,14 @@ def _clipped(channel: Channel, x: np.ndarray, segment: Segment) -> float:
         at |= (raw <= least) | (raw >= most)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], at, [False]]).astype(int)))
     lengths = edges[1::2] - edges[::2]
-    usual = _blunt(x, segment, near)
+    usual = _blunt(x, segment.rate / f, near + step)
     return float(lengths[lengths >= max(CLIPPED, usual)].sum() / len(x))
 
 
-def _blunt(x: np.ndarray, segment: Segment, near: float) -> int:
-    """Samples that a sine's own crest spends within `near` of its peak, and one more."""
+def _blunt(x: np.ndarray, cycle: float, near: float) -> int:
+    """Samples, of so many in a cycle, that a sine's own crest spends within `near` of its peak, and two more."""
     amplitude = max(float(np.nanmax(np.abs(x))), 1e-300)
-    return 2 + int(2 * np.sqrt(2 * near / amplitude) * segment.rate / (2 * np.pi * 50))
+    return 2 + int(2 * np.sqrt(2 * near / amplitude) * cycle / (2 * np.pi))
 
 
 def _frequency(recording: Recording, number: int, segment: Segment) -> float | None:

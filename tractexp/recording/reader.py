@@ -13,6 +13,7 @@ from tractexp.record.dips import Dip, check_numbers, chosen, level, numbered
 from tractexp.record.phasor import Phasors
 from tractexp.recording.arrangement import arranged, tuned
 from tractexp.recording.connection import usual
+from tractexp.recording.estimator import estimator_of
 from tractexp.recording.feeder import Feeder, propose
 from tractexp.recording.label import order
 from tractexp.recording.measure import phasors_of
@@ -30,7 +31,7 @@ class WaveformReader(Reader):
     voltages: list[Any] = field(default_factory=list)  # channels in the order a, b, c: numbers from 0, or names
     currents: list[Any] = field(default_factory=list)  # channels, counted positive into the load
     connection: Any = None  # how the channels are connected, a name or name and settings; null: by how many they are
-    estimator: Any = "one_cycle"  # of the phasors, a name or name and settings
+    estimator: Any = None  # of the phasors, a name or name and settings; null: one cycle
     harmonics: list[int] = field(default_factory=list)  # whose powers P_h, with THD_u and THD_i, the record holds
     train: list[int] | None = None  # dips to fit; null: the first that can be used
     validate: list[int] | None = None  # dips held out; null: every other one that can be used
@@ -93,7 +94,7 @@ class WaveformReader(Reader):
             base=Base(frequency=frequency),
             source=self.path,
             notes=plugin.chosen("connection", feeder.connection).notes,
-            window=plugin.chosen("estimator", self.estimator).window(frequency),
+            window=estimator_of(self.estimator).window(frequency),
             more=phasors.more,
         )
 
@@ -151,7 +152,7 @@ class WaveformReader(Reader):
         return [phasors_of(recording, feeder, segment, *settings) for segment in recording.waveforms()]
 
     def _notes(self, recording: Recording, feeder: Feeder, dips: Sequence[Dip]) -> tuple[str, ...]:
-        kind = plugin.chosen("estimator", self.estimator).name.replace("_", "-")
+        kind = estimator_of(self.estimator).name.replace("_", "-")
         steps = [dip.made.step for dip in dips if isinstance(dip.made, Record)]
         every = f" every {1000 * steps[0]:.3g} ms" if steps else ""
         notes = [f"{kind} phasors{every}, {counted(len(dips), 'dip')} found", *recording.notes, *feeder.why]

@@ -20,7 +20,8 @@ SPREADSHEETS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")  # how .xlsx, .ods and .xls 
 PARQUET = b"PAR1"
 FOREIGN = {  # how files begin that are no table, whatever they are called
     b"%PDF": "a PDF file", b"\x89PNG": "a picture", b"\x1f\x8b": "compressed; unpack it first", b"{": "JSON",
-    b"\x89HDF": "an HDF5 file", b"SQLite": "a database", b"<": "XML or HTML; save the table as CSV", b"MATLAB": "a MATLAB file",
+    b"\x89HDF": "an HDF5 file", b"SQLite": "a database", b"<": "XML or HTML; save the table as CSV",
+    b"MATLAB": "a MATLAB file",
 }  # fmt: skip
 
 
@@ -166,7 +167,7 @@ def located(path: str) -> tuple[Any, str]:
     package, _, name = path.removeprefix(PACKAGE).partition("/")
     try:
         return importlib.resources.files(package), name
-    except (ImportError, ValueError) as error:
+    except (ImportError, ValueError, TypeError) as error:
         raise UserError(f"{path}: there is no installed package '{package}'") from error
 
 

@@ -1,5 +1,6 @@
 """What a table holds, made of its columns: a load's powers against time, or a recording of waveforms."""
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -53,11 +54,11 @@ class Tabular:
 
 
 def kind_of(path: str) -> str:
-    """What the table in a file holds: "powers", "phasors" or "waveforms"; "powers" where that cannot be told."""
+    """What the table in a file holds: "powers", "phasors" or "waves"; "powers" where that cannot be told."""
     try:
         told = beside(path)
         if told.recording is not None:
-            return "waveforms"
+            return "waves"
         return mapped(open_table(path, Form(), whole=False), told.columns, told.units).kind
     except UserError:
         return "powers"  # whose reader says what is wrong
@@ -84,8 +85,8 @@ def powers(table: Table, found: Mapped, nominal: float, reverse: bool, kilovolts
         made = _of_powers(table, found, kilovolts)
     else:
         raise UserError(
-            f"{table.source} holds waveforms ({', '.join(c.told for c in found.columns.values())}), not powers; read it "
-            f"as such: data=waveforms data.path={table.source}"
+            f"{table.source} holds waveforms ({', '.join(c.told for c in found.columns.values())}), not powers; read "
+            f"it as such: data=waveforms data.path={table.source}"
         )
     if reverse:
         made.columns["P"], made.columns["Q"] = -made.columns["P"], -made.columns["Q"]
@@ -227,20 +228,16 @@ def recording(table: Table, found: Mapped, nominal: float) -> Recording:
 
     Raises `UserError` for a table of something else, and for times that are not even within a segment.
     """
-    if found.kind != "waveforms":
+    if found.kind != "waves":
         raise UserError(
             f"{table.source} holds {found.kind}, not waveforms; read it as such: data=csv data.path={table.source}"
         )
-    numbers = {
-        k: "number" for k, name in enumerate(table.heading.names)
-        if name and k != found.columns["t"].number and all(
-            k < len(row) and (is_number(row[k]) or is_number(row[k], ",")) for row in table.sample[:20]
-        )
-    }  # fmt: skip
     t = found.columns["t"]
+    named = [k for k, name in enumerate(table.heading.names) if name and k != t.number]
+    numbers = {k: "number" for k in named if _numeric(table, k)}
     cells = table.read({t.number: "time", **numbers})
     for k in numbers:
-        wild = np.abs(cells[k].values) > HUGE
+        wild = ~(np.abs(cells[k].values) <= HUGE)
         if wild.any():
             i = int(np.argmax(wild))
             raise table.refuse(
@@ -258,6 +255,12 @@ def recording(table: Table, found: Mapped, nominal: float) -> Recording:
     )
 
 
+def _numeric(table: Table, number: int) -> bool:
+    """Whether a column begins with numbers, and not with words."""
+    cells = [row[number] if number < len(row) else "" for row in table.sample[:20]]
+    return all(is_number(cell) or is_number(cell, ",") for cell in cells)
+
+
 def _channel(table: Table, found: Mapped, number: int, values: np.ndarray, key: str) -> Channel:
     """A column as a channel; what it measures is told by its key, else by its name."""
     name, unit = table.label(number), table.heading.units[number]
@@ -271,18 +274,21 @@ def _channel(table: Table, found: Mapped, number: int, values: np.ndarray, key: 
 
 def _segments(table: Table, t: np.ndarray) -> tuple[list[Segment], list[str]]:
     """Runs of even sampling; a note on jitter and on gaps."""
+    if not np.isfinite(t).all():
+        i = int(np.argmin(np.isfinite(t)))
+        raise UserError(f"{table.source}: {table.place(i)}: t = {t[i]} is not a finite number")
     steps = np.diff(t)
     if len(t) < 3 or (steps <= 0).any():
         i = int(np.argmax(steps <= 0)) + 1 if len(t) > 2 else 0
         raise UserError(
-            f"{table.source}: {table.place(i)}: time does not increase: t = {t[i]:.9g} s after {t[i - 1]:.9g} s; give the"
-            " unit of time (data.units={t: ms}), or more digits"
+            f"{table.source}: {table.place(i)}: time does not increase: t = {t[i]:.9g} s after {t[i - 1]:.9g} s; give "
+            "the unit of time (data.units={t: ms}), or more digits"
             if len(t) > 2 else f"{table.source}: only {len(t)} rows; waveforms need more"
         )  # fmt: skip
     usual = float(np.median(steps))
     breaks = [0, *(np.flatnonzero(steps > GAP * usual) + 1).tolist(), len(t)]
     made, widest = [], 0.0
-    for first, stop in zip(breaks, breaks[1:], strict=False):
+    for first, stop in itertools.pairwise(breaks):
         if stop - first < 3:
             continue
         grid = np.linspace(t[first], t[stop - 1], stop - first)
@@ -291,8 +297,8 @@ def _segments(table: Table, t: np.ndarray) -> tuple[list[Segment], list[str]]:
         if off.max() > 0.5:
             i = first + int(off.argmax())
             raise UserError(
-                f"{table.source}: {table.place(i)}: sampling is not uniform: t = {t[i]:.9g} s is {off.max():.2g} steps off"
-                " the uniform grid; waveforms must be sampled evenly"
+                f"{table.source}: {table.place(i)}: sampling is not uniform: t = {t[i]:.9g} s is {off.max():.2g} steps "
+                "off the uniform grid; waveforms must be sampled evenly"
             )
         widest = max(widest, float(off.max()))
         made.append(Segment(first, stop, 1 / step, float(t[first] - t[0])))

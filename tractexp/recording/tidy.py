@@ -72,14 +72,16 @@ def restored(path: str, told: Mapping[str, Any]) -> Recording:
         channels, status = told["channels"], told["status"]
         if len(table.heading.names) != 1 + len(channels) + len(status):
             raise UserError(
-                f"{path}: has {len(table.heading.names)} columns where its sidecar tells of t, {len(channels)} channels "
-                f"and {len(status)} status channels; convert the recording again, or remove the sidecar"
+                f"{path}: has {len(table.heading.names)} columns where its sidecar tells of t, {len(channels)} "
+                f"channels and {len(status)} status channels; convert the recording again, or remove the sidecar"
             )
         cells = table.read({k: "gaps" for k in range(1, len(table.heading.names))})
+        segments = [Segment(**one) for one in told["segments"]]
+        _check_segments(path, segments, len(cells[1].values))
         return Recording(
             path,
             [_channel(one, cells[k].values) for k, one in enumerate(channels, 1)],
-            [Segment(**one) for one in told["segments"]],
+            segments,
             float(told["frequency"]),
             told["station"],
             told["device"],
@@ -92,8 +94,22 @@ def restored(path: str, told: Mapping[str, Any]) -> Recording:
             list(told["notes"]),
             {key: _extra(value) for key, value in told["extra"].items()},
         )  # fmt: skip
-    except (KeyError, TypeError, ValueError) as error:
-        raise UserError(f"{path}: its sidecar is not as task=convert writes it ({error}); remove it") from error
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise UserError(f"{path}: its sidecar is not as task=convert writes it; remove it, or convert again") from error
+
+
+def _check_segments(path: str, segments: Sequence[Segment], rows: int) -> None:
+    """Raise `UserError` where segments are not those of a table with so many rows."""
+    edges = [0]
+    for one in segments:
+        if not (edges[-1] <= one.first < one.stop <= rows and 0 < one.rate < np.inf and np.isfinite(one.start)):
+            raise UserError(
+                f"{path}: has {rows} rows, and its sidecar of samples {one.first} to {one.stop} at {one.rate} Hz; "
+                "convert the recording again, or remove the sidecar"
+            )
+        edges.append(one.stop)
+    if len(edges) == 1:
+        raise UserError(f"{path}: its sidecar tells of no segment of samples; convert the recording again")
 
 
 def _extra(value: Any) -> Any:
@@ -161,6 +177,8 @@ def _channel(told: Mapping[str, Any], values: np.ndarray) -> Channel:
     if kind.kind in "iu":
         missing = known["missing"]
         raw = np.where(np.isnan(raw), 0 if missing is None else missing, np.rint(raw))
+        if not (np.iinfo(kind).min <= raw.min() and raw.max() <= np.iinfo(kind).max):
+            raise ValueError(f"{told['name']} leaves the range of its converter")
     return Channel(raw=raw.astype(kind), limits=limits and (limits[0], limits[1]), **known)
 
 

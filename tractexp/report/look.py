@@ -26,7 +26,7 @@ BOUND = 0.1  # of the nominal frequency: what lies further off is that of a dead
 SHADES = {"dip": PALETTE[5], "swell": PALETTE[4], "interruption": PALETTE[3]}
 CAPTION = (
     "Waveforms, primary values; RMS of one cycle every half cycle (IEC 61000-4-30); symmetrical components and powers"
-    " of one-cycle phasors, P and Q positive when consumed. Drag to zoom, double-click for the whole."
+    " of one-cycle phasors, P [MW] and Q [Mvar] positive when consumed. Drag to zoom, double-click for the whole."
 )
 
 
@@ -43,7 +43,7 @@ def page(path: Path, views: Sequence[View], content: Mapping[str, Any]) -> Path:
             made.items(known["notes"])
         if len(known["feeders"]) > 1:
             made.table(
-                ["load", "connected as", "channels", "U [kV]", "P [MW]", "Q [Mvar]", "events", "worth fitting"],
+                ["load", "connected as", "channels", "U", "P", "Q", "events", "worth fitting"],
                 [_summary(f) for f in known["feeders"]], words=(1, 2), caption="At the beginning; P and Q consumed.",
             )  # fmt: skip
         for k, (shown, feeder) in enumerate(zip(view.sights, known["feeders"], strict=True)):
@@ -99,7 +99,7 @@ def _channel(c: Mapping[str, Any]) -> list[str]:
 
 def _summary(known: Mapping[str, Any]) -> list[str]:
     """A load in one row."""
-    size = [figure(known[key]) for key in ("U", "P", "Q")]
+    size = [figure(known[key], 4, unit) for key, unit in zip("UPQ", known["units"], strict=True)]
     channels = ", ".join(map(str, (*known["voltages"], *known["currents"])))
     worth = [e for e in known["events"] if e["worth"]]
     return [known["name"], known["connection"], channels, *size, str(len(known["events"])), str(len(worth))]
@@ -110,8 +110,9 @@ def _load(made: Page, view: View, shown: Sight, known: Mapping[str, Any], folded
     made.heading(known["name"])
     made.items([*_described(known), *known["why"], *known["said"]])
     if known["events"]:
+        _, P, Q = known["units"]
         made.table(
-            ["dip", "kind", "starts [s]", "lasts [ms]", "depth", "jump", "U2/U1", "P [MW]", "Q [Mvar]", "fit it?"],
+            ["dip", "kind", "starts [s]", "lasts [ms]", "depth", "jump", "U2/U1", f"P [{P}]", f"Q [{Q}]", "fit it?"],
             [_event(e) for e in known["events"]], words=(1, 9),
             caption="Depth, U2 and jump against the voltage before. P and Q before and after. Dips are numbered as"
             " data.train and data.validate take them.",
@@ -146,7 +147,9 @@ def _described(known: Mapping[str, Any]) -> list[str]:
         reverse = ", current reversed" * known["reverse_current"]
         told.append(f"Channels: {named}; connected as {known['connection']}{reverse}.")
     if known["U"] is not None:
-        told.append(f"At first {figure(known['U'])} kV, {figure(known['P'])} MW, {figure(known['Q'])} Mvar.")
+        told.append(
+            f"At first {', '.join(figure(known[k], 4, u) for k, u in zip('UPQ', known['units'], strict=True))}."
+        )
     if known["sum_V"] is not None:
         current = "" if known["sum_I"] is None else f", the currents to {known['sum_I']:.2%}"
         told.append(f"The voltages of the three phases sum to {known['sum_V']:.2%} of one{current}.")
@@ -206,9 +209,9 @@ def _of_waves(recording: Recording, shown: Sight, every: int = 1, span: tuple[fl
     """All panels of a load; `every` so many samples become one, within the times `span` [s]."""
     assert shown.feeder is not None
     single = len(shown.phasors[0].V) == 1
-    sequences = "|U|, |I| [kV, kA]" if single else "U1, U2, U0 [kV]"
-    panels = ["u [kV]", "i [kA]", "U RMS [kV]", "I RMS [kA]", sequences, "P, Q [MW, Mvar]", "f [Hz]"]
-    chart = Chart("t [s]", panels, heights=(1.4, 1.4, 1, 1, 1, 1.2, 0.8), pixels=1250)
+    sequences = "U, I [kV, kA]" if single else "U seq. [kV]"
+    panels = ["u [kV]", "i [kA]", "U RMS [kV]", "I RMS [kA]", sequences, "P, Q [MW]", "f [Hz]"]
+    chart = Chart("t [s]", panels, heights=(1.3, 1.3, 1, 1, 1, 1.2, 0.7), pixels=950)
     for segment in recording.waveforms():
         _waves(chart, recording, shown, segment, every, span)
     for p in shown.phasors:

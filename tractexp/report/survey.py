@@ -39,7 +39,16 @@ COLUMNS = (  # key, heading, kind of cell, digits
     ("load", "load", "words", 0), ("start", "starts [s]", "number", 3), ("when", "when", "words", 0),
     ("rate", "rate [Hz]", "figure", 5), ("why", "why", "why", 0),
 )  # fmt: skip
-KEPT = ("file", "station", "P_before", "P_after", "Q_before", "Q_after", "command")  # of a row, beside the columns
+KEPT = (
+    "file",
+    "station",
+    "P_before",
+    "P_after",
+    "Q_before",
+    "Q_after",
+    "unit",
+    "command",
+)  # of a row, beside the columns
 WORK = """
 const {columns, rows, atOnce, colors} = JSON.parse(document.getElementById("rows").textContent);
 const $ = id => document.getElementById(id);
@@ -73,7 +82,8 @@ const cell = (row, [name, , kind, digits]) => {
   if (kind === "pair") {
     const figure = v => v === null ? "?" : v && Math.abs(v) < 1e-3 ? v.toExponential(1) : Number(v.toPrecision(digits));
     const [before, after] = [row[`${name}_before`], row[`${name}_after`]];
-    return `<td>${before === null && after === null ? "" : `${figure(before)} \u2192 ${figure(after)}`}</td>`;
+    const unit = row.unit === "pu" ? " pu" : "";
+    return `<td>${before === null && after === null ? "" : `${figure(before)} \u2192 ${figure(after)}${unit}`}</td>`;
   }
   if (kind === "words") return `<td class="words">${safe(value ?? "")}</td>`;
   if (value === null || value === undefined) return "<td></td>";

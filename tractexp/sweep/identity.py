@@ -37,7 +37,7 @@ def _file(name: str) -> str:
         package, _, rest = name.removeprefix(PACKAGE).partition("/")
         try:
             name = str(importlib.resources.files(package) / rest)
-        except (ImportError, ValueError):
+        except (ImportError, ValueError, TypeError):
             return ""
     path = Path(name)
     try:

@@ -12,13 +12,14 @@ class Convert(Task):
     reads = ("data",)
     instead = {"model": "a conversion has no model"}
 
-    to: str = "parquet"  # parquet, csv (with a sidecar in JSON), comtrade (.cfg and .dat), cff
+    to: str = ""  # parquet (where none is named), csv (both with a sidecar in JSON), comtrade (.cfg and .dat), cff
     what: str | None = None  # recording or events; null: the recording, where the file holds waveforms
 
     def run(self, job: Job) -> None:
-        from tractexp.api.convert import converted
+        from tractexp.api.convert import parts_of, writer_of, written
 
-        made = converted(build("data", job.config["data"]), self.to, self.what, job.folder)
+        writer = writer_of(self.to)
+        made = written(parts_of(build("data", job.config["data"]), writer, self.what), writer, job.folder)
         for sentence in made.said:
             say(sentence)
         for path in made.files:

@@ -71,7 +71,7 @@ def tell(content: Any) -> None:
 
 def _tell_load(feeder: Any) -> None:
     numbers = ", ".join(map(str, (*feeder["voltages"], *feeder["currents"])))
-    told = ", ".join(figure(feeder[k], 4, unit) for k, unit in (("U", "kV"), ("P", "MW"), ("Q", "Mvar")))
+    told = ", ".join(figure(feeder[k], 4, unit) for k, unit in zip("UPQ", feeder["units"], strict=True))
     channels = f" (channels {numbers}, {feeder['connection']})" if numbers else ""
     say(f"load {feeder['name']}{channels}: {told or 'nothing measured'}")
     for sentence in (*feeder["why"], *feeder["said"]):
@@ -84,7 +84,8 @@ def _tell_load(feeder: Any) -> None:
              "yes" if e["worth"] else "no"]
             for e in feeder["events"]
         ]  # fmt: skip
-        table(["dip", "kind", "t [s]", "ms", "depth", "jump", "U2", "P [MW]", "Q [Mvar]", "fit it?"], rows)
+        _, P, Q = feeder["units"]
+        table(["dip", "kind", "t [s]", "ms", "depth", "jump", "U2", f"P [{P}]", f"Q [{Q}]", "fit it?"], rows)
         for e in feeder["events"]:
             say(f"  {e['kind']} at {e['start']:.3f} s, {'worth fitting' if e['worth'] else 'not fitted'}: {e['why']}")
     else:

@@ -2,7 +2,8 @@
 
     TestAcme = tractexp.testing.contract("acme_loads")
 
-Each check is a function of a plugin class in `loads`, `searches` and `readers`, and says in a sentence what fails.
+Each check is a function of a plugin class in `loads`, `searches`, `readers` and `channels`, and says in a sentence what
+fails.
 """
 
 import functools
@@ -12,9 +13,9 @@ from typing import Any
 
 from tractexp.errors import UserError
 from tractexp.plugin import Plugin, discover, import_all
-from tractexp.testing import loads, readers, searches
+from tractexp.testing import channels, loads, readers, searches
 
-SUITES = (*loads.SUITES, searches.SUITE, readers.SUITE)
+SUITES = (*loads.SUITES, searches.SUITE, readers.SUITE, *channels.SUITES)
 
 
 def contract(package: str, samples: Mapping[str, Sequence[Mapping[str, Any]]] | None = None) -> type:

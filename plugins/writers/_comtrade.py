@@ -1,0 +1,19 @@
+"""COMTRADE, in two files or in one."""
+
+from pathlib import Path
+
+from tractexp.record import Record
+from tractexp.recording import Recording, comtrade, tidy
+from tractexp.recording.writer import Writer
+
+
+class _COMTRADE(Writer):
+    """The first data file type that holds the raw values exactly: 16 or 32 bits, or text."""
+
+    waves = True
+
+    def record(self, record: Record, path: Path) -> list[Path]:
+        return self.recording(tidy.recording_of(record), path)
+
+    def recording(self, recording: Recording, path: Path) -> list[Path]:
+        return comtrade.write(recording, path)

@@ -1,0 +1,15 @@
+"""COMTRADE in one file."""
+
+from tractexp.plugin import plugin
+from tractexp_plugins.writers._comtrade import _COMTRADE
+
+
+@plugin
+class CFF(_COMTRADE):
+    """COMTRADE in one file, .cff: the raw values of the source where they are integers, else numbers in full as text.
+
+    Source: IEEE C37.111-2013, section 9.
+    Departures: none.
+    """
+
+    endings = (".cff",)

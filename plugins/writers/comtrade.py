@@ -1,0 +1,15 @@
+"""COMTRADE in two files."""
+
+from tractexp.plugin import plugin
+from tractexp_plugins.writers._comtrade import _COMTRADE
+
+
+@plugin
+class COMTRADE(_COMTRADE):
+    """COMTRADE, .cfg and .dat: the raw values of the source where they are integers, else numbers in full as text.
+
+    Source: IEEE C37.111-2013.
+    Departures: none.
+    """
+
+    endings = (".cfg", ".dat")

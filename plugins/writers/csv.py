@@ -1,0 +1,15 @@
+"""CSV with a sidecar."""
+
+from tractexp.plugin import plugin
+from tractexp_plugins.writers._table import _Table
+
+
+@plugin
+class CSV(_Table):
+    """A tidy CSV table, every number with the digits that give it back, and a sidecar in JSON: units, base, channels.
+
+    Source: RFC 4180.
+    Departures: lines end in a line feed alone.
+    """
+
+    endings = (".csv", ".json")

@@ -1,0 +1,16 @@
+"""Parquet with a sidecar."""
+
+from tractexp.plugin import plugin
+from tractexp_plugins.writers._table import _Table
+
+
+@plugin
+class Parquet(_Table):
+    """A tidy Parquet table, numbers as they are, and a sidecar in JSON: units, base, channels, notes.
+
+    Source: Apache Parquet format 2.6.
+    Departures: none.
+    """
+
+    endings = (".parquet", ".json")
+    usual = True

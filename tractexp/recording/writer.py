@@ -1,0 +1,27 @@
+"""What a writer plugin must do: write a record or a recording in a format that a reader reads."""
+
+from abc import abstractmethod
+from pathlib import Path
+from typing import ClassVar
+
+from tractexp.plugin import Plugin
+from tractexp.record.record import Record
+from tractexp.recording.recording import Recording
+
+
+class Writer(Plugin):
+    """Base of the writers, chosen by `task.to=NAME`. What they write is read again as it was."""
+
+    group: ClassVar[str] = "writer"
+    chosen: ClassVar[bool] = False
+    endings: ClassVar[tuple[str, ...]] = ()  # of the files it writes, the one that a reader is given first
+    usual: ClassVar[bool] = False  # taken where none is named
+    waves: ClassVar[bool] = False  # events of waveforms are written as the waveforms about them
+
+    @abstractmethod
+    def record(self, record: Record, path: Path) -> list[Path]:
+        """Write a record to `path`, with the first ending, and what belongs beside it; returns the files."""
+
+    @abstractmethod
+    def recording(self, recording: Recording, path: Path) -> list[Path]:
+        """The same for a recording."""
