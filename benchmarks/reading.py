@@ -48,7 +48,7 @@ def _spent(work):
 
 def opened(path, short, pipe):
     """Open a record and measure its phasors, after a second of one has been, so that compilation is not counted."""
-    feeder = Feeder((0, 1, 2), (3, 4, 5))
+    feeder = Feeder((0, 1, 2), (3, 4, 5), "three_phase")
     warm = comtrade.load(short)
     phasors_of(warm, feeder, warm.segments[0])
     recording, seconds, megabytes = _spent(lambda: comtrade.load(path))
