@@ -177,12 +177,12 @@ def _parquet(path: str, data: bytes) -> Table:
 
     try:
         made = parquet.read_table(pyarrow.BufferReader(data))
-    except (pyarrow.ArrowException, OSError) as error:
+        names = [str(name) for name in made.column_names]
+        columns = [_arrow(made.column(k)) for k in range(len(names))]
+    except (pyarrow.ArrowException, OSError, ValueError) as error:
         raise UserError(f"{path}: not a whole Parquet file; write it again, or give the table as CSV") from error
-    names = [str(name) for name in made.column_names]
     parted = [split_unit(name) for name in names]
     head = Heading(tuple(name for name, _ in parted), tuple(unit for _, unit in parted), 0, 0)
-    columns = [_arrow(made.column(k)) for k in range(len(names))]
     sample = [list(row) for row in zip(*(c[:200] for c in columns), strict=False)]
     return Rows(path, head, columns.__getitem__, sample, first=1)
 

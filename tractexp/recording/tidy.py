@@ -88,7 +88,7 @@ def restored(path: str, told: Mapping[str, Any]) -> Recording:
             datetime.fromisoformat(told["start"]) if told["start"] else None,
             told["trigger"],
             [
-                Status(**one, raw=cells[k].values.astype(np.int8))
+                Status(**one, raw=(cells[k].values == 1).astype(np.int8))
                 for k, one in enumerate(status, 1 + len(channels))
             ],
             list(told["notes"]),
