@@ -43,13 +43,7 @@ def propose(recording: Recording) -> list[Feeder]:
     waves = {i: c for i, c in enumerate(recording.channels) if c.form == "waveform" and kind(c)}
     volts = [i for i in waves if kind(waves[i]) == "voltage"]
     amps = [i for i in waves if kind(waves[i]) == "current"]
-    f = frequency(recording, volts) or frequency(recording, amps)
-    strange = ""
-    if f is not None and nearest_nominal(f) is None:
-        turning = snapshots(recording, volts, f)
-        if turning is not None and any(turning.pure(i) for i in volts):
-            strange = f"the voltages have {f:.3g} Hz, which is no network's"
-    f = recording.frequency if f is None or nearest_nominal(f) is None else f
+    f, strange = _frequency(recording, volts, amps)
     seen = snapshots(recording, sorted(waves), f)
     if not volts or not amps or seen is None:
         return []
@@ -61,6 +55,16 @@ def propose(recording: Recording) -> list[Feeder]:
     feeders = _kirchhoff(seen, feeders)
     level = max((_size(seen, f.currents) for f in feeders), default=0.0)
     return sorted((_marked(recording, seen, feeder, level, strange) for feeder in feeders), key=lambda f: not f.loaded)
+
+
+def _frequency(recording: Recording, volts: Sequence[int], amps: Sequence[int]) -> tuple[float, str]:
+    """(Hz to look at the channels with, what is said of voltages that have no network's frequency)."""
+    f = frequency(recording, volts) or frequency(recording, amps)
+    if f is None or nearest_nominal(f) is not None:
+        return f or recording.frequency, ""
+    seen = snapshots(recording, volts, f)
+    turns = seen is not None and any(seen.pure(i) for i in volts)
+    return recording.frequency, f"the voltages have {f:.3g} Hz, which is no network's" if turns else ""
 
 
 def _groups(recording: Recording, seen: Snapshots, numbers: Sequence[int]) -> list[Group]:
