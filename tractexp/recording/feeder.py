@@ -185,7 +185,8 @@ def _text(recording: Recording, group: Group) -> set[str]:
 
 def _size(seen: Snapshots, numbers: Sequence[int]) -> float:
     """Magnitude [kV, kA] where it is large: the upper quartile of the mean over the channels."""
-    return float(np.percentile(np.nan_to_num(np.abs(seen.of(numbers))).mean(axis=0), 75))
+    size = np.nan_to_num(np.abs(seen.of(numbers))).mean(axis=0)
+    return float(np.percentile(size, 75)) if len(size) else 0.0
 
 
 def _positive(X: np.ndarray, pairs: bool) -> np.ndarray:
