@@ -105,7 +105,8 @@ def _symmetric(seen: Snapshots, numbers: Sequence[int]) -> tuple[int, ...]:
 
 
 def _unit(x: np.ndarray) -> np.ndarray:
-    return x / np.where(np.abs(x) > 0, np.abs(x), 1)
+    size = np.abs(x)
+    return np.where(size > 0, x, 1) / np.where(size > 0, size, 1)
 
 
 def _fits(load: Group, buses: Sequence[Group]) -> bool:
