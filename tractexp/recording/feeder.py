@@ -43,13 +43,7 @@ def propose(recording: Recording) -> list[Feeder]:
     waves = {i: c for i, c in enumerate(recording.channels) if c.form == "waveform" and kind(c)}
     volts = [i for i in waves if kind(waves[i]) == "voltage"]
     amps = [i for i in waves if kind(waves[i]) == "current"]
-    f = frequency(recording, volts) or frequency(recording, amps)
-    strange = ""
-    if f is not None and nearest_nominal(f) is None:
-        turning = snapshots(recording, volts, f)
-        if turning is not None and any(turning.pure(i) for i in volts):
-            strange = f"the voltages have {f:.3g} Hz, which is no network's"
-    f = recording.frequency if f is None or nearest_nominal(f) is None else f
+    f, strange = _frequency(recording, volts, amps)
     seen = snapshots(recording, sorted(waves), f)
     if not volts or not amps or seen is None:
         return []
@@ -61,6 +55,16 @@ def propose(recording: Recording) -> list[Feeder]:
     feeders = _kirchhoff(seen, feeders)
     level = max((_size(seen, f.currents) for f in feeders), default=0.0)
     return sorted((_marked(recording, seen, feeder, level, strange) for feeder in feeders), key=lambda f: not f.loaded)
+
+
+def _frequency(recording: Recording, volts: Sequence[int], amps: Sequence[int]) -> tuple[float, str]:
+    """(Hz to look at the channels with, what is said of voltages that have no network's frequency)."""
+    f = frequency(recording, volts) or frequency(recording, amps)
+    if f is None or nearest_nominal(f) is not None:
+        return f or recording.frequency, ""
+    seen = snapshots(recording, volts, f)
+    turns = seen is not None and any(seen.pure(i) for i in volts)
+    return recording.frequency, f"the voltages have {f:.3g} Hz, which is no network's" if turns else ""
 
 
 def _groups(recording: Recording, seen: Snapshots, numbers: Sequence[int]) -> list[Group]:
@@ -101,7 +105,8 @@ def _symmetric(seen: Snapshots, numbers: Sequence[int]) -> tuple[int, ...]:
 
 
 def _unit(x: np.ndarray) -> np.ndarray:
-    return x / np.where(np.abs(x) > 0, np.abs(x), 1)
+    size = np.abs(x)
+    return np.where(size > 0, x, 1) / np.where(size > 0, size, 1)
 
 
 def _fits(load: Group, buses: Sequence[Group]) -> bool:
@@ -181,7 +186,8 @@ def _text(recording: Recording, group: Group) -> set[str]:
 
 def _size(seen: Snapshots, numbers: Sequence[int]) -> float:
     """Magnitude [kV, kA] where it is large: the upper quartile of the mean over the channels."""
-    return float(np.percentile(np.nan_to_num(np.abs(seen.of(numbers))).mean(axis=0), 75))
+    size = np.nan_to_num(np.abs(seen.of(numbers))).mean(axis=0)
+    return float(np.percentile(size, 75)) if len(size) else 0.0
 
 
 def _positive(X: np.ndarray, pairs: bool) -> np.ndarray:

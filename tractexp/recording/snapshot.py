@@ -37,10 +37,10 @@ class Snapshots:
         return bool(np.nanmedian(self.rest[k][large] ** 2) <= (1 / PURE - 1) * np.nanmedian(size[large] ** 2))
 
 
-def segments(recording: Recording) -> list[Segment]:
-    """The segments that hold waveforms at any nominal frequency the file may really have; none is no error."""
-    least = FEWEST_PER_CYCLE * recording.frequency
-    return [s for s in recording.segments if s.rate >= least and s.stop - s.first >= 2 * s.rate / recording.frequency]
+def segments(recording: Recording, f: float) -> list[Segment]:
+    """The segments that hold two cycles or more of waveforms of frequency f [Hz]; none is no error."""
+    fast = [s for s in recording.segments if s.rate >= FEWEST_PER_CYCLE * f]
+    return [s for s in fast if s.stop - s.first >= 2 * s.rate / f + 1]
 
 
 def snapshots(recording: Recording, numbers: Sequence[int], frequency: float | None = None) -> Snapshots | None:
@@ -49,7 +49,7 @@ def snapshots(recording: Recording, numbers: Sequence[int], frequency: float | N
     In each the least-squares fit of a mean and a sinusoid of `frequency` [Hz] (by default the nominal one).
     """
     f = frequency or recording.frequency
-    parts = [_windows(recording, numbers, segment, f) for segment in segments(recording)]
+    parts = [_windows(recording, numbers, segment, f) for segment in segments(recording, f)]
     if not parts:
         return None
     t, X, rest = (np.concatenate(each, axis=-1) for each in zip(*parts, strict=True))
