@@ -265,6 +265,11 @@ def _frequency(left: _Lines, header: Header) -> int | None:
             f"{quoted(text)} where the nominal frequency should be; more lines of channels may be there than line 2 "
             "announces, or the frequency is missing",
         )
+    if found == 0 or not text.strip(", "):
+        left.remarks.add(
+            f"the nominal frequency is not told: {header.frequency:g} Hz, unless the voltage shows another", line
+        )
+        found = header.frequency
     if found is None or not FREQUENCY[0] <= found <= FREQUENCY[1]:
         low, high = FREQUENCY
         raise left.refuse(
