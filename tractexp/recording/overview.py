@@ -12,6 +12,7 @@ from tractexp.plugin import build
 from tractexp.record import Event, Record, detect, find_dips
 from tractexp.record.dips import Dip
 from tractexp.record.phasor import Phasors
+from tractexp.recording.arrangement import arranged
 from tractexp.recording.connection import usual
 from tractexp.recording.feeder import Feeder, propose
 from tractexp.recording.happening import Happening, happenings, happenings_of
@@ -126,17 +127,26 @@ def view_of(source: str, node: Mapping[str, Any]) -> View:
 
 def overview(reader: WaveformReader, recording: Recording) -> list[Sight]:
     """The loads of a recording as they are proposed, each with what happened to it; `reader` is that of its file."""
-    return [sight(reader, recording, feeder) for feeder in propose(recording)]
+    found = propose(recording)
+    loaded = any(feeder.loaded for feeder in found)
+    return [sight(reader, recording, feeder, events=feeder.loaded or not loaded) for feeder in found]
 
 
-def sight(reader: WaveformReader, recording: Recording, feeder: Feeder) -> Sight:
-    """One load of a recording, looked at. What cannot be told of it is said, and is no error."""
-    made = Sight(feeder.name or "load", feeder=feeder, settings=_settings(feeder))
+def sight(reader: WaveformReader, recording: Recording, feeder: Feeder, events: bool = True) -> Sight:
+    """One load of a recording, looked at. What cannot be told of it is said, and is no error.
+
+    Without `events` what happened is not looked for: beside loads, what carries nothing tells of noise only.
+    """
     phasors, found, said = [], [], []
+    try:
+        feeder = arranged(recording, feeder)
+    except UserError as error:
+        said.append(str(error))
+    made = Sight(feeder.name or "load", feeder=feeder, settings=_settings(feeder))
     try:
         segments = recording.waveforms()
     except UserError as error:
-        return replace(made, said=(str(error),))
+        return replace(made, said=(*said, str(error)))
     for segment in segments:
         try:
             measured = phasors_of(recording, feeder, segment)
@@ -145,10 +155,11 @@ def sight(reader: WaveformReader, recording: Recording, feeder: Feeder) -> Sight
             said.append(str(error))
             continue
         phasors.append(measured)
-        found += happenings(waves, segment.rate, segment.start, recording.frequency, measured)
+        if events:
+            found += happenings(waves, segment.rate, segment.start, recording.frequency, measured)
     dips, refused = [], ""
     try:
-        dips = reader.dips(feeder, phasors, recording.frequency) if phasors else []
+        dips = reader.dips(feeder, phasors, recording.frequency) if found else []
     except UserError as error:
         refused = str(error)
     seen = _numbered(found, dips, reader.path, refused)
