@@ -13,7 +13,8 @@ import pytest
 import tractexp
 from tractexp.identification.problem import Problem
 from tractexp.identification.result import respond
-from tractexp.record.through import mean, sharpened
+from tractexp.model.window import mean
+from tractexp.record.through import sharpened
 from tractexp.recording import comtrade
 
 STORED = json.loads(field_chain.STORED.read_text(encoding="utf-8"))

@@ -12,8 +12,8 @@ import numpy as np
 from tractexp.errors import UserError, check_choice
 from tractexp.model.drive import EVENT, Drive
 from tractexp.model.parts import Effect, Measurement, Motor, Static
+from tractexp.model.window import seen
 from tractexp.parameter import Parameter
-from tractexp.record.through import seen
 
 TOLERANCE = 1e-7  # pu, largest step-doubling error of P or Q an automatic substep may leave
 MOST_SUBSTEPS = 256

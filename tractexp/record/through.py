@@ -1,8 +1,9 @@
-"""A window on both sides of a load: the voltage it saw reckoned back, and its answer seen as the record shows it.
+"""The voltage that a load saw, reckoned back from phasors that are averages over a window.
 
 With a window h, U = h * u and I = h * i are recorded, and P + jQ = U conj(I). A load whose current is linear in the
 voltage would not show it; any other does wherever the voltage bends. u is reckoned back from U near the edges of the
-dip, where it is free to bend, and the current that a model draws at u is averaged as the recorder does.
+dip, where it is free to bend; the current a model draws at u is then averaged as the recorder does
+(`tractexp.model.window`).
 
 Source: IEC/IEEE 60255-118-1. Departures: the angle of the voltage is taken as steady over a window.
 """
@@ -17,17 +18,6 @@ from tractexp.record.event import Event
 EDGE = 0.05  # s on either side of a window around an edge, in which the voltage may bend
 BENT, CALM = 0.01, 3e-4  # pu: second differences of the voltage there, and elsewhere
 ERROR = 2e-4  # pu: how exactly the averaged voltage must be the recorded one, if its noise allows
-
-
-def mean(y: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Mean of y (..., N) with weights (odd,) about each sample, y constant beyond its ends."""
-    ends = [(0, 0)] * (y.ndim - 1) + [(len(weights) // 2,) * 2]
-    return np.lib.stride_tricks.sliding_window_view(np.pad(y, ends, "edge"), len(weights), axis=-1) @ weights
-
-
-def seen(power: np.ndarray, u: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """The power (..., N) that a load draws at the voltage u (N,), as phasors of these weights show it."""
-    return mean(power / u, weights) * mean(u, weights)
 
 
 def sharpened(event: Event, weights: np.ndarray, window: float) -> Event:
