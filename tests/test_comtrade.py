@@ -183,6 +183,7 @@ MENDED = {
     "padding": ([("\n1\n4000,40", "\n3\n4000,40\n4000,40\n4000,40")], "lines 14, 15: a sampling rate without samples"),
     "count of rates": ([("\n1\n4000,40", "\n2\n4000,40")], "line 12: 2 sampling rates announced, 1 found"),
     "no count of rates": ([("\n1\n4000,40", "\n4000,40")], "line 12: the number of sampling rates is missing"),
+    "no frequency": ([("\n50\n", "\n0\n")], "line 11: the nominal frequency is not told: 50 Hz, unless"),
     "no such day": (
         [("01/02/2024,10:00:00.000000", "00/00/2024,10:00:00")],
         "line 14: .* is not a day of the calendar",
@@ -231,7 +232,6 @@ REFUSED = {
         [("\n50\n", "\n-1\n")],
         "line 11: nominal frequency '-1' is not a number between 10 and 100 Hz; write",
     ),
-    "no frequency": ([("\n50\n", "\n0\n")], "line 11: nominal frequency '0' is not"),
     "offset": ([("A,0.02,0.5", "A,0.02,1e308")], "line 6: analog channel 4 of 6 'Ia': offset '1e308' is not a number"),
     "multiplier": ([("kV,0.01", "kV,nan")], "line 3: analog channel 1 of 6 'Ua': multiplier 'nan' is not a number"),
     "infinite": ([("kV,0.01", "kV,inf")], "multiplier 'inf' is not a number between -1e12 and 1e12; correct it"),
