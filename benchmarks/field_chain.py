@@ -65,8 +65,8 @@ def phasors() -> list[dict[str, Any]]:
 
 def ten_minutes(folder: Path) -> Path:
     """A COMTRADE record of six channels at 4 kHz, 50.02 Hz."""
+    from tractexp.filetypes.comtrade import write
     from tractexp.recording import Channel, Recording, Segment
-    from tractexp.recording.comtrade import write
 
     t = np.arange(round(TEN_MINUTES * RATE)) / RATE
     made = []

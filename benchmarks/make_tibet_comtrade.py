@@ -19,8 +19,8 @@ from make_tibet import DIPS, LOAD
 
 from independent import Waveforms, simulate
 from independent.recorder import PHASES
+from tractexp.filetypes.comtrade import write
 from tractexp.recording import Channel, Recording, Segment, Status
-from tractexp.recording.comtrade import write
 
 RATE = 4000.0  # Hz
 LENGTH = 2.04  # s, of the records 2 s and a window

@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 
 import tractexp
+from tractexp.filetypes.comtrade_writer import write
 from tractexp.recording import Channel, Recording, Segment
-from tractexp.recording.comtrade_writer import write
 
 CORES = 2
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tractexp.errors import UserError
+from tractexp.filetypes import cev
 from tractexp.plugin import build
-from tractexp.recording import cev
 
 KILOVOLT, AMPERE, LAG, F, PER_CYCLE = 63.5, 200.0, np.deg2rad(30), 49.98, 32
 COLUMNS = ["IA", "IB", "IC", "IG", "VA(kV)", "VB(kV)", "VC(kV)", "*", "VDC", "FREQ"]

@@ -9,8 +9,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tractexp.errors import UserError
+from tractexp.filetypes import comtrade
 from tractexp.record import foreign
-from tractexp.recording import Channel, Recording, Segment, Status, comtrade
+from tractexp.recording import Channel, Recording, Segment, Status
 
 CFG = """Substation,device,1999
 8,6A,2D

@@ -12,12 +12,13 @@ from hypothesis import strategies as st
 
 import tractexp
 from tractexp.errors import UserError
+from tractexp.filetypes import comtrade
+from tractexp.filetypes.sidecar import beside
+from tractexp.filetypes.tidy import recording_of, restored, unique, write_record, write_recording
 from tractexp.plugin import build
 from tractexp.record import Base, Record
 from tractexp.record.window import Window
-from tractexp.recording import Channel, Recording, Segment, Status, comtrade
-from tractexp.recording.sidecar import beside
-from tractexp.recording.tidy import recording_of, restored, unique, write_record, write_recording
+from tractexp.recording import Channel, Recording, Segment, Status
 
 TABLES = [".csv", ".parquet"]
 NAMES = st.text(st.characters(codec="utf-8", exclude_categories=("C", "Z")), min_size=1, max_size=12)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from field_waves import KA, dip, load, noise, phases, recording, wave
 
-from tractexp.recording import comtrade, propose
+from tractexp.filetypes import comtrade
+from tractexp.recording import propose
 from tractexp.recording.label import order
 from tractexp.recording.measure import phasors_of
 from tractexp.recording.recording import Channel

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import tractexp
+from tractexp.filetypes import comtrade
 from tractexp.identification.problem import Problem
 from tractexp.identification.result import respond
 from tractexp.model.window import mean
 from tractexp.record.through import sharpened
-from tractexp.recording import comtrade
 
 STORED = json.loads(field_chain.STORED.read_text(encoding="utf-8"))
 PAGE = field_chain.DOCS.read_text(encoding="utf-8")

@@ -8,7 +8,8 @@ import pytest
 
 import tractexp
 from tractexp.errors import UserError
-from tractexp.recording import Channel, Recording, Segment, comtrade
+from tractexp.filetypes import comtrade
+from tractexp.recording import Channel, Recording, Segment
 
 KILOVOLT = 230 / np.sqrt(3)  # phase to ground
 Y = (0.45 - 0.03j) * 1e-3 * 3  # kA/kV of the load: 71 MW at 230 kV

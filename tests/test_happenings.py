@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from field_waves import KA, KV, load, noise, phases, recording, wave
 
+from tractexp.filetypes import comtrade
 from tractexp.record import Base, Record
-from tractexp.recording import Feeder, comtrade, happenings, happenings_of
+from tractexp.recording import Feeder, happenings, happenings_of
 from tractexp.recording.measure import phasors_of, waves_of
 
 SEEDS = range(4)

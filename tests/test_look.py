@@ -13,8 +13,8 @@ from test_cli import tractexp as command_line
 import tractexp
 import tractexp.progress
 from tractexp.errors import UserError
+from tractexp.filetypes.comtrade_writer import write
 from tractexp.overrides import assigned, override
-from tractexp.recording.comtrade_writer import write
 from tractexp.recording.traces import half_cycle_rms, spectrum
 from tractexp.report.look import envelope
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from field_waves import KV, noise, phases, recording, wave
 
-from tractexp.recording import Channel, Recording, Segment, comtrade, quality
+from tractexp.filetypes import comtrade
+from tractexp.recording import Channel, Recording, Segment, quality
 
 RATE = 3200.0
 T = np.arange(6400) / RATE

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from tractexp.errors import UserError
+from tractexp.filetypes import comtrade
 from tractexp.plugin import build
 from tractexp.record import detect, find_dips
 from tractexp.record.phasor import measure
-from tractexp.recording import comtrade
 
 KILOVOLT, KILOAMPERE, LAG = 110 / np.sqrt(3), 0.2, np.deg2rad(30)
 S0 = 3 * KILOVOLT * KILOAMPERE * np.exp(1j * LAG)  # MVA

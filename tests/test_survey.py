@@ -19,9 +19,9 @@ from test_cli import tractexp as command_line
 import tractexp
 from tractexp.api import surveying
 from tractexp.errors import UserError
+from tractexp.filetypes.comtrade_writer import write
 from tractexp.plugin import build
 from tractexp.recording import archive
-from tractexp.recording.comtrade_writer import write
 
 DEPTHS = {"shallow 1": 0.06, "deep 1": 0.5, "shallow 2": 0.08, "deep 2": 0.6, "shallow 3": 0.07}
 

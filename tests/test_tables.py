@@ -12,9 +12,9 @@ import pytest
 
 import tractexp
 from tractexp.errors import UserError
+from tractexp.filetypes.tabulated import kind_of
 from tractexp.plugin import build
 from tractexp.record import detect
-from tractexp.recording.tabulated import kind_of
 
 RATE = 200.0
 BASE = (27.5, 20.0)  # kV, MVA: what the records in kV and MW are of

@@ -1,8 +1,9 @@
 """Records from COMTRADE fault recordings: the dips of one file, numbered in order of time."""
 
 from tractexp.files import located
+from tractexp.filetypes import comtrade
 from tractexp.plugin import plugin
-from tractexp.recording import Recording, comtrade
+from tractexp.recording import Recording
 from tractexp.recording.reader import WaveformReader
 
 

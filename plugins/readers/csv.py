@@ -5,12 +5,12 @@ from pathlib import Path
 from typing import Any
 
 from tractexp.errors import UserError, check_range
+from tractexp.filetypes.sidecar import Sidecar, beside
+from tractexp.filetypes.table import PACKAGE
+from tractexp.filetypes.tabulated import Powers, Tabular, kind_of, powers
 from tractexp.plugin import plugin
 from tractexp.record import Base, Events, Reader, Record
 from tractexp.record.dips import Dip, check_numbers, chosen, level, numbered
-from tractexp.recording.sidecar import Sidecar, beside
-from tractexp.recording.table import PACKAGE
-from tractexp.recording.tabulated import Powers, Tabular, kind_of, powers
 from tractexp.wording import counted
 
 PRE, POST = 1.0, 10.0  # s kept of a table that holds several dips

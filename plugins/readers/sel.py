@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
+from tractexp.filetypes import cev
 from tractexp.plugin import plugin
-from tractexp.recording import Recording, cev
+from tractexp.recording import Recording
 from tractexp.recording.reader import WaveformReader
 
 

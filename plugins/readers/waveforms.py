@@ -1,12 +1,12 @@
 """Records from tables of waveforms: the dips of one file, numbered in order of time."""
 
 from tractexp.errors import check_range
+from tractexp.filetypes.sidecar import beside
+from tractexp.filetypes.tabulated import Tabular, kind_of, recording
+from tractexp.filetypes.tidy import restored
 from tractexp.plugin import plugin
 from tractexp.recording import Recording
 from tractexp.recording.reader import WaveformReader
-from tractexp.recording.sidecar import beside
-from tractexp.recording.tabulated import Tabular, kind_of, recording
-from tractexp.recording.tidy import restored
 
 
 @plugin

@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
+from tractexp.filetypes import comtrade, tidy
 from tractexp.record import Record
-from tractexp.recording import Recording, comtrade, tidy
+from tractexp.recording import Recording
 from tractexp.recording.writer import Writer
 
 

@@ -9,12 +9,12 @@ from tractexp import plugin
 from tractexp.api.arguments import public
 from tractexp.api.read import GROUP, node_of
 from tractexp.errors import UserError, check_choice
+from tractexp.filetypes.tidy import unique
 from tractexp.outcome import Table, Tabulated
 from tractexp.record import Event, Reader, Record
 from tractexp.recording import Recording, Writer
 from tractexp.recording.cut import cut
 from tractexp.recording.reader import WaveformReader
-from tractexp.recording.tidy import unique
 
 WHAT = ("recording", "events")
 MARGIN = 0.1  # s of waveforms kept about a dip's record, for the windows of its first and last phasors

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from tractexp.errors import UserError
-from tractexp.recording.cells import is_date, is_gap, is_number, is_time
-from tractexp.recording.columns import is_unit, split_unit
+from tractexp.filetypes.cells import is_date, is_gap, is_number, is_time
+from tractexp.filetypes.columns import is_unit, split_unit
 
 ALIKE = 3  # rows of numbers of one length make sure that a table has begun
 

@@ -10,8 +10,8 @@ from datetime import datetime, timedelta
 from math import isfinite
 
 from tractexp.errors import UserError
+from tractexp.filetypes.remarks import Remarks
 from tractexp.recording.recording import UNITS
-from tractexp.recording.remarks import Remarks
 
 VALUE = {"ASCII": "f8", "BINARY": "<i2", "BINARY32": "<i4", "FLOAT32": "<f4"}  # of one analog value
 FREQUENCY = (10.0, 100.0)  # Hz, nominal: 16.7 and 25 Hz railways to 60 Hz, with room

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import UserError, among, check_choice, nearest
-from tractexp.recording.cells import BadCell, is_number, is_time, numbers, times
-from tractexp.recording.columns import split_unit
-from tractexp.recording.heading import Heading, heading
+from tractexp.filetypes.cells import BadCell, is_number, is_time, numbers, times
+from tractexp.filetypes.columns import split_unit
+from tractexp.filetypes.heading import Heading, heading
 
 PACKAGE = "pkg://"
 SPREADSHEETS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")  # how .xlsx, .ods and .xls begin
@@ -123,7 +123,7 @@ def open_table(path: str, form: Form, whole: bool = True) -> Table:
 
     Of a text not `whole` only the beginning is read: enough to know its columns.
     """
-    from tractexp.recording.table_text import HEAD, open_text
+    from tractexp.filetypes.table_text import HEAD, open_text
 
     data = content(path, None if whole else HEAD)
     if not whole and data.startswith((PARQUET, *SPREADSHEETS)):

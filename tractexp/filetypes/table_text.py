@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.recording.cells import BadCell, is_number, is_time
-from tractexp.recording.columns import split_unit
-from tractexp.recording.heading import Heading, heading
-from tractexp.recording.table import Column, Form, Table, column
-from tractexp.recording.text import MARKS, decode
+from tractexp.filetypes.cells import BadCell, is_number, is_time
+from tractexp.filetypes.columns import split_unit
+from tractexp.filetypes.heading import Heading, heading
+from tractexp.filetypes.table import Column, Form, Table, column
+from tractexp.filetypes.text import MARKS, decode
 
 HEAD = 1 << 18  # bytes in which the heading is looked for
 SAMPLE = 400  # lines of them, at most

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from tractexp.errors import UserError, among, nearest
-from tractexp.recording.cells import is_number, is_time
-from tractexp.recording.columns import Role, is_unit, role
-from tractexp.recording.table import Table
+from tractexp.filetypes.cells import is_number, is_time
+from tractexp.filetypes.columns import Role, is_unit, role
+from tractexp.filetypes.table import Table
 
 CONTRACT = ("t", "U", "P", "Q", "f", "U2")
 PHASES = ("a", "b", "c")

@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.recording.comtrade_header import number, quoted
-from tractexp.recording.comtrade_samples import HUGE
+from tractexp.filetypes.comtrade_header import number, quoted
+from tractexp.filetypes.comtrade_samples import HUGE
+from tractexp.filetypes.remarks import Remarks
+from tractexp.filetypes.text import decode
 from tractexp.recording.recording import UNITS, Channel, Recording, Segment, Status
-from tractexp.recording.remarks import Remarks
-from tractexp.recording.text import decode
 
 ROOT = float(np.sqrt(2))
 LARGEST = 32 * 2**20  # bytes: event reports last seconds

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from tractexp.errors import UserError
+from tractexp.filetypes.table import located
 from tractexp.record.record import Base
 from tractexp.record.window import Window
-from tractexp.recording.table import located
 
 
 @dataclass(frozen=True)

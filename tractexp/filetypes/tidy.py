@@ -19,9 +19,9 @@ import numpy as np
 
 from tractexp import files
 from tractexp.errors import UserError
+from tractexp.filetypes.table import Form, open_table
 from tractexp.record.record import Record
 from tractexp.recording.recording import Channel, Recording, Segment, Status
-from tractexp.recording.table import Form, open_table
 
 UNITS = {"t": "s", "U": "pu", "P": "pu", "Q": "pu", "f": "Hz"}  # as data.units; U2 is as U
 

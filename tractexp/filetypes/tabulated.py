@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import UserError
+from tractexp.filetypes.cells import is_number
+from tractexp.filetypes.columns import PER_UNIT, factor, role
+from tractexp.filetypes.mapping import LINES, PHASES, Mapped, check_mapping, mapped
+from tractexp.filetypes.sidecar import Sidecar, beside
+from tractexp.filetypes.table import Form, Table, open_table
 from tractexp.record.record import JITTER
-from tractexp.recording.cells import is_number
-from tractexp.recording.columns import PER_UNIT, factor, role
-from tractexp.recording.mapping import LINES, PHASES, Mapped, check_mapping, mapped
 from tractexp.recording.recording import Channel, Recording, Segment
-from tractexp.recording.sidecar import Sidecar, beside
-from tractexp.recording.table import Form, Table, open_table
 
 TURN = np.exp(2j * np.pi / 3)
 FORWARD = np.sqrt(3) * np.exp(1j * np.pi / 6)  # the positive sequence of line voltages over that of phase voltages

@@ -9,8 +9,8 @@ import numpy as np
 
 from tractexp import files
 from tractexp.errors import UserError, check_choice
-from tractexp.recording.comtrade_header import EPOCH, VALUE, date
-from tractexp.recording.comtrade_samples import NONE, row
+from tractexp.filetypes.comtrade_header import EPOCH, VALUE, date
+from tractexp.filetypes.comtrade_samples import NONE, row
 from tractexp.recording.recording import Channel, Recording, Segment
 
 KINDS = {1999: ("BINARY", "ASCII"), 2013: ("BINARY", "BINARY32", "FLOAT32", "ASCII")}  # ever more values fit

@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import UserError, nearest
-from tractexp.recording import timeline
-from tractexp.recording.comtrade_header import Analog, Digital, Header, parse
-from tractexp.recording.comtrade_samples import NONE, Place, Samples, read
-from tractexp.recording.comtrade_writer import write as write
+from tractexp.filetypes import timeline
+from tractexp.filetypes.comtrade_header import Analog, Digital, Header, parse
+from tractexp.filetypes.comtrade_samples import NONE, Place, Samples, read
+from tractexp.filetypes.comtrade_writer import write as write
+from tractexp.filetypes.remarks import Remarks
+from tractexp.filetypes.text import decode, lines
+from tractexp.filetypes.timeline import Stretch
 from tractexp.recording.recording import UNITS, Channel, Recording, Status
-from tractexp.recording.remarks import Remarks
-from tractexp.recording.text import decode, lines
-from tractexp.recording.timeline import Stretch
 
 LARGEST_CFG = 4 * 2**20  # bytes: fifty thousand channels
 MISSING = {"BINARY": -32768.0, "BINARY32": -2147483648.0}  # raw values that stand for none

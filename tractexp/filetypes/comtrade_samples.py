@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.recording.comtrade_header import VALUE, Header, number, quoted
-from tractexp.recording.remarks import Remarks
+from tractexp.filetypes.comtrade_header import VALUE, Header, number, quoted
+from tractexp.filetypes.remarks import Remarks
 
 LACKING = 0.01  # of the announced samples: so many may be missing at the end, with a note
 LARGE = 256 * 2**20  # bytes: a larger binary file stays on the disk and is mapped
