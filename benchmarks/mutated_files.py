@@ -27,7 +27,8 @@ from memory import peak, reset  # noqa: E402
 from tractexp import files  # noqa: E402
 from tractexp.api.read import reader_of  # noqa: E402
 from tractexp.errors import UserError  # noqa: E402
-from tractexp.recording import Channel, Recording, Segment, Status, cev, comtrade  # noqa: E402
+from tractexp.filetypes import cev, comtrade  # noqa: E402
+from tractexp.recording import Channel, Recording, Segment, Status  # noqa: E402
 
 SECONDS, MEGABYTES = 5.0, 500.0
 LEAKS = re.compile(

@@ -313,7 +313,9 @@ def test_the_list_of_a_group_begins_with_its_default_and_counts_as_people_do(tmp
 def test_a_group_that_is_none_gets_the_nearest_one(tmp_path):
     done = tractexp("list", "optimisers", cwd=tmp_path)
     assert done.returncode == 2
-    assert done.stderr.startswith("tractexp: there is no group 'optimisers'; did you mean 'optimizer'? Groups: data, ")
+    assert done.stderr.startswith(
+        "tractexp: there is no group 'optimisers'; did you mean 'optimizer'? Groups: connection, data, "
+    )
     assert done.stderr.count("\n") == 1
 
 
