@@ -87,7 +87,9 @@ from tractexp.discrepancy.injection import PUSHES, Injection
 from tractexp.model.model import compose
 from tractexp.plugin import discover, get
 
-TestDocumented = tractexp.testing.contract("documented", {"tabbed": [{"files": ["dip.tsv"]}]})
+TestDocumented = tractexp.testing.contract(
+    "documented", {"tabbed": [{"files": ["dip.tsv"]}], "raw16": [{"path": "dip.raw16"}]}
+)
 
 
 @pytest.mark.parametrize("name", sorted(discover()["effect"]))
@@ -119,7 +121,7 @@ def test_the_examples_of_the_documentation_keep_the_contracts(tmp_path):
     blocks = re.findall(r"```python\n# (\w+\.py)\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
     assert {name for name, _ in blocks} == {
         "linear_load.py", "rate_dependence.py", "late_load.py", "channel_gain.py", "acme_motor.py",
-        "shrinking_step.py", "tabbed.py", "open_y.py", "hann.py",
+        "shrinking_step.py", "tabbed.py", "raw16.py", "tabs.py", "open_y.py", "hann.py",
     }  # fmt: skip
     package = tmp_path / "documented"
     package.mkdir()
@@ -127,6 +129,9 @@ def test_the_examples_of_the_documentation_keep_the_contracts(tmp_path):
         (package / name).write_text(text, encoding="utf-8")
     t = np.arange(100) * 0.01
     np.savetxt(tmp_path / "dip.tsv", np.c_[t, np.ones(100), np.ones(100), np.full(100, 0.5)], delimiter="\t")
+    t = np.arange(8000) / 4000
+    u = np.cos(2 * np.pi * (50 * t[:, None] - np.arange(3) / 3)) * np.where((t > 1) & (t < 1.2), 0.7, 1.0)[:, None]
+    np.round(np.hstack([18000 * u, 6000 * u])).astype("<i2").tofile(tmp_path / "dip.raw16")
     (tmp_path / "test_strangers.py").write_text(STRANGERS)
     passed("test_strangers.py", tmp_path, tmp_path)
 

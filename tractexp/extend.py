@@ -13,12 +13,14 @@ from tractexp.model.unfit import Unfit
 from tractexp.parameter import Parameter
 from tractexp.plugin import plugin
 from tractexp.record import Base, Events, Reader, Record
-from tractexp.recording import Connection, Estimator
+from tractexp.recording import Channel, Connection, Estimator, Recording, Segment, Writer
+from tractexp.recording.reader import WaveformReader
 
 __all__ = [
     "EVENT",
     "INPUTS",
     "Base",
+    "Channel",
     "Connection",
     "Effect",
     "Estimator",
@@ -31,9 +33,13 @@ __all__ = [
     "Parameter",
     "Reader",
     "Record",
+    "Recording",
+    "Segment",
     "Static",
     "Unfit",
     "UserError",
+    "WaveformReader",
+    "Writer",
     "check_choice",
     "check_range",
     "plugin",

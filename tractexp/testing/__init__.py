@@ -2,8 +2,8 @@
 
     TestAcme = tractexp.testing.contract("acme_loads")
 
-Each check is a function of a plugin class in `loads`, `searches`, `readers` and `channels`, and says in a sentence what
-fails.
+Each check is a function of a plugin class in `loads`, `searches`, `readers`, `channels` and `writers`, and says in a
+sentence what fails.
 """
 
 import functools
@@ -13,9 +13,9 @@ from typing import Any
 
 from tractexp.errors import UserError
 from tractexp.plugin import Plugin, discover, import_all
-from tractexp.testing import channels, loads, readers, searches
+from tractexp.testing import channels, loads, readers, searches, writers
 
-SUITES = (*loads.SUITES, searches.SUITE, readers.SUITE, *channels.SUITES)
+SUITES = (*loads.SUITES, searches.SUITE, readers.SUITE, *channels.SUITES, writers.SUITE)
 
 
 def contract(package: str, samples: Mapping[str, Sequence[Mapping[str, Any]]] | None = None) -> type:
