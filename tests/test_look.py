@@ -66,6 +66,10 @@ def test_a_load_may_be_named_and_is_then_the_only_one(station):
 def test_every_command_runs_as_it_stands_and_reads_what_was_shown(looked, station, tmp_path):
     """In a shell's words, from another folder, name of the file with a space, brackets and Chinese letters."""
     for feeder in looked.feeders:
+        if feeder["P"] < 0:  # a source, or a load counted backwards: not told which, so not fitted
+            assert not feeder["command"]
+            assert any("P is negative before it" in e["why"] for e in looked.events)
+            continue
         words = shlex.split(feeder["command"])
         assert words[0] == "tractexp"
         done = command_line(
@@ -76,8 +80,6 @@ def test_every_command_runs_as_it_stands_and_reads_what_was_shown(looked, statio
         (event,) = json.loads((tmp_path / "run" / "result.json").read_text())["events"]
         assert event["name"] == f"{station.stem}_dip1"
         assert "dip of 40 %" in done.stdout
-        before = json.loads((tmp_path / "run" / "result.json").read_text())["before"]
-        assert before["P0"] * feeder["P"] > 0  # the direction that was proposed
 
 
 def test_dips_are_numbered_as_the_reader_numbers_them(tmp_path):

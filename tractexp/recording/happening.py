@@ -270,10 +270,11 @@ def _worth(
     if kind != "dip":
         return False, NO_FIT[kind]
     lead = (e.start - first) * trace.step
-    rows = trace.phases if len(trace.phases) else trace.U[None]
-    usual = np.maximum(np.median(rows[:, first : max(e.start, first + 1)], axis=1), 1e-12)
-    lowest = (rows[:, e.start : e.end] / usual[:, None]).min()
-    size = f"the positive sequence falls by {100 * depth:.3g} %, the lowest phase to {100 * lowest:.3g} %"
+    size = f"the voltage falls by {100 * depth:.3g} %"
+    if len(trace.phases) == 3:
+        usual = np.maximum(np.median(trace.phases[:, first : max(e.start, first + 1)], axis=1), 1e-12)
+        lowest = (trace.phases[:, e.start : e.end] / usual[:, None]).min()
+        size = f"the positive sequence falls by {100 * depth:.3g} %, the lowest phase to {100 * lowest:.3g} %"
     if lead < FEWEST_BEFORE * 1e-3 or e.start - first < 2:
         return False, f"{size}, but only {1000 * lead:.0f} ms of steady state come before it"
     if not e.cleared:
@@ -281,14 +282,17 @@ def _worth(
     if not e.returned:
         return False, f"{size}, but the record ends before the voltage is back"
     if depth < SHALLOWEST:
-        return False, f"{size}: too little for a model that is driven by the positive sequence"
+        return False, f"{size}: too little to tell a load's answer from its noise"
     noise = len(trace.I) and not np.median(_clean(trace)[:, first : e.start], axis=1).any()
     if not np.isfinite(before[0]) or np.hypot(*before) == 0 or noise:
         return False, f"{size}, but no load current flows before it"
     if not e.sudden:
         return False, f"{size}, but slowly: only the static part of the load can be told"
     if before[0] < 0:
-        return True, f"{size}; P is negative before it: reversed current or regeneration"
+        why = (
+            "power is fed back, or the current is counted out of the load (then data.reverse_current=true makes it one)"
+        )
+        return False, f"{size}, but P is negative before it: {why}"
     return True, f"{size}, {lead:.2g} s before it and the recovery are recorded"
 
 
