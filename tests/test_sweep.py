@@ -349,7 +349,7 @@ def test_a_sweep_that_is_ended_keeps_what_is_finished_and_closes_its_parent(way,
 def test_workers_end_with_a_parent_that_is_killed():
     script = """
 import os, time
-from tractexp.sweep.workers import processes
+from tractexp.workers import processes
 with processes(1) as executor:
     print(executor.submit(os.getpid).result(), flush=True)
     executor.submit(time.sleep, 600).result()

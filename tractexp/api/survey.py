@@ -9,7 +9,7 @@ from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.look import Listed
 from tractexp.api.pages import Written
-from tractexp.api.surveying import QUIET, UNREAD, kept, looked, state, writing
+from tractexp.api.surveying import QUIET, UNREAD, kept, looked, states, writing
 from tractexp.errors import UserError, check_range
 from tractexp.outcome import Table
 from tractexp.overrides import typed
@@ -132,7 +132,7 @@ def survey(
     paths = list(archive.files(place))
     if not paths:
         raise UserError(f"data.path={folder} holds no file that can be read")
-    names = {path.relative_to(place).as_posix(): state(path) for path in paths}
+    names = {path.relative_to(place).as_posix(): now for path, now in states(paths).items()}
     journal = Path(keep) / JOURNAL if keep else None
     known = kept(journal)
     rows = {name: known[name][1] for name, now in names.items() if name in known and known[name][0] == now}

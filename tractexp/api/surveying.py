@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -16,7 +17,7 @@ from tractexp.api.look import command, event_row, series
 from tractexp.errors import UserError
 from tractexp.recording import archive
 from tractexp.recording.overview import Seen, Sight, View
-from tractexp.sweep.workers import processes
+from tractexp.workers import processes
 
 Rows = list[dict[str, Any]]
 
@@ -145,18 +146,19 @@ def _alone(folder: Path, name: str) -> Rows:
         return [dict.fromkeys(COLUMNS) | {"file": name, "kind": UNREAD, "worth": False, "why": why}]
 
 
-def state(path: Path) -> list[Any]:
-    """What changes with a file: name, size and time of the files of its name, and the version of this program."""
+def states(paths: Sequence[Path]) -> dict[Path, list[Any]]:
+    """What changes with each file: name, size and time of the files of its name, and the version of this program."""
     from tractexp import __version__
 
-    beside = sorted(p for p in path.parent.glob(f"{_literal(path.stem)}.*") if p.is_file())
-    return [__version__, *([p.name, p.stat().st_size, p.stat().st_mtime_ns] for p in beside)]
-
-
-def _literal(text: str) -> str:
-    import glob
-
-    return glob.escape(text)
+    beside: dict[Path, list[Path]] = defaultdict(list)  # by folder and stem: each folder is listed once
+    for folder in {path.parent for path in paths}:
+        for path in sorted(folder.iterdir()):
+            beside[folder / path.stem].append(path)
+    found: dict[Path, list[Any]] = {}
+    for path in paths:
+        there = [(p, p.stat()) for p in beside[path.parent / path.stem] if p.is_file()]
+        found[path] = [__version__, *([p.name, told.st_size, told.st_mtime_ns] for p, told in there)]
+    return found
 
 
 def kept(journal: Path | None) -> dict[str, tuple[list[Any], Rows]]:

@@ -13,9 +13,9 @@ from typing import Any
 from tractexp import files
 from tractexp.errors import UserError
 from tractexp.sweep import identity
-from tractexp.sweep.parent import parent_of
 from tractexp.sweep.status import FAILED, FINISHED, RUNNING, Status
 from tractexp.tasks.given import given, variant
+from tractexp.tracking.swept import parent_of
 
 OUTPUT, TRACEBACK = "output.txt", "traceback.txt"
 

@@ -18,7 +18,7 @@ from tractexp.sweep.compose import Composer
 from tractexp.sweep.job import SweepJob, work
 from tractexp.sweep.progress import progress
 from tractexp.sweep.status import FAILED, RUNNING, Status
-from tractexp.sweep.workers import dask_cluster, processes
+from tractexp.workers import dask_cluster, processes
 
 BARREN = 3  # times a pool may break before any job of it has started
 

@@ -1,6 +1,5 @@
-"""The parent run of a sweep in MLflow, and `sweep.json`, by which its jobs and later tasks find it."""
+"""The parent run of a sweep in MLflow."""
 
-import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,16 +8,7 @@ from typing import Any
 from tractexp import provenance
 from tractexp.files import write_json
 from tractexp.sweep.status import FAILED, FINISHED, INTERRUPTED, objective, read
-
-FILE = "sweep.json"
-
-
-def parent_of(folder: Path) -> str | None:
-    """The run id of the sweep in `folder`; None where it is not logged."""
-    try:
-        return json.loads((folder / FILE).read_text(encoding="utf-8"))["run"]
-    except (OSError, ValueError, KeyError):
-        return None
+from tractexp.tracking.swept import FILE, parent_of
 
 
 @contextmanager

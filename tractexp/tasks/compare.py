@@ -104,8 +104,8 @@ def track(job: Job, made: Any, paths: list[Path]) -> None:
     if not node["enabled"]:
         return
     from tractexp import tracking
-    from tractexp.sweep.parent import parent_of
     from tractexp.tracking.attach import attach
+    from tractexp.tracking.swept import parent_of
 
     parent = parent_of(made.folder) if made.folder is not None else None
     comparisons = made.comparisons
