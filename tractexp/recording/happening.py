@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.record.event import FEWEST_BEFORE, SHALLOWEST, STEADY
+from tractexp.record.event import FEWEST_BEFORE, OPEN_POLE, SHALLOWEST, STEADY, UNCLEARED
 from tractexp.record.phasor import Phasors
 from tractexp.record.record import Record
 from tractexp.recording.excursion import DEAD, Excursion, excursions
@@ -22,8 +22,6 @@ EVEN = 3.0  # the longest period of a pole slip over its shortest, at most
 BALANCED = 0.05  # U2 over U1: swings are balanced, faults are not
 OPEN_CURRENT = 0.05  # of the mean of the other two: a phase that carries less is open
 OPEN_CYCLES = 3.0  # so long at least
-OPEN_U2 = 0.15  # of U1: unbalance of an open pole where no currents are known
-UNCLEARED = 0.5  # s: no protection leaves a fault on so long, so unbalance that lasts longer is an open pole
 SECOND = 0.15  # of the fundamental: second harmonic of an inrush (IEEE C37.91, usual restraint of differential relays)
 INRUSH_CYCLES = 5.0  # so long at least: the offset of a fault current lasts less
 CLEAN = 0.5  # of a current's energy is in its fundamental and second harmonic, or it is noise
@@ -119,7 +117,7 @@ def _open(trace: Trace, e: Excursion) -> Excursion | None:
             return None
         first, stop = max(runs[0][0], e.start), min(max(r[1] for r in runs), e.end)
         return replace(e, start=first, end=max(stop, first + 1)) if stop - first > 0.5 * (e.end - first) else None
-    unbalanced = trace.U2[e.start : e.end] > OPEN_U2 * trace.U[e.start : e.end]
+    unbalanced = trace.U2[e.start : e.end] > OPEN_POLE * trace.U[e.start : e.end]
     if np.count_nonzero(unbalanced) * trace.step > UNCLEARED:
         return e
     return None
