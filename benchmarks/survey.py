@@ -5,10 +5,10 @@ each. Wall seconds are those of the whole call on two processes, their start inc
 whole tree of processes, so they hold on a shared machine too; the load average says how shared it was.
 """
 
+import argparse
 import json
 import os
 import resource
-import sys
 import tempfile
 import time
 from datetime import datetime
@@ -59,7 +59,9 @@ def spent() -> float:
 
 
 def main() -> None:
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 400
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--files", type=int, default=400)
+    count = parser.parse_args().files
     with tempfile.TemporaryDirectory() as name:
         folder, keep = Path(name, "archive"), Path(name, "kept")
         archive(folder, count)

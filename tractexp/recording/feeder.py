@@ -34,6 +34,15 @@ class Feeder:
     why: tuple[str, ...] = ()  # what it was recognised by, and what was changed in the order given, one sentence each
     loaded: bool = True
 
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The settings of a reader that reads this load."""
+        told: dict[str, Any] = {"voltages": list(self.voltages), "currents": list(self.currents)}
+        counts = len(self.voltages), len(self.currents)
+        if self.connection != usual(*counts, lines=counts[0] == 2):
+            told["connection"] = self.connection
+        return told | ({"reverse_current": True} if self.reverse_current else {})
+
 
 def propose(recording: Recording) -> list[Feeder]:
     """The feeders that a recording of any number of channels shows; loaded ones first, [] where there are none.

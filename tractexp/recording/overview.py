@@ -13,7 +13,6 @@ from tractexp.record import Event, Record, detect, find_dips
 from tractexp.record.dips import Dip
 from tractexp.record.phasor import Phasors
 from tractexp.recording.arrangement import arranged
-from tractexp.recording.connection import usual
 from tractexp.recording.feeder import Feeder, propose
 from tractexp.recording.happening import Happening, happenings, happenings_of
 from tractexp.recording.measure import phasors_of, waves_of
@@ -142,7 +141,7 @@ def sight(reader: WaveformReader, recording: Recording, feeder: Feeder, events: 
         feeder = arranged(recording, feeder)
     except UserError as error:
         said.append(str(error))
-    made = Sight(feeder.name or "load", feeder=feeder, settings=_settings(feeder))
+    made = Sight(feeder.name or "load", feeder=feeder, settings=feeder.settings)
     try:
         segments = recording.waveforms()
     except UserError as error:
@@ -230,12 +229,3 @@ def _common(what: Happening, start: float, end: float) -> float:
 def _why(what: Happening, event: Event | None, refused: str) -> str:
     """What makes it (not) worth fitting: what happened, or that no record can be made of it."""
     return what.why if event is not None or not what.worth else f"no record can be made of it: {refused}"
-
-
-def _settings(feeder: Feeder) -> dict[str, Any]:
-    """The settings of a reader that reads this load."""
-    told = {"reverse_current": True} if feeder.reverse_current else {}
-    counts = len(feeder.voltages), len(feeder.currents)
-    if feeder.connection != usual(*counts, lines=counts[0] == 2):
-        told["connection"] = feeder.connection
-    return {"voltages": list(feeder.voltages), "currents": list(feeder.currents), **told}

@@ -1,5 +1,6 @@
 """Readers of waveform files: from channels to the dips of one load, numbered in order of time."""
 
+import shlex
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -8,7 +9,8 @@ from typing import Any
 
 from tractexp import plugin
 from tractexp.errors import UserError, check_range
-from tractexp.record import Base, Events, Reader, Record
+from tractexp.overrides import assigned
+from tractexp.record import Base, Events, Reader, Record, detect
 from tractexp.record.dips import Dip, check_numbers, chosen, level, numbered
 from tractexp.record.phasor import Phasors
 from tractexp.recording.arrangement import arranged, tuned
@@ -69,10 +71,10 @@ class WaveformReader(Reader):
 
         Raises `UserError` where there is none, and where the load carries no power.
         """
-        made = numbered([self._whole(feeder, p, frequency) for p in streams], self.path, self.pre, self.post)
+        wholes = [self._whole(feeder, phasors, frequency) for phasors in streams]
+        made = numbered(wholes, self.path, self.pre, self.post)
         if not made:
-            spans = ", ".join(f"{s.t[0]:.3f} to {s.t[-1]:.3f} s" for s in streams)
-            raise UserError(f"{self.path}: no dip found in the waveforms ({spans}): the voltage never falls by 3 %")
+            detect(max(wholes, key=lambda whole: whole.samples))  # raises, and says what there is instead
         first = next((dip.made for dip in made if isinstance(dip.made, Record)), None)
         if first is None:
             return made
@@ -141,7 +143,8 @@ class WaveformReader(Reader):
             return arranged(recording, replace(found[0], reverse_current=reverse, why=why))
         every = ", ".join(f"{i} '{c.name}' [{c.unit}]" for i, c in enumerate(recording.channels))
         loads = "; ".join(
-            f"{f.name}: 'data.voltages=[{_listed(f.voltages)}]' 'data.currents=[{_listed(f.currents)}]'" for f in found
+            f"{f.name}: {shlex.join(assigned(f'data.{key}', value) for key, value in f.settings.items())}"
+            for f in found
         )
         shown = f"{len(found)} loads; choose one: {loads}" if found else f"none by itself; its channels: {every}"
         raise UserError(f"data.voltages and data.currents are missing, and {recording.source} shows {shown}")
@@ -178,7 +181,3 @@ def _per_unit(made: Record | UserError, base: Base) -> Record | UserError:
         return replace(made, base=base, more=base.per_unit(made.more), **base.per_unit(made.channels)).check()
     except UserError as error:
         return error
-
-
-def _listed(numbers: Sequence[int]) -> str:
-    return ",".join(map(str, numbers))
