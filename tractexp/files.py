@@ -20,7 +20,7 @@ def located(path: str) -> Path:
     package, _, name = path.removeprefix(PACKAGE).partition("/")
     try:
         return Path(str(importlib.resources.files(package))) / name
-    except (ImportError, ValueError) as error:
+    except (ImportError, ValueError, TypeError) as error:
         raise UserError(f"{path}: there is no installed package '{package}'") from error
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from tractexp.errors import UserError, check_range
+from tractexp.files import PACKAGE
 from tractexp.filetypes.sidecar import Sidecar, beside
-from tractexp.filetypes.table import PACKAGE
 from tractexp.filetypes.tabulated import Powers, Tabular, kind_of, powers
 from tractexp.plugin import plugin
 from tractexp.record import Base, Events, Reader, Record

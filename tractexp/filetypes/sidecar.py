@@ -3,11 +3,10 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from tractexp.errors import UserError
-from tractexp.filetypes.table import located
+from tractexp.files import located
 from tractexp.record.record import Base
 from tractexp.record.window import Window
 
@@ -29,9 +28,9 @@ class Sidecar:
 
 def beside(path: str) -> Sidecar:
     """The sidecar of a table, an empty one where there is none; raises `UserError` for one that is no JSON."""
-    folder, name = located(path)
-    file = folder / f"{Path(name).stem}.json"
-    if Path(name).suffix.lower() == ".json" or not file.is_file():
+    own = located(path)
+    file = own.with_name(f"{own.stem}.json")
+    if own.suffix.lower() == ".json" or not file.is_file():
         return Sidecar()
     try:
         told = json.loads(file.read_bytes().decode("utf-8-sig"))

@@ -5,17 +5,16 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tractexp.errors import UserError, among, check_choice, nearest
+from tractexp.files import located
 from tractexp.filetypes.cells import BadCell, is_number, is_time, numbers, times
 from tractexp.filetypes.columns import split_unit
 from tractexp.filetypes.heading import Heading, heading
 
-PACKAGE = "pkg://"
 SPREADSHEETS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")  # how .xlsx, .ods and .xls begin
 PARQUET = b"PAR1"
 FOREIGN = {  # how files begin that are no table, whatever they are called
@@ -140,14 +139,14 @@ def open_table(path: str, form: Form, whole: bool = True) -> Table:
 
 def content(path: str, limit: int | None = None) -> bytes:
     """The bytes of a file, or of one inside an installed package (`pkg://package/file.csv`); whole lines to a limit."""
-    folder, name = located(path)
-    file = folder / name
+    file = located(path)
+    folder = file.parent
     if not file.is_file():
         if file.is_dir():
             raise UserError(f"{path} is a folder, not a file; give a file in it, or task=survey data.path={path}")
         found = [item.name for item in folder.iterdir() if not item.is_dir()] if folder.is_dir() else None
-        hint = "; that folder does not exist" if found is None else nearest(name, found)
-        raise UserError(f"{path}: there is no such file in {str(folder) if found is not None else folder}{hint}")
+        hint = "; that folder does not exist" if found is None else nearest(file.name, found)
+        raise UserError(f"{path}: there is no such file in {folder}{hint}")
     try:
         if limit is None:
             return file.read_bytes()
@@ -156,19 +155,6 @@ def content(path: str, limit: int | None = None) -> bytes:
         return data if len(data) < limit else data[: data.rfind(b"\n") + 1] or data
     except OSError as error:
         raise UserError(f"{path} cannot be read: {error.strerror or 'it is no ordinary file'}") from error
-
-
-def located(path: str) -> tuple[Any, str]:
-    """The folder, in the file system or in an installed package, and the name of a file."""
-    if not path.startswith(PACKAGE):
-        return Path(path).parent, Path(path).name
-    import importlib.resources
-
-    package, _, name = path.removeprefix(PACKAGE).partition("/")
-    try:
-        return importlib.resources.files(package), name
-    except (ImportError, ValueError, TypeError) as error:
-        raise UserError(f"{path}: there is no installed package '{package}'") from error
 
 
 def _parquet(path: str, data: bytes) -> Table:

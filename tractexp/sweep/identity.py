@@ -3,15 +3,13 @@
 import functools
 import glob
 import hashlib
-import importlib.resources
 import json
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 from tractexp import provenance
-
-PACKAGE = "pkg://"
+from tractexp.errors import UserError
+from tractexp.files import located
 
 
 def configuration(config: Mapping[str, Any], choices: Mapping[str, str]) -> str:
@@ -33,19 +31,13 @@ def _digest(content: bytes) -> str:
 @functools.cache
 def _file(name: str) -> str:
     """The content of the file `name` and of its companions of the same stem (a sidecar, a .dat); "" for no file."""
-    if name.startswith(PACKAGE):
-        package, _, rest = name.removeprefix(PACKAGE).partition("/")
-        try:
-            name = str(importlib.resources.files(package) / rest)
-        except (ImportError, ValueError, TypeError):
-            return ""
-    path = Path(name)
     try:
+        path = located(name)
         if not path.is_file():
             return ""
         files = sorted(path.parent.glob(glob.escape(path.stem) + ".*"))
         return "".join(_digest(file.read_bytes()) for file in files if file.is_file())
-    except OSError:  # the job will say what is wrong with it
+    except (OSError, ValueError, UserError):  # the job will say what is wrong with it
         return ""
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from tractexp.errors import UserError
+from tractexp.files import PACKAGE
 from tractexp.plugin import build
 from tractexp.record import Reader
 
@@ -46,7 +47,7 @@ def _without_files(value: Any) -> Any:
         return {key: _without_files(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
         return [_without_files(inner) for inner in value]
-    there = isinstance(value, str) and (value.startswith("pkg://") or Path(value).is_file())
+    there = isinstance(value, str) and (value.startswith(PACKAGE) or Path(value).is_file())
     return f"{value}.missing" if there else value
 
 
