@@ -15,7 +15,8 @@ import tractexp.progress
 from tractexp.errors import UserError
 from tractexp.filetypes.comtrade_writer import write
 from tractexp.overrides import assigned, override
-from tractexp.recording.traces import half_cycle_rms, spectrum
+from tractexp.recording.quality import spectrum
+from tractexp.recording.trace import half_cycle_rms
 from tractexp.report.look import envelope
 
 

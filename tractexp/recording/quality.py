@@ -184,3 +184,10 @@ def _fit(segment: Segment, f: float | None, form: str, gaps: int, clipped: float
     if segment.rate < WAVES:
         return f"fit for phasors; {segment.rate:g} Hz is too slow for waves, which need {WAVES:g} Hz"
     return "fit for phasors and for waves"
+
+
+def spectrum(wave: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies (M,) [Hz] and RMS values (M,) of a wave (N,), by a Hann window (a sinusoid is right at its peak)."""
+    window = np.hanning(len(wave) + 1)[:-1]
+    made = np.fft.rfft((wave - wave.mean()) * window)
+    return np.fft.rfftfreq(len(wave), 1 / rate), np.sqrt(2) * np.abs(made) / window.sum()

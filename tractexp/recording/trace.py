@@ -1,5 +1,6 @@
 """A feeder every half cycle: RMS of each phase (IEC 61000-4-30), sequence components, powers, second harmonic."""
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,13 +50,7 @@ def of_waves(waves: np.ndarray, rate: float, start: float, nominal: float, phaso
     f = _tracked(phasors, nominal)
     width = rate / np.interp(t, phasors.t, f)  # samples in a window
     center = (t - start) * rate + 0.5  # sample k lies between k and k + 1
-    low, high = np.clip(center - width / 2, 0, n), np.clip(center + width / 2, 0, n)
-
-    def mean(x: np.ndarray) -> np.ndarray:
-        total = np.concatenate([np.zeros((len(x), 1), x.dtype), np.cumsum(x, axis=1)], axis=1)
-        at = np.arange(n + 1)
-        return np.array([np.interp(high, at, row) - np.interp(low, at, row) for row in total]) / (high - low)
-
+    mean = functools.partial(_means, low=np.clip(center - width / 2, 0, n), high=np.clip(center + width / 2, 0, n))
     at_samples = np.interp(start + np.arange(n) / rate, phasors.t, f)
     turn = np.exp(-1j * frame(at_samples, rate))
     currents = waves[K:]
@@ -73,6 +68,23 @@ def of_waves(waves: np.ndarray, rate: float, start: float, nominal: float, phaso
         content,
         1 / nominal,
     )
+
+
+def half_cycle_rms(waves: np.ndarray, rate: float, frequency: float) -> tuple[np.ndarray, np.ndarray]:
+    """RMS over one cycle, taken anew each half cycle (IEC 61000-4-30, U_rms(1/2)) of waves (K, N).
+
+    Returns the times of the windows' centers (M,) [s] from the first sample on and the values (K, M).
+    """
+    cycle = rate / frequency  # samples, not whole
+    low = np.arange(0.0, waves.shape[-1] - cycle + 1e-9, cycle / 2)
+    return (low + (cycle - 1) / 2) / rate, np.sqrt(np.maximum(_means(waves**2, low, low + cycle), 0.0))
+
+
+def _means(x: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Means (K, M) of x (K, N) from `low` to `high` (M,), sample k lying between k and k + 1."""
+    total = np.concatenate([np.zeros((len(x), 1), x.dtype), np.cumsum(x, axis=1)], axis=1)
+    at = np.arange(x.shape[-1] + 1)
+    return np.array([np.interp(high, at, row) - np.interp(low, at, row) for row in total]) / (high - low)
 
 
 def of_record(record: Record) -> Trace:

@@ -9,7 +9,8 @@ import numpy as np
 from tractexp.recording import Recording, Segment
 from tractexp.recording.measure import FeederWaves
 from tractexp.recording.overview import Sight, View
-from tractexp.recording.traces import half_cycle_rms, spectrum
+from tractexp.recording.quality import spectrum
+from tractexp.recording.trace import half_cycle_rms
 from tractexp.report.chart import Chart
 from tractexp.report.page import Page
 from tractexp.report.style import ACTIVE, PALETTE, REACTIVE, VOLTAGE
