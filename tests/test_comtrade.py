@@ -400,3 +400,9 @@ def test_foreign_files_are_named():
     assert foreign.sentence("a/b.PQD").startswith("a/b.PQD is PQDIF (IEEE 1159.3)")
     assert "give the .cfg beside it" in foreign.sentence("x.hdr")
     assert foreign.sentence("x.cfg") == ""
+
+
+@pytest.mark.parametrize(("unit", "kilo"), [("V", 1e-3), ("kV", 1.0), ("KV", 1.0), ("mV", 1e-6), ("MV", 1e3)])
+def test_a_unit_is_what_its_letters_say_milli_and_mega_apart(unit, kilo):
+    channel = Channel("U", np.array([2, -3], np.int16), unit, "voltage")
+    np.testing.assert_allclose(channel.values(), [2 * kilo, -3 * kilo])

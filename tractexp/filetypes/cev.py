@@ -19,7 +19,7 @@ from tractexp.filetypes.comtrade_header import number, quoted
 from tractexp.filetypes.comtrade_samples import HUGE
 from tractexp.filetypes.remarks import Remarks
 from tractexp.filetypes.text import decode
-from tractexp.recording.recording import UNITS, Channel, Recording, Segment, Status
+from tractexp.recording.recording import Channel, Recording, Segment, Status, unit_of
 
 ROOT = float(np.sqrt(2))
 LARGEST = 32 * 2**20  # bytes: event reports last seconds
@@ -204,7 +204,7 @@ def _channel(report: Report, k: int, values: np.ndarray, gain: float, remarks: R
             unit = "A" if name[0] == "I" else "kV"
             if unit == "kV":
                 remarks.add(f"no unit given for {name}, kV taken")
-    quantity = "frequency" if name == "FREQ" else UNITS.get(unit.lower(), ("", 1.0))[0]
+    quantity = "frequency" if name == "FREQ" else unit_of(unit)[0]
     ratio = _ratio(report, name, remarks) if wave else 1.0
     return Channel(
         name, values, unit, quantity, (wave[1] or "") if wave else "", (wave[2] or "") if wave else "",

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from tractexp.recording.recording import UNITS as ELECTRICAL
+from tractexp.recording.recording import unit_of
 
 # {unit in lower case: (quantity, factor to s, kV, kA, MW, Mvar, Hz, rad, pu)}
 UNITS: Mapping[str, tuple[str, float]] = {
@@ -111,7 +112,8 @@ def factor(unit: str) -> float:
     """From a unit to the one used inside, 1 for none."""
     if unit.strip() == "mW":
         return 1e-9
-    return UNITS.get(unit.strip().lower(), ("", 1.0))[1]
+    quantity, by = unit_of(unit)
+    return by if quantity else UNITS.get(unit.strip().lower(), ("", 1.0))[1]
 
 
 def role(name: str, unit: str = "") -> Role | None:

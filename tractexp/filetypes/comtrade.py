@@ -18,7 +18,7 @@ from tractexp.filetypes.comtrade_writer import write as write
 from tractexp.filetypes.remarks import Remarks
 from tractexp.filetypes.text import decode, lines
 from tractexp.filetypes.timeline import Stretch
-from tractexp.recording.recording import UNITS, Channel, Recording, Status
+from tractexp.recording.recording import Channel, Recording, Status, unit_of
 
 LARGEST_CFG = 4 * 2**20  # bytes: fifty thousand channels
 MISSING = {"BINARY": -32768.0, "BINARY32": -2147483648.0}  # raw values that stand for none
@@ -115,7 +115,7 @@ def _channel(header: Header, k: int, samples: Samples, stretches: list[Stretch])
     told, raw = header.analogs[k], samples.analogs[k]
     raw, missing = _missing(header.kind, told, raw)
     return Channel(
-        told.name, timeline.evened(raw, stretches, missing), told.unit, UNITS.get(told.unit.lower(), ("", 1.0))[0],
+        told.name, timeline.evened(raw, stretches, missing), told.unit, unit_of(told.unit)[0],
         told.phase, told.circuit, told.gain, told.offset, told.ratio, told.skew * 1e-6, told.limits, missing,
     )  # fmt: skip
 

@@ -11,7 +11,7 @@ from math import isfinite
 
 from tractexp.errors import UserError
 from tractexp.filetypes.remarks import Remarks
-from tractexp.recording.recording import UNITS
+from tractexp.recording.recording import unit_of
 
 VALUE = {"ASCII": "f8", "BINARY": "<i2", "BINARY32": "<i4", "FLOAT32": "<f4"}  # of one analog value
 FREQUENCY = (10.0, 100.0)  # Hz, nominal: 16.7 and 25 Hz railways to 60 Hz, with room
@@ -224,7 +224,7 @@ def _checked_ratio(left: _Lines, line: int, channel: str, made: Analog) -> Analo
     if made.side != "S" or (made.primary > 0 and made.secondary > 0):
         return made
     words = f"its ratio {made.primary:g}/{made.secondary:g} is not positive"
-    if made.unit.lower() in UNITS:
+    if unit_of(made.unit)[0]:
         raise left.refuse(
             line, f"{channel} is in secondary values, but {words}; write the ratio of its transformer there, or P for "
             "primary values",

@@ -19,7 +19,14 @@ UNITS: Mapping[str, tuple[str, float]] = {
     "mv": ("voltage", 1e-6), "a": ("current", 1e-3), "amp": ("current", 1e-3), "amps": ("current", 1e-3),
     "ampere": ("current", 1e-3), "amperes": ("current", 1e-3), "ka": ("current", 1.0), "ma": ("current", 1e-6),
 }  # fmt: skip
+MEGA = {"MV": ("voltage", 1e3), "MA": ("current", 1e3)}  # which small letters would make milli
 FEWEST_PER_CYCLE = 10  # samples: a slower segment holds no waveform but magnitudes
+
+
+def unit_of(text: str) -> tuple[str, float]:
+    """(quantity, factor to kV or kA) of a unit as a file writes it; ("", 1.0) for another."""
+    text = text.strip()
+    return MEGA.get(text) or UNITS.get(text.lower(), ("", 1.0))
 
 
 @dataclass(frozen=True)
@@ -71,7 +78,7 @@ class Channel:
     @property
     def factor(self) -> float:
         """From the file's unit to the one used inside."""
-        quantity, factor = UNITS.get(self.unit.strip().lower(), ("", 1.0))
+        quantity, factor = unit_of(self.unit)
         return factor if quantity else 1e-3 if self.quantity in ("voltage", "current") else 1.0
 
 
