@@ -111,6 +111,19 @@ class TestLineVoltages:
             only(station(tmp_path, lines, Y * V, t, names=names, labels=labels), voltages=[0, 1], currents=[2, 3, 4])
         )
 
+    def test_a_residual_beside_them_is_no_third_one(self, tmp_path):
+        t = seconds()
+        V = phasors(t, DIP)
+        lines = np.array([V[0] - V[1], V[1] - V[2], V.mean(axis=0)])
+        path = station(tmp_path, lines, Y * V, t, names=["U21", "U32", "V0", "I1", "I2", "I3"], labels=[""] * 6)
+        with pytest.raises(UserError, match=r"channel 2 'V0' is the residual .*: voltages=\[0, 1\]"):
+            only(path, voltages=[0, 1, 2], currents=[3, 4, 5])
+        is_right(only(path, voltages=[0, 1], currents=[3, 4, 5]))
+        is_right(only(path))
+        path = station(tmp_path, lines, Y * V, t, names=[*"abcdef"], labels=[""] * 6)
+        with pytest.raises(UserError, match=r"50 % of the positive one: .* are not the voltages of one bus"):
+            only(path, voltages=[0, 1, 2], currents=[3, 4, 5])
+
 
 def test_b_the_frequency_that_is_measured_counts_not_the_one_that_is_declared(tmp_path):
     t = seconds()

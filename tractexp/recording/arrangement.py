@@ -18,13 +18,14 @@ from tractexp.record.direction import at_level, direction
 from tractexp.record.phasor import sequences
 from tractexp.recording.connection import usual
 from tractexp.recording.feeder import Feeder
-from tractexp.recording.label import backward, groups, kind, order
+from tractexp.recording.label import backward, groups, kind, order, residual
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import frequency, nearest_nominal, snapshots
 
 ALIVE = 0.5  # of the upper level of V1: less is a fault, or a dead line
 LOADED = 0.2  # of the upper level of I1, as well
 CALM = 0.05  # of the median V1: the state in which orders are compared
+UNEVEN = 0.25  # V2 over V1 in the calm: no network's voltages are so uneven
 BALANCED = 0.5  # I2 over I1 of an order that makes sense
 SENSIBLE = 75.0  # degrees between V1 and I1 that a load has at most
 BACKWARD = 135.0  # degrees from which on the current is turned round, or power fed back
@@ -66,6 +67,7 @@ def arranged(recording: Recording, feeder: Feeder) -> Feeder:
 
     Raises `UserError` where the order given makes no sense and another does, which is proposed with its P and Q.
     """
+    _residuals(recording, feeder)
     feeder = _lines_by_label(recording, feeder)
     connection = chosen("connection", feeder.connection)
     seen = _seen(recording, feeder)
@@ -83,6 +85,17 @@ def arranged(recording: Recording, feeder: Feeder) -> Feeder:
         _labels(recording, feeder, seen)
         _currents(recording, feeder, seen)
     return _directed(feeder, seen)
+
+
+def _residuals(recording: Recording, feeder: Feeder) -> None:
+    """Refuse what is measured of all phases together, where a phase or a line is needed."""
+    for key, numbers in (("voltages", feeder.voltages), ("currents", feeder.currents)):
+        if odd := [i for i in numbers if len(numbers) > 1 and residual(recording.channels[i])]:
+            rest = [i for i in numbers if i not in odd]
+            raise UserError(
+                f"data.{key}={[*numbers]}: {_called(recording, odd[0])} is the residual of all phases, and no phase; "
+                f"give the phases, or with two line voltages or two current transformers those alone: data.{key}={rest}"
+            )
 
 
 def _lines_by_label(recording: Recording, feeder: Feeder) -> Feeder:
@@ -183,6 +196,12 @@ def _root3(recording: Recording, ours: Sequence[int], theirs: Sequence[int]) -> 
 def _voltages(recording: Recording, feeder: Feeder, seen: _Seen) -> None:
     """Refuse voltages whose negative sequence exceeds the positive one while they are alive."""
     V1, V2 = (float(np.median(np.abs(x)[seen.calm])) for x in sequences(seen.V))
+    if UNEVEN * V1 < V2 <= V1:
+        names = ", ".join(_called(recording, i) for i in feeder.voltages)
+        raise UserError(
+            f"data.voltages={[*feeder.voltages]}: in the calm, the negative sequence is {100 * V2 / V1:.0f} % of the "
+            f"positive one: {names} are not the voltages of one bus; 'tractexp look' shows what the file holds"
+        )
     if V2 <= V1:
         return
     if _to_ground(feeder) and (k := _turned(seen.V[:, seen.calm])) is not None:
