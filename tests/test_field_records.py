@@ -164,6 +164,14 @@ def test_d_a_reversed_transformer_is_told_from_regeneration(tmp_path):
     assert any("regeneration (a braking train), no reversed current" in note for note in event.record.notes)
 
 
+@pytest.mark.parametrize("settings", [{}, {"voltages": [0, 1, 2], "currents": [3, 4, 5]}], ids=["proposed", "named"])
+def test_what_is_found_of_order_and_direction_is_said_once_in_a_look(tmp_path, settings):
+    t = seconds()
+    V = phasors(t, DIP)
+    (feeder,) = tractexp.look(station(tmp_path, V, -Y * V, t), **settings).feeders
+    assert sum("data.reverse_current=true" in why for why in feeder["why"]) == 1
+
+
 class TestNotADip:
     """E: fitted, as dips of 100 % and of 37 %."""
 

@@ -128,7 +128,16 @@ def overview(reader: WaveformReader, recording: Recording) -> list[Sight]:
     """The loads of a recording as they are proposed, each with what happened to it; `reader` is that of its file."""
     found = propose(recording)
     loaded = any(feeder.loaded for feeder in found)
-    return [sight(reader, recording, feeder, events=feeder.loaded or not loaded) for feeder in found]
+    made = []
+    for feeder in found:
+        said = ()
+        try:
+            feeder = arranged(recording, feeder)
+        except UserError as error:
+            said = (str(error),)
+        shown = sight(reader, recording, feeder, events=feeder.loaded or not loaded)
+        made.append(replace(shown, said=(*said, *shown.said)))
+    return made
 
 
 def sight(reader: WaveformReader, recording: Recording, feeder: Feeder, events: bool = True) -> Sight:
@@ -137,10 +146,6 @@ def sight(reader: WaveformReader, recording: Recording, feeder: Feeder, events: 
     Without `events` what happened is not looked for: beside loads, what carries nothing tells of noise only.
     """
     phasors, found, said = [], [], []
-    try:
-        feeder = arranged(recording, feeder)
-    except UserError as error:
-        said.append(str(error))
     made = Sight(feeder.name or "load", feeder=feeder, settings=feeder.settings)
     try:
         segments = recording.waveforms()
