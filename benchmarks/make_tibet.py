@@ -7,6 +7,7 @@ The recording the paper uses was never published. These three dips of one load c
 import argparse
 import dataclasses
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -75,8 +76,9 @@ def make(folder: Path) -> list[Path]:
     return written
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+def main(make: Callable[[Path], list[Path]] = make, about: str = __doc__) -> None:
+    """The command of a script that makes shipped records by `make`."""
+    parser = argparse.ArgumentParser(description=about.partition("\n")[0])
     home = Path(__file__).resolve().parents[1] / "tractexp" / "data"
     parser.add_argument("--out", type=Path, default=home, help="folder to write to (default: the shipped data)")
     for path in make(parser.parse_args().out):

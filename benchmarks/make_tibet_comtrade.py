@@ -10,12 +10,11 @@ and two current transformers (Aron). The transformer is ideal and the grid stiff
 that of the two windings. A train would be a single-phase load on one of them; it is no machine of known truth.
 """
 
-import argparse
 from datetime import datetime
 from pathlib import Path
 
 import numpy as np
-from make_tibet import DIPS, LOAD
+from make_tibet import DIPS, LOAD, main
 
 from independent import Waveforms, simulate
 from independent.recorder import PHASES
@@ -75,13 +74,5 @@ def make(folder: Path) -> list[Path]:
     return written
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    home = Path(__file__).resolve().parents[1] / "tractexp" / "data"
-    parser.add_argument("--out", type=Path, default=home, help="folder to write to (default: the shipped data)")
-    for path in make(parser.parse_args().out):
-        print(path)
-
-
 if __name__ == "__main__":
-    main()
+    main(make, __doc__)

@@ -202,9 +202,7 @@ def _view(source: str | Record, settings: Mapping[str, Any]) -> View:
 def series(shown: Sight) -> dict[str, np.ndarray]:
     """Columns (M,) of one load: t [s], f [Hz], U, U2 [kV], P [MW], Q [Mvar] and, of channels, I1, I2 [kA]."""
     if shown.record is not None:
-        made, base = shown.record.channels, shown.record.base
-        units = {"U": base.voltage, "U2": base.voltage, "P": base.power, "Q": base.power}
-        return {name: values * units.get(name, 1.0) for name, values in made.items()}
+        return shown.record.base.absolute(shown.record.channels)
     parts = [
         {
             "t": p.t, "f": p.f, "U": p.U, "U2": p.U2, "I1": np.abs(p.I1), "I2": np.abs(p.I2), "P": np.real(p.S),
@@ -307,10 +305,10 @@ def _is_usual(setting: Any, value: Any) -> bool:
 def _sums(shown: Sight) -> dict[str, Any]:
     """Kirchhoff: the sums of the three voltages and of the three currents, as shares of a phase's, at the beginning."""
     made = {}
-    for key, phases in (("V", "V"), ("I", "I")):
+    for key in "VI":
         value = None
         if shown.phasors and len(shown.phasors[0].V) == 3:
-            first = getattr(shown.phasors[0], phases)[:, :50]
+            first = getattr(shown.phasors[0], key)[:, :50]
             scale = float(np.abs(first).mean())
             value = float(np.abs(first.sum(axis=0)).mean()) / scale if scale > 0 else None
         made[f"sum_{key}"] = value

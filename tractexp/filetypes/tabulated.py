@@ -14,10 +14,10 @@ from tractexp.filetypes.columns import PER_UNIT, factor, role
 from tractexp.filetypes.mapping import LINES, PHASES, Mapped, check_mapping, mapped
 from tractexp.filetypes.sidecar import Sidecar, beside
 from tractexp.filetypes.table import Form, Table, open_table
+from tractexp.record.phasor import sequences
 from tractexp.record.record import JITTER
 from tractexp.recording.recording import Channel, Recording, Segment
 
-TURN = np.exp(2j * np.pi / 3)
 FORWARD = np.sqrt(3) * np.exp(1j * np.pi / 6)  # the positive sequence of line voltages over that of phase voltages
 VOLTS = 1000.0  # a voltage without a unit that is above it is in V
 NEAR_ONE = (0.3, 3.0)  # and within these it is per unit
@@ -216,8 +216,7 @@ def _sequences(X: np.ndarray, keys: list[str]) -> tuple[np.ndarray, np.ndarray |
     """Positive and negative sequence (N,) of phasors (3, N) of phases or lines; of one (1, N), it and None."""
     if len(X) == 1:
         return X[0], None
-    positive = (X[0] + TURN * X[1] + TURN**2 * X[2]) / 3
-    negative = (X[0] + TURN**2 * X[1] + TURN * X[2]) / 3
+    positive, negative = sequences(X)
     if keys[0][1:] in LINES:
         return positive / FORWARD, negative / FORWARD.conjugate()
     return positive, negative

@@ -121,12 +121,11 @@ def _extra(value: Any) -> Any:
 def recording_of(record: Record) -> Recording:
     """A record as a recording of magnitudes in kV (line to line), MW, Mvar and Hz, for formats that know no other."""
     base = record.base
-    told = {"U": ("kV", "voltage", base.voltage), "P": ("MW", "power", base.power),
-            "Q": ("Mvar", "reactive_power", base.power), "f": ("Hz", "frequency", 1.0),
-            "U2": ("kV", "voltage", base.voltage)}  # fmt: skip
+    told = {"U": ("kV", "voltage"), "P": ("MW", "power"), "Q": ("Mvar", "reactive_power"), "f": ("Hz", "frequency"),
+            "U2": ("kV", "voltage")}  # fmt: skip
     channels = [
-        Channel(name, values * told[name][2], told[name][0], told[name][1], form="value")
-        for name, values in record.channels.items()
+        Channel(name, values, *told[name], form="value")
+        for name, values in base.absolute(record.channels).items()
         if name != "t"
     ]
     segment = Segment(0, record.samples, record.rate, 0.0)
@@ -137,10 +136,7 @@ def _recorded(channel: Channel) -> np.ndarray:
     """The values (N,) of a channel as recorded: those of its converter, gain and offset applied; nan for none."""
     if channel.gain == 1 and channel.offset == 0 and channel.missing is None:
         return np.asarray(channel.raw)
-    made = np.asarray(channel.raw, dtype=np.float64) * channel.gain + channel.offset
-    if channel.missing is not None:
-        made[channel.raw == channel.missing] = np.nan
-    return made
+    return channel.recorded()
 
 
 def _told(recording: Recording) -> dict[str, Any]:

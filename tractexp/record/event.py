@@ -121,8 +121,12 @@ def _margin(U: np.ndarray) -> float:
     alive = U[DEAD * U.max() < U]
     if len(alive) < FEWEST_BEFORE:
         return SHALLOWEST
-    spread = np.median(np.abs(np.diff(alive))) / 0.6745 / np.sqrt(2)
-    return max(SHALLOWEST, NOISE_FACTOR * float(spread / np.median(alive)))
+    return max(SHALLOWEST, NOISE_FACTOR * float(sample_noise(alive) / np.median(alive)))
+
+
+def sample_noise(x: np.ndarray) -> np.ndarray:
+    """Standard deviation of the noise from sample to sample of x (..., N): robust, and blind to slow changes."""
+    return np.median(np.abs(np.diff(x)), axis=-1) / 0.6745 / np.sqrt(2)
 
 
 def _swell(t: np.ndarray, U: np.ndarray, k: int, reference: float, margin: float) -> tuple[int, int] | None:

@@ -109,6 +109,11 @@ def sequences(phases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return (a + TURN * b + TURN**2 * c) / 3, (a + TURN**2 * b + TURN * c) / 3
 
 
+def symmetrical(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positive and negative sequence (N,) of phasors (3, N); of a single phase (1, N), itself and zero."""
+    return sequences(X) if len(X) == 3 else (X[0], np.zeros_like(X[0]))
+
+
 def turning(angle: np.ndarray, rate: float) -> np.ndarray:
     """Frequency [Hz] at which a phasor's angle (N,) [rad] turns in its frame."""
     return np.gradient(np.unwrap(angle)) * rate / (2 * np.pi)
@@ -125,8 +130,7 @@ def track(voltages: np.ndarray, rate: float, nominal: float, cycles: float = 4.0
     at = np.arange(reach, n - reach, every)
     f = np.full(n, nominal)
     for _ in range(PASSES):
-        X = fundamental(voltages, rate, f, at)
-        V1 = sequences(X)[0] if len(X) == 3 else X[0]
+        V1 = symmetrical(fundamental(voltages, rate, f, at))[0]
         angle = np.unwrap(np.angle(V1)) + frame(f, rate)[at]
         speed = _speed(angle, np.abs(V1) < least, half) * rate / every / (2 * np.pi)
         f = np.interp(
@@ -164,22 +168,22 @@ class Phasors:
     @property
     def V1(self) -> np.ndarray:
         """Positive-sequence voltage (M,) [kV]; of a single-phase load its voltage."""
-        return sequences(self.V)[0] if len(self.V) == 3 else self.V[0]
+        return symmetrical(self.V)[0]
 
     @property
     def V2(self) -> np.ndarray:
         """Negative-sequence voltage (M,) [kV]; zero for a single-phase load."""
-        return sequences(self.V)[1] if len(self.V) == 3 else np.zeros_like(self.V[0])
+        return symmetrical(self.V)[1]
 
     @property
     def I1(self) -> np.ndarray:
         """Positive-sequence current (M,) [kA]; of a single-phase load its current."""
-        return sequences(self.I)[0] if len(self.I) == 3 else self.I[0]
+        return symmetrical(self.I)[0]
 
     @property
     def I2(self) -> np.ndarray:
         """Negative-sequence current (M,) [kA]; zero for a single-phase load."""
-        return sequences(self.I)[1] if len(self.I) == 3 else np.zeros_like(self.I[0])
+        return symmetrical(self.I)[1]
 
     @property
     def S(self) -> np.ndarray:

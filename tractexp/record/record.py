@@ -30,9 +30,17 @@ class Base:
 
     def per_unit(self, columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Columns by name, U and U2 [kV], P and P_3, P_5, ... [MW] and Q [Mvar] made per unit."""
-        units = {"U": self.voltage, "U2": self.voltage, "P": self.power, "Q": self.power}
-        units |= {name: self.power for name in columns if name.startswith("P_")}
-        return {name: values / units.get(name, 1.0) for name, values in columns.items()}
+        return {name: values / self._one(name) for name, values in columns.items()}
+
+    def absolute(self, columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Columns per unit made kV, MW and Mvar: the way back."""
+        return {name: values * self._one(name) for name, values in columns.items()}
+
+    def _one(self, name: str) -> float:
+        """What one per unit of a column is."""
+        if name in ("P", "Q") or name.startswith("P_"):
+            return self.power
+        return self.voltage if name in ("U", "U2") else 1.0
 
 
 @dataclass(frozen=True, eq=False)

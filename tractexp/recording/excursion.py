@@ -9,16 +9,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tractexp.record.event import NOISE_FACTOR, RECOVERED, sample_noise
+from tractexp.record.record import DEAD
 from tractexp.recording.trace import Trace
 
 LEAVES = 0.03  # of the reference, positive sequence
 LEAVES_PHASE = 0.05  # of the reference, any phase (of the 1 to 6 % considered in IEC 61000-4-30:2015, 5.11)
 HYSTERESIS = 0.02  # of the reference (IEC 61000-4-30, 5.4.2)
 DIP = 0.1  # of the reference: what the standard calls a dip or a swell (5.4), over once it is within 8 %
-REGAINED = 0.2  # of the deviation: what may be missing when it counts as over, as in `find_dips`
 SLIDING = 60.0  # s, time constant of the reference (IEC 61000-4-30, 5.4.4)
-NOISE_FACTOR = 6.0  # standard deviations of noise that a deviation must exceed
-DEAD = 0.05  # of the voltage while alive: no voltage at all
 FLAT = 1.0  # s that a new level must last to be one (IEC 61000-4-30, 5.11: 100 half cycles)
 LONGEST = 60.0  # s: what lasts longer is a new level
 ABRUPT = 3.0  # cycles within which a fault or a switch changes the voltage
@@ -76,7 +75,7 @@ def _levels(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
     most = np.percentile(levels, 95, axis=1)
     levels = levels[most > DEAD * most.max()]
     middle = np.maximum(np.median(levels, axis=1), 1e-12)
-    spread = np.median(np.abs(np.diff(levels, axis=1)), axis=1) / 0.6745 / np.sqrt(2) / middle
+    spread = sample_noise(levels) / middle
     usual = np.array([LEAVES] + [LEAVES_PHASE] * (len(levels) - 1))
     return levels, np.maximum(usual, NOISE_FACTOR * spread)
 
@@ -89,7 +88,7 @@ def _one(
     row = int(np.argmax(np.abs(off[:, 0]) / limits))
     side = np.sign(off[row, 0])
     worst = np.maximum.accumulate(np.abs(off).max(axis=0))
-    allowed = np.maximum(np.maximum(limits - HYSTERESIS, limits / 3)[:, None], REGAINED * worst)
+    allowed = np.maximum(np.maximum(limits - HYSTERESIS, limits / 3)[:, None], RECOVERED * worst)
     allowed = np.where(worst > DIP, np.maximum(allowed, DIP - HYSTERESIS), allowed)
     inside = (np.abs(off) <= allowed).all(axis=0)
     crossed = (side * off[row] < -limits[row]) & (side * off < 0).any(axis=0)

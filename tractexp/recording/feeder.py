@@ -202,7 +202,7 @@ def _size(seen: Snapshots, numbers: Sequence[int]) -> float:
 def _positive(X: np.ndarray, pairs: bool) -> np.ndarray:
     """Positive sequence (M,) of three phasors; of two line voltages that which they say, to a constant factor."""
     if len(X) == 3:
-        return (X[0] + TURN * X[1] + TURN**2 * X[2]) / 3
+        return sequences(X)[0]
     return (X[0] - TURN**2 * X[1]) / 3 if pairs else X[0]
 
 

@@ -67,10 +67,15 @@ class Channel:
 
     def values(self, first: int = 0, stop: int | None = None) -> np.ndarray:
         """Primary values (M,) in kV, kA, MW, Mvar, Hz or rad (another quantity in its own unit); nan where missing."""
+        made = self.recorded(first, stop)
+        made *= self.ratio * self.factor
+        return made
+
+    def recorded(self, first: int = 0, stop: int | None = None) -> np.ndarray:
+        """Values (M,) in `unit`, on the side that was recorded; nan where missing."""
         raw = self.raw[first:stop]
         with np.errstate(invalid="ignore"):  # a damaged float may be a signalling nan
             made = np.asarray(raw, dtype=np.float64) * self.gain + self.offset
-        made *= self.ratio * self.factor
         if self.missing is not None:
             made[raw == self.missing] = np.nan
         return made
