@@ -55,6 +55,16 @@ def defaults() -> dict[str, str]:
     return {group: name for item in content["defaults"] if isinstance(item, dict) for group, name in item.items()}
 
 
+@functools.cache
+def replaced(group: str, name: str) -> dict[str, str]:
+    """{group: choice} that the configuration `group=name` puts in the place of the usual ones."""
+    import yaml
+
+    content = yaml.safe_load((CONF / group / f"{name}.yaml").read_text(encoding="utf-8"))
+    items = [item for item in content.get("defaults", ()) if isinstance(item, dict)]
+    return {key.removeprefix("override /"): chosen for item in items for key, chosen in item.items()}
+
+
 def entry_points() -> list[importlib.metadata.EntryPoint]:
     """The plugin packages that are installed, in order of name."""
     return sorted(importlib.metadata.entry_points(group=ENTRY_POINTS), key=lambda p: (p.name, p.value))

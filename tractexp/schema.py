@@ -20,6 +20,7 @@ class ModelConfig:
     substeps: int | None = None  # Runge-Kutta steps per sample; null: as many as needed
     integration: str = "classical"  # or printed: Eq. (4) of the paper as it stands, one step per sample
     per_event: list[str] = field(default_factory=list)  # parameters with a value of their own in each event
+    domain: str = "phasors"  # or waves; chosen by domain=
 
 
 @dataclass

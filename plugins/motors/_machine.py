@@ -22,7 +22,7 @@ def single_cage(eq, T_prime, X_prime, C, T_m):
     E, omega = eq.flux("E", "E"), eq.speed(r"\omega")
     V = eq.V
     Z = eq.place(sites.stator_impedance, I * X_prime)
-    current = eq.place(sites.stator_current, (V - E) / Z)
+    current = eq.place(sites.stator_current, eq.branch("psi", r"\psi", V, Z, behind=E))
     coupling = eq.place(sites.coupling, C)
     time_constant = eq.place(sites.time_constant, T_prime)
     electrical_torque = eq.place(sites.electrical_torque, re(E * conjugate(current)))

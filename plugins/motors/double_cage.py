@@ -41,7 +41,7 @@ class DoubleCage(Motor):
         V = eq.V
         Z = eq.place(sites.stator_impedance, I * X_second, "Z''")
         inner = eq.define("internal_voltage", E + D, "E''")
-        current = eq.place(sites.stator_current, (V - inner) / Z)
+        current = eq.place(sites.stator_current, eq.branch("psi", r"\psi", V, Z, behind=inner))
         coupling = eq.place(sites.coupling, C)
         time_constant = eq.place(sites.time_constant, T_prime)
         electrical_torque = eq.place(sites.electrical_torque, re(inner * conjugate(current)))

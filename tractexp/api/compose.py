@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tractexp.api.arguments import Choice, check_kind, public, read_choice
-from tractexp.choices import defaults
-from tractexp.errors import UserError, among
+from tractexp.choices import choices, defaults, replaced
+from tractexp.errors import UserError, among, check_choice
 from tractexp.outcome import Table, Tabulated
 
 if TYPE_CHECKING:
     from tractexp.model.model import Model
 
-GROUP, PARTS = "model", ("motor", "static")
+GROUP, DOMAIN, PARTS = "model", "domain", ("motor", "static")
 
 
 class Portable:
@@ -38,12 +38,14 @@ class LoadModel(Portable, Tabulated):
     substeps: int | None = None
     per_event: Sequence[str] = ()
     integration: str = "classical"
+    domain: str = "phasors"
 
     @property
     def node(self) -> dict[str, Any]:
-        """The parts, as `result.json` keeps them; and the integration where it is not the classical."""
+        """The parts, as `result.json` keeps them; integration and domain where they are not the usual ones."""
         parts = {"motor": dict(self.motor), "static": dict(self.static), "effects": list(self.effects)}
-        return parts if self.integration == "classical" else {**parts, "integration": self.integration}
+        usual = {"integration": "classical", "domain": "phasors"}
+        return parts | {key: told for key, plain in usual.items() if (told := getattr(self, key)) != plain}
 
     @functools.cached_property
     def model(self) -> "Model":
@@ -95,6 +97,7 @@ def compose(
     substeps: int | None = None,
     per_event: Sequence[str] | None = None,
     integration: str | None = None,
+    domain: str | None = None,
 ) -> LoadModel:
     """A load model: a choice of `conf/model` (by name, or the path of a YAML file), or a motor beside a static load.
 
@@ -102,17 +105,20 @@ def compose(
     they replace those of `model`, and one left out is that of the paper's model. `effects` names what is added to the
     equations. `bounds` {name: [lower, upper]} and `fixed` {name: value}, in the parameters' own units, are added to the
     choice's; `per_event` names parameters with a value of their own in each event; `substeps` are Runge-Kutta steps per
-    sample, as many as needed by default; `integration` "printed" is Eq. (4) of the paper as it stands.
+    sample, as many as needed by default; `integration` "printed" is Eq. (4) of the paper as it stands; with `domain`
+    "waves" the same equations draw sampled currents, and what phasors neglect is kept.
 
     Raises `UserError` for an unknown name or an effect that does not fit the equations; the values are checked where
     the model is used.
     """
-    made = model_of(model)
+    made = model_of(model, domain)
     chosen_parts = {"motor": motor, "static": static}
     parts = {
         part: Choice.of(f"model/{part}", chosen).node for part, chosen in chosen_parts.items() if chosen is not None
     }
-    given = {"effects": effects, "substeps": substeps, "per_event": per_event, "integration": integration}
+    given = {
+        "effects": effects, "substeps": substeps, "per_event": per_event, "integration": integration, "domain": domain,
+    }  # fmt: skip
     made = made.with_(bounds=bounds, fixed=fixed, **given, **parts)
     _ = made.parameters
     for key in made.fixed:
@@ -122,8 +128,14 @@ def compose(
     return made
 
 
-def model_of(given: Any) -> LoadModel:
-    """What a call takes as `model`: a name, a path, a mapping of parts, a `LoadModel` or a composed `Model`."""
+def model_of(given: Any, domain: str | None = None) -> LoadModel:
+    """What a call takes as `model`: a name, a path, a mapping of parts, a `LoadModel` or a composed `Model`.
+
+    None is the usual model of the `domain`. Raises `UserError` for an unknown name.
+    """
+    if domain is not None:
+        check_choice("domain", domain, sorted(choices()[DOMAIN]))
+        return replace(model_of(given or replaced(DOMAIN, domain).get(GROUP)), domain=domain)
     if isinstance(given, LoadModel):
         return given
     if given is None or isinstance(given, str | Path):
@@ -148,7 +160,7 @@ def _node(model: Any) -> dict[str, Any]:
     try:
         motor, static = ({"name": p.name, **dataclasses.asdict(p)} for p in (model.motor, model.static))
         told = {"motor": motor, "static": static, "effects": [effect.name for effect in model.effects]}
-        return told | {"integration": model.integration}
+        return told | {"integration": model.integration, "domain": model.domain}
     except AttributeError:
         kind = type(model).__name__
         raise UserError(f"model is of type {kind}; give a name, or what tractexp.compose makes") from None

@@ -277,6 +277,7 @@ def identify(
     fixed: Mapping[str, float] | None = None,
     per_event: Sequence[str] | None = None,
     substeps: int | None = None,
+    domain: str | None = None,
     objective: Any = None,
     optimizer: Any = None,
     budget: int | None = None,
@@ -290,7 +291,8 @@ def identify(
 
     `records` are events of `tractexp.read`, or what it reads; several are fitted together. Those of `validate` are only
     judged. `model` is a choice of `conf/model`, the path of such a YAML file, or what `tractexp.compose` or an
-    investigation (`found.extended`) made; `bounds`, `fixed`, `per_event` and `substeps` are as in `tractexp.compose`.
+    investigation (`found.extended`) made; `bounds`, `fixed`, `per_event`, `substeps` and `domain` are as in
+    `tractexp.compose`: with `domain="waves"` the records' sampled currents are fitted, not the power that phasors show.
 
     `objective` and `optimizer` are names, or mappings of `name` and settings: `{"name": "pso", "population": 100}`. A
     model, an objective or an optimizer left out is that of `conf/config.yaml`, as on the command line. The search ends
@@ -301,7 +303,7 @@ def identify(
     Raises `UserError` for wrong names or values, records that lack what the model reads, and where nothing tried can be
     simulated.
     """
-    known = {"bounds": bounds, "fixed": fixed, "per_event": per_event, "substeps": substeps}
+    known = {"bounds": bounds, "fixed": fixed, "per_event": per_event, "substeps": substeps, "domain": domain}
     setup = Asked.of(
         records, model, validate, objective, known, seed=seed, budget=budget, time_limit=time_limit, target=target,
         optimizer=Choice.of("optimizer", optimizer), check_intervals=check_intervals,

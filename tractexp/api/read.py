@@ -11,7 +11,7 @@ from tractexp import plugin
 from tractexp.api.arguments import Choice, check_kind, choices, public
 from tractexp.errors import UserError, among
 from tractexp.outcome import Table, Tabulated
-from tractexp.record import Base, Event, Record, Window, describe, detect, reader_of
+from tractexp.record import Base, Event, Record, Waves, Window, describe, detect, reader_of
 
 REQUIRED, OPTIONAL = ("t", "U", "P", "Q"), ("f", "U2")
 GROUP = "data"
@@ -170,7 +170,8 @@ def kept(event: Event) -> dict[str, Any]:
 
 def kept_record(record: Record) -> dict[str, Any]:
     """A record as plain data."""
-    plain = {"base": asdict(record.base), "window": record.window and record.window.to_dict(), "more": {**record.more}}
+    plain = {"base": asdict(record.base), "window": record.window and record.window.to_dict(), "more": {**record.more},
+             "waves": record.waves and record.waves.to_dict()}  # fmt: skip
     return {f.name: getattr(record, f.name) for f in fields(Record)} | plain
 
 
@@ -185,4 +186,8 @@ def record_again(content: Mapping[str, Any]) -> Record:
     base, notes = Base(**content["base"]), tuple(content["notes"])
     window = Window.of(content["window"]) if content.get("window") else None
     more = {name: np.array(values, dtype=float) for name, values in content.get("more", {}).items()}
-    return Record(content["name"], base=base, source=content["source"], notes=notes, window=window, more=more, **arrays)
+    waves = Waves.of(content["waves"]) if content.get("waves") else None
+    return Record(
+        content["name"], base=base, source=content["source"], notes=notes, window=window, more=more, waves=waves,
+        **arrays,
+    )  # fmt: skip

@@ -63,7 +63,7 @@ class Setup(Given):
         return cls(
             train=dips_of("records", records, least=1),
             validate=dips_of("validate", validate),
-            model=model_of(model).with_(**known),
+            model=model_of(model, known.get("domain")).with_(**known),
             objective=Choice.of("objective", objective),
             **search,
         )

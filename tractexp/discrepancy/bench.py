@@ -102,7 +102,7 @@ class Bench:
     def residuals_of(self, unit: np.ndarray, sets: Sequence[tuple[Sequence[str], bool]]) -> np.ndarray:
         """As `residuals`, with a set of names for each of the coordinates, and whether a push is in it."""
         keys = [self.kernels.family.key(names, pushed) for names, pushed in sets]
-        residuals = np.empty((len(unit), 2, self.drive.samples))
+        residuals = np.empty((len(unit), self.drive.channels, self.drive.samples))
         for key in dict.fromkeys(keys):
             mine = np.array([k == key for k in keys])
             first = sets[keys.index(key)]
@@ -123,9 +123,8 @@ class Bench:
 
     def apart(self, further_rows: int) -> list[Apart]:
         """P0 and Q0 act on the rows of their own event only; `further_rows` follow those of the records."""
-        events, N = len(self.events), self.drive.samples
-        rows = np.zeros((events, 2 * N + further_rows), dtype=bool)
+        events, size = len(self.events), self.drive.measured.size
+        rows = np.zeros((events, size + further_rows), dtype=bool)
         for e in range(events):
-            part = self.drive.part(e)
-            rows[e, part] = rows[e, N + part.start : N + part.stop] = True
+            rows[e, :size].reshape(self.drive.measured.shape)[:, self.drive.part(e)] = True
         return [Apart(len(self.coordinates.base) + np.arange(events) * 2 + c, rows) for c in (0, 1)]

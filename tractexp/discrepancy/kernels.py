@@ -39,7 +39,7 @@ class Family:
         effects = [self.catalogue[n].effect for n in sorted({*names, *self.catalogue.of_measurement})]
         pushes = [Injection()] if pushed else []
         base = self.model
-        model = compose(base.motor, base.static, [*base.effects, *effects, *pushes], base.integration)
+        model = compose(base.motor, base.static, [*base.effects, *effects, *pushes], base.integration, base.domain)
         return model.behind(base.recorder)
 
     @functools.cached_property
@@ -105,19 +105,19 @@ class Kernels:
         self._made: dict[Key, tuple[Likelihood, np.ndarray]] = {None: self._simulator(self.whole)}
 
     def residuals(self, key: Key, unit: np.ndarray) -> np.ndarray:
-        """Calculated minus measured (n, 2, N) [pu] at coordinates (n, D)."""
+        """Calculated minus measured (n, C, N) [pu] at coordinates (n, D)."""
         likelihood, columns = self._of(key)
         return likelihood.residuals(unit[:, columns])
 
     def simulate(self, names: Iterable[str], unit: np.ndarray, drive: Drive) -> np.ndarray:
-        """P and Q (n, 2, N) [pu] under other voltages, with these effects at coordinates (n, D)."""
+        """What is compared (n, C, N) [pu] under other voltages, with these effects at coordinates (n, D)."""
         likelihood, columns = self._of(self.family.key(names))
         problem = likelihood.problem
         values = problem.full(likelihood.values(unit[:, columns]))
 
         def simulated(part: np.ndarray) -> np.ndarray:
             response = problem.model.simulate(drive, part, self.substeps)
-            return np.stack([response.P, response.Q], axis=1)
+            return response.by_candidate
 
         return side_by_side(simulated, values)
 

@@ -84,7 +84,7 @@ def surprise(observed: Observed, likelihood: Likelihood, unit: np.ndarray, seed:
     Q, _ = np.linalg.qr(J)
     rest = np.concatenate([rows[None], white])
     rest -= (rest @ Q) @ Q.T
-    channels = rest.reshape(len(rest), 2, -1)
+    channels = rest.reshape(len(rest), observed.drive.channels, -1)
     by_test = surprises.statistics(channels, observed)
     if observed.drive.events > 1:
         by_test[PER_EVENT] = ((rest @ _of_each_event(likelihood, J, Q).T) ** 2).sum(axis=1)
@@ -111,7 +111,8 @@ def _of_each_event(likelihood: Likelihood, J: np.ndarray, Q: np.ndarray) -> np.n
 def loudest_stretch(channels: np.ndarray, layout: Layout) -> tuple[float, str]:
     """The loudest window of the whitened residual (2, N): how many times the noise, and where it is."""
     cells = surprises.cells_of(layout)
-    level = [float(np.sqrt(np.mean(channels["PQ".index(c.channel), c.part] ** 2))) for c in cells]
+    row = layout.drive.names.index
+    level = [float(np.sqrt(np.mean(channels[row(c.channel), c.part] ** 2))) for c in cells]
     k = int(np.argmax(level))
     cell = cells[k]
     name = layout.events[cell.event].record.name

@@ -48,14 +48,14 @@ def _deeper(known: Uncertainty) -> list[str]:
     problem = known.likelihood.problem
     if not poor or not identifiable.all():
         return []
-    deepest = int(np.argmax([e.depth for e in problem.events]))
-    shape, noise = Shape.of(problem.events[deepest]), known.likelihood.noise.of(deepest)
     named = ", ".join(poor)
     without_figures = (
         f"for {named}: record a dip of another depth and fit it together, or fix what stays open by model.fixed"
     )
-    if problem.per_event:
+    if problem.per_event or problem.model.waves:
         return [without_figures]
+    deepest = int(np.argmax([e.depth for e in problem.events]))
+    shape, noise = Shape.of(problem.events[deepest]), known.likelihood.noise.of(deepest)
     try:
         forecasts = over_depth(problem, known.values, shape, known.information, noise)
     except UserError:  # this model or these values cannot be planned with

@@ -182,8 +182,9 @@ def noise_at(
 
     The whole tells more, too, where what is left is nothing but noise. `blur` is that of `Observed.blurred`.
     """
-    rows, J = replace(likelihood, noise=Noise.white(1.0, 1.0)).jacobian(unit)
-    residual, columns = rows.reshape(2, -1), J.T.reshape(-1, 2, likelihood.problem.drive.samples)
+    measured = likelihood.problem.drive.measured
+    rows, J = replace(likelihood, noise=Noise.white(*[1.0] * len(measured))).jacobian(unit)
+    residual, columns = rows.reshape(measured.shape), J.T.reshape(-1, *measured.shape)
     seen = observed.noise(residual, likelihood.known, columns, blur, whole)
     return seen or noise_of(likelihood, residual)
 
@@ -196,17 +197,18 @@ def noise_of(likelihood: Likelihood, residuals: np.ndarray) -> Noise:
     pairs: list[Pair] = []
     for e in range(drive.events):
         part, pair = drive.part(e), []
-        for c in range(2):
+        for c in range(drive.channels):
             pieces = stretches(residuals[c, part], likelihood.known[c, part])
             enough = sum(map(len, pieces)) >= FEWEST
             pair.append(fit_autoregression(pieces).scaled(back) if enough else white_noise(1.0))
-        pairs.append((pair[0], pair[1]))
+        pairs.append(tuple(pair))
     return Noise(tuple(pairs))
 
 
 def louder(likelihood: Likelihood, unit: np.ndarray) -> float:
     """How many times as loud as the noise the whitened residual is from the dips on; at least one."""
-    rows, drive = likelihood.rows(unit[None])[0].reshape(2, -1), likelihood.problem.drive
+    drive = likelihood.problem.drive
+    rows = likelihood.rows(unit[None])[0].reshape(drive.channels, -1)
     parts = [slice(drive.part(e).start + event.start, drive.part(e).stop)
              for e, event in enumerate(likelihood.problem.events)]  # fmt: skip
     after = np.concatenate([rows[:, part][likelihood.known[:, part]] for part in parts])
@@ -219,7 +221,7 @@ def cleaned(likelihood: Likelihood, unit: np.ndarray) -> Likelihood:
     known = drive.weights > 0
     residuals = np.abs(replace(likelihood, known=known).residuals(unit)[0])
     for e in range(drive.events):
-        for c in range(2):
+        for c in range(drive.channels):
             part = drive.part(e)
             seen = residuals[c, part][known[c, part]]
             if len(seen):

@@ -21,14 +21,12 @@ CENTRAL = 1e-5  # of a parameter's range: truncation and rounding both stay belo
 
 
 def before_the_event(event: Event) -> Pair:
-    """Level and color of the noise of P and Q before the dip: what is known of it before anything is fitted."""
+    """Level and color of each channel's noise before the dip: what is known of it before anything is fitted."""
     pair = []
-    for values, level in ((event.record.P, event.noise_P), (event.record.Q, event.noise_Q)):
-        quiet = values[event.steady]
-        known = np.isfinite(quiet)
-        made = fit_autoregression(stretches(quiet - quiet[known].mean(), known), QUIET_ORDER)
+    for quiet, level in zip(event.calm, event.levels, strict=True):
+        made = fit_autoregression(stretches(quiet, np.isfinite(quiet)), QUIET_ORDER)
         pair.append(made.scaled(max(level, SMALLEST) / made.deviation[0]))
-    return pair[0], pair[1]
+    return tuple(pair)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +83,7 @@ class Likelihood:
         response = problem.model.simulate(
             drive, problem.candidates(self.values(unit)), problem.step.substeps, np.swapaxes(before, 0, 1)
         )
-        rows = np.stack((response.P, response.Q), axis=1)
-        rows -= drive.measured
+        rows = response.by_candidate - drive.measured
         rows *= self.known
         rows[response.miss.max(axis=0) > 0] = np.nan
         return rows
@@ -124,6 +121,6 @@ class Likelihood:
 
     def part_of(self, event: int) -> np.ndarray:
         """Which rows (R,) belong to an event."""
-        mask = np.zeros((2, self.problem.drive.samples), dtype=bool)
+        mask = np.zeros(self.problem.drive.measured.shape, dtype=bool)
         mask[:, self.problem.drive.part(event)] = True
         return mask.ravel()

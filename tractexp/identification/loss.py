@@ -35,14 +35,14 @@ class Loss(Plugin):
         return z
 
     def scales(self, events: Sequence[Event], drive: Drive) -> np.ndarray:
-        """The usual residual of each sample of P and Q (2, N) [pu]. Raises `UserError` where it is not known."""
+        """The usual residual of each sample of P and Q (C, N) [pu]. Raises `UserError` where it is not known."""
         if self.quadratic:
             return np.ones((2, 1))
         given = getattr(self, "scale", None)
-        usual = np.empty((2, drive.samples))
+        usual = np.empty(drive.measured.shape)
         for e, event in enumerate(events):
-            for c, channel in enumerate("PQ"):
-                level = given or (event.noise_P, event.noise_Q)[c]
+            for c, channel in enumerate(drive.names):
+                level = given or event.levels[c]
                 if not level > 0:
                     raise UserError(
                         f"{event.record.where}: {channel} shows no noise before the dip, so that a robust objective"

@@ -14,11 +14,13 @@ from tractexp.errors import UserError
 from tractexp.identification.problem import Problem, excitation
 from tractexp.model.drive import Drive
 from tractexp.noise.model import Noise
-from tractexp.noise.quiet import estimate, quiet_stretches
+from tractexp.noise.quiet import HIGHEST, estimate, quiet_stretches
 from tractexp.noise.voltage import Smoothed, smoothed
 from tractexp.noise.wander import LESS, WITHIN, Rest, Wander, find, power_profile
 from tractexp.record import Event
 
+OFFSET = 0.005  # pu: what may be left of a channel's offset, which the mean before the dip took off
+HIGHEST_OF_WAVES = 24  # order of the autoregressions: harmonics are sharp
 LEAST_KEPT = 0.2  # of a residual's variance: where the fit takes more, it tells nothing of the noise
 # Twice the log-likelihood from which a load is said to wander. An investigation asks for less: a wandering that is not
 # there costs it little, and an estimate a third of its precision.
@@ -36,6 +38,8 @@ class Observed:
     @classmethod
     def of(cls, problem: Problem) -> "Observed":
         """The same problem with the noise taken out of the voltage of each event."""
+        if problem.model.waves:  # within a cycle nothing tells noise of the voltage from the voltage
+            return cls(problem, tuple(Smoothed(event, np.empty((0, event.record.samples))) for event in problem.events))
         clean = tuple(smoothed(event) for event in problem.events)
         return cls(problem.driven_by([s.event for s in clean]), clean)
 
@@ -68,13 +72,16 @@ class Observed:
         kept = np.maximum(1 - (apart**2).sum(axis=1), LEAST_KEPT).reshape(residuals.shape)  # the fit took the rest
         wander = functools.partial(self._wander, residuals, columns, known)
         where = [self.drive.part(e) for e in range(self.drive.events)] if whole else self.quiet
+        highest = HIGHEST_OF_WAVES if self.problem.model.waves else HIGHEST
         try:
-            return estimate(residuals / np.sqrt(kept), known, where, wander, blur)
+            return estimate(residuals / np.sqrt(kept), known, where, wander, blur, highest)
         except UserError:
             return None
 
     def _wander(self, left: np.ndarray, columns: np.ndarray, known: np.ndarray, mix: np.ndarray) -> Wander | None:
-        """How the load wanders before the events and during them, in mixed channels."""
+        """How the load wanders before the events and during them, in mixed channels; not told of waveforms."""
+        if self.problem.model.waves:
+            return None
         parts = [self.drive.part(e) for e in range(self.drive.events)]
         before = [self.drive.measured[:, p][:, event.steady] for p, event in zip(parts, self.events, strict=True)]
         rests = []
@@ -87,7 +94,12 @@ class Observed:
         )  # fmt: skip
 
     def blurred(self, values: np.ndarray) -> np.ndarray | None:
-        """What errors of the voltage do to the power at free values (d,): (k, 2, N) [pu], None where it has none."""
+        """What errors of the voltage do to the power at free values (d,): (k, 2, N) [pu], None where it has none.
+
+        Of waveforms, whose voltage stands as recorded, the offsets (k, 3, N) that the current's channels may have.
+        """
+        if self.problem.model.waves:
+            return self._offsets()
         most = max(len(s.errors) for s in self.smoothed)
         if not most:
             return None
@@ -97,6 +109,16 @@ class Observed:
         power = np.concatenate(parts)
         return np.nan_to_num(power[1:] - power[0])
 
+    def _offsets(self) -> np.ndarray:
+        """A constant in each compared current of each event, of one standard deviation."""
+        drive, shapes = self.drive, []
+        for e in range(drive.events):
+            for c in range(drive.channels):
+                if drive.weights[c, drive.part(e)].any():
+                    shapes.append(np.zeros(drive.measured.shape))
+                    shapes[-1][c, drive.part(e)] = OFFSET
+        return np.array(shapes)
+
     def _driven(self, values: np.ndarray, shapes: Sequence[int | None]) -> np.ndarray:
         """Power (shapes, 2, N) under the smoothed voltages, each with one of its errors; all in one simulation."""
         problem, count = self.problem, len(shapes)
@@ -104,4 +126,4 @@ class Observed:
         drive = Drive.of([excitation(event, problem.model) for event in events])
         own = np.tile(problem.by_event(values), (count, 1, 1))
         response = problem.model.simulate(drive, own, np.tile(problem.step.substeps, count))
-        return np.stack((response.P[0], response.Q[0])).reshape(2, count, -1).swapaxes(0, 1)
+        return response.outputs[:, 0].reshape(drive.channels, count, -1).swapaxes(0, 1)

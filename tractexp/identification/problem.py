@@ -12,15 +12,29 @@ from tractexp.errors import UserError, among
 from tractexp.identification.loss import Loss
 from tractexp.identification.search import REFUSED
 from tractexp.identification.starts import even
-from tractexp.model.drive import Drive, Excitation
+from tractexp.model.drive import Drive, Excitation, Waveforms
 from tractexp.model.model import CLASSICAL, MOST_SUBSTEPS, Model
 from tractexp.model.parts import Effect
 from tractexp.parameter import Box, Parameter
-from tractexp.record import Event
+from tractexp.record import Event, WaveEvent, in_waves
 from tractexp.record.through import sharpened
 
+WEIGHTS = {3: (0.5, 0.5, 1.0), 1: (1.0, 0.0, 0.0)}  # by phases, so that the objective is the mean over them
 PROBES = 64  # candidates across the box on which the Runge-Kutta step is judged
 FINE = 5e-6  # pu, largest error of the automatic step on those candidates; noise of records starts near 1e-4
+
+
+def excited(event: Event, model: Model | None = None, loss: Loss | None = None) -> Excitation | Waveforms:
+    """What drives a model through an event in its domain, squared errors weighed as the loss says."""
+    loss = loss or Loss()
+    if not isinstance(event, WaveEvent):
+        return replace(excitation(event, model), weight_P=loss.weight_P, weight_Q=loss.weight_Q)
+    return Waveforms(
+        step=event.record.step, v=event.v, v_zero=event.v_zero, turn=event.turn, currents=event.currents,
+        U=event.record.U, U2=event.record.U2, U0=event.U0, P0=event.P0, Q0=event.Q0,
+        U20=float(event.record.U2[event.steady].mean()), omega_s0=event.omega_s0,
+        omega_n=2 * np.pi * event.record.base.frequency, weights=WEIGHTS[event.phases],
+    )  # fmt: skip
 
 
 def excitation(event: Event, model: Model | None = None) -> Excitation:
@@ -121,7 +135,8 @@ class Problem:
         Parameters in `per_event` have a value of their own in each of several events; their columns are called
         `T_m[1]`, `T_m[2]`, ... `loss` None means least squares.
         """
-        self.model, self.events = model, tuple(events)
+        self.model = model
+        self.events: tuple[Event, ...] = tuple(map(in_waves, events)) if model.waves else tuple(events)
         _check_channels(model, self.events)
         self.parameters = narrowed(model.parameters, bounds or {})
         self.fixed = {name: float(value) for name, value in (fixed or {}).items()}
@@ -147,8 +162,7 @@ class Problem:
         self.loss = loss or Loss()
         self._rest = np.array([self.fixed.get(name, np.nan) for name in model.names])
         self._columns = np.array([self._sources(e) for e in range(len(self.events))])  # (E, d), -1: fixed
-        weights = {"weight_P": self.loss.weight_P, "weight_Q": self.loss.weight_Q}
-        self.drive = Drive.of([replace(excitation(e, model), **weights) for e in self.events])
+        self.drive = Drive.of([excited(e, model, self.loss) for e in self.events])
         self._scale = self.loss.scales(self.events, self.drive)
         self.step = self._step(substeps)
 
@@ -167,8 +181,7 @@ class Problem:
         """The same problem with other voltages of the same lengths; Runge-Kutta steps and scales stay."""
         other = copy.copy(self)
         other.events = tuple(events)
-        weights = {"weight_P": self.loss.weight_P, "weight_Q": self.loss.weight_Q}
-        other.drive = Drive.of([replace(excitation(e, self.model), **weights) for e in other.events])
+        other.drive = Drive.of([excited(e, self.model, self.loss) for e in other.events])
         return other
 
     def _sources(self, event: int) -> list[int]:
@@ -192,6 +205,8 @@ class Problem:
     def objective(self, values: np.ndarray) -> np.ndarray:
         """Eq. (8) of free values (n, free): mean squared error of P plus that of Q, over all events [pu²].
 
+        Of waveforms, the mean squared error of the phase currents.
+
         With another loss or other weights, the mean of those.
 
         Candidates without a steady state get `REFUSED` times one plus how far they miss it; those that diverge
@@ -207,7 +222,7 @@ class Problem:
         return np.where(miss > 0, REFUSED * (1 + miss), f)
 
     def residuals(self, values: np.ndarray) -> np.ndarray:
-        """Calculated minus measured (n, 2 N), P then Q, scaled so that the sum of squares is the objective."""
+        """Calculated minus measured (n, C N), channel by channel, so scaled that their squares sum to the objective."""
         drive = self.drive
         if self.loss.quadratic:
             errors, miss = self._errors(values)
@@ -219,12 +234,12 @@ class Problem:
         return rows.reshape(len(rows), -1)
 
     def _errors(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Calculated minus measured (n, 2, N) [pu], and how far each event misses a steady state (E, n)."""
+        """Calculated minus measured (n, C, N) [pu], and how far each event misses a steady state (E, n)."""
         response = self.model.simulate(self.drive, self.candidates(values), self.step.substeps)
-        return np.stack((response.P, response.Q), axis=1) - self.drive.measured, response.miss
+        return response.by_candidate - self.drive.measured, response.miss
 
     def _losses(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Weighted losses (n, 2, N) [pu²], and the misses as above."""
+        """Weighted losses (n, C, N) [pu²], and the misses as above."""
         errors, miss = self._errors(values)
         return self.drive.weights * self._scale**2 * self.loss.rho((errors / self._scale) ** 2), miss
 

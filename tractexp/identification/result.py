@@ -11,24 +11,31 @@ import numpy as np
 from tractexp import files, provenance
 from tractexp.errors import UserError
 from tractexp.identification.adequacy import ACCEPTED
-from tractexp.identification.problem import Problem, excitation
+from tractexp.identification.problem import Problem, excited
 from tractexp.identification.search import REFUSED, Found, History
-from tractexp.model.drive import Drive, Excitation
+from tractexp.identification.seen import seen_by_estimator
+from tractexp.model.drive import PHASORS, Drive, Excitation
 from tractexp.model.model import CLASSICAL, Model, compose
 from tractexp.plugin import build
-from tractexp.record import Event, find_dips
+from tractexp.record import Event, WaveEvent, find_dips, in_waves
+
+AFTER = 0.15  # s after a dip's start in which the currents' error counts
 
 
-def parts(node: Mapping[str, Any]) -> tuple[Any, Any, list[Any], str]:
-    """The motor, static load and effects a model configuration names, built, and how they are integrated."""
+def parts(node: Mapping[str, Any]) -> tuple[Any, Any, list[Any], str, str]:
+    """The motor, static load and effects a model configuration names, built; how they are integrated; the domain."""
     effects = [build("effect", {"name": name}) for name in node.get("effects", ())]
     motor, static = build("model/motor", node["motor"]), build("model/static", node["static"])
-    return motor, static, effects, node.get("integration", CLASSICAL)
+    return motor, static, effects, node.get("integration", CLASSICAL), node.get("domain", PHASORS)
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Measured and calculated power of one event, (N,) each, and the relative errors of Eq. (20), as fractions."""
+    """Measured and calculated power of one event, (N,) each, and the relative errors of Eq. (20), as fractions.
+
+    Of waveforms the power is that which the record's estimator sees in calculated and in recorded currents, and
+    `currents` (3, N), alpha, beta and zero, are the calculated ones [pu] on the samples of the event in `waves`.
+    """
 
     event: Event
     role: str  # "train" or "validate"
@@ -36,6 +43,16 @@ class Fit:
     Q: np.ndarray
     epsilon_p: float
     epsilon_q: float
+    epsilon_i: float | None = None
+    waves: WaveEvent | None = None
+    currents: np.ndarray | None = None
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """As `result.json` has it."""
+        made = {"name": self.event.record.name, "role": self.role}
+        made |= {"epsilon_p": self.epsilon_p, "epsilon_q": self.epsilon_q}
+        return made if self.epsilon_i is None else made | {"epsilon_i": self.epsilon_i}
 
 
 def by_event(values: Mapping[str, float], per_event: Mapping[str, Sequence[float]]) -> dict[str, float]:
@@ -52,14 +69,38 @@ def relative_error(measured: np.ndarray, calculated: np.ndarray) -> float:
 
 def respond(model: Model, values: np.ndarray, event: Event, role: str) -> Fit:
     """Play one event through the model. Raises `UserError` where these parameters have no steady state there."""
-    drive = Drive.of([excitation(event, model)])
+    event = in_waves(event) if model.waves else event
+    drive = Drive.of([excited(event, model)])
     if refusal := model.refusal(values, drive):
         raise UserError(f"{event.record.name}: {refusal}")
     substeps, _ = model.substeps(drive, values)
     response = model.simulate(drive, values, substeps)
+    if isinstance(event, WaveEvent):
+        return _of_waves(event, role, response.outputs[:, 0])
     P, Q = response.P[0], response.Q[0]
     errors = relative_error(event.record.P, P), relative_error(event.record.Q, Q)
     return Fit(event, role, P, Q, *errors)
+
+
+def _of_waves(event: WaveEvent, role: str, currents: np.ndarray) -> Fit:
+    """Calculated currents (3, N) beside the recorded ones, and the phasors of both by one estimator."""
+    compared, P, Q = seen_by_estimator(event, currents)
+    record = compared.record
+    errors = relative_error(record.P, P), relative_error(record.Q, Q)
+    return Fit(compared, role, P, Q, *errors, current_error(event, currents), event, currents)
+
+
+def current_error(event: WaveEvent, currents: np.ndarray) -> float:
+    """epsilon_i: rms of what calculated currents (3, N) miss from the dip's start to 0.15 s after it, all phases.
+
+    Over the rms of the recorded currents before the dip.
+    """
+    window = slice(event.start, event.start + round(AFTER / event.record.step))
+    before = slice(event.first, event.start)
+    rms = lambda i, part: float(np.sqrt(np.mean(event.of_phases(i)[:, part] ** 2)))  # noqa: E731
+    recorded = np.nan_to_num(event.currents)
+    known = np.array(event.known)[:, None]
+    return rms((currents - recorded) * known, window) / rms(recorded, before)
 
 
 @dataclass(frozen=True)
@@ -205,10 +246,7 @@ def conclude(
         seconds=found.seconds,
         status=found.status,
         seed=seed,
-        events=[
-            {"name": f.event.record.name, "role": f.role, "epsilon_p": f.epsilon_p, "epsilon_q": f.epsilon_q}
-            for f in fits
-        ],
+        events=[f.told for f in fits],
         at_bound=at_bound(problem, free),
         units={p.name: p.unit for p in problem.parameters},
         bounds={p.name: list(p.bounds) for p in problem.parameters},

@@ -92,7 +92,7 @@ def extremes(draws: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def cells_of(layout: Layout) -> list[Cell]:
-    """Every window of every event, for P and for Q."""
+    """Every window of every event, for each channel that is compared."""
     cells = []
     for e, event in enumerate(layout.events):
         first, step, origin = int(layout.drive.first[e]), event.record.step, event.record.t[0]
@@ -101,15 +101,17 @@ def cells_of(layout: Layout) -> list[Cell]:
             if j - i < 2:
                 continue
             part = slice(first + i, first + j)
-            cells += [Cell(e, c, part, origin + i * step, origin + (j - 1) * step) for c in "PQ"]
+            cells += [Cell(e, c, part, origin + i * step, origin + (j - 1) * step) for c in layout.drive.names]
     return cells
 
 
 def energies(channels: np.ndarray, layout: Layout) -> np.ndarray:
     """Energy of each residual (b, 2, N) in each cell, (b, cells), over that of a sample in quiet."""
     square = channels**2
-    square /= np.mean(np.concatenate([square[:, :, part] for part in layout.quiet], axis=2), axis=2, keepdims=True)
-    return np.stack([square[:, "PQ".index(c.channel), c.part].sum(axis=1) for c in cells_of(layout)], axis=1)
+    quiet = np.mean(np.concatenate([square[:, :, part] for part in layout.quiet], axis=2), axis=2, keepdims=True)
+    square /= np.where(quiet > 0, quiet, 1.0)  # a current that is not compared is zero throughout
+    row = layout.drive.names.index
+    return np.stack([square[:, row(c.channel), c.part].sum(axis=1) for c in cells_of(layout)], axis=1)
 
 
 def aligned(channels: np.ndarray, layout: Layout) -> np.ndarray:

@@ -114,11 +114,12 @@ def conclude(likelihood: Likelihood, unit: np.ndarray, notes: Sequence[str] = ()
 
 def test(likelihood: Likelihood, rows: np.ndarray) -> list[dict[str, Any]]:
     """Whiteness and normality of the whitened residuals (2 N,) of each event and channel."""
-    drive, white = likelihood.problem.drive, rows.reshape(2, -1)
+    drive = likelihood.problem.drive
+    white = rows.reshape(drive.channels, -1)
     results = []
     for e, event in enumerate(likelihood.problem.events):
         part = drive.part(e)
-        for c, channel in enumerate("PQ"):
+        for c, channel in enumerate(drive.names):
             seen = white[c, part][likelihood.known[c, part]]
             if len(seen) < FEWEST:
                 continue
@@ -135,7 +136,7 @@ def describe_noise(likelihood: Likelihood) -> list[dict[str, Any]]:
         pair = noise.pair(e)
         covariance = noise.covariance(e)
         cross = covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1])
-        for c, (channel, before) in enumerate(zip("PQ", (event.noise_P, event.noise_Q), strict=True)):
+        for c, (channel, before) in enumerate(zip(likelihood.problem.drive.names, event.levels, strict=True)):
             rows.append(
                 {
                     "event": event.record.name,

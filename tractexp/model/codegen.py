@@ -10,7 +10,7 @@ from collections.abc import Iterable
 import sympy
 from sympy.printing.pycode import PythonCodePrinter
 
-from tractexp.model.drive import INPUTS
+from tractexp.model.drive import INPUTS, SMOOTH
 from tractexp.model.lowering import Lowered, Phase, symbols
 from tractexp.model.template import FAST, GROUP, HEADER, LANES, RUN, SETTLE, VECTORS
 
@@ -77,7 +77,10 @@ def source(lowered: Lowered, title: str, integration: str = "classical") -> str:
         n_event=len(lowered.event),
         n_signal=max(len(sample_signals), 1),
         rows_W=at.count,
-        row_P=at["P"], row_Q=at["Q"], row_sum_P=at["sum_P"], row_sum_Q=at["sum_Q"], row_miss=at["miss"],
+        C=len(lowered.outputs), outputs=", ".join(lowered.outputs), row_miss=at["miss"],
+        no_sums=_indent(16, (f"W[{at[f'sum_{o}']} + l] = 0.0" for o in lowered.outputs)),
+        store=_indent(28, (f"outputs[{c}, begin + l, i] = W[{at[o]} + l]" for c, o in enumerate(lowered.outputs))),
+        sums=_indent(16, (f"sums[e, {c}, begin + l] = W[{at[f'sum_{o}']} + l]" for c, o in enumerate(lowered.outputs))),
         unpack_event=_indent(8, (f"{s} = event[e, {i}]" for i, s in enumerate(lowered.event))),
         fill_signals=_indent(8, _fill_signals(lowered)),
         start=_indent(16, _load_candidate(lowered, rows, at)),
@@ -96,7 +99,8 @@ class _Rows:
         used = {name: symbols(getattr(lowered, name)) for name in PHASES}
         self.needed = {name: [s for s in lane if s in used[name]] for name in PHASES}
         self.carried = [s for s in lane if any(s in needed for needed in self.needed.values())]
-        names = [*lowered.states, *lowered.memories, *self.carried, "P", "Q", "sum_P", "sum_Q", "miss"]
+        own = [*lowered.outputs, *(f"sum_{o}" for o in lowered.outputs), "miss"]
+        names = [*lowered.states, *lowered.memories, *self.carried, *own]
         self.offset = {str(name): LANES * i for i, name in enumerate(names)}
         self.count = len(names)
 
@@ -156,16 +160,27 @@ def _sample(lowered: Lowered, at: _Rows) -> list[str]:
     carried = [*lowered.states, *lowered.memories]
     lines = [f"{s} = inputs[{_row(s)}, i]" for s in lowered.inputs]
     lines += [f"{s} = signals[{j}, i]" for j, (s, _) in enumerate(_sample_signals(lowered))]
-    lines += ["p, q, w_p, w_q = measured[0, i], measured[1, i], weights[0, i], weights[1, i]"]
+    measured, weights = _compared(lowered)
+    given = [f"{what}[{c}, i]" for what in ("measured", "weights") for c in range(len(measured))]
+    lines += [f"{_names([*measured, *weights])} = {_names(given)}"]
     needed = dict.fromkeys([*at.needed["renewal"], *at.needed["output"]])
     body = at.load([*carried, *needed])
     if lowered.memories:
         body.append(f"{_targets(lowered.memories)} = _renewal({_names(_arguments(lowered, at, 'renewal'))})")
         body += [f"W[{at[s]} + l] = {s}" for s in lowered.memories]
-    body += [f"P, Q = _output({_names(_arguments(lowered, at, 'output'))})"]
-    body += [f"W[{at['P']} + l] = P", f"W[{at['Q']} + l] = Q"]
-    body += [f"W[{at['sum_P']} + l] += w_p * (p - P) * (p - P)", f"W[{at['sum_Q']} + l] += w_q * (q - Q) * (q - Q)"]
+    body += [f"{_names(lowered.outputs)} = _output({_names(_arguments(lowered, at, 'output'))})"]
+    body += [f"W[{at[o]} + l] = {o}" for o in lowered.outputs]
+    off = [f"({m} - {o})" for m, o in zip(measured, lowered.outputs, strict=True)]
+    body += [
+        f"W[{at[f'sum_{o}']} + l] += {w} * {d} * {d}" for o, w, d in zip(lowered.outputs, weights, off, strict=True)
+    ]
     return [*lines, "for l in range(lanes):", *_nested(body)]
+
+
+def _compared(lowered: Lowered) -> tuple[list[str], list[str]]:
+    """What the kernel calls the measured values of its outputs, and their weights."""
+    names = [o.lower() if o.isupper() else f"{o}_m" for o in lowered.outputs]
+    return names, [f"w_{name}" for name in names]
 
 
 def _advance(lowered: Lowered, at: _Rows, half_way: str) -> list[str]:
@@ -192,11 +207,13 @@ def _advance(lowered: Lowered, at: _Rows, half_way: str) -> list[str]:
 def _between(symbol: sympy.Symbol, point: str, fraction: str) -> str:
     """An input between samples i and i + 1: the voltage on the cubic its slopes define, all else on a straight line."""
     k, place = _row(symbol), f"{fraction} / substeps[e]"
-    if symbol.name in ("U", "U_rate"):
-        rate = INPUTS.index("U_rate")
-        ends = f"inputs[0, i], inputs[0, i + 1], step * inputs[{rate}, i], step * inputs[{rate}, i + 1]"
-        scale = "" if symbol.name == "U" else " / step"
-        return f"{symbol}{point} = _{'cubic' if symbol.name == 'U' else 'slope'}({ends}, {place}){scale}"
+    rates = {rate: name for name, rate in SMOOTH.items()}
+    if symbol.name in SMOOTH or symbol.name in rates:
+        name = rates.get(symbol.name, symbol.name)
+        value, rate = INPUTS.index(name), INPUTS.index(SMOOTH[name])
+        ends = f"inputs[{value}, i], inputs[{value}, i + 1], step * inputs[{rate}, i], step * inputs[{rate}, i + 1]"
+        scale = "" if symbol.name == name else " / step"
+        return f"{symbol}{point} = _{'slope' if scale else 'cubic'}({ends}, {place}){scale}"
     return f"{symbol}{point} = inputs[{k}, i] + (inputs[{k}, i + 1] - inputs[{k}, i]) * ({place})"
 
 

@@ -9,6 +9,7 @@ from sympy import conjugate, im, re
 
 from tractexp.errors import UserError
 from tractexp.model import sites
+from tractexp.model.drive import PHASORS
 from tractexp.model.equations import Equations
 from tractexp.model.parts import Effect, Measurement, Motor, Static
 from tractexp.model.signature import asked
@@ -25,9 +26,11 @@ class Refused(UserError):
         self.effect, self.reason = effect, reason
 
 
-def declared(motor: Motor, static: Static, effects: Sequence[Effect], title: str) -> Equations:
+def declared(
+    motor: Motor, static: Static, effects: Sequence[Effect], title: str, domain: str = PHASORS
+) -> Equations:  # fmt: skip
     """The equations of a load. Raises `Refused` for an effect that does not fit, `UserError` for parts that do not."""
-    eq = Equations()
+    eq = Equations(domain)
     try:
         _motor(eq, motor)
         _static(eq, static)
@@ -38,7 +41,7 @@ def declared(motor: Motor, static: Static, effects: Sequence[Effect], title: str
             _effect(eq, effect)
         except Unfit as why:
             raise Refused(effect.name, str(why)) from why
-    if eq.P == 0 and eq.Q == 0:
+    if not any(eq.outputs().values()):
         raise UserError(f"the {title} draw no power; choose a model/motor or a model/static other than 'none'")
     eq.close()
     return eq
@@ -62,6 +65,9 @@ def _motor(eq: Equations, motor: Motor) -> None:
     V = eq.V
     if sites.stator_current not in eq:
         current = eq.place(sites.stator_current, current)
+    if eq.waves:
+        eq.draw(eq.place(sites.motor_current, current))
+        return
     drawn = V * conjugate(current)
     eq.consume(eq.place(sites.P_motor, re(drawn)), eq.place(sites.Q_motor, im(drawn)))
 
@@ -83,7 +89,8 @@ def _static(eq: Equations, static: Static) -> None:
     if "f" in given:
         eq.define(f.name, (eq.omega_n + eq.omega_s) / (eq.omega_n + eq.omega_s0), "f")
     P, Q = law
-    eq.consume(eq.place(sites.P_static, eq.P_s0 * P), eq.place(sites.Q_static, eq.Q_s0 * Q))
+    powers = eq.place(sites.P_static, eq.P_s0 * P), eq.place(sites.Q_static, eq.Q_s0 * Q)
+    eq.consume(*powers, static.damping(**asked(static.damping, own)))
 
 
 def _check_law(static: Static, law: Any, before: Mapping[sympy.Symbol, float]) -> None:
@@ -103,6 +110,8 @@ def _check_law(static: Static, law: Any, before: Mapping[sympy.Symbol, float]) -
 
 def _effect(eq: Equations, effect: Effect) -> None:
     """Raises `Unfit` with the reason where the effect makes no sense for the equations."""
+    if why := effect.phasors_only if eq.waves else effect.waves_only:
+        raise Unfit(why)
     if why := effect.refusal(eq):
         raise Unfit(why)
     eq.write(effect.name)

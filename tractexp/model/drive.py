@@ -1,11 +1,19 @@
 """What drives a simulation: recorded voltage and the steady state before it, laid out for the kernel."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-INPUTS = ("U", "omega_s", "U_rate", "U2", "t")  # rows of `Drive.inputs`; U_rate is the slope of U there [pu/s]
+PHASORS, WAVES = DOMAINS = ("phasors", "waves")
+# Rows of `Drive.inputs`: U_rate is the slope of U there [pu/s]. Those of waves follow: the voltage's space vector v in
+# the frame, its zero sequence, their slopes, and the frame's angle to phase a by cosine and sine.
+INPUTS = (
+    "U", "omega_s", "U_rate", "U2", "t",
+    "v_d", "v_q", "v_zero", "v_d_rate", "v_q_rate", "v_zero_rate", "turn_re", "turn_im",
+)  # fmt: skip
+SMOOTH = {name: f"{name}_rate" for name in ("U", "v_d", "v_q", "v_zero")}  # what is a cubic between samples: its slope
+OUTPUTS = {PHASORS: ("P", "Q"), WAVES: ("i_alpha", "i_beta", "i_zero")}  # rows of `Drive.measured`
 EVENT = ("U0", "omega_s0", "U20", "omega_n", "step")  # columns of `Drive.event`
 
 
@@ -34,6 +42,70 @@ class Excitation:
     weight_Q: float = 1.0
     window: np.ndarray | None = None  # (odd,) weights of the recorder's window, through which power is looked at
 
+    @property
+    def inputs(self) -> np.ndarray:
+        """The kernel's rows (5, N)."""
+        absent = np.full(len(self.U), np.nan)
+        return np.stack(
+            [
+                self.U,
+                np.zeros(len(self.U)) if self.omega_s is None else self.omega_s,
+                slopes(self.U) / self.step,
+                absent if self.U2 is None else self.U2,
+                np.arange(len(self.U)) * self.step,
+            ]
+        )
+
+    @property
+    def measured(self) -> np.ndarray:
+        """What a simulation is compared with (2, N): P and Q."""
+        return np.stack([self.P, self.Q])
+
+    @property
+    def weights(self) -> tuple[float, ...]:
+        """How much a squared error of each row counts."""
+        return self.weight_P, self.weight_Q
+
+
+@dataclass(frozen=True, eq=False)
+class Waveforms:
+    """One event of sampled waveforms: space vectors in a frame that turns with the voltage before the event.
+
+    v (N,) complex is the voltage [pu of its peak], real and U0 before the event; v_zero (N,) its zero sequence. `turn`
+    (N,) complex of size one turns the frame's vectors into the stationary frame of phase a. currents (3, N) are alpha,
+    beta and zero sequence there [pu], nan where not compared, `weights` how much a squared error of each counts. U
+    (N,) and U2 are the sizes of the voltage's sequences as a window of the past shows them [pu]. omega_s0 is the
+    frame's speed relative to nominal [rad/s].
+    """
+
+    step: float
+    v: np.ndarray
+    v_zero: np.ndarray
+    turn: np.ndarray
+    currents: np.ndarray
+    U: np.ndarray
+    U2: np.ndarray
+    U0: float
+    P0: float
+    Q0: float
+    U20: float = 0.0
+    omega_s0: float = 0.0
+    omega_n: float = 2 * np.pi * 50.0
+    weights: tuple[float, ...] = (0.5, 0.5, 1.0)
+    window: np.ndarray | None = None
+
+    @property
+    def inputs(self) -> np.ndarray:
+        """The kernel's rows (13, N)."""
+        n, smooth = len(self.v), (self.v.real, self.v.imag, self.v_zero)
+        rows = [self.U, np.full(n, self.omega_s0), slopes(self.U) / self.step, self.U2, np.arange(n) * self.step]
+        return np.stack([*rows, *smooth, *(slopes(y) / self.step for y in smooth), self.turn.real, self.turn.imag])
+
+    @property
+    def measured(self) -> np.ndarray:
+        """What a simulation is compared with (3, N): the currents."""
+        return self.currents
+
 
 def slopes(y: np.ndarray) -> np.ndarray:
     """Slope at each sample (N,), per sample, of the smooth curve through them: Akima's, which does not overshoot.
@@ -59,36 +131,23 @@ def slopes(y: np.ndarray) -> np.ndarray:
 class Drive:
     """One or several events end to end. Shapes: N samples in all, E events."""
 
-    inputs: np.ndarray  # (5, N), rows as in INPUTS; omega_s is 0 and U2 nan where not recorded
-    measured: np.ndarray  # (2, N): P, Q, gaps filled with 0
-    weights: np.ndarray  # (2, N): 0 in a gap
+    inputs: np.ndarray  # (5, N) or (13, N), rows as in INPUTS; omega_s is 0 and U2 nan where not recorded
+    measured: np.ndarray  # (C, N): P and Q, or three currents; gaps filled with 0
+    weights: np.ndarray  # (C, N): 0 in a gap
     first: np.ndarray  # (E + 1,)
     event: np.ndarray  # (E, 5), columns as in EVENT
     before: np.ndarray  # (E, 2): P0, Q0
     windows: tuple[np.ndarray | None, ...] = ()  # of each event, where any has one
 
     @classmethod
-    def of(cls, events: Sequence[Excitation]) -> "Drive":
-        """Lay events end to end."""
-
-        def joined(channel: Callable[[Excitation], np.ndarray]) -> np.ndarray:
-            return np.concatenate([channel(e) for e in events])
-
-        inputs = np.stack(
-            [
-                joined(lambda e: e.U),
-                joined(lambda e: np.zeros(len(e.U)) if e.omega_s is None else e.omega_s),
-                joined(lambda e: slopes(e.U) / e.step),
-                joined(lambda e: np.full(len(e.U), np.nan) if e.U2 is None else e.U2),
-                joined(lambda e: np.arange(len(e.U)) * e.step),
-            ]
-        )
-        measured = np.stack([joined(lambda e: e.P), joined(lambda e: e.Q)])
-        lengths = [len(e.U) for e in events]
-        weights = np.repeat([[e.weight_P for e in events], [e.weight_Q for e in events]], lengths, axis=1)
+    def of(cls, events: Sequence[Excitation] | Sequence[Waveforms]) -> "Drive":
+        """Lay events end to end, all phasors or all waves."""
+        measured = np.concatenate([e.measured for e in events], axis=1)
+        lengths = [e.measured.shape[1] for e in events]
+        weights = np.repeat(np.array([e.weights for e in events]).T, lengths, axis=1)
         gaps = np.isnan(measured)
         return cls(
-            inputs=np.ascontiguousarray(inputs, dtype=float),
+            inputs=np.ascontiguousarray(np.concatenate([e.inputs for e in events], axis=1), dtype=float),
             measured=np.where(gaps, 0.0, measured),
             weights=np.where(gaps, 0.0, weights),
             first=np.concatenate([[0], np.cumsum(lengths)]),
@@ -96,6 +155,16 @@ class Drive:
             before=np.array([[e.P0, e.Q0] for e in events]),
             windows=tuple(e.window for e in events) if any(e.window is not None for e in events) else (),
         )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What the compared quantities are called."""
+        return next(names for names in OUTPUTS.values() if len(names) == len(self.measured))
+
+    @property
+    def channels(self) -> int:
+        """How many quantities are compared."""
+        return len(self.measured)
 
     @property
     def events(self) -> int:

@@ -14,7 +14,7 @@ from sympy import I, Symbol, conjugate, im, re
 
 from tractexp.errors import Unknown, UserError, nearest
 from tractexp.model import sites
-from tractexp.model.drive import EVENT, INPUTS
+from tractexp.model.drive import EVENT, INPUTS, OUTPUTS, PHASORS, WAVES
 from tractexp.model.names import check_name
 from tractexp.model.sites import Site
 from tractexp.model.unfit import Unfit
@@ -22,6 +22,8 @@ from tractexp.parameter import Parameter
 
 LONG = 300  # nodes of an expression
 LONG_AGO = -(10**6)  # s: the time at which a load rests before the event
+NOTHING = sympy.Integer(0)
+DAMPING = sympy.Rational(1, 20)  # resistance over reactance of a reactive load of which nothing else is said
 OWN = "motor"  # who writes the states that are pushed, and the speed that effects ask for
 
 
@@ -40,6 +42,7 @@ class State:
     derivative: sympy.Expr | None = None
     initial: sympy.Expr | None = None
     balance: sympy.Expr | None = None
+    derived: bool = False  # `initial` is written in what moves, and taken before the event once all parts have declared
 
 
 @dataclass(frozen=True)
@@ -76,14 +79,25 @@ class Equations:
     - `V`, the voltage at the motor's terminals; `omega`, the motor's speed [rad/s, relative to nominal];
     - `P`, `Q`, what all parts draw together.
 
+    With the `domain` waves (`eq.waves`) voltages and currents are space vectors in a frame that turns at the frequency
+    before the event, and what phasors neglect is kept: a branch's flux and a capacitor's charge move. `v` is the
+    voltage there (in phasors it is `U`), `v_rate` its slope [pu/s], `v_zero` its zero sequence, `turn` turns into the
+    frame of phase a; `U` is then the size of the positive sequence as the past half cycle shows it, `omega_s` the
+    frame's constant speed. What is written with `branch`, `capacitor`, `draw` and `consume` holds in both domains.
+
     `eq[what]` is the symbol of a site, or of a state, parameter or quantity by its name, `what in eq` whether there is
     one. Asking for what a model lacks raises `Unfit`, which refuses the effect that asks.
 
     A flux is one complex symbol; its real and imaginary part become two real states of the kernel.
     """
 
-    def __init__(self) -> None:
-        self.U, self.omega_s, self.U_rate, self.U2, self.t = map(_real, INPUTS)
+    def __init__(self, domain: str = PHASORS) -> None:
+        self.waves = domain == WAVES
+        self.U, self.omega_s, self.U_rate, self.U2, self.t, *waves = map(_real, INPUTS)
+        v_d, v_q, self.v_zero, v_d_rate, v_q_rate, self.v_zero_rate, turn_re, turn_im = waves
+        self.v, self.v_rate, self.turn = self.U, self.U_rate, sympy.Integer(1)
+        if self.waves:
+            self.v, self.v_rate, self.turn = v_d + I * v_q, v_d_rate + I * v_q_rate, turn_re + I * turn_im
         self.U0, self.omega_s0, self.U20, self.omega_n, self.step = map(_real, EVENT)
         self.P0, self.Q0 = _real("P0"), _real("Q0")
         self.P_s0, self.Q_s0 = _real("P_s0"), _real("Q_s0")
@@ -100,8 +114,12 @@ class Equations:
             self.omega_s: r"\omega_s", self.U0: "U_0", self.omega_s0: r"\omega_{s0}",
             self.P0: "P_0", self.Q0: "Q_0", self.omega_n: r"\omega_n", self.U2: "U_2", self.U20: "U_{20}",
             self.P_s0: "P_{s0}", self.Q_s0: "Q_{s0}", self.U_rate: r"\dot U", self.step: r"\Delta t",
+            v_d: "v_d", v_q: "v_q", self.v_zero: "v_0", v_d_rate: r"\dot v_d", v_q_rate: r"\dot v_q",
+            self.v_zero_rate: r"\dot v_0", turn_re: r"\cos\theta", turn_im: r"\sin\theta",
         }  # fmt: skip
-        self._power: dict[Site, sympy.Expr] = {sites.P: sympy.Integer(0), sites.Q: sympy.Integer(0)}
+        drawn = (sites.current, sites.zero_current) if self.waves else (sites.P, sites.Q)
+        self._drawn: dict[Site, sympy.Expr] = dict.fromkeys(drawn, sympy.Integer(0))
+        self._fluxes: dict[sympy.Expr, Symbol] = {}  # of branches at the bus, by resistance over reactance
         self._owners: dict[str, str] = {}  # who declared the parameter, state or quantity of a name
         self._writer = OWN
 
@@ -122,7 +140,7 @@ class Equations:
 
     def __contains__(self, what: Site | str) -> bool:
         name = what.name if isinstance(what, Site) else what
-        return any(s.name == name for s in (*self._power, *self._symbols()))
+        return any(s.name == name for s in (*self._drawn, *self._symbols()))
 
     def __getitem__(self, what: Site | str) -> Symbol:
         """The symbol of a site, or of the state, parameter or quantity of that name; `Unfit` where there is none."""
@@ -139,13 +157,13 @@ class Equations:
     def expression(self, site: Site | str) -> sympy.Expr:
         """What stands at a site now, before any later edit."""
         site = sites.named(site)
-        return self._power[site] if site in self._power else self.definitions[self[site]]
+        return self._drawn[site] if site in self._drawn else self.definitions[self[site]]
 
     @property
     def V(self) -> Symbol:
         """The voltage at the motor's terminals [pu], a phasor: the recorded voltage unless an effect edits it."""
         if self._writer == OWN and sites.motor_voltage not in self:
-            self.place(sites.motor_voltage, self.U)
+            self.place(sites.motor_voltage, self.v)
         return self[sites.motor_voltage]
 
     @property
@@ -158,13 +176,21 @@ class Equations:
 
     @property
     def P(self) -> sympy.Expr:
-        """The active power of all parts together [pu]."""
-        return self._power[sites.P]
+        """The active power of all parts together [pu]; of waves, of the space vectors at an instant."""
+        return re(self.v * conjugate(self._drawn[sites.current])) if self.waves else self._drawn[sites.P]
 
     @property
     def Q(self) -> sympy.Expr:
-        """The reactive power of all parts together [pu]."""
-        return self._power[sites.Q]
+        """The reactive power of all parts together [pu]; of waves, of the space vectors at an instant."""
+        return im(self.v * conjugate(self._drawn[sites.current])) if self.waves else self._drawn[sites.Q]
+
+    def outputs(self) -> dict[str, sympy.Expr]:
+        """What a simulation is compared with, by name: the power, or the currents in the stationary frame."""
+        if not self.waves:
+            return dict(zip(OUTPUTS[PHASORS], (self.P, self.Q), strict=True))
+        total, zero = (self._drawn[s] for s in (sites.current, sites.zero_current))
+        still = self.turn * total
+        return dict(zip(OUTPUTS[WAVES], (re(still), im(still), zero), strict=True))
 
     # What parts write
 
@@ -243,8 +269,8 @@ class Equations:
         expression = sympy.sympify(change(self.expression(site)))
         self._check_kind(site, expression)
         self.edits.setdefault(self._writer, []).append(site.name)
-        if site in self._power:
-            self._power[site] = expression
+        if site in self._drawn:
+            self._drawn[site] = expression
             return
         if shown is not None:
             self.shown[self[site]] = shown
@@ -264,6 +290,10 @@ class Equations:
     def lag(self, name: str, latex: str) -> Symbol:
         """Any other real state, such as those that effects add."""
         return self._state(_real(name), latex, "lag")
+
+    def lag_vector(self, name: str, latex: str) -> Symbol:
+        """Any other complex state, such as the flux of a branch or the voltage of a capacitor [pu]."""
+        return self._state(_complex(name), latex, "lag")
 
     def twin(self, state: Symbol, suffix: str) -> Symbol:
         """A state of the same role, as a second machine of the same equations has one."""
@@ -325,10 +355,63 @@ class Equations:
         shown = slack if shown is None else shown
         self.requirements.append(Requirement(sympy.sympify(slack), sentence, sympy.sympify(shown)))
 
-    def consume(self, P: sympy.Expr, Q: sympy.Expr) -> None:
-        """Add power drawn at the bus (positive when consumed); before the event the static load gives way."""
-        for site, power in ((sites.P, P), (sites.Q, Q)):
-            self._power[site] += sympy.sympify(power)
+    def consume(self, P: sympy.Expr, Q: sympy.Expr, damping: sympy.Expr = DAMPING) -> None:
+        """Add power drawn at the bus (positive when consumed); before the event the static load gives way.
+
+        Of waves it is the current of a conductance beside a branch of resistance over reactance `damping`, which draw
+        these powers at the sizes of the voltage that `U` shows: admittances that vary slowly. A power that changes
+        within a cycle does so as fast as `U` follows.
+        """
+        P, Q = sympy.sympify(P), sympy.sympify(Q)
+        if not self.waves:
+            for site, power in ((sites.P, P), (sites.Q, Q)):
+                self._drawn[site] += power
+            return
+        speed = 1 + self.omega_s / self.omega_n
+        G, B = P - Q * damping / speed, Q * (speed**2 + damping**2) / speed
+        self.draw((G * self.v + (B * self._flux_of(damping) if Q != 0 else 0)) / self.U**2)
+
+    def draw(self, current: sympy.Expr, zero: sympy.Expr = NOTHING) -> None:
+        """Add a current drawn at the bus [pu] and, of waves, one of zero sequence."""
+        if self.waves:
+            self._drawn[sites.current] += current
+            self._drawn[sites.zero_current] += zero
+            return
+        drawn = self.v * conjugate(current)
+        self.consume(re(drawn), im(drawn))
+
+    def branch(
+        self, name: str, latex: str, voltage: sympy.Expr, impedance: sympy.Expr, behind: sympy.Expr = NOTHING
+    ) -> sympy.Expr:
+        """The current [pu] through a resistance and a reactance in series, R + jX, from `voltage` to that `behind`.
+
+        Phasors: (V - E)/(R + jX). Waves: (psi + jE)/X, where the flux linkage psi, a state of that name, follows
+        dpsi/dt = omega_n (V - R i) - j (omega_n + omega_s) psi, which at rest and at nominal frequency is the same.
+        """
+        if not self.waves:
+            return (voltage - behind) / impedance
+        R, X = re(impedance), im(impedance)
+        psi, speed = self.lag_vector(name, latex), 1 + self.omega_s / self.omega_n
+        current = (psi + I * behind) / X
+        before = (voltage - speed * behind) / (R + I * X * speed)
+        self.moves(psi, self.omega_n * (voltage - R * current - I * speed * psi), X * before - I * behind)
+        self.states[psi].derived = True
+        return current
+
+    def capacitor(self, susceptance: sympy.Expr) -> sympy.Expr:
+        """The current [pu] of a capacitor at the bus, b (dv/dt/omega_n + j (1 + omega_s/omega_n) v)."""
+        return susceptance * (self.v_rate * self.waves / self.omega_n + I * (1 + self.omega_s / self.omega_n) * self.v)
+
+    def _flux_of(self, damping: sympy.Expr) -> Symbol:
+        """The flux linkage of a branch at the bus, of one reactance and so much resistance."""
+        damping = sympy.sympify(damping)
+        if damping not in self._fluxes:
+            k = "" if not self._fluxes else f"_{len(self._fluxes) + 1}"
+            psi = self._fluxes[damping] = self.lag_vector(f"branch_flux{k}", rf"\psi_s{k}")
+            leak = damping + I * (1 + self.omega_s / self.omega_n)
+            self.moves(psi, self.omega_n * (self.v - leak * psi), self.v / leak)
+            self.states[psi].derived = True
+        return self._fluxes[damping]
 
     def close(self) -> None:
         """Give the static load what the other parts leave before the event. Called once all parts have declared."""
@@ -338,6 +421,7 @@ class Equations:
         for symbol, memory in self.memories.items():
             if memory.renewal is None:
                 raise UserError(f"nothing renews the memory '{symbol}'; call eq.renews once for each memory")
+        self._derive_starts()
         without_static = {self.P_s0: sympy.Integer(0), self.Q_s0: sympy.Integer(0)}
         others = [self.real(self.before(self.expand(power).xreplace(without_static))) for power in (self.P, self.Q)]
         self.definitions[self.P_s0] = self.P0 - others[0]
@@ -347,10 +431,24 @@ class Equations:
         for requirement in self.requirements:
             self._check_still(f"what must hold for a steady state ('{requirement.sentence}')", requirement.slack)
 
+    def _derive_starts(self) -> None:
+        """Take the values before the event of states that are written in others' by these."""
+        known: dict[Symbol, sympy.Expr] = {}
+        for symbol, state in self.states.items():
+            if not state.derived:
+                known[start_symbol(symbol)] = state.initial
+                if not symbol.is_real:
+                    known |= zip(
+                        phasor_parts(start_symbol(symbol)), (re(state.initial), im(state.initial)), strict=True
+                    )
+        for state in self.states.values():
+            if state.derived:
+                state.initial = self.before(state.initial).xreplace(known)
+
     def _check_still(self, what: str, expression: sympy.Expr) -> None:
         """Raise `UserError` where a value before the event is written in what moves after it."""
         inputs = {self.U: "eq.U0", self.omega_s: "eq.omega_s0", self.U2: "eq.U20"}
-        moving = {*inputs, self.U_rate, self.t, *self.states, *self.memories}
+        moving = {*map(_real, INPUTS), *self.states, *self.memories}
         if found := sorted(self.expand(expression).free_symbols & moving, key=str):
             use = "".join(f"{inputs[s]} or " for s in found if s in inputs)
             raise UserError(f"{what} contains {found[0]}, which moves; use {use}eq.before(...)")
@@ -365,8 +463,9 @@ class Equations:
 
     def at_rest(self) -> dict[Symbol, sympy.Expr]:
         """The values before the event of inputs and computed quantities."""
-        still = {self.U_rate: sympy.Integer(0), self.t: sympy.Integer(LONG_AGO)}
-        return {self.U: self.U0, self.omega_s: self.omega_s0, self.U2: self.U20} | still | self.known_before
+        still = dict.fromkeys(map(_real, INPUTS), sympy.Integer(0)) | {self.t: sympy.Integer(LONG_AGO)}
+        still |= {_real("v_d"): self.U0, _real("turn_re"): sympy.Integer(1)}
+        return still | {self.U: self.U0, self.omega_s: self.omega_s0, self.U2: self.U20} | self.known_before
 
     def expand(self, expression: sympy.Expr, named: Callable[[Symbol], bool] = lambda _: True) -> sympy.Expr:
         """The expression with the quantities that are `named` (by default all) replaced by what they stand for."""
@@ -432,7 +531,7 @@ class Equations:
         lines = [rf"\frac{{d {s.latex}}}{{dt}} = {tex(s.derivative)}" for s in self.states.values()]
         lines += [rf"{m.latex} \leftarrow {tex(m.renewal)}" for m in self.memories.values()]
         lines += [f"{tex(s)} = {tex(self.shown.get(s, expression))}" for s, expression in self.definitions.items()]
-        lines += [f"P = {tex(self.P)}", f"Q = {tex(self.Q)}"]
+        lines += [f"{site.latex} = {tex(drawn)}" for site, drawn in self._drawn.items()]
         return lines + [f"{starts[start_symbol(s.symbol)]} = {tex(s.initial)}" for s in self.states.values()]
 
 

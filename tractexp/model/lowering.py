@@ -43,6 +43,7 @@ class Lowered:
     derivative: Phase
     renewal: Phase
     output: Phase
+    outputs: tuple[str, ...]  # what its expressions are called
 
 
 class _Hoister:
@@ -107,17 +108,18 @@ def lower(eq: Equations) -> Lowered:
     steps = {symbol: eq.real(e) for symbol, e in eq.steps.items()}
     derivative = _phase(hoist, [d for _, d, _ in rows], steps)
     renewal = _phase(hoist, [eq.real(m.renewal) for m in eq.memories.values()], steps)
-    output = _phase(hoist, [eq.real(eq.P), eq.real(eq.Q)], steps)
+    outputs = eq.outputs()
+    output = _phase(hoist, [eq.real(e) for e in outputs.values()], steps)
     slack = [eq.expand(r.slack) for r in eq.requirements]
     remembered = [eq.real(m.initial) for m in eq.memories.values()]
     start = _phase(None, [i for _, _, i in rows] + remembered + slack)
     at_rest = eq.at_rest() | dict(zip((*states, *memories), starts, strict=True))
     balances = _phase(None, [b.xreplace(at_rest) for b in eq.real_balances()])
     phases = (derivative, renewal, output)
-    used = tuple(s for s in inputs if s == eq.U or any(s in symbols(p) for p in phases))
+    used = tuple(s for s in inputs if s == eq.v or any(s in symbols(p) for p in phases))
     lowered = Lowered(
         parameters, used, event, states, memories, starts, start, balances,
-        tuple(hoist.constants.values()), _phase(None, list(hoist.constants)), *phases,
+        tuple(hoist.constants.values()), _phase(None, list(hoist.constants)), *phases, tuple(outputs),
     )  # fmt: skip
     _check_closed(lowered, lane)
     return replace(lowered, rest=None) if not eq.edits and settled(eq, start, balances, starts) else lowered

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import UserError, check_choice
-from tractexp.model.drive import EVENT, Drive
+from tractexp.model.drive import DOMAINS, EVENT, PHASORS, WAVES, Drive
 from tractexp.model.parts import Effect, Measurement, Motor, Static
 from tractexp.model.window import seen
 from tractexp.parameter import Parameter
@@ -22,18 +22,32 @@ CLASSICAL, PRINTED = INTEGRATIONS = ("classical", "printed")  # Runge-Kutta of o
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """Simulated power. `miss` is 0 where a steady state exists; there P and Q are valid."""
+    """What a load draws: P and Q, or waveforms' currents. Valid where `miss` is 0: a steady state exists there."""
 
-    P: np.ndarray  # (n, N) pu
-    Q: np.ndarray  # (n, N) pu
+    outputs: np.ndarray  # (C, n, N) pu
     miss: np.ndarray  # (E, n)
+
+    @property
+    def P(self) -> np.ndarray:
+        """(n, N) pu."""
+        return self.outputs[0]
+
+    @property
+    def Q(self) -> np.ndarray:
+        """(n, N) pu."""
+        return self.outputs[1]
+
+    @property
+    def by_candidate(self) -> np.ndarray:
+        """(n, C, N) pu."""
+        return np.swapaxes(self.outputs, 0, 1)
 
 
 @dataclass(frozen=True, eq=False)
 class Errors:
     """Weighted sums of squared errors; `refused` candidates have no steady state or diverged."""
 
-    sums: np.ndarray  # (E, 2, n) pu²: P, Q
+    sums: np.ndarray  # (E, C, n) pu²: P, Q, or three currents
     miss: np.ndarray  # (n,)
 
     @property
@@ -55,8 +69,11 @@ class Model:
     Candidates are arrays `values` (n, d) in the order of `parameters`, or (E, n, d) where they differ by event.
     """
 
-    def __init__(self, motor: Motor, static: Static, effects: Sequence[Effect] = (), integration: str = CLASSICAL):
-        self.motor, self.static, self.integration = motor, static, integration
+    def __init__(
+        self, motor: Motor, static: Static, effects: Sequence[Effect] = (), integration: str = CLASSICAL,
+        domain: str = PHASORS,
+    ):  # fmt: skip
+        self.motor, self.static, self.integration, self.domain = motor, static, integration, domain
         self.effects = tuple(sorted(effects, key=lambda e: (e.order, e.name)))  # the same model in whatever order given
         self.measurements = tuple(e for e in self.effects if isinstance(e, Measurement))
         self.recorder: Measurement | None = None
@@ -64,6 +81,13 @@ class Model:
         self.title = " with ".join([load, *(effect.name for effect in self.effects)])
         if integration == PRINTED:
             self.title += ", integrated by Eq. (4) as printed"
+        if self.waves:
+            self.title += ", on waveforms"
+
+    @property
+    def waves(self) -> bool:
+        """Whether it draws sampled currents, not phasors' power."""
+        return self.domain == WAVES
 
     def behind(self, recorder: Measurement | None) -> "Model":
         """The same load as a known recorder shows it: without parameters, before the faults of the measurement."""
@@ -91,20 +115,20 @@ class Model:
         """The declaration all parts wrote into (an `Equations`). Raises `UserError` for parts that do not fit."""
         from tractexp.model.declaration import declared
 
-        return declared(self.motor, self.static, self.effects, self.title)
+        return declared(self.motor, self.static, self.effects, self.title, self.domain)
 
     def acceptance(self, effect: Effect) -> "Acceptance":
         """Whether one more effect makes sense for this model, and what it would edit; remembered beside the kernels."""
         from tractexp.model.kernel import remembered
 
         parts = (self.motor, self.static, *self.effects, effect)
-        return Acceptance(**json.loads(remembered(parts, lambda: self._tried(effect), "acceptance")))
+        return Acceptance(**json.loads(remembered(parts, lambda: self._tried(effect), self._kept("acceptance"))))
 
     def _tried(self, effect: Effect) -> str:
         from tractexp.model.declaration import Refused
 
         try:
-            eq = compose(self.motor, self.static, [*self.effects, effect]).equations
+            eq = compose(self.motor, self.static, [*self.effects, effect], domain=self.domain).equations
         except Refused as refused:
             return json.dumps({"refusal": refused.reason if refused.effect == effect.name else str(refused)})
         return json.dumps({"refusal": None, "edits": eq.edits.get(effect.name, [])})
@@ -115,7 +139,11 @@ class Model:
         from tractexp.model.kernel import remembered
 
         what = "source" if self.integration == CLASSICAL else f"source_{self.integration}"
-        return remembered((self.motor, self.static, *self.effects), self._generated, what)
+        return remembered((self.motor, self.static, *self.effects), self._generated, self._kept(what))
+
+    def _kept(self, what: str) -> str:
+        """What a text is called in the cache: those of phasors by themselves."""
+        return f"{what}_{self.domain}" if self.waves else what
 
     def _generated(self) -> str:
         from tractexp.model.codegen import source
@@ -139,7 +167,7 @@ class Model:
         """
         candidates = self._candidates(drive, values, before)
         n = candidates.shape[2]
-        outputs = np.empty((2, n, drive.samples))
+        outputs = np.empty((drive.channels, n, drive.samples))
         outputs.fill(np.nan)
         _, miss = self._run(drive, candidates, substeps, outputs)
         for e, window in enumerate(drive.windows):
@@ -149,7 +177,7 @@ class Model:
         for effect in self.measurements:
             columns = {p.name: candidates[:, self.names.index(p.name)] for p in effect.parameters}
             outputs = effect.observe(outputs, drive, columns)
-        return Response(outputs[0], outputs[1], miss)
+        return Response(outputs, miss)
 
     def errors(self, drive: Drive, values: np.ndarray, substeps: Sequence[int] | int = 1) -> Errors:
         """Weighted squared errors of every candidate over every event, in one pass and without storing responses."""
@@ -161,7 +189,7 @@ class Model:
     @staticmethod
     def _errors_of(response: Response, drive: Drive) -> Errors:
         """Squared errors of stored responses: where the measurement stands between kernel and sums."""
-        square = (np.stack([response.P, response.Q]) - drive.measured[:, None]) ** 2 * drive.weights[:, None]
+        square = (response.outputs - drive.measured[:, None]) ** 2 * drive.weights[:, None]
         sums = np.add.reduceat(square, drive.first[:-1], axis=2)
         return Errors(np.moveaxis(sums, 2, 0), response.miss.sum(axis=0))
 
@@ -179,7 +207,7 @@ class Model:
             fine = self.simulate(drive, values, 2 * chosen)
             for e in range(drive.events):
                 good, part = coarse.miss[e] == 0, drive.part(e)
-                gaps = [np.abs(a[good, part] - b[good, part]) for a, b in ((coarse.P, fine.P), (coarse.Q, fine.Q))]
+                gaps = np.abs(coarse.outputs[:, good, part] - fine.outputs[:, good, part])
                 left[e] = np.nan_to_num(np.max(gaps, initial=0.0), nan=np.inf)
             short = ~(left <= tolerance) & (chosen < most)
             if not short.any():
@@ -244,7 +272,7 @@ class Model:
 
     def _run(self, drive, candidates, substeps, outputs):
         n = candidates.shape[2]
-        sums, miss = np.empty((drive.events, 2, n)), np.empty((drive.events, n))
+        sums, miss = np.empty((drive.events, drive.channels, n)), np.empty((drive.events, n))
         steps = np.broadcast_to(np.asarray(substeps, dtype=np.int64), (drive.events,)).copy()
         sums.fill(np.nan)
         self.kernel.run(
@@ -262,10 +290,16 @@ class Model:
         return sums, miss
 
 
-def compose(motor: Motor, static: Static, effects: Sequence[Effect] = (), integration: str = CLASSICAL) -> Model:
-    """A composite load of these parts. Raises `UserError` for an effect named twice or an unknown integration."""
+def compose(
+    motor: Motor, static: Static, effects: Sequence[Effect] = (), integration: str = CLASSICAL, domain: str = PHASORS
+) -> Model:  # fmt: skip
+    """A composite load of these parts. Raises `UserError` for an effect named twice, an unknown integration or domain.
+
+    `domain` is `phasors` or `waves`.
+    """
     check_choice("model.integration", integration, INTEGRATIONS)
+    check_choice("domain", domain, DOMAINS)
     names = [effect.name for effect in effects]
     if twice := next((n for n in names if names.count(n) > 1), None):
         raise UserError(f"model.effects names '{twice}' twice; name each effect once")
-    return Model(motor, static, effects, integration)
+    return Model(motor, static, effects, integration, domain)

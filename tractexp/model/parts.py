@@ -75,6 +75,12 @@ class Static(Part):
         A law that names an argument `f` gets the frequency over that before the event.
         """
 
+    def damping(self, **parameters: Any) -> Any:
+        """Resistance over reactance of the branch that draws Q_s in waveforms; in phasors there is none."""
+        from tractexp.model.equations import DAMPING
+
+        return DAMPING
+
     def require(self, **parameters: Any) -> Iterable[tuple]:
         """What must hold for a steady state: (slack, sentence) or (slack, sentence, shown), slack >= 0 where it does.
 
@@ -87,6 +93,7 @@ class Static(Part):
         super().check_class(where)
         check_signature(cls, "law", "u", where, offered=("f",))
         check_signature(cls, "require", None, where, offered=("P0", "Q0", "U0"), all_taken=False)
+        check_signature(cls, "damping", None, where, all_taken=False)
 
 
 class Effect(Part):
@@ -104,6 +111,8 @@ class Effect(Part):
     grid: ClassVar[dict[str, tuple[float, ...]]] = {}
     relevant: ClassVar[dict[str, float]] = {}
     confused_with: ClassVar[tuple[str, ...]] = ()
+    phasors_only: ClassVar[str] = ""  # why it makes no sense of waveforms; "" where it does
+    waves_only: ClassVar[str] = ""  # why it makes no sense of phasors
 
     @abstractmethod
     def edit(self, eq: "Equations", **parameters: Any) -> None:

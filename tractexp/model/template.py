@@ -85,8 +85,8 @@ def run(candidates, event, first, inputs, measured, weights, substeps, sums, mis
     candidates (events, rows, n): {rows};
     event (events, {n_event}): {event}; first (events + 1,): where each event starts in the samples;
     inputs (rows as in INPUTS, N), of which are used: {inputs};
-    measured, weights (2, N): P, Q; substeps (events,); sums (events, 2, n) and miss (events, n) are written;
-    outputs (2, n, N) or empty.
+    measured, weights ({C}, N): {outputs}; substeps (events,); sums (events, {C}, n) and miss (events, n) are written;
+    outputs ({C}, n, N) or empty.
     """
     prefer_vectors(VECTORS)
     n = candidates.shape[2]
@@ -106,21 +106,18 @@ def run(candidates, event, first, inputs, measured, weights, substeps, sums, mis
                 k = min(begin + l, n - 1)
 {start}
                 reachable = reachable or m <= 0.0
-                W[{row_sum_P} + l] = 0.0
-                W[{row_sum_Q} + l] = 0.0
+{no_sums}
                 W[{row_miss} + l] = m
             if reachable:
                 for i in range(first[e], first[e + 1]):
 {sample}
                     if store:
                         for l in range(some):
-                            outputs[0, begin + l, i] = W[{row_P} + l]
-                            outputs[1, begin + l, i] = W[{row_Q} + l]
+{store}
                     if i + 1 < first[e + 1]:
 {advance}
             for l in range(some):
-                sums[e, 0, begin + l] = W[{row_sum_P} + l]
-                sums[e, 1, begin + l] = W[{row_sum_Q} + l]
+{sums}
                 miss[e, begin + l] = W[{row_miss} + l]
 '''
 

@@ -1,4 +1,4 @@
-"""The noise of P and Q together: correlated with each other and in time, and how residuals are whitened by it.
+"""The noise of what is compared: correlated between channels and in time, and how residuals are whitened by it.
 
 Beside fast noise there may be shapes of known variance, slow or local: the wandering of the load, and what is left of
 the voltage's noise, which enters the model and leaves it in P and Q at once.
@@ -18,32 +18,36 @@ from tractexp.noise.wander import Wander
 BURN_IN = 500  # samples
 UNSEEN = 0.05  # standard deviations of the fast noise: shapes that do less are left out
 
-Pair = tuple[Autoregression, Autoregression]  # of P and of Q
+Pair = tuple[Autoregression, ...]  # of P and of Q, or of each current
 Shrunk = tuple[tuple[int, ...], np.ndarray, np.ndarray]  # channels, orthonormal shapes (k, R) in them, what goes (k,)
 
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """Residuals (P, Q) of each event, times `mix`, are two independent autoregressions.
+    """Residuals of each event's C channels, times `mix`, are independent autoregressions.
 
-    `pairs` has one for each event, or a single one that holds for every event. Without `mix` P and Q are independent
-    as they stand, and a sample of one counts where the other is missing.
+    `pairs` has one for each event, or a single one that holds for every event. Without `mix` the channels are
+    independent as they stand, and a sample of one counts where another is missing.
     """
 
     pairs: tuple[Pair, ...]
-    mix: np.ndarray | None = None  # (2, 2)
-    shocks: tuple[np.ndarray, np.ndarray] | None = None  # of unit variance, as they were seen; None: normal
+    mix: np.ndarray | None = None  # (C, C)
+    shocks: tuple[np.ndarray, ...] | None = None  # of unit variance, as they were seen; None: normal
     wander: Wander | None = None  # of the mixed channels
-    blur: np.ndarray | None = None  # (k, 2, N) pu: what errors of the voltage do, each of one standard deviation
+    blur: np.ndarray | None = None  # (k, C, N) pu: what errors of the voltage do, each of one standard deviation
     _shrunk: dict[int, "list[Shrunk]"] = field(default_factory=dict, init=False)
 
     @classmethod
-    def white(cls, P: float, Q: float) -> "Noise":
-        """Independent samples of these standard deviations [pu]."""
-        return cls(((white_noise(P), white_noise(Q)),))
+    def white(cls, *deviations: float) -> "Noise":
+        """Independent samples of these standard deviations [pu], one of each channel."""
+        return cls((tuple(map(white_noise, deviations)),))
+
+    @property
+    def channels(self) -> int:
+        return len(self.pairs[0])
 
     def pair(self, event: int) -> Pair:
-        """The autoregressions of P and Q in one event."""
+        """The autoregressions of the channels in one event."""
         return self.pairs[event if len(self.pairs) > 1 else 0]
 
     def of(self, event: int) -> "Noise":
@@ -58,7 +62,7 @@ class Noise:
     def scaled(self, factor: float) -> "Noise":
         """The same noise, `factor` times as loud."""
         wander = self.wander and replace(self.wander, intensity=self.wander.intensity * factor**2)
-        pairs = tuple((P.scaled(factor), Q.scaled(factor)) for P, Q in self.pairs)
+        pairs = tuple(tuple(channel.scaled(factor) for channel in pair) for pair in self.pairs)
         made = replace(self, pairs=pairs, wander=wander, blur=None if self.blur is None else self.blur * factor)
         made._shrunk.update(self._shrunk)  # shapes and noise keep their ratio
         return made
@@ -69,9 +73,10 @@ class Noise:
         return replace(self, wander=wander, blur=blur)
 
     def whiten(self, residuals: np.ndarray, drive: Drive, known: np.ndarray) -> np.ndarray:
-        """(n, 2, N) to rows (n, 2 N) of independent unit variance; samples that are not `known` (2, N) are 0."""
+        """(n, C, N) to rows (n, C N) of independent unit variance; samples that are not `known` (C, N) are 0."""
         if self.mix is not None:
-            known = np.broadcast_to(known.all(axis=0), known.shape)
+            measured = known.any(axis=1)
+            known = known[measured].all(axis=0) & measured[:, None]
         rows = np.empty_like(residuals)
         with np.errstate(over="ignore", invalid="ignore"):  # what diverges has a deviance that is not finite
             mixed = self._mixed(residuals)
@@ -82,7 +87,7 @@ class Noise:
         return rows.reshape(len(rows), -1)
 
     def draw(self, rng: np.random.Generator, count: int, lengths: Sequence[int]) -> np.ndarray:
-        """Noise of events of these lengths end to end, (count, 2, N) [pu]."""
+        """Noise of events of these lengths end to end, (count, C, N) [pu]."""
         ends = np.cumsum([0, *lengths]).tolist()
         drawn = [self._drawn(rng, count, slice(a, b), e) for e, (a, b) in enumerate(itertools.pairwise(ends))]
         joined = np.concatenate(drawn, axis=2)
@@ -96,10 +101,9 @@ class Noise:
         return samples / max(1.0, *((g / s) ** 2 for g, s in zip(gains, spreads, strict=True)))
 
     @property
-    def levels(self) -> tuple[float, float]:
-        """Standard deviations [pu] of P and of Q in the first event."""
-        P, Q = np.sqrt(self._fast_variance(0)).tolist()
-        return P, Q
+    def levels(self) -> tuple[float, ...]:
+        """Standard deviations [pu] of the channels in the first event."""
+        return tuple(np.sqrt(self._fast_variance(0)).tolist())
 
     def memory(self, step: float) -> float:
         """Within which time [s] a first-order autoregression as loud at rest as P forgets, samples `step` [s] apart.
@@ -112,15 +116,15 @@ class Noise:
         a = (ratio - 1) / (ratio + 1)
         return -step / float(np.log(a)) if a > 0 else 0.0
 
-    def describe(self) -> str:
+    def describe(self, names: Sequence[str] = ("P", "Q")) -> str:
         """Level and color, as a run prints them."""
-        pair, level = self.pairs[0], self.levels
+        pair, levels = self.pairs[0], zip(names, self.levels, strict=True)
         color = "white" if all(a.white for a in pair) else f"colored (order {max(a.order for a in pair)})"
-        return f"P {level[0]:.2g} pu, Q {level[1]:.2g} pu, {color}"
+        return f"{', '.join(f'{name} {level:.2g} pu' for name, level in levels)}, {color}"
 
     def deviation(self, drive: Drive) -> np.ndarray:
-        """Standard deviation of every sample of P and Q, (2, N) [pu], with what its shapes add."""
-        variance = np.empty((2, drive.samples))
+        """Standard deviation of every sample of each channel, (C, N) [pu], with what its shapes add."""
+        variance = np.empty(drive.measured.shape)
         for e in range(drive.events):
             part = drive.part(e)
             shapes = np.einsum("ij,kjt->kit", self._unmixing, self._shapes(part))
@@ -129,28 +133,28 @@ class Noise:
 
     @property
     def _unmixing(self) -> np.ndarray:
-        return np.eye(2) if self.mix is None else np.linalg.inv(self.mix)
+        return np.eye(self.channels) if self.mix is None else np.linalg.inv(self.mix)
 
     def covariance(self, event: int) -> np.ndarray:
-        """Covariance (2, 2) of the fast noise of P and Q in one event [pu²]."""
+        """Covariance (C, C) of the fast noise of the channels in one event [pu²]."""
         back = self._unmixing
         return back @ np.diag([channel.deviation[0] ** 2 for channel in self.pair(event)]) @ back.T
 
     def _fast_variance(self, event: int) -> np.ndarray:
-        """Variance (2,) of the fast noise of P and Q [pu²]."""
+        """Variance (C,) of the fast noise of the channels [pu²]."""
         return self._unmixing**2 @ [channel.deviation[0] ** 2 for channel in self.pair(event)]
 
     def _mixed(self, rows: np.ndarray) -> np.ndarray:
-        """Channels (n, 2, N) mixed so that their noise is independent."""
+        """Channels (n, C, N) mixed so that their noise is independent."""
         return rows if self.mix is None else self.mix @ rows
 
     def _fast(self, mixed: np.ndarray, known: np.ndarray, event: int) -> np.ndarray:
-        """Mixed channels (n, 2, samples) of one event without the color of the fast noise."""
+        """Mixed channels (n, C, samples) of one event without the color of the fast noise."""
         rows = [channel.whiten(mixed[:, c], known[c]) for c, channel in enumerate(self.pair(event))]
         return np.stack(rows, axis=1)
 
     def _without_shapes(self, white: np.ndarray, known: np.ndarray, part: slice, event: int) -> np.ndarray:
-        """Whitened rows (n, 2, samples) of an event without the excess variance of its shapes.
+        """Whitened rows (n, C, samples) of an event without the excess variance of its shapes.
 
         With B the whitened shapes, (I + B'B)^(-1/2) by their singular vectors.
         """
@@ -167,19 +171,19 @@ class Noise:
     def _whitened_shapes(
         self, known: np.ndarray, part: slice, event: int
     ) -> Iterator[tuple[tuple[int, ...], np.ndarray]]:
-        """Channels and the whitened shapes (k, R) in them: P and Q apart where nothing changes both at once."""
+        """Channels and the whitened shapes (k, R) in them: channels apart where nothing changes several at once."""
         shapes = self._fast(self._shapes(part), known, event)
         if self.blur is not None:
-            yield (0, 1), shapes.reshape(len(shapes), -1)
+            yield tuple(range(self.channels)), shapes.reshape(len(shapes), -1)
             return
-        for c, own in enumerate(np.split(shapes, 2)):
+        for c, own in enumerate(np.split(shapes, self.channels)):
             yield (c,), own[:, c]
 
     def _shapes(self, part: slice) -> np.ndarray:
-        """Shapes (k, 2, samples) of the mixed channels in one event, of one standard deviation each; P's before Q's."""
-        shapes = [np.empty((0, 2, part.stop - part.start))]
+        """Shapes (k, C, samples) of the mixed channels in one event, of one standard deviation each, in their order."""
+        shapes = [np.empty((0, self.channels, part.stop - part.start))]
         if self.wander is not None:
-            for c in (0, 1):
+            for c in range(self.channels):
                 modes = self.wander.modes(c, part)
                 shapes.append(np.zeros((len(modes), *shapes[0].shape[1:])))
                 shapes[-1][:, c] = modes
@@ -188,7 +192,7 @@ class Noise:
         return np.concatenate(shapes)
 
     def _drawn(self, rng: np.random.Generator, count: int, part: slice, event: int) -> np.ndarray:
-        """Mixed channels (count, 2, samples) of one event."""
+        """Mixed channels (count, C, samples) of one event."""
         colored = []
         size = (count, part.stop - part.start + BURN_IN)
         for c, channel in enumerate(self.pair(event)):

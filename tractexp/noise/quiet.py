@@ -6,7 +6,7 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.model.drive import Drive
-from tractexp.noise.color import FEWEST, Autoregression, fit_autoregression
+from tractexp.noise.color import FEWEST, Autoregression, fit_autoregression, white_noise
 from tractexp.noise.model import Noise
 from tractexp.noise.wander import Wander, without_slow
 from tractexp.record import Event
@@ -23,7 +23,7 @@ def quiet_stretches(events: Sequence[Event], drive: Drive) -> list[slice]:
     for e, event in enumerate(events):
         first, n = int(drive.first[e]), event.record.samples
         tail = round(n - TAIL * (n - event.end))
-        parts += [slice(first, first + event.start), slice(first + tail, first + n)]
+        parts += [slice(first + event.first, first + event.start), slice(first + tail, first + n)]
     return [p for p in parts if p.stop - p.start >= SHORTEST]
 
 
@@ -33,13 +33,15 @@ def estimate(
     quiet: Sequence[slice],
     wander: Callable[[np.ndarray], Wander | None] = lambda mix: None,
     blur: np.ndarray | None = None,
+    highest: int = HIGHEST,
 ) -> Noise:
-    """Noise from residuals (2, N) in quiet stretches; `wander` tells how the load wanders in channels mixed by `mix`.
+    """Noise from residuals (C, N) in quiet stretches; `wander` tells how the load wanders in channels mixed by `mix`.
 
     Raises `UserError` where too few samples are quiet.
     """
-    both = known.all(axis=0)
-    pieces = [residuals[:, part][:, both[part]] for part in quiet]
+    measured = known.any(axis=1)
+    both = known[measured].all(axis=0)
+    pieces = [residuals[measured, part][:, both[part]] for part in quiet]
     count = sum(p.shape[1] for p in pieces)
     if count < FEWEST:
         raise UserError(
@@ -48,18 +50,22 @@ def estimate(
         )
     together = np.concatenate(pieces, axis=1)
     covariance = together @ together.T / count
-    covariance += 1e-18 * np.eye(2)
-    mix = np.linalg.inv(np.linalg.cholesky(covariance))
+    covariance += 1e-18 * np.eye(len(covariance))
+    own = np.linalg.inv(np.linalg.cholesky(covariance))
+    fast = [[(own @ p)[c] for p in pieces] for c in range(len(own))]
+    mix = np.eye(len(measured))
+    mix[np.ix_(measured, measured)] = own
     slow = wander(mix)
-    fast = [[(mix @ p)[c] for p in pieces] for c in (0, 1)]
     if slow is not None:
         fast = [[without_slow(p) for p in channel] for channel in fast]
     # Sparing, because a color that is not there changes the weight of slow differences, which every effect makes.
-    P, Q = (fit_autoregression(channel, HIGHEST, sparing=True) for channel in fast)
+    found = [fit_autoregression(channel, highest, sparing=True) for channel in fast]
     shocks = None
-    if count >= MANY:
-        shocks = _shocks(P, fast[0]), _shocks(Q, fast[1])
-    return Noise(((P, Q),), mix, shocks, slow, blur)
+    if count >= MANY and measured.all():
+        shocks = tuple(map(_shocks, found, fast))
+    colors = iter(found)
+    pair = tuple(next(colors) if there else white_noise(1.0) for there in measured)
+    return Noise((pair,), mix, shocks, slow, blur)
 
 
 def _shocks(channel: Autoregression, pieces: Sequence[np.ndarray]) -> np.ndarray:

@@ -10,4 +10,7 @@ from tractexp.record.reader import endings as endings
 from tractexp.record.reader import reader_of as reader_of
 from tractexp.record.record import Base as Base
 from tractexp.record.record import Record as Record
+from tractexp.record.wave_event import WaveEvent as WaveEvent
+from tractexp.record.wave_event import in_waves as in_waves
+from tractexp.record.waves import Waves as Waves
 from tractexp.record.window import Window as Window

@@ -47,6 +47,22 @@ class Event:
         return describe(self)
 
     @property
+    def first(self) -> int:
+        """The first sample that was recorded."""
+        return 0
+
+    @property
+    def levels(self) -> tuple[float, ...]:
+        """Standard deviation of the noise of each channel that is compared [pu]: of P and of Q."""
+        return self.noise_P, self.noise_Q
+
+    @property
+    def calm(self) -> np.ndarray:
+        """What P and Q do before the dip beside their means, (2, n) [pu]; nan in a gap."""
+        quiet = np.stack([self.record.P[self.steady], self.record.Q[self.steady]])
+        return np.stack([row - row[np.isfinite(row)].mean() for row in quiet])
+
+    @property
     def t_start(self) -> float:
         return float(self.record.t[self.start])
 

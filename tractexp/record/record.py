@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tractexp.errors import UserError
+from tractexp.record.waves import Waves
 from tractexp.record.window import Window
 
 JITTER = 0.01  # of a step: times closer than this to a uniform grid count as uniform
@@ -65,6 +66,7 @@ class Record:
     notes: tuple[str, ...] = ()
     window: Window | None = None
     more: Mapping[str, np.ndarray] = field(default_factory=dict)  # P_3, P_5, ... [pu], THD_u, THD_i
+    waves: Waves | None = None  # what the phasors were measured from, where the recorder kept it
 
     def __repr__(self) -> str:
         span = f"{self.samples} samples of {', '.join(self.channels)}"

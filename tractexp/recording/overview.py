@@ -163,7 +163,7 @@ def sight(reader: WaveformReader, recording: Recording, feeder: Feeder, events: 
             found += happenings(waves, segment.rate, segment.start, recording.frequency, measured)
     dips, refused = [], ""
     try:
-        dips = reader.dips(feeder, phasors, recording.frequency) if found else []
+        dips = reader.dips(feeder, [(p, None) for p in phasors], recording.frequency) if found else []
     except UserError as error:
         refused = str(error)
     seen = _numbered(found, dips, reader.path, refused)

@@ -10,7 +10,7 @@ from typing import Any
 from tractexp import plugin
 from tractexp.errors import UserError, check_range
 from tractexp.overrides import assigned
-from tractexp.record import Base, Events, Reader, Record, detect
+from tractexp.record import Base, Events, Reader, Record, Waves, detect
 from tractexp.record.dips import Dip, check_numbers, chosen, level, numbered
 from tractexp.record.phasor import Phasors
 from tractexp.recording.arrangement import arranged, tuned
@@ -18,10 +18,12 @@ from tractexp.recording.connection import usual
 from tractexp.recording.estimator import estimator_of
 from tractexp.recording.feeder import Feeder, propose
 from tractexp.recording.label import order
-from tractexp.recording.measure import phasors_of
+from tractexp.recording.measure import FeederWaves, phasors_of
 from tractexp.recording.recording import Recording
 from tractexp.wording import counted
 
+Stream = tuple[Phasors, Waves | None]  # of one segment
+BESIDE = 2  # cycles of waveforms kept beside a record's phasors, for the windows of its first and last
 COUNT = {1: "one", 2: "two", 3: "three"}
 
 
@@ -64,14 +66,15 @@ class WaveformReader(Reader):
         recording = self.opened()
         feeder = self.feeder(recording)
         dips = self.dips(feeder, self._streams(recording, feeder), recording.frequency)
-        return chosen(self.path, dips, self.train, self.validate, self._notes(recording, feeder, dips))
+        events = chosen(self.path, dips, self.train, self.validate, self._notes(recording, feeder, dips))
+        return Events(list(map(_kept, events.train)), list(map(_kept, events.validate)))
 
-    def dips(self, feeder: Feeder, streams: Sequence[Phasors], frequency: float) -> list[Dip]:
+    def dips(self, feeder: Feeder, streams: Sequence[Stream], frequency: float) -> list[Dip]:
         """The dips of one load, on one base: voltage and apparent power before the first that can be used.
 
         Raises `UserError` where there is none, and where the load carries no power.
         """
-        wholes = [self._whole(feeder, phasors, frequency) for phasors in streams]
+        wholes = [self._whole(feeder, stream, frequency) for stream in streams]
         made = numbered(wholes, self.path, self.pre, self.post)
         if not made:
             detect(max(wholes, key=lambda whole: whole.samples))  # raises, and says what there is instead
@@ -83,8 +86,9 @@ class WaveformReader(Reader):
             raise UserError(f"{self.path}: data.currents carry no power before the first dip ({1e6 * S:.2g} VA)")
         return [replace(dip, made=_per_unit(dip.made, Base(U, S, frequency))) for dip in made]
 
-    def _whole(self, feeder: Feeder, phasors: Phasors, frequency: float) -> Record:
+    def _whole(self, feeder: Feeder, stream: Stream, frequency: float) -> Record:
         """All of one segment, in kV, MW and Mvar."""
+        phasors, waves = stream
         return Record(
             name=Path(self.path).stem,
             t=phasors.t,
@@ -98,6 +102,7 @@ class WaveformReader(Reader):
             notes=plugin.chosen("connection", feeder.connection).notes,
             window=estimator_of(self.estimator).window(frequency),
             more=phasors.more,
+            waves=waves,
         )
 
     def feeder(self, recording: Recording) -> Feeder:
@@ -149,10 +154,15 @@ class WaveformReader(Reader):
         shown = f"{len(found)} loads; choose one: {loads}" if found else f"none by itself; its channels: {every}"
         raise UserError(f"data.voltages and data.currents are missing, and {recording.source} shows {shown}")
 
-    def _streams(self, recording: Recording, feeder: Feeder) -> list[Phasors]:
-        """The phasors of each segment that holds waveforms."""
-        settings = self.estimator, self.skew, self.harmonics
-        return [phasors_of(recording, feeder, segment, *settings) for segment in recording.waveforms()]
+    def _streams(self, recording: Recording, feeder: Feeder) -> list[Stream]:
+        """The phasors and the waves of each segment that holds waveforms."""
+        settings, made = (self.estimator, self.skew, self.harmonics), []
+        for segment in recording.waveforms():
+            phasors = phasors_of(recording, feeder, segment, *settings)
+            waves = FeederWaves.of(recording, feeder, segment)
+            late = waves.late if self.skew else None
+            made.append((phasors, Waves(waves, segment.start, segment.rate, self.estimator, late)))
+        return made
 
     def _notes(self, recording: Recording, feeder: Feeder, dips: Sequence[Dip]) -> tuple[str, ...]:
         kind = estimator_of(self.estimator).name.replace("_", "-")
@@ -171,6 +181,14 @@ class WaveformReader(Reader):
         if skew > 0 and not self.skew:
             notes.append(f"time skew of up to {1e6 * skew:.3g} microseconds not corrected (data.skew=true does)")
         return tuple(notes)
+
+
+def _kept(record: Record) -> Record:
+    """The record with its own waveforms in memory, and a window's length about them."""
+    if record.waves is None:
+        return record
+    about = BESIDE / record.base.frequency
+    return replace(record, waves=record.waves.between(record.t[0] - about, record.t[-1] + about))
 
 
 def _per_unit(made: Record | UserError, base: Base) -> Record | UserError:

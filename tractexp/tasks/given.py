@@ -8,6 +8,7 @@ from typing import Any
 from tractexp.errors import UserError
 
 ALWAYS = ("task", "experiment", "seed", "tracking", "hydra")  # open to every task
+OF = {"domain": "model"}  # groups that choose for another
 NAMED = ("optimizer", "data")  # choices that a run is named after anyway
 
 
@@ -35,7 +36,7 @@ def refuse_unread(task: Any, chosen: Mapping[str, str], needless: Collection[str
     """Raise `UserError` for the first setting chosen that a task (class or instance) does not read."""
     read = [part for part in (*ALWAYS, *task.reads) if part not in needless]
     for key, value in chosen.items():
-        if not any(_overlap(key, part) for part in read):
+        if not any(_overlap(OF.get(key, key), part) for part in read):
             instead = (task.instead[part] for part in task.instead if _overlap(key, part))
             raise UserError(f"{key}={value} is not read by task={task.name}; {next(instead, 'leave it out')}")
 

@@ -1,0 +1,279 @@
+"""An event as its waveforms show it: space vectors in a frame that turns with the voltage before the dip.
+
+Before the dip the waveforms are periodic: an offset, the fundamental and its harmonics, fitted by least squares at the
+frequency really present. The offsets are the recorder's and are taken off; the fundamental gives the frame and the
+power; and the periodic voltage, continued to the time before the record, lets a simulation reach its periodic steady
+state.
+"""
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.record.event import Event
+from tractexp.record.phasor import TURN
+from tractexp.record.record import Record
+from tractexp.record.waves import Waves
+
+COARSEST = 16  # samples per cycle
+FEWEST_CYCLES = 2  # before the event
+LEAD = 6  # cycles of the periodic voltage before the record, in which a simulation reaches its steady state
+HIGHEST = 25  # harmonic that is fitted
+LEAVES = 0.03  # of the voltage: how far it leaves its periodic course where an event begins
+NOISY = 6.0  # standard deviations of its noise, if that is more
+SILENT, LOUDER = 0.02, 3.0  # of the current, and times what is there before: less zero sequence than this is none
+
+
+@dataclass(frozen=True, eq=False)
+class WaveEvent(Event):
+    """An event in waveforms. `record` has t, U, P and Q on the waveforms' samples, as the last half cycle shows them.
+
+    v (N,) complex is the voltage's space vector in the frame [pu of its peak], v_zero (N,) its zero sequence, `turn`
+    (N,) turns into the stationary frame of phase a; currents (3, N) are alpha, beta and zero sequence there [pu], nan
+    where not compared. The first `lead` samples stand before the record. `omega_s0` [rad/s] is the frame's speed
+    relative to nominal; `random` (3,) is what is not periodic in the currents before the dip [pu], `unexplained`
+    (3, n) all that is no fundamental there. `offsets` (2 K,) [kV, kA] were taken off.
+    """
+
+    phasors: Event
+    v: np.ndarray
+    v_zero: np.ndarray
+    turn: np.ndarray
+    currents: np.ndarray
+    lead: int
+    omega_s0: float
+    random: tuple[float, ...]
+    unexplained: np.ndarray
+    offsets: np.ndarray
+    phases: int
+
+    @property
+    def first(self) -> int:
+        return self.lead
+
+    @property
+    def levels(self) -> tuple[float, ...]:
+        """Standard deviation of all that no fundamental explains before the dip, of each current [pu]."""
+        return tuple(max(float(np.sqrt(np.mean(row**2))), 1e-9) for row in self.unexplained)
+
+    @property
+    def calm(self) -> np.ndarray:
+        return self.unexplained
+
+    @property
+    def known(self) -> tuple[bool, ...]:
+        """Which of the three currents are compared."""
+        return tuple(bool(np.isfinite(row).any()) for row in self.currents)
+
+    def of_phases(self, currents: np.ndarray) -> np.ndarray:
+        """Currents (3, N), alpha, beta and zero, as those of the phases, (K, N)."""
+        return phases_of(currents, self.phases)
+
+
+def phases_of(stationary: np.ndarray, phases: int) -> np.ndarray:
+    """Alpha, beta and zero sequence (3, N) as phases (K, N), three or one."""
+    vector, zero = stationary[0] + 1j * stationary[1], np.nan_to_num(stationary[2])
+    return np.stack([(vector * TURN ** (-k)).real + zero for k in range(phases)])
+
+
+def stationary(phases: np.ndarray, rate: float, frequency: float) -> tuple[np.ndarray, np.ndarray]:
+    """Space vector (N,) complex and zero sequence (N,) of phases (K, N).
+
+    A single phase is the real part of its vector; the imaginary part is what it was a quarter of a cycle ago, so that
+    the vector turns as that of three phases does.
+    """
+    if len(phases) == 3:
+        return 2 / 3 * (phases[0] + TURN * phases[1] + TURN**2 * phases[2]), phases.mean(axis=0)
+    at = np.arange(phases.shape[1])
+    return phases[0] + 1j * np.interp(at - rate / frequency / 4, at, phases[0]), np.zeros(phases.shape[1])
+
+
+@dataclass(frozen=True, eq=False)
+class Periodic:
+    """Offset, fundamental and harmonics (2 H + 1, channels) of channels before an event, about the time `origin`."""
+
+    coefficients: np.ndarray
+    frequency: float
+    origin: float
+    rest: np.ndarray  # (channels,) standard deviation of what is not periodic
+
+    @classmethod
+    def of(cls, t: np.ndarray, x: np.ndarray, frequency: float, rate: float) -> "Periodic":
+        """Fitted to channels x (channels, n) at times t (n,) [s]."""
+        highest = max(1, min(HIGHEST, int(0.45 * rate / frequency), (len(t) // 3 - 1) // 2))
+        made = cls(np.zeros((2 * highest + 1, len(x))), frequency, float(t[0]), np.zeros(len(x)))
+        basis = made.basis(t)
+        found = np.linalg.lstsq(basis, x.T, rcond=None)[0]
+        left = x.T - basis @ found
+        return replace(made, coefficients=found, rest=np.sqrt((left**2).sum(axis=0) / max(len(t) - len(found), 1)))
+
+    def basis(self, t: np.ndarray) -> np.ndarray:
+        """(n, 2 H + 1): one, then cosine and sine of each harmonic."""
+        angle = 2 * np.pi * self.frequency * np.outer(t - self.origin, 1 + np.arange(len(self.coefficients) // 2))
+        waves = np.stack([np.cos(angle), np.sin(angle)], axis=2).reshape(len(t), -1)
+        return np.concatenate([np.ones((len(t), 1)), waves], axis=1)
+
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """The channels (channels, n), their offsets left out."""
+        return (self.basis(t)[:, 1:] @ self.coefficients[1:]).T
+
+    @property
+    def offsets(self) -> np.ndarray:
+        return self.coefficients[0]
+
+    @property
+    def fundamentals(self) -> np.ndarray:
+        """Peak phasors (channels,) about the origin."""
+        return self.coefficients[1] - 1j * self.coefficients[2]
+
+
+def in_waves(event: Event) -> WaveEvent:
+    """The event in waveforms. Raises `UserError` where its record has none, or too few samples per cycle or before it.
+
+    An event that is in waveforms is returned as it is.
+    """
+    if isinstance(event, WaveEvent):
+        return event
+    record, nominal = event.record, event.record.base.frequency
+    waves = _waves(event)
+    t = waves.start + np.arange(waves.samples.shape[1]) / waves.rate
+    cycle, K = 1 / nominal, waves.phases
+    before = t < event.t_start - cycle  # phasors see an event half a window early
+    if np.count_nonzero(before) < FEWEST_CYCLES * cycle * waves.rate:
+        have = max(event.t_start - cycle - t[0], 0.0)
+        raise UserError(
+            f"{record.where}: {1000 * have:.0f} ms of waveforms before the dip at t = {event.t_start:.3f} s, and the"
+            f" steady state needs {FEWEST_CYCLES} cycles ({1000 * FEWEST_CYCLES * cycle:.0f} ms); take domain=phasors,"
+            " or a record that starts earlier"
+        )
+    x = _per_unit(waves, record)
+    frequency = _frequency(t[before], x[:K, before], waves.rate, event.f0)
+    periodic = Periodic.of(t[before], x[:, before], frequency, waves.rate)
+    x = x - periodic.offsets[:, None]
+    lead = round(LEAD * waves.rate / frequency)
+    time = np.concatenate([t[0] - np.arange(lead, 0, -1) / waves.rate, t])
+    x = np.concatenate([periodic.at(time[:lead]), x], axis=1)
+
+    V, I = (_positive(part) for part in np.split(periodic.fundamentals, 2))
+    turn = np.exp(1j * (2 * np.pi * frequency * (time - periodic.origin) + np.angle(V)))
+    (v, v_zero), (i, i_zero) = (stationary(part, waves.rate, frequency) for part in np.split(x, 2))
+    power = V * np.conj(I)
+    start = lead + _onset(t, x[:K, lead:], periodic, K, before)
+    made = _slow(v / turn, i / turn, turn, waves.rate, frequency)
+    currents = np.stack([i.real, i.imag, i_zero])
+    currents[:, :lead] = np.nan
+    calm = _calm(i, i_zero, turn, I * np.exp(-1j * np.angle(V)), slice(lead, lead + np.count_nonzero(before)))
+    compared = _compared(currents[:, start:], calm, K)
+    currents[~compared] = np.nan
+    noise = periodic.rest[K:]
+    levels = (noise.mean() * np.sqrt(2 / 3),) * 2 + (noise.mean() / np.sqrt(3),) if K == 3 else (noise[0], 1.0, 1.0)
+    slow = replace(
+        record, t=time, U=made[0], P=made[1].real, Q=made[1].imag, f=None, U2=made[2], window=None, more={}, waves=None
+    )
+    end = min(max(int(np.searchsorted(time, event.t_end)), start + 1), len(time) - 1)
+    return WaveEvent(
+        **{f.name: getattr(event, f.name) for f in fields(Event)}
+        | {
+            "record": slow, "start": start, "end": end, "U0": float(np.abs(V)), "P0": float(power.real),
+            "Q0": float(power.imag), "f0": frequency, "steady": slice(lead, lead + np.count_nonzero(before)),
+        },
+        phasors=event, v=v / turn, v_zero=v_zero, turn=turn, currents=currents, lead=lead,
+        omega_s0=2 * np.pi * (frequency - nominal), random=tuple(map(float, levels)), unexplained=calm,
+        offsets=periodic.offsets * _scale(record, K), phases=K,
+    )  # fmt: skip
+
+
+def _waves(event: Event) -> Waves:
+    """The waveforms of an event, from as early and to as late as its record may use them."""
+    record, waves = event.record, event.record.waves
+    if waves is None:
+        raise UserError(
+            f"{record.where} has no waveforms: domain=waves needs the samples of voltages and currents, as a COMTRADE"
+            " file or a table of waveforms has them; take domain=phasors"
+        )
+    if waves.rate < COARSEST * record.base.frequency:
+        raise UserError(
+            f"{record.where}: {waves.rate:g} samples per second are {waves.rate / record.base.frequency:.3g} per cycle,"
+            f" and domain=waves needs {COARSEST}; take domain=phasors"
+        )
+    cycle = 1.5 / record.base.frequency
+    first = waves.start if record.t[0] - waves.start < cycle else float(record.t[0]) + cycle / 3
+    last = waves.end if waves.end - record.t[-1] < cycle else float(record.t[-1]) - cycle / 3
+    return waves.between(first, last)
+
+
+def _scale(record: Record, phases: int) -> np.ndarray:
+    """One per unit of each channel (2 K,): peaks [kV, kA]."""
+    V = record.base.voltage * np.sqrt(2 / phases)
+    return np.repeat([V, 2 * record.base.power / (phases * V)], phases)
+
+
+def _per_unit(waves: Waves, record: Record) -> np.ndarray:
+    """(2 K, M) per unit of the peaks, channels that are sampled late moved back."""
+    x = waves.samples / _scale(record, waves.phases)[:, None]
+    if waves.late is None:
+        return x
+    at = np.arange(x.shape[1])
+    return np.stack([np.interp(at + late * waves.rate, at, row) for row, late in zip(x, waves.late, strict=True)])
+
+
+def _positive(phasors: np.ndarray) -> complex:
+    """Positive sequence of three phasors, or the only one."""
+    return complex(phasors @ TURN ** np.arange(len(phasors)) / len(phasors))
+
+
+def _frequency(t: np.ndarray, v: np.ndarray, rate: float, guess: float) -> float:
+    """Frequency [Hz] of voltages (K, n), from how their fundamental turns from the first half to the second."""
+    found = guess
+    for _ in range(2):
+        whole = max(1, int((t[-1] - t[0]) * found / 2)) / found  # s: cycles of a half
+        n = round(whole * rate)
+        halves = (Periodic.of(t[part], v[:, part], found, rate) for part in (slice(0, n), slice(-n, None)))
+        first, last = halves
+        angle = np.angle(_positive(last.fundamentals) / _positive(first.fundamentals))
+        between = last.origin - first.origin
+        found += float(np.angle(np.exp(1j * (angle - 2 * np.pi * found * between)))) / (2 * np.pi * between)
+    return found
+
+
+def _onset(t: np.ndarray, v: np.ndarray, periodic: Periodic, K: int, before: np.ndarray) -> int:
+    """The first sample at which a voltage (K, M) has left its periodic course."""
+    off = np.abs(v - periodic.at(t)[:K]).max(axis=0)
+    limit = max(LEAVES, NOISY * float(periodic.rest[:K].max()))
+    left = off > limit
+    left &= np.r_[left[1:], False] | np.r_[left[2:], False, False]
+    left[: np.count_nonzero(before) // 2] = False
+    return int(np.argmax(left)) if left.any() else int(np.count_nonzero(before))
+
+
+def _slow(
+    v: np.ndarray, i: np.ndarray, turn: np.ndarray, rate: float, frequency: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """|V1|, P + jQ and |V2| (N,) as the mean over the last half cycle shows them: the other sequence turns whole."""
+    n = max(1, round(rate / frequency / 2))
+
+    def mean(y: np.ndarray) -> np.ndarray:
+        total = np.cumsum(np.concatenate([np.full(n, y[:n].mean()), y]))
+        return (total[n:] - total[:-n]) / n
+
+    V, I = mean(v), mean(i)
+    return np.abs(V), V * I.conj(), np.abs(mean(np.conj(v * turn) / turn))
+
+
+def _calm(i: np.ndarray, zero: np.ndarray, turn: np.ndarray, I: complex, part: slice) -> np.ndarray:
+    """What is no fundamental in the currents before the dip, (3, n)."""
+    left = (i - I * turn)[part]
+    return np.stack([left.real, left.imag, zero[part]])
+
+
+def _compared(after: np.ndarray, before: np.ndarray, phases: int) -> np.ndarray:
+    """Which of alpha, beta and zero (3, n) are compared: of one phase the first, of three zero if the dip shows it."""
+    if phases == 1:
+        return np.array([True, False, False])
+    size, vector, calm = _rms(after[2]), _rms(after[:2]), _rms(before[2])
+    return np.array([True, True, size > max(SILENT * vector, LOUDER * calm)])
+
+
+def _rms(x: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(x**2)))

@@ -1,0 +1,52 @@
+"""Sampled waveforms of one load, as a fault recorder took them: what the phasors of a record were measured from."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Waves:
+    """Voltages [kV, phase to ground; of a single-phase load its own] and as many currents [kA], into the load.
+
+    `samples` (2 K, M), K three or one, begins at `start` [s] of the record's time; an array, or what is read when it is
+    sliced like one. `late` (2 K,) [s] is how much later than stamped each channel is sampled. `estimator` names what
+    phasors were measured by, so that those of calculated waveforms compare with them.
+    """
+
+    samples: Any
+    start: float
+    rate: float  # samples per second
+    estimator: Any = None
+    late: np.ndarray | None = None
+
+    @property
+    def phases(self) -> int:
+        """Three or one."""
+        return self.samples.shape[0] // 2
+
+    @property
+    def end(self) -> float:
+        """Time of the last sample [s]."""
+        return self.start + (self.samples.shape[1] - 1) / self.rate
+
+    def between(self, first: float, last: float) -> "Waves":
+        """The samples from time `first` to `last` [s], as an array."""
+        a = max(0, int(np.ceil((first - self.start) * self.rate - 1e-6)))
+        b = min(self.samples.shape[1], int(np.floor((last - self.start) * self.rate + 1e-6)) + 1)
+        return replace(self, samples=np.asarray(self.samples[:, a:b]), start=self.start + a / self.rate)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain data."""
+        late = None if self.late is None else self.late.tolist()
+        told = {"start": self.start, "rate": self.rate, "estimator": self.estimator, "late": late}
+        return {"samples": np.asarray(self.samples[:, :]), **told}
+
+    @classmethod
+    def of(cls, content: Mapping[str, Any]) -> "Waves":
+        """What `to_dict` told."""
+        late = content["late"] if content["late"] is None else np.array(content["late"])
+        samples = np.array(content["samples"], dtype=float)
+        return cls(samples, content["start"], content["rate"], content["estimator"], late)
