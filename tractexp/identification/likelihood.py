@@ -13,7 +13,7 @@ from tractexp.identification.descent import Apart
 from tractexp.identification.problem import Problem
 from tractexp.noise.color import SMALLEST, fit_autoregression, stretches
 from tractexp.noise.model import Noise, Pair
-from tractexp.record import Event
+from tractexp.record import Event, WaveEvent
 
 POWER_RANGE = 0.2  # of the apparent power before the event: how far P0 and Q0 may move
 QUIET_ORDER = 4  # of an autoregression of the few samples before a dip
@@ -24,7 +24,8 @@ def before_the_event(event: Event) -> Pair:
     """Level and color of each channel's noise before the dip: what is known of it before anything is fitted."""
     pair = []
     for quiet, level in zip(event.calm, event.levels, strict=True):
-        made = fit_autoregression(stretches(quiet, np.isfinite(quiet)), QUIET_ORDER)
+        order = 0 if isinstance(event, WaveEvent) else QUIET_ORDER  # harmonics are no colored noise
+        made = fit_autoregression(stretches(quiet, np.isfinite(quiet)), order)
         pair.append(made.scaled(max(level, SMALLEST) / made.deviation[0]))
     return tuple(pair)
 

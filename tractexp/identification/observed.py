@@ -20,7 +20,7 @@ from tractexp.noise.wander import LESS, WITHIN, Rest, Wander, find, power_profil
 from tractexp.record import Event
 
 OFFSET = 0.005  # pu: what may be left of a channel's offset, which the mean before the dip took off
-HIGHEST_OF_WAVES = 24  # order of the autoregressions: harmonics are sharp
+HIGHEST_OF_WAVES = 0  # order of the autoregressions: a load of harmonics is no colored noise
 LEAST_KEPT = 0.2  # of a residual's variance: where the fit takes more, it tells nothing of the noise
 # Twice the log-likelihood from which a load is said to wander. An investigation asks for less: a wandering that is not
 # there costs it little, and an estimate a third of its precision.
