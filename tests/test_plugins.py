@@ -150,7 +150,7 @@ def test_the_documentation_tells_every_word_of_the_equations_and_every_site():
     framework = {
         "parameters", "definitions", "steps", "known_before", "shown", "states", "memories", "requirements", "edits",
         "latex_names", "write", "declare", "close", "at_rest", "expand", "real_states", "real_balances", "parts",
-        "real", "latex",
+        "real", "latex", "outputs",
     }  # fmt: skip
     assert told == {w for w in (*dir(Equations), *vars(Equations())) if not w.startswith("_")} - framework
     for site in SITES.values():

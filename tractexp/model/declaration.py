@@ -57,9 +57,10 @@ def motor_alone(motor: Motor) -> Equations:
 def _motor(eq: Equations, motor: Motor) -> None:
     """The motor draws V conj(I)."""
     eq.write("motor")
+    there = len(eq.definitions)
     current = motor.declare(eq, **eq.declare(motor.parameters))
     if current is None:
-        if eq.states or eq.definitions:
+        if eq.states or len(eq.definitions) > there:
             raise UserError(f"declare() of the motor '{motor.name}' returns nothing; it must return the stator current")
         return
     V = eq.V

@@ -29,6 +29,7 @@ coupling = Site("coupling", "c", "real", "1", "motor", "(X - X')/X, the rotor's 
 time_constant = Site("time_constant", r"\tau'", "real", "s", "motor", "transient time constant X'/X T0'")
 electrical_torque = Site("electrical_torque", "T_e", "real", "pu", "motor", "torque the field exerts on the rotor")
 load_torque = Site("load_torque", "T_L", "real", "pu", "motor", "torque of what the motor drives")
+bus_voltage = Site("bus_voltage", "v", "phasor", "pu", "bus", "voltage that all parts see, as recorded (waves)")
 motor_current = Site("motor_current", "i_d", "phasor", "pu", "motor", "current that the motors draw (waves)")
 P_motor = Site("P_motor", "P_d", "real", "pu", "motor", "active power of the motor")
 Q_motor = Site("Q_motor", "Q_d", "real", "pu", "motor", "reactive power of the motor")
