@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tractexp.identification.result import excitation
+from tractexp.identification.problem import excitation
 from tractexp.model.drive import Drive
 from tractexp.noise import Noise
 from tractexp.noise.color import FEWEST, SMALLEST

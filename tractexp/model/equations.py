@@ -98,7 +98,7 @@ class Equations:
         self.v, self.v_rate, self.turn = self.U, self.U_rate, sympy.Integer(1)
         if self.waves:
             self.v, self.v_rate, self.turn = v_d + I * v_q, v_d_rate + I * v_q_rate, turn_re + I * turn_im
-            self.recorded_voltage = self.v
+        self.recorded_voltage = self.v
         self.U0, self.omega_s0, self.U20, self.omega_n, self.step = map(_real, EVENT)
         self.P0, self.Q0 = _real("P0"), _real("Q0")
         self.P_s0, self.Q_s0 = _real("P_s0"), _real("Q_s0")
