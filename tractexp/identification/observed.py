@@ -99,7 +99,7 @@ class Observed:
         Of waveforms, whose voltage stands as recorded, the offsets (k, 3, N) that the current's channels may have.
         """
         if self.problem.model.waves:
-            return self._offsets()
+            return offsets(self.drive)
         most = max(len(s.errors) for s in self.smoothed)
         if not most:
             return None
@@ -109,16 +109,6 @@ class Observed:
         power = np.concatenate(parts)
         return np.nan_to_num(power[1:] - power[0])
 
-    def _offsets(self) -> np.ndarray:
-        """A constant in each compared current of each event, of one standard deviation."""
-        drive, shapes = self.drive, []
-        for e in range(drive.events):
-            for c in range(drive.channels):
-                if drive.weights[c, drive.part(e)].any():
-                    shapes.append(np.zeros(drive.measured.shape))
-                    shapes[-1][c, drive.part(e)] = OFFSET
-        return np.array(shapes)
-
     def _driven(self, values: np.ndarray, shapes: Sequence[int | None]) -> np.ndarray:
         """Power (shapes, 2, N) under the smoothed voltages, each with one of its errors; all in one simulation."""
         problem, count = self.problem, len(shapes)
@@ -127,3 +117,14 @@ class Observed:
         own = np.tile(problem.by_event(values), (count, 1, 1))
         response = problem.model.simulate(drive, own, np.tile(problem.step.substeps, count))
         return response.outputs[:, 0].reshape(drive.channels, count, -1).swapaxes(0, 1)
+
+
+def offsets(drive: Drive) -> np.ndarray:
+    """A constant in each compared current of each event, of one standard deviation, (k, 3, N) [pu]."""
+    shapes = []
+    for e in range(drive.events):
+        for c in range(drive.channels):
+            if drive.weights[c, drive.part(e)].any():
+                shapes.append(np.zeros(drive.measured.shape))
+                shapes[-1][c, drive.part(e)] = OFFSET
+    return np.array(shapes)
