@@ -252,11 +252,11 @@ def investigate(
     """Find what a load model lacks: where it disagrees with the records, which effect explains that, and how sure.
 
     `records` are events of `tractexp.read`, or what it reads; all are fitted together. What is found is judged on those
-    of `validate`. `model` is the base model, as in `tractexp.identify`, with `bounds`, `fixed`, `substeps` and `domain`:
-    with `domain="waves"` the sampled currents are investigated. Only `effects` are tested, by default all there are. `false_alarms` (0.001 to 0.5) is the probability of naming
-    anything where nothing is missing; `criteria` {name: value} are the other thresholds of the decisions, listed in
-    `tractexp.discrepancy.criteria`. The same `seed` gives the same bits. `progress`: None shows the stage, False does
-    not; a callable is told each stage.
+    of `validate`. `model` is the base model, as in `tractexp.identify`, with `bounds`, `fixed`, `substeps` and
+    `domain`: with "waves" the sampled currents are investigated. Only `effects` are tested, by default all there are.
+    `false_alarms` (0.001 to 0.5) is the probability of naming anything where nothing is missing; `criteria`
+    {name: value} are the other thresholds of the decisions, listed in `tractexp.discrepancy.criteria`. The same `seed`
+    gives the same bits. `progress`: None shows the stage, False does not; a callable is told each stage.
 
     Nothing is searched, so that there is no objective, optimizer or budget. Raises `UserError` for wrong names or
     values, for events that do not belong together, and for a model with `per_event`: the events share its parameters.

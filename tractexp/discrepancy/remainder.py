@@ -13,12 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tractexp.identification.problem import excited
 from tractexp.identification.observed import HIGHEST_OF_WAVES
+from tractexp.identification.problem import excited
 from tractexp.model.drive import Drive
-from tractexp.noise import Noise
+from tractexp.noise import Noise, quiet
 from tractexp.noise.color import FEWEST, SMALLEST
-from tractexp.noise import quiet
 from tractexp.record import Event, WaveEvent
 
 MOST = 4  # shapes that are told
