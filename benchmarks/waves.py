@@ -144,11 +144,16 @@ def summary(part: str, rows: list[dict]) -> dict:
     median = lambda key: {n: float(np.median([abs(r[key][n]) for r in good])) for n in NAMES}  # noqa: E731
     if part == "coverage":
         fine = [r for r in good if r["grade"] == "adequate"]
-        told |= {"adequate": len(fine), "others": [(r["seed"], r["grade"], r["p"], r["loudest"]) for r in good if r not in fine]}
+        told |= {
+            "adequate": len(fine),
+            "others": [(r["seed"], r["grade"], r["p"], r["loudest"]) for r in good if r not in fine],
+        }
         told["coverage"] = {n: float(np.mean([r["inside"][n] for r in good])) for n in NAMES}
         told["coverage_of_all"] = float(np.mean([list(r["inside"].values()) for r in good]))
         told["coverage_where_adequate"] = float(np.mean([list(r["inside"].values()) for r in fine]))
-        told["rms_z"] = {n: float(np.sqrt(np.mean([r["z"][n] ** 2 for r in good if r["z"][n] is not None]))) for n in NAMES}
+        told["rms_z"] = {
+            n: float(np.sqrt(np.mean([r["z"][n] ** 2 for r in good if r["z"][n] is not None]))) for n in NAMES
+        }
         told |= {"median_error": median("off"), "median_half_width": median("wide")}
         told["by_kind"] = {
             k: float(np.mean([list(r["inside"].values()) for r in good if r["kind"] == k])) for k in waves.KINDS

@@ -57,8 +57,11 @@ class Noise:
 
     @functools.cached_property
     def loudest_blur(self) -> float:
-        """The largest variance that noise of the voltage causes at any sample, over that of the power."""
-        return 0.0 if self.blur is None else float((self._mixed(self.blur) ** 2).sum(axis=0).max())
+        """The largest variance that noise of the voltage causes at any sample, over that of the power.
+
+        Of currents the shapes are offsets, which come from no voltage.
+        """
+        return 0.0 if self.blur is None or self.channels > 2 else float((self._mixed(self.blur) ** 2).sum(axis=0).max())
 
     def scaled(self, factor: float) -> "Noise":
         """The same noise, `factor` times as loud."""
@@ -76,8 +79,7 @@ class Noise:
     def whiten(self, residuals: np.ndarray, drive: Drive, known: np.ndarray) -> np.ndarray:
         """(n, C, N) to rows (n, C N) of independent unit variance; samples that are not `known` (C, N) are 0."""
         if self.mix is not None:
-            measured = known.any(axis=1)
-            known = known[measured].all(axis=0) & measured[:, None]
+            known = self._together(known, drive)
         rows = np.empty_like(residuals)
         with np.errstate(over="ignore", invalid="ignore"):  # what diverges has a deviance that is not finite
             mixed = self._mixed(residuals)
@@ -86,6 +88,16 @@ class Noise:
                 white = self._fast(mixed[:, :, part], known[:, part], e)
                 rows[:, :, part] = self._without_shapes(white, known[:, part], part, e)
         return rows.reshape(len(rows), -1)
+
+    def _together(self, known: np.ndarray, drive: Drive) -> np.ndarray:
+        """Samples (C, N) that count where channels are mixed: those at which all count that are measured.
+
+        The mixing of currents is triangular, so that an event without the last, of zero sequence, has the others.
+        """
+        if self.channels > 2 and drive.events > 1:
+            parts = [known[:, drive.part(e)] for e in range(drive.events)]
+            return np.concatenate([_all_measured(part) for part in parts], axis=1)
+        return _all_measured(known)
 
     def draw(self, rng: np.random.Generator, count: int, lengths: Sequence[int]) -> np.ndarray:
         """Noise of events of these lengths end to end, (count, C, N) [pu]."""
@@ -210,6 +222,12 @@ class Noise:
             colored.append(channel.recurring(shocks)[:, BURN_IN:])
         shapes = self._shapes(part)
         return np.stack(colored, axis=1) + np.einsum("bk,kct->bct", rng.standard_normal((count, len(shapes))), shapes)
+
+
+def _all_measured(known: np.ndarray) -> np.ndarray:
+    """Samples (C, n) at which every channel counts that counts at all."""
+    measured = known.any(axis=1)
+    return known[measured].all(axis=0) & measured[:, None]
 
 
 def _shrunk(channels: tuple[int, ...], shapes: np.ndarray) -> Shrunk:
