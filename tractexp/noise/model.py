@@ -35,6 +35,7 @@ class Noise:
     shocks: tuple[np.ndarray, ...] | None = None  # of unit variance, as they were seen; None: normal
     wander: Wander | None = None  # of the mixed channels
     blur: np.ndarray | None = None  # (k, C, N) pu: what errors of the voltage do, each of one standard deviation
+    vector: bool = False  # the first two channels are a space vector, whose autoregression is complex
     _shrunk: dict[int, "list[Shrunk]"] = field(default_factory=dict, init=False)
 
     @classmethod
@@ -108,7 +109,7 @@ class Noise:
     def worth(self, samples: int) -> float:
         """How many independent samples tell as much of the slowest of this noise, by the color's gain at rest."""
         channels = [channel for pair in self.pairs for channel in pair]
-        gains = [1 / max(1 - float(a.coefficients[-1].sum()), 1e-3) for a in channels]
+        gains = [1 / max(float(abs(1 - a.coefficients[-1].sum())), 1e-3) for a in channels]
         spreads = [a.deviation[0] / a.deviation[-1] for a in channels]
         return samples / max(1.0, *((g / s) ** 2 for g, s in zip(gains, spreads, strict=True)))
 
@@ -162,7 +163,11 @@ class Noise:
 
     def _fast(self, mixed: np.ndarray, known: np.ndarray, event: int) -> np.ndarray:
         """Mixed channels (n, C, samples) of one event without the color of the fast noise."""
-        rows = [channel.whiten(mixed[:, c], known[c]) for c, channel in enumerate(self.pair(event))]
+        pair, rows = self.pair(event), []
+        if self.vector:
+            white = pair[0].whiten(mixed[:, 0] + 1j * mixed[:, 1], known[0])
+            rows = [white.real, white.imag]
+        rows += [channel.whiten(mixed[:, c], known[c]) for c, channel in enumerate(pair) if c >= len(rows)]
         return np.stack(rows, axis=1)
 
     def _without_shapes(self, white: np.ndarray, known: np.ndarray, part: slice, event: int) -> np.ndarray:
@@ -205,9 +210,13 @@ class Noise:
 
     def _drawn(self, rng: np.random.Generator, count: int, part: slice, event: int) -> np.ndarray:
         """Mixed channels (count, C, samples) of one event."""
-        colored = []
+        colored, pair = [], self.pair(event)
         size = (count, part.stop - part.start + BURN_IN)
-        for c, channel in enumerate(self.pair(event)):
+        if self.vector:
+            shocks = rng.standard_normal((2, *size)) * pair[0].deviation[-1]
+            turning = pair[0].recurring(shocks[0] + 1j * shocks[1])[:, BURN_IN:]
+            colored = [turning.real, turning.imag]
+        for c, channel in list(enumerate(pair))[len(colored) :]:
             shocks = rng.standard_normal(size) if self.shocks is None else rng.choice(self.shocks[c], size)
             shocks *= channel.deviation[-1]
             colored.append(channel.recurring(shocks)[:, BURN_IN:])
