@@ -25,6 +25,7 @@ from tractexp.parameter import Parameter
 LONG = 300  # nodes of an expression
 LONG_AGO = -(10**6)  # s: the time at which a load rests before the event
 NOTHING = sympy.Integer(0)
+LOWEST = sympy.Rational(1, 20)  # of the voltage before the event: below it what draws a power is an admittance
 DAMPING = sympy.Rational(1, 20)  # resistance over reactance of a reactive load of which nothing else is said
 OWN = "motor"  # who writes the states that are pushed, and the speed that effects ask for
 
@@ -368,7 +369,8 @@ class Equations:
 
         Of waves it is the current of a conductance beside a branch of resistance over reactance `damping`, which draw
         these powers at the sizes of the voltage that `U` shows: admittances that vary slowly. A power that changes
-        within a cycle does so as fast as `U` follows.
+        within a cycle does so as fast as `U` follows. Below a twentieth of the voltage before the event admittances
+        grow no further.
         """
         P, Q = sympy.sympify(P), sympy.sympify(Q)
         if not self.waves:
@@ -377,7 +379,8 @@ class Equations:
             return
         speed = 1 + self.omega_s / self.omega_n
         G, B = P - Q * damping / speed, Q * (speed**2 + damping**2) / speed
-        self.draw((G * self.v + (B * self._flux_of(damping) if Q != 0 else 0)) / self.U**2)
+        current = G * self.v + (B * self._flux_of(damping) if Q != 0 else 0)
+        self.draw(current / sympy.Max(self.U, LOWEST * self.U0) ** 2)
 
     def draw(self, current: sympy.Expr, zero: sympy.Expr = NOTHING) -> None:
         """Add a current drawn at the bus [pu] and, of waves, one of zero sequence."""
@@ -408,7 +411,8 @@ class Equations:
 
     def capacitor(self, susceptance: sympy.Expr) -> sympy.Expr:
         """The current [pu] of a capacitor at the bus, b (dv/dt/omega_n + j (1 + omega_s/omega_n) v)."""
-        return susceptance * (self.v_rate * self.waves / self.omega_n + I * (1 + self.omega_s / self.omega_n) * self.v)
+        rate = self.v_rate / self.omega_n if self.waves else NOTHING
+        return susceptance * (rate + I * (1 + self.omega_s / self.omega_n) * self.v)
 
     def _flux_of(self, damping: sympy.Expr) -> Symbol:
         """The flux linkage of a branch at the bus, of one reactance and so much resistance."""
