@@ -1,7 +1,7 @@
 """The noise of one bench, estimated from what its fits leave where little happens.
 
-Of waveforms it has the color that the model gives the voltage's own noise, does not wander within so short a record,
-and has the offsets that the channels may have kept.
+Of waveforms it is white but for what noise of the voltage causes (`tractexp.noise.waves`), does not wander within so
+short a record, and has the offsets that the channels may have kept.
 """
 
 import functools
@@ -11,8 +11,8 @@ import numpy as np
 
 from tractexp.discrepancy.bench import Bench
 from tractexp.identification.likelihood import Likelihood
+from tractexp.identification.observed import answers, offsets
 from tractexp.identification.problem import Problem
-from tractexp.identification.wave_errors import answers, offsets
 from tractexp.noise import Noise
 from tractexp.noise.quiet import estimate
 from tractexp.noise.wander import Rest, Wander, find
@@ -26,14 +26,15 @@ class QuietNoise:
 
     bench: Bench
     blur: np.ndarray | None  # of the voltage's noise, None where it has none; of waveforms, of the currents' offsets
-    heard: tuple[np.ndarray, np.ndarray] | None = None  # of waveforms, currents that noise of the voltage causes
+    answers: tuple[np.ndarray, np.ndarray] | None = None  # of waveforms, to a wrong sample of the voltage
 
     @classmethod
     def at(cls, bench: Bench, unit: np.ndarray) -> "QuietNoise":
         """Where errors of the voltage act as they do on the base model at coordinates (D,)."""
         if bench.waves:
-            base, at = bench.kernels.bare, bench.coordinates
-            return cls(bench, offsets(bench.drive), answers(base, base.space.from_unit(unit[at.base])))
+            bare = Likelihood.of(bench.kernels.bare)
+            own = np.r_[unit[bench.coordinates.base], unit[bench.coordinates.before]]
+            return cls(bench, offsets(bench.drive), answers(bench.kernels.bare, bare.values(own)))
         most = bench.records.voltage_errors
         if not most:
             return cls(bench, None)
@@ -51,8 +52,9 @@ class QuietNoise:
         What a fit leaves (C, N), and columns of all that could explain it (k, C, N), tell more of how the load wanders.
         """
         bench = self.bench
-        if self.heard is not None:
-            return of_waves(residual, bench.known, bench.quiet, self.heard, bench.events[0].phases, self.blur)
+        if self.answers is not None:
+            phases = bench.records.phases
+            return of_waves(residual, bench.known, bench.quiet, self.answers, phases, self.blur)
         wander = functools.partial(self._wander, left, columns)
         return estimate(residual, bench.known, bench.quiet, wander, self.blur)
 

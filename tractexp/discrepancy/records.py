@@ -42,6 +42,12 @@ class Records:
         """How many shapes of error the voltage of some event may still have."""
         return max(len(s.errors) for s in self.smoothed)
 
+    @property
+    def phases(self) -> int:
+        """How many currents were sampled; none of phasors."""
+        first = self.recorded[0]
+        return first.phases if isinstance(first, WaveEvent) else 0
+
     def off_by(self, shape: int) -> list[Event]:
         """The events with one of the errors of their voltage each."""
         return [s.off_by(shape) for s in self.smoothed]

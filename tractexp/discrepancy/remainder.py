@@ -15,8 +15,9 @@ import numpy as np
 
 from tractexp.identification.problem import excited
 from tractexp.model.drive import Drive
-from tractexp.noise import Noise, quiet
+from tractexp.noise import Noise
 from tractexp.noise.color import FEWEST, SMALLEST
+from tractexp.noise.quiet import estimate
 from tractexp.record import Event, WaveEvent
 
 MOST = 4  # shapes that are told
@@ -121,13 +122,12 @@ class _Stretch:
     def of(cls, event: Event, residual: np.ndarray, noise: Noise, blur: np.ndarray | None) -> "_Stretch":
         """The color of the noise is that before the dip, where that tells it: what is left would color its own.
 
-        Of waveforms it is the voltage's, which the model tells.
+        Of waveforms it stays what it is, for what is left cannot color that.
         """
         drive = Drive.of([excited(event)])
-        known, before = drive.weights > 0, slice(event.first, event.start)
+        known, before = drive.weights > 0, slice(0, event.start)
         if not isinstance(event, WaveEvent) and np.count_nonzero(known.all(axis=0)[before]) >= FEWEST:
-            whole = slice(0, before.stop - before.start)
-            noise = quiet.estimate(_level(residual[:, before]), known[:, before], [whole])
+            noise = estimate(_level(residual[:, before]), known[:, before], [before])
         return cls(event, residual, replace(noise, wander=None, blur=blur), drive)
 
     @property

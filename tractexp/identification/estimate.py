@@ -21,7 +21,6 @@ from tractexp.identification.problem import Problem
 from tractexp.identification.uncertainty import Uncertainty, conclude, threshold
 from tractexp.identification.valleys import along_least_known, distinct, explored
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, WITHIN, Verdict, size
-from tractexp.identification.wave_errors import answers
 from tractexp.noise.color import FEWEST, fit_autoregression, stretches, white_noise
 from tractexp.noise.model import Noise, Pair
 
@@ -186,8 +185,8 @@ def noise_at(
     measured = likelihood.problem.drive.measured
     rows, J = replace(likelihood, noise=Noise.white(*[1.0] * len(measured))).jacobian(unit)
     residual, columns = rows.reshape(measured.shape), J.T.reshape(-1, *measured.shape)
-    heard = answers(observed.problem, likelihood.values(unit)) if observed.problem.model.waves else None
-    seen = observed.noise(residual, likelihood.known, columns, blur, whole, heard)
+    answers = observed.answers(likelihood.values(unit))
+    seen = observed.noise(residual, likelihood.known, columns, blur, whole, answers)
     return seen or noise_of(likelihood, residual)
 
 

@@ -6,21 +6,23 @@ wanders, and what is left of the voltage's noise, which enters the model and lea
 
 import functools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.identification.problem import Problem, excitation
-from tractexp.identification.wave_errors import offsets
+from tractexp.identification.problem import Problem, excitation, excited
 from tractexp.model.drive import Drive
+from tractexp.noise.color import SMALLEST
 from tractexp.noise.model import Noise
 from tractexp.noise.quiet import estimate, quiet_stretches
 from tractexp.noise.voltage import Smoothed, smoothed
 from tractexp.noise.wander import LESS, WITHIN, Rest, Wander, find, power_profile
 from tractexp.noise.waves import of_waves
-from tractexp.record import Event
+from tractexp.record import Event, WaveEvent
 
+OFFSET = 0.005  # pu: what may be left of a channel's offset, which the mean before the dip took off
+ANSWERED = 8  # samples of the lead after which a single wrong sample of the voltage is put there
 LEAST_KEPT = 0.2  # of a residual's variance: where the fit takes more, it tells nothing of the noise
 # Twice the log-likelihood from which a load is said to wander. An investigation asks for less: a wandering that is not
 # there costs it little, and an estimate a third of its precision.
@@ -73,7 +75,7 @@ class Observed:
         """Noise from what a fit leaves (2, N) in quiet, or of the `whole` records; None where too few samples are.
 
         `columns` (k, 2, N) are what each coordinate could still change; `blur` is that of `blurred`, `answers` that
-        of `wave_errors`.
+        of `answers`.
         """
         apart = np.linalg.qr(columns.reshape(len(columns), -1)[np.any(columns != 0, axis=(1, 2))].T)[0]
         kept = np.maximum(1 - (apart**2).sum(axis=1), LEAST_KEPT).reshape(residuals.shape)  # the fit took the rest
@@ -115,6 +117,10 @@ class Observed:
         power = np.concatenate(parts)
         return np.nan_to_num(power[1:] - power[0])
 
+    def answers(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """`answers` of this problem at free values (d,); None of phasors."""
+        return answers(self.problem, values) if self.problem.model.waves else None
+
     def _driven(self, values: np.ndarray, shapes: Sequence[int | None]) -> np.ndarray:
         """Power (shapes, 2, N) under the smoothed voltages, each with one of its errors; all in one simulation."""
         problem, count = self.problem, len(shapes)
@@ -123,3 +129,46 @@ class Observed:
         own = np.tile(problem.by_event(values), (count, 1, 1))
         response = problem.model.simulate(drive, own, np.tile(problem.step.substeps, count))
         return response.outputs[:, 0].reshape(drive.channels, count, -1).swapaxes(0, 1)
+
+
+def answers(problem: Problem, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What one standard deviation of a sample of the voltage does to the currents at
+    free values (d,), of waveforms.
+
+    (L,) complex of the space vector and (L,) of the zero sequence, in the stationary frame, from shortly before
+    that sample to the dip: what is smooth between samples is changed a little earlier. Of the first event.
+    """
+    event = problem.events[0]
+    noise = max(event.noise_U, SMALLEST)
+    shocks = [(noise, 0.0), (1j * noise, 0.0), (0.0, noise / np.sqrt(2))][: event.phases]  # the zero's is a third
+    events = [event, *(_struck(event, *shock) for shock in shocks)]
+    drive = Drive.of([excited(e, problem.model) for e in events])
+    own = np.tile(problem.by_event(values)[:1], (len(events), 1, 1))
+    response = problem.model.simulate(drive, own, np.tile(problem.step.substeps[:1], len(events)))
+    seen = response.outputs[:, 0].reshape(drive.channels, len(events), -1)[:, :, : event.start]
+    off = np.nan_to_num(seen[:, 1:] - seen[:, :1])
+    if event.phases == 1:
+        return off[0, 0], np.zeros(1)
+    return (off[0, 0] + 1j * off[1, 0] - 1j * (off[0, 1] + 1j * off[1, 1])) / 2, off[2, 2]
+
+
+def offsets(drive: Drive) -> np.ndarray:
+    """A constant in each compared current of each event, of one standard deviation, (k, 3, N) [pu]."""
+    shapes = []
+    for e in range(drive.events):
+        for c in range(drive.channels):
+            if drive.weights[c, drive.part(e)].any():
+                shapes.append(np.zeros(drive.measured.shape))
+                shapes[-1][c, drive.part(e)] = OFFSET
+    return np.array(shapes)
+
+
+def _struck(event: WaveEvent, vector: complex, zero: float) -> WaveEvent:
+    """The event with one sample of the lead's voltage off, in the stationary frame."""
+    v, v_zero = event.v.copy(), event.v_zero.copy()
+    v[ANSWERED] += vector * event.turn[ANSWERED].conj()
+    v_zero[ANSWERED] += zero
+    if event.phases == 1:  # whose imaginary part is what the sample was a quarter of a cycle ago
+        later = ANSWERED + round(event.rate / event.f0 / 4)
+        v[later] += 1j * vector * event.turn[later].conj()
+    return replace(event, v=v, v_zero=v_zero)

@@ -53,7 +53,7 @@ class Noise:
 
     def of(self, event: int) -> "Noise":
         """The noise of one event by itself, without its shapes."""
-        return Noise((self.pair(event),), self.mix)
+        return Noise((self.pair(event),), self.mix, vector=self.vector)
 
     @functools.cached_property
     def loudest_blur(self) -> float:

@@ -67,6 +67,12 @@ class WaveEvent(Event):
         """Which of the three currents are compared."""
         return tuple(bool(np.isfinite(row).any()) for row in self.currents)
 
+    @property
+    def peaks(self) -> tuple[float, float]:
+        """One per unit of a phase's voltage [kV] and current [kA]."""
+        voltage, *_, current = _scale(self.record, self.phases)
+        return float(voltage), float(current)
+
     def of_phases(self, currents: np.ndarray) -> np.ndarray:
         """Currents (3, N), alpha, beta and zero, as those of the phases, (K, N)."""
         return phases_of(currents, self.phases)
