@@ -107,7 +107,12 @@ def investigation() -> dict:
             events[:1], validate=events[1:], model="fifth_order_branch", domain="waves", progress=False
         )  # fmt: skip
         spent.append((time.perf_counter() - clock, time.process_time() - own))
-    return {"verdict": str(found.verdict), "seconds": spent[1][0], "processor_seconds": spent[1][1], "first": spent[0][0]}
+    return {
+        "verdict": str(found.verdict),
+        "seconds": spent[1][0],
+        "processor_seconds": spent[1][1],
+        "first": spent[0][0],
+    }
 
 
 def main() -> None:
