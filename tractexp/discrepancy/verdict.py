@@ -29,7 +29,7 @@ class Nearest:
     rival: Rival
     fitted: float
     held_out: float
-    calculated: np.ndarray  # (2, N) pu, of the fitted events end to end
+    calculated: np.ndarray  # (C, N) pu, of the fitted events end to end
     others: list[tuple[tuple[str, ...], float]]  # the next ones, with their shares on the fitted events
 
     @property

@@ -14,6 +14,7 @@ INPUTS = (
 )  # fmt: skip
 SMOOTH = {name: f"{name}_rate" for name in ("U", "v_d", "v_q", "v_zero")}  # what is a cubic between samples: its slope
 OUTPUTS = {PHASORS: ("P", "Q"), WAVES: ("i_alpha", "i_beta", "i_zero")}  # rows of `Drive.measured`
+IN_WORDS = {"i_alpha": "current alpha", "i_beta": "current beta", "i_zero": "zero-sequence current"}  # as pages say
 EVENT = ("U0", "omega_s0", "U20", "omega_n", "step")  # columns of `Drive.event`
 
 
@@ -160,6 +161,11 @@ class Drive:
     def names(self) -> tuple[str, ...]:
         """What the compared quantities are called."""
         return next(names for names in OUTPUTS.values() if len(names) == len(self.measured))
+
+    @property
+    def spoken(self) -> tuple[str, ...]:
+        """The same as a page says it: P and Q, or which current."""
+        return tuple(IN_WORDS.get(name, name) for name in self.names)
 
     @property
     def channels(self) -> int:

@@ -32,7 +32,15 @@ KIND = {"none": "good", "named": "good", "tied": "plain", "unexplained": "bad"}
 COLORS = {CHOSEN: "#009E73", KEPT: "#E69F00"}
 REFITTED, ESTIMATED = "#0072B2", "#9A9A9A"
 BAR, ROOM = 24, 1.2  # pixels; of the longest bar, for what stands beside the bars
+NOISE_OF_WAVES = (
+    "It is estimated before the dip and at the end of the record, from what the fit leaves there: harmonics that no"
+    " equation explains count as noise. Beside it each current may keep a small offset."
+)
 MOST_SETS = 12  # that are compared in a table
+CURRENTS = (
+    ", as the record's estimator sees them in calculated and recorded currents. epsilon_i: what the currents of all"
+    " phases miss in the 0.15 s after the dip begins, rms, over their rms before it"
+)
 
 
 def page(path: Path, found: Investigation, title: str) -> Path:
@@ -73,9 +81,12 @@ def _smaller(made: Page, found: Investigation) -> None:
         stages = [("base model", gap.before), ("extended model", gap.after)]
         for stage, c in stages if found.names else stages[:1]:
             closed = f"{gap.closed:.0%}" if c is gap.after and np.isfinite(gap.closed) else ""
-            rows.append([label, stage, f"{c.epsilon_p:.3%}", f"{c.epsilon_q:.3%}", f"{c.chi2_per_sample:.3f}", closed])
-    columns = ["events", "model", "epsilon_p", "epsilon_q", "chi2 per sample"]
-    caption = "epsilon: relative error of P and Q, Eq. (20). chi2 per sample: 1 where only noise is left."
+            errors = [f"{e:.3%}" for e in (c.epsilon_p, c.epsilon_q, c.epsilon_i) if e is not None]
+            rows.append([label, stage, *errors, f"{c.chi2_per_sample:.3f}", closed])
+    waves = found.bench.waves
+    columns = ["events", "model", "epsilon_p", "epsilon_q", *["epsilon_i"] * waves, "chi2 per sample"]
+    caption = f"epsilon: relative error of P and Q, Eq. (20){CURRENTS * waves}."
+    caption += " chi2 per sample: 1 where only noise is left."
     if found.names:
         columns.append("gap closed")
         caption += " Gap closed: the share of what an explanation could gain at all."
@@ -312,8 +323,13 @@ def _disagreement(made: Page, found: Investigation) -> None:
 
 
 def _noise(made: Page, found: Investigation) -> None:
+    level, free = found.bench.describe(found.last.noise), joined(found.catalogue.of_measurement)
+    if found.bench.waves:
+        faults = f" Faults of the measurement ({free}) are free in every fit, each held by what is likely." * bool(free)
+        made.heading("Noise").text(f"{level}. {NOISE_OF_WAVES}{faults}")
+        return
     made.heading("Noise").text(
-        f"{found.last.noise.describe()}. It is estimated where nothing happens, from what the fit leaves there, and"
+        f"{level}. It is estimated where nothing happens, from what the fit leaves there, and"
         " so contains what smoothing leaves of the voltage's noise. Time skew, measurement window and load drift are"
         " free in every fit, each held by what is physically likely."
     )
