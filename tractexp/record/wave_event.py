@@ -53,6 +53,11 @@ class WaveEvent(Event):
         return self.lead
 
     @property
+    def channels(self) -> tuple[str, ...]:
+        """With I0 where the currents' zero sequence is compared."""
+        return (*super().channels, *(("I0",) if self.known[2] else ()))
+
+    @property
     def levels(self) -> tuple[float, ...]:
         """Standard deviation of all that no fundamental explains before the dip, of each current [pu]."""
         return tuple(max(float(np.sqrt(np.mean(row**2))), 1e-9) for row in self.unexplained)
