@@ -139,7 +139,9 @@ def test_a_feeder_and_a_capacitor_ring_at_their_resonance():
         array[:] = values
     drive = Drive.of([still])
     seen, _ = run("feeder_impedance", "shunt_capacitor", X_f=0.12, capacitor=1.0, drive=drive)
-    ringing = (seen * still.turn)[620:1100] - (run("shunt_capacitor", capacitor=1.0, drive=drive)[0] * still.turn)[620:1100]
+    ringing = (seen * still.turn)[620:1100] - (run("shunt_capacitor", capacitor=1.0, drive=drive)[0] * still.turn)[
+        620:1100
+    ]
     spectrum = np.abs(np.fft.fft(ringing * np.hanning(480), 1 << 16))
     f = np.fft.fftfreq(1 << 16, 1 / 12800.0)
     high = np.abs(f) > 90

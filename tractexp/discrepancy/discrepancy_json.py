@@ -81,10 +81,13 @@ def _nearest(investigation: Investigation) -> dict[str, Any] | None:
     assert near.rival.tests is not None
     unit, own = near.rival.fit.unit, own_parameters(investigation.bench, near.names)
     known = {e.parameter.name: e for e in estimates(near.rival.tests, unit, near.names)}
+    on = {"train": near.curves, "validate": near.carried} if investigation.bench.waves else {}
+    told = {role: both and {"before": _curves(both[0]), "after": _curves(both[1])} for role, both in on.items()}
     return {
         "effects": list(near.names),
         "explained": _number(near.fitted),
         "explained_held_out": _number(near.held_out),
+        **({"gap": told} if told else {}),
         "others": [{"effects": list(names), "explained": _number(share)} for names, share in near.others],
         "parameters": {name: _estimate(known[name]) for name in own},
     }

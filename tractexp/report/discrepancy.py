@@ -17,12 +17,13 @@ from tractexp.discrepancy.evidence import (
     evidence,
     why_not_the_most_helpful,
 )
+from tractexp.discrepancy.gap import Curves
 from tractexp.discrepancy.investigate import Investigation
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import Estimate, estimates
 from tractexp.discrepancy.recommended import adequacy, held
 from tractexp.discrepancy.remainder import Remainder
-from tractexp.discrepancy.verdict import UNEXPLAINED
+from tractexp.discrepancy.verdict import UNEXPLAINED, Nearest
 from tractexp.report.chart import Chart
 from tractexp.report.overlay import overlaid
 from tractexp.report.page import Page
@@ -74,16 +75,15 @@ def _graded(found: Investigation) -> str:
 
 def _smaller(made: Page, found: Investigation) -> None:
     made.heading("How large the gap is" if not found.names else "How much smaller the gap is")
-    rows = []
-    for label, gap in (("fitted", found.train), ("held out", found.validate)):
+    waves, near = found.bench.waves, found.verdict.nearest
+    rows = _with_nearest(near) if waves and near else []
+    for label, gap in () if rows else (("fitted", found.train), ("held out", found.validate)):
         if gap is None:
             continue
         stages = [("base model", gap.before), ("extended model", gap.after)]
         for stage, c in stages if found.names else stages[:1]:
             closed = f"{gap.closed:.0%}" if c is gap.after and np.isfinite(gap.closed) else ""
-            errors = [f"{e:.3%}" for e in (c.epsilon_p, c.epsilon_q, c.epsilon_i) if e is not None]
-            rows.append([label, stage, *errors, f"{c.chi2_per_sample:.3f}", closed])
-    waves = found.bench.waves
+            rows.append([label, stage, *_off(c), closed])
     columns = ["events", "model", "epsilon_p", "epsilon_q", *["epsilon_i"] * waves, "chi2 per sample"]
     caption = f"epsilon: relative error of P and Q, Eq. (20){CURRENTS * waves}."
     caption += " chi2 per sample: 1 where only noise is left."
@@ -93,6 +93,19 @@ def _smaller(made: Page, found: Investigation) -> None:
     made.table(columns, [row[: len(columns)] for row in rows], caption, words=(1,))
     if found.fitted_to_both:
         made.text("The extended model was fitted to the held-out events, too: what they say of it is no test of it.")
+
+
+def _with_nearest(near: Nearest) -> list[list[str]]:
+    """The base model's gap and that of the candidates which come nearest."""
+    told = (("fitted", near.curves), ("held out", near.carried))
+    stages = ("base model", "nearest candidates")
+    return [[label, stage, *_off(c), ""] for label, both in told if both for stage, c in zip(stages, both, strict=True)]
+
+
+def _off(c: Curves) -> list[str]:
+    """How far off curves are, as a table tells it."""
+    errors = [f"{e:.3%}" for e in (c.epsilon_p, c.epsilon_q, c.epsilon_i) if e is not None]
+    return [*errors, f"{c.chi2_per_sample:.3f}"]
 
 
 def _left(made: Page, found: Investigation) -> None:

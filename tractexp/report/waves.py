@@ -7,19 +7,17 @@ import numpy as np
 
 from tractexp.identification.problem import Problem
 from tractexp.identification.result import AFTER, Fit
-from tractexp.model.drive import IN_WORDS, OUTPUTS, WAVES
 from tractexp.record import WaveEvent
 from tractexp.report import style
 from tractexp.report.chart import Chart
 from tractexp.report.events import FOUND, WITHIN
 
 PHASES = ("a", "b", "c")
-COLORS = ("#E69F00", "#009E73", "#D55E00")  # of phases a, b, c
+COLORS = ("#E69F00", "#009E73", "#56B4E9")  # of phases a, b, c: none of them is a model's
 CYCLES = 2.0  # shown at first before and after the dip
 HARMONICS = (1, 3, 5, 7, 9, 11, 13, 17, 19, 23, 25)
 FASTEST = 1300.0  # Hz: what a spectrum shows
 KILO = 1.0  # kA of a peak from which an axis is in kA
-SMALL_PART = 1e-9
 TOLD = 4  # events of which it is told how they were prepared
 SPECTRUM = (
     "Amplitudes of measured less calculated currents, in percent of the fundamental before the dip, over whole cycles"
@@ -60,8 +58,8 @@ def wave_chart(
     """Voltages, then each phase's current as recorded and as calculated, and what the curves leave of it.
 
     The dip is in view at first. Voltages are in kV, currents in A or kA. `deviation` (3, N) of the noise [pu] draws a
-    band around the currents `around` (3, N) and about zero; `places` have `channel` (as `Drive.spoken`), `start` and
-    `end` [s]: where more than chance is left.
+    band around the currents `around` (3, N) and about zero; `places` have `start` and `end` [s]: where more than chance
+    is left of some current.
     """
     (kV, kA), kept = event.peaks, slice(event.lead, None)
     names = PHASES[: event.phases] if event.phases > 1 else ("",)
@@ -75,7 +73,8 @@ def wave_chart(
         made.samples(f"phase {name}" if name else "voltage", start, step, kV * u, color)
     if deviation is not None and around is not None:
         _noise_bands(made, event, one * deviation, one * around)
-    _shaded(made, event, places)
+    for first, last in _together(places):
+        made.shade(first, last, FOUND, 1 + event.phases, "more than chance leaves", opacity=0.2)
     for k in range(event.phases):
         made.samples("measured", start, step, one * measured[k], style.MEASURED, 1 + k, width=3)
     for name, currents, color, dash in curves:
@@ -99,13 +98,15 @@ def _noise_bands(made: Chart, event: WaveEvent, deviation: np.ndarray, around: n
     made.band(name, t, -half.max(axis=0), half.max(axis=0), style.FAINT, 1 + event.phases)
 
 
-def _shaded(made: Chart, event: WaveEvent, places: Sequence[Any]) -> None:
-    """The stretches in which something stands out, in every phase that the current concerned has a part of."""
-    parts = np.abs(event.of_phases(np.eye(3))) > SMALL_PART
-    for place in places:
-        channel = [IN_WORDS[name] for name in OUTPUTS[WAVES]].index(place.channel)
-        for panel in [*(1 + np.flatnonzero(parts[:, channel])), 1 + event.phases]:
-            made.shade(place.start, place.end, FOUND, int(panel), "more than chance leaves", opacity=0.2)
+def _together(places: Sequence[Any]) -> list[tuple[float, float]]:
+    """The stretches [s] that places of any channel cover, none of them twice."""
+    covered: list[tuple[float, float]] = []
+    for place in sorted(places, key=lambda p: p.start):
+        if covered and place.start <= covered[-1][1]:
+            covered[-1] = covered[-1][0], max(covered[-1][1], place.end)
+        else:
+            covered.append((place.start, place.end))
+    return covered
 
 
 def _voltage(event: WaveEvent) -> np.ndarray:
