@@ -15,6 +15,7 @@ from sympy import I, Symbol, conjugate, im, re
 
 from tractexp.errors import Unknown, UserError, nearest
 from tractexp.model import sites
+from tractexp.model.apart import Apart
 from tractexp.model.drive import EVENT, INPUTS, OUTPUTS, PHASORS, WAVES
 from tractexp.model.graph import replaced, symbols_of
 from tractexp.model.names import check_name
@@ -293,9 +294,9 @@ class Equations:
         """
         return self._state(_complex(name), latex, "flux")
 
-    def speed(self, latex: str = r"\omega") -> Symbol:
-        """The speed of the motor [electrical rad/s, relative to nominal synchronous]; its name is `omega`."""
-        return self._state(_real("omega"), latex, "speed")
+    def speed(self, latex: str = r"\omega", name: str = "omega") -> Symbol:
+        """The speed of the motor [electrical rad/s, relative to nominal synchronous]."""
+        return self._state(_real(name), latex, "speed")
 
     def lag(self, name: str, latex: str) -> Symbol:
         """Any other real state, such as those that effects add."""
@@ -304,6 +305,10 @@ class Equations:
     def lag_vector(self, name: str, latex: str) -> Symbol:
         """Any other complex state, such as the flux of a branch or the voltage of a capacitor [pu]."""
         return self._state(_complex(name), latex, "lag")
+
+    def apart(self, suffix: str) -> Apart:
+        """These equations as a further machine writes into them: whatever it names ends in this suffix."""
+        return Apart(self, suffix)
 
     def twin(self, state: Symbol, suffix: str) -> Symbol:
         """A state of the same role, as a second machine of the same equations has one."""
