@@ -108,8 +108,9 @@ def run(name: str, seed: int, only: Sequence[str] = ()) -> dict:
     try:
         _, dips = events(name, [SERIES, seed])
         clock = time.perf_counter()
+        chosen = {"effects": [*only]} if only else {}
         found = tractexp.investigate(
-            dips[:1], validate=dips[1:], model=MODEL, domain="waves", progress=False, **({"effects": [*only]} if only else {})
+            dips[:1], validate=dips[1:], model=MODEL, domain="waves", progress=False, **chosen
         )  # fmt: skip
         row |= {"verdict": str(found.verdict), "names": list(found.names)}
         row["gap"] = json.loads(json.dumps(found.gap, default=lambda x: getattr(x, "__dict__", str(x))))

@@ -161,7 +161,7 @@ def test_what_is_recorded_reaches_the_event_through_the_product():
     event = in_waves(events[0])
     fault = case.faults[0]
     assert event.f0 == pytest.approx(fault.frequency, abs=2e-3)
-    assert event.U0 == pytest.approx(fault.voltage, rel=2e-4)
+    assert pytest.approx(fault.voltage, rel=2e-4) == event.U0
     peak = waves.BASE_VOLTAGE * np.sqrt(2 / 3)
     one = np.repeat([peak, 2 * waves.BASE_POWER / (3 * peak)], 3)
     np.testing.assert_allclose(event.offsets / one, case.sampler.offsets, atol=3e-4)
@@ -179,7 +179,7 @@ def test_what_is_hidden_is_named_and_nothing_is_not(hidden, named):
 
 def test_a_record_made_here_is_read_from_comtrade_as_it_is(tmp_path):
     """Written by the product's own writer from a table of samples, read, fitted to the same values."""
-    case, events = waves.drawn_events([1, 3])
+    _, events = waves.drawn_events([1, 3])
     kept = events[0].record.waves
     t = kept.start + np.arange(kept.samples.shape[1]) / kept.rate
     table = tmp_path / "site.csv"
