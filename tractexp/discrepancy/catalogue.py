@@ -97,7 +97,7 @@ def catalogue(
 def missing_channel(effect: Effect, events: Sequence[Event], swing: float) -> str:
     """The sentence why the recorded channels do not show this effect, "" where they do."""
     for channel in effect.reads:
-        if any(getattr(e.record, channel) is None for e in events):
+        if any(channel not in e.channels for e in events):
             return f"it is seen through {channel}, which is not recorded"
         if channel == "f" and all(np.ptp(e.record.f) < swing for e in events):
             return f"it is seen through the frequency, which moves by less than {swing:g} Hz"

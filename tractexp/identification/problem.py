@@ -88,7 +88,7 @@ def _known(name: str, known: Mapping[str, object], where: str) -> None:
 def _check_channels(model: Model, events: Sequence[Event]) -> None:
     """Raise `UserError` where a part of the model reads a channel that an event does not have."""
     for (channel, part), event in itertools.product(model.reads.items(), events):
-        if channel in event.record.channels:
+        if channel in event.channels:
             continue
         if isinstance(part, Effect):
             what, mend = f"effect '{part.name}'", "leave the effect out of model.effects"

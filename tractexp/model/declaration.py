@@ -33,7 +33,7 @@ def declared(
     eq = Equations(domain)
     for what, part in (("motor", motor), ("static load", static)):
         if why := _foreign(eq, part):
-            raise UserError(f"the {what} '{part.name}' does not go with domain={domain}: {why}")
+            raise UserError(f"the {what} '{part.label}' does not go with domain={domain}: {why}")
     try:
         _motor(eq, motor)
         _static(eq, static)

@@ -15,6 +15,7 @@ from sympy import I, Symbol, conjugate, im, re
 
 from tractexp.errors import Unknown, UserError, nearest
 from tractexp.model import sites
+from tractexp.model.apart import Apart
 from tractexp.model.drive import EVENT, INPUTS, OUTPUTS, PHASORS, WAVES
 from tractexp.model.graph import replaced, symbols_of
 from tractexp.model.names import check_name
@@ -125,6 +126,7 @@ class Equations:
         self._drawn: dict[Site, sympy.Expr] = dict.fromkeys(drawn, sympy.Integer(0))
         self._fluxes: dict[sympy.Expr, Symbol] = {}  # of branches at the bus, by resistance over reactance
         self._real_parts: dict[Symbol, sympy.Expr] = {}  # of named quantities, as they stand now
+        self._lost = NOTHING, NOTHING  # power [pu] between the recorded bus and that which all parts see
         self._owners: dict[str, str] = {}  # who declared the parameter, state or quantity of a name
         self._writer = "bus"
         if self.waves:
@@ -292,9 +294,9 @@ class Equations:
         """
         return self._state(_complex(name), latex, "flux")
 
-    def speed(self, latex: str = r"\omega") -> Symbol:
-        """The speed of the motor [electrical rad/s, relative to nominal synchronous]; its name is `omega`."""
-        return self._state(_real("omega"), latex, "speed")
+    def speed(self, latex: str = r"\omega", name: str = "omega") -> Symbol:
+        """The speed of the motor [electrical rad/s, relative to nominal synchronous]."""
+        return self._state(_real(name), latex, "speed")
 
     def lag(self, name: str, latex: str) -> Symbol:
         """Any other real state, such as those that effects add."""
@@ -303,6 +305,10 @@ class Equations:
     def lag_vector(self, name: str, latex: str) -> Symbol:
         """Any other complex state, such as the flux of a branch or the voltage of a capacitor [pu]."""
         return self._state(_complex(name), latex, "lag")
+
+    def apart(self, suffix: str) -> Apart:
+        """These equations as a further machine writes into them: whatever it names ends in this suffix."""
+        return Apart(self, suffix)
 
     def twin(self, state: Symbol, suffix: str) -> Symbol:
         """A state of the same role, as a second machine of the same equations has one."""
@@ -391,6 +397,10 @@ class Equations:
         drawn = self.v * conjugate(current)
         self.consume(re(drawn), im(drawn))
 
+    def lose(self, P: sympy.Expr, Q: sympy.Expr) -> None:
+        """Power lost before the event between the recorded bus and the voltage that all parts see, of waves."""
+        self._lost = self._lost[0] + P, self._lost[1] + Q
+
     def branch(
         self, name: str, latex: str, voltage: sympy.Expr, impedance: sympy.Expr, behind: sympy.Expr = NOTHING
     ) -> sympy.Expr:
@@ -411,8 +421,15 @@ class Equations:
 
     def capacitor(self, susceptance: sympy.Expr) -> sympy.Expr:
         """The current [pu] of a capacitor at the bus, b (dv/dt/omega_n + j (1 + omega_s/omega_n) v)."""
-        rate = self.v_rate / self.omega_n if self.waves else NOTHING
-        return susceptance * (rate + I * (1 + self.omega_s / self.omega_n) * self.v)
+        rate = NOTHING
+        if self.waves:
+            rate = self[sites.bus_voltage_rate] if sites.bus_voltage_rate in self else self._place_rate()
+        return susceptance * (rate / self.omega_n + I * (1 + self.omega_s / self.omega_n) * self.v)
+
+    def _place_rate(self) -> Symbol:
+        """The site of the voltage's slope: where a part reads it, which most do not."""
+        site = sites.bus_voltage_rate
+        return self._define(_complex(site.name), self.v_rate, site.latex)
 
     def _flux_of(self, damping: sympy.Expr) -> Symbol:
         """The flux linkage of a branch at the bus, of one reactance and so much resistance."""
@@ -436,13 +453,20 @@ class Equations:
         self._derive_starts()
         without_static = {self.P_s0: sympy.Integer(0), self.Q_s0: sympy.Integer(0)}
         others = [self.real(self.before(self.expand(power).xreplace(without_static))) for power in (self.P, self.Q)]
-        self.definitions[self.P_s0] = self.P0 - others[0]
-        self.definitions[self.Q_s0] = self.Q0 - others[1]
+        lost = [self.real(self.before(power)) for power in self._lost]
+        share = self._share()
+        self.definitions[self.P_s0] = (self.P0 - others[0] - lost[0]) / share
+        self.definitions[self.Q_s0] = (self.Q0 - others[1] - lost[1]) / share
         self._real_parts.clear()
         for symbol, declared in (self.states | self.memories).items():
             self._check_still(f"the value before the event of '{symbol}'", declared.initial)
         for requirement in self.requirements:
             self._check_still(f"what must hold for a steady state ('{requirement.sentence}')", requirement.slack)
+
+    def _share(self) -> sympy.Expr:
+        """What admittances that stand for a power at U_0 draw of it before the event, where the bus has less."""
+        size = sum(part**2 for part in self.parts(self.before(self.v)))
+        return sympy.Integer(1) if not self.waves or size == self.U0**2 else size / self.U0**2
 
     def _derive_starts(self) -> None:
         """Take the values before the event of states that are written in others' by these."""

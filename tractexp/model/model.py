@@ -77,7 +77,7 @@ class Model:
         self.effects = tuple(sorted(effects, key=lambda e: (e.order, e.name)))  # the same model in whatever order given
         self.measurements = tuple(e for e in self.effects if isinstance(e, Measurement))
         self.recorder: Measurement | None = None
-        load = f"{motor.name} motor and {static.name} static load"
+        load = f"{motor.label} motor and {static.name} static load"
         self.title = " with ".join([load, *(effect.name for effect in self.effects)])
         if integration == PRINTED:
             self.title += ", integrated by Eq. (4) as printed"

@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from tractexp.model.drive import Drive
     from tractexp.model.equations import Equations
 
-CHANNELS = ("f", "U2")  # recorded channels that not every record has
+CHANNELS = ("f", "U2", "I0")  # recorded channels that not every record has; I0 of waveforms, where there is some
 
 
 class Part(Plugin):
     """A part of a load.
 
-    `reads` names the recorded channels (`f`, `U2`) without which its parameters cannot be identified.
+    `reads` names the recorded channels (`f`, `U2`, `I0`) without which its parameters cannot be identified.
     """
 
     reads: ClassVar[tuple[str, ...]] = ()

@@ -1,9 +1,9 @@
 """Noise of sampled currents: white noise of their own, and that of the recorded voltage, as the load passes it on.
 
 A model is driven by the voltage as recorded. What is noise in it makes calculated currents wander about the true ones:
-slowly, since a machine's flux sums the voltage up, and in the sense in which its rotor turns, so that the two components
-of the space vector are one complex series. Its color follows from the model's own response to a single wrong sample of
-the voltage, so that the loudness of the two is all that has to be told from the records.
+slowly, since a machine's flux sums the voltage up, and in the sense in which its rotor turns, so that the two
+components of the space vector are one complex series. Its color follows from the model's own response to a single wrong
+sample of the voltage, so that the loudness of the two is all that has to be told from the records.
 """
 
 from collections.abc import Sequence
