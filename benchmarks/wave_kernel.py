@@ -18,15 +18,15 @@ import numpy as np
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import wave_records as waves  # noqa: E402
-from simulation import excitation  # noqa: E402
+import wave_records as waves
+from simulation import excitation
 
-from tractexp.identification.problem import Problem, excited  # noqa: E402
-from tractexp.identification.search import search  # noqa: E402
-from tractexp.model.drive import Drive  # noqa: E402
-from tractexp.model.model import Model, compose  # noqa: E402
-from tractexp.plugin import get  # noqa: E402
-from tractexp.record import in_waves  # noqa: E402
+from tractexp.identification.problem import Problem, excited
+from tractexp.identification.search import search
+from tractexp.model.drive import Drive
+from tractexp.model.model import Model, compose
+from tractexp.plugin import get
+from tractexp.record import in_waves
 
 STORED = Path(__file__).with_suffix(".json")
 CANDIDATES, STARTS = 200, 20

@@ -218,14 +218,17 @@ def drawn(devices: tuple[Device, ...], fault: Fault, t: np.ndarray) -> Instants:
         return [rate for d, a, b in parts for rate in d.rates(x[a:b], here, zero)]
 
     start = np.concatenate([states for _, states in made])
-    # So short that no edge is passed over unseen.
-    solved = solve_ivp(slopes, (begin, t[-1]), start, "DOP853", t, rtol=1e-8, atol=1e-10, max_step=0.004)
-    if not solved.success:
-        raise RuntimeError(f"the simulation stopped: {solved.message}")
+    y = np.empty((0, len(t)))
+    if len(start):
+        # So short that no edge is passed over unseen.
+        solved = solve_ivp(slopes, (begin, t[-1]), start, "DOP853", t, rtol=1e-8, atol=1e-10, max_step=0.004)
+        if not solved.success:
+            raise RuntimeError(f"the simulation stopped: {solved.message}")
+        y = solved.y
     v, zero, slope = v[early:], zero[early:], np.gradient(v, grid)[early:]
     current, current_zero = np.zeros_like(v), np.zeros(len(t))
     for d, a, b in parts:
-        x, device = solved.y[a:b], d.device if isinstance(d, Switched) else d
+        x, device = y[a:b], d.device if isinstance(d, Switched) else d
         current += device.current(x, v, slope) * (d.left(t) if isinstance(d, Switched) else 1.0)
         current_zero += device.zero(x) if isinstance(device, Earthed) else 0.0
     return Instants(t, v, zero, current, current_zero)
