@@ -16,6 +16,10 @@ class Zip(Static):
     is a requirement of the model: a_Z + a_I and b_Z + b_I are at most 1. At U = U_0 it draws what the exponential
     load draws, with the slopes p_v = 2 a_Z + a_I and q_v = 2 b_Z + b_I.
 
+    Of waveforms it is an admittance that follows the size of the voltage over the past half cycle: the power is the
+    law's once half a cycle has passed since the voltage changed, and negative sequence and harmonics see the
+    admittance of the fundamental.
+
     Not to be confused with `exponential`, which has one number for each power; the two agree to first order near
     U_0 and part in deep dips, where the constant-power share keeps its power.
 
