@@ -35,8 +35,8 @@ class FeederImpedance(Effect):
 
     Source: WECC composite load model specification 2015 (feeder and transformer).
     Departures: R_f and X_f are one impedance from bus to load, of waveforms with R_p beside X_f (losses of a winding
-    at high frequencies; it takes 1.6 % of the current at 50 Hz); the zero sequence sees none of it; where a load has no solution (voltage collapse) the
-    last iterate stands.
+    at high frequencies; it takes 1.6 % of the current at 50 Hz); the zero sequence sees none of it; where a load has
+    no solution (voltage collapse) the last iterate stands.
     """
 
     R_f = Parameter(0.0, (-0.02, 0.1), "pu", "feeder resistance on the record's base", SOURCE, null=0.0)

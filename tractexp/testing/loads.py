@@ -107,7 +107,7 @@ def on(p: Parameter) -> float:
 
 
 def play(of: Model, drive: Drive, chosen: np.ndarray, substeps: int = SUBSTEPS) -> np.ndarray:
-    """P and Q (2, n, N) [pu], or the current in its frame and of zero sequence (3, n, N); fails without steady state."""
+    """P and Q (2, n, N) [pu], or the current in its frame and of zero sequence (3, n, N); fails at no rest."""
     response = of.simulate(drive, chosen, substeps)
     if (response.miss != 0).any():
         missed = np.atleast_2d(chosen)[int(np.argmax((response.miss != 0).any(axis=0)))]
@@ -180,7 +180,9 @@ def converges_in_order_four(cls: type[Part]) -> None:
 
     of = with_part(cls)
     eq = of.equations
-    written = [eq.expand(e) for e in (*(s.derivative for s in eq.states.values()), *eq.outputs().values(), *eq.steps.values())]
+    written = [
+        eq.expand(e) for e in (*(s.derivative for s in eq.states.values()), *eq.outputs().values(), *eq.steps.values())
+    ]
     if eq.memories or not eq.states or any(e.has(sympy.Max, sympy.Min) for e in written):
         return  # a corner costs the order
     smooth = drives.wave_dip(0.3, edge=0.01) if of.waves else drives.dip(0.3, step=10e-3, edge=0.04)
