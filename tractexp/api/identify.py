@@ -221,8 +221,7 @@ class Identification(Written):
         r = self.result
         said = [as_sentence(self.headline)] if self.headline else []
         said += [
-            f"{e['name']} ({e['role']}): epsilon_p {e['epsilon_p']:.3%}, epsilon_q {e['epsilon_q']:.3%}"
-            for e in r.events
+            f"{e['name']} ({e['role']}): {', '.join(f'{key} {e[key]:.3%}' for key in r.epsilons)}" for e in r.events
         ]
         said += [told] if (told := self.search_told()) else []
         said += [f"note: {note}" for note in r.uncertainty.get("notes", ())]

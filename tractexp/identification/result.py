@@ -11,6 +11,7 @@ import numpy as np
 from tractexp import files, provenance
 from tractexp.errors import UserError
 from tractexp.identification.adequacy import ACCEPTED
+from tractexp.identification.periodic import unsettled
 from tractexp.identification.problem import Problem, excited
 from tractexp.identification.search import REFUSED, Found, History
 from tractexp.identification.seen import seen_by_estimator
@@ -19,6 +20,7 @@ from tractexp.model.model import CLASSICAL, Model, compose
 from tractexp.plugin import build
 from tractexp.record import Event, WaveEvent, find_dips, in_waves
 
+EPSILONS = ("epsilon_p", "epsilon_q", "epsilon_i")
 AFTER = 0.15  # s after a dip's start in which the currents' error counts
 
 
@@ -34,7 +36,8 @@ class Fit:
     """Measured and calculated power of one event, (N,) each, and the relative errors of Eq. (20), as fractions.
 
     Of waveforms the power is that which the record's estimator sees in calculated and in recorded currents, and
-    `currents` (3, N), alpha, beta and zero, are the calculated ones [pu] on the samples of the event in `waves`.
+    `currents` (3, N), alpha, beta and zero, are the calculated ones [pu] on the samples of the event in `waves`;
+    `unsettled` is by how much they still change from one cycle to the next before the record, a share of them.
     """
 
     event: Event
@@ -46,13 +49,14 @@ class Fit:
     epsilon_i: float | None = None
     waves: WaveEvent | None = None
     currents: np.ndarray | None = None
+    unsettled: float | None = None
 
     @property
     def told(self) -> dict[str, Any]:
         """As `result.json` has it."""
         made = {"name": self.event.record.name, "role": self.role}
         made |= {"epsilon_p": self.epsilon_p, "epsilon_q": self.epsilon_q}
-        return made if self.epsilon_i is None else made | {"epsilon_i": self.epsilon_i}
+        return made if self.epsilon_i is None else made | {"epsilon_i": self.epsilon_i, "unsettled": self.unsettled}
 
 
 def by_event(values: Mapping[str, float], per_event: Mapping[str, Sequence[float]]) -> dict[str, float]:
@@ -87,7 +91,8 @@ def _of_waves(event: WaveEvent, role: str, currents: np.ndarray) -> Fit:
     compared, P, Q = seen_by_estimator(event, currents)
     record = compared.record
     errors = relative_error(record.P, P), relative_error(record.Q, Q)
-    return Fit(compared, role, P, Q, *errors, current_error(event, currents), event, currents)
+    error, change = current_error(event, currents), unsettled(event, currents)
+    return Fit(compared, role, P, Q, *errors, error, event, currents, change)
 
 
 def current_error(event: WaveEvent, currents: np.ndarray) -> float:
@@ -146,6 +151,11 @@ class Result:
         """The estimate by the names of intervals and verdicts: T_m[1], T_m[2] where events have values of their own."""
         values = by_event(self.parameters, self.per_event)
         return {name: values[name] for name in self.verdicts or values}
+
+    @property
+    def epsilons(self) -> tuple[str, ...]:
+        """The relative errors that each event has: of P and Q, and of waveforms of the currents."""
+        return tuple(key for key in EPSILONS if all(key in event for event in self.events))
 
     @property
     def acceptable(self) -> bool:

@@ -29,6 +29,8 @@ class Part(Plugin):
     """
 
     reads: ClassVar[tuple[str, ...]] = ()
+    phasors_only: ClassVar[str] = ""  # why it makes no sense of waveforms; "" where it does
+    waves_only: ClassVar[str] = ""  # why it makes no sense of phasors
 
     @classmethod
     def check_class(cls, where: str) -> None:
@@ -111,8 +113,6 @@ class Effect(Part):
     grid: ClassVar[dict[str, tuple[float, ...]]] = {}
     relevant: ClassVar[dict[str, float]] = {}
     confused_with: ClassVar[tuple[str, ...]] = ()
-    phasors_only: ClassVar[str] = ""  # why it makes no sense of waveforms; "" where it does
-    waves_only: ClassVar[str] = ""  # why it makes no sense of phasors
 
     @abstractmethod
     def edit(self, eq: "Equations", **parameters: Any) -> None:

@@ -69,7 +69,8 @@ const zoomed = chart => {
 const draw = chart => {
   const {data, layout} = JSON.parse(chart.nextElementSibling.textContent);
   const sampled = data.filter(trace => trace.samples);
-  sampled.forEach(trace => { unpack(trace.samples); Object.assign(trace, seen(trace.samples, -Infinity, Infinity)); });
+  const [from, to] = (layout.xaxis.range || [-Infinity, Infinity]).map(Number);
+  sampled.forEach(trace => { unpack(trace.samples); Object.assign(trace, seen(trace.samples, from, to)); });
   Plotly.newPlot(chart, data, layout, SETTINGS);
   const told = event => Object.keys(event).some(key => key.startsWith("xaxis"));
   if (sampled.length) chart.on("plotly_relayout", event => told(event) && zoomed(chart));

@@ -1,6 +1,7 @@
 """The page of an identification, to be read in a minute: what it is good for, what was found, how sure, what next."""
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
@@ -17,10 +18,14 @@ from tractexp.report import style
 from tractexp.report.chart import Chart
 from tractexp.report.events import CAPTION, Curve, event_chart
 from tractexp.report.page import Page
+from tractexp.report.waves import CAPTION as WAVE_CAPTION
+from tractexp.report.waves import IN_WAVES, Drawn, prepared, spectrum_chart, wave_chart
 from tractexp.wording import as_sentence, in_words
 
+ROLES = {"train": "fitted", "validate": "held out"}
 KIND = {"adequate": "good", "effect_missing": "plain", "wrong_model": "bad"}
 SHOWN = 4  # events whose curves are not folded away
+CHANNELS = (style.ACTIVE, style.REACTIVE, style.PALETTE[2])  # of what is compared
 SMALLEST = 0.01  # of the deviance: starts closer than this ended in the same place
 
 
@@ -60,7 +65,13 @@ def page(
 def _acceptance(result: Any) -> str:
     holds = "holds" if result.acceptable else "does not hold"
     errors = f"epsilon_p {result.epsilon_p:.2%}, epsilon_q {result.epsilon_q:.2%}"
-    return f"Acceptance of Eq. (20), below 5 %, {holds}: {errors}."
+    return f"Acceptance of Eq. (20), below 5 %, {holds}: {errors}.{_of_currents(result)}"
+
+
+def _of_currents(result: Any) -> str:
+    """epsilon_i of each event, in a sentence; "" in phasors."""
+    told = [f"{e['epsilon_i']:.2%} ({e['name']}, {ROLES[e['role']]})" for e in result.events if "epsilon_i" in e]
+    return f" Of the currents themselves epsilon_i is {', '.join(told)}." if told else ""
 
 
 def _identified(known: Uncertainty, adequacy: Adequacy) -> list[str]:
@@ -75,23 +86,34 @@ def headline(known: Uncertainty) -> str:
 
 
 def _curves(made: Page, fits: Sequence[Any], known: Uncertainty) -> None:
-    """One chart of each event; of many the later ones are folded away."""
+    """The charts of each event; of many the later ones are folded away."""
     likelihood = known.likelihood
+    waves = likelihood.problem.model.waves
+    made.text(*[IN_WAVES] * waves)
     deviation = likelihood.noise.deviation(likelihood.problem.drive) / known.widened
     parts = [likelihood.problem.drive.part(e) for e in range(likelihood.problem.drive.events)]
     made.text(CAPTION)
     for k, fit in enumerate(fits):
-        record, role = fit.event.record, "fitted" if fit.role == "train" else "held out"
-        power = np.stack((fit.P, fit.Q))
         noise = deviation[:, parts[k]] if fit.role == "train" else None
-        chart = event_chart(fit.event, [Curve("estimate", power, style.PALETTE[0])], deviation=noise, around=power)
-        caption = f"{record.name}, {role}: epsilon_p {fit.epsilon_p:.3%}, epsilon_q {fit.epsilon_q:.3%}."
-        caption = " ".join([caption, *(f"{note}." for note in record.notes)])
-        if k < SHOWN:
-            made.chart(chart, caption)
-        else:
-            with made.folded(f"{record.name}, {role}"):
-                made.chart(chart, caption)
+        with made.folded(f"{fit.event.record.name}, {ROLES[fit.role]}") if k >= SHOWN else nullcontext():
+            _event(made, fit, noise)
+    if waves:
+        made.heading("What was done to the records", level=3).items(prepared(likelihood.problem, fits))
+
+
+def _event(made: Page, fit: Any, noise: np.ndarray | None) -> None:
+    """The currents of an event in waveforms and their spectra, then P and Q; `noise` (2, N) is that of phasors."""
+    record, power = fit.event.record, np.stack((fit.P, fit.Q))
+    about, notes = f"{record.name}, {ROLES[fit.role]}", [f"{note}." for note in record.notes]
+    if fit.waves is not None:
+        made.chart(
+            wave_chart(fit.waves, [Drawn("estimate", fit.currents, style.PALETTE[0])]),
+            " ".join([f"{about}: epsilon_i {fit.epsilon_i:.3%}.", WAVE_CAPTION, *notes]),
+        )
+        made.chart(*spectrum_chart(fit.waves, fit.currents))
+        noise, notes = None, ["Measured and calculated are phasors of the currents above, by the same estimator."]
+    chart = event_chart(fit.event, [Curve("estimate", power, style.PALETTE[0])], deviation=noise, around=power)
+    made.chart(chart, " ".join([f"{about}: epsilon_p {fit.epsilon_p:.3%}, epsilon_q {fit.epsilon_q:.3%}.", *notes]))
 
 
 def _parameters(made: Page, result: Any, known: Uncertainty, adequacy: Adequacy, about: dict[str, str]) -> None:
@@ -194,17 +216,18 @@ def _left(made: Page, known: Uncertainty) -> None:
     """Whitened residuals, their autocorrelation, and what the tests of them say."""
     likelihood = known.likelihood
     drive, events = likelihood.problem.drive, likelihood.problem.events
-    white = known.widened * likelihood.rows(known.unit[None])[0].reshape(2, -1)
+    white = known.widened * likelihood.rows(known.unit[None])[0].reshape(drive.channels, -1)
     colored = [t for t in known.tests if t["p"] < REJECTED]
     made.text(_conclusion(colored, len(known.tests)))
     for e, event in enumerate(events[:SHOWN]):
         part = drive.part(e)
-        chart = Chart("t [s]", ["P [σ]", "Q [σ]"], pixels=320)
+        compared = [c for c in range(drive.channels) if likelihood.known[c, part].any()]
+        chart = Chart("t [s]", [f"{drive.names[c]} [σ]" for c in compared], pixels=320)
         lags = Chart("lag [samples]", ["autocorrelation"], pixels=320)
-        for c, (name, color) in enumerate(zip("PQ", (style.ACTIVE, style.REACTIVE), strict=True)):
-            seen = likelihood.known[c, part]
+        for panel, c in enumerate(compared):
+            name, color, seen = drive.names[c], CHANNELS[c], likelihood.known[c, part]
             rows = white[c, part][seen]
-            chart.line(name, event.record.t[seen], rows, color, c, width=0.8)
+            chart.line(name, event.record.t[seen], rows, color, panel, width=0.8)
             x = np.arange(1, min(LAGS, len(rows) // 4) + 1)
             lags.points(name, x + 0.2 * c, autocorrelation(rows, len(x)), color, size=5)
             limit = 1.96 / np.sqrt(max(len(rows), 1))
@@ -221,11 +244,11 @@ def _left(made: Page, known: Uncertainty) -> None:
         )  # fmt: skip
         made.table(
             ["event", "channel", "noise [pu]", "before the dip [pu]", "order", "neighbors' correlation",
-             "correlation of P and Q"],
+             f"correlation of {drive.names[0]} and {drive.names[1]}"],
             [[n["event"], n["channel"], digits(n["deviation"] / known.widened), digits(n["before"]), str(n["order"]),
               f"{n['correlation']:.2f}", f"{n['between_P_and_Q']:.2f}"] for n in known.noise],
             caption="Noise of each channel, told from what the fit leaves before the dips and at the end of the"
-                    " records: an autoregression of P and Q mixed until they are independent.", words=(1,),
+                    " records: an autoregression of the channels mixed until they are independent.", words=(1,),
         )  # fmt: skip
 
 

@@ -37,7 +37,7 @@ def refuse_unread(task: Any, chosen: Mapping[str, str], needless: Collection[str
     read = [part for part in (*ALWAYS, *task.reads) if part not in needless]
     for key, value in chosen.items():
         if not any(_overlap(OF.get(key, key), part) for part in read):
-            instead = (task.instead[part] for part in task.instead if _overlap(key, part))
+            instead = (task.instead[part] for part in task.instead if _overlap(OF.get(key, key), part))
             raise UserError(f"{key}={value} is not read by task={task.name}; {next(instead, 'leave it out')}")
 
 

@@ -1,7 +1,7 @@
 """Identify a load model's parameters from recorded dips."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -39,8 +39,12 @@ def report(fit: "Identification") -> None:
     say()
     say(as_sentence(fit.headline))
     estimates(fit)
-    rows = [[e["name"], e["role"], f"{e['epsilon_p']:.3%}", f"{e['epsilon_q']:.3%}"] for e in fit.result.events]
-    table(["event", "role", "epsilon_p", "epsilon_q"], rows)
+    errors = fit.result.epsilons
+    rows = [[e["name"], e["role"], *(f"{e[key]:.3%}" for key in errors)] for e in fit.result.events]
+    table(["event", "role", *errors], rows)
+    for event in fit.result.events:
+        if told := unsettled_told(event):
+            say(told)
     holds = "holds" if fit.result.acceptable else "does NOT hold"
     say(f"acceptance of Eq. (20), epsilon_p and epsilon_q below 5 %: {holds}")
     if fit.trusted:
@@ -51,6 +55,14 @@ def report(fit: "Identification") -> None:
     for sentence in fit.advice:
         say(f"next: {sentence}")
     say()
+
+
+def unsettled_told(event: dict[str, Any]) -> str:
+    """How well a simulation in waveforms begins at rest, in a sentence; "" in phasors, which do so exactly."""
+    if event.get("unsettled") is None:
+        return ""
+    change = f"the calculated currents still change by {event['unsettled']:.2g} of their size from cycle to cycle"
+    return f"periodic steady state before {event['name']}: {change}"
 
 
 def estimates(fit: "Identification") -> None:
@@ -88,7 +100,9 @@ def track(job: Job, fit: "Identification", paths: list[Path], predictor: bool) -
     of_search = ("objective", "epsilon_p", "epsilon_q", "simulations", "seconds")
     metrics |= {f"search_{key}": result.search[key] for key in of_search}
     for k, event in enumerate(result.events, start=1):
-        metrics |= {f"{event['role']}_{k}_{e}": event[e] for e in ("epsilon_p", "epsilon_q")}
+        metrics |= {f"{event['role']}_{k}_{e}": event[e] for e in result.epsilons}
+    if "epsilon_i" in result.epsilons:
+        metrics["epsilon_i"] = max(e["epsilon_i"] for e in result.events if e["role"] == "train")
     history = fit.ended.history
     known = history.objective < REFUSED
     best = history.objective[known]

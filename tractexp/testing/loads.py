@@ -29,7 +29,7 @@ ASYMPTOTIC = (1e-11, 1e-6)  # pu: errors of the fourth order, above rounding
 @functools.cache
 def partners() -> tuple[type[Motor], type[Static]]:
     """The registered motor and static load a contract is played with: few parameters, a flux and a speed that move."""
-    motors = [cls for cls in _all("model/motor") if _moves(cls)]
+    motors = [cls for cls in _all("model/motor") if cls.parameters and _moves(cls)]
     statics = [cls for cls in _all("model/static") if cls.parameters and not cls.reads]
     if not (motors and statics):
         raise UserError("contracts need a registered motor with flux and speed and a static load with parameters")
@@ -50,7 +50,7 @@ def _all(group: str) -> list[type]:
 @functools.cache
 def model(motor: type[Motor], static: type[Static], *effects: type[Effect]) -> Model:
     """A load of these parts with default settings."""
-    domain = WAVES if any(cls.waves_only for cls in effects) else PHASORS
+    domain = WAVES if any(cls.waves_only for cls in (motor, static, *effects)) else PHASORS
     return compose(motor(), static(), [cls() for cls in effects], domain=domain)
 
 

@@ -1,0 +1,191 @@
+"""One event in waveforms: voltages, currents as recorded and as calculated, and the spectrum of what is left."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tractexp.identification.problem import Problem
+from tractexp.identification.result import AFTER, Fit
+from tractexp.record import WaveEvent
+from tractexp.report import style
+from tractexp.report.chart import Chart
+from tractexp.report.events import FOUND, WITHIN
+
+PHASES = ("a", "b", "c")
+COLORS = ("#E69F00", "#009E73", "#56B4E9")  # of phases a, b, c: none of them is a model's
+CYCLES = 2.0  # shown at first before and after the dip
+HARMONICS = (1, 3, 5, 7, 9, 11, 13, 17, 19, 23, 25)
+FASTEST = 1300.0  # Hz: what a spectrum shows
+KILO = 1.0  # kA of a peak from which an axis is in kA
+TOLD = 4  # events of which it is told how they were prepared
+SPECTRUM = (
+    "Amplitudes of measured less calculated currents, in percent of the fundamental before the dip, over whole cycles"
+    " of the stationary phases: what is 50 Hz there is 50 Hz here. Above from the dip on ({after:.0f} ms), below before"
+    " it ({before:.0f} ms); a longer stretch tells frequencies better apart. Marked are the fundamental and its odd"
+    " harmonics. A load of harmonics stands in both, a wrong decay beside the fundamental, an offset at 0 Hz."
+)
+IN_WAVES = (
+    "In waveforms the sampled currents are compared, driven by the sampled voltage, both as space vectors of the"
+    " stationary frame (alpha along phase a); nothing is averaged over a cycle. One per unit is the peak of the"
+    " phase voltage before the dip, and of the current of the same apparent power. P, Q, epsilon_p and epsilon_q"
+    " are of the recorded and of the calculated currents through the record's own phasor estimator, so they"
+    " compare with those of a run in phasors."
+)
+CAPTION = (
+    "The currents are instantaneous values, phase by phase, offsets of the recorder taken off. Dotted: the dip begins"
+    " and ends. Drag to zoom, double-click to go back; zoomed in, every sample is drawn."
+)
+
+
+class Drawn(NamedTuple):
+    """Calculated currents (3, N) [pu]: alpha, beta and zero."""
+
+    name: str
+    currents: np.ndarray
+    color: str
+    dash: str = "solid"
+
+
+def wave_chart(
+    event: WaveEvent,
+    curves: Sequence[Drawn],
+    *,
+    deviation: np.ndarray | None = None,
+    around: np.ndarray | None = None,
+    places: Sequence[Any] = (),
+) -> Chart:
+    """Voltages, then each phase's current as recorded and as calculated, and what the curves leave of it.
+
+    The dip is in view at first. Voltages are in kV, currents in A or kA. `deviation` (3, N) of the noise [pu] draws a
+    band around the currents `around` (3, N) and about zero; `places` have `start` and `end` [s]: where more than chance
+    is left of some current.
+    """
+    (kV, kA), kept = event.peaks, slice(event.lead, None)
+    names = PHASES[: event.phases] if event.phases > 1 else ("",)
+    measured = event.of_phases(np.nan_to_num(event.currents))[:, kept]
+    unit, one = ("kA", kA) if kA * np.abs(measured).max() >= KILO else ("A", 1000 * kA)
+    start, step = float(event.record.t[event.lead]), event.record.step
+    panels = ["u [kV]", *(f"i{f'_{n}' if n else ''} [{unit}]" for n in names), f"Δi [{unit}]"]
+    made = Chart("t [s]", panels, heights=[1.0, *[1.3] * len(names), 1.0], pixels=170 + 130 * len(panels))
+    colors = COLORS if event.phases > 1 else (style.VOLTAGE,)
+    for name, u, color in zip(names, event.of_phases(_voltage(event))[:, kept], colors, strict=False):
+        made.samples(f"phase {name}" if name else "voltage", start, step, kV * u, color)
+    if deviation is not None and around is not None:
+        _noise_bands(made, event, one * deviation, one * around)
+    for first, last in _together(places):
+        made.shade(first, last, FOUND, 1 + event.phases, "more than chance leaves", opacity=0.2)
+    for k in range(event.phases):
+        made.samples("measured", start, step, one * measured[k], style.MEASURED, 1 + k, width=3)
+    for name, currents, color, dash in curves:
+        calculated = event.of_phases(currents)[:, kept]
+        for k, phase in enumerate(names):
+            made.samples(name, start, step, one * calculated[k], color, 1 + k, width=1.3, dash=dash)
+            rest = one * (measured[k] - calculated[k])
+            own = colors[k] if len(curves) == 1 and phase else color
+            made.samples(f"phase {phase}" if own != color else name, start, step, rest, own, len(names) + 1, dash=dash)
+    return made.edge(event.t_start).edge(event.t_end).limits(None, *_view(event))
+
+
+def _noise_bands(made: Chart, event: WaveEvent, deviation: np.ndarray, around: np.ndarray) -> None:
+    """Where noise alone would let a sample lie: about each phase's current and, the widest of them, about zero."""
+    t = event.record.t[event.lead :]
+    known = np.array(event.known)[:, None]
+    half = WITHIN * np.sqrt(event.of_phases(np.eye(3)) ** 2 @ (deviation * known) ** 2)[:, event.lead :]
+    middle, name = event.of_phases(around)[:, event.lead :], f"± {WITHIN:g} σ of the noise"
+    for k in range(event.phases):
+        made.band(name, t, middle[k] - half[k], middle[k] + half[k], style.FAINT, 1 + k)
+    made.band(name, t, -half.max(axis=0), half.max(axis=0), style.FAINT, 1 + event.phases)
+
+
+def _together(places: Sequence[Any]) -> list[tuple[float, float]]:
+    """The stretches [s] that places of any channel cover, none of them twice."""
+    covered: list[tuple[float, float]] = []
+    for place in sorted(places, key=lambda p: p.start):
+        if covered and place.start <= covered[-1][1]:
+            covered[-1] = covered[-1][0], max(covered[-1][1], place.end)
+        else:
+            covered.append((place.start, place.end))
+    return covered
+
+
+def _voltage(event: WaveEvent) -> np.ndarray:
+    """The recorded voltage (3, N) in the stationary frame: alpha, beta and zero [pu]."""
+    v = event.v * event.turn
+    return np.stack([v.real, v.imag, event.v_zero])
+
+
+def _view(event: WaveEvent) -> tuple[float, float]:
+    """From two cycles before the dip to two after it, or to where epsilon_i ends counting [s]."""
+    t, cycles = event.record.t, CYCLES / event.f0
+    to = max(event.t_end + cycles, event.t_start + AFTER)
+    return max(float(t[event.lead]), event.t_start - cycles), min(float(t[-1]), to)
+
+
+class Spectrum(NamedTuple):
+    """Amplitudes (K, n) of the phases' residual at frequencies (n,) [Hz], over the fundamental before the dip."""
+
+    frequencies: np.ndarray
+    amplitudes: np.ndarray
+    seconds: float
+
+
+def spectra(event: WaveEvent, currents: np.ndarray) -> tuple[Spectrum, Spectrum]:
+    """Of what calculated currents (3, N) leave, from the dip on and before it; over whole cycles, unweighted.
+
+    Unweighted, the squares of all of it add up to the residual's energy, a decay at its beginning included.
+    """
+    known = np.array(event.known)[:, None]
+    left = event.of_phases((np.nan_to_num(event.currents) - currents) * known)
+    cycle = event.rate / event.f0
+    after = min(AFTER * event.rate, left.shape[1] - event.start)
+    size = abs(event.P0 + 1j * event.Q0) / event.U0  # of the fundamental's peak [pu]
+    made = []
+    for samples, last in ((after, None), (event.start - event.lead, event.start)):
+        n = round(max(1, int(samples / cycle + 0.25)) * cycle)
+        first = event.start if last is None else max(event.start - n, event.lead)
+        part = left[:, first : min(first + n, left.shape[1])]
+        found = np.abs(np.fft.rfft(part)) / part.shape[1] * 2 / size
+        found[:, 0] /= 2
+        made.append(Spectrum(np.fft.rfftfreq(part.shape[1], event.record.step), found, part.shape[1] / event.rate))
+    return made[0], made[1]
+
+
+def spectrum_chart(event: WaveEvent, currents: np.ndarray) -> tuple[Chart, str]:
+    """The spectra above each other, and the caption."""
+    after, before = spectra(event, currents)
+    made = Chart("frequency [Hz]", ["after [%]", "before [%]"], pixels=380)
+    names = [f"phase {n}" for n in PHASES[: event.phases]] if event.phases > 1 else ["residual"]
+    highest = min(FASTEST, event.rate / 2)
+    for panel, (frequencies, amplitudes, _) in enumerate((after, before)):
+        shown = frequencies <= highest
+        for name, row, color in zip(names, amplitudes, COLORS, strict=False):
+            made.line(name, frequencies[shown], 100 * row[shown], color, panel)
+        made.limits(panel, 0.0, 1.08 * 100 * max(float(amplitudes[:, shown].max()), 1e-4))
+    for order in HARMONICS:
+        if order * event.f0 < highest:
+            made.edge(order * event.f0)
+    marks = [order * round(event.f0, 1) for order in HARMONICS if order * event.f0 < highest and order != 9]
+    told = SPECTRUM.format(after=1000 * after.seconds, before=1000 * before.seconds)
+    return made.ticks(None, marks).limits(None, 0.0, highest), told
+
+
+def prepared(problem: Problem, fits: Sequence[Fit]) -> list[str]:
+    """What was done to each record before it was fitted, and how it is simulated, in sentences."""
+    steps = f"Runge-Kutta steps of the fit: {problem.step.describe(problem.events)}."
+    return [*(_prepared(fit) for fit in fits[:TOLD] if fit.waves is not None), steps]
+
+
+def _prepared(fit: Fit) -> str:
+    """Frequency, cycles before the dip, offsets taken off and the periodic steady state of one event."""
+    event: Any = fit.waves
+    cycles = (event.start - event.lead) * event.f0 / event.rate
+    volts, amperes = np.abs(event.offsets[: event.phases]).max(), np.abs(event.offsets[event.phases :]).max()
+    zero = "" if event.phases == 1 else " Zero sequence is " + ("" if event.known[2] else "not ") + "compared."
+    return (
+        f"{event.record.name}: {event.f0:.3f} Hz, {cycles:.1f} cycles before the dip; offsets of up to"
+        f" {1000 * volts:.3g} V and {1000 * amperes:.3g} A taken off.{zero} The periodic voltage before the dip is"
+        f" continued back for {event.lead * event.f0 / event.rate:.0f} cycles, in which the simulation reaches its"
+        f" steady state: over the last of them the calculated currents still change by {fit.unsettled:.2g} of their"
+        " size."
+    )
