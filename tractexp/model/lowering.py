@@ -111,7 +111,8 @@ def lower(eq: Equations) -> Lowered:
     renewal = _phase(hoist, [eq.real(m.renewal) for m in eq.memories.values()], steps)
     outputs = eq.outputs()
     output = _phase(hoist, [eq.real(e) for e in outputs.values()], steps)
-    slack = [eq.expand(r.slack) for r in eq.requirements]
+    begin = dict(zip(starts, (initial for _, _, initial in rows), strict=False))
+    slack = [eq.expand(r.slack).xreplace(begin) for r in eq.requirements]
     remembered = [eq.real(m.initial) for m in eq.memories.values()]
     start = _phase(None, [i for _, _, i in rows] + remembered + slack)
     at_rest = eq.at_rest() | dict(zip((*states, *memories), starts, strict=True))
