@@ -17,8 +17,8 @@ OMEGA_N, P0, Q0 = 100 * np.pi, drives.P0, drives.Q0
 OMEGA = OMEGA_N - 1.5  # of the frame of the drives
 NAMES = sorted(discover()["effect"])
 PHASORS_ONLY = {"frequency_dependence", "measurement_window", "negative_sequence_braking", "transformer_inrush"}
-WAVES_ONLY = {"zero_sequence_path", "transformer_saturation", "negative_sequence_path", "fault_resistance", "stuck_pole",
-              "current_transformer_saturation", "transformer_error", "harmonics_source"}  # fmt: skip
+WAVES_ONLY = {"zero_sequence_path", "transformer_saturation", "negative_sequence_path", "fault_resistance",
+              "stuck_pole", "current_transformer_saturation", "transformer_error", "harmonics_source"}  # fmt: skip
 STACK = ("feeder_impedance", "shunt_capacitor", "second_motor_group", "undervoltage_trip", "transformer_saturation",
          "current_transformer_saturation", "harmonics_source")  # fmt: skip
 DIP = drives.wave_dip(0.5)
@@ -127,7 +127,7 @@ def test_a_feeder_is_its_circuit():
 
 
 def test_a_feeder_and_a_capacitor_ring_at_their_resonance():
-    """b = 1 behind X = 0.12 with hardly a load: the step of the voltage rings at 1/sqrt(X b) times nominal."""
+    """b = 1 behind X = 0.12, beside a branch of Q0 + b: the step rings at sqrt(1/X + Q0 + b) times nominal."""
     n = 3200
     still = drives.wave_flat(1.0, rate=12800.0, samples=n)
     step = np.where(np.arange(n) < 600, 1.0, 0.9)
@@ -142,7 +142,7 @@ def test_a_feeder_and_a_capacitor_ring_at_their_resonance():
     f = np.fft.fftfreq(1 << 16, 1 / 12800.0)
     high = np.abs(f) > 90
     found = abs(f[high][np.argmax(spectrum[high])])
-    assert found == pytest.approx(50 / np.sqrt(0.12), rel=0.06)
+    assert found == pytest.approx(50 * np.sqrt(1 / 0.12 + Q0 + 1.0), rel=0.03)
 
 
 def test_a_load_behind_a_feeder_draws_before_the_dip_what_was_recorded():
@@ -154,7 +154,7 @@ def test_a_load_behind_a_feeder_draws_before_the_dip_what_was_recorded():
 def test_the_zero_sequence_follows_its_branch():
     b, r = 20.0, 0.03
     v, _ = smooth("v_zero")
-    (psi,) = solved(lambda t, y: OMEGA_N * (v(t) - r * y), [0.0])
+    (psi,) = solved(lambda t, y: OMEGA_N * (v(t) - r * y), [1e-9])
     assert np.abs(run("zero_sequence_path", zero_susceptance=b, zero_resistance=r)[1] - b * psi.real).max() < 1e-6
     assert b * psi.real.max() > 0.2
 
@@ -210,7 +210,7 @@ def test_a_core_that_a_dip_leaves_offset_draws_peaks_of_one_sign_until_the_offse
     drawn = y * np.sign(flux) * np.maximum(0, abs(flux) - limit)
     known = 2 / 3 * (drawn[0] + TURN * drawn[1] + TURN**2 * drawn[2]) / DIP.turn
     assert np.abs(extra - known).max() < 2e-3  # the corner of the curve, stepped over
-    assert np.abs(extra[:380]).max() == 0
+    assert np.abs(extra[:380]).max() < 1e-12
     assert np.abs(drawn[:, 560:]).max() > 0.05
     assert np.abs(extra[-20:]).max() < 0.3 * np.abs(extra[560:]).max()
 
@@ -255,7 +255,7 @@ def test_a_fault_inside_the_load_lasts_as_long_as_the_voltage_is_off():
     inside, outside = slice(392, 540), np.r_[0:383, 575:896]
     assert pytest.approx(g * DIP.v[inside], abs=1e-9) == extra[inside]
     assert pytest.approx(g * DIP.v_zero[inside], abs=1e-9) == zero[inside]
-    assert np.abs(extra[outside]).max() == 0
+    assert np.abs(extra[outside]).max() < 1e-12
 
 
 @pytest.mark.parametrize("phase", [0, 1, 2])
