@@ -35,8 +35,8 @@ class FeederImpedance(Effect):
 
     Source: WECC composite load model specification 2015 (feeder and transformer).
     Departures: R_f and X_f are one impedance from bus to load, of waveforms with R_p beside X_f (losses of a winding
-    at high frequencies; it takes 1.6 % of the current at 50 Hz); the zero sequence sees none of it; where a load has no solution (voltage collapse) the
-    last iterate stands.
+    at high frequencies; it takes 1.6 % of the current at 50 Hz); the zero sequence sees none of it; where a load has
+    no solution (voltage collapse) the last iterate stands.
     """
 
     R_f = Parameter(0.0, (-0.02, 0.1), "pu", "feeder resistance on the record's base", SOURCE, null=0.0)
@@ -127,7 +127,7 @@ def _linear(eq, drop_0):
     if any(row.has(x, y) for rows in J for row in rows):
         raise Unfit("its current is not linear in the voltage at an instant")
     rest = [part.xreplace({x: sympy.Integer(0), y: sympy.Integer(0)}) for part in parts]
-    J = [[eq.compute(f"feeder_{r}{c}", e) if e != 0 else e for c, e in zip("dq", row, strict=True)]
+    J = [[eq.compute(f"feeder_{r}{c}", e, e) if e != 0 else e for c, e in zip("dq", row, strict=True)]
          for r, row in zip("dq", J, strict=True)]  # fmt: skip
     return inside, J, [eq.compute(f"feeder_{r}", e) for r, e in zip("dq", rest, strict=True)]
 
@@ -140,8 +140,9 @@ def _solved(eq, R, J, rest, source):
     (a, b), (c, e) = ((J[0][0] * R + 1, J[0][1] * R), (J[1][0] * R, J[1][1] * R + 1))
     whole = eq.compute("feeder_whole", a * e - b * c)
     eq.require(
-        1 + R * eq.P0 / eq.U0**2,
-        "R_f + R_p is negative beyond the resistance that the load may be, so that no current settles; raise X_f",
+        eq.real(eq.before(a * e - b * c)),
+        "no current settles between an impedance and a load of which one has a negative resistance ({value:.3g}); raise"
+        " X_f, or lower T_m so that the static load draws power",
     )
     return (e * d - b * q) / whole + sympy.I * (a * q - c * d) / whole
 

@@ -111,9 +111,10 @@ def lower(eq: Equations) -> Lowered:
     renewal = _phase(hoist, [eq.real(m.renewal) for m in eq.memories.values()], steps)
     outputs = eq.outputs()
     output = _phase(hoist, [eq.real(e) for e in outputs.values()], steps)
-    slack = [eq.expand(r.slack) for r in eq.requirements]
-    remembered = [eq.real(m.initial) for m in eq.memories.values()]
-    start = _phase(None, [i for _, _, i in rows] + remembered + slack)
+    first = [i for _, _, i in rows] + [eq.real(m.initial) for m in eq.memories.values()]
+    begin = dict(zip(starts, first, strict=True))
+    slack = [eq.expand(r.slack).xreplace(begin) for r in eq.requirements]
+    start = _phase(None, first + slack)
     at_rest = eq.at_rest() | dict(zip((*states, *memories), starts, strict=True))
     balances = _phase(None, [replaced(b, at_rest) for b in eq.real_balances()])
     phases = (derivative, renewal, output)

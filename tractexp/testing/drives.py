@@ -1,4 +1,4 @@
-"""The events that contracts play: smooth dips with a sagging frequency and an unbalance, and steady voltage; in waves too."""
+"""The events that contracts play: smooth dips with sagging frequency and an unbalance, steady voltage; and in waves."""
 
 import numpy as np
 

@@ -107,7 +107,7 @@ def on(p: Parameter) -> float:
 
 
 def play(of: Model, drive: Drive, chosen: np.ndarray, substeps: int = SUBSTEPS) -> np.ndarray:
-    """P and Q (2, n, N) [pu], or the current in its frame and of zero sequence (3, n, N); fails without steady state."""
+    """P and Q (2, n, N) [pu], or the current in its frame and of zero sequence (3, n, N); fails at no rest."""
     response = of.simulate(drive, chosen, substeps)
     if (response.miss != 0).any():
         missed = np.atleast_2d(chosen)[int(np.argmax((response.miss != 0).any(axis=0)))]
