@@ -14,6 +14,7 @@ from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import Estimate, estimates, own_parameters
 from tractexp.discrepancy.verdict import NAMED, UNEXPLAINED
 from tractexp.identification.adequacy import Grade
+from tractexp.model.drive import PHASORS
 from tractexp.wording import joined
 
 
@@ -165,10 +166,9 @@ def _number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def use_of(investigation: Investigation, conf: str) -> str:
-    """The command that runs the extended model."""
-    domain = "domain=waves " * investigation.bench.waves
-    return f"python -m tractexp --config-dir {conf} {domain}model=extended"
+def use_of(domain: str, conf: str) -> str:
+    """The command that runs the extended model, to be found in the folder `conf`."""
+    return f"python -m tractexp --config-dir {conf} {f'domain={domain} ' * (domain != PHASORS)}model=extended"
 
 
 def write_model(investigation: Investigation, node: dict[str, Any], path: Path) -> Path:
@@ -183,6 +183,6 @@ def write_model(investigation: Investigation, node: dict[str, Any], path: Path) 
         "bounds": {n: list(b) for n, b in node["bounds"].items()},
         "fixed": {**node["fixed"], **recommended.held(investigation)},
     } | {part: chosen for part, chosen in settings.items() if chosen}
-    told = use_of(investigation, "<this conf>")
+    told = use_of(investigation.bench.load.domain, "<this conf>")
     head = f"# The base model and what was found missing: {told}\n"
     return files.write(path, head + yaml.safe_dump(extended, sort_keys=False))

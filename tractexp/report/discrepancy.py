@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tractexp.discrepancy.discrepancy_json import recommendation
+from tractexp.discrepancy.discrepancy_json import recommendation, use_of
 from tractexp.discrepancy.evidence import (
     CHOSEN,
     FITTED,
@@ -292,12 +292,13 @@ def _equations(made: Page, found: Investigation) -> None:
     if others := [joined(names) for names in found.verdict.sets[1:]]:
         made.text(f"It has {joined(found.names)}; {joined(others, 'or')} instead would fit these events as well.")
     made.text(
-        "conf/model/extended.yaml beside this page: python -m tractexp --config-dir conf model=extended. Its equations"
+        f"conf/model/extended.yaml beside this page: {use_of(found.bench.load.domain, 'conf')}. Its equations"
         " that changed or came in:"
     )
     base = found.bench.load
     effects = [found.catalogue[n].effect for n in found.names]
-    before, after = base.latex(), compose(base.motor, base.static, [*base.effects, *effects]).latex()
+    extended = compose(base.motor, base.static, [*base.effects, *effects], domain=base.domain)
+    before, after = base.latex(), extended.latex()
     old = {line.split("=")[0]: line for line in before}
     for line in after:
         if line not in before and "|_0" not in line:
