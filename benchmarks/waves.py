@@ -90,7 +90,7 @@ def swapped(series: str, seed: int) -> dict:
 
 
 def lengths(series: str, seed: int) -> dict:
-    """Relative standard errors over length, depth and kind of the fault, of one drawn load and recorder, at the truth."""
+    """Relative standard errors at the truth over length, depth and kind of the fault, of one drawn load."""
     rng = np.random.default_rng([SERIES[series], 9000 + seed])
     of, rows = waves.site(rng), []
     recorder = replace(waves.sampler(rng), rate=3200.0, bits=16)
