@@ -12,6 +12,7 @@ import json
 import math
 import os
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +30,7 @@ from tractexp.plugin import get
 from tractexp.record import in_waves
 
 STORED = Path(__file__).with_suffix(".json")
-CANDIDATES, STARTS = 200, 20
+CANDIDATES, STARTS, RATE = 200, 20, 1600.0  # Hz: some 1,300 samples
 EFFECTS = ("second_motor_group", "speed_dependent_torque", "shunt_capacitor")  # for a fit with more parameters
 
 
@@ -41,13 +42,14 @@ def model(*effects: str) -> Model:
 
 def recorded(seed: int = 5):
     """A drawn event of some 1,300 samples."""
-    case, events = waves.drawn_events([1, seed])
-    return case, in_waves(events[0])
+    case, _ = waves.drawn_events([1, seed])
+    case = replace(case, sampler=replace(case.sampler, rate=RATE))
+    return in_waves(waves.events(case, [1, seed])[0])
 
 
 def kernels(rounds: int) -> list[dict]:
     """Nanoseconds per step and candidate of both models, taking turns."""
-    rng, (_, event) = np.random.default_rng(0), recorded()
+    rng, event = np.random.default_rng(0), recorded()
     phasors = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
     prepared = []
     for load, driving in ((phasors, excitation()), (model(), excited(event))):
@@ -76,7 +78,7 @@ def fits() -> list[dict]:
     from tractexp.identification.estimate import estimate
 
     rows = []
-    _, event = recorded()
+    event = recorded()
     for extra in ((), EFFECTS):
         load = model(*extra)
         problem = Problem(load, [event])

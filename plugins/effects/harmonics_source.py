@@ -14,8 +14,8 @@ class HarmonicsSource(Measurement):
 
         i(t) -> i(t) + h r(theta(t)),   r = periodic part of (recorded - calculated) before the event
 
-    r has harmonics up to the 13th of either sequence, found by least squares in the first two recorded cycles; theta
-    is the angle of the frame. Rectifiers draw such currents; h = 1: they go on as they were. At h = 0 the base model.
+    r has harmonics up to the 13th of either sequence, found by least squares in the first two recorded cycles and there
+    left alone, since it would fit their noise, too; theta is the angle of the frame. Rectifiers draw such currents; h = 1: they go on as they were. At h = 0 the base model.
 
     Source: Arrillaga, Watson 2003, Power System Harmonics, ch. 3: converters as sources of current.
     Departures: a converter's harmonics follow its current and voltage; here they do not change with the event.
@@ -38,6 +38,7 @@ class HarmonicsSource(Measurement):
             last = first + int(np.searchsorted(angle[first:] - angle[first], 2 * np.pi * CYCLES))
             basis = self._basis(angle)
             found = np.linalg.pinv(basis[first:last])  # (2 H + 1, W)
+            basis[:last] = 0.0
             compared = drive.weights[:, part].any(axis=1)
             left = drive.measured[compared, None, part.start + first : part.start + last]
             left = left - power[compared, :, part.start + first : part.start + last]
