@@ -25,7 +25,7 @@ from tractexp.record import in_waves
 from tractexp.report import overlay
 
 FEW = ("shunt_capacitor", "speed_dependent_torque")
-SEED, RATE, CAPACITOR = (2, 0), 1600.0, 0.3  # samples per second, pu
+SEED, RATE, CAPACITOR = (2, 0), 3200.0, 0.3  # samples per second, pu
 
 
 def dips(*more):

@@ -23,6 +23,7 @@ from tractexp.record import Event, WaveEvent
 
 OFFSET = 0.005  # pu: what may be left of a channel's offset, which the mean before the dip took off
 EDGY, MOST_EDGES = 8.0, 40  # times the median by which slopes of the voltage differ that are unsure, and of how many
+LEFT = 2.0  # times what white noise leaves of an offset that the mean before the dip took off
 ANSWERED = 8  # samples of the lead after which a single wrong sample of the voltage is put there
 LEAST_KEPT = 0.2  # of a residual's variance: where the fit takes more, it tells nothing of the noise
 # Twice the log-likelihood from which a load is said to wander. An investigation asks for less: a wandering that is not
@@ -153,16 +154,17 @@ def answers(problem: Problem, values: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def unsure(problem: Problem, values: np.ndarray) -> np.ndarray:
-    """What may be wrong with waveforms and is no noise, as it shows in the currents at free values (d,), (k, 3, N) [pu].
+    """What may be wrong with waveforms and is no noise, as the currents show it at free values (d,), (k, 3, N) [pu].
 
-    The offsets that the channels of the current may have, and how steep the voltage is at the samples of its edges.
+    The offsets that the channels may have, those of the voltage as the model passes them on, and how steep the voltage
+    is at the samples of its edges: there two curves through the same samples differ.
     """
-    shapes = [offsets(problem.drive), *(_of_edges(problem, values, e) for e in range(problem.drive.events))]
+    shapes = [offsets(problem.drive), *(_of_voltage(problem, values, e) for e in range(problem.drive.events))]
     return np.concatenate(shapes)
 
 
-def _of_edges(problem: Problem, values: np.ndarray, event: int) -> np.ndarray:
-    """What another slope of the voltage at each sample of the edges of one event does to the currents, (k, 3, N)."""
+def _of_voltage(problem: Problem, values: np.ndarray, event: int) -> np.ndarray:
+    """What offsets of the voltage and another slope at each sample of its edges do in one event, (k, 3, N)."""
     from scipy.interpolate import CubicSpline
 
     drive, part = problem.drive, problem.drive.part(event)
@@ -172,16 +174,24 @@ def _of_edges(problem: Problem, values: np.ndarray, event: int) -> np.ndarray:
     size = np.linalg.norm(off, axis=0)
     steep = np.flatnonzero(size > EDGY * max(float(np.median(size)), SMALLEST))
     steep = steep[np.argsort(-size[steep], kind="stable")[:MOST_EDGES]]
-    one = Drive.of([excited(problem.events[event], problem.model)] * (len(steep) + 1))
+    plain = [problem.events[event]] * (len(steep) + 1)
+    one = Drive.of([excited(e, problem.model) for e in (*plain, *_shifted(problem.events[event]))])
     for k, sample in enumerate(steep, start=1):
         for c, name in enumerate(("v_d_rate", "v_q_rate")):
             one.inputs[INPUTS.index(name), one.first[k] + sample] += off[c, sample]
     own = np.tile(problem.by_event(values)[[event]], (one.events, 1, 1))
     made = problem.model.simulate(one, own, np.tile(problem.step.substeps[[event]], one.events)).outputs[:, 0]
     made = made.reshape(one.channels, one.events, -1).swapaxes(0, 1)
-    shapes = np.zeros((len(steep), *drive.measured.shape))
+    shapes = np.zeros((len(made) - 1, *drive.measured.shape))
     shapes[:, :, part] = np.nan_to_num(made[1:] - made[0]) * (drive.weights[:, part] > 0)
     return shapes
+
+
+def _shifted(event: WaveEvent) -> list[WaveEvent]:
+    """The event with the offset that noise may have left in each component of its voltage, from the record on."""
+    size = LEFT * event.noise_U / np.sqrt(max(event.start - event.lead, 1))
+    there = np.arange(len(event.v)) >= event.lead
+    return [replace(event, v=event.v + there * size * way * event.turn.conj()) for way in (1.0, 1j)[: event.phases]]
 
 
 def offsets(drive: Drive) -> np.ndarray:
