@@ -26,7 +26,7 @@ DOMAINS = ("phasors", "waves")
 
 @functools.cache
 def model(motors, domain, *effects, static="none"):
-    motor = {"name": "groups", "of": list(motors)} if len(motors) > 1 else {"name": motors[0]}
+    motor = {"name": "motor_groups", "of": list(motors)} if len(motors) > 1 else {"name": motors[0]}
     made = [get("effect", name)() for name in effects]
     return compose(build("model/motor", motor), get("model/static", static)(), made, domain=domain)
 
@@ -79,7 +79,7 @@ def test_each_group_has_its_parameters():
     assert by_name["X_prime_2"].about == by_name["X_prime"].about + ", of group 2"
     assert of.motor.within_a_cycle
     assert of.title == "stator_flux + electromechanical + electromechanical motor and branch static load, on waveforms"
-    assert not build("model/motor", {"name": "groups"}).within_a_cycle
+    assert not build("model/motor", {"name": "motor_groups"}).within_a_cycle
 
 
 def test_groups_of_the_same_motor_stand_in_order_of_inertia():
@@ -104,18 +104,18 @@ def test_a_steady_state_that_a_group_lacks_names_the_group():
 
 def test_the_command_line_takes_a_list():
     assert overrides(["model/motor=[stator_flux, double_cage]", "seed=3"]) == [
-        "model/motor=groups", "model.motor.of=[stator_flux,double_cage]", "seed=3",
+        "model/motor=motor_groups", "model.motor.of=[stator_flux,double_cage]", "seed=3",
     ]  # fmt: skip
     assert overrides(["model/motor=stator_flux"]) == ["model/motor=stator_flux"]
     for several in ("model/motor=[a,b],c", "model/motor=[a,b],[c,d]"):
-        with pytest.raises(UserError, match="a sweep over lists is written model/motor=groups") as told:
+        with pytest.raises(UserError, match="a sweep over lists is written model/motor=motor_groups") as told:
             overrides([several])
         assert several in str(told.value)
 
 
 def test_a_list_of_motors_is_a_model_that_is_kept():
     made = tractexp.compose(motor=["stator_flux", {"name": "double_cage"}], static="branch", domain="waves")
-    assert made.node["motor"] == {"name": "groups", "of": ["stator_flux", {"name": "double_cage"}]}
+    assert made.node["motor"] == {"name": "motor_groups", "of": ["stator_flux", {"name": "double_cage"}]}
     assert compose(*parts(made.node)).names == made.model.names
     assert {"X_prime", "X_prime_2", "X_second_2"} <= set(made.parameters)
 
@@ -125,7 +125,7 @@ def test_a_list_of_motors_is_a_model_that_is_kept():
     [
         (["stator_flux"], "several motor groups are two or more, and model/motor=['stator_flux'] names 1"),
         (["stator_flux", "none"], "has 'none' in it, which is no motor by itself"),
-        (["groups", "stator_flux"], "has 'groups' in it, which is no motor by itself"),
+        (["motor_groups", "stator_flux"], "has 'motor_groups' in it, which is no motor by itself"),
         (["stator_flux", "stator_flx"], "there is no model/motor 'stator_flx'; did you mean 'stator_flux'?"),
         (["stator_flux", 3], "has 3 in its list; give a name, or a mapping of 'name' and settings"),
         (["stator_flux", {"nam": "x"}], "has {'nam': 'x'} in its list"),

@@ -279,7 +279,7 @@ def test_an_oscillation_at_supply_frequency_follows_a_sudden_dip_in_the_fifth_or
 
 
 def test_the_lists_above_are_all_there_is():
-    assert set(discover()["model/motor"]) == {*MOTORS, "none", "groups"}
+    assert set(discover()["model/motor"]) == {*MOTORS, "none", "motor_groups"}
     assert set(discover()["model/static"]) == set(STATICS)
 
 

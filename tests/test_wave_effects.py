@@ -42,26 +42,20 @@ def run(*names, motor="none", substeps=16, drive=DIPS, **chosen):
     return turned, response.outputs[2, 0]
 
 
-def smooth(name):
-    """A row of the drive between samples, and its slope."""
+def smooth(*names):
+    """A row of the drive between samples, or two as real and imaginary part, and its slope."""
     rows = dict(zip(INPUTS, DIPS.inputs, strict=True))
-    curve = CubicHermiteSpline(rows["t"], rows[name], rows[SMOOTH[name]])
+    value, rate = (sum(unit * rows[n] for unit, n in zip((1, 1j), which, strict=False)) for which in
+                   (names, [SMOOTH[n] for n in names]))  # fmt: skip
+    curve = CubicHermiteSpline(rows["t"], value, rate)
     return curve, curve.derivative()
 
 
-def voltage():
-    (d, d_rate), (q, q_rate) = smooth("v_d"), smooth("v_q")
-    return lambda t: d(t) + 1j * q(t), lambda t: d_rate(t) + 1j * q_rate(t)
-
-
 def solved(slope, start):
-    """States (k, N), complex: DOP853 from sample to sample."""
-    t, y, out = DIPS.inputs[INPUTS.index("t")], np.asarray(start, dtype=complex), []
-    for k, s in enumerate(t):
-        out.append(y)
-        if k + 1 < len(t):
-            y = solve_ivp(slope, (s, t[k + 1]), y, "DOP853", rtol=1e-10, atol=1e-12).y[:, -1]
-    return np.array(out).T
+    """States (k, N), complex."""
+    t = DIPS.inputs[INPUTS.index("t")]
+    start = np.asarray(start, dtype=complex)
+    return solve_ivp(slope, (0, t[-1]), start, "DOP853", t, rtol=1e-9, atol=1e-11, max_step=DIP.step).y
 
 
 # which there are
@@ -97,7 +91,7 @@ def branch_of(P, Q, v=1.0, r=0.3):
 
 def test_a_capacitor_draws_what_the_slope_of_the_voltage_says():
     b = 0.4
-    v, rate = voltage()
+    v, rate = smooth("v_d", "v_q")
     G, B, r = branch_of(P0, Q0 + b * OMEGA / OMEGA_N)
     (psi,) = solved(lambda t, y: OMEGA_N * v(t) - (r * OMEGA_N + 1j * OMEGA) * y, [1 / (r + 1j * OMEGA / OMEGA_N)])
     t = DIPS.inputs[INPUTS.index("t")]
@@ -114,7 +108,7 @@ def test_a_feeder_is_its_circuit():
     v_0 = 1 - R * i_0 - R_p * (i_0 - inductor_0)
     left = v_0 * np.conj(i_0)
     G, B, r = branch_of(left.real, left.imag, v_0)
-    v, _ = voltage()
+    v, _ = smooth("v_d", "v_q")
     at = lambda t, y: (v(t) + R_p * y[0] - (R + R_p) * B * y[1]) / (1 + (R + R_p) * G)  # noqa: E731
 
     def slope(t, y):
@@ -160,7 +154,7 @@ def test_the_zero_sequence_follows_its_branch():
     v, _ = smooth("v_zero")
     (psi,) = solved(lambda t, y: OMEGA_N * (v(t) - r * y), [0.0])
     assert np.abs(run("zero_sequence_path", zero_susceptance=b, zero_resistance=r)[1] - b * psi.real).max() < 1e-6
-    assert b * psi.real.max() > 0.5
+    assert b * psi.real.max() > 0.2
 
 
 def test_a_second_group_is_two_motors_side_by_side():

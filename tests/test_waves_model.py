@@ -189,7 +189,7 @@ def test_before_the_event_nothing_moves(names):
 def test_the_pairs_are_all_there_is():
     refused = {"mechanical", "exponential_frequency"}
     assert {p[0] for p in PAIRS} == set(MOTORS) | {"none"}
-    assert set(discover()["model/motor"]) == set(MOTORS) | {"none", "mechanical", "groups"}
+    assert set(discover()["model/motor"]) == set(MOTORS) | {"none", "mechanical", "motor_groups"}
     assert {p[1] for p in PAIRS} == set(STATICS)
     assert set(discover()["model/static"]) == set(STATICS) | refused - {"mechanical"}
 

@@ -117,22 +117,28 @@ def _linear(eq, drop_0):
         inside, rate = eq.lag_vector("feeder_drop", "w"), eq[sites.bus_voltage_rate]
         drop = eq.recorded_voltage - known[eq.v]
         known[rate] = eq.expression(sites.bus_voltage_rate) - (drop - inside) / DAMPED
-    whole = eq.expand(eq.expression(sites.current), lambda s: s not in known)
+    reads = set(known)  # and what is written in it
+    while more := {s for s, e in eq.definitions.items() if s not in reads and e.free_symbols & reads}:
+        reads |= more
+    whole = eq.expand(eq.expression(sites.current), lambda s: s in reads and s not in known)
     eq.define("feeder_drawn", eq.expression(sites.current), "i")
     parts = eq.parts(whole.xreplace(known))
     J = [[sympy.diff(part, axis) for axis in (x, y)] for part in parts]
     if any(row.has(x, y) for rows in J for row in rows):
         raise Unfit("its current is not linear in the voltage at an instant")
-    return inside, J, [part.xreplace({x: sympy.Integer(0), y: sympy.Integer(0)}) for part in parts]
+    rest = [part.xreplace({x: sympy.Integer(0), y: sympy.Integer(0)}) for part in parts]
+    J = [[eq.compute(f"feeder_{r}{c}", e) if e != 0 else e for c, e in zip("dq", row, strict=True)]
+         for r, row in zip("dq", J, strict=True)]  # fmt: skip
+    return inside, J, [eq.compute(f"feeder_{r}", e) for r, e in zip("dq", rest, strict=True)]
 
 
 def _solved(eq, R, J, rest, source):
     """v of v + R (J v + rest) = source."""
     import sympy
 
-    d, q = (s - R * r for s, r in zip(eq.parts(source), rest, strict=True))
+    d, q = (eq.compute(f"feeder_source_{k}", s - R * r) for k, s, r in zip("dq", eq.parts(source), rest, strict=True))
     (a, b), (c, e) = ((J[0][0] * R + 1, J[0][1] * R), (J[1][0] * R, J[1][1] * R + 1))
-    whole = a * e - b * c
+    whole = eq.compute("feeder_whole", a * e - b * c)
     eq.require(
         1 + R * eq.P0 / eq.U0**2,
         "R_f + R_p is negative beyond the resistance that the load may be, so that no current settles; raise X_f",

@@ -39,6 +39,7 @@ class SecondMotorGroup(Effect):
         for symbol in moving:
             state, slower = eq.states[symbol], inertia_ratio if symbol == omega else 1
             eq.moves(twins[symbol], state.derivative.xreplace(twins) / slower, state.initial)
+            eq.states[twins[symbol]].derived = state.derived
         for site in _drawn(eq):
             second = twins[eq[site]]
             eq.edit(site, lambda own, second=second: (1 - group_share) * own + group_share * second)

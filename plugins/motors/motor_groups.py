@@ -7,7 +7,7 @@ from tractexp.extend import Motor, UserError, build, plugin, sites
 
 
 @plugin
-class Groups(Motor):
+class MotorGroups(Motor):
     r"""Several groups of motors at one bus, each with parameters, fluxes and a speed of its own.
 
         I = I_1 + I_2 + ...,        P_d + j Q_d = V I*
