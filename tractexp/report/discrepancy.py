@@ -341,7 +341,11 @@ def _disagreement(made: Page, found: Investigation) -> None:
 def _noise(made: Page, found: Investigation) -> None:
     level, free = found.bench.describe(found.last.noise), joined(found.catalogue.of_measurement)
     if found.bench.waves:
-        faults = f" Faults of the measurement ({free}) are free in every fit, and not judged." * bool(free)
+        unjudged = found.last.noise.loudest_blur > found.bench.criteria.blurred
+        how = (
+            "and not judged: these offsets and edges would pass for them" if unjudged else "each held by what is likely"
+        )
+        faults = f" Faults of the measurement ({free}) are free in every fit, {how}." * bool(free)
         made.heading("Noise").text(f"{level}. {NOISE_OF_WAVES}{faults}")
         return
     made.heading("Noise").text(
