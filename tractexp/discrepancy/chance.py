@@ -45,7 +45,7 @@ def chance_at(t: Tangent, noise: Noise, quiet: QuietNoise, seed: int, plain: boo
     if plain or bench.criteria.knows_noise(worth):  # two numbers tell that of waveforms
         return _collected(t, [t.whitened(noise, drawn)], noise)
     rest = rich_residuals(t, drawn)
-    return _collected(t, [t.whitened(quiet.of(rest[b]), drawn[b : b + 1]) for b in range(draws)], noise)
+    return _collected(t, [t.whitened(quiet.of(t.unit, rest[b]), drawn[b : b + 1]) for b in range(draws)], noise)
 
 
 def _collected(t: Tangent, projections: list[Projection], noise: Noise) -> Chance:

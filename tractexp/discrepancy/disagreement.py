@@ -94,7 +94,7 @@ def examined(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int, plain: bool
     """All tests at one fit, under the noise of what no candidate explains there; `plain` takes it as known."""
     bench = quiet.bench
     t = tangent(bench, fit, noise)
-    noise = quiet.of(rich_residuals(t, t.residual[None])[0], t.residual, t.explaining)
+    noise = quiet.of(fit.unit, rich_residuals(t, t.residual[None])[0], t.residual, t.explaining)
     fit = refit(bench, noise, [(fit.names, fit.unit)])[0]
     t = tangent(bench, fit, noise)
     projection = t.whitened(noise)

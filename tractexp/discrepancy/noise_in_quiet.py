@@ -11,7 +11,7 @@ import numpy as np
 
 from tractexp.discrepancy.bench import Bench
 from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.observed import answers, offsets
+from tractexp.identification.observed import answers, unsure
 from tractexp.identification.problem import Problem
 from tractexp.noise import Noise
 from tractexp.noise.quiet import estimate
@@ -26,15 +26,12 @@ class QuietNoise:
 
     bench: Bench
     blur: np.ndarray | None  # of the voltage's noise, None where it has none; of waveforms, of the currents' offsets
-    answers: tuple[np.ndarray, np.ndarray] | None = None  # of waveforms, to a wrong sample of the voltage
 
     @classmethod
     def at(cls, bench: Bench, unit: np.ndarray) -> "QuietNoise":
         """Where errors of the voltage act as they do on the base model at coordinates (D,)."""
         if bench.waves:
-            bare = Likelihood.of(bench.kernels.bare)
-            own = np.r_[unit[bench.coordinates.base], unit[bench.coordinates.before]]
-            return cls(bench, offsets(bench.drive), answers(bench.kernels.bare, bare.values(own)))
+            return cls(bench, unsure(bench.problem, _values(bench, unit)))
         most = bench.records.voltage_errors
         if not most:
             return cls(bench, None)
@@ -44,17 +41,24 @@ class QuietNoise:
 
     def of_fit(self, unit: np.ndarray) -> Noise:
         """The noise of the quiet residuals at coordinates (D,)."""
-        return self.of(self.bench.residuals(unit[None])[0])
+        return self.of(unit, self.bench.residuals(unit[None])[0])
 
-    def of(self, residual: np.ndarray, left: np.ndarray | None = None, columns: np.ndarray | None = None) -> Noise:
-        """The noise of one residual (C, N) in quiet stretches.
+    def of(
+        self,
+        unit: np.ndarray,
+        residual: np.ndarray,
+        left: np.ndarray | None = None,
+        columns: np.ndarray | None = None,
+    ) -> Noise:
+        """The noise of one residual (C, N) in quiet stretches, at coordinates (D,).
 
         What a fit leaves (C, N), and columns of all that could explain it (k, C, N), tell more of how the load wanders.
+        Of waveforms the model there tells how noise of the voltage is passed on.
         """
         bench = self.bench
-        if self.answers is not None:
-            phases = bench.records.phases
-            return of_waves(residual, bench.known, bench.quiet, self.answers, phases, self.blur)
+        if bench.waves:
+            passed, phases = answers(bench.problem, _values(bench, unit)), bench.records.phases
+            return of_waves(residual, bench.known, bench.quiet, passed, phases, self.blur)
         wander = functools.partial(self._wander, left, columns)
         return estimate(residual, bench.known, bench.quiet, wander, self.blur)
 
@@ -79,6 +83,11 @@ def white(bench: Bench) -> Noise:
     each = zip(*(e.levels for e in bench.events), strict=True)
     levels = [float(np.sqrt(np.mean([level**2 for level in channel]))) for channel in each]
     return Noise(Noise.white(*levels).pairs, np.eye(len(levels)))
+
+
+def _values(bench: Bench, unit: np.ndarray) -> np.ndarray:
+    """Free values (d,) of the problem of everything at coordinates (D,)."""
+    return Likelihood.of(bench.problem).values(unit)
 
 
 def _at_voltage(bench: Bench, events: tuple[Event, ...] | list[Event], unit: np.ndarray) -> np.ndarray:

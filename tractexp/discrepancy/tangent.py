@@ -24,6 +24,7 @@ class Tangent:
     """Raw residuals and differences at a fit; `whitened` turns them into a `Projection` under a noise model."""
 
     bench: Bench
+    unit: np.ndarray  # (D,) coordinates of the fit
     residual: np.ndarray  # (C, N)
     nuisance: np.ndarray  # (k, C, N)
     prior: np.ndarray  # (k, k) prior rows of the nuisances, whitened
@@ -106,7 +107,9 @@ def tangent(bench: Bench, fit: Refit, noise: Noise) -> Tangent:
     fitted = {*at.base, *at.parameters(fit.names)}
     split = _by_event(bench, nuisance[[i for i, c in enumerate(nuisances) if c in fitted and i not in held]])
     walls = tuple(nuisances[i] for i in sorted(held))
-    return Tangent(bench, base, nuisance, prior, departure, members, tuple(columns), split, cells, groups, walls)
+    return Tangent(
+        bench, fit.unit, base, nuisance, prior, departure, members, tuple(columns), split, cells, groups, walls
+    )
 
 
 def resting(bench: Bench, unit: np.ndarray, columns: Sequence[int], gradient: np.ndarray) -> np.ndarray:

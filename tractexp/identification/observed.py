@@ -12,7 +12,7 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.identification.problem import Problem, excitation, excited
-from tractexp.model.drive import Drive
+from tractexp.model.drive import EVENT, INPUTS, Drive
 from tractexp.noise.color import SMALLEST
 from tractexp.noise.model import Noise
 from tractexp.noise.quiet import estimate, quiet_stretches
@@ -22,6 +22,8 @@ from tractexp.noise.waves import of_waves
 from tractexp.record import Event, WaveEvent
 
 OFFSET = 0.005  # pu: what may be left of a channel's offset, which the mean before the dip took off
+EDGY, MOST_EDGES = 8.0, 40  # times the median by which slopes of the voltage differ that are unsure, and of how many
+LEFT = 2.0  # times what white noise leaves of an offset that the mean before the dip took off
 ANSWERED = 8  # samples of the lead after which a single wrong sample of the voltage is put there
 LEAST_KEPT = 0.2  # of a residual's variance: where the fit takes more, it tells nothing of the noise
 # Twice the log-likelihood from which a load is said to wander. An investigation asks for less: a wandering that is not
@@ -104,10 +106,10 @@ class Observed:
     def blurred(self, values: np.ndarray) -> np.ndarray | None:
         """What errors of the voltage do to the power at free values (d,): (k, 2, N) [pu], None where it has none.
 
-        Of waveforms, whose voltage stands as recorded, the offsets (k, 3, N) that the current's channels may have.
+        Of waveforms, whose voltage stands as recorded, what `unsure` tells.
         """
         if self.problem.model.waves:
-            return offsets(self.drive)
+            return unsure(self.problem, values)
         most = max(len(s.errors) for s in self.smoothed)
         if not most:
             return None
@@ -132,8 +134,7 @@ class Observed:
 
 
 def answers(problem: Problem, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What one standard deviation of a sample of the voltage does to the currents at
-    free values (d,), of waveforms.
+    """What one standard deviation of a sample of the voltage does to the currents at free values (d,), of waveforms.
 
     (L,) complex of the space vector and (L,) of the zero sequence, in the stationary frame, from shortly before
     that sample to the dip: what is smooth between samples is changed a little earlier. Of the first event.
@@ -150,6 +151,47 @@ def answers(problem: Problem, values: np.ndarray) -> tuple[np.ndarray, np.ndarra
     if event.phases == 1:
         return off[0, 0], np.zeros(1)
     return (off[0, 0] + 1j * off[1, 0] - 1j * (off[0, 1] + 1j * off[1, 1])) / 2, off[2, 2]
+
+
+def unsure(problem: Problem, values: np.ndarray) -> np.ndarray:
+    """What may be wrong with waveforms and is no noise, as the currents show it at free values (d,), (k, 3, N) [pu].
+
+    The offsets that the channels may have, those of the voltage as the model passes them on, and how steep the voltage
+    is at the samples of its edges: there two curves through the same samples differ.
+    """
+    shapes = [offsets(problem.drive), *(_of_voltage(problem, values, e) for e in range(problem.drive.events))]
+    return np.concatenate(shapes)
+
+
+def _of_voltage(problem: Problem, values: np.ndarray, event: int) -> np.ndarray:
+    """What offsets of the voltage and another slope at each sample of its edges do in one event, (k, 3, N)."""
+    from scipy.interpolate import CubicSpline
+
+    drive, part = problem.drive, problem.drive.part(event)
+    v, slope = (drive.inputs[[INPUTS.index(f"v_{c}{end}") for c in "dq"], part] for end in ("", "_rate"))
+    step = float(drive.event[event, EVENT.index("step")])
+    off = CubicSpline(np.arange(v.shape[1]), v, axis=1)(np.arange(v.shape[1]), 1) / step - slope
+    size = np.linalg.norm(off, axis=0)
+    steep = np.flatnonzero(size > EDGY * max(float(np.median(size)), SMALLEST))
+    steep = steep[np.argsort(-size[steep], kind="stable")[:MOST_EDGES]]
+    plain = [problem.events[event]] * (len(steep) + 1)
+    one = Drive.of([excited(e, problem.model) for e in (*plain, *_shifted(problem.events[event]))])
+    for k, sample in enumerate(steep, start=1):
+        for c, name in enumerate(("v_d_rate", "v_q_rate")):
+            one.inputs[INPUTS.index(name), one.first[k] + sample] += off[c, sample]
+    own = np.tile(problem.by_event(values)[[event]], (one.events, 1, 1))
+    made = problem.model.simulate(one, own, np.tile(problem.step.substeps[[event]], one.events)).outputs[:, 0]
+    made = made.reshape(one.channels, one.events, -1).swapaxes(0, 1)
+    shapes = np.zeros((len(made) - 1, *drive.measured.shape))
+    shapes[:, :, part] = np.nan_to_num(made[1:] - made[0]) * (drive.weights[:, part] > 0)
+    return shapes
+
+
+def _shifted(event: WaveEvent) -> list[WaveEvent]:
+    """The event with the offset that noise may have left in each component of its voltage, from the record on."""
+    size = LEFT * event.noise_U / np.sqrt(max(event.start - event.lead, 1))
+    there = np.arange(len(event.v)) >= event.lead
+    return [replace(event, v=event.v + there * size * way * event.turn.conj()) for way in (1.0, 1j)[: event.phases]]
 
 
 def offsets(drive: Drive) -> np.ndarray:

@@ -57,11 +57,8 @@ class Noise:
 
     @functools.cached_property
     def loudest_blur(self) -> float:
-        """The largest variance that noise of the voltage causes at any sample, over that of the power.
-
-        Of currents the shapes are offsets, which come from no voltage.
-        """
-        return 0.0 if self.blur is None or self.channels > 2 else float((self._mixed(self.blur) ** 2).sum(axis=0).max())
+        """The largest variance that noise of the voltage causes at any sample, over that of the power."""
+        return 0.0 if self.blur is None else float((self._mixed(self.blur) ** 2).sum(axis=0).max())
 
     def scaled(self, factor: float) -> "Noise":
         """The same noise, `factor` times as loud."""

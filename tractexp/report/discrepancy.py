@@ -35,7 +35,9 @@ REFITTED, ESTIMATED = "#0072B2", "#9A9A9A"
 BAR, ROOM = 24, 1.2  # pixels; of the longest bar, for what stands beside the bars
 NOISE_OF_WAVES = (
     "It is estimated before the dip and at the end of the record, from what the fit leaves there: harmonics that no"
-    " equation explains count as noise. Beside it each current may keep a small offset."
+    " equation explains count as noise; noise of the voltage is passed on as the model does. Beside it each channel may"
+    " keep a small offset, and how steep the voltage is at the samples of an edge is known no better than two curves"
+    " through them agree."
 )
 MOST_SETS = 12  # that are compared in a table
 CURRENTS = (
@@ -339,7 +341,11 @@ def _disagreement(made: Page, found: Investigation) -> None:
 def _noise(made: Page, found: Investigation) -> None:
     level, free = found.bench.describe(found.last.noise), joined(found.catalogue.of_measurement)
     if found.bench.waves:
-        faults = f" Faults of the measurement ({free}) are free in every fit, each held by what is likely." * bool(free)
+        unjudged = found.last.noise.loudest_blur > found.bench.criteria.blurred
+        how = (
+            "and not judged: these offsets and edges would pass for them" if unjudged else "each held by what is likely"
+        )
+        faults = f" Faults of the measurement ({free}) are free in every fit, {how}." * bool(free)
         made.heading("Noise").text(f"{level}. {NOISE_OF_WAVES}{faults}")
         return
     made.heading("Noise").text(
