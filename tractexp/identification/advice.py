@@ -52,7 +52,7 @@ def _deeper(known: Uncertainty) -> list[str]:
     without_figures = (
         f"for {named}: record a dip of another depth and fit it together, or fix what stays open by model.fixed"
     )
-    if problem.per_event or problem.model.waves:
+    if problem.per_event:
         return [without_figures]
     deepest = int(np.argmax([e.depth for e in problem.events]))
     shape, noise = Shape.of(problem.events[deepest]), known.likelihood.noise.of(deepest)
