@@ -13,9 +13,10 @@ SYSTEM = 100.0  # MVA, the system base of ANDES
 class Andes(Format):
     """Tables of an ANDES case in JSON: the bus, the motor, and the static load with the PQ it replaces.
 
-    `electromechanical`, and `stator_flux` without its transients, is Motor3 and `double_cage` Motor5, on a machine base equal to the record's, with constant load
-    torque (c1 = T_m) and the T-circuit of `tractexp.exchange.circuit`; `exponential` and `exponential_frequency` are
-    FLoad, the other static loads ZIP. Add the tables to a case and connect the bus.
+    `electromechanical`, and `stator_flux` without its transients, is Motor3 and `double_cage` Motor5, on a machine base
+    equal to the record's, with constant load torque (c1 = T_m) and the T-circuit of `tractexp.exchange.circuit`;
+    `exponential` and `exponential_frequency` are FLoad, the other static loads ZIP. Add the tables to a case and
+    connect the bus.
 
     Not to be confused with a complete case: there is no source in it.
 

@@ -10,8 +10,9 @@ class PsseDyr(Format):
 
     CIM5BL: bus, model, load, IT, RA, XA, XM, R1, X1, R2, X2, E1, S(E1), E2, S(E2), MBASE, PMULT, H, VI, TI, TB, D,
     TNOM. Type 1, no saturation, constant torque (D = 0), no undervoltage trip (VI = 0); MBASE is the record's base.
-    R2 = X2 = 0 is a single cage; of `stator_flux` the stator's transients are left out. IEELBL: three terms a V^n each for P and for Q, then the frequency coefficients, then
-    the exponents, n1..n6; coefficients are divided by U_0^n, because V is the bus voltage and not U/U_0.
+    R2 = X2 = 0 is a single cage; of `stator_flux` the stator's transients are left out. IEELBL: three terms a V^n
+    each for P and for Q, then the frequency coefficients, then the exponents, n1..n6; coefficients are divided by
+    U_0^n, because V is the bus voltage and not U/U_0.
 
     Not to be confused with the power flow data: the two loads and their MW and Mvar must be in the .raw file.
 

@@ -104,8 +104,9 @@ def plan(
     `rate` [1/s] or `noise` (standard deviation, as a share of P before the event; white) are given. With `domain`
     "waves" it is a balanced dip in which the voltage's phase jumps by `jump` [degrees], and the noise is that of the
     sampled currents, as a share of P before the event, too. `values` are what is planned at: "fit", the estimate of
-    that record; "default", the model's; an identification; or the path of a `result.json`. Of several records those that tell most together are chosen, until another one narrows the intervals
-    by less than the share `least`, at most `events` of them. The model is as in `tractexp.identify`.
+    that record; "default", the model's; an identification; or the path of a `result.json`. Of several records those
+    that tell most together are chosen, until another one narrows the intervals by less than the share `least`, at most
+    `events` of them. The model is as in `tractexp.identify`.
 
     Raises `UserError` for wrong names or values, and for a model with `per_event`.
     """
