@@ -22,7 +22,7 @@ AXES = {  # of a scan: what its axis says, and what a value is multiplied by
     RATE: ("samples per second", 1.0),
     NOISE: ("noise [% of P before the dip]", 100.0),
     JUMP: ("phase jump [degrees]", 1.0),
-    CURRENT_NOISE: ("noise of the currents [% of P before the dip]", 100.0),
+    CURRENT_NOISE: ("noise of the currents [% of P]", 100.0),
 }
 LINES = [(color, dash) for dash in ("solid", "dash", "dot") for color in PALETTE]
 CEILING = 10.0  # times the value: wider intervals are not told
