@@ -15,10 +15,11 @@ from tractexp.model.model import compose
 from tractexp.plugin import discover, get
 
 MOTORS = ("mechanical", "voltage", "electromechanical", "stator_flux", "double_cage")
-STATICS = ("exponential", "zip", "constant_impedance", "constant_power", "exponential_frequency", "none")
+STATICS = ("exponential", "zip", "constant_impedance", "constant_power", "exponential_frequency", "branch", "none")
 VALUES = {
     "T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "R_s": 0.02, "T_second": 0.01,
     "X_second": 0.18, "p_v": 1.4, "q_v": 3.0, "a_Z": 0.4, "a_I": 0.3, "b_Z": 0.7, "b_I": 0.2, "p_f": 1.3, "q_f": -1.1,
+    "branch_resistance": 0.3,
 }  # fmt: skip
 
 
@@ -278,7 +279,7 @@ def test_an_oscillation_at_supply_frequency_follows_a_sudden_dip_in_the_fifth_or
 
 
 def test_the_lists_above_are_all_there_is():
-    assert set(discover()["model/motor"]) == {*MOTORS, "none"}
+    assert set(discover()["model/motor"]) == {*MOTORS, "none", "motor_groups"}
     assert set(discover()["model/static"]) == set(STATICS)
 
 

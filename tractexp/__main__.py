@@ -69,14 +69,14 @@ def _run() -> int:
 
     from tractexp.choices import CONF
     from tractexp.config import register
-    from tractexp.overrides import override
+    from tractexp.overrides import overrides
     from tractexp.provenance import started
     from tractexp.refusal import explained
 
     register()
     started(sys.argv[1:])
     os.environ[FULL_ERROR] = "1"  # let exceptions through: they are told below, in one sentence
-    sys.argv[1:] = map(override, sys.argv[1:])
+    sys.argv[1:] = overrides(sys.argv[1:])
     refusals: list[UserError] = []
 
     @hydra.main(version_base="1.3", config_path=str(CONF), config_name="config")

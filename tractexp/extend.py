@@ -11,7 +11,7 @@ from tractexp.model.drive import EVENT, INPUTS
 from tractexp.model.parts import Effect, Measurement, Motor, Static
 from tractexp.model.unfit import Unfit
 from tractexp.parameter import Parameter
-from tractexp.plugin import plugin
+from tractexp.plugin import build, plugin
 from tractexp.record import Base, Events, Reader, Record
 from tractexp.recording import Channel, Connection, Estimator, Recording, Segment, Writer
 from tractexp.recording.reader import WaveformReader
@@ -40,6 +40,7 @@ __all__ = [
     "UserError",
     "WaveformReader",
     "Writer",
+    "build",
     "check_choice",
     "check_range",
     "plugin",

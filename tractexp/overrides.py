@@ -2,8 +2,10 @@
 
 import re
 import shlex
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+
+from tractexp.errors import UserError
 
 # settings that take names of their own
 OPEN = (
@@ -14,6 +16,33 @@ NAMING = ("data.", "task.", "tracking.", "hydra.run.dir", "hydra.sweep.dir")  # 
 MARKS = set(",'\"[](){}\\")  # which a name within a list cannot have as it stands
 WORD = re.compile(r"[^\W\d_].*[^\W\d_]|[^\w.+\-]")  # in what is no number
 PLAIN = re.compile(r"[A-Za-z0-9_./:\-]*", re.ASCII)  # what Hydra's grammar takes as it stands
+
+
+def overrides(arguments: Iterable[str]) -> list[str]:
+    """The command's arguments as Hydra reads them.
+
+    `model/motor=[a,b]` is several motors, for which Hydra would merge the settings of both.
+    """
+    made = []
+    for argument in arguments:
+        group, _, value = argument.partition("=")
+        made += _several(group, value) if group == "model/motor" and "[" in value else [override(argument)]
+    return made
+
+
+def _several(group: str, value: str) -> list[str]:
+    """The overrides that a list chosen in a group stands for."""
+    from tractexp.plugin import of_several
+
+    listed = _parts(value.strip()[1:-1])
+    node = of_several(group, [part.strip() for part in listed])
+    name, ((setting, names),) = node.pop("name"), node.items()
+    key = f"{group.replace('/', '.')}.{setting}"
+    if not (value.strip().startswith("[") and value.strip().endswith("]")) or any("[" in part for part in listed):
+        raise UserError(
+            f"{group}={value} is not one list of names; a sweep over lists is written {group}={name} {key}=[a,b],[c,d]"
+        )
+    return [f"{group}={name}", f"{key}=[{','.join(names)}]"]
 
 
 def override(argument: str) -> str:

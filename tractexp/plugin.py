@@ -15,7 +15,7 @@ import functools
 import importlib
 import inspect
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
@@ -39,6 +39,13 @@ class Plugin:
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     chosen: ClassVar[bool] = True  # by a Hydra group; False: by names within a setting
     sourced: ClassVar[bool] = True  # the docstring must say where the equations come from
+    members: "tuple[Plugin, ...]" = ()  # plugins that it is made of
+    listed: ClassVar[str] = ""  # its setting that takes the names, where a list is chosen in its group
+
+    @property
+    def label(self) -> str:
+        """What sentences call it."""
+        return self.name
 
     def check(self) -> None:
         """Raise `UserError` for a setting out of range. Called once, when the plugin is built."""
@@ -242,6 +249,14 @@ def build(group: str, settings: Mapping[str, Any]) -> Any:
     made = cls(**chosen)
     made.check()
     return made
+
+
+def of_several(group: str, given: Sequence[Any]) -> dict[str, Any]:
+    """The node that a list of choices in one group stands for. Raises `UserError` in a group of which one is chosen."""
+    for name, cls in discover().get(group, {}).items():
+        if cls.listed:
+            return {"name": name, cls.listed: list(given)}
+    raise UserError(f"{group}={list(given)} is a list; one name is chosen there")
 
 
 def chosen(group: str, given: Any) -> Any:

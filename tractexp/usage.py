@@ -14,6 +14,7 @@ FEW = 9  # names of a group that fit into two lines of the help, or three
 
 GROUPS = {
     "task": "what to do",
+    "domain": "what is compared",
     "model": "a motor and a static load",
     "model/motor": "the motor's equations",
     "model/static": "the static load's equations",
@@ -28,7 +29,14 @@ GROUPS = {
     "experiment": "a task with its settings, such as a table of the paper",
     "hydra/launcher": "where the jobs of a sweep run; by default on the cores of this computer",
 }
-LATER = ("task", "format", "writer", "hydra/launcher")  # groups that the help has told, or leaves to `tractexp list`
+LATER = (
+    "task",
+    "connection",
+    "estimator",
+    "format",
+    "writer",
+    "hydra/launcher",
+)  # groups that the help has told, or leaves to `tractexp list`
 
 TEXT = """\
 tractexp: identify the parameters of a traction load from recorded voltage dips

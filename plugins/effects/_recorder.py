@@ -7,7 +7,7 @@ from numba import njit
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def earlier(y, lag, out):
-    """Write y (2, n, N) as it was `lag` (n,) samples earlier to `out`; y keeps its first and last value beyond them.
+    """Write y (C, n, N) as it was `lag` (n,) samples earlier to `out`; y keeps its first and last value beyond them.
 
     Between samples y is the cubic of Catmull and Rom (1974).
     """
@@ -17,7 +17,7 @@ def earlier(y, lag, out):
         r = lag[k] - whole
         far, near = r * r * (r - 1) / 2, r * (1 + r * (4 - 3 * r)) / 2
         here, ahead = 1 + r * r * (3 * r - 5) / 2, -r * (1 - r) * (1 - r) / 2
-        for c in range(2):
+        for c in range(y.shape[0]):
             for i in range(last + 1):
                 at = i - whole
                 a, b = y[c, k, min(max(at - 2, 0), last)], y[c, k, min(max(at - 1, 0), last)]

@@ -1,9 +1,10 @@
 """Impedance between the recorded bus and the load."""
 
-from tractexp.extend import Effect, Parameter, plugin, sites
+from tractexp.extend import Effect, Parameter, Unfit, plugin, sites
 
 SOURCE = "WECC composite load model 2015 (jXxf, Rfdr + jXfdr)"
 ITERATIONS = 2
+DAMPED = 5e-5  # s: of waveforms, inductance over resistance of what lies beside the reactance
 STEEPEST = 0.3  # least slope Newton's method may see: near voltage collapse it would step too far
 
 
@@ -22,8 +23,19 @@ class FeederImpedance(Effect):
     from the v that the admittance before the event would give. At R_f = X_f = 0 the base model. Other parts, such as
     a capacitor, stay at the recorded bus.
 
+    In waveforms all parts lie behind it, a capacitor too, so that its resonance with the reactance is there. Beside the
+    reactance lies a resistance R_p = X_f/(omega_n T_p), T_p = 50 us, by which the voltage v of the bus is no state and
+    the null is the base model:
+
+        v = v_recorded - R_f i - R_p (i - i_L),   di_L/dt = (i - i_L)/T_p - j (omega_n + omega_s) i_L
+
+    The current i is a part linear in v and one of states, so that this is two linear equations; a capacitor sees the
+    slope of v through a lag of T_p. Where all before the event leaves the static load is what its P and Q would be at
+    the recorded voltage.
+
     Source: WECC composite load model specification 2015 (feeder and transformer).
-    Departures: R_f and X_f are one impedance from bus to load; where a load has no solution (voltage collapse) the
+    Departures: R_f and X_f are one impedance from bus to load, of waveforms with R_p beside X_f (losses of a winding
+    at high frequencies; it takes 1.6 % of the current at 50 Hz); the zero sequence sees none of it; where a load has no solution (voltage collapse) the
     last iterate stands.
     """
 
@@ -35,6 +47,8 @@ class FeederImpedance(Effect):
     confused_with = ("stator_resistance", "dc_link_lag", "magnetic_saturation", "speed_dependent_torque")
 
     def refusal(self, eq):
+        if eq.waves:
+            return None
         if sites.P_motor not in eq or _affine(eq):
             return None
         return "its motor's current is not a + b V in the voltage V"
@@ -43,6 +57,9 @@ class FeederImpedance(Effect):
         import sympy
         from sympy import I, conjugate, im, re
 
+        if eq.waves:
+            _before_all(eq, R_f, X_f)
+            return
         Z, motor = R_f + I * X_f, sites.P_motor in eq
         loads = [eq[s] for s in (sites.P_motor, sites.P_static, sites.Q_motor, sites.Q_static) if s in eq]
         at_bus = [eq.before(power.xreplace(dict.fromkeys(loads, sympy.Integer(0)))) for power in (eq.P, eq.Q)]
@@ -63,6 +80,70 @@ class FeederImpedance(Effect):
         eq.edit(sites.static_voltage, lambda _: sympy.exp(x), shown=sympy.Abs(name) / sympy.Abs(V_0))
         square = re(current) ** 2 + im(current) ** 2
         eq.consume(R_f * square, X_f * square)
+
+
+def _before_all(eq, R_f, X_f):
+    """Of waveforms: every part sees the voltage behind R_f and the reactance with its R_p."""
+    from sympy import I
+
+    R_p, before = X_f / (eq.omega_n * DAMPED), (eq.P0 - I * eq.Q0) / eq.U0
+    in_reactance = eq.lag_vector("feeder_current", "i_L")
+    in_reactance_0 = before / (1 + I * DAMPED * (eq.omega_n + eq.omega_s0))
+    drop_0 = (R_f + R_p) * before - R_p * in_reactance_0
+
+    source = eq.recorded_voltage + R_p * in_reactance
+    inside, J, rest = _linear(eq, drop_0)
+    bus = _solved(eq, R_f + R_p, J, rest, source)
+    v = _computed(eq, "behind_feeder", bus, eq.U0 - drop_0)
+    drop = eq.recorded_voltage - eq.v
+    eq.edit(sites.bus_voltage, lambda recorded: v, shown=source - (R_f + R_p) * eq["feeder_drawn"])
+    if inside is not None:
+        eq.moves(inside, (drop - inside) / DAMPED, drop_0)
+        eq.edit(sites.bus_voltage_rate, lambda rate: rate - (drop - inside) / DAMPED)
+    speed = eq.omega_n + eq.omega_s
+    eq.moves(in_reactance, (eq["feeder_drawn"] - in_reactance) / DAMPED - I * speed * in_reactance, in_reactance_0)
+    lost = drop_0 * (eq.P0 + I * eq.Q0) / eq.U0
+    eq.lose(*eq.parts(lost))
+
+
+def _linear(eq, drop_0):
+    """Of waveforms: the state behind a capacitor's slope or None, and the current as J (x, y) + rest, v = x + j y."""
+    import sympy
+    from sympy import I
+
+    x, y = sympy.symbols("bus_x bus_y", real=True)
+    known, inside = {eq.v: x + I * y}, None
+    if sites.bus_voltage_rate in eq:
+        inside, rate = eq.lag_vector("feeder_drop", "w"), eq[sites.bus_voltage_rate]
+        drop = eq.recorded_voltage - known[eq.v]
+        known[rate] = eq.expression(sites.bus_voltage_rate) - (drop - inside) / DAMPED
+    reads = set(known)  # and what is written in it
+    while more := {s for s, e in eq.definitions.items() if s not in reads and e.free_symbols & reads}:
+        reads |= more
+    whole = eq.expand(eq.expression(sites.current), lambda s: s in reads and s not in known)
+    eq.define("feeder_drawn", eq.expression(sites.current), "i")
+    parts = eq.parts(whole.xreplace(known))
+    J = [[sympy.diff(part, axis) for axis in (x, y)] for part in parts]
+    if any(row.has(x, y) for rows in J for row in rows):
+        raise Unfit("its current is not linear in the voltage at an instant")
+    rest = [part.xreplace({x: sympy.Integer(0), y: sympy.Integer(0)}) for part in parts]
+    J = [[eq.compute(f"feeder_{r}{c}", e) if e != 0 else e for c, e in zip("dq", row, strict=True)]
+         for r, row in zip("dq", J, strict=True)]  # fmt: skip
+    return inside, J, [eq.compute(f"feeder_{r}", e) for r, e in zip("dq", rest, strict=True)]
+
+
+def _solved(eq, R, J, rest, source):
+    """v of v + R (J v + rest) = source."""
+    import sympy
+
+    d, q = (eq.compute(f"feeder_source_{k}", s - R * r) for k, s, r in zip("dq", eq.parts(source), rest, strict=True))
+    (a, b), (c, e) = ((J[0][0] * R + 1, J[0][1] * R), (J[1][0] * R, J[1][1] * R + 1))
+    whole = eq.compute("feeder_whole", a * e - b * c)
+    eq.require(
+        1 + R * eq.P0 / eq.U0**2,
+        "R_f + R_p is negative beyond the resistance that the load may be, so that no current settles; raise X_f",
+    )
+    return (e * d - b * q) / whole + sympy.I * (a * q - c * d) / whole
 
 
 def _solve(eq, Z, b, B, V_0):

@@ -22,6 +22,9 @@ class FrequencyDependence(Effect):
     k_qf = Parameter(0.0, (-6.0, 6.0), "1", "relative change of Q per relative change of frequency", SOURCE, null=0.0)
 
     reads = ("f",)
+    phasors_only = (
+        "the frame of waveforms turns at the frequency before the event, and what changes it is in the voltage"
+    )
     relevant = {"k_pf": 1.0, "k_qf": 1.0}
     confused_with = ("load_drift",)
 

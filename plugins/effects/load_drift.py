@@ -1,5 +1,7 @@
 """Load that drifts by itself during the record."""
 
+import numpy as np
+
 from tractexp.extend import Measurement, Parameter, plugin
 from tractexp.model.drive import INPUTS
 
@@ -12,7 +14,8 @@ class LoadDrift(Measurement):
 
         P -> P (1 + d_P t),   Q -> Q (1 + d_Q t),   t since the first sample of the event
 
-    At d_P = d_Q = 0 the base model.
+    In waveforms the currents change so, their parts in phase with the voltage before the event by d_P, those across it
+    by d_Q, and the zero sequence not at all. At d_P = d_Q = 0 the base model.
 
     Source: a straight line is the first term of any slow change.
     Departures: none.
@@ -28,6 +31,15 @@ class LoadDrift(Measurement):
         out = power.copy()
         for e in range(drive.events):
             part = drive.part(e)
-            for channel, name in zip(out, ("drift_P", "drift_Q"), strict=True):
-                channel[:, part] *= 1 + values[name][e][:, None] * drive.inputs[INPUTS.index("t"), part]
+            rows = dict(zip(INPUTS, drive.inputs[:, part], strict=False))
+            drift = (values[name][e][:, None] * rows["t"] for name in ("drift_P", "drift_Q"))
+            if "turn_re" not in rows:
+                for channel, more in zip(out, drift, strict=True):
+                    channel[:, part] *= 1 + more
+                continue
+            turn = rows["turn_re"] + 1j * rows["turn_im"]
+            seen = (out[0, :, part] + 1j * out[1, :, part]) * np.conj(turn)
+            along, across = drift
+            seen = turn * (seen + along * seen.real + 1j * across * seen.imag)
+            out[0, :, part], out[1, :, part] = seen.real, seen.imag
         return out

@@ -23,6 +23,7 @@ class NegativeSequenceBraking(Effect):
     negative_sequence = Parameter(0.0, (0.0, 10.0), "1", "size relative to the theory", SOURCE, "k_2", null=0.0)
 
     reads = ("U2",)
+    phasors_only = "in waveforms the motor's equations carry negative sequence and its torque themselves"
     relevant = {"negative_sequence": 0.5}
     confused_with = ("second_motor_group", "shunt_capacitor")
 

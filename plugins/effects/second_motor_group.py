@@ -39,14 +39,20 @@ class SecondMotorGroup(Effect):
         for symbol in moving:
             state, slower = eq.states[symbol], inertia_ratio if symbol == omega else 1
             eq.moves(twins[symbol], state.derivative.xreplace(twins) / slower, state.initial)
-        for site in (sites.P_motor, sites.Q_motor):
+            eq.states[twins[symbol]].derived = state.derived
+        for site in _drawn(eq):
             second = twins[eq[site]]
             eq.edit(site, lambda own, second=second: (1 - group_share) * own + group_share * second)
 
 
+def _drawn(eq):
+    """What the motor draws: its power, of waveforms its current."""
+    return (sites.motor_current,) if eq.waves else (sites.P_motor, sites.Q_motor)
+
+
 def _moving(eq):
     """The states the motor's power depends on, and those that these depend on in turn."""
-    found, read = set(), {eq[sites.P_motor], eq[sites.Q_motor]}
+    found, read = set(), {eq[site] for site in _drawn(eq)}
     while read:
         new = set().union(*(eq.expand(e).free_symbols for e in read)) & eq.states.keys() - found
         found |= new

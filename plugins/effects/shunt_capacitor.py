@@ -10,9 +10,11 @@ class ShuntCapacitor(Effect):
     """A capacitor bank at the bus, whose reactive power falls with the square of the voltage.
 
         Q -> Q - b U^2 (omega_s + omega_n)/omega_n
+        i -> i + b (dv/dt/omega_n + j (omega_s + omega_n)/omega_n v)      in waveforms
 
     Q_0 includes the bank, so the static load has b U_0^2 more. At b = 0 the base model. An exponent q_v near 2
-    hides it: without a switching of the bank or a change of frequency it is hardly seen.
+    hides it in phasors: without a switching of the bank or a change of frequency it is hardly seen. In waveforms every
+    edge and every harmonic of the voltage shows it.
 
     Source: WECC composite load model specification (Bss, Bfdr).
     Departures: none.
@@ -24,4 +26,4 @@ class ShuntCapacitor(Effect):
     confused_with = ("static_var_compensator", "negative_sequence_braking")
 
     def edit(self, eq, capacitor):
-        eq.consume(0, -capacitor * eq.U**2 * (1 + eq.omega_s / eq.omega_n))
+        eq.draw(eq.capacitor(capacitor))

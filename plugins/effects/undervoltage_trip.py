@@ -17,7 +17,8 @@ class UndervoltageTrip(Effect):
 
         P -> (1 - F g) P,   Q -> (1 - F g) Q,   g = 1 while tripped, down to 0 within T_b, else 0
 
-    At F = 0 the base model, whatever the thresholds.
+    At F = 0 the base model, whatever the thresholds. In waveforms the currents fall by F g, and the relay sees U, the
+    positive sequence of the last half cycle.
 
     Source: NERC 2016, Dynamic Load Modeling, app. A; WECC composite load model (one stage).
     Departures: levels count from the voltage before the event; thresholds are softened over 1 % of voltage and one
@@ -50,5 +51,5 @@ class UndervoltageTrip(Effect):
         eq.renews(above, high * (above + eq.step), 0)
         left = sympy.Max(0, tripped - returns * eq.step / (reconnect_ramp + eq.step))
         eq.renews(tripped, left + (1 - left) * goes, 0)
-        for site in (sites.P, sites.Q):
-            eq.edit(site, lambda power: power * (1 - tripped_share * tripped))
+        for site in (sites.current, sites.zero_current) if eq.waves else (sites.P, sites.Q):
+            eq.edit(site, lambda drawn: drawn * (1 - tripped_share * tripped))

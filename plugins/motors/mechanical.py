@@ -23,12 +23,20 @@ class Mechanical(Motor):
     Not to be confused with a constant-slip or constant-torque load: the slip moves. Not to be confused with the
     first-order *voltage* models of the literature, which keep the flux and drop the speed (see `voltage`).
 
+    Of waveforms it says nothing: a flux that is in equilibrium at each instant would let the current jump with every
+    jump of the voltage.
+
     Source: Wu, Fan, Zou 2022, Table 1 (mechanical transient model), Eq. (1) with dE/dt = 0 in the frame that
     turns with the voltage; Kundur 1994, Power System Stability and Control, section 7.2.
     Departures: the paper names the model and prints no equations for it.
     """
 
     T_prime, X_prime, C, M, T_m = _machine.T_PRIME, _machine.X_PRIME, _machine.C, _machine.M, _machine.T_M
+
+    phasors_only = (
+        "its fluxes are in equilibrium with the voltage, which may hold over cycles and never within one; take"
+        " model/motor=stator_flux or electromechanical, whose fluxes move"
+    )
 
     def declare(self, eq, T_prime, X_prime, C, M, T_m):
         from sympy import I, conjugate, re

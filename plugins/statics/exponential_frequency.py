@@ -27,6 +27,10 @@ class ExponentialFrequency(Static):
     q_f = Parameter(-1.0, (-4.0, 4.0), "1", "frequency exponent of reactive power", SOURCE)
 
     reads = ("f",)
+    phasors_only = (
+        "its frequency is a recorded channel, and a waveform has none; take model/static=branch, whose reactance"
+        " follows the frequency by itself"
+    )
 
     def law(self, u, f, p_v, q_v, p_f, q_f):
         return u**p_v * f**p_f, u**q_v * f**q_f

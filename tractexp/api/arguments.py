@@ -104,15 +104,17 @@ class Choice:
     node: Mapping[str, Any]
 
     @classmethod
-    def of(cls, group: str, chosen: "str | Mapping[str, Any] | Choice | None") -> "Choice":
-        """The choice of a name, or of a mapping of `name` and settings that replace the choice's own.
+    def of(cls, group: str, chosen: "str | Mapping[str, Any] | Sequence[Any] | Choice | None") -> "Choice":
+        """The choice of a name, of a mapping of `name` and settings that replace the choice's own, or of several.
 
         None is the default of `conf/config.yaml`.
         """
         if isinstance(chosen, Choice):
             return cls(chosen.name, completed(group, chosen.node))
         chosen = defaults()[group] if chosen is None else chosen
-        check_kind(group, chosen, str | Mapping[str, Any])
+        check_kind(group, chosen, str | Mapping[str, Any] | Sequence[Any])
+        if isinstance(chosen, Sequence) and not isinstance(chosen, str):
+            chosen = plugin.of_several(group, chosen)
         asked = {"name": chosen} if isinstance(chosen, str) else dict(chosen)
         if "name" not in asked:
             raise UserError(f"{group}={asked} lacks 'name'; give a name, or a mapping of 'name' and settings")

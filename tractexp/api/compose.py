@@ -89,7 +89,7 @@ class LoadModel(Portable, Tabulated):
 def compose(
     model: Any = None,
     *,
-    motor: str | Mapping[str, Any] | None = None,
+    motor: str | Mapping[str, Any] | Sequence[Any] | None = None,
     static: str | Mapping[str, Any] | None = None,
     effects: Sequence[str] | None = None,
     bounds: Mapping[str, Sequence[float]] | None = None,
@@ -102,11 +102,12 @@ def compose(
     """A load model: a choice of `conf/model` (by name, or the path of a YAML file), or a motor beside a static load.
 
     `motor` and `static` are names ("double_cage"; "none" for without), or mappings of `name` and the plugin's settings;
-    they replace those of `model`, and one left out is that of the paper's model. `effects` names what is added to the
-    equations. `bounds` {name: [lower, upper]} and `fixed` {name: value}, in the parameters' own units, are added to the
-    choice's; `per_event` names parameters with a value of their own in each event; `substeps` are Runge-Kutta steps per
-    sample, as many as needed by default; `integration` "printed" is Eq. (4) of the paper as it stands; with `domain`
-    "waves" the same equations draw sampled currents, and what phasors neglect is kept.
+    a list of motors is several groups side by side (["stator_flux", "double_cage"]). They replace those of `model`, and
+    one left out is that of the paper's model. `effects` names what is added to the equations. `bounds` {name: [lower,
+    upper]} and `fixed` {name: value}, in the parameters' own units, are added to the choice's; `per_event` names
+    parameters with a value of their own in each event; `substeps` are Runge-Kutta steps per sample, as many as needed
+    by default; `integration` "printed" is Eq. (4) of the paper as it stands; with `domain` "waves" the same equations
+    draw sampled currents, and what phasors neglect is kept.
 
     Raises `UserError` for an unknown name or an effect that does not fit the equations; the values are checked where
     the model is used.

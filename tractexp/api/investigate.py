@@ -42,11 +42,15 @@ class Question(Given):
 
 @dataclass(frozen=True)
 class Misfit:
-    """How far a model is from some events: relative errors of Eq. (20), and chi-squared per sample."""
+    """How far a model is from some events: relative errors of Eq. (20), and chi-squared per sample.
+
+    `epsilon_i` is that of the currents, where those are compared.
+    """
 
     epsilon_p: float
     epsilon_q: float
     chi2_per_sample: float
+    epsilon_i: float | None = None
 
 
 @dataclass(frozen=True)
@@ -182,16 +186,17 @@ class Investigation(Written):
         return _made(self.question, False)
 
     def table(self) -> Table:
-        rows = []
+        rows, waves = [], self.gap.train.before.epsilon_i is not None
         for label, gap in (("fitted", self.gap.train), ("held out", self.gap.validate)):
             stages = (("before", gap.before), ("after", gap.after)) if gap else ()
             for stage, misfit in stages if self.names else stages[:1]:
-                errors = [f"{misfit.epsilon_p:.3%}", f"{misfit.epsilon_q:.3%}", f"{misfit.chi2_per_sample:.3f}"]
+                errors = [f"{e:.3%}" for e in (misfit.epsilon_p, misfit.epsilon_q, misfit.epsilon_i) if e is not None]
+                errors.append(f"{misfit.chi2_per_sample:.3f}")
                 closed = f"{gap.closed:.0%}" if gap and stage == "after" and gap.closed is not None else ""
                 rows.append([label, stage, *errors, closed])
         left = self.remainder.said
         said = [self.reason, *self.sizes, *left, f"noise: {self.content['noise']}", f"next: {self.recommendation}"]
-        columns = ["events", "", "epsilon_p", "epsilon_q", "chi2 per sample", "gap closed"]
+        columns = ["events", "", "epsilon_p", "epsilon_q", *["epsilon_i"] * waves, "chi2 per sample", "gap closed"]
         return Table(columns, rows, f"{self.verdict.upper()} {' and '.join(self.names)}".strip(), said)
 
     def to_dict(self) -> dict[str, Any]:
@@ -240,17 +245,18 @@ def investigate(
     bounds: Mapping[str, Sequence[float]] | None = None,
     fixed: Mapping[str, float] | None = None,
     substeps: int | None = None,
+    domain: str | None = None,
     seed: int = 0,
     progress: Any = None,
 ) -> Investigation:
     """Find what a load model lacks: where it disagrees with the records, which effect explains that, and how sure.
 
     `records` are events of `tractexp.read`, or what it reads; all are fitted together. What is found is judged on those
-    of `validate`. `model` is the base model, as in `tractexp.identify`, with `bounds`, `fixed` and `substeps`. Only
-    `effects` are tested, by default the whole catalogue. `false_alarms` (0.001 to 0.5) is the probability of naming
-    anything where nothing is missing; `criteria` {name: value} are the other thresholds of the decisions, listed in
-    `tractexp.discrepancy.criteria`. The same `seed` gives the same bits. `progress`: None shows the stage, False does
-    not; a callable is told each stage.
+    of `validate`. `model` is the base model, as in `tractexp.identify`, with `bounds`, `fixed`, `substeps` and
+    `domain`: with "waves" the sampled currents are investigated. Only `effects` are tested, by default all there are.
+    `false_alarms` (0.001 to 0.5) is the probability of naming anything where nothing is missing; `criteria`
+    {name: value} are the other thresholds of the decisions, listed in `tractexp.discrepancy.criteria`. The same `seed`
+    gives the same bits. `progress`: None shows the stage, False does not; a callable is told each stage.
 
     Nothing is searched, so that there is no objective, optimizer or budget. Raises `UserError` for wrong names or
     values, for events that do not belong together, and for a model with `per_event`: the events share its parameters.
@@ -258,7 +264,7 @@ def investigate(
     check_range("seed", seed, 0)
     chosen = {"false_alarms": false_alarms, **(criteria or {})}
     _criteria(chosen)
-    base = model_of(model).with_(bounds=bounds, fixed=fixed, substeps=substeps)
+    base = model_of(model, domain).with_(bounds=bounds, fixed=fixed, substeps=substeps)
     if base.per_event:
         raise UserError(f"model.per_event={list(base.per_event)} has no meaning in an investigation; leave it out")
     train, held = dips_of("records", records, least=1), dips_of("validate", validate)

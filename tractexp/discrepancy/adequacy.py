@@ -27,5 +27,6 @@ def least_p(projection: Projection) -> np.ndarray:
 
 
 def channels_of(projection: Projection, bench: Bench) -> np.ndarray:
-    """Whitened, projected residuals (b, 2, N), without the rows of the prior."""
-    return projection.r[:, : 2 * bench.drive.samples].reshape(len(projection.r), 2, -1)
+    """Whitened, projected residuals (b, C, N), without the rows of the prior."""
+    size = bench.drive.measured.size
+    return projection.r[:, :size].reshape(len(projection.r), bench.drive.channels, -1)

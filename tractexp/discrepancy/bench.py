@@ -58,6 +58,11 @@ class Bench:
         return self.kernels.family.model
 
     @property
+    def waves(self) -> bool:
+        """Whether currents are compared, sample by sample, not the power of phasors."""
+        return self.load.waves
+
+    @property
     def events(self) -> tuple[Event, ...]:
         return self.records.events
 
@@ -72,13 +77,18 @@ class Bench:
 
     @functools.cached_property
     def known(self) -> np.ndarray:
-        """Which samples of P and Q count, (2, N)."""
+        """Which samples count, (C, N)."""
         return self.drive.weights > 0
 
     @property
     def samples(self) -> int:
-        """Values of P and Q that count."""
+        """Values that count: of P and Q, or of the currents."""
         return int(np.count_nonzero(self.known))
+
+    def describe(self, noise: Noise) -> str:
+        """Level and color of the noise of what is compared, as a run prints them."""
+        told = noise.describe(self.drive.spoken).split(", ")
+        return ", ".join(part for part, there in zip(told, [*self.known.any(axis=1), True], strict=True) if there)
 
     @functools.cached_property
     def profile(self) -> np.ndarray:
@@ -91,7 +101,7 @@ class Bench:
         return quiet_stretches(self.events, self.drive)
 
     def residuals(self, unit: np.ndarray, names: Sequence[str] | None = None, pushed: bool = False) -> np.ndarray:
-        """Calculated minus measured (n, 2, N) [pu] at coordinates (n, D) where effects but `names` are at their null.
+        """Calculated minus measured (n, C, N) [pu] at coordinates (n, D) where effects but `names` are at their null.
 
         By default any effect and any push may be there, at the price of the largest kernel.
         """
@@ -110,11 +120,11 @@ class Bench:
         return residuals
 
     def whiten(self, noise: Noise, residuals: np.ndarray) -> np.ndarray:
-        """Residuals (n, 2, N) as rows (n, 2 N) of independent unit variance."""
+        """Residuals (n, C, N) as rows (n, C N) of independent unit variance."""
         return noise.whiten(residuals, self.drive, self.known)
 
     def rows(self, unit: np.ndarray, noise: Noise, faults: Sequence[int], sets: Sequence[Sequence[str]]) -> np.ndarray:
-        """Whitened residuals (n, 2 N) of coordinates with a set of names each, then the prior of the free faults."""
+        """Whitened residuals (n, C N) of coordinates with a set of names each, then the prior of the free faults."""
         raw = self.residuals_of(unit, [(names, False) for names in sets])
         white = side_by_side(lambda part: self.whiten(noise, part), raw)
         at = self.coordinates

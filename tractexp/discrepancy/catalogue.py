@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.errors import UserError, among
+from tractexp.model.drive import PHASORS
 from tractexp.model.model import compose
 from tractexp.model.parts import Effect, Measurement, Motor, Static
 from tractexp.parameter import Parameter
@@ -68,7 +69,7 @@ class Catalogue:
 
 def catalogue(
     motor: Motor, static: Static, present: Sequence[Effect], events: Sequence[Event], only: Sequence[str] = (),
-    swing: float = 0.05,
+    swing: float = 0.05, domain: str = PHASORS,
 ) -> Catalogue:  # fmt: skip
     """The registered effects that the model lacks. `only` restricts it; faults of the measurement always stay.
     `swing` [Hz] is the change of the frequency that shows an effect of it.
@@ -80,7 +81,7 @@ def catalogue(
         if name not in registered:
             raise UserError(f"task.effects names '{name}', which is no effect{among(name, registered)}")
     here = {effect.name for effect in present}
-    base = compose(motor, static, present)
+    base = compose(motor, static, present, domain=domain)
     testable, untestable = [], {}
     for name in sorted(registered):
         effect = get("effect", name)()
@@ -96,7 +97,7 @@ def catalogue(
 def missing_channel(effect: Effect, events: Sequence[Event], swing: float) -> str:
     """The sentence why the recorded channels do not show this effect, "" where they do."""
     for channel in effect.reads:
-        if any(getattr(e.record, channel) is None for e in events):
+        if any(channel not in e.channels for e in events):
             return f"it is seen through {channel}, which is not recorded"
         if channel == "f" and all(np.ptp(e.record.f) < swing for e in events):
             return f"it is seen through the frequency, which moves by less than {swing:g} Hz"

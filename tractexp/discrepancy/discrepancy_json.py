@@ -14,6 +14,7 @@ from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import Estimate, estimates, own_parameters
 from tractexp.discrepancy.verdict import NAMED, UNEXPLAINED
 from tractexp.identification.adequacy import Grade
+from tractexp.model.drive import PHASORS
 from tractexp.wording import joined
 
 
@@ -39,7 +40,7 @@ def content(investigation: Investigation) -> dict[str, Any]:
         "adequacy": recommended.adequacy(investigation).told(),
         "held": recommended.held(investigation),
         "extended": "conf/model/extended.yaml" if investigation.names else None,
-        "noise": investigation.last.noise.describe(),
+        "noise": investigation.bench.describe(investigation.last.noise),
         "phasor_window": None if window is None else window.window,
         "false_alarm_rate": investigation.bench.criteria.false_alarms,
         "parameters": parameters(investigation),
@@ -81,10 +82,13 @@ def _nearest(investigation: Investigation) -> dict[str, Any] | None:
     assert near.rival.tests is not None
     unit, own = near.rival.fit.unit, own_parameters(investigation.bench, near.names)
     known = {e.parameter.name: e for e in estimates(near.rival.tests, unit, near.names)}
+    on = {"train": near.curves, "validate": near.carried} if investigation.bench.waves else {}
+    told = {role: both and {"before": _curves(both[0]), "after": _curves(both[1])} for role, both in on.items()}
     return {
         "effects": list(near.names),
         "explained": _number(near.fitted),
         "explained_held_out": _number(near.held_out),
+        **({"gap": told} if told else {}),
         "others": [{"effects": list(names), "explained": _number(share)} for names, share in near.others],
         "parameters": {name: _estimate(known[name]) for name in own},
     }
@@ -107,23 +111,21 @@ def _estimate(known: Estimate) -> dict[str, Any]:
 
 
 def write_left(investigation: Investigation, path: Path) -> Path:
-    """Write what the nearest candidates leave, measured less calculated [pu], as CSV: event, t [s], P, Q."""
+    """Write what the nearest candidates leave, measured less calculated [pu], as CSV: event, t [s], each channel."""
     drive, nearest = investigation.bench.drive, investigation.verdict.nearest
     near = investigation.train.before.calculated if nearest is None else nearest.calculated
-    lines = ["event,t,P,Q"]
+    lines = [",".join(["event", "t", *drive.names])]
     for e, event in enumerate(investigation.bench.events):
         left = drive.measured[:, drive.part(e)] - near[:, drive.part(e)]
-        rows = zip(event.record.t, *left, strict=True)
-        lines += [f"{event.record.name},{t:.9g},{P:.9g},{Q:.9g}" for t, P, Q in rows]
+        rows = list(zip(event.record.t, *left, strict=True))[event.first :]
+        lines += [",".join([event.record.name, *(f"{x:.9g}" for x in row)]) for row in rows]
     return files.write(path, "\n".join(lines) + "\n")
 
 
 def _curves(curves: Curves) -> dict[str, float]:
-    return {
-        "epsilon_p": curves.epsilon_p,
-        "epsilon_q": curves.epsilon_q,
-        "chi2_per_sample": curves.chi2_per_sample,
-    }
+    own = {} if curves.epsilon_i is None else {"epsilon_i": curves.epsilon_i}
+    errors = {"epsilon_p": curves.epsilon_p, "epsilon_q": curves.epsilon_q}
+    return errors | own | {"chi2_per_sample": curves.chi2_per_sample}
 
 
 def sets(investigation: Investigation) -> list[dict[str, Any]]:
@@ -164,6 +166,11 @@ def _number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
+def use_of(domain: str, conf: str) -> str:
+    """The command that runs the extended model, to be found in the folder `conf`."""
+    return f"python -m tractexp --config-dir {conf} {f'domain={domain} ' * (domain != PHASORS)}model=extended"
+
+
 def write_model(investigation: Investigation, node: dict[str, Any], path: Path) -> Path:
     """Write the extended model as a choice of the group `model`, usable at once through `--config-dir`."""
     import yaml
@@ -176,5 +183,6 @@ def write_model(investigation: Investigation, node: dict[str, Any], path: Path) 
         "bounds": {n: list(b) for n, b in node["bounds"].items()},
         "fixed": {**node["fixed"], **recommended.held(investigation)},
     } | {part: chosen for part, chosen in settings.items() if chosen}
-    head = "# The base model and what was found missing: python -m tractexp --config-dir <this conf> model=extended\n"
+    told = use_of(investigation.bench.load.domain, "<this conf>")
+    head = f"# The base model and what was found missing: {told}\n"
     return files.write(path, head + yaml.safe_dump(extended, sort_keys=False))

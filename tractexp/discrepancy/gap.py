@@ -8,22 +8,29 @@ import numpy as np
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.pushes import push_points
 from tractexp.discrepancy.tangent import resting, two_sided
-from tractexp.identification.result import relative_error
+from tractexp.identification.result import current_error, relative_error
+from tractexp.identification.seen import seen_by_estimator
 from tractexp.noise import Noise
 from tractexp.noise.span import spanned
+from tractexp.record import WaveEvent
 
 SAME = 0.03  # singular values below this share of the largest: pushes that differ from others in noise only
 
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """Calculated power of all events end to end, (2, N) [pu], and what is left against the measurement."""
+    """What a model calculates of all events end to end, (C, N) [pu], and what is left against the measurement.
+
+    Of waveforms P and Q are those that the record's estimator sees in calculated and in recorded currents, and
+    `epsilon_i` is what the currents miss; over several events it is the rms of theirs.
+    """
 
     calculated: np.ndarray
     epsilon_p: float
     epsilon_q: float
     deviance: float
     chi2_per_sample: float
+    epsilon_i: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,10 +69,27 @@ def curves(bench: Bench, unit: np.ndarray, noise: Noise, names: Sequence[str] | 
     white = bench.whiten(noise, residual)[0]
     measured = bench.drive.measured
     calculated = residual[0] + measured
-    counted = np.where(bench.known, measured, np.nan)
-    errors = [relative_error(counted[c], calculated[c]) for c in (0, 1)]
     deviance = float(white @ white)
-    return Curves(calculated, *errors, deviance, deviance / max(bench.samples, 1))
+    P, Q, i = _errors(bench, calculated)
+    return Curves(calculated, P, Q, deviance, deviance / max(bench.samples, 1), i)
+
+
+def _errors(bench: Bench, calculated: np.ndarray) -> tuple[float, float, float | None]:
+    """epsilon_p, epsilon_q and, of waveforms, epsilon_i of what is calculated (C, N) [pu], as fractions."""
+    each = [
+        (event, calculated[:, bench.drive.part(e)])
+        for e, event in enumerate(bench.events)
+        if isinstance(event, WaveEvent)
+    ]
+    if not each:
+        counted = np.where(bench.known, bench.drive.measured, np.nan)
+        P, Q = (relative_error(counted[c], calculated[c]) for c in (0, 1))
+        return P, Q, None
+    seen = [seen_by_estimator(event, currents) for event, currents in each]
+    measured = np.concatenate([np.stack([event.record.P, event.record.Q]) for event, _, _ in seen], axis=1)
+    made = np.concatenate([np.stack(power) for _, *power in seen], axis=1)
+    P, Q = (relative_error(measured[c], made[c]) for c in (0, 1))
+    return P, Q, float(np.sqrt(np.mean([current_error(*one) ** 2 for one in each])))
 
 
 def gap(

@@ -12,7 +12,11 @@ EDGE = 0.002  # s: how sharp a window starts and ends
 
 
 class Injection(Effect):
-    """Adds push_k to the k-th balance between `window_on` and `window_off` [s since the first sample]."""
+    """Adds push_k to the k-th balance between `window_on` and `window_off` [s since the first sample].
+
+    Of waveforms what is pushed in place of P and Q is the current's component along the voltage before the event, and
+    that which lags it by a quarter of a cycle: at that voltage, the same.
+    """
 
     name = "injection"
 
@@ -40,7 +44,10 @@ class Injection(Effect):
         for state in eq.states.values():  # of the motor itself: a twin that an effect adds follows it
             if state.writer == OWN and state.role in pushes:
                 state.derivative += gate * pushes[state.role]
-        eq.consume(gate * push_P, gate * push_Q)
+        if eq.waves:
+            eq.draw(gate * (push_P - I * push_Q))
+        else:
+            eq.consume(gate * push_P, gate * push_Q)
 
 
 PUSHES = tuple(p.name for p in Injection.parameters[:5])

@@ -18,7 +18,7 @@ from tractexp.discrepancy.kernels import Family
 from tractexp.discrepancy.overlay import Overlay, left, on_fitted, on_held_out
 from tractexp.discrepancy.places import Place, places
 from tractexp.discrepancy.precision import Estimate, estimates
-from tractexp.discrepancy.records import Records, check_events
+from tractexp.discrepancy.records import Records, check_events, in_waves_of
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.survivors import Survivors, survivors
 from tractexp.discrepancy.verdict import NONE, UNEXPLAINED, Verdict, verdict
@@ -156,9 +156,12 @@ def investigate(
     `UserError` for wrong events or names.
     """
     criteria = criteria or Criteria()
+    train, validate = (in_waves_of(model, events) for events in (train, validate))
     check_events(train, validate)
     with Effort(tell).audible() as effort:
-        missing = catalogue(model.motor, model.static, model.effects, train, only, criteria.frequency_swing)
+        missing = catalogue(
+            model.motor, model.static, model.effects, train, only, criteria.frequency_swing, model.domain
+        )
         some, others = len(missing.candidates), len(missing.untestable)
         effort.say(f"testing {some} effects, {others} more cannot be tested on these events")
         Family(model, missing).compile(effort.say)

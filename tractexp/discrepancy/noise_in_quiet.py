@@ -1,4 +1,8 @@
-"""The noise of one bench, estimated from what its fits leave where little happens."""
+"""The noise of one bench, estimated from what its fits leave where little happens.
+
+Of waveforms it is white but for what noise of the voltage causes (`tractexp.noise.waves`), does not wander within so
+short a record, and has the offsets that the channels may have kept.
+"""
 
 import functools
 from dataclasses import dataclass
@@ -7,23 +11,30 @@ import numpy as np
 
 from tractexp.discrepancy.bench import Bench
 from tractexp.identification.likelihood import Likelihood
+from tractexp.identification.observed import answers, offsets
 from tractexp.identification.problem import Problem
 from tractexp.noise import Noise
 from tractexp.noise.quiet import estimate
 from tractexp.noise.wander import Rest, Wander, find
+from tractexp.noise.waves import of_waves
 from tractexp.record import Event
 
 
 @dataclass(frozen=True, eq=False)
 class QuietNoise:
-    """Estimates noise on a bench. `blur` (k, 2, N) [pu] is what errors of the voltage do to the power there."""
+    """Estimates noise on a bench. `blur` (k, C, N) [pu] is what errors of the record do to what is compared."""
 
     bench: Bench
-    blur: np.ndarray | None  # None where the voltage has no noise
+    blur: np.ndarray | None  # of the voltage's noise, None where it has none; of waveforms, of the currents' offsets
+    answers: tuple[np.ndarray, np.ndarray] | None = None  # of waveforms, to a wrong sample of the voltage
 
     @classmethod
     def at(cls, bench: Bench, unit: np.ndarray) -> "QuietNoise":
         """Where errors of the voltage act as they do on the base model at coordinates (D,)."""
+        if bench.waves:
+            bare = Likelihood.of(bench.kernels.bare)
+            own = np.r_[unit[bench.coordinates.base], unit[bench.coordinates.before]]
+            return cls(bench, offsets(bench.drive), answers(bench.kernels.bare, bare.values(own)))
         most = bench.records.voltage_errors
         if not most:
             return cls(bench, None)
@@ -36,12 +47,16 @@ class QuietNoise:
         return self.of(self.bench.residuals(unit[None])[0])
 
     def of(self, residual: np.ndarray, left: np.ndarray | None = None, columns: np.ndarray | None = None) -> Noise:
-        """The noise of one residual (2, N) in quiet stretches.
+        """The noise of one residual (C, N) in quiet stretches.
 
-        What a fit leaves (2, N), and columns of all that could explain it (k, 2, N), tell more of how the load wanders.
+        What a fit leaves (C, N), and columns of all that could explain it (k, C, N), tell more of how the load wanders.
         """
+        bench = self.bench
+        if self.answers is not None:
+            phases = bench.records.phases
+            return of_waves(residual, bench.known, bench.quiet, self.answers, phases, self.blur)
         wander = functools.partial(self._wander, left, columns)
-        return estimate(residual, self.bench.known, self.bench.quiet, wander, self.blur)
+        return estimate(residual, bench.known, bench.quiet, wander, self.blur)
 
     def _wander(self, left: np.ndarray | None, columns: np.ndarray | None, mix: np.ndarray) -> Wander | None:
         """How the load wanders before the events and during them, in mixed channels."""
@@ -61,12 +76,13 @@ class QuietNoise:
 
 def white(bench: Bench) -> Noise:
     """White noise of the level before the dips: what is known before the first fit."""
-    P, Q = (float(np.sqrt(np.mean([getattr(e, f"noise_{c}") ** 2 for e in bench.events]))) for c in "PQ")
-    return Noise(Noise.white(P, Q).pairs, np.eye(2))
+    each = zip(*(e.levels for e in bench.events), strict=True)
+    levels = [float(np.sqrt(np.mean([level**2 for level in channel]))) for channel in each]
+    return Noise(Noise.white(*levels).pairs, np.eye(len(levels)))
 
 
 def _at_voltage(bench: Bench, events: tuple[Event, ...] | list[Event], unit: np.ndarray) -> np.ndarray:
-    """Residuals (2, N) of the base model at coordinates (D,), driven by the voltages of other events."""
+    """Residuals (C, N) of the base model at coordinates (D,), driven by the voltages of other events."""
     kernels, at = bench.kernels, bench.coordinates
     problem = Problem(bench.model, events, kernels.bounds, kernels.fixed, kernels.substeps)
     return Likelihood.of(problem).residuals(np.r_[unit[at.base], unit[at.before]][None])[0]

@@ -12,16 +12,17 @@ from tractexp.discrepancy.held_out import Judged, carried
 from tractexp.discrepancy.places import Place
 from tractexp.discrepancy.remainder import Remainder, remainders
 from tractexp.discrepancy.verdict import Nearest
+from tractexp.identification.problem import excited
 from tractexp.noise import Noise
 from tractexp.record import Event
 
 
 @dataclass(frozen=True, eq=False)
 class Overlay:
-    """One event as recorded, and P and Q (2, n) [pu] of the models on it.
+    """One event as recorded, and what the models draw in it (C, n) [pu]: P and Q, or the currents of a `WaveEvent`.
 
     `after` is the extended model's where there is one, `nearest` that of the candidates which come nearest where
-    nothing explains. `driving` (n,) is the voltage that the load saw, `deviation` (2, n) that of the noise.
+    nothing explains. `driving` (n,) is the voltage that the load saw, `deviation` (C, n) that of the noise.
     """
 
     event: Event
@@ -35,8 +36,8 @@ class Overlay:
 
     @property
     def measured(self) -> np.ndarray:
-        """P and Q (2, n) [pu], nan in gaps."""
-        return np.stack([self.event.record.P, self.event.record.Q])
+        """What the models are compared with (C, n) [pu], nan in gaps."""
+        return excited(self.event).measured
 
 
 def on_fitted(
@@ -79,7 +80,7 @@ def _each(
     *,
     held_out: bool,
 ) -> list[Overlay]:
-    """Curves (2, N) of events end to end, cut into events."""
+    """Curves (C, N) of events end to end, cut into events."""
     deviation, made = noise.deviation(bench.drive), []
     for e, event in enumerate(bench.records.recorded):
         part = bench.drive.part(e)

@@ -20,7 +20,7 @@ DISTINCT = 1e-3  # of the largest singular value: directions weaker than this ar
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """A candidate with one setting of its scanned parameters: differences (k, 2, N) per unit of each size."""
+    """A candidate with one setting of its scanned parameters: differences (k, C, N) per unit of each size."""
 
     candidate: Candidate
     setting: dict[str, float]

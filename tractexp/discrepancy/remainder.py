@@ -13,12 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tractexp.identification.result import excitation
+from tractexp.identification.problem import excited
 from tractexp.model.drive import Drive
 from tractexp.noise import Noise
 from tractexp.noise.color import FEWEST, SMALLEST
 from tractexp.noise.quiet import estimate
-from tractexp.record import Event
+from tractexp.record import Event, WaveEvent
 
 MOST = 4  # shapes that are told
 DECAYS = 6  # time constants tried, from two samples to the length of the record after the dip
@@ -111,7 +111,7 @@ class _Shape(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Stretch:
-    """What is left of one event, (2, n) [pu], and how its own noise whitens it."""
+    """What is left of one event, (C, n) [pu], and how its own noise whitens it."""
 
     event: Event
     residual: np.ndarray
@@ -120,19 +120,28 @@ class _Stretch:
 
     @classmethod
     def of(cls, event: Event, residual: np.ndarray, noise: Noise, blur: np.ndarray | None) -> "_Stretch":
-        """The color of the noise is that before the dip, where that tells it: what is left would color its own."""
-        drive = Drive.of([excitation(event)])
+        """The color of the noise is that before the dip, where that tells it: what is left would color its own.
+
+        Of waveforms it stays what it is, for what is left cannot color that.
+        """
+        drive = Drive.of([excited(event)])
         known, before = drive.weights > 0, slice(0, event.start)
-        if np.count_nonzero(known.all(axis=0)[before]) >= FEWEST:
+        if not isinstance(event, WaveEvent) and np.count_nonzero(known.all(axis=0)[before]) >= FEWEST:
             noise = estimate(_level(residual[:, before]), known[:, before], [before])
         return cls(event, residual, replace(noise, wander=None, blur=blur), drive)
 
+    @property
+    def size(self) -> int:
+        """Values that count; of waveforms the time before the record does not."""
+        waves = isinstance(self.event, WaveEvent)
+        return int(np.count_nonzero(self.drive.weights)) if waves else self.residual.size
+
     def white(self, rows: np.ndarray) -> np.ndarray:
-        """(m, 2, n) [pu] to independent rows (m, 2, n) of unit variance."""
+        """(m, C, n) [pu] to independent rows (m, C, n) of unit variance."""
         return self.noise.whiten(rows, self.drive, self.drive.weights > 0).reshape(rows.shape)
 
     def fitted(self, shape: _Shape, channel: int) -> tuple[float, np.ndarray, np.ndarray]:
-        """By how much a shape in P (0) or Q (1) lowers the deviance, its sizes (1 or 2,) [pu], and itself (2, n)."""
+        """By how much a shape in one channel lowers the deviance, its sizes (1 or 2,) [pu], and itself (C, n)."""
         templates = shape.templates(self.residual.shape[1])
         raw = np.zeros((len(templates), *self.residual.shape))
         raw[:, channel] = templates
@@ -144,7 +153,7 @@ class _Stretch:
 
 
 def _level(rows: np.ndarray) -> np.ndarray:
-    """Rows (2, n) about their straight lines: what a fit leaves before the dip may lie off zero."""
+    """Rows (C, n) about their straight lines: what a fit leaves before the dip may lie off zero."""
     x = np.linspace(-1.0, 1.0, rows.shape[1])
     return rows - np.stack([np.polynomial.Polynomial.fit(x, row, 1)(x) for row in rows])
 
@@ -152,7 +161,7 @@ def _level(rows: np.ndarray) -> np.ndarray:
 def remainders(
     residual: np.ndarray, events: Sequence[Event], noise: Noise, false_alarms: float = 0.05
 ) -> list[Remainder]:  # fmt: skip
-    """The shapes that stand out of residuals (2, N) [pu], measured less calculated, of events end to end.
+    """The shapes that stand out of residuals (C, N) [pu], measured less calculated, of events end to end.
 
     The loudest first, at most `MOST`; none where white noise would show as much with a probability of `false_alarms`.
     Gaps are 0. `noise` is what a fit left in quiet stretches.
@@ -163,7 +172,7 @@ def remainders(
         _Stretch.of(event, residual[:, part], noise.of(e), None if noise.blur is None else noise.blur[:, :, part])
         for e, (event, part) in enumerate(zip(events, parts, strict=True))
     ]
-    excess = sum(float(np.sum(s.white(s.residual[None]) ** 2)) - s.residual.size for s in stretches)
+    excess = sum(float(np.sum(s.white(s.residual[None]) ** 2)) - s.size for s in stretches)
     loudest = [_loudest(s, false_alarms / len(stretches)) for s in stretches]
     told: list[Remainder] = []
     while len(told) < MOST and any(loudest):
@@ -188,12 +197,12 @@ def _loudest(stretch: _Stretch, false_alarms: float) -> tuple[float, _Shape, int
     limit = 2 * np.log(tried / false_alarms)
     if best[0] < HOPELESS * limit:
         return None
-    polished = max((_polished(stretch, best[1], c) for c in (0, 1)), key=lambda f: f[0])
+    polished = max((_polished(stretch, best[1], c) for c in range(len(white))), key=lambda f: f[0])
     return polished if polished[0] > limit else None
 
 
 def _searched(white: np.ndarray, first: int) -> tuple[int, list[tuple[float, _Shape]]]:
-    """How many shapes were tried in white rows (2, n) from sample `first` on, and the best of each kind."""
+    """How many shapes were tried in white rows (C, n) from sample `first` on, and the best of each kind."""
     length = white.shape[1] - first
     decays = np.geomspace(2.0, max(length, 4), DECAYS)
     shapes = [(float(d), 0.0) for d in (*decays, np.inf)]
@@ -207,7 +216,7 @@ def _searched(white: np.ndarray, first: int) -> tuple[int, list[tuple[float, _Sh
         k = int(gains.argmax())
         if (gain := float(gains[k])) > best.get(frequency > 0, (-1.0,))[0]:
             best[frequency > 0] = gain, _Shape(first + k, decay, frequency)
-    return 2 * length * len(shapes), list(best.values())
+    return len(white) * length * len(shapes), list(best.values())
 
 
 def _gains(white: np.ndarray, decay: float, frequency: float) -> np.ndarray:
@@ -233,7 +242,7 @@ def _gains(white: np.ndarray, decay: float, frequency: float) -> np.ndarray:
 
 
 def _polished(stretch: _Stretch, shape: _Shape, channel: int) -> tuple[float, _Shape, int]:
-    """The best shape near one, as the noise lets it be seen in P (0) or Q (1)."""
+    """The best shape near one, as the noise lets it be seen in one channel."""
     from scipy.optimize import minimize
 
     n = stretch.residual.shape[1]
@@ -269,13 +278,13 @@ def _told(stretch: _Stretch, shape: _Shape, channel: int, sizes: np.ndarray, sha
     tau = shape.decay * step if shape.decay < STAYS * rest else None
     kind = "ringing" if ringing else "step" if tau is None else "pulse" if shape.decay < PULSE else "decay"
     size = float(np.hypot(*sizes)) if ringing else float(sizes[0])
-    level = max((event.noise_P, event.noise_Q)[channel], SMALLEST)
+    level = max(event.levels[channel], SMALLEST)
     start = float(event.record.t[shape.start])
     ended = start > event.t_end - 1.5 * step
     frequency = shape.frequency / step if ringing else None
     pace = None if tau is None or frequency is None else np.hypot(2 * np.pi * frequency * tau, 1.0)
     return Remainder(
-        event=event.record.name, channel="PQ"[channel], kind=kind, start=start,
+        event=event.record.name, channel=stretch.drive.spoken[channel], kind=kind, start=start,
         after=start - (event.t_end if ended else event.t_start), ended=ended, frequency=frequency,
         time_constant=tau, damping=None if pace is None else float(1 / pace), size=size, noise=abs(size) / level,
         share=float(share),

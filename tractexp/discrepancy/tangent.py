@@ -24,24 +24,24 @@ class Tangent:
     """Raw residuals and differences at a fit; `whitened` turns them into a `Projection` under a noise model."""
 
     bench: Bench
-    residual: np.ndarray  # (2, N)
-    nuisance: np.ndarray  # (k, 2, N)
+    residual: np.ndarray  # (C, N)
+    nuisance: np.ndarray  # (k, C, N)
     prior: np.ndarray  # (k, k) prior rows of the nuisances, whitened
     estimate: np.ndarray  # (k,) the nuisances' departure from their prior mean, in its standard deviations (or 0)
     faults: dict[str, list[int]]  # which nuisances belong to which fault of the measurement
     columns: tuple[Column, ...]
-    split: np.ndarray  # (e, 2, N) differences of the fitted parameters, each in one event only
-    cells: np.ndarray  # (c, 2, N) responses to injections
+    split: np.ndarray  # (e, C, N) differences of the fitted parameters, each in one event only
+    cells: np.ndarray  # (c, C, N) responses to injections
     groups: np.ndarray  # (c,) which balance an injection pushes
     held: tuple[int, ...]  # columns of the base model's parameters that rest on a wall
 
     @functools.cached_property
     def explaining(self) -> np.ndarray:
-        """All that the fit or any candidate could change, (k, 2, N)."""
+        """All that the fit or any candidate could change, (k, C, N)."""
         return np.concatenate([self.nuisance, *(c.raw for c in self.columns)])
 
     def whitened(self, noise: Noise, residuals: np.ndarray | None = None) -> Projection:
-        """Project under this noise; `residuals` (b, 2, N) replace the fit's own (for the bootstrap)."""
+        """Project under this noise; `residuals` (b, C, N) replace the fit's own (for the bootstrap)."""
         own = residuals is None
         raw = [
             self.nuisance,
@@ -120,7 +120,7 @@ def resting(bench: Bench, unit: np.ndarray, columns: Sequence[int], gradient: np
 
 
 def _by_event(bench: Bench, columns: np.ndarray) -> np.ndarray:
-    """Columns (k, 2, N) cut into one for each event, (k E, 2, N)."""
+    """Columns (k, C, N) cut into one for each event, (k E, C, N)."""
     split = np.zeros((len(bench.events), *columns.shape))
     for e, rows in enumerate(split):
         part = bench.drive.part(e)
@@ -159,7 +159,7 @@ def _candidate_points(bench: Bench, fit: Refit) -> tuple[np.ndarray, np.ndarray,
 
 
 def rich_residuals(t: Tangent, residuals: np.ndarray) -> np.ndarray:
-    """Residuals (b, 2, N) with everything any column explains taken away, unweighted: what noise is estimated from.
+    """Residuals (b, C, N) with everything any column explains taken away, unweighted: what noise is estimated from.
 
     Each is divided by what is left of its variance then, so that the noise does not come out too small.
     """

@@ -8,7 +8,7 @@ import numpy as np
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.explanations import Explanations
 from tractexp.discrepancy.fitting import Refit
-from tractexp.discrepancy.gap import curves
+from tractexp.discrepancy.gap import Curves, curves
 from tractexp.discrepancy.held_out import HeldOut, carried
 from tractexp.discrepancy.next_dip import NextDip, next_dip
 from tractexp.discrepancy.survivors import Rival, Survivors
@@ -29,8 +29,10 @@ class Nearest:
     rival: Rival
     fitted: float
     held_out: float
-    calculated: np.ndarray  # (2, N) pu, of the fitted events end to end
+    calculated: np.ndarray  # (C, N) pu, of the fitted events end to end
     others: list[tuple[tuple[str, ...], float]]  # the next ones, with their shares on the fitted events
+    curves: tuple[Curves, Curves]  # of the base model and with these, on the fitted events
+    carried: tuple[Curves, Curves] | None  # on the held-out ones
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -184,11 +186,11 @@ def _nearest(
         return None
     before, after = curves(bench, bare.unit, noise), curves(bench, best.unit, noise)
     excess = max(before.deviance - bench.samples, 1e-300)
-    held = float("nan")
+    held, there = float("nan"), None
     if validate:
-        other, units, level = carried(bench, validate, [bare, best])
-        there = [curves(other, u, level).deviance for u in units]
-        held = (there[0] - there[1]) / max(there[0] - other.samples, 1e-300)
+        other, (plain, near), level = carried(bench, validate, [bare, best])
+        there = curves(other, plain, level), curves(other, near, level)
+        held = (there[0].deviance - there[1].deviance) / max(there[0].deviance - other.samples, 1e-300)
     others = [(r.fit.names, (before.deviance - r.fit.deviance) / excess) for r in rivals[1:4]]
     share = (before.deviance - after.deviance) / excess
-    return Nearest(rivals[0], float(share), float(held), after.calculated, others)
+    return Nearest(rivals[0], float(share), float(held), after.calculated, others, (before, after), there)

@@ -16,6 +16,8 @@ from tractexp.discrepancy.records import Records
 def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[BaseFit, Disagreement]:
     """The base model's fit and tests behind the recorder's window, where there is one; else those given."""
     bench, noise, best = base.bench, first.noise, None
+    if bench.waves:  # samples have no window
+        return base, first
     if bench.drive.windows:  # the model is of a kind that is always looked at through what the records say
         return base, first
     if noise.loudest_blur > bench.criteria.blurred:  # noise of the voltage would pass for a window

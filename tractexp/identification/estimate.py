@@ -185,7 +185,8 @@ def noise_at(
     measured = likelihood.problem.drive.measured
     rows, J = replace(likelihood, noise=Noise.white(*[1.0] * len(measured))).jacobian(unit)
     residual, columns = rows.reshape(measured.shape), J.T.reshape(-1, *measured.shape)
-    seen = observed.noise(residual, likelihood.known, columns, blur, whole)
+    answers = observed.answers(likelihood.values(unit))
+    seen = observed.noise(residual, likelihood.known, columns, blur, whole, answers)
     return seen or noise_of(likelihood, residual)
 
 

@@ -6,21 +6,23 @@ wanders, and what is left of the voltage's noise, which enters the model and lea
 
 import functools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.identification.problem import Problem, excitation
+from tractexp.identification.problem import Problem, excitation, excited
 from tractexp.model.drive import Drive
+from tractexp.noise.color import SMALLEST
 from tractexp.noise.model import Noise
-from tractexp.noise.quiet import HIGHEST, estimate, quiet_stretches
+from tractexp.noise.quiet import estimate, quiet_stretches
 from tractexp.noise.voltage import Smoothed, smoothed
 from tractexp.noise.wander import LESS, WITHIN, Rest, Wander, find, power_profile
-from tractexp.record import Event
+from tractexp.noise.waves import of_waves
+from tractexp.record import Event, WaveEvent
 
 OFFSET = 0.005  # pu: what may be left of a channel's offset, which the mean before the dip took off
-HIGHEST_OF_WAVES = 0  # order of the autoregressions: a load of harmonics is no colored noise
+ANSWERED = 8  # samples of the lead after which a single wrong sample of the voltage is put there
 LEAST_KEPT = 0.2  # of a residual's variance: where the fit takes more, it tells nothing of the noise
 # Twice the log-likelihood from which a load is said to wander. An investigation asks for less: a wandering that is not
 # there costs it little, and an estimate a third of its precision.
@@ -62,26 +64,32 @@ class Observed:
         return power_profile(self.drive.measured, self.drive.before, self.drive.first)
 
     def noise(
-        self, residuals: np.ndarray, known: np.ndarray, columns: np.ndarray, blur: np.ndarray | None, whole: bool
+        self,
+        residuals: np.ndarray,
+        known: np.ndarray,
+        columns: np.ndarray,
+        blur: np.ndarray | None,
+        whole: bool,
+        answers: Sequence[np.ndarray] | None = None,
     ) -> Noise | None:
         """Noise from what a fit leaves (2, N) in quiet, or of the `whole` records; None where too few samples are.
 
-        `columns` (k, 2, N) are what each coordinate could still change; `blur` is that of `blurred`.
+        `columns` (k, 2, N) are what each coordinate could still change; `blur` is that of `blurred`, `answers` that
+        of `answers`.
         """
         apart = np.linalg.qr(columns.reshape(len(columns), -1)[np.any(columns != 0, axis=(1, 2))].T)[0]
         kept = np.maximum(1 - (apart**2).sum(axis=1), LEAST_KEPT).reshape(residuals.shape)  # the fit took the rest
-        wander = functools.partial(self._wander, residuals, columns, known)
         where = [self.drive.part(e) for e in range(self.drive.events)] if whole else self.quiet
-        highest = HIGHEST_OF_WAVES if self.problem.model.waves else HIGHEST
         try:
-            return estimate(residuals / np.sqrt(kept), known, where, wander, blur, highest)
+            if answers is not None:
+                return of_waves(residuals / np.sqrt(kept), known, where, answers, self.events[0].phases, blur)
+            wander = functools.partial(self._wander, residuals, columns, known)
+            return estimate(residuals / np.sqrt(kept), known, where, wander, blur)
         except UserError:
             return None
 
     def _wander(self, left: np.ndarray, columns: np.ndarray, known: np.ndarray, mix: np.ndarray) -> Wander | None:
-        """How the load wanders before the events and during them, in mixed channels; not told of waveforms."""
-        if self.problem.model.waves:
-            return None
+        """How the load wanders before the events and during them, in mixed channels."""
         parts = [self.drive.part(e) for e in range(self.drive.events)]
         before = [self.drive.measured[:, p][:, event.steady] for p, event in zip(parts, self.events, strict=True)]
         rests = []
@@ -99,7 +107,7 @@ class Observed:
         Of waveforms, whose voltage stands as recorded, the offsets (k, 3, N) that the current's channels may have.
         """
         if self.problem.model.waves:
-            return self._offsets()
+            return offsets(self.drive)
         most = max(len(s.errors) for s in self.smoothed)
         if not most:
             return None
@@ -109,15 +117,9 @@ class Observed:
         power = np.concatenate(parts)
         return np.nan_to_num(power[1:] - power[0])
 
-    def _offsets(self) -> np.ndarray:
-        """A constant in each compared current of each event, of one standard deviation."""
-        drive, shapes = self.drive, []
-        for e in range(drive.events):
-            for c in range(drive.channels):
-                if drive.weights[c, drive.part(e)].any():
-                    shapes.append(np.zeros(drive.measured.shape))
-                    shapes[-1][c, drive.part(e)] = OFFSET
-        return np.array(shapes)
+    def answers(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """`answers` of this problem at free values (d,); None of phasors."""
+        return answers(self.problem, values) if self.problem.model.waves else None
 
     def _driven(self, values: np.ndarray, shapes: Sequence[int | None]) -> np.ndarray:
         """Power (shapes, 2, N) under the smoothed voltages, each with one of its errors; all in one simulation."""
@@ -127,3 +129,46 @@ class Observed:
         own = np.tile(problem.by_event(values), (count, 1, 1))
         response = problem.model.simulate(drive, own, np.tile(problem.step.substeps, count))
         return response.outputs[:, 0].reshape(drive.channels, count, -1).swapaxes(0, 1)
+
+
+def answers(problem: Problem, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What one standard deviation of a sample of the voltage does to the currents at
+    free values (d,), of waveforms.
+
+    (L,) complex of the space vector and (L,) of the zero sequence, in the stationary frame, from shortly before
+    that sample to the dip: what is smooth between samples is changed a little earlier. Of the first event.
+    """
+    event = problem.events[0]
+    noise = max(event.noise_U, SMALLEST)
+    shocks = [(noise, 0.0), (1j * noise, 0.0), (0.0, noise / np.sqrt(2))][: event.phases]  # the zero's is a third
+    events = [event, *(_struck(event, *shock) for shock in shocks)]
+    drive = Drive.of([excited(e, problem.model) for e in events])
+    own = np.tile(problem.by_event(values)[:1], (len(events), 1, 1))
+    response = problem.model.simulate(drive, own, np.tile(problem.step.substeps[:1], len(events)))
+    seen = response.outputs[:, 0].reshape(drive.channels, len(events), -1)[:, :, : event.start]
+    off = np.nan_to_num(seen[:, 1:] - seen[:, :1])
+    if event.phases == 1:
+        return off[0, 0], np.zeros(1)
+    return (off[0, 0] + 1j * off[1, 0] - 1j * (off[0, 1] + 1j * off[1, 1])) / 2, off[2, 2]
+
+
+def offsets(drive: Drive) -> np.ndarray:
+    """A constant in each compared current of each event, of one standard deviation, (k, 3, N) [pu]."""
+    shapes = []
+    for e in range(drive.events):
+        for c in range(drive.channels):
+            if drive.weights[c, drive.part(e)].any():
+                shapes.append(np.zeros(drive.measured.shape))
+                shapes[-1][c, drive.part(e)] = OFFSET
+    return np.array(shapes)
+
+
+def _struck(event: WaveEvent, vector: complex, zero: float) -> WaveEvent:
+    """The event with one sample of the lead's voltage off, in the stationary frame."""
+    v, v_zero = event.v.copy(), event.v_zero.copy()
+    v[ANSWERED] += vector * event.turn[ANSWERED].conj()
+    v_zero[ANSWERED] += zero
+    if event.phases == 1:  # whose imaginary part is what the sample was a quarter of a cycle ago
+        later = ANSWERED + round(event.rate / event.f0 / 4)
+        v[later] += 1j * vector * event.turn[later].conj()
+    return replace(event, v=v, v_zero=v_zero)

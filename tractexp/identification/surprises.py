@@ -101,7 +101,7 @@ def cells_of(layout: Layout) -> list[Cell]:
             if j - i < 2:
                 continue
             part = slice(first + i, first + j)
-            cells += [Cell(e, c, part, origin + i * step, origin + (j - 1) * step) for c in layout.drive.names]
+            cells += [Cell(e, c, part, origin + i * step, origin + (j - 1) * step) for c in layout.drive.spoken]
     return cells
 
 
@@ -110,7 +110,7 @@ def energies(channels: np.ndarray, layout: Layout) -> np.ndarray:
     square = channels**2
     quiet = np.mean(np.concatenate([square[:, :, part] for part in layout.quiet], axis=2), axis=2, keepdims=True)
     square /= np.where(quiet > 0, quiet, 1.0)  # a current that is not compared is zero throughout
-    row = layout.drive.names.index
+    row = layout.drive.spoken.index
     return np.stack([square[:, row(c.channel), c.part].sum(axis=1) for c in cells_of(layout)], axis=1)
 
 

@@ -144,7 +144,7 @@ def describe_noise(likelihood: Likelihood) -> list[dict[str, Any]]:
                     "deviation": float(np.sqrt(covariance[c, c])),
                     "before": float(before),
                     "order": pair[c].order,
-                    "correlation": 0.0 if pair[c].white else float(pair[c].coefficients[1, 0]),
+                    "correlation": 0.0 if pair[c].white else float(pair[c].coefficients[1, 0].real),
                     "between_P_and_Q": float(cross),
                     "wanders": noise.wander is not None,
                     "of_the_voltage": float(np.sqrt(noise.loudest_blur)),

@@ -11,7 +11,7 @@ from tractexp.errors import UserError
 from tractexp.model import sites
 from tractexp.model.drive import PHASORS
 from tractexp.model.equations import Equations
-from tractexp.model.parts import Effect, Measurement, Motor, Static
+from tractexp.model.parts import Effect, Measurement, Motor, Part, Static
 from tractexp.model.signature import asked
 from tractexp.model.unfit import Unfit
 
@@ -31,6 +31,9 @@ def declared(
 ) -> Equations:  # fmt: skip
     """The equations of a load. Raises `Refused` for an effect that does not fit, `UserError` for parts that do not."""
     eq = Equations(domain)
+    for what, part in (("motor", motor), ("static load", static)):
+        if why := _foreign(eq, part):
+            raise UserError(f"the {what} '{part.label}' does not go with domain={domain}: {why}")
     try:
         _motor(eq, motor)
         _static(eq, static)
@@ -45,6 +48,11 @@ def declared(
         raise UserError(f"the {title} draw no power; choose a model/motor or a model/static other than 'none'")
     eq.close()
     return eq
+
+
+def _foreign(eq: Equations, part: Part) -> str:
+    """Why a part makes no sense in the equations' domain; "" where it does."""
+    return part.phasors_only if eq.waves else part.waves_only
 
 
 def motor_alone(motor: Motor) -> Equations:
@@ -111,9 +119,7 @@ def _check_law(static: Static, law: Any, before: Mapping[sympy.Symbol, float]) -
 
 def _effect(eq: Equations, effect: Effect) -> None:
     """Raises `Unfit` with the reason where the effect makes no sense for the equations."""
-    if why := effect.phasors_only if eq.waves else effect.waves_only:
-        raise Unfit(why)
-    if why := effect.refusal(eq):
+    if why := _foreign(eq, effect) or effect.refusal(eq):
         raise Unfit(why)
     eq.write(effect.name)
     if not isinstance(effect, Measurement):

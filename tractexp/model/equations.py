@@ -5,6 +5,7 @@ derivatives and steady state, and the power they draw. Kernel, steady state, par
 it. What stands at a site can be edited after it was placed: that is what a missing effect does.
 """
 
+import itertools
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, Literal, NoReturn
@@ -14,7 +15,9 @@ from sympy import I, Symbol, conjugate, im, re
 
 from tractexp.errors import Unknown, UserError, nearest
 from tractexp.model import sites
+from tractexp.model.apart import Apart
 from tractexp.model.drive import EVENT, INPUTS, OUTPUTS, PHASORS, WAVES
+from tractexp.model.graph import replaced, symbols_of
 from tractexp.model.names import check_name
 from tractexp.model.sites import Site
 from tractexp.model.unfit import Unfit
@@ -23,6 +26,7 @@ from tractexp.parameter import Parameter
 LONG = 300  # nodes of an expression
 LONG_AGO = -(10**6)  # s: the time at which a load rests before the event
 NOTHING = sympy.Integer(0)
+LOWEST = sympy.Rational(1, 20)  # of the voltage before the event: below it what draws a power is an admittance
 DAMPING = sympy.Rational(1, 20)  # resistance over reactance of a reactive load of which nothing else is said
 OWN = "motor"  # who writes the states that are pushed, and the speed that effects ask for
 
@@ -121,6 +125,8 @@ class Equations:
         drawn = (sites.current, sites.zero_current) if self.waves else (sites.P, sites.Q)
         self._drawn: dict[Site, sympy.Expr] = dict.fromkeys(drawn, sympy.Integer(0))
         self._fluxes: dict[sympy.Expr, Symbol] = {}  # of branches at the bus, by resistance over reactance
+        self._real_parts: dict[Symbol, sympy.Expr] = {}  # of named quantities, as they stand now
+        self._lost = NOTHING, NOTHING  # power [pu] between the recorded bus and that which all parts see
         self._owners: dict[str, str] = {}  # who declared the parameter, state or quantity of a name
         self._writer = "bus"
         if self.waves:
@@ -272,6 +278,7 @@ class Equations:
         site = sites.named(site)
         expression = sympy.sympify(change(self.expression(site)))
         self._check_kind(site, expression)
+        self._real_parts.clear()
         self.edits.setdefault(self._writer, []).append(site.name)
         if site in self._drawn:
             self._drawn[site] = expression
@@ -287,9 +294,9 @@ class Equations:
         """
         return self._state(_complex(name), latex, "flux")
 
-    def speed(self, latex: str = r"\omega") -> Symbol:
-        """The speed of the motor [electrical rad/s, relative to nominal synchronous]; its name is `omega`."""
-        return self._state(_real("omega"), latex, "speed")
+    def speed(self, latex: str = r"\omega", name: str = "omega") -> Symbol:
+        """The speed of the motor [electrical rad/s, relative to nominal synchronous]."""
+        return self._state(_real(name), latex, "speed")
 
     def lag(self, name: str, latex: str) -> Symbol:
         """Any other real state, such as those that effects add."""
@@ -298,6 +305,10 @@ class Equations:
     def lag_vector(self, name: str, latex: str) -> Symbol:
         """Any other complex state, such as the flux of a branch or the voltage of a capacitor [pu]."""
         return self._state(_complex(name), latex, "lag")
+
+    def apart(self, suffix: str) -> Apart:
+        """These equations as a further machine writes into them: whatever it names ends in this suffix."""
+        return Apart(self, suffix)
 
     def twin(self, state: Symbol, suffix: str) -> Symbol:
         """A state of the same role, as a second machine of the same equations has one."""
@@ -364,7 +375,8 @@ class Equations:
 
         Of waves it is the current of a conductance beside a branch of resistance over reactance `damping`, which draw
         these powers at the sizes of the voltage that `U` shows: admittances that vary slowly. A power that changes
-        within a cycle does so as fast as `U` follows.
+        within a cycle does so as fast as `U` follows. Below a twentieth of the voltage before the event admittances
+        grow no further.
         """
         P, Q = sympy.sympify(P), sympy.sympify(Q)
         if not self.waves:
@@ -373,7 +385,8 @@ class Equations:
             return
         speed = 1 + self.omega_s / self.omega_n
         G, B = P - Q * damping / speed, Q * (speed**2 + damping**2) / speed
-        self.draw((G * self.v + (B * self._flux_of(damping) if Q != 0 else 0)) / self.U**2)
+        current = G * self.v + (B * self._flux_of(damping) if Q != 0 else 0)
+        self.draw(current / sympy.Max(self.U, LOWEST * self.U0) ** 2)
 
     def draw(self, current: sympy.Expr, zero: sympy.Expr = NOTHING) -> None:
         """Add a current drawn at the bus [pu] and, of waves, one of zero sequence."""
@@ -383,6 +396,10 @@ class Equations:
             return
         drawn = self.v * conjugate(current)
         self.consume(re(drawn), im(drawn))
+
+    def lose(self, P: sympy.Expr, Q: sympy.Expr) -> None:
+        """Power lost before the event between the recorded bus and the voltage that all parts see, of waves."""
+        self._lost = self._lost[0] + P, self._lost[1] + Q
 
     def branch(
         self, name: str, latex: str, voltage: sympy.Expr, impedance: sympy.Expr, behind: sympy.Expr = NOTHING
@@ -404,7 +421,15 @@ class Equations:
 
     def capacitor(self, susceptance: sympy.Expr) -> sympy.Expr:
         """The current [pu] of a capacitor at the bus, b (dv/dt/omega_n + j (1 + omega_s/omega_n) v)."""
-        return susceptance * (self.v_rate * self.waves / self.omega_n + I * (1 + self.omega_s / self.omega_n) * self.v)
+        rate = NOTHING
+        if self.waves:
+            rate = self[sites.bus_voltage_rate] if sites.bus_voltage_rate in self else self._place_rate()
+        return susceptance * (rate / self.omega_n + I * (1 + self.omega_s / self.omega_n) * self.v)
+
+    def _place_rate(self) -> Symbol:
+        """The site of the voltage's slope: where a part reads it, which most do not."""
+        site = sites.bus_voltage_rate
+        return self._define(_complex(site.name), self.v_rate, site.latex)
 
     def _flux_of(self, damping: sympy.Expr) -> Symbol:
         """The flux linkage of a branch at the bus, of one reactance and so much resistance."""
@@ -428,12 +453,20 @@ class Equations:
         self._derive_starts()
         without_static = {self.P_s0: sympy.Integer(0), self.Q_s0: sympy.Integer(0)}
         others = [self.real(self.before(self.expand(power).xreplace(without_static))) for power in (self.P, self.Q)]
-        self.definitions[self.P_s0] = self.P0 - others[0]
-        self.definitions[self.Q_s0] = self.Q0 - others[1]
+        lost = [self.real(self.before(power)) for power in self._lost]
+        share = self._share()
+        self.definitions[self.P_s0] = (self.P0 - others[0] - lost[0]) / share
+        self.definitions[self.Q_s0] = (self.Q0 - others[1] - lost[1]) / share
+        self._real_parts.clear()
         for symbol, declared in (self.states | self.memories).items():
             self._check_still(f"the value before the event of '{symbol}'", declared.initial)
         for requirement in self.requirements:
             self._check_still(f"what must hold for a steady state ('{requirement.sentence}')", requirement.slack)
+
+    def _share(self) -> sympy.Expr:
+        """What admittances that stand for a power at U_0 draw of it before the event, where the bus has less."""
+        size = sum(part**2 for part in self.parts(self.before(self.v)))
+        return sympy.Integer(1) if not self.waves or size == self.U0**2 else size / self.U0**2
 
     def _derive_starts(self) -> None:
         """Take the values before the event of states that are written in others' by these."""
@@ -453,7 +486,7 @@ class Equations:
         """Raise `UserError` where a value before the event is written in what moves after it."""
         inputs = {self.U: "eq.U0", self.omega_s: "eq.omega_s0", self.U2: "eq.U20"}
         moving = {*map(_real, INPUTS), *self.states, *self.memories}
-        if found := sorted(self.expand(expression).free_symbols & moving, key=str):
+        if found := sorted(symbols_of(self.expand(expression)) & moving, key=str):
             use = "".join(f"{inputs[s]} or " for s in found if s in inputs)
             raise UserError(f"{what} contains {found[0]}, which moves; use {use}eq.before(...)")
 
@@ -463,7 +496,7 @@ class Equations:
         for symbol, start in list(at_start.items()):
             if not symbol.is_real:
                 at_start |= zip(phasor_parts(symbol), phasor_parts(start), strict=True)
-        return self.expand(expression).xreplace(self.at_rest() | at_start)
+        return replaced(self.expand(expression), self.at_rest() | at_start)
 
     def at_rest(self) -> dict[Symbol, sympy.Expr]:
         """The values before the event of inputs and computed quantities."""
@@ -474,8 +507,8 @@ class Equations:
     def expand(self, expression: sympy.Expr, named: Callable[[Symbol], bool] = lambda _: True) -> sympy.Expr:
         """The expression with the quantities that are `named` (by default all) replaced by what they stand for."""
         expression = sympy.sympify(expression)
-        while found := {s for s in expression.free_symbols & self.definitions.keys() if named(s)}:
-            expression = expression.xreplace({s: self.definitions[s] for s in found})
+        while found := {s for s in symbols_of(expression) & self.definitions.keys() if named(s)}:
+            expression = replaced(expression, {s: self.definitions[s] for s in found})
         return expression
 
     def real_states(self) -> list[tuple[Symbol, sympy.Expr, sympy.Expr]]:
@@ -506,21 +539,25 @@ class Equations:
                 a, b = phasor_parts(state)
                 a0, b0 = phasor_parts(start_symbol(state))
                 split |= {state: a + I * b, start_symbol(state): a0 + I * b0}
-        lowered = self.expand(expression, lambda s: not s.is_real).xreplace(split)
+        lowered = replaced(self.expand(expression, lambda s: not s.is_real), split)
         if _is_real(lowered):
             both = (lowered if lowered.is_real else _shorter(lowered), sympy.Integer(0))
         else:
             both = map(_shorter, lowered.as_real_imag())
-        real, imaginary = (e.xreplace({s: self.real(s) for s in self._names(e)}) for e in both)
+        real, imaginary = (replaced(e, {s: self.real(s) for s in self._names(e)}) for e in both)
         return real, imaginary
 
     def _names(self, expression: sympy.Expr) -> set[Symbol]:
-        return expression.free_symbols & self.definitions.keys()
+        return symbols_of(expression) & self.definitions.keys()
 
     def real(self, expression: sympy.Expr) -> sympy.Expr:
         """The real part of an expression that is meant to be real."""
         named = self.definitions.get(expression)
-        return self.parts(expression if named is None else named)[0]
+        if named is None:
+            return self.parts(expression)[0]
+        if expression not in self._real_parts:
+            self._real_parts[expression] = self.parts(named)[0]
+        return self._real_parts[expression]
 
     def latex(self) -> list[str]:
         """The equations one a line: states, memories, named quantities, power, steady state."""
@@ -544,14 +581,14 @@ def _shorter(expression: sympy.Expr) -> sympy.Expr:
 
     Long ones stay as they are: they gain nothing, and expanding them takes seconds.
     """
-    if sum(1 for _ in sympy.preorder_traversal(expression)) > LONG:
+    if sum(1 for _ in itertools.islice(sympy.preorder_traversal(expression), LONG + 1)) > LONG:
         return expression
     return min(expression, sympy.expand(expression), key=sympy.count_ops)
 
 
 def _is_real(expression: sympy.Expr) -> bool:
     """Whether an expression is made of real symbols, or SymPy knows it to be real wherever it is finite."""
-    return bool(expression.is_real) or not (expression.has(I) or any(not s.is_real for s in expression.free_symbols))
+    return bool(expression.is_real) or not (expression.has(I) or any(not s.is_real for s in symbols_of(expression)))
 
 
 def _real(name: str) -> Symbol:

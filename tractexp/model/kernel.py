@@ -40,7 +40,7 @@ def remembered(parts: Iterable[object], generate: Callable[[], str], what: str =
     its parts (their `repr`), every file beside their plugins, this package's own code, and SymPy's version. Of a part
     that stands in no file, such as one typed into a notebook, nothing is remembered.
     """
-    parts = tuple(parts)
+    parts = tuple(one for part in parts for one in (part, *getattr(part, "members", ())))
     modules = [type(part).__module__ for part in parts]
     files = [getattr(sys.modules.get(module), "__file__", None) for module in modules]
     if None in files:

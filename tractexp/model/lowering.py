@@ -14,6 +14,7 @@ from sympy import Symbol
 from tractexp.errors import UserError
 from tractexp.model.drive import EVENT, INPUTS
 from tractexp.model.equations import Equations, phasor_parts, start_symbol
+from tractexp.model.graph import replaced, symbols_of
 from tractexp.model.rest import settled
 
 
@@ -114,7 +115,7 @@ def lower(eq: Equations) -> Lowered:
     remembered = [eq.real(m.initial) for m in eq.memories.values()]
     start = _phase(None, [i for _, _, i in rows] + remembered + slack)
     at_rest = eq.at_rest() | dict(zip((*states, *memories), starts, strict=True))
-    balances = _phase(None, [b.xreplace(at_rest) for b in eq.real_balances()])
+    balances = _phase(None, [replaced(b, at_rest) for b in eq.real_balances()])
     phases = (derivative, renewal, output)
     used = tuple(s for s in inputs if s == eq.v or any(s in symbols(p) for p in phases))
     lowered = Lowered(
@@ -139,7 +140,7 @@ def _phase(
     targets, expressions = list(needed), [*needed.values(), *expressions]
     if hoist is not None:
         expressions = [hoist(e) for e in expressions]
-        used = set().union(*(e.free_symbols for e in expressions))
+        used = set().union(*map(symbols_of, expressions))
         signals = tuple((s, e) for e, s in hoist.signals.items() if s in used)
     temporaries, reduced = sympy.cse(expressions, symbols=sympy.numbered_symbols("x", real=True), order="none")
     computed = [*temporaries, *zip(targets, reduced, strict=False)]
@@ -149,10 +150,10 @@ def _phase(
 def _needed(expressions: list[sympy.Expr], steps: Mapping[Symbol, sympy.Expr]) -> dict[Symbol, sympy.Expr]:
     """The steps that some expressions need, and those that these need in turn."""
     needed: set[Symbol] = set()
-    new = set().union(*(e.free_symbols for e in expressions)) & steps.keys()
+    new = set().union(*map(symbols_of, expressions)) & steps.keys()
     while new:
         needed |= new
-        new = set().union(*(steps[s].free_symbols for s in new)) & steps.keys() - needed
+        new = set().union(*(symbols_of(steps[s]) for s in new)) & steps.keys() - needed
     return {symbol: e for symbol, e in steps.items() if symbol in needed}
 
 

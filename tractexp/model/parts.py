@@ -19,16 +19,18 @@ if TYPE_CHECKING:
     from tractexp.model.drive import Drive
     from tractexp.model.equations import Equations
 
-CHANNELS = ("f", "U2")  # recorded channels that not every record has
+CHANNELS = ("f", "U2", "I0")  # recorded channels that not every record has; I0 of waveforms, where there is some
 
 
 class Part(Plugin):
     """A part of a load.
 
-    `reads` names the recorded channels (`f`, `U2`) without which its parameters cannot be identified.
+    `reads` names the recorded channels (`f`, `U2`, `I0`) without which its parameters cannot be identified.
     """
 
     reads: ClassVar[tuple[str, ...]] = ()
+    phasors_only: ClassVar[str] = ""  # why it makes no sense of waveforms; "" where it does
+    waves_only: ClassVar[str] = ""  # why it makes no sense of phasors
 
     @classmethod
     def check_class(cls, where: str) -> None:
@@ -111,8 +113,6 @@ class Effect(Part):
     grid: ClassVar[dict[str, tuple[float, ...]]] = {}
     relevant: ClassVar[dict[str, float]] = {}
     confused_with: ClassVar[tuple[str, ...]] = ()
-    phasors_only: ClassVar[str] = ""  # why it makes no sense of waveforms; "" where it does
-    waves_only: ClassVar[str] = ""  # why it makes no sense of phasors
 
     @abstractmethod
     def edit(self, eq: "Equations", **parameters: Any) -> None:

@@ -30,6 +30,9 @@ time_constant = Site("time_constant", r"\tau'", "real", "s", "motor", "transient
 electrical_torque = Site("electrical_torque", "T_e", "real", "pu", "motor", "torque the field exerts on the rotor")
 load_torque = Site("load_torque", "T_L", "real", "pu", "motor", "torque of what the motor drives")
 bus_voltage = Site("bus_voltage", "v", "phasor", "pu", "bus", "voltage that all parts see, as recorded (waves)")
+bus_voltage_rate = Site(
+    "bus_voltage_rate", r"\dot v", "phasor", "pu/s", "bus", "its slope, where a part reads it (waves)"
+)
 motor_current = Site("motor_current", "i_d", "phasor", "pu", "motor", "current that the motors draw (waves)")
 P_motor = Site("P_motor", "P_d", "real", "pu", "motor", "active power of the motor")
 Q_motor = Site("Q_motor", "Q_d", "real", "pu", "motor", "reactive power of the motor")

@@ -35,6 +35,7 @@ class Noise:
     shocks: tuple[np.ndarray, ...] | None = None  # of unit variance, as they were seen; None: normal
     wander: Wander | None = None  # of the mixed channels
     blur: np.ndarray | None = None  # (k, C, N) pu: what errors of the voltage do, each of one standard deviation
+    vector: bool = False  # the first two channels are a space vector, whose autoregression is complex
     _shrunk: dict[int, "list[Shrunk]"] = field(default_factory=dict, init=False)
 
     @classmethod
@@ -52,12 +53,15 @@ class Noise:
 
     def of(self, event: int) -> "Noise":
         """The noise of one event by itself, without its shapes."""
-        return Noise((self.pair(event),), self.mix)
+        return Noise((self.pair(event),), self.mix, vector=self.vector)
 
     @functools.cached_property
     def loudest_blur(self) -> float:
-        """The largest variance that noise of the voltage causes at any sample, over that of the power."""
-        return 0.0 if self.blur is None else float((self._mixed(self.blur) ** 2).sum(axis=0).max())
+        """The largest variance that noise of the voltage causes at any sample, over that of the power.
+
+        Of currents the shapes are offsets, which come from no voltage.
+        """
+        return 0.0 if self.blur is None or self.channels > 2 else float((self._mixed(self.blur) ** 2).sum(axis=0).max())
 
     def scaled(self, factor: float) -> "Noise":
         """The same noise, `factor` times as loud."""
@@ -75,8 +79,7 @@ class Noise:
     def whiten(self, residuals: np.ndarray, drive: Drive, known: np.ndarray) -> np.ndarray:
         """(n, C, N) to rows (n, C N) of independent unit variance; samples that are not `known` (C, N) are 0."""
         if self.mix is not None:
-            measured = known.any(axis=1)
-            known = known[measured].all(axis=0) & measured[:, None]
+            known = self._together(known, drive)
         rows = np.empty_like(residuals)
         with np.errstate(over="ignore", invalid="ignore"):  # what diverges has a deviance that is not finite
             mixed = self._mixed(residuals)
@@ -85,6 +88,16 @@ class Noise:
                 white = self._fast(mixed[:, :, part], known[:, part], e)
                 rows[:, :, part] = self._without_shapes(white, known[:, part], part, e)
         return rows.reshape(len(rows), -1)
+
+    def _together(self, known: np.ndarray, drive: Drive) -> np.ndarray:
+        """Samples (C, N) that count where channels are mixed: those at which all count that are measured.
+
+        The mixing of currents is triangular, so that an event without the last, of zero sequence, has the others.
+        """
+        if self.channels > 2 and drive.events > 1:
+            parts = [known[:, drive.part(e)] for e in range(drive.events)]
+            return np.concatenate([_all_measured(part) for part in parts], axis=1)
+        return _all_measured(known)
 
     def draw(self, rng: np.random.Generator, count: int, lengths: Sequence[int]) -> np.ndarray:
         """Noise of events of these lengths end to end, (count, C, N) [pu]."""
@@ -96,7 +109,7 @@ class Noise:
     def worth(self, samples: int) -> float:
         """How many independent samples tell as much of the slowest of this noise, by the color's gain at rest."""
         channels = [channel for pair in self.pairs for channel in pair]
-        gains = [1 / max(1 - float(a.coefficients[-1].sum()), 1e-3) for a in channels]
+        gains = [1 / max(float(abs(1 - a.coefficients[-1].sum())), 1e-3) for a in channels]
         spreads = [a.deviation[0] / a.deviation[-1] for a in channels]
         return samples / max(1.0, *((g / s) ** 2 for g, s in zip(gains, spreads, strict=True)))
 
@@ -150,7 +163,11 @@ class Noise:
 
     def _fast(self, mixed: np.ndarray, known: np.ndarray, event: int) -> np.ndarray:
         """Mixed channels (n, C, samples) of one event without the color of the fast noise."""
-        rows = [channel.whiten(mixed[:, c], known[c]) for c, channel in enumerate(self.pair(event))]
+        pair, rows = self.pair(event), []
+        if self.vector:
+            white = pair[0].whiten(mixed[:, 0] + 1j * mixed[:, 1], known[0])
+            rows = [white.real, white.imag]
+        rows += [channel.whiten(mixed[:, c], known[c]) for c, channel in enumerate(pair) if c >= len(rows)]
         return np.stack(rows, axis=1)
 
     def _without_shapes(self, white: np.ndarray, known: np.ndarray, part: slice, event: int) -> np.ndarray:
@@ -193,14 +210,24 @@ class Noise:
 
     def _drawn(self, rng: np.random.Generator, count: int, part: slice, event: int) -> np.ndarray:
         """Mixed channels (count, C, samples) of one event."""
-        colored = []
+        colored, pair = [], self.pair(event)
         size = (count, part.stop - part.start + BURN_IN)
-        for c, channel in enumerate(self.pair(event)):
+        if self.vector:
+            shocks = rng.standard_normal((2, *size)) * pair[0].deviation[-1]
+            turning = pair[0].recurring(shocks[0] + 1j * shocks[1])[:, BURN_IN:]
+            colored = [turning.real, turning.imag]
+        for c, channel in list(enumerate(pair))[len(colored) :]:
             shocks = rng.standard_normal(size) if self.shocks is None else rng.choice(self.shocks[c], size)
             shocks *= channel.deviation[-1]
             colored.append(channel.recurring(shocks)[:, BURN_IN:])
         shapes = self._shapes(part)
         return np.stack(colored, axis=1) + np.einsum("bk,kct->bct", rng.standard_normal((count, len(shapes))), shapes)
+
+
+def _all_measured(known: np.ndarray) -> np.ndarray:
+    """Samples (C, n) at which every channel counts that counts at all."""
+    measured = known.any(axis=1)
+    return known[measured].all(axis=0) & measured[:, None]
 
 
 def _shrunk(channels: tuple[int, ...], shapes: np.ndarray) -> Shrunk:

@@ -52,6 +52,11 @@ class Event:
         return 0
 
     @property
+    def channels(self) -> tuple[str, ...]:
+        """What is recorded beside t, U, P and Q, and these, by name."""
+        return tuple(self.record.channels)
+
+    @property
     def levels(self) -> tuple[float, ...]:
         """Standard deviation of the noise of each channel that is compared [pu]: of P and of Q."""
         return self.noise_P, self.noise_Q

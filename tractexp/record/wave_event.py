@@ -32,8 +32,9 @@ class WaveEvent(Event):
     v (N,) complex is the voltage's space vector in the frame [pu of its peak], v_zero (N,) its zero sequence, `turn`
     (N,) turns into the stationary frame of phase a; currents (3, N) are alpha, beta and zero sequence there [pu], nan
     where not compared. The first `lead` samples stand before the record. `omega_s0` [rad/s] is the frame's speed
-    relative to nominal; `random` (3,) is what is not periodic in the currents before the dip [pu], `unexplained`
-    (3, n) all that is no fundamental there. `offsets` (2 K,) [kV, kA] were taken off.
+    relative to nominal; `random` (3,) is what is not periodic in the currents before the dip [pu], `noise_U` in either
+    component of the voltage's space vector, `unexplained` (3, n) all that is no fundamental there. `offsets` (2 K,)
+    [kV, kA] were taken off.
     """
 
     phasors: Event
@@ -51,6 +52,11 @@ class WaveEvent(Event):
     @property
     def first(self) -> int:
         return self.lead
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """With I0 where the currents' zero sequence is compared."""
+        return (*super().channels, *(("I0",) if self.known[2] else ()))
 
     @property
     def levels(self) -> tuple[float, ...]:
@@ -172,7 +178,7 @@ def in_waves(event: Event) -> WaveEvent:
     calm = _calm(i, i_zero, turn, I * np.exp(-1j * np.angle(V)), slice(lead, lead + np.count_nonzero(before)))
     compared = _compared(currents[:, start:], calm, K)
     currents[~compared] = np.nan
-    noise = periodic.rest[K:]
+    noise, noise_U = periodic.rest[K:], np.sqrt(np.mean(periodic.rest[:K] ** 2) * (2 / 3 if K == 3 else 1))
     levels = (noise.mean() * np.sqrt(2 / 3),) * 2 + (noise.mean() / np.sqrt(3),) if K == 3 else (noise[0], 1.0, 1.0)
     slow = replace(
         record, t=time, U=made[0], P=made[1].real, Q=made[1].imag, f=None, U2=made[2], window=None, more={}, waves=None
@@ -182,7 +188,8 @@ def in_waves(event: Event) -> WaveEvent:
         **{f.name: getattr(event, f.name) for f in fields(Event)}
         | {
             "record": slow, "start": start, "end": end, "U0": float(np.abs(V)), "P0": float(power.real),
-            "Q0": float(power.imag), "f0": frequency, "steady": slice(lead, lead + np.count_nonzero(before)),
+            "Q0": float(power.imag), "f0": frequency, "noise_U": float(noise_U),
+            "steady": slice(lead, lead + np.count_nonzero(before)),
         },
         phasors=event, v=v / turn, v_zero=v_zero, turn=turn, currents=currents, lead=lead,
         omega_s0=2 * np.pi * (frequency - nominal), random=tuple(map(float, levels)), unexplained=calm,

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tractexp.discrepancy.discrepancy_json import recommendation
+from tractexp.discrepancy.discrepancy_json import recommendation, use_of
 from tractexp.discrepancy.evidence import (
     CHOSEN,
     FITTED,
@@ -17,12 +17,13 @@ from tractexp.discrepancy.evidence import (
     evidence,
     why_not_the_most_helpful,
 )
+from tractexp.discrepancy.gap import Curves
 from tractexp.discrepancy.investigate import Investigation
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import Estimate, estimates
 from tractexp.discrepancy.recommended import adequacy, held
 from tractexp.discrepancy.remainder import Remainder
-from tractexp.discrepancy.verdict import UNEXPLAINED
+from tractexp.discrepancy.verdict import UNEXPLAINED, Nearest
 from tractexp.report.chart import Chart
 from tractexp.report.overlay import overlaid
 from tractexp.report.page import Page
@@ -32,7 +33,15 @@ KIND = {"none": "good", "named": "good", "tied": "plain", "unexplained": "bad"}
 COLORS = {CHOSEN: "#009E73", KEPT: "#E69F00"}
 REFITTED, ESTIMATED = "#0072B2", "#9A9A9A"
 BAR, ROOM = 24, 1.2  # pixels; of the longest bar, for what stands beside the bars
+NOISE_OF_WAVES = (
+    "It is estimated before the dip and at the end of the record, from what the fit leaves there: harmonics that no"
+    " equation explains count as noise. Beside it each current may keep a small offset."
+)
 MOST_SETS = 12  # that are compared in a table
+CURRENTS = (
+    ", as the record's estimator sees them in calculated and recorded currents. epsilon_i: what the currents of all"
+    " phases miss in the 0.15 s after the dip begins, rms, over their rms before it"
+)
 
 
 def page(path: Path, found: Investigation, title: str) -> Path:
@@ -66,22 +75,37 @@ def _graded(found: Investigation) -> str:
 
 def _smaller(made: Page, found: Investigation) -> None:
     made.heading("How large the gap is" if not found.names else "How much smaller the gap is")
-    rows = []
-    for label, gap in (("fitted", found.train), ("held out", found.validate)):
+    waves, near = found.bench.waves, found.verdict.nearest
+    rows = _with_nearest(near) if waves and near else []
+    for label, gap in () if rows else (("fitted", found.train), ("held out", found.validate)):
         if gap is None:
             continue
         stages = [("base model", gap.before), ("extended model", gap.after)]
         for stage, c in stages if found.names else stages[:1]:
             closed = f"{gap.closed:.0%}" if c is gap.after and np.isfinite(gap.closed) else ""
-            rows.append([label, stage, f"{c.epsilon_p:.3%}", f"{c.epsilon_q:.3%}", f"{c.chi2_per_sample:.3f}", closed])
-    columns = ["events", "model", "epsilon_p", "epsilon_q", "chi2 per sample"]
-    caption = "epsilon: relative error of P and Q, Eq. (20). chi2 per sample: 1 where only noise is left."
+            rows.append([label, stage, *_off(c), closed])
+    columns = ["events", "model", "epsilon_p", "epsilon_q", *["epsilon_i"] * waves, "chi2 per sample"]
+    caption = f"epsilon: relative error of P and Q, Eq. (20){CURRENTS * waves}."
+    caption += " chi2 per sample: 1 where only noise is left."
     if found.names:
         columns.append("gap closed")
         caption += " Gap closed: the share of what an explanation could gain at all."
     made.table(columns, [row[: len(columns)] for row in rows], caption, words=(1,))
     if found.fitted_to_both:
         made.text("The extended model was fitted to the held-out events, too: what they say of it is no test of it.")
+
+
+def _with_nearest(near: Nearest) -> list[list[str]]:
+    """The base model's gap and that of the candidates which come nearest."""
+    told = (("fitted", near.curves), ("held out", near.carried))
+    stages = ("base model", "nearest candidates")
+    return [[label, stage, *_off(c), ""] for label, both in told if both for stage, c in zip(stages, both, strict=True)]
+
+
+def _off(c: Curves) -> list[str]:
+    """How far off curves are, as a table tells it."""
+    errors = [f"{e:.3%}" for e in (c.epsilon_p, c.epsilon_q, c.epsilon_i) if e is not None]
+    return [*errors, f"{c.chi2_per_sample:.3f}"]
 
 
 def _left(made: Page, found: Investigation) -> None:
@@ -268,12 +292,13 @@ def _equations(made: Page, found: Investigation) -> None:
     if others := [joined(names) for names in found.verdict.sets[1:]]:
         made.text(f"It has {joined(found.names)}; {joined(others, 'or')} instead would fit these events as well.")
     made.text(
-        "conf/model/extended.yaml beside this page: python -m tractexp --config-dir conf model=extended. Its equations"
+        f"conf/model/extended.yaml beside this page: {use_of(found.bench.load.domain, 'conf')}. Its equations"
         " that changed or came in:"
     )
     base = found.bench.load
     effects = [found.catalogue[n].effect for n in found.names]
-    before, after = base.latex(), compose(base.motor, base.static, [*base.effects, *effects]).latex()
+    extended = compose(base.motor, base.static, [*base.effects, *effects], domain=base.domain)
+    before, after = base.latex(), extended.latex()
     old = {line.split("=")[0]: line for line in before}
     for line in after:
         if line not in before and "|_0" not in line:
@@ -312,8 +337,13 @@ def _disagreement(made: Page, found: Investigation) -> None:
 
 
 def _noise(made: Page, found: Investigation) -> None:
+    level, free = found.bench.describe(found.last.noise), joined(found.catalogue.of_measurement)
+    if found.bench.waves:
+        faults = f" Faults of the measurement ({free}) are free in every fit, each held by what is likely." * bool(free)
+        made.heading("Noise").text(f"{level}. {NOISE_OF_WAVES}{faults}")
+        return
     made.heading("Noise").text(
-        f"{found.last.noise.describe()}. It is estimated where nothing happens, from what the fit leaves there, and"
+        f"{level}. It is estimated where nothing happens, from what the fit leaves there, and"
         " so contains what smoothing leaves of the voltage's noise. Time skew, measurement window and load drift are"
         " free in every fit, each held by what is physically likely."
     )

@@ -2,19 +2,28 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from tractexp.discrepancy.overlay import Overlay
-from tractexp.record import describe
+from tractexp.identification.seen import seen_by_estimator
+from tractexp.record import WaveEvent, describe
 from tractexp.report.chart import Chart
 from tractexp.report.events import CAPTION, Curve, event_chart
 from tractexp.report.page import Page
+from tractexp.report.waves import CAPTION as WAVE_CAPTION
+from tractexp.report.waves import Drawn, wave_chart
 
 BASE, EXTENDED, NEAREST = "#D55E00", "#0072B2", "#CC79A7"
+IN_PHASORS = (
+    "The record's estimator run over the recorded and over the calculated currents, so that its window cancels; a dip"
+    " of few cycles is smeared alike in both."
+)
 SHOWN = 4  # events of each role that are not folded
 
 
 def overlaid(page: Page, overlays: Sequence[Overlay]) -> Page:
     """A chart of each event, the fitted ones first; those beyond the first few are folded."""
-    page.text(CAPTION)
+    page.text(WAVE_CAPTION if any(isinstance(o.event, WaveEvent) for o in overlays) else CAPTION)
     for role, held_out in (("fitted", False), ("held out", True)):
         group = [o for o in overlays if o.held_out == held_out]
         for overlay in group[:SHOWN]:
@@ -27,21 +36,48 @@ def overlaid(page: Page, overlays: Sequence[Overlay]) -> Page:
 
 
 def _shown(page: Page, overlay: Overlay, role: str) -> None:
-    page.heading(f"{overlay.event.record.name}, {role}", level=3).chart(chart(overlay), f"{describe(overlay.event)}.")
+    event = overlay.event
+    page.heading(f"{event.record.name}, {role}", level=3)
+    if not isinstance(event, WaveEvent):
+        page.chart(chart(overlay), f"{describe(event)}.")
+        return
+    page.chart(currents(event, overlay), f"{describe(event.phasors)}.")
+    with page.folded("The same in phasors: P and Q"):
+        page.chart(in_phasors(event, overlay), IN_PHASORS)
 
 
 def chart(overlay: Overlay) -> Chart:
     """One event with the curves of the models; the noise band is that of the best of them."""
-    best = overlay.before if overlay.after is None else overlay.after
-    curves = [
-        Curve(name, power, color, dash)
-        for name, power, color, dash in (
-            ("base model", overlay.before, BASE, "solid"),
-            ("nearest candidates", overlay.nearest, NEAREST, "dot"),
-            ("extended model", overlay.after, EXTENDED, "solid"),
-        )
-        if power is not None
-    ]
+    curves = [Curve(*model) for model in _models(overlay)]
     return event_chart(
-        overlay.event, curves, deviation=overlay.deviation, around=best, places=overlay.places, driving=overlay.driving
+        overlay.event, curves, deviation=overlay.deviation, around=_best(overlay), places=overlay.places,
+        driving=overlay.driving,
+    )  # fmt: skip
+
+
+def currents(event: WaveEvent, overlay: Overlay) -> Chart:
+    """The currents of the phases, in which the noise band is that of the best of the models."""
+    curves = [Drawn(*model) for model in _models(overlay)]
+    return wave_chart(
+        event, curves, deviation=overlay.deviation, around=_best(overlay), places=overlay.places
+    )  # fmt: skip
+
+
+def in_phasors(event: WaveEvent, overlay: Overlay) -> Chart:
+    """What the record's estimator sees in the currents, calculated and recorded."""
+    seen = [(name, seen_by_estimator(event, made), *look) for name, made, *look in _models(overlay)]
+    return event_chart(seen[0][1][0], [Curve(name, np.stack(power), *look) for name, (_, *power), *look in seen])
+
+
+def _models(overlay: Overlay) -> list[tuple[str, np.ndarray, str, str]]:
+    """What there is: name, what it draws, color and dash."""
+    models = (
+        ("base model", overlay.before, BASE, "solid"),
+        ("nearest candidates", overlay.nearest, NEAREST, "dot"),
+        ("extended model", overlay.after, EXTENDED, "solid"),
     )
+    return [(name, made, color, dash) for name, made, color, dash in models if made is not None]
+
+
+def _best(overlay: Overlay) -> np.ndarray:
+    return overlay.before if overlay.after is None else overlay.after

@@ -10,9 +10,10 @@ from tractexp.identification.result import AFTER, Fit
 from tractexp.record import WaveEvent
 from tractexp.report import style
 from tractexp.report.chart import Chart
+from tractexp.report.events import FOUND, WITHIN
 
 PHASES = ("a", "b", "c")
-COLORS = ("#E69F00", "#009E73", "#D55E00")  # of phases a, b, c
+COLORS = ("#E69F00", "#009E73", "#56B4E9")  # of phases a, b, c: none of them is a model's
 CYCLES = 2.0  # shown at first before and after the dip
 HARMONICS = (1, 3, 5, 7, 9, 11, 13, 17, 19, 23, 25)
 FASTEST = 1300.0  # Hz: what a spectrum shows
@@ -46,10 +47,19 @@ class Drawn(NamedTuple):
     dash: str = "solid"
 
 
-def wave_chart(event: WaveEvent, curves: Sequence[Drawn]) -> Chart:
+def wave_chart(
+    event: WaveEvent,
+    curves: Sequence[Drawn],
+    *,
+    deviation: np.ndarray | None = None,
+    around: np.ndarray | None = None,
+    places: Sequence[Any] = (),
+) -> Chart:
     """Voltages, then each phase's current as recorded and as calculated, and what the curves leave of it.
 
-    The dip is in view at first. Voltages are in kV, currents in A or kA.
+    The dip is in view at first. Voltages are in kV, currents in A or kA. `deviation` (3, N) of the noise [pu] draws a
+    band around the currents `around` (3, N) and about zero; `places` have `start` and `end` [s]: where more than chance
+    is left of some current.
     """
     (kV, kA), kept = event.peaks, slice(event.lead, None)
     names = PHASES[: event.phases] if event.phases > 1 else ("",)
@@ -61,6 +71,10 @@ def wave_chart(event: WaveEvent, curves: Sequence[Drawn]) -> Chart:
     colors = COLORS if event.phases > 1 else (style.VOLTAGE,)
     for name, u, color in zip(names, event.of_phases(_voltage(event))[:, kept], colors, strict=False):
         made.samples(f"phase {name}" if name else "voltage", start, step, kV * u, color)
+    if deviation is not None and around is not None:
+        _noise_bands(made, event, one * deviation, one * around)
+    for first, last in _together(places):
+        made.shade(first, last, FOUND, 1 + event.phases, "more than chance leaves", opacity=0.2)
     for k in range(event.phases):
         made.samples("measured", start, step, one * measured[k], style.MEASURED, 1 + k, width=3)
     for name, currents, color, dash in curves:
@@ -71,6 +85,28 @@ def wave_chart(event: WaveEvent, curves: Sequence[Drawn]) -> Chart:
             own = colors[k] if len(curves) == 1 and phase else color
             made.samples(f"phase {phase}" if own != color else name, start, step, rest, own, len(names) + 1, dash=dash)
     return made.edge(event.t_start).edge(event.t_end).limits(None, *_view(event))
+
+
+def _noise_bands(made: Chart, event: WaveEvent, deviation: np.ndarray, around: np.ndarray) -> None:
+    """Where noise alone would let a sample lie: about each phase's current and, the widest of them, about zero."""
+    t = event.record.t[event.lead :]
+    known = np.array(event.known)[:, None]
+    half = WITHIN * np.sqrt(event.of_phases(np.eye(3)) ** 2 @ (deviation * known) ** 2)[:, event.lead :]
+    middle, name = event.of_phases(around)[:, event.lead :], f"± {WITHIN:g} σ of the noise"
+    for k in range(event.phases):
+        made.band(name, t, middle[k] - half[k], middle[k] + half[k], style.FAINT, 1 + k)
+    made.band(name, t, -half.max(axis=0), half.max(axis=0), style.FAINT, 1 + event.phases)
+
+
+def _together(places: Sequence[Any]) -> list[tuple[float, float]]:
+    """The stretches [s] that places of any channel cover, none of them twice."""
+    covered: list[tuple[float, float]] = []
+    for place in sorted(places, key=lambda p: p.start):
+        if covered and place.start <= covered[-1][1]:
+            covered[-1] = covered[-1][0], max(covered[-1][1], place.end)
+        else:
+            covered.append((place.start, place.end))
+    return covered
 
 
 def _voltage(event: WaveEvent) -> np.ndarray:

@@ -57,6 +57,8 @@ def read(events: Any) -> None:
 
 def tell(found: "Investigation", paths: Sequence[Path]) -> None:
     """Print the verdict first, then how large it is and how much it explains, where, and what was written."""
+    from tractexp.discrepancy.discrepancy_json import use_of
+
     content, shown = found.content, found.table()
     say()
     say(f"verdict: {found.verdict.upper()} {' or '.join(map(joined, content['name_sets']))}".rstrip())
@@ -85,7 +87,7 @@ def tell(found: "Investigation", paths: Sequence[Path]) -> None:
     say(f"beside it: {', '.join(sorted(by_name))}")
     if model := by_name.get("extended.yaml"):
         which = f", which has {joined(found.names)}" * (found.verdict == "tied")
-        say(f"use the extended model{which}: python -m tractexp --config-dir {model.parent.parent} model=extended")
+        say(f"use the extended model{which}: {use_of(found.question.model.domain, str(model.parent.parent))}")
 
 
 def log(job: Job, found: "Investigation", paths: list[Path]) -> None:
@@ -97,7 +99,8 @@ def log(job: Job, found: "Investigation", paths: list[Path]) -> None:
         if (gap := getattr(found.gap, role)) is None:
             continue
         for stage in STAGES:
-            metrics |= {f"{role}_{stage}_{key}": value for key, value in vars(getattr(gap, stage)).items()}
+            known = {key: value for key, value in vars(getattr(gap, stage)).items() if value is not None}
+            metrics |= {f"{role}_{stage}_{key}": value for key, value in known.items()}
         if gap.closed is not None:
             metrics[f"{role}_gap_closed"] = gap.closed
     children = [

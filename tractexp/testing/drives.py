@@ -1,8 +1,8 @@
-"""The events that contracts play: smooth dips with a sagging frequency and an unbalance, and steady voltage."""
+"""The events that contracts play: smooth dips with a sagging frequency and an unbalance, and steady voltage; in waves too."""
 
 import numpy as np
 
-from tractexp.model.drive import Drive, Excitation
+from tractexp.model.drive import WAVES, Drive, Excitation, Waveforms
 
 P0, Q0 = 1.0, 0.6  # pu, drawn before every event
 
@@ -20,9 +20,33 @@ def flat(voltage: float = 0.97, speed: float = -1.5, samples: int = 300) -> Exci
     return _event(np.full(samples, voltage), 1e-3, np.full(samples, speed), np.full(samples, 0.03))
 
 
-def drive(*depths: float) -> Drive:
+def wave_dip(depth: float = 0.5, rate: float = 3200.0, length: float = 0.28, edge: float = 0.002) -> Waveforms:
+    """Space vectors of a dip to 1 - `depth` pu for 50 ms, unbalanced, with a jump of the angle and a zero sequence."""
+    t = np.arange(round(length * rate)) / rate
+    rise = lambda begin: 0.5 - 0.5 * np.cos(np.pi * np.clip((t - begin) / edge, 0, 1))  # noqa: E731
+    shape = depth * (rise(0.12) - rise(0.17))
+    theta = (100 * np.pi - 1.5) * t
+    v = 1 - shape * np.exp(0.2j) - 0.5 * shape * np.exp(0.5j - 2j * theta)
+    return _waves(v, 0.1 * shape * np.cos(theta + 1.0), theta, rate)
+
+
+def wave_flat(voltage: float = 0.97, rate: float = 3200.0, samples: int = 640) -> Waveforms:
+    """A space vector that turns at one size and speed."""
+    t = np.arange(samples) / rate
+    return _waves(np.full(samples, voltage + 0j), np.zeros(samples), (100 * np.pi - 1.5) * t, rate)
+
+
+def drive(*depths: float, domain: str = "") -> Drive:
     """Dips of these depths, end to end."""
-    return Drive.of([dip(depth) for depth in depths])
+    made = wave_dip if domain == WAVES else dip
+    return Drive.of([made(depth) for depth in depths])
+
+
+def _waves(v: np.ndarray, v_zero: np.ndarray, theta: np.ndarray, rate: float) -> Waveforms:
+    turn, n = np.exp(1j * theta), round(rate / 100)
+    slow = np.convolve(np.concatenate([np.full(n - 1, v[0]), v]), np.full(n, 1 / n), "valid")
+    U0, still = abs(v[0]), np.zeros((3, len(v)))
+    return Waveforms(1 / rate, v, v_zero, turn, still, abs(slow), abs(v) - U0, U0, P0, Q0, omega_s0=-1.5)
 
 
 def _event(U: np.ndarray, step: float, speed: np.ndarray, U2: np.ndarray) -> Excitation:

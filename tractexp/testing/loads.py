@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from tractexp.errors import UserError, among
-from tractexp.model.drive import Drive
+from tractexp.model.drive import INPUTS, PHASORS, WAVES, Drive
 from tractexp.model.model import Model, compose
 from tractexp.model.parts import Effect, Measurement, Motor, Part, Static
 from tractexp.parameter import Parameter
@@ -29,7 +29,7 @@ ASYMPTOTIC = (1e-11, 1e-6)  # pu: errors of the fourth order, above rounding
 @functools.cache
 def partners() -> tuple[type[Motor], type[Static]]:
     """The registered motor and static load a contract is played with: few parameters, a flux and a speed that move."""
-    motors = [cls for cls in _all("model/motor") if _moves(cls)]
+    motors = [cls for cls in _all("model/motor") if cls.parameters and _moves(cls)]
     statics = [cls for cls in _all("model/static") if cls.parameters and not cls.reads]
     if not (motors and statics):
         raise UserError("contracts need a registered motor with flux and speed and a static load with parameters")
@@ -50,7 +50,8 @@ def _all(group: str) -> list[type]:
 @functools.cache
 def model(motor: type[Motor], static: type[Static], *effects: type[Effect]) -> Model:
     """A load of these parts with default settings."""
-    return compose(motor(), static(), [cls() for cls in effects])
+    domain = WAVES if any(cls.waves_only for cls in (motor, static, *effects)) else PHASORS
+    return compose(motor(), static(), [cls() for cls in effects], domain=domain)
 
 
 def with_part(cls: type[Part]) -> Model:
@@ -61,6 +62,13 @@ def with_part(cls: type[Part]) -> Model:
     if issubclass(cls, Static):
         return model(motor, cls)
     return model(*_base(cls), cls)
+
+
+@functools.cache
+def without(cls: type[Effect]) -> Model:
+    """The base model of an effect, in its domain."""
+    motor, static = _base(cls)
+    return compose(motor(), static(), domain=with_part(cls).domain)
 
 
 @functools.cache
@@ -82,7 +90,8 @@ def _bases() -> Iterator[tuple[type[Motor], type[Static]]]:
 
 def _taken(motor: type[Motor], static: type[Static], cls: type[Effect]) -> str | None:
     """Why a base model refuses an effect, None where it takes it. Anything but a sentence is raised."""
-    return model(motor, static).acceptance(cls()).refusal
+    domain = WAVES if cls.waves_only else PHASORS
+    return compose(motor(), static(), domain=domain).acceptance(cls()).refusal
 
 
 def values(of: Model, pick: Callable[[Parameter], float] = lambda p: p.default, only: Part | None = None) -> np.ndarray:
@@ -98,7 +107,7 @@ def on(p: Parameter) -> float:
 
 
 def play(of: Model, drive: Drive, chosen: np.ndarray, substeps: int = SUBSTEPS) -> np.ndarray:
-    """P and Q (2, n, N) [pu]; fails where there is no steady state."""
+    """P and Q (2, n, N) [pu], or the current in its frame and of zero sequence (3, n, N); fails without steady state."""
     response = of.simulate(drive, chosen, substeps)
     if (response.miss != 0).any():
         missed = np.atleast_2d(chosen)[int(np.argmax((response.miss != 0).any(axis=0)))]
@@ -106,7 +115,16 @@ def play(of: Model, drive: Drive, chosen: np.ndarray, substeps: int = SUBSTEPS) 
         raise AssertionError(
             f"{of.title} has no steady state at {dict(zip(of.names, missed.tolist(), strict=True))}: {why}"
         )
-    return np.stack([response.P, response.Q])
+    return _shown(of, drive, response.outputs)
+
+
+def _shown(of: Model, drive: Drive, outputs: np.ndarray) -> np.ndarray:
+    """What stands still where the voltage turns steadily."""
+    if not of.waves:
+        return outputs
+    rows = dict(zip(INPUTS, drive.inputs, strict=True))
+    still = (outputs[0] + 1j * outputs[1]) * (rows["turn_re"] - 1j * rows["turn_im"])
+    return np.stack([still.real, still.imag, outputs[2]])
 
 
 # What every part must satisfy
@@ -135,7 +153,8 @@ def rests(cls: type[Part]) -> None:
     chosen = values(of, on)
     near = np.random.default_rng(1).uniform(0.95, 1.05, (10, len(chosen))) * chosen
     low, high = np.array([p.bounds for p in of.parameters], dtype=float).reshape(-1, 2).T
-    power = play(of, Drive.of([drives.flat()]), np.clip(near, low, high))
+    flat = drives.wave_flat() if of.waves else drives.flat()
+    power = play(of, Drive.of([flat]), np.clip(near, low, high))
     assert np.isfinite(power).all(), f"{of.title} diverges under a steady voltage"
     off = np.abs(power - power[:, :, :1]).max()
     assert off < STILL, f"{of.title} moves by {off:.2g} pu under a steady voltage"
@@ -148,9 +167,9 @@ def is_finite_or_refused_at_its_bounds(cls: type[Part]) -> None:
     rows = np.tile(values(of), (len(corners), 1))
     own = [of.names.index(p.name) for p in cls.parameters]
     rows[:, own] = np.array(corners)
-    response = of.simulate(drives.drive(0.3, 0.65), rows, 16)
+    response = of.simulate(drives.drive(0.3, 0.65, domain=of.domain), rows, 16)
     good = (response.miss == 0).all(axis=0)
-    power = np.stack([response.P, response.Q])[:, good]
+    power = response.outputs[:, good]
     assert np.isfinite(power).all(), f"{of.title} is not finite in a corner of the bounds of '{cls.name}'"
     assert np.abs(power).max(initial=0.0) < LARGEST, f"{of.title} draws more than {LARGEST:g} pu in a corner"
 
@@ -161,10 +180,13 @@ def converges_in_order_four(cls: type[Part]) -> None:
 
     of = with_part(cls)
     eq = of.equations
-    written = [eq.expand(e) for e in (*(s.derivative for s in eq.states.values()), eq.P, eq.Q, *eq.steps.values())]
+    written = [
+        eq.expand(e) for e in (*(s.derivative for s in eq.states.values()), *eq.outputs().values(), *eq.steps.values())
+    ]
     if eq.memories or not eq.states or any(e.has(sympy.Max, sympy.Min) for e in written):
         return  # a corner costs the order
-    drive, chosen = Drive.of([drives.dip(0.3, step=10e-3, edge=0.04)]), values(of, on)
+    smooth = drives.wave_dip(0.3, edge=0.01) if of.waves else drives.dip(0.3, step=10e-3, edge=0.04)
+    drive, chosen = Drive.of([smooth]), values(of, on)
     fine = play(of, drive, chosen, 4 * COUNTS[-1])
     errors = np.array([np.abs(play(of, drive, chosen, n) - fine).max() for n in COUNTS])
     used = (errors > ASYMPTOTIC[0]) & (errors < ASYMPTOTIC[1])
@@ -211,8 +233,8 @@ def has_sizes_that_matter(cls: type[Effect]) -> None:
 
 def is_the_base_model_at_its_null(cls: type[Effect]) -> None:
     """With its sizes at their nulls the load is the base model, whatever its other parameters: the two are nested."""
-    of, bare = with_part(cls), model(*_base(cls))
-    drive, rng, own = drives.drive(0.3, 0.5, 0.65), np.random.default_rng(2), cls()
+    of, bare = with_part(cls), without(cls)
+    drive, rng, own = drives.drive(0.3, 0.5, 0.65, domain=of.domain), np.random.default_rng(2), cls()
     rows = [values(of, lambda p: rng.uniform(*p.bounds) if p.null is None else p.null, own) for _ in range(3)]
     off = np.abs(play(of, drive, np.array(rows)) - play(bare, drive, values(bare))).max()
     assert off < SAME, f"at its null '{cls.name}' is {off:.2g} pu away from the base model"
@@ -220,7 +242,8 @@ def is_the_base_model_at_its_null(cls: type[Effect]) -> None:
 
 def is_seen_in_a_dip(cls: type[Effect]) -> None:
     """Each size has a derivative at its null, and the size that matters changes the response of a dip."""
-    of, own, drive = with_part(cls), cls(), drives.drive(0.6)
+    of, own = with_part(cls), cls()
+    drive = drives.drive(0.6, domain=of.domain)
     for p, null in ((p, p.null) for p in cls.parameters if p.null is not None):
         low, high = p.bounds
         slopes = []
@@ -252,7 +275,7 @@ def sees_each_event_by_itself(cls: type[Measurement]) -> None:
     """The end of one event does not leak into the beginning of the next, and power keeps its shape."""
     of = with_part(cls)
     chosen = values(of, on)
-    together, alone = play(of, drives.drive(0.3, 0.6), chosen), play(of, drives.drive(0.6), chosen)
+    together, alone = (play(of, drives.drive(*dips, domain=of.domain), chosen) for dips in ((0.3, 0.6), (0.6,)))
     assert np.array_equal(together[:, :, -alone.shape[2] :], alone), f"'{cls.name}' mixes events"
 
 

@@ -1,0 +1,42 @@
+"""What happens in each phase by itself, written with the space vector and the zero sequence of three phases."""
+
+
+def phases_of(eq, vector, zero):
+    """The three phases of a space vector in the frame and a zero sequence."""
+    return [_real(eq, vector * _turned(-k)) + zero for k in range(3)]
+
+
+def vector_of(eq, phases):
+    """The space vector in the frame of three phases, and their zero sequence."""
+    from sympy import Rational, conjugate
+
+    still = Rational(2, 3) * sum(_turned(k) * x for k, x in enumerate(phases))
+    return conjugate(eq.turn) * still, sum(phases) / 3
+
+
+def beyond(x, knee):
+    """By how much x lies beyond +-knee."""
+    import sympy
+
+    return sympy.Max(0, x - knee) - sympy.Max(0, -x - knee)
+
+
+def left(eq, level):
+    """1 in a moment at which the voltage is off by more than `level` of that before the event, else 0."""
+    import sympy
+
+    off = eq.recorded_voltage - eq.U0
+    square = sum(part**2 for part in eq.parts(off))
+    return sympy.Min(1, sympy.Max(0, 10 * (square / (level * eq.U0) ** 2 - 1)))  # all of it 5 % farther
+
+
+def _turned(k):
+    """exp(j k 120 degrees)."""
+    from sympy import I, Rational, sqrt
+
+    k = k % 3
+    return (1, Rational(-1, 2) + I * sqrt(3) / 2, Rational(-1, 2) - I * sqrt(3) / 2)[k]
+
+
+def _real(eq, vector):
+    return eq.parts(eq.turn * vector)[0]

@@ -1,0 +1,190 @@
+"""Effects in waveforms: which make sense, that they are nested in the base model, and what circuits say of each."""
+
+import functools
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicHermiteSpline
+
+from tractexp.model.drive import INPUTS, SMOOTH, WAVES, Drive
+from tractexp.model.model import compose
+from tractexp.plugin import discover, get
+from tractexp.testing import drives
+
+OMEGA_N, P0, Q0 = 100 * np.pi, drives.P0, drives.Q0
+OMEGA = OMEGA_N - 1.5  # of the frame of the drives
+NAMES = sorted(discover()["effect"])
+PHASORS_ONLY = {"frequency_dependence", "measurement_window", "negative_sequence_braking", "transformer_inrush"}
+WAVES_ONLY = {"zero_sequence_path"}
+DIP = drives.wave_dip(0.5)
+DIPS = Drive.of([DIP])
+
+
+def effect(name):
+    return get("effect", name)()
+
+
+@functools.cache
+def model(*names, motor="none", static="branch"):
+    parts = get("model/motor", motor)(), get("model/static", static)()
+    return compose(*parts, [effect(n) for n in names], domain=WAVES)
+
+
+def run(*names, motor="none", substeps=16, drive=DIPS, **chosen):
+    """The current's space vector in its frame and the zero sequence, (N,) each, at defaults but for what is chosen."""
+    of = model(*names, motor=motor)
+    response = of.simulate(drive, [chosen.pop(p.name, p.default) for p in of.parameters], substeps)
+    assert not chosen
+    assert (response.miss == 0).all()
+    rows = dict(zip(INPUTS, drive.inputs, strict=True))
+    turned = (response.outputs[0, 0] + 1j * response.outputs[1, 0]) * (rows["turn_re"] - 1j * rows["turn_im"])
+    return turned, response.outputs[2, 0]
+
+
+def smooth(*names):
+    """A row of the drive between samples, or two as real and imaginary part, and its slope."""
+    rows = dict(zip(INPUTS, DIPS.inputs, strict=True))
+    value, rate = (sum(unit * rows[n] for unit, n in zip((1, 1j), which, strict=False)) for which in
+                   (names, [SMOOTH[n] for n in names]))  # fmt: skip
+    curve = CubicHermiteSpline(rows["t"], value, rate)
+    return curve, curve.derivative()
+
+
+def solved(slope, start):
+    """States (k, N), complex."""
+    t = DIPS.inputs[INPUTS.index("t")]
+    start = np.asarray(start, dtype=complex)
+    return solve_ivp(slope, (0, t[-1]), start, "DOP853", t, rtol=1e-9, atol=1e-11, max_step=DIP.step).y
+
+
+# which there are
+
+
+def test_each_is_taken_or_refused_for_a_reason_of_its_own():
+    """Those of one domain say so in the other."""
+    refused = {n: model(motor="electromechanical").acceptance(effect(n)).refusal for n in NAMES}
+    assert {n for n, why in refused.items() if why} == PHASORS_ONLY
+    assert all(why == effect(n).phasors_only for n, why in refused.items() if why)
+    assert {n for n in NAMES if effect(n).waves_only} == WAVES_ONLY
+
+
+@pytest.mark.parametrize("motor", ["electromechanical", "stator_flux"])
+def test_all_together_at_their_nulls_are_the_base_model(motor):
+    names = [n for n in NAMES if model(motor=motor).acceptance(effect(n)).refusal is None]
+    whole, bare = model(*names, motor=motor), model(motor=motor)
+    together = whole.simulate(DIPS, [p.default for p in whole.parameters], 8)
+    alone = bare.simulate(DIPS, [p.default for p in bare.parameters], 8)
+    assert (together.miss == 0).all()
+    assert np.abs(together.outputs - alone.outputs).max() < 1e-12
+
+
+# what circuits say
+
+
+def branch_of(P, Q, v=1.0, r=0.3):
+    """Conductance, susceptance of the branch's inductance and its resistance over reactance, that draw P + jQ at v."""
+    speed = OMEGA / OMEGA_N
+    B = Q * (speed**2 + r**2) / speed / abs(v) ** 2
+    return (P - Q * r / speed) / abs(v) ** 2, B, r
+
+
+def test_a_capacitor_draws_what_the_slope_of_the_voltage_says():
+    b = 0.4
+    v, rate = smooth("v_d", "v_q")
+    G, B, r = branch_of(P0, Q0 + b * OMEGA / OMEGA_N)
+    (psi,) = solved(lambda t, y: OMEGA_N * v(t) - (r * OMEGA_N + 1j * OMEGA) * y, [1 / (r + 1j * OMEGA / OMEGA_N)])
+    t = DIPS.inputs[INPUTS.index("t")]
+    known = G * v(t) + B * psi + b * (rate(t) / OMEGA_N + 1j * OMEGA / OMEGA_N * v(t))
+    assert np.abs(run("shunt_capacitor", capacitor=b)[0] - known).max() < 1e-7
+
+
+def test_a_feeder_is_its_circuit():
+    """Its reactance with what lies beside it, before conductance and branch: states are the two inductors' currents."""
+    R, X, T = 0.02, 0.1, 5e-5
+    R_p = X / OMEGA_N / T
+    i_0 = P0 - 1j * Q0
+    inductor_0 = i_0 / (1 + 1j * T * OMEGA)
+    v_0 = 1 - R * i_0 - R_p * (i_0 - inductor_0)
+    left = v_0 * np.conj(i_0)
+    G, B, r = branch_of(left.real, left.imag, v_0)
+    v, _ = smooth("v_d", "v_q")
+    at = lambda t, y: (v(t) + R_p * y[0] - (R + R_p) * B * y[1]) / (1 + (R + R_p) * G)  # noqa: E731
+
+    def slope(t, y):
+        node = at(t, y)
+        drawn = G * node + B * y[1]
+        return [(drawn - y[0]) / T - 1j * OMEGA * y[0], OMEGA_N * node - (r * OMEGA_N + 1j * OMEGA) * y[1]]
+
+    y = solved(slope, [inductor_0, v_0 / (r + 1j * OMEGA / OMEGA_N)])
+    t = DIPS.inputs[INPUTS.index("t")]
+    known = G * at(t, y) + B * y[1]
+    seen, _ = run("feeder_impedance", R_f=R, X_f=X, substeps=32)
+    assert np.abs(seen - known).max() < 2e-6
+    assert np.abs(seen - run()[0]).max() > 0.1
+
+
+def test_a_feeder_and_a_capacitor_ring_at_their_resonance():
+    """b = 1 behind X = 0.12 with hardly a load: the step of the voltage rings at 1/sqrt(X b) times nominal."""
+    n = 3200
+    still = drives.wave_flat(1.0, rate=12800.0, samples=n)
+    step = np.where(np.arange(n) < 600, 1.0, 0.9)
+    for array, values in ((still.v, step), (still.U, step)):
+        array[:] = values
+    drive = Drive.of([still])
+    seen, _ = run("feeder_impedance", "shunt_capacitor", X_f=0.12, capacitor=1.0, drive=drive)
+    ringing = (seen * still.turn)[620:1100] - (run("shunt_capacitor", capacitor=1.0, drive=drive)[0] * still.turn)[
+        620:1100
+    ]
+    spectrum = np.abs(np.fft.fft(ringing * np.hanning(480), 1 << 16))
+    f = np.fft.fftfreq(1 << 16, 1 / 12800.0)
+    high = np.abs(f) > 90
+    found = abs(f[high][np.argmax(spectrum[high])])
+    assert found == pytest.approx(50 / np.sqrt(0.12), rel=0.06)
+
+
+def test_a_load_behind_a_feeder_draws_before_the_dip_what_was_recorded():
+    for motor in ("stator_flux", "electromechanical"):
+        seen, _ = run("feeder_impedance", "shunt_capacitor", motor=motor, R_f=0.02, X_f=0.1, capacitor=0.3)
+        assert np.abs(seen[:380] - (P0 - 1j * Q0)).max() < 1e-6
+
+
+def test_the_zero_sequence_follows_its_branch():
+    b, r = 20.0, 0.03
+    v, _ = smooth("v_zero")
+    (psi,) = solved(lambda t, y: OMEGA_N * (v(t) - r * y), [0.0])
+    assert np.abs(run("zero_sequence_path", zero_susceptance=b, zero_resistance=r)[1] - b * psi.real).max() < 1e-6
+    assert b * psi.real.max() > 0.2
+
+
+def test_a_second_group_is_two_motors_side_by_side():
+    g, r = 0.3, 5.0
+    M = get("model/motor", "stator_flux").M.default
+    both = run("second_motor_group", motor="stator_flux", group_share=g, inertia_ratio=r)[0]
+    first, second = (run(motor="stator_flux", M=inertia)[0] for inertia in (M, r * M))
+    assert np.abs(both - (1 - g) * first - g * second).max() < 1e-11
+    assert np.abs(both - first).max() > 1e-3
+
+
+def test_a_trip_takes_its_share_of_the_currents():
+    chosen = {"tripped_share": 0.4, "trip_level": 0.8, "trip_delay": 0.01}
+    drive = Drive.of([drives.wave_dip(0.6)])
+    names = ("undervoltage_trip", "zero_sequence_path")
+    i, zero = run(*names, drive=drive, zero_susceptance=10.0, **chosen)
+    whole, whole_zero = run("zero_sequence_path", drive=drive, zero_susceptance=10.0)
+    late = slice(520, 700)
+    assert pytest.approx(0.6 * whole[late], abs=1e-4) == i[late]
+    assert pytest.approx(0.6 * whole_zero[late], abs=1e-4) == zero[late]
+    assert pytest.approx(whole[:400], abs=1e-6) == i[:400]
+
+
+def test_a_drift_grows_with_its_part_of_the_current():
+    seen, whole = run("load_drift", drift_P=0.05, drift_Q=-0.03)[0], run()[0]
+    t = DIPS.inputs[INPUTS.index("t")]
+    known = whole.real * (1 + 0.05 * t) + 1j * whole.imag * (1 - 0.03 * t)
+    assert np.abs(seen - known).max() < 1e-12
+
+
+def test_a_skew_shifts_the_currents_of_the_stationary_frame():
+    late, whole = run("time_skew", skew=2 / 3200)[0] * DIP.turn, run()[0] * DIP.turn
+    assert np.abs(late[5:] - whole[3:-2]).max() < 1e-12

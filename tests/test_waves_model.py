@@ -1,0 +1,293 @@
+"""The equations on waveforms: against equations written out by hand, and against what phasors and physics say."""
+
+import functools
+import itertools
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.interpolate import Akima1DInterpolator
+from waves_of import OMEGA, dip, event, smooth, times, vector
+
+from tractexp.errors import UserError
+from tractexp.extend import Effect, Parameter
+from tractexp.model.drive import Drive, Excitation
+from tractexp.model.model import compose
+from tractexp.plugin import discover, get
+
+MOTORS = ("stator_flux", "electromechanical", "double_cage", "voltage")
+STATICS = ("branch", "constant_impedance", "exponential", "zip", "constant_power", "none")
+VALUES = {
+    "T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "R_s": 0.03, "T_second": 0.01,
+    "X_second": 0.18, "p_v": 1.4, "q_v": 3.0, "a_Z": 0.4, "a_I": 0.3, "b_Z": 0.7, "b_I": 0.2, "branch_resistance": 0.3,
+    "capacitor": 0.2, "zero_conductance": 0.4,
+}  # fmt: skip
+
+
+class Shunt(Effect):
+    """A capacitor in each phase, and a conductance of the zero sequence."""
+
+    name = "shunt"
+    capacitor = Parameter(0.0, (0.0, 1.0), "pu", "susceptance", "test", null=0.0)
+    zero_conductance = Parameter(0.0, (0.0, 1.0), "pu", "of the zero sequence", "test", null=0.0)
+    parameters = (capacitor, zero_conductance)
+
+    def edit(self, eq, capacitor, zero_conductance):
+        eq.draw(eq.capacitor(capacitor), zero_conductance * eq.v_zero)
+
+
+@functools.cache
+def model(motor, static="branch", *effects, domain="waves"):
+    made = [Shunt() if name == "shunt" else get("effect", name)() for name in effects]
+    return compose(get("model/motor", motor)(), get("model/static", static)(), made, domain=domain)
+
+
+def values(of, **changed):
+    return np.array([(VALUES | changed)[name] for name in of.names])
+
+
+def played(of, made, chosen=None, substeps=16):
+    """The currents (3, N) of one candidate."""
+    response = of.simulate(Drive.of([made]), values(of) if chosen is None else chosen, substeps)
+    assert response.miss[0, 0] == 0
+    return response.outputs[:, 0]
+
+
+def by_hand(made, p):
+    """Currents (N,) complex and zero sequence (N,) of a machine, a branch beside a conductance, and a capacitor.
+
+    Written in the stationary frame with stator and rotor flux linkages, as textbooks do, and solved by DOP853 from the
+    phasors of the circuit before the event. Between samples the voltage is SciPy's makima in the turning frame.
+    """
+    w = OMEGA + made.omega_s0  # rad/s of the frame
+    X, T0 = p["X_prime"] / (1 - p["C"]), p["T_prime"] / (1 - p["C"])
+    r = p["branch_resistance"]
+    t = times(made)
+    parts = [Akima1DInterpolator(t, y, method="makima") for y in (made.v.real, made.v.imag)]
+    slopes = [y.derivative() for y in parts]
+    turn = lambda at: np.exp(1j * w * at)  # noqa: E731
+    v = lambda at: (parts[0](at) + 1j * parts[1](at)) * turn(at)  # noqa: E731
+    rate = lambda at: (slopes[0](at) + 1j * slopes[1](at)) * turn(at) + 1j * w * v(at)  # noqa: E731
+
+    def machine(psi, rotor, speed, u):
+        """The rotor's linkage referred to the stator (behind X'), so that i = (psi - rotor)/X'."""
+        i = (psi - rotor) / p["X_prime"]
+        torque = (np.conj(rotor) * i).imag
+        fluxes = OMEGA * (u - p["R_s"] * i), (-rotor + (X - p["X_prime"]) * i) / T0 + 1j * speed * rotor
+        return i, torque, (*fluxes, (torque - p["T_m"]) / p["M"])
+
+    def before(slip):
+        """Phasors of the machine at a slip [rad/s] at U0."""
+        share = (X - p["X_prime"]) / (1 + 1j * slip * T0)  # rotor linkage over current, at rest in the rotor's frame
+        i = made.U0 / (p["R_s"] + 1j * w / OMEGA * (p["X_prime"] + share))
+        return i, share * i
+
+    low, high = 0.0, 1.0 / p["T_prime"]
+    for _ in range(200):
+        slip = (low + high) / 2
+        i0, rotor0 = before(slip)
+        low, high = (slip, high) if (np.conj(rotor0) * i0).imag < p["T_m"] else (low, slip)
+    i0, rotor0 = before(slip)
+
+    b = p.get("capacitor", 0.0)
+    S = made.P0 + 1j * made.Q0 - made.U0 * np.conj(i0 + 1j * b * w / OMEGA * made.U0)
+    B = S.imag / made.U0**2 * (r**2 + (w / OMEGA) ** 2) / (w / OMEGA)
+    G = S.real / made.U0**2 - B * r / (r**2 + (w / OMEGA) ** 2)
+
+    def rhs(at, y):
+        psi, rotor, branch = y[0] + 1j * y[1], y[2] + 1j * y[3], y[5] + 1j * y[6]
+        _, _, (dpsi, drotor, dspeed) = machine(psi, rotor, y[4], v(at))
+        dbranch = OMEGA * (v(at) - r * branch)
+        return [dpsi.real, dpsi.imag, drotor.real, drotor.imag, dspeed, dbranch.real, dbranch.imag]
+
+    start = turn(t[0])
+    psi0 = (p["X_prime"] * i0 + rotor0) * start
+    branch0, rotor0 = made.U0 / (r + 1j * w / OMEGA) * start, rotor0 * start
+    y = np.array([psi0.real, psi0.imag, rotor0.real, rotor0.imag, w - slip, branch0.real, branch0.imag])
+    rows = [y]
+    for first, last in itertools.pairwise(t):
+        y = solve_ivp(rhs, (first, last), y, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+        rows.append(y)
+    y = np.array(rows).T
+    i = (y[0] + 1j * y[1] - y[2] - 1j * y[3]) / p["X_prime"]
+    i = i + G * v(t) + B * (y[5] + 1j * y[6]) + b / OMEGA * rate(t)
+    return i, p.get("zero_conductance", 0.0) * made.v_zero
+
+
+@pytest.mark.parametrize("f0", [50.0, 49.7])
+def test_the_kernel_agrees_with_equations_written_by_hand_and_converges_in_order_four(f0):
+    of = model("stator_flux", "branch", "shunt")
+    u = dip(0.45, jump=0.6, negative=0.2, end=0.05, f0=f0)
+    zero = lambda t: 0.1 * smooth(t / 0.004) * np.cos(2 * np.pi * f0 * t)  # noqa: E731
+    made = event(u, zero, rate=3200.0, length=0.09, f0=f0, U0=0.98)
+    current, i_zero = by_hand(made, dict(zip(of.names, values(of), strict=True)))
+    errors = []
+    for substeps in (1, 2, 4, 32):
+        alpha, beta, null = played(of, made, substeps=substeps)
+        errors.append(np.abs(alpha + 1j * beta - current).max())
+        assert null == pytest.approx(i_zero, abs=1e-14)
+    assert np.abs(i_zero).max() > 0.03
+    assert errors[-1] < 1e-10
+    assert np.log2(np.array(errors[:2]) / errors[1:3]) == pytest.approx(4, abs=0.3)
+
+
+@pytest.mark.parametrize("angle", [0.7, -2.4])
+def test_a_voltage_turned_by_an_angle_gives_currents_turned_by_it(angle):
+    of, whole = model("stator_flux", "branch", "shunt"), np.exp(1j * angle)
+    made = event(dip(0.4, jump=0.5, negative=0.2), length=0.2)
+    turned = event(dip(0.4, jump=0.5, negative=0.2), length=0.2, angle=angle)
+    one, other = (vector(of.simulate(Drive.of([e]), values(of), 4)) for e in (made, turned))
+    assert other == pytest.approx(one * whole, abs=1e-12)
+
+
+def test_third_order_with_a_stator_resistance_is_fifth_order_with_its_stator_flux():
+    third, fifth = model("electromechanical", "branch", "stator_resistance"), model("stator_flux", "branch")
+    made = event(dip(0.5, jump=0.7, negative=0.25), length=0.3, f0=49.6, U0=1.02)
+    assert played(third, made) == pytest.approx(played(fifth, made), abs=1e-11)
+
+
+def test_double_cage_with_an_open_second_cage_is_the_single_cage():
+    double = model("double_cage", "exponential", "stator_resistance")
+    single = model("stator_flux", "exponential")
+    made = event(dip(0.5, jump=0.7, negative=0.25), length=0.3, f0=50.3)
+    closed = played(double, made, values(double, X_second=VALUES["X_prime"]))
+    assert closed == pytest.approx(played(single, made), abs=1e-9)
+    assert np.abs(closed - played(double, made)).max() > 0.05
+
+
+def test_an_offset_decays_where_the_stator_has_a_resistance():
+    """What is left of the currents' mean over a cycle, half a second after a sudden dip."""
+    made = event(dip(0.4, edge=2e-4, end=10.0), length=0.6, rate=5000.0)
+    left = []
+    for effects in ((), ("stator_resistance",)):
+        of = model("double_cage", "none", *effects)
+        current = vector(of.simulate(Drive.of([made]), values(of), 4))
+        left.append(abs(current[-100:].mean()))
+    assert left[0] > 0.3
+    assert left[1] < 0.01 * left[0]
+
+
+# One kernel for each motor, and each static load beside one of them
+PAIRS = (
+    ("stator_flux", "branch", "shunt"), ("electromechanical", "branch", "stator_resistance"),
+    ("double_cage", "exponential", "stator_resistance"), ("voltage", "zip"), ("stator_flux", "exponential"),
+    ("none", "constant_power"), ("none", "constant_impedance"), ("double_cage", "none"),
+    ("double_cage", "none", "stator_resistance"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("names", PAIRS, ids=" ".join)
+def test_before_the_event_nothing_moves(names):
+    of, U0 = model(*names), 0.97
+    made = event(lambda t: U0 * np.exp(2j * np.pi * 49.6 * t), f0=49.6, U0=U0, length=0.3, rate=2000.0)
+    current = vector(of.simulate(Drive.of([made]), values(of), 8)) / made.turn
+    assert np.abs(current - current[0]).max() < 1e-9
+    if names[1] != "none":  # what is recorded before is drawn before
+        assert U0 * np.conj(current[0]) == pytest.approx(made.P0 + 1j * made.Q0, abs=1e-9)
+
+
+def test_the_pairs_are_all_there_is():
+    refused = {"mechanical", "exponential_frequency"}
+    assert {p[0] for p in PAIRS} == set(MOTORS) | {"none"}
+    assert set(discover()["model/motor"]) == set(MOTORS) | {"none", "mechanical", "motor_groups"}
+    assert {p[1] for p in PAIRS} == set(STATICS)
+    assert set(discover()["model/static"]) == set(STATICS) | refused - {"mechanical"}
+
+
+@pytest.mark.parametrize(
+    ("motor", "static", "sentence"),
+    [
+        ("mechanical", "branch", "the motor 'mechanical' does not go with domain=waves: its fluxes are in equilibrium"),
+        ("none", "exponential_frequency", "the static load 'exponential_frequency' does not go with domain=waves"),
+    ],
+)
+def test_what_makes_no_sense_of_waveforms_is_refused_in_a_sentence(motor, static, sentence):
+    with pytest.raises(UserError) as refused:
+        _ = model(motor, static).equations
+    assert sentence in str(refused.value)
+
+
+def test_laws_of_a_constant_impedance_are_one_circuit():
+    made = event(dip(0.5, jump=0.7, negative=0.25), length=0.2)
+    plain = played(model("none", "constant_impedance"), made)
+    fluxes = played(model("none", "exponential"), made, np.array([2.0, 2.0]))
+    assert fluxes == pytest.approx(plain, abs=1e-12)
+    branch = model("stator_flux", "branch")
+    share = played(branch, made, values(branch, branch_resistance=0.05))
+    assert share == pytest.approx(played(model("stator_flux", "exponential"), made, values(
+        model("stator_flux", "exponential"), p_v=2.0, q_v=2.0)), abs=1e-12)  # fmt: skip
+
+
+def test_a_constant_power_is_drawn_once_half_a_cycle_has_passed():
+    of = model("none", "constant_power")
+    made = event(dip(0.4, end=10.0, edge=0.002), length=0.6, Q0=0.0)
+    power = made.v * np.conj(vector(of.simulate(Drive.of([made]), values(of), 4)) / made.turn)
+    t = times(made)
+    assert np.abs(power[t > 0.0121] - 1).max() < 1e-9
+    assert power.real[np.argmin(np.abs(t - 0.002))] == pytest.approx(0.36, abs=0.06)  # its admittance is as before
+
+
+def test_a_dead_short_leaves_numbers():
+    made = event(dip(1.0, end=0.1), length=0.2)
+    for names in (("none", "constant_power"), ("stator_flux", "exponential")):
+        of = model(*names)
+        assert np.isfinite(played(of, made, substeps=4)).all()
+
+
+@pytest.mark.parametrize("names", [("stator_flux", "branch"), ("double_cage", "branch", "stator_resistance")])
+def test_input_power_is_losses_and_shaft_power_and_what_is_stored(names):
+    """At any state and voltage: v.i = T_e (1 + omega/omega_n) + losses + rate of what is stored."""
+    of = model(*names)
+    eq, rows = of.equations, of.equations.real_states()
+    rng, states = np.random.default_rng(3), [s.name for s, _, _ in rows]
+    p = dict(zip(of.names, values(of), strict=True))
+    before = dict(U0=1.0, U=0.8, omega_s0=0.0, omega_s=0.0, omega_n=OMEGA, P0=1.0, Q0=0.6, step=1e-3)
+    at_rest = of.at_rest(values(of), Drive.of([event(dip())]))
+    x = dict(zip(states, rng.normal(0, 0.5, len(states)), strict=True))
+    v = complex(*rng.normal(0, 1, 2))
+    known = p | before | at_rest | x | {"v_d": v.real, "v_q": v.imag, "turn_re": 1.0, "turn_im": 0.0}
+    compute = lambda e: complex(e.subs({s: known[s.name] for s in e.free_symbols}))  # noqa: E731
+    slope = {s.name: compute(d).real for s, d, _ in rows}
+    vec = lambda of, name: of[f"{name}_re"] + 1j * of[f"{name}_im"]  # noqa: E731
+
+    psi, flux, dpsi, dflux = (vec(of, n) for of in (x, slope) for n in ("psi", "branch_flux"))
+    T0, inner, dinner = p["T_prime"] / (1 - p["C"]), vec(x, "E"), vec(slope, "E")
+    circuits = [(inner, dinner, p["X_prime"] * p["C"] / (1 - p["C"]), T0)]
+    leakage = p["X_prime"]
+    if "D_re" in x:
+        leakage, second = p["X_second"], p["T_second"] * p["X_prime"] / p["X_second"]
+        circuits.append((vec(x, "D"), vec(slope, "D"), p["X_prime"] - leakage, second))
+        inner, dinner = inner + vec(x, "D"), dinner + vec(slope, "D")
+    current, rate = (psi + 1j * inner) / leakage, (dpsi + 1j * dinner) / leakage
+    lost = p["R_s"] * abs(current) ** 2
+    stored = leakage * (rate * np.conj(current)).real / OMEGA
+    for e, de, reactance, T in circuits:
+        lost += reactance / (T * OMEGA) * abs(e / (1j * reactance) - current) ** 2
+        stored += (de * np.conj(e)).real / reactance / OMEGA
+    shaft = (inner * np.conj(current)).real * (1 + x["omega"] / OMEGA)
+    assert (v * np.conj(current)).real == pytest.approx(shaft + lost + stored, rel=1e-9)
+
+    alpha, beta, _ = (compute(eq.real(e)).real for e in eq.outputs().values())
+    B = at_rest["Q_s0"] * (1 + p["branch_resistance"] ** 2)
+    G = at_rest["P_s0"] - at_rest["Q_s0"] * p["branch_resistance"]
+    lost = G * abs(v) ** 2 + B * p["branch_resistance"] * abs(flux) ** 2
+    stored = B * (dflux * np.conj(flux)).real / OMEGA
+    assert (v * np.conj(alpha + 1j * beta - current)).real == pytest.approx(lost + stored, rel=1e-9)
+
+
+def test_a_slow_symmetric_dip_draws_the_power_that_phasors_say():
+    """The error of P and Q against the third order with its resistance falls with the slope of the voltage."""
+    waves = model("stator_flux", "exponential")
+    phasors = model("electromechanical", "exponential", "stator_resistance", domain="phasors")
+    gaps = []
+    for edge in (0.05, 0.2, 0.8):
+        made = event(dip(0.3, end=1.0, edge=edge), length=2.0, rate=2000.0)
+        current = vector(waves.simulate(Drive.of([made]), values(waves), 4)) / made.turn
+        S = made.v * np.conj(current)
+        n = len(made.v)
+        still = Excitation(made.step, made.v.real.copy(), np.ones(n), np.full(n, 0.6), 1.0, 1.0, 0.6)
+        plain = phasors.simulate(Drive.of([still]), values(phasors), 4)
+        gaps.append(np.abs(S - plain.P[0] - 1j * plain.Q[0]).max())
+    assert gaps[0] > 5e-3
+    assert gaps[1] < 0.4 * gaps[0]
+    assert gaps[2] < 0.4 * gaps[1]

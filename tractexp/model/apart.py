@@ -1,0 +1,77 @@
+"""The equations as one of several machines at the bus writes into them."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import sympy
+from sympy import Symbol
+
+from tractexp.errors import UserError
+from tractexp.model.sites import Site
+
+if TYPE_CHECKING:
+    from tractexp.model.equations import Equations
+
+
+class Apart:
+    """A view of `Equations` that ends every name in a suffix: what a second motor declares is a second motor.
+
+    What it puts at sites are quantities with a name like any other, for a site belongs to the first; what it only reads
+    (voltages, speeds, the words of the equations) is everyone's.
+    """
+
+    def __init__(self, eq: "Equations", suffix: str):
+        self._eq, self._suffix = eq, suffix
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._eq, name)
+
+    def __contains__(self, what: Site | str) -> bool:
+        return self._named(what) in self._eq
+
+    def __getitem__(self, what: Site | str) -> Symbol:
+        return self._eq[self._named(what) if what in self else what]
+
+    def _named(self, what: Site | str) -> str:
+        return (what.name if isinstance(what, Site) else what) + self._suffix
+
+    def _latex(self, latex: str) -> str:
+        return rf"{{{latex}}}{self._suffix}"
+
+    @property
+    def omega(self) -> Symbol:
+        """The speed of this machine."""
+        return self._eq["omega" + self._suffix]
+
+    def define(self, name: str, expression: sympy.Expr, latex: str) -> Symbol:
+        return self._eq.define(name + self._suffix, expression, self._latex(latex))
+
+    def place(self, site: Site, expression: sympy.Expr, latex: str | None = None) -> Symbol:
+        return self.define(site.name, expression, latex or site.latex)
+
+    def compute(self, name: str, expression: sympy.Expr, before: sympy.Expr | None = None) -> Symbol:
+        return self._eq.compute(name + self._suffix, expression, before)
+
+    def edit(self, site: Site | str, change: Callable[[sympy.Expr], sympy.Expr], shown: object = None) -> None:
+        raise UserError(f"a motor edits the site {site}; of several motor groups only effects edit sites")
+
+    def flux(self, name: str, latex: str) -> Symbol:
+        return self._eq.flux(name + self._suffix, self._latex(latex))
+
+    def lag(self, name: str, latex: str) -> Symbol:
+        return self._eq.lag(name + self._suffix, self._latex(latex))
+
+    def lag_vector(self, name: str, latex: str) -> Symbol:
+        return self._eq.lag_vector(name + self._suffix, self._latex(latex))
+
+    def memory(self, name: str, latex: str) -> Symbol:
+        return self._eq.memory(name + self._suffix, self._latex(latex))
+
+    def speed(self, latex: str = r"\omega") -> Symbol:
+        return self._eq.speed(self._latex(latex), "omega" + self._suffix)
+
+    def branch(self, name: str, latex: str, *circuit: sympy.Expr, **behind: sympy.Expr) -> sympy.Expr:
+        return self._eq.branch(name + self._suffix, self._latex(latex), *circuit, **behind)
+
+    def require(self, slack: sympy.Expr, sentence: str, shown: sympy.Expr | None = None) -> None:
+        self._eq.require(slack, f"of motor group {self._suffix.strip('_')}: {sentence}", shown)

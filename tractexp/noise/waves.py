@@ -1,0 +1,99 @@
+"""Noise of sampled currents: white noise of their own, and that of the recorded voltage, as the load passes it on.
+
+A model is driven by the voltage as recorded. What is noise in it makes calculated currents wander about the true ones:
+slowly, since a machine's flux sums the voltage up, and in the sense in which its rotor turns, so that the two
+components of the space vector are one complex series. Its color follows from the model's own response to a single wrong
+sample of the voltage, so that the loudness of the two is all that has to be told from the records.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.noise.color import FEWEST, SMALLEST, Autoregression, white_noise
+from tractexp.noise.model import Noise
+
+HIGHEST = 48  # order of the autoregressions
+GAINED = 1.005  # times its least variance: a prediction as good is good enough
+SHARES = (0.0, 0.25, 0.5, 1.0)  # of the voltage's deviations from its periodic course that are noise
+CLEARLY = 4.0  # of twice the log-likelihood, by which anything else must be better than all of them
+FLOORS = np.geomspace(1.0, 0.01, 28)  # of the current's own noise over all that is left in quiet
+
+
+def of_waves(
+    residuals: np.ndarray,
+    known: np.ndarray,
+    quiet: Sequence[slice],
+    answers: Sequence[np.ndarray],
+    phases: int,
+    blur: np.ndarray | None = None,
+) -> Noise:
+    """Noise from residuals (3, N) in quiet stretches.
+
+    `answers` has, for the space vector and for the zero sequence, the currents (L,) [pu] that one standard deviation of
+    a voltage's sample causes at the samples from then on. Raises `UserError` where too few samples are quiet.
+    """
+    measured = known.any(axis=1)
+    count = sum(part.stop - part.start for part in quiet)
+    if count < FEWEST:
+        raise UserError(
+            f"the noise cannot be told from {count} quiet samples before and after the dips: at least {FEWEST} are"
+            " needed; give records that start earlier"
+        )
+    vector = residuals[0] + 1j * residuals[1] if phases == 3 else residuals[0]
+    first = _fitted([vector[part][known[0, part]] for part in quiet], answers[0])
+    pair = [first, first if phases == 3 else white_noise(1.0), white_noise(1.0)]
+    if measured[2]:
+        pair[2] = _fitted([residuals[2, part][known[2, part]] for part in quiet], answers[1])
+    return Noise((tuple(pair),), np.eye(3), blur=blur, vector=phases == 3)
+
+
+def _fitted(pieces: Sequence[np.ndarray], answer: np.ndarray) -> Autoregression:
+    """The most likely sum of white noise and noise of the voltage, of stretches (n_i,) real or complex."""
+    per = 2 if np.iscomplexobj(pieces[0]) else 1
+    level = max(np.sqrt(np.mean(np.abs(np.concatenate(pieces)) ** 2) / per), SMALLEST)
+    passed = covariances(answer, HIGHEST)
+    if per == 1:
+        passed = passed.real
+    best, chosen = np.inf, white_noise(level)
+    for share in SHARES if passed[0].real > (1e-3 * level) ** 2 else (0.0,):
+        for floor in FLOORS if share else (1.0,):
+            whole = share**2 * passed
+            whole[0] += (floor * level) ** 2
+            made = predicted(whole)
+            price = sum(_surprise(made, piece, per) for piece in pieces) - CLEARLY * (share == 1.0)
+            if price < best:
+                best, chosen = price, made
+    return chosen
+
+
+def _surprise(made: Autoregression, piece: np.ndarray, per: int) -> float:
+    """Minus twice the log-likelihood of a stretch (n,)."""
+    white = made.whiten(piece, np.ones(len(piece), dtype=bool))
+    errors = np.log(made.deviation[np.minimum(np.arange(len(piece)), made.order)])
+    return float(np.sum(np.abs(white) ** 2) + 2 * per * errors.sum())
+
+
+def covariances(answer: np.ndarray, highest: int) -> np.ndarray:
+    """E[x(t + k) x*(t)] for k = 0 ... highest of noise that is the sum of such answers (L,) to unit shocks."""
+    padded = np.concatenate([answer, np.zeros(highest)])
+    return np.array([np.vdot(answer, padded[k : k + len(answer)]) for k in range(highest + 1)])
+
+
+def predicted(covariance: np.ndarray) -> Autoregression:
+    """The autoregression of these covariances (p + 1,), by Levinson's recursion; of less order where that is as good.
+
+    Source: Levinson 1947; Hayes 1996, Statistical Digital Signal Processing and Modeling, section 5.2.
+    """
+    table, variance = [np.empty(0, dtype=covariance.dtype)], [float(covariance[0].real)]
+    for m in range(1, len(covariance)):
+        last = table[-1]
+        reflection = (covariance[m] - last @ covariance[m - 1 : 0 : -1]) / variance[-1]
+        table.append(np.concatenate([last - reflection * last[::-1].conj(), [reflection]]))
+        variance.append(variance[-1] * max(1 - abs(reflection) ** 2, 1e-12))
+    order = int(np.argmax(np.array(variance) <= GAINED * variance[-1]))
+    coefficients = np.zeros((order + 1, order), dtype=covariance.dtype)
+    for k in range(order + 1):
+        coefficients[k, :k] = table[k]
+    return Autoregression(coefficients, np.sqrt(variance[: order + 1]))
