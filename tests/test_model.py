@@ -354,7 +354,13 @@ def test_a_pair_that_draws_nothing_is_refused():
 def test_the_sites_of_a_model_are_a_table_of_what_stands_there(model):
     table = tractexp.sites(model)
     rows = {row[0]: dict(zip(table.columns, row, strict=True)) for row in table.rows}
-    assert set(rows) == set(SITES) - {"bus_voltage", "bus_voltage_rate", "motor_current", "current", "zero_current"}  # those of waveforms
+    assert set(rows) == set(SITES) - {
+        "bus_voltage",
+        "bus_voltage_rate",
+        "motor_current",
+        "current",
+        "zero_current",
+    }  # those of waveforms
     assert rows["coupling"]["expression"] == "C"
     assert rows["load_torque"]["could be edited by"] == "speed_dependent_torque"
     assert rows["P"]["could be edited by"] == "undervoltage_trip"

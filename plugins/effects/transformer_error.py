@@ -1,7 +1,5 @@
 """Error of scale and angle between the transformers of current and of voltage."""
 
-import numpy as np
-
 from tractexp.extend import Measurement, Parameter, plugin
 from tractexp.model.drive import INPUTS
 
@@ -20,7 +18,9 @@ class TransformerError(Measurement):
     """
 
     scale_error = Parameter(0.0, (-0.1, 0.1), "1", "ratio error", "IEC 61869-2", "e_s", null=0.0)
-    angle_error = Parameter(0.0, (-0.1, 0.1), "rad", "phase displacement of the current", "IEC 61869-2", "e_a", null=0.0)
+    angle_error = Parameter(
+        0.0, (-0.1, 0.1), "rad", "phase displacement of the current", "IEC 61869-2", "e_a", null=0.0
+    )
 
     waves_only = "in phasors P and Q are taken as they are, and an angle between them hides in the load"
     relevant = {"scale_error": 0.01, "angle_error": 0.01}
