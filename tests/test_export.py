@@ -192,7 +192,7 @@ def test_the_modelica_text_simulates_as_our_kernel_does(motor, static, effects):
             ("mechanical", "exponential"),
             "format 'andes' cannot represent the motor 'mechanical'; it can represent",
         ),
-        ("andes", ("stator_flux", "exponential"), "cannot represent the motor 'stator_flux'"),
+        ("andes", ("voltage", "exponential"), "cannot represent the motor 'voltage'"),
         ("psse_dyr", ("voltage", "zip"), "format 'psse_dyr' cannot represent the motor 'voltage'"),
         ("psse_dyr", ("none", "exponential_frequency"), "cannot represent the static load 'exponential_frequency'"),
         (

@@ -13,9 +13,10 @@ SYSTEM = 100.0  # MVA, the system base of ANDES
 class Andes(Format):
     """Tables of an ANDES case in JSON: the bus, the motor, and the static load with the PQ it replaces.
 
-    `electromechanical` is Motor3 and `double_cage` Motor5, on a machine base equal to the record's, with constant load
-    torque (c1 = T_m) and the T-circuit of `tractexp.exchange.circuit`; `exponential` and `exponential_frequency` are
-    FLoad, the other static loads ZIP. Add the tables to a case and connect the bus.
+    `electromechanical`, and `stator_flux` without its transients, is Motor3 and `double_cage` Motor5, on a machine base
+    equal to the record's, with constant load torque (c1 = T_m) and the T-circuit of `tractexp.exchange.circuit`;
+    `exponential` and `exponential_frequency` are FLoad, the other static loads ZIP. Add the tables to a case and
+    connect the bus.
 
     Not to be confused with a complete case: there is no source in it.
 
@@ -24,8 +25,8 @@ class Andes(Format):
     """
 
     suffix = ".json"
-    motors = ("electromechanical", "double_cage", "none")
-    statics = ("exponential", "exponential_frequency", "zip", "constant_impedance", "constant_power", "none")
+    motors = ("electromechanical", "stator_flux", "double_cage", "none")
+    statics = ("exponential", "exponential_frequency", "zip", "constant_impedance", "branch", "constant_power", "none")
     effects = ("stator_resistance",)
 
     def text(self, load):
@@ -40,7 +41,7 @@ class Andes(Format):
     def notes(self, load):
         slip = -load.before.get("omega_before", 0.0) / load.omega_n
         start = "ANDES starts its power flow at standstill; where it does not converge, start the motor"
-        return [f"{start} at the slip {slip:.5g}"] if slip else []
+        return [*([f"{start} at the slip {slip:.5g}"] if slip else []), *self.left_out(load)]
 
     def _motor(self, load):
         c = load.circuit
@@ -61,7 +62,9 @@ class Andes(Format):
         if static.startswith("exponential"):
             exponents = {"ap": value("p_v"), "aq": value("q_v"), "bp": value("p_f", 0.0), "bq": value("q_f", 0.0)}
             return {"PQ": [pq], "FLoad": [{"idx": "law", "pq": "static", "kp": 100.0, "kq": 100.0, **exponents}]}
-        shares = {"constant_impedance": (1, 0, 1, 0), "constant_power": (0, 0, 0, 0)}.get(static)
+        shares = {"constant_impedance": (1, 0, 1, 0), "branch": (1, 0, 1, 0), "constant_power": (0, 0, 0, 0)}.get(
+            static
+        )
         a_Z, a_I, b_Z, b_I = shares or (value(name) for name in ("a_Z", "a_I", "b_Z", "b_I"))
         named = {"kpz": a_Z, "kpi": a_I, "kpp": 1 - a_Z - a_I, "kqz": b_Z, "kqi": b_I, "kqp": 1 - b_Z - b_I}
         return {"PQ": [pq], "ZIP": [{"idx": "law", "pq": "static", **{k: 100.0 * v for k, v in named.items()}}]}

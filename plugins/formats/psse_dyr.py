@@ -10,8 +10,9 @@ class PsseDyr(Format):
 
     CIM5BL: bus, model, load, IT, RA, XA, XM, R1, X1, R2, X2, E1, S(E1), E2, S(E2), MBASE, PMULT, H, VI, TI, TB, D,
     TNOM. Type 1, no saturation, constant torque (D = 0), no undervoltage trip (VI = 0); MBASE is the record's base.
-    R2 = X2 = 0 is a single cage. IEELBL: three terms a V^n each for P and for Q, then the frequency coefficients, then
-    the exponents, n1..n6; coefficients are divided by U_0^n, because V is the bus voltage and not U/U_0.
+    R2 = X2 = 0 is a single cage; of `stator_flux` the stator's transients are left out. IEELBL: three terms a V^n
+    each for P and for Q, then the frequency coefficients, then the exponents, n1..n6; coefficients are divided by
+    U_0^n, because V is the bus voltage and not U/U_0.
 
     Not to be confused with the power flow data: the two loads and their MW and Mvar must be in the .raw file.
 
@@ -21,8 +22,8 @@ class PsseDyr(Format):
     """
 
     suffix = ".dyr"
-    motors = ("electromechanical", "double_cage", "none")
-    statics = ("exponential", "zip", "constant_impedance", "constant_power", "none")
+    motors = ("electromechanical", "stator_flux", "double_cage", "none")
+    statics = ("exponential", "zip", "constant_impedance", "branch", "constant_power", "none")
     effects = ("stator_resistance",)
 
     def text(self, load):
@@ -43,7 +44,7 @@ class PsseDyr(Format):
         return "".join(records)
 
     def notes(self, load):
-        lines = []
+        lines = self.left_out(load)
         for identifier, part in (("M", "motor"), ("S", "static")):
             if f"P_{part}" in load.before:
                 P, Q = (load.power * load.before[f"{power}_{part}"] for power in "PQ")
@@ -56,7 +57,7 @@ class PsseDyr(Format):
         if static == "zip":
             shares = [(value(f"{x}_Z"), value(f"{x}_I")) for x in "ab"]
             return [((Z, 2.0), (current, 1.0), (1 - Z - current, 0.0)) for Z, current in shares]
-        fixed = {"constant_impedance": (2.0, 2.0), "constant_power": (0.0, 0.0)}.get(static)
+        fixed = {"constant_impedance": (2.0, 2.0), "branch": (2.0, 2.0), "constant_power": (0.0, 0.0)}.get(static)
         return [((1.0, n), (0.0, 0.0), (0.0, 0.0)) for n in fixed or (value("p_v"), value("q_v"))]
 
 

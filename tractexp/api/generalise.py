@@ -42,8 +42,13 @@ class Generalised(Written):
     curves: Sequence[Mapping[str, Any]]  # what is drawn: each optimizer's first seed on each held-out dip
 
     @property
+    def errors(self) -> tuple[str, ...]:
+        """What is told of each dip: residuals and relative errors of P and Q, and in waveforms of the currents."""
+        return (*ERRORS, *["epsilon_i"] * all("epsilon_i" in row for row in self.residuals))
+
+    @property
     def medians(self) -> list[dict[str, Any]]:
-        """Over the seeds: {event, kind, optimizer, residual_P, residual_Q, epsilon_p, epsilon_q}, by event."""
+        """Over the seeds: {event, kind, optimizer, residual_P, residual_Q, epsilon_p, epsilon_q ...}, by event."""
         groups: dict[Any, list[Mapping[str, Any]]] = {}
         for event, kind in dict.fromkeys((row["event"], row["kind"]) for row in self.residuals):
             for row in self.residuals:
@@ -51,12 +56,12 @@ class Generalised(Written):
                     groups.setdefault((event, kind, row["optimizer"]), []).append(row)
         return [
             dict(zip(("event", "kind", "optimizer"), key, strict=True))
-            | {error: float(median(row[error] for row in rows)) for error in ERRORS}
+            | {error: float(median(row[error] for row in rows)) for error in self.errors}
             for key, rows in groups.items()
         ]
 
     def table(self) -> Table:
-        columns = ["event", "kind", "optimizer", *ERRORS]
+        columns = ["event", "kind", "optimizer", *self.errors]
         said = [TOLD]
         return Table(columns, [[row[c] for c in columns] for row in self.medians], "on dips not fitted", said)
 
@@ -165,7 +170,7 @@ def _residuals(result: "Result", fits: "Sequence[Fit]", kinds: Sequence[str]) ->
             "residual_Q": mean_residual(fit.event.record.Q, fit.Q),
             "epsilon_p": fit.epsilon_p,
             "epsilon_q": fit.epsilon_q,
-        }
+        } | ({} if fit.epsilon_i is None else {"epsilon_i": fit.epsilon_i})
 
 
 def _curve(result: "Result", fits: "Sequence[Fit]", kinds: Sequence[str], k: int) -> dict[str, Any]:

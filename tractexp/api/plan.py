@@ -16,7 +16,7 @@ from tractexp.api.setup import Setup
 from tractexp.errors import UserError, check_range
 from tractexp.outcome import Table
 from tractexp.record import Event
-from tractexp.report.plan import DEPTH, DURATION, NOISE, RATE
+from tractexp.report.plan import CURRENT_NOISE, DEPTH, DURATION, JUMP, NOISE, RATE
 
 if TYPE_CHECKING:
     from tractexp.identification.plan import Choice, Shape
@@ -24,10 +24,11 @@ if TYPE_CHECKING:
     from tractexp.report.plan import Planned
 
 DURATIONS = (0.06, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8)  # s
+JUMPS = (0.0, 5.0, 10.0, 20.0, 30.0, 45.0, 60.0)  # degrees
+PER_CYCLE = (16, 32, 64, 128, 200)  # samples of waveforms
 RATES = (25.0, 50.0, 100.0, 200.0, 500.0, 1000.0)  # Hz
 NOISES = (0.001, 0.002, 0.005, 0.01, 0.02)  # of P before the event
 FIT, DEFAULT = "fit", "default"
-SHAPE = ("depth", "duration", "rate")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -87,6 +88,8 @@ def plan(
     duration: float | None = None,
     rate: float | None = None,
     noise: float | None = None,
+    jump: float | None = None,
+    domain: str | None = None,
     values: Any = FIT,
     least: float = 0.05,
     events: int | None = None,
@@ -98,10 +101,12 @@ def plan(
 
     How deep must a dip be for `parameter` (H stands for M) to be known with half of its 95 % interval `within` a share
     of the value? The dip is that of the deepest of `records`, unless `depth` (of the voltage before), `duration` [s],
-    `rate` [1/s] or `noise` (standard deviation, as a share of P before the event; white) are given. `values` are what
-    is planned at: "fit", the estimate of that record; "default", the model's; an identification; or the path of a
-    `result.json`. Of several records those that tell most together are chosen, until another one narrows the intervals
-    by less than the share `least`, at most `events` of them. The model is as in `tractexp.identify`.
+    `rate` [1/s] or `noise` (standard deviation, as a share of P before the event; white) are given. With `domain`
+    "waves" it is a balanced dip in which the voltage's phase jumps by `jump` [degrees], and the noise is that of the
+    sampled currents, as a share of P before the event, too. `values` are what is planned at: "fit", the estimate of
+    that record; "default", the model's; an identification; or the path of a `result.json`. Of several records those
+    that tell most together are chosen, until another one narrows the intervals by less than the share `least`, at most
+    `events` of them. The model is as in `tractexp.identify`.
 
     Raises `UserError` for wrong names or values, and for a model with `per_event`.
     """
@@ -111,12 +116,13 @@ def plan(
         check_range("task.events", events, 1)
     if noise is not None:
         check_range("task.noise", noise, 1e-9, 1.0)
-    known = {"bounds": bounds, "fixed": fixed, "substeps": substeps}
+    known = {"bounds": bounds, "fixed": fixed, "substeps": substeps, "domain": domain}
     setup = Setup.of(records, model, (), None, known)
     if isinstance(values, Identification):
         values = values.result.parameters
     asked = {
         "parameter": parameter, "within": within, "depth": depth, "duration": duration, "rate": rate, "noise": noise,
+        "jump": jump,
         "values": values, "least": least, "events": events,
     }  # fmt: skip
     planned = _planned(setup, **asked)
@@ -135,7 +141,9 @@ def _planned(setup: Setup, parameter: str, within: float, values: Any, least: fl
     column(problem.space.names, parameter)
     if problem.per_event:
         raise UserError("task=plan plans for shared parameters; leave model.per_event empty")
-    deepest = max(recorded, key=lambda e: e.depth)
+    if given["jump"] is not None and not problem.model.waves:
+        raise UserError(f"task.jump={given['jump']:g} is of waveforms: add domain=waves, or leave it out")
+    deepest = max(problem.events, key=lambda e: e.depth)
     at, origin, noise = _guess(setup, deepest, values)
     shape = _shape(deepest, seen=noise, **given)
     shape.check()
@@ -211,19 +219,21 @@ def _scans(problem: Any, values: np.ndarray, shape: "Shape") -> dict[str, Any]:
     by_depth = over_depth(problem, values, shape)
     P = abs(shape.P0)
     loud = [replace(shape, noise_P=x * P, noise_Q=x * P) for x in NOISES]
-    return {
-        DEPTH: (tuple(f.shape.depth for f in by_depth), by_depth),
-        DURATION: over("duration", DURATIONS),
-        RATE: over("rate", RATES),
-        NOISE: (NOISES, [forecast(problem, values, s) for s in loud]),
-    }
+    made = {DEPTH: (tuple(f.shape.depth for f in by_depth), by_depth), DURATION: over("duration", DURATIONS)}
+    if shape.waves:
+        made[JUMP] = over("jump", JUMPS)
+    rates = tuple(n * shape.frequency for n in PER_CYCLE) if shape.waves else RATES
+    made[RATE] = over("rate", rates)
+    return made | {CURRENT_NOISE if shape.waves else NOISE: (NOISES, [forecast(problem, values, s) for s in loud])}
 
 
 def _described(shape: "Shape") -> str:
     memory = f"forgotten within {1000 * shape.memory:.0f} ms" if shape.memory > 0 else "white"
-    P, Q = (f"{100 * level / abs(shape.P0):.2g} %" for level in (shape.noise_P, shape.noise_Q))
+    first, second = (f"{100 * level / abs(shape.P0):.2g} %" for level in (shape.noise_P, shape.noise_Q))
+    names = ("i_alpha", "i_beta") if shape.waves else ("P", "Q")
     dip = f"a dip of {100 * shape.depth:.0f} % for {1000 * shape.duration:.0f} ms at {shape.rate:.0f} Hz"
-    return f"planned: {dip}, noise {P} in P and {Q} in Q, of P, {memory}"
+    dip += f", the phase jumping by {shape.jump:.0f} degrees" if shape.waves else ""
+    return f"planned: {dip}, noise {first} in {names[0]} and {second} in {names[1]}, of P, {memory}"
 
 
 def _content(planned: "Planned") -> dict[str, Any]:

@@ -2,7 +2,8 @@
 
 import io
 import tempfile
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ from tractexp import files
 from tractexp.record import Event
 
 if TYPE_CHECKING:
+    from tractexp.identification.result import Fit
     from tractexp.model.model import Model
 
 
@@ -27,6 +29,8 @@ class Response:
     measured: tuple[np.ndarray, np.ndarray] | None = None
     epsilon: tuple[float, float] | None = None  # of P and Q, fractions
     notes: tuple[str, ...] = ()
+    currents: Mapping[str, np.ndarray] = field(default_factory=dict)  # of waveforms: t [s] and each phase's [pu]
+    epsilon_i: float | None = None
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
@@ -38,11 +42,13 @@ class Response:
     def row(self) -> list[str]:
         """Title, lowest U, lowest and highest P and Q, and both errors, as a table shows them."""
         errors = [f"{e:.3%}" for e in self.epsilon] if self.epsilon else ["", ""]
+        errors += [] if self.epsilon_i is None else [f"{self.epsilon_i:.3%}"]
         ends = self.U.min(), self.P.min(), self.P.max(), self.Q.min(), self.Q.max()
         return [self.title, *(f"{v:.4f}" for v in ends), *errors]
 
     def __repr__(self) -> str:
         errors = ", epsilon_p {:.3%}, epsilon_q {:.3%}".format(*self.epsilon) if self.epsilon else ""
+        errors += "" if self.epsilon_i is None else f", epsilon_i {self.epsilon_i:.3%}"
         return f"{self.title}: t, U, P, Q of {len(self.t)} samples{errors}"
 
     def _repr_html_(self) -> str:
@@ -57,12 +63,10 @@ class Response:
         return pandas.DataFrame(self.columns)
 
     def write(self, folder: Path, number: int) -> list[Path]:
-        """Write response.csv and response.svg, with a number from the second event on."""
+        """Write response.csv and response.svg, with a number from the second event on; of waveforms currents, too."""
         stem = folder / ("response" if number == 1 else f"response_{number}")
-        text, columns = io.StringIO(), self.columns
-        rows = np.column_stack(list(columns.values()))
-        np.savetxt(text, rows, fmt="%.9g", delimiter=",", header=",".join(columns), comments="")
-        return [files.write(stem.with_suffix(".csv"), text.getvalue()), self.draw(stem.with_suffix(".svg"))]
+        made = [_csv(stem.with_suffix(".csv"), self.columns), self.draw(stem.with_suffix(".svg"))]
+        return made + ([_csv(stem.with_name(f"{stem.name}_currents.csv"), self.currents)] if self.currents else [])
 
     def draw(self, path: Path) -> Path:
         """Draw the response, against the measurement where there is one."""
@@ -76,10 +80,33 @@ class Response:
         return figures.response(path, self.t, self.U, made, title=self.title, notes=self.notes)
 
 
+def _csv(path: Path, columns: Mapping[str, np.ndarray]) -> Path:
+    text = io.StringIO()
+    rows = np.column_stack(list(columns.values()))
+    np.savetxt(text, rows, fmt="%.9g", delimiter=",", header=",".join(columns), comments="")
+    return files.write(path, text.getvalue())
+
+
 def respond_to(model: "Model", values: np.ndarray, event: Event) -> Response:
     """A recorded event played through a model. Raises `UserError` where it has no steady state there."""
     from tractexp.identification.result import respond
 
-    fit, record = respond(model, values, event, "validate"), event.record
+    fit = respond(model, values, event, "validate")
+    record = fit.event.record  # of waveforms, as the estimator sees recorded and calculated currents
     measured, epsilon = (record.P, record.Q), (fit.epsilon_p, fit.epsilon_q)
-    return Response(record.name, record.t, record.U, fit.P, fit.Q, measured, epsilon, tuple(record.notes))
+    return Response(
+        record.name, record.t, record.U, fit.P, fit.Q, measured, epsilon, tuple(record.notes), _currents(fit),
+        fit.epsilon_i,
+    )  # fmt: skip
+
+
+def _currents(fit: "Fit") -> dict[str, np.ndarray]:
+    """t [s] and the currents of each phase [pu of their peak], calculated and measured; none of phasors."""
+    if fit.waves is None or fit.currents is None:
+        return {}
+    kept, event = slice(fit.waves.lead, None), fit.waves
+    made = {"t": event.record.t[kept]}
+    for end, currents in (("", fit.currents), ("_measured", np.nan_to_num(event.currents))):
+        names = [f"i_{n}{end}" for n in "abc"] if event.phases == 3 else [f"i{end}"]
+        made |= dict(zip(names, event.of_phases(currents)[:, kept], strict=True))
+    return made

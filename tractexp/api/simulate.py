@@ -64,6 +64,7 @@ class Simulation(Written):
 
     def table(self) -> Table:
         columns = ["event", "U min", "P min", "P max", "Q min", "Q max", "epsilon_p", "epsilon_q"]
+        columns += ["epsilon_i"] * any(one.epsilon_i is not None for one in self.responses)
         return Table(columns, [one.row for one in self.responses], self.model.model.title)
 
     def to_dict(self) -> dict[str, Any]:
@@ -77,11 +78,12 @@ class Simulation(Written):
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         def response(told: Mapping[str, Any]) -> Response:
             arrays: Any = {key: np.array(told[key], dtype=float) for key in ("t", "U", "P", "Q")}
-            notes = tuple(told["notes"])
+            arrays["notes"] = tuple(told["notes"])
             if told["measured"]:
                 P, Q = (np.array(values, dtype=float) for values in told["measured"])
-                return Response(told["title"], **arrays, measured=(P, Q), epsilon=tuple(told["epsilon"]), notes=notes)
-            return Response(told["title"], **arrays, notes=notes)
+                arrays |= {"measured": (P, Q), "epsilon": tuple(told["epsilon"]), "epsilon_i": told.get("epsilon_i")}
+                arrays["currents"] = {k: np.array(x, dtype=float) for k, x in told.get("currents", {}).items()}
+            return Response(told["title"], **arrays)
 
         responses = tuple(map(response, content["responses"]))
         return cls(LoadModel(**content["model"]), content["values"], responses)
@@ -138,18 +140,12 @@ def simulate(
 
 def _played(load: LoadModel, values: np.ndarray, dip: Dip, before: Mapping[str, float]) -> Response:
     """The response to a dip made by hand."""
-    from tractexp.model.drive import Drive, Excitation
+    from tractexp.identification.play import play
 
     t, shape = dip.voltage()
-    U, unknown = before["U0"] * shape, np.full(len(t), np.nan)
-    nominal = 2 * np.pi * before["frequency"]
-    event = Excitation(1 / dip.rate, U, unknown, unknown, before["U0"], before["P0"], before["Q0"], omega_n=nominal)
-    drive = Drive.of([event])
-    if refusal := load.model.refusal(values, drive):
-        raise UserError(refusal)
-    substeps: Any = load.model.substeps(drive, values)[0]
-    response = load.model.simulate(drive, values, substeps)
-    return Response(f"dip of {dip.depth:.0%} for {dip.duration:g} s", t, U, response.P[0], response.Q[0])
+    U = before["U0"] * shape
+    P, Q = play(load.model, values, t, U, before)
+    return Response(f"dip of {dip.depth:.0%} for {dip.duration:g} s", t, U, P, Q)
 
 
 def smooth(x: np.ndarray) -> np.ndarray:

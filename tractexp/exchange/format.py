@@ -27,7 +27,9 @@ class Identified:
 
     @cached_property
     def model(self) -> Model:
-        return compose(*parts(self.result.model))
+        """In phasors, which every format is written for; the parameters are those of either domain."""
+        motor, static, effects, integration, _ = parts(self.result.model)
+        return compose(motor, static, effects, integration)
 
     @property
     def values(self) -> dict[str, float]:
@@ -79,6 +81,12 @@ class Format(Plugin):
     def notes(self, load: Identified) -> list[str]:
         """What a user must know to use the file, one sentence each."""
         return []
+
+    def left_out(self, load: Identified) -> list[str]:
+        """What a simulator of phasors leaves out of the motor, in a sentence."""
+        if not load.model.motor.within_a_cycle:
+            return []
+        return ["the stator's transients are left out: the machine of this format has none"]
 
     def check_parts(self, load: Identified) -> None:
         """Raise `UserError` for a part of the model that this format cannot represent."""

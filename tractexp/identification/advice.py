@@ -8,9 +8,14 @@ from tractexp.errors import UserError
 from tractexp.identification.adequacy import Adequacy, Grade
 from tractexp.identification.information import SHARE
 from tractexp.identification.plan import Forecast, Shape, over_depth
+from tractexp.identification.problem import Problem
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import BOUND, EDGE, UNIDENTIFIED, WEAK, WITHIN, shown, size
 from tractexp.noise.color import runs
+from tractexp.record.wave_event import COARSEST
+
+SHORT = 5.0  # cycles: of a shorter dip phasors of one cycle show little but their own window
+UNBALANCED = 0.1  # of the voltage before
 
 
 def advise(known: Uncertainty, adequacy: Adequacy, odd: Sequence[str] = ()) -> list[str]:
@@ -18,11 +23,13 @@ def advise(known: Uncertainty, adequacy: Adequacy, odd: Sequence[str] = ()) -> l
 
     Of a model that does not describe the load nothing is said that would only hold if it did.
     """
+    better = waves_better(known.likelihood.problem)
     said = [f"leave {name} out, or free what differs there by model.per_event" for name in odd]
     if adequacy.grade is Grade.WRONG_MODEL:
-        return ["find what is missing: task=discrepancy; or choose another model: tractexp list model", *said]
+        missing = "find what is missing: task=discrepancy; or choose another model: tractexp list model"
+        return [*better, missing, *said]
     if adequacy.grade is Grade.EFFECT_MISSING:
-        return ["find the missing effect: task=discrepancy", *said]
+        return [*better, "find the missing effect: task=discrepancy", *said]
     said += [
         f"widen model.bounds.{name}, or ask whether the model is the right one"
         for name, verdict in known.verdicts.items()
@@ -34,7 +41,28 @@ def advise(known: Uncertainty, adequacy: Adequacy, odd: Sequence[str] = ()) -> l
             said.append(f"fix one of {', '.join(tied)} by model.fixed: no record of this kind can tell them apart")
         else:
             said.append(f"fix {tied[0]} by model.fixed: the record does not change with it")
-    return [*said, *_deeper(known)] or ["nothing: every parameter is identified"]
+    said += _deeper(known)
+    return [*said, *better] if said else ["nothing: every parameter is identified"]
+
+
+def waves_better(problem: Problem) -> list[str]:
+    """That its waveforms tell more than the phasors of an event that is short or unbalanced; [] where none does.
+
+    Of records that hold no samples, or too few in a cycle, nothing is said.
+    """
+    for event in () if problem.model.waves else problem.events:
+        waves, record = event.record.waves, event.record
+        if waves is None or waves.rate < COARSEST * record.base.frequency:
+            continue
+        if event.duration * record.base.frequency < SHORT:
+            why = f"lasts {1000 * event.duration:.0f} ms, less than {SHORT:g} cycles, which phasors smear"
+        elif record.U2 is not None and record.U2[event.start : event.end].max() > UNBALANCED * event.U0:
+            share = record.U2[event.start : event.end].max() / event.U0
+            why = f"is unbalanced, U2 {share:.0%} of U, which phasors leave out"
+        else:
+            continue
+        return [f"fit the sampled waveforms, by domain=waves: the dip of {record.name} {why}"]
+    return []
 
 
 def _deeper(known: Uncertainty) -> list[str]:
@@ -52,7 +80,7 @@ def _deeper(known: Uncertainty) -> list[str]:
     without_figures = (
         f"for {named}: record a dip of another depth and fit it together, or fix what stays open by model.fixed"
     )
-    if problem.per_event or problem.model.waves:
+    if problem.per_event:
         return [without_figures]
     deepest = int(np.argmax([e.depth for e in problem.events]))
     shape, noise = Shape.of(problem.events[deepest]), known.likelihood.noise.of(deepest)

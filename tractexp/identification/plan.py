@@ -15,10 +15,12 @@ from tractexp.identification.likelihood import Likelihood, before_the_event
 from tractexp.identification.problem import Problem
 from tractexp.identification.uncertainty import LEVEL
 from tractexp.noise import Autoregression, Noise
-from tractexp.record import Base, Event, Record
+from tractexp.record import Base, Event, Record, WaveEvent
+from tractexp.record.balanced import balanced
+from tractexp.record.wave_event import COARSEST
 
 BEFORE, AFTER = 0.3, 1.5  # s recorded before and after a planned dip
-EDGE = 0.02  # s, fall and rise of a planned dip
+EDGE, SUDDEN = 0.02, 0.001  # s, fall and rise of a planned dip, in phasors and in waveforms
 FINEST = 5e-4  # s, longest Runge-Kutta step of a forecast
 DEPTHS = np.arange(0.05, 0.951, 0.025)
 INERTIA = "H"  # H = M omega_s / 2 has the relative precision of M
@@ -26,7 +28,11 @@ INERTIA = "H"  # H = M omega_s / 2 has the relative precision of M
 
 @dataclass(frozen=True)
 class Shape:
-    """A dip that might be recorded, from 1 pu, with trapezoidal edges. Noise [pu] forgets within `memory` [s]."""
+    """A dip that might be recorded, from 1 pu, with trapezoidal edges. Noise [pu] forgets within `memory` [s].
+
+    In `waves` it is a balanced dip in which the voltage's phase jumps by `jump` [degrees], and the noise is that of the
+    currents alpha (noise_P) and beta (noise_Q).
+    """
 
     depth: float
     duration: float  # s
@@ -37,30 +43,33 @@ class Shape:
     Q0: float = 0.5
     frequency: float = 50.0
     memory: float = 0.0
+    waves: bool = False
+    jump: float = 0.0
 
     @classmethod
     def of(cls, event: Event, noise: Noise | None = None) -> "Shape":
         """The shape of a recorded event, with the noise that a fit found there, or that before the dip."""
         seen = noise or Noise((before_the_event(event),))
-        (noise_P, noise_Q), memory = seen.levels, seen.memory(event.record.step)
+        (noise_P, noise_Q, *_), memory = seen.levels, seen.memory(event.record.step)
         return cls(
             event.depth, event.duration, event.rate, noise_P, noise_Q, event.P0, event.Q0,
-            event.record.base.frequency, memory,
+            event.record.base.frequency, memory, *_in_waves(event),
         )  # fmt: skip
 
     @property
     def noise(self) -> Noise:
-        """Noise of P and Q at this rate: a first-order autoregression."""
+        """Noise of what is compared at this rate: a first-order autoregression."""
         a = math.exp(-1 / (self.rate * self.memory)) if self.memory > 0 else 0.0
         color, shock = np.array([[0.0], [a]]), math.sqrt(1 - a * a)
         P, Q = (Autoregression(color, level * np.array([1.0, shock])) for level in (self.noise_P, self.noise_Q))
-        return Noise(((P, Q),))
+        return Noise(((P, Q, P) if self.waves else (P, Q),))
 
     def check(self, where: str = "task") -> None:
         """Raise `UserError` for what cannot be recorded."""
         check_range(f"{where}.depth", self.depth, 0.03, 0.95)
         check_range(f"{where}.duration", self.duration, 2 / self.rate, 10.0)
-        check_range(f"{where}.rate", self.rate, 5.0, 20_000.0)
+        check_range(f"{where}.rate", self.rate, COARSEST * self.frequency if self.waves else 5.0, 20_000.0)
+        check_range(f"{where}.jump", self.jump, -90.0, 90.0)
         if not min(self.noise_P, self.noise_Q) > 0:
             raise UserError(
                 f"the records show no noise before the dip, and without noise every interval is zero; give it as"
@@ -71,17 +80,31 @@ class Shape:
         """The event as if it had been recorded; P and Q hold the steady state, for no forecast looks at them."""
         step = 1 / self.rate
         t = np.arange(math.ceil((BEFORE + self.duration + AFTER) * self.rate)) * step
-        fall, back = (np.clip((t - s) / EDGE, 0.0, 1.0) for s in (BEFORE, BEFORE + self.duration))
+        edge = SUDDEN if self.waves else EDGE
+        fall, back = (np.clip((t - s) / edge, 0.0, 1.0) for s in (BEFORE, BEFORE + self.duration))
         U = 1 - self.depth * (fall - back)
-        start, end = (int(np.searchsorted(t, s)) for s in (BEFORE, BEFORE + self.duration + EDGE))
+        start, end = (int(np.searchsorted(t, s)) for s in (BEFORE, BEFORE + self.duration + edge))
+        name = f"{100 * self.depth:.0f} % for {1000 * self.duration:.0f} ms"
+        if self.waves:
+            v = U * np.exp(1j * np.radians(self.jump) * (fall - back))
+            return balanced(name, t, v, (1.0, self.P0, self.Q0), self.frequency, start, end)
         record = Record(
-            f"{100 * self.depth:.0f} % for {1000 * self.duration:.0f} ms", t, U,
+            name, t, U,
             np.full(len(t), self.P0), np.full(len(t), self.Q0), base=Base(frequency=self.frequency),
         )  # fmt: skip
         return Event(
             record=record, start=start, end=min(end, len(t) - 1), depth=self.depth, U0=1.0, P0=self.P0, Q0=self.Q0,
             f0=self.frequency, noise_U=0.0, noise_P=self.noise_P, noise_Q=self.noise_Q, steady=slice(0, start), dips=1,
         )  # fmt: skip
+
+
+def _in_waves(event: Event) -> tuple[bool, float]:
+    """Whether an event is in waveforms, and by how much its voltage's phase jumps [degrees]."""
+    if not isinstance(event, WaveEvent):
+        return False, 0.0
+    cycle = max(1, round(event.rate / event.f0 / 2))
+    middle = max((event.start + event.end) // 2, event.start + cycle)
+    return True, float(np.degrees(np.angle(event.v[middle - cycle : middle + cycle].mean())))
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +131,10 @@ def normal_quantile(level: float = LEVEL) -> float:
 def like(problem: Problem, events: Sequence[Event]) -> Problem:
     """The same free parameters, bounds and fixed values on other events."""
     bounds = {p.name: p.bounds for p in problem.parameters}
-    substeps = max(1, math.ceil(max(e.record.step for e in events) / FINEST))
+    longest = FINEST
+    if problem.model.waves:  # as fine as what was recorded needs
+        longest = min(e.record.step / n for e, n in zip(problem.events, problem.step.substeps, strict=True))
+    substeps = max(1, math.ceil(max(e.record.step for e in events) / longest - 1e-6))
     return Problem(problem.model, events, bounds, problem.fixed, substeps)
 
 

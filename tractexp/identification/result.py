@@ -12,10 +12,11 @@ from tractexp import files, provenance
 from tractexp.errors import UserError
 from tractexp.identification.adequacy import ACCEPTED
 from tractexp.identification.periodic import unsettled
+from tractexp.identification.play import play
 from tractexp.identification.problem import Problem, excited
 from tractexp.identification.search import REFUSED, Found, History
 from tractexp.identification.seen import seen_by_estimator
-from tractexp.model.drive import PHASORS, Drive, Excitation
+from tractexp.model.drive import PHASORS, Drive
 from tractexp.model.model import CLASSICAL, Model, compose
 from tractexp.plugin import build
 from tractexp.record import Event, WaveEvent, find_dips, in_waves
@@ -177,7 +178,8 @@ class Result:
         """P and Q [pu] for a new voltage U [pu] at uniform times t [s]; f [Hz] where the frequency is known.
 
         The voltage before the first dip (all of it where there is none) gives the steady state. P0 and Q0 are
-        the power drawn there; by default that of the event the model was identified on.
+        the power drawn there; by default that of the event the model was identified on. Of a model identified in
+        waveforms the voltage is taken as balanced, and the power is instantaneous.
         """
         model = compose(*parts(self.model))
         t, U = np.asarray(t, dtype=float), np.asarray(U, dtype=float)
@@ -185,27 +187,10 @@ class Result:
         steady = slice(0, max(dips[0][0], 1) if dips else None)
         nominal = 2 * np.pi * self.before["frequency"]
         omega_s = None if f is None else 2 * np.pi * np.asarray(f, dtype=float) - nominal
-        drive = Drive.of(
-            [
-                Excitation(
-                    step=float((t[-1] - t[0]) / (len(t) - 1)),
-                    U=U,
-                    P=np.full(len(U), np.nan),
-                    Q=np.full(len(U), np.nan),
-                    U0=float(U[steady].mean()),
-                    P0=self.before["P0"] if P0 is None else P0,
-                    Q0=self.before["Q0"] if Q0 is None else Q0,
-                    omega_s=omega_s,
-                    omega_s0=0.0 if omega_s is None else float(omega_s[steady].mean()),
-                    omega_n=nominal,
-                )
-            ]
-        )
+        known = {key: value for key, value in {"P0": P0, "Q0": Q0}.items() if value is not None}
+        before = self.before | known | {"U0": float(U[steady].mean())}
         values = np.array([self.parameters[name] for name in model.names])
-        if refusal := model.refusal(values, drive):
-            raise UserError(refusal)
-        response = model.simulate(drive, values, model.substeps(drive, values)[0])
-        return response.P[0], response.Q[0]
+        return play(model, values, t, U, before, omega_s, 0.0 if omega_s is None else float(omega_s[steady].mean()))
 
 
 def write_history(path: Path, history: History) -> Path:

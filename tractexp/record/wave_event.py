@@ -172,7 +172,7 @@ def in_waves(event: Event) -> WaveEvent:
     (v, v_zero), (i, i_zero) = (stationary(part, waves.rate, frequency) for part in np.split(x, 2))
     power = V * np.conj(I)
     start = lead + _onset(t, x[:K, lead:], periodic, K, before)
-    made = _slow(v / turn, i / turn, turn, waves.rate, frequency)
+    made = half_cycle(v / turn, i / turn, turn, waves.rate, frequency)
     currents = np.stack([i.real, i.imag, i_zero])
     currents[:, :lead] = np.nan
     calm = _calm(i, i_zero, turn, I * np.exp(-1j * np.angle(V)), slice(lead, lead + np.count_nonzero(before)))
@@ -260,10 +260,13 @@ def _onset(t: np.ndarray, v: np.ndarray, periodic: Periodic, K: int, before: np.
     return int(np.argmax(left)) if left.any() else int(np.count_nonzero(before))
 
 
-def _slow(
+def half_cycle(
     v: np.ndarray, i: np.ndarray, turn: np.ndarray, rate: float, frequency: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """|V1|, P + jQ and |V2| (N,) as the mean over the last half cycle shows them: the other sequence turns whole."""
+    """|V1|, P + jQ and |V2| (N,) of vectors (N,) in the frame, as the mean over the last half cycle shows them.
+
+    In half a cycle the other sequence turns whole.
+    """
     n = max(1, round(rate / frequency / 2))
 
     def mean(y: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tractexp.identification.plan import INERTIA, Choice, Forecast, Needed, column
+from tractexp.identification.plan import EDGE, INERTIA, SUDDEN, Choice, Forecast, Needed, column
 from tractexp.identification.problem import Problem
 from tractexp.report.chart import Chart
 from tractexp.report.page import Page
@@ -15,11 +15,14 @@ from tractexp.report.style import PALETTE
 from tractexp.wording import as_sentence
 
 DEPTH, DURATION, RATE, NOISE = "depth", "duration [s]", "samples per second", "noise, of P before the dip"
+JUMP, CURRENT_NOISE = "phase jump [degrees]", "noise of the currents, of P before the dip"
 AXES = {  # of a scan: what its axis says, and what a value is multiplied by
     DEPTH: ("depth of the dip [%]", 100.0),
     DURATION: ("duration of the dip [ms]", 1000.0),
     RATE: ("samples per second", 1.0),
     NOISE: ("noise [% of P before the dip]", 100.0),
+    JUMP: ("phase jump [degrees]", 1.0),
+    CURRENT_NOISE: ("noise of the currents [% of P]", 100.0),
 }
 LINES = [(color, dash) for dash in ("solid", "dash", "dot") for color in PALETTE]
 CEILING = 10.0  # times the value: wider intervals are not told
@@ -50,7 +53,7 @@ def percent(relative: float) -> str:
 
 def page(path: Path, planned: Planned) -> Path:
     """Write the page; returns its path."""
-    needed = planned.needed
+    needed, waves = planned.needed, planned.problem.model.waves
     answer = str(needed)
     title = f"How deep a dip tells {needed.parameter}"
     made = Page(title, f"A plan for {planned.problem.model.title}, before anything more is recorded.")
@@ -79,9 +82,10 @@ def page(path: Path, planned: Planned) -> Path:
     _events(made, planned)
     made.heading("What it rests on").items(
         [
-            "Intervals follow from the sensitivity of P and Q to each parameter at the values above. Where the"
-            " interval is wide, or the values are far off, so is the forecast.",
-            "The planned dip falls from 1 pu and comes back along straight edges of 20 ms.",
+            f"Intervals follow from the sensitivity of {'the currents' if waves else 'P and Q'} to each parameter at"
+            " the values above. Where the interval is wide, or the values are far off, so is the forecast.",
+            "The planned dip falls from 1 pu and comes back along straight edges of"
+            f" {1000 * (SUDDEN if waves else EDGE):g} ms{', in all three phases alike' * waves}.",
             "Noise of the recorded voltage, and effects that the model lacks, are not in it.",
         ]
     )

@@ -50,15 +50,17 @@ class Generalise(Task):
 def show(medians: Sequence[Mapping[str, Any]]) -> None:
     """Print a table for each held-out dip, medians over the seeds."""
     from tractexp.api.generalise import TOLD
+    from tractexp.identification.result import EPSILONS
 
     say()
+    errors = [key for key in EPSILONS if all(key in row for row in medians)]
     for event, kind in dict.fromkeys((row["event"], row["kind"]) for row in medians):
         cells = [
             [row["optimizer"], *(f"{row[key]:.3e}" for key in ("residual_P", "residual_Q")),
-             *(f"{row[key]:.3%}" for key in ("epsilon_p", "epsilon_q")), ""]
+             *(f"{row[key]:.3%}" for key in errors), ""]
             for row in medians if row["event"] == event
         ]  # fmt: skip
-        table(["optimizer", "residual P", "residual Q", "epsilon_p", "epsilon_q", ""], cells, f"{kind}: {event}")
+        table(["optimizer", "residual P", "residual Q", *errors, ""], cells, f"{kind}: {event}")
     say(TOLD)
 
 

@@ -10,7 +10,7 @@ from tractexp.tasks.task import Job, Task, call
 if TYPE_CHECKING:
     from tractexp.report.plan import Planned
 
-ASKED = ("parameter", "within", "depth", "duration", "rate", "noise", "values", "least", "events")
+ASKED = ("parameter", "within", "depth", "duration", "rate", "noise", "jump", "values", "least", "events")
 
 
 @plugin
@@ -29,6 +29,7 @@ class Plan(Task):
     duration: float | None = None  # s
     rate: float | None = None  # Hz
     noise: float | None = None  # standard deviation, as a share of P before the event; white
+    jump: float | None = None  # degrees, of the voltage's phase; in waveforms
     values: str = "fit"  # fit, default, or the path of a result.json
     least: float = 0.05  # another event of the archive must narrow the intervals by this share
     events: int | None = None  # at most so many

@@ -62,4 +62,9 @@ class Simulate(Task):
             for k, one in enumerate(made.responses, start=1)
             for c, error in zip("pq", one.epsilon or (), strict=False)
         }
+        metrics |= {
+            f"event_{k}_epsilon_i": one.epsilon_i
+            for k, one in enumerate(made.responses, start=1)
+            if one.epsilon_i is not None
+        }
         job.log(name="simulation", values=made.values, metrics=metrics, artifacts=[*paths, job.folder / ".hydra"])
