@@ -15,7 +15,8 @@ class HarmonicsSource(Measurement):
         i(t) -> i(t) + h r(theta(t)),   r = periodic part of (recorded - calculated) before the event
 
     r has harmonics up to the 13th of either sequence, found by least squares in the first two recorded cycles and there
-    left alone, since it would fit their noise, too; theta is the angle of the frame. Rectifiers draw such currents; h = 1: they go on as they were. At h = 0 the base model.
+    left alone, since it would fit their noise, too; theta is the angle of the frame. Rectifiers draw such currents;
+    h = 1: they go on as they were. At h = 0 the base model.
 
     Source: Arrillaga, Watson 2003, Power System Harmonics, ch. 3: converters as sources of current.
     Departures: a converter's harmonics follow its current and voltage; here they do not change with the event.

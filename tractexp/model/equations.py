@@ -17,6 +17,7 @@ from tractexp.errors import Unknown, UserError, nearest
 from tractexp.model import sites
 from tractexp.model.apart import Apart
 from tractexp.model.drive import EVENT, INPUTS, OUTPUTS, PHASORS, WAVES
+from tractexp.model.graph import halves as real_and_imaginary
 from tractexp.model.graph import replaced, symbols_of
 from tractexp.model.names import check_name
 from tractexp.model.sites import Site
@@ -125,7 +126,7 @@ class Equations:
         drawn = (sites.current, sites.zero_current) if self.waves else (sites.P, sites.Q)
         self._drawn: dict[Site, sympy.Expr] = dict.fromkeys(drawn, sympy.Integer(0))
         self._fluxes: dict[sympy.Expr, Symbol] = {}  # of branches at the bus, by resistance over reactance
-        self._real_parts: dict[Symbol, sympy.Expr] = {}  # of named quantities, as they stand now
+        self._halves: dict[Symbol, tuple[sympy.Expr, sympy.Expr]] = {}  # of named quantities, as they stand now
         self._lost = NOTHING, NOTHING  # power [pu] between the recorded bus and that which all parts see
         self._owners: dict[str, str] = {}  # who declared the parameter, state or quantity of a name
         self._writer = "bus"
@@ -199,8 +200,7 @@ class Equations:
         if not self.waves:
             return dict(zip(OUTPUTS[PHASORS], (self.P, self.Q), strict=True))
         total, zero = (self._drawn[s] for s in (sites.current, sites.zero_current))
-        still = self.turn * total
-        return dict(zip(OUTPUTS[WAVES], (re(still), im(still), zero), strict=True))
+        return dict(zip(OUTPUTS[WAVES], (*self.parts(self.turn * total), zero), strict=True))
 
     # What parts write
 
@@ -276,9 +276,12 @@ class Equations:
         prints where the change is the solution of an equation. Raises `Unfit` where the model lacks the site.
         """
         site = sites.named(site)
-        expression = sympy.sympify(change(self.expression(site)))
+        before = self.expression(site)
+        if site is sites.current:
+            before = self._named("current", before)
+        expression = sympy.sympify(change(before))
         self._check_kind(site, expression)
-        self._real_parts.clear()
+        self._halves.clear()
         self.edits.setdefault(self._writer, []).append(site.name)
         if site in self._drawn:
             self._drawn[site] = expression
@@ -391,11 +394,19 @@ class Equations:
     def draw(self, current: sympy.Expr, zero: sympy.Expr = NOTHING) -> None:
         """Add a current drawn at the bus [pu] and, of waves, one of zero sequence."""
         if self.waves:
-            self._drawn[sites.current] += current
+            self._drawn[sites.current] += self._named("drawn", current)
             self._drawn[sites.zero_current] += zero
             return
         drawn = self.v * conjugate(current)
         self.consume(re(drawn), im(drawn))
+
+    def _named(self, name: str, expression: sympy.Expr) -> sympy.Expr:
+        """A space vector by a name of its own, so that what is made of it does not repeat it."""
+        expression = sympy.sympify(expression)
+        if expression.is_Atom:
+            return expression
+        k = sum(s.name.startswith(f"{name}_") for s in self.definitions) + 1
+        return self._define(_complex(f"{name}_{k}"), expression, f"i_{{{name.split('_')[0]},{k}}}")
 
     def lose(self, P: sympy.Expr, Q: sympy.Expr) -> None:
         """Power lost before the event between the recorded bus and the voltage that all parts see, of waves."""
@@ -452,12 +463,17 @@ class Equations:
                 raise UserError(f"nothing renews the memory '{symbol}'; call eq.renews once for each memory")
         self._derive_starts()
         without_static = {self.P_s0: sympy.Integer(0), self.Q_s0: sympy.Integer(0)}
-        others = [self.real(self.before(self.expand(power).xreplace(without_static))) for power in (self.P, self.Q)]
+        if self.waves:  # space vectors first by their parts, which are short: products across names are long
+            whole = self.parts(self.v * conjugate(self._drawn[sites.current]))
+            others = [replaced(power, without_static | self._starts()) for power in whole]
+        else:
+            powers = (self.expand(power).xreplace(without_static) for power in (self.P, self.Q))
+            others = [self.real(self.before(power)) for power in powers]
         lost = [self.real(self.before(power)) for power in self._lost]
         share = self._share()
         self.definitions[self.P_s0] = (self.P0 - others[0] - lost[0]) / share
         self.definitions[self.Q_s0] = (self.Q0 - others[1] - lost[1]) / share
-        self._real_parts.clear()
+        self._halves.clear()
         for symbol, declared in (self.states | self.memories).items():
             self._check_still(f"the value before the event of '{symbol}'", declared.initial)
         for requirement in self.requirements:
@@ -492,11 +508,15 @@ class Equations:
 
     def before(self, expression: sympy.Expr) -> sympy.Expr:
         """An expression's value before the event, of constants: `eq.before(eq.omega)` is the speed there."""
+        return replaced(self.expand(expression), self._starts())
+
+    def _starts(self) -> dict[Symbol, sympy.Expr]:
+        """What stands before the event for all that moves, states and their parts by what they start from."""
         at_start = {symbol: start_symbol(symbol) for symbol in (*self.states, *self.memories)}
         for symbol, start in list(at_start.items()):
             if not symbol.is_real:
                 at_start |= zip(phasor_parts(symbol), phasor_parts(start), strict=True)
-        return replaced(self.expand(expression), self.at_rest() | at_start)
+        return self.at_rest() | at_start
 
     def at_rest(self) -> dict[Symbol, sympy.Expr]:
         """The values before the event of inputs and computed quantities."""
@@ -539,6 +559,8 @@ class Equations:
                 a, b = phasor_parts(state)
                 a0, b0 = phasor_parts(start_symbol(state))
                 split |= {state: a + I * b, start_symbol(state): a0 + I * b0}
+        if self.waves:  # of space vectors products are not expanded across a name either
+            return self._parts_by_name(sympy.sympify(expression), split)
         lowered = replaced(self.expand(expression, lambda s: not s.is_real), split)
         if _is_real(lowered):
             both = (lowered if lowered.is_real else _shorter(lowered), sympy.Integer(0))
@@ -547,17 +569,32 @@ class Equations:
         real, imaginary = (replaced(e, {s: self.real(s) for s in self._names(e)}) for e in both)
         return real, imaginary
 
+    def _parts_by_name(self, expression: sympy.Expr, split: dict[Symbol, sympy.Expr]) -> tuple[sympy.Expr, sympy.Expr]:
+        """Real and imaginary part where every name, real or complex, is lowered by itself."""
+        names = {s for s in symbols_of(expression) & self.definitions.keys() if not s.is_real}
+        halves = {s: phasor_parts(s) for s in names}
+        lowered = replaced(expression, split | {s: a + I * b for s, (a, b) in halves.items()})
+        both = real_and_imaginary(lowered)
+        known = {}
+        for s, pair in halves.items():
+            known |= zip(pair, self._parts_of(s), strict=True)
+        real, imaginary = (
+            replaced(_shorter(e), known | {s: self.real(s) for s in self._names(e)}, plain=True) for e in both
+        )
+        return real, imaginary
+
     def _names(self, expression: sympy.Expr) -> set[Symbol]:
         return symbols_of(expression) & self.definitions.keys()
 
     def real(self, expression: sympy.Expr) -> sympy.Expr:
         """The real part of an expression that is meant to be real."""
-        named = self.definitions.get(expression)
-        if named is None:
-            return self.parts(expression)[0]
-        if expression not in self._real_parts:
-            self._real_parts[expression] = self.parts(named)[0]
-        return self._real_parts[expression]
+        return (self._parts_of(expression) if expression in self.definitions else self.parts(expression))[0]
+
+    def _parts_of(self, name: Symbol) -> tuple[sympy.Expr, sympy.Expr]:
+        """Real and imaginary part of a named quantity, reckoned once."""
+        if name not in self._halves:
+            self._halves[name] = self.parts(self.definitions[name])
+        return self._halves[name]
 
     def latex(self) -> list[str]:
         """The equations one a line: states, memories, named quantities, power, steady state."""

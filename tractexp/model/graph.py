@@ -26,15 +26,67 @@ def symbols_of(expression: Basic) -> set[Symbol]:
     return {part for part in nodes(expression) if isinstance(part, Symbol)}
 
 
-def replaced(expression: sympy.Expr, known: Mapping[Symbol, sympy.Expr]) -> sympy.Expr:
-    """The expression with symbols replaced, as `xreplace` does it."""
+def replaced(expression: sympy.Expr, known: Mapping[Symbol, sympy.Expr], plain: bool = False) -> sympy.Expr:
+    """The expression with symbols replaced, as `xreplace` does it; `plain`: maxima and minima are not looked into."""
     made: dict[Basic, Basic] = dict(known)
 
     def visit(part: Basic) -> Basic:
         if part not in made:
             args = [visit(a) for a in part.args]
             same = all(a is b for a, b in zip(args, part.args, strict=True))
-            made[part] = part if same else part.func(*args)
+            made[part] = part if same else _rebuilt(part, args, plain)
         return made[part]
 
     return visit(expression)  # type: ignore[return-value]
+
+
+def _rebuilt(part: Basic, args: list[Basic], plain: bool) -> Basic:
+    """The same function of other arguments. SymPy compares those of a maximum with each other, which takes seconds."""
+    if plain and isinstance(part, sympy.Max | sympy.Min) and not all(a.is_number for a in args):
+        return part.func(*args, evaluate=False)
+    return part.func(*args)
+
+
+def halves(expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
+    """Real and imaginary part of an expression in real symbols, products left as products.
+
+    SymPy multiplies out what it splits, which of a product of many sums takes minutes.
+    """
+    made: dict[Basic, tuple[sympy.Expr, sympy.Expr]] = {}
+
+    def visit(part: Basic) -> tuple[sympy.Expr, sympy.Expr]:
+        if part not in made:
+            made[part] = _halves(part, [visit(a) for a in part.args])
+        return made[part]
+
+    return visit(expression)
+
+
+def _product(factors: list[tuple[sympy.Expr, sympy.Expr]]) -> tuple[sympy.Expr, sympy.Expr]:
+    real, imaginary = sympy.Mul(*(a for a, b in factors if b == 0)), sympy.Integer(0)
+    for a, b in ((a, b) for a, b in factors if b != 0):
+        real, imaginary = real * a - imaginary * b, real * b + imaginary * a
+    return real, imaginary
+
+
+def _halves(part: Basic, args: list[tuple[sympy.Expr, sympy.Expr]]) -> tuple[sympy.Expr, sympy.Expr]:
+    """Those of one node from those of its arguments."""
+    zero = sympy.Integer(0)
+    if isinstance(part, sympy.Add):
+        return sympy.Add(*(a for a, _ in args)), sympy.Add(*(b for _, b in args))
+    if isinstance(part, sympy.Mul):
+        return _product(args)
+    if isinstance(part, sympy.re | sympy.im):
+        return args[0][isinstance(part, sympy.im)], zero
+    if isinstance(part, sympy.conjugate):
+        return args[0][0], -args[0][1]
+    if isinstance(part, sympy.Abs) and args[0][1] != 0:
+        return sympy.sqrt(args[0][0] ** 2 + args[0][1] ** 2), zero
+    if part.args and all(b == 0 for _, b in args):
+        return _rebuilt(part, [a for a, _ in args], plain=True), zero
+    if isinstance(part, sympy.Pow) and part.exp == -1:
+        (a, b), _ = args
+        return a / (a**2 + b**2), -b / (a**2 + b**2)
+    if isinstance(part, sympy.Pow) and part.exp.is_Integer and part.exp > 1:
+        return _product([args[0]] * int(part.exp))
+    return part.as_real_imag()

@@ -54,12 +54,21 @@ class _Hoister:
         self.lane, self.event, self.inputs = lane, event, inputs
         self.constants: dict[sympy.Expr, Symbol] = {}
         self.signals: dict[sympy.Expr, Symbol] = {}
+        self._made: dict[sympy.Expr, sympy.Expr] = {}  # what was rewritten already
+        self._symbols: dict[sympy.Expr, frozenset[Symbol]] = {}
+
+    def symbols(self, e: sympy.Expr) -> frozenset[Symbol]:
+        """The symbols of an expression, those of each of its parts found once."""
+        if e not in self._symbols:
+            own = frozenset((e,)) if e.is_Symbol else frozenset()
+            self._symbols[e] = own.union(*map(self.symbols, e.args))
+        return self._symbols[e]
 
     def is_constant(self, e: sympy.Expr) -> bool:
-        return e.free_symbols <= self.lane | self.event
+        return self.symbols(e) <= self.lane | self.event
 
     def is_signal(self, e: sympy.Expr) -> bool:
-        return e.free_symbols <= self.inputs | self.event
+        return self.symbols(e) <= self.inputs | self.event
 
     def constant(self, e: sympy.Expr) -> sympy.Expr:
         if e.is_number or e in self.lane:
@@ -72,6 +81,11 @@ class _Hoister:
         return self.signals.setdefault(e, Symbol(f"s{len(self.signals)}", real=True))
 
     def __call__(self, e: sympy.Expr) -> sympy.Expr:
+        if e not in self._made:
+            self._made[e] = self._rewritten(e)
+        return self._made[e]
+
+    def _rewritten(self, e: sympy.Expr) -> sympy.Expr:
         if self.is_constant(e):
             return self.constant(e)
         if self.is_signal(e):
@@ -116,7 +130,7 @@ def lower(eq: Equations) -> Lowered:
     slack = [eq.expand(r.slack).xreplace(begin) for r in eq.requirements]
     start = _phase(None, first + slack)
     at_rest = eq.at_rest() | dict(zip((*states, *memories), starts, strict=True))
-    balances = _phase(None, [replaced(b, at_rest) for b in eq.real_balances()])
+    balances = _phase(None, [replaced(b, at_rest, eq.waves) for b in eq.real_balances()])
     phases = (derivative, renewal, output)
     used = tuple(s for s in inputs if s == eq.v or any(s in symbols(p) for p in phases))
     lowered = Lowered(
