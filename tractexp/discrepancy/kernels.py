@@ -16,7 +16,7 @@ from tractexp.discrepancy.catalogue import Catalogue
 from tractexp.discrepancy.cores import side_by_side
 from tractexp.discrepancy.injection import Injection
 from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.problem import Problem
+from tractexp.identification.problem import FINE_OF_WAVES, Problem
 from tractexp.model.drive import Drive
 from tractexp.model.kernel import compile_missing
 from tractexp.model.model import Model, compose
@@ -99,10 +99,18 @@ class Kernels:
     ):
         self.family, self.events, self.bounds, self.fixed = family, tuple(events), bounds, fixed
         self.bare = Problem(family.model, events, bounds, fixed, substeps)
-        self.substeps = int(self.bare.step.substeps.max())
+        self.substeps = max(int(self.bare.step.substeps.max()), self._fewest() if substeps is None else 1)
         self.whole = Problem(family.whole, events, bounds, fixed, self.substeps)
         self._column = {name: k for k, name in enumerate(self.whole.space.names)}
         self._made: dict[Key, tuple[Likelihood, np.ndarray]] = {None: self._simulator(self.whole)}
+
+    def _fewest(self) -> int:
+        """Steps that the model of everything needs where every effect is at its null: of waveforms some are stiff."""
+        if not self.family.model.waves:
+            return 1
+        whole = Problem(self.family.whole, self.events, self.bounds, self.fixed, 1)
+        null = [p.default if p.null is None else p.null for p in whole.parameters]
+        return int(whole.model.substeps(whole.drive, np.array(null), FINE_OF_WAVES)[0].max())
 
     def residuals(self, key: Key, unit: np.ndarray) -> np.ndarray:
         """Calculated minus measured (n, C, N) [pu] at coordinates (n, D)."""

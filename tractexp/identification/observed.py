@@ -21,6 +21,7 @@ from tractexp.noise.wander import LESS, WITHIN, Rest, Wander, find, power_profil
 from tractexp.noise.waves import of_waves
 from tractexp.record import Event, WaveEvent
 
+DIVERGED = 10.0  # pu: a wrong sample of the voltage makes no such difference
 OFFSET = 0.005  # pu: what may be left of a channel's offset, which the mean before the dip took off
 EDGY, MOST_EDGES = 8.0, 40  # times the median by which slopes of the voltage differ that are unsure, and of how many
 LEFT = 2.0  # times what white noise leaves of an offset that the mean before the dip took off
@@ -147,7 +148,7 @@ def answers(problem: Problem, values: np.ndarray) -> tuple[np.ndarray, np.ndarra
     own = np.tile(problem.by_event(values)[:1], (len(events), 1, 1))
     response = problem.model.simulate(drive, own, np.tile(problem.step.substeps[:1], len(events)))
     seen = response.outputs[:, 0].reshape(drive.channels, len(events), -1)[:, :, : event.start]
-    off = np.nan_to_num(seen[:, 1:] - seen[:, :1])
+    off = _finite(seen[:, 1:] - seen[:, :1])
     if event.phases == 1:
         return off[0, 0], np.zeros(1)
     return (off[0, 0] + 1j * off[1, 0] - 1j * (off[0, 1] + 1j * off[1, 1])) / 2, off[2, 2]
@@ -183,8 +184,13 @@ def _of_voltage(problem: Problem, values: np.ndarray, event: int) -> np.ndarray:
     made = problem.model.simulate(one, own, np.tile(problem.step.substeps[[event]], one.events)).outputs[:, 0]
     made = made.reshape(one.channels, one.events, -1).swapaxes(0, 1)
     shapes = np.zeros((len(made) - 1, *drive.measured.shape))
-    shapes[:, :, part] = np.nan_to_num(made[1:] - made[0]) * (drive.weights[:, part] > 0)
+    shapes[:, :, part] = _finite(made[1:] - made[0]) * (drive.weights[:, part] > 0)
     return shapes
+
+
+def _finite(off: np.ndarray) -> np.ndarray:
+    """Differences of responses [pu]; what diverged tells nothing."""
+    return np.where(np.abs(off) < DIVERGED, off, 0.0)
 
 
 def _shifted(event: WaveEvent) -> list[WaveEvent]:

@@ -14,6 +14,7 @@ from tractexp.model.drive import INPUTS, SMOOTH
 from tractexp.model.lowering import Lowered, Phase, symbols
 from tractexp.model.template import FAST, GROUP, HEADER, LANES, RUN, SETTLE, VECTORS
 
+LONG_TUPLE = 29  # beyond it Numba knows no tuple with a choice in it
 PHASES = ("derivative", "renewal", "output")  # what is evaluated lane by lane
 HALF_WAY = {"classical": "0.5 * h", "printed": "h / 6.0"}  # how far along a slope the two stages in the middle are
 
@@ -230,7 +231,10 @@ def _start(lowered: Lowered, rows: list[sympy.Symbol]) -> str:
     short = [f"max(0.0, -({_printer.doprint(s)}))" for s in slacks]
     lines = [f"{s} = {_printer.doprint(e)}" for s, e in lowered.start.temporaries]
     lines.append(f"miss = min({' + '.join(short) or '0.0'}, 1e6)")
-    lines.append(f"return {', '.join([*map(_printer.doprint, states), 'miss if miss >= 0.0 else 1e6'])}")
+    missed = "miss if miss >= 0.0 else 1e6"
+    if len(states) >= LONG_TUPLE:
+        lines, missed = [*lines, f"miss = {missed}"], "miss"
+    lines.append(f"return {', '.join([*map(_printer.doprint, states), missed])}")
     return _text("_start", [*rows, *lowered.event], lines)
 
 
@@ -244,6 +248,8 @@ def _settle(lowered: Lowered, rows: list[sympy.Symbol]) -> str:
     if not n:
         return f"\n\n@inlined\ndef _settle({arguments}):\n    return (0.0,)\n"
     text = SETTLE.format(arguments=arguments, states=_names(states), n=n, known=known, x=x, **moving)
+    if n >= LONG_TUPLE:
+        text = text.replace(f"return {x}, ", "off = ").rstrip() + f"\n    return {x}, off\n"
     return text.replace(f"return {x},", f"return {_names(f'x[{k}]' for k in range(n))},")
 
 
