@@ -7,7 +7,6 @@ it. What stands at a site can be edited after it was placed: that is what a miss
 
 import itertools
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from typing import Any, Literal, NoReturn
 
 import sympy
@@ -16,60 +15,26 @@ from sympy import I, Symbol, conjugate, im, re
 from tractexp.errors import Unknown, UserError, nearest
 from tractexp.model import sites
 from tractexp.model.apart import Apart
+from tractexp.model.circuit import NOTHING, Circuit
 from tractexp.model.drive import EVENT, INPUTS, OUTPUTS, PHASORS, WAVES
 from tractexp.model.graph import halves as real_and_imaginary
 from tractexp.model.graph import replaced, symbols_of
 from tractexp.model.names import check_name
 from tractexp.model.sites import Site
+from tractexp.model.states import Memory, Requirement, State
+from tractexp.model.symbols import is_real as _is_real
+from tractexp.model.symbols import phasor_parts, start_symbol
+from tractexp.model.symbols import real_symbol as _real
+from tractexp.model.symbols import vector_symbol as _complex
 from tractexp.model.unfit import Unfit
 from tractexp.parameter import Parameter
 
 LONG = 300  # nodes of an expression
 LONG_AGO = -(10**6)  # s: the time at which a load rests before the event
-NOTHING = sympy.Integer(0)
-LOWEST = sympy.Rational(1, 20)  # of the voltage before the event: below it what draws a power is an admittance
-DAMPING = sympy.Rational(1, 20)  # resistance over reactance of a reactive load of which nothing else is said
 OWN = "motor"  # who writes the states that are pushed, and the speed that effects ask for
 
 
-@dataclass
-class State:
-    """A continuous state: d(symbol)/dt = derivative, and its value in the steady state before the event.
-
-    `role` says what it is, `writer` which part declared it (`motor`, or an effect's name). `balance` is what vanishes
-    in that steady state, where it is not the derivative.
-    """
-
-    symbol: Symbol
-    latex: str
-    role: Literal["flux", "speed", "lag"]
-    writer: str
-    derivative: sympy.Expr | None = None
-    initial: sympy.Expr | None = None
-    balance: sympy.Expr | None = None
-    derived: bool = False  # `initial` is written in what moves, and taken before the event once all parts have declared
-
-
-@dataclass(frozen=True)
-class Requirement:
-    """`slack` >= 0 is needed for a steady state; `sentence` says what is violated, `shown` is printed in it."""
-
-    slack: sympy.Expr
-    sentence: str
-    shown: sympy.Expr
-
-
-@dataclass
-class Memory:
-    """A discrete memory, such as a relay: renewed once a sample, before the power of that sample is read."""
-
-    symbol: Symbol
-    latex: str
-    renewal: sympy.Expr | None = None
-    initial: sympy.Expr | None = None
-
-
-class Equations:
+class Equations(Circuit):
     """The declaration of one composite load, Eq. (7) of Wu et al. 2022.
 
     Symbols given, all per unit of the record's base except angular speeds [rad/s], which are relative to the
@@ -373,86 +338,6 @@ class Equations:
         shown = slack if shown is None else shown
         self.requirements.append(Requirement(sympy.sympify(slack), sentence, sympy.sympify(shown)))
 
-    def consume(self, P: sympy.Expr, Q: sympy.Expr, damping: sympy.Expr = DAMPING) -> None:
-        """Add power drawn at the bus (positive when consumed); before the event the static load gives way.
-
-        Of waves it is the current of a conductance beside a branch of resistance over reactance `damping`, which draw
-        these powers at the sizes of the voltage that `U` shows: admittances that vary slowly. A power that changes
-        within a cycle does so as fast as `U` follows. Below a twentieth of the voltage before the event admittances
-        grow no further.
-        """
-        P, Q = sympy.sympify(P), sympy.sympify(Q)
-        if not self.waves:
-            for site, power in ((sites.P, P), (sites.Q, Q)):
-                self._drawn[site] += power
-            return
-        speed = 1 + self.omega_s / self.omega_n
-        G, B = P - Q * damping / speed, Q * (speed**2 + damping**2) / speed
-        current = G * self.v + (B * self._flux_of(damping) if Q != 0 else 0)
-        self.draw(current / sympy.Max(self.U, LOWEST * self.U0) ** 2)
-
-    def draw(self, current: sympy.Expr, zero: sympy.Expr = NOTHING) -> None:
-        """Add a current drawn at the bus [pu] and, of waves, one of zero sequence."""
-        if self.waves:
-            self._drawn[sites.current] += self._named("drawn", current)
-            self._drawn[sites.zero_current] += zero
-            return
-        drawn = self.v * conjugate(current)
-        self.consume(re(drawn), im(drawn))
-
-    def _named(self, name: str, expression: sympy.Expr) -> sympy.Expr:
-        """A space vector by a name of its own, so that what is made of it does not repeat it."""
-        expression = sympy.sympify(expression)
-        if expression.is_Atom:
-            return expression
-        k = sum(s.name.startswith(f"{name}_") for s in self.definitions) + 1
-        return self._define(_complex(f"{name}_{k}"), expression, f"i_{{{name.split('_')[0]},{k}}}")
-
-    def lose(self, P: sympy.Expr, Q: sympy.Expr) -> None:
-        """Power lost before the event between the recorded bus and the voltage that all parts see, of waves."""
-        self._lost = self._lost[0] + P, self._lost[1] + Q
-
-    def branch(
-        self, name: str, latex: str, voltage: sympy.Expr, impedance: sympy.Expr, behind: sympy.Expr = NOTHING
-    ) -> sympy.Expr:
-        """The current [pu] through a resistance and a reactance in series, R + jX, from `voltage` to that `behind`.
-
-        Phasors: (V - E)/(R + jX). Waves: (psi + jE)/X, where the flux linkage psi, a state of that name, follows
-        dpsi/dt = omega_n (V - R i) - j (omega_n + omega_s) psi, which at rest and at nominal frequency is the same.
-        """
-        if not self.waves:
-            return (voltage - behind) / impedance
-        R, X = re(impedance), im(impedance)
-        psi, speed = self.lag_vector(name, latex), 1 + self.omega_s / self.omega_n
-        current = (psi + I * behind) / X
-        before = (voltage - speed * behind) / (R + I * X * speed)
-        self.moves(psi, self.omega_n * (voltage - R * current - I * speed * psi), X * before - I * behind)
-        self.states[psi].derived = True
-        return current
-
-    def capacitor(self, susceptance: sympy.Expr) -> sympy.Expr:
-        """The current [pu] of a capacitor at the bus, b (dv/dt/omega_n + j (1 + omega_s/omega_n) v)."""
-        rate = NOTHING
-        if self.waves:
-            rate = self[sites.bus_voltage_rate] if sites.bus_voltage_rate in self else self._place_rate()
-        return susceptance * (rate / self.omega_n + I * (1 + self.omega_s / self.omega_n) * self.v)
-
-    def _place_rate(self) -> Symbol:
-        """The site of the voltage's slope: where a part reads it, which most do not."""
-        site = sites.bus_voltage_rate
-        return self._define(_complex(site.name), self.v_rate, site.latex)
-
-    def _flux_of(self, damping: sympy.Expr) -> Symbol:
-        """The flux linkage of a branch at the bus, of one reactance and so much resistance."""
-        damping = sympy.sympify(damping)
-        if damping not in self._fluxes:
-            k = "" if not self._fluxes else f"_{len(self._fluxes) + 1}"
-            psi = self._fluxes[damping] = self.lag_vector(f"branch_flux{k}", rf"\psi_s{k}")
-            leak = damping + I * (1 + self.omega_s / self.omega_n)
-            self.moves(psi, self.omega_n * (self.v - leak * psi), self.v / leak)
-            self.states[psi].derived = True
-        return self._fluxes[damping]
-
     def close(self) -> None:
         """Give the static load what the other parts leave before the event. Called once all parts have declared."""
         for symbol, state in self.states.items():
@@ -598,19 +483,9 @@ class Equations:
 
     def latex(self) -> list[str]:
         """The equations one a line: states, memories, named quantities, power, steady state."""
-        starts = {start_symbol(s): f"{{{self.latex_names[s]}}}|_0" for s in (*self.states, *self.memories)}
-        names = self.latex_names | starts
-        for s in self.states:
-            halves = phasor_parts(start_symbol(s))
-            names |= zip(
-                halves, (rf"\operatorname{{{part}}} {starts[start_symbol(s)]}" for part in ("Re", "Im")), strict=True
-            )
-        tex = lambda e: sympy.latex(e, symbol_names=names, imaginary_unit="j", mul_symbol=r" \, ")  # noqa: E731
-        lines = [rf"\frac{{d {s.latex}}}{{dt}} = {tex(s.derivative)}" for s in self.states.values()]
-        lines += [rf"{m.latex} \leftarrow {tex(m.renewal)}" for m in self.memories.values()]
-        lines += [f"{tex(s)} = {tex(self.shown.get(s, expression))}" for s, expression in self.definitions.items()]
-        lines += [f"{site.latex} = {tex(drawn)}" for site, drawn in self._drawn.items()]
-        return lines + [f"{starts[start_symbol(s.symbol)]} = {tex(s.initial)}" for s in self.states.values()]
+        from tractexp.model.printed import lines
+
+        return lines(self)
 
 
 def _shorter(expression: sympy.Expr) -> sympy.Expr:
@@ -623,30 +498,4 @@ def _shorter(expression: sympy.Expr) -> sympy.Expr:
     return min(expression, sympy.expand(expression), key=sympy.count_ops)
 
 
-def _is_real(expression: sympy.Expr) -> bool:
-    """Whether an expression is made of real symbols, or SymPy knows it to be real wherever it is finite."""
-    return bool(expression.is_real) or not (expression.has(I) or any(not s.is_real for s in symbols_of(expression)))
-
-
-def _real(name: str) -> Symbol:
-    return Symbol(name, real=True)
-
-
-def _complex(name: str) -> Symbol:
-    return Symbol(name, complex=True)
-
-
-def start_symbol(state: Symbol) -> Symbol:
-    """The symbol of a state's value before the event."""
-    return (_real if state.is_real else _complex)(f"{state.name}_before")
-
-
-def phasor_parts(state: Symbol) -> tuple[Symbol, Symbol]:
-    """The two real symbols behind a phasor."""
-    return _real(f"{state.name}_re"), _real(f"{state.name}_im")
-
-
-__all__ = [
-    "Equations", "I", "Memory", "Requirement", "State",
-    "conjugate", "im", "phasor_parts", "re", "start_symbol", "sympy",
-]  # fmt: skip
+__all__ = ["Equations", "I", "Memory", "Requirement", "State", "phasor_parts", "start_symbol", "sympy"]

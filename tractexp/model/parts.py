@@ -79,7 +79,7 @@ class Static(Part):
 
     def damping(self, **parameters: Any) -> Any:
         """Resistance over reactance of the branch that draws Q_s in waveforms; in phasors there is none."""
-        from tractexp.model.equations import DAMPING
+        from tractexp.model.circuit import DAMPING
 
         return DAMPING
 

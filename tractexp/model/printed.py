@@ -1,0 +1,27 @@
+"""Equations in LaTeX."""
+
+from typing import TYPE_CHECKING
+
+import sympy
+
+from tractexp.model.symbols import phasor_parts, start_symbol
+
+if TYPE_CHECKING:
+    from tractexp.model.equations import Equations
+
+
+def lines(eq: "Equations") -> list[str]:
+    """The equations one a line: states, memories, named quantities, what is drawn, steady state."""
+    starts = {start_symbol(s): f"{{{eq.latex_names[s]}}}|_0" for s in (*eq.states, *eq.memories)}
+    names = eq.latex_names | starts
+    for s in eq.states:
+        halves = phasor_parts(start_symbol(s))
+        names |= zip(
+            halves, (rf"\operatorname{{{part}}} {starts[start_symbol(s)]}" for part in ("Re", "Im")), strict=True
+        )
+    tex = lambda e: sympy.latex(e, symbol_names=names, imaginary_unit="j", mul_symbol=r" \, ")  # noqa: E731
+    made = [rf"\frac{{d {s.latex}}}{{dt}} = {tex(s.derivative)}" for s in eq.states.values()]
+    made += [rf"{m.latex} \leftarrow {tex(m.renewal)}" for m in eq.memories.values()]
+    made += [f"{tex(s)} = {tex(eq.shown.get(s, expression))}" for s, expression in eq.definitions.items()]
+    made += [f"{site.latex} = {tex(drawn)}" for site, drawn in eq._drawn.items()]
+    return made + [f"{starts[start_symbol(s.symbol)]} = {tex(s.initial)}" for s in eq.states.values()]

@@ -1,0 +1,44 @@
+"""What equations hold beside named quantities: states, memories, and what a steady state requires."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import sympy
+from sympy import Symbol
+
+
+@dataclass
+class State:
+    """A continuous state: d(symbol)/dt = derivative, and its value in the steady state before the event.
+
+    `role` says what it is, `writer` which part declared it (`motor`, or an effect's name). `balance` is what vanishes
+    in that steady state, where it is not the derivative.
+    """
+
+    symbol: Symbol
+    latex: str
+    role: Literal["flux", "speed", "lag"]
+    writer: str
+    derivative: sympy.Expr | None = None
+    initial: sympy.Expr | None = None
+    balance: sympy.Expr | None = None
+    derived: bool = False  # `initial` is written in what moves, and taken before the event once all parts have declared
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """`slack` >= 0 is needed for a steady state; `sentence` says what is violated, `shown` is printed in it."""
+
+    slack: sympy.Expr
+    sentence: str
+    shown: sympy.Expr
+
+
+@dataclass
+class Memory:
+    """A discrete memory, such as a relay: renewed once a sample, before the power of that sample is read."""
+
+    symbol: Symbol
+    latex: str
+    renewal: sympy.Expr | None = None
+    initial: sympy.Expr | None = None

@@ -1,0 +1,31 @@
+"""Symbols of a model: real ones and complex ones, their parts, and what they start from."""
+
+import sympy
+from sympy import I, Symbol
+
+from tractexp.model.graph import symbols_of
+
+
+def is_real(expression: sympy.Expr) -> bool:
+    """Whether an expression is made of real symbols, or SymPy knows it to be real wherever it is finite."""
+    return bool(expression.is_real) or not (expression.has(I) or any(not s.is_real for s in symbols_of(expression)))
+
+
+def real_symbol(name: str) -> Symbol:
+    """A symbol of something real."""
+    return Symbol(name, real=True)
+
+
+def vector_symbol(name: str) -> Symbol:
+    """A symbol of something complex."""
+    return Symbol(name, complex=True)
+
+
+def start_symbol(state: Symbol) -> Symbol:
+    """The symbol of a state's value before the event."""
+    return (real_symbol if state.is_real else vector_symbol)(f"{state.name}_before")
+
+
+def phasor_parts(state: Symbol) -> tuple[Symbol, Symbol]:
+    """The two real symbols behind a phasor."""
+    return real_symbol(f"{state.name}_re"), real_symbol(f"{state.name}_im")
