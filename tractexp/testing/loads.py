@@ -50,8 +50,12 @@ def _all(group: str) -> list[type]:
 @functools.cache
 def model(motor: type[Motor], static: type[Static], *effects: type[Effect]) -> Model:
     """A load of these parts with default settings."""
-    domain = WAVES if any(cls.waves_only for cls in (motor, static, *effects)) else PHASORS
-    return compose(motor(), static(), [cls() for cls in effects], domain=domain)
+    return compose(motor(), static(), [cls() for cls in effects], domain=_domain(motor, static, *effects))
+
+
+def _domain(*parts: type[Part]) -> str:
+    """The domain in which parts are tried: waveforms where one of them makes sense only there."""
+    return WAVES if any(cls.waves_only for cls in parts) else PHASORS
 
 
 def with_part(cls: type[Part]) -> Model:
@@ -90,8 +94,7 @@ def _bases() -> Iterator[tuple[type[Motor], type[Static]]]:
 
 def _taken(motor: type[Motor], static: type[Static], cls: type[Effect]) -> str | None:
     """Why a base model refuses an effect, None where it takes it. Anything but a sentence is raised."""
-    domain = WAVES if cls.waves_only else PHASORS
-    return compose(motor(), static(), domain=domain).acceptance(cls()).refusal
+    return compose(motor(), static(), domain=_domain(motor, static, cls)).acceptance(cls()).refusal
 
 
 def values(of: Model, pick: Callable[[Parameter], float] = lambda p: p.default, only: Part | None = None) -> np.ndarray:
