@@ -23,7 +23,7 @@ from tractexp.plugin import get
 from tractexp.record import in_waves
 from tractexp.report import overlay
 
-# Nothing but noise is left. Its level is estimated from quiet stretches, of which the later are louder by noise that the
+# Nothing but noise is left. Its level is estimated from quiet stretches; the later ones are louder by noise that the
 # machine's fluxes have summed up: on this record 8 % too loud, so that chi-squared is 0.84 where nothing is missing.
 QUIET, LOUD = 0.75, 1.15
 FEW = ("shunt_capacitor", "speed_dependent_torque")
