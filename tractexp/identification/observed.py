@@ -12,7 +12,7 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.identification.problem import Problem, excitation, excited
-from tractexp.model.drive import EVENT, INPUTS, Drive
+from tractexp.model.drive import Drive
 from tractexp.noise.color import SMALLEST
 from tractexp.noise.model import Noise
 from tractexp.noise.quiet import estimate, quiet_stretches
@@ -23,7 +23,6 @@ from tractexp.record import Event, WaveEvent
 
 DIVERGED = 10.0  # pu: a wrong sample of the voltage makes no such difference
 OFFSET = 0.005  # pu: what may be left of a channel's offset, which the mean before the dip took off
-EDGY, MOST_EDGES = 8.0, 40  # times the median by which slopes of the voltage differ that are unsure, and of how many
 LEFT = 2.0  # times what white noise leaves of an offset that the mean before the dip took off
 ANSWERED = 8  # samples of the lead after which a single wrong sample of the voltage is put there
 LEAST_KEPT = 0.2  # of a residual's variance: where the fit takes more, it tells nothing of the noise
@@ -157,29 +156,17 @@ def answers(problem: Problem, values: np.ndarray) -> tuple[np.ndarray, np.ndarra
 def unsure(problem: Problem, values: np.ndarray) -> np.ndarray:
     """What may be wrong with waveforms and is no noise, as the currents show it at free values (d,), (k, 3, N) [pu].
 
-    The offsets that the channels may have, those of the voltage as the model passes them on, and how steep the voltage
-    is at the samples of its edges: there two curves through the same samples differ.
+    The offsets that the channels may have, and those of the voltage as the model passes them on.
     """
     shapes = [offsets(problem.drive), *(_of_voltage(problem, values, e) for e in range(problem.drive.events))]
     return np.concatenate(shapes)
 
 
 def _of_voltage(problem: Problem, values: np.ndarray, event: int) -> np.ndarray:
-    """What offsets of the voltage and another slope at each sample of its edges do in one event, (k, 3, N)."""
-    from scipy.interpolate import CubicSpline
-
+    """What offsets of the voltage do in one event, (k, 3, N)."""
     drive, part = problem.drive, problem.drive.part(event)
-    v, slope = (drive.inputs[[INPUTS.index(f"v_{c}{end}") for c in "dq"], part] for end in ("", "_rate"))
-    step = float(drive.event[event, EVENT.index("step")])
-    off = CubicSpline(np.arange(v.shape[1]), v, axis=1)(np.arange(v.shape[1]), 1) / step - slope
-    size = np.linalg.norm(off, axis=0)
-    steep = np.flatnonzero(size > EDGY * max(float(np.median(size)), SMALLEST))
-    steep = steep[np.argsort(-size[steep], kind="stable")[:MOST_EDGES]]
-    plain = [problem.events[event]] * (len(steep) + 1)
-    one = Drive.of([excited(e, problem.model) for e in (*plain, *_shifted(problem.events[event]))])
-    for k, sample in enumerate(steep, start=1):
-        for c, name in enumerate(("v_d_rate", "v_q_rate")):
-            one.inputs[INPUTS.index(name), one.first[k] + sample] += off[c, sample]
+    plain = problem.events[event]
+    one = Drive.of([excited(e, problem.model) for e in (plain, *_shifted(plain))])
     own = np.tile(problem.by_event(values)[[event]], (one.events, 1, 1))
     made = problem.model.simulate(one, own, np.tile(problem.step.substeps[[event]], one.events)).outputs[:, 0]
     made = made.reshape(one.channels, one.events, -1).swapaxes(0, 1)
