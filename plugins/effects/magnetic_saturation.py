@@ -11,8 +11,8 @@ class MagneticSaturation(Effect):
 
         X - X' -> (X - X')/sigma,   T0' -> T0'/sigma,   sigma = 1 + k_s (|E|^2 - |E_0|^2)
 
-    In waveforms E + j X'/2 I, the voltage of the air gap with equal leakages, stands for E: in a dip's first cycles stator
-    and rotor flux are apart, and the main flux is between them.
+    In waveforms E + j X'/2 I, the voltage of the air gap with equal leakages, stands for E: in a dip's first cycles
+    stator and rotor flux are apart, and the main flux is between them.
 
     In the parameters of the model, C = (X - X')/X and T' = X'/X T0', both are divided by n = 1 + (1 - C)(sigma - 1).
     At k_s = 0 the base model.
