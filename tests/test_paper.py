@@ -323,7 +323,7 @@ def test_a_figure_of_one_run_makes_one_search(memory, tmp_path, monkeypatch):
     for _ in range(2):
         study = Study(_recipe, {}, _recipe().events, (), 30, workers=1, limits=searches.Limits(150), tell=told.append)
         study.prepare(["figure8"])
-        paper.write(study, ["figure8"], claims.claims(study, ["figure8"]), tmp_path)
+        paper.sheets(study, ["figure8"], claims.claims(study, ["figure8"]))
     assert made == [(["issa"], 1)] * 2
     again = "  1 of them were made before by the same code on the same records, and are read back"
     searched_, wrote = "searches of issa: seed 0, 300 iterations of 50", "writing Figure 8"
@@ -676,7 +676,7 @@ def test_the_equations_alone_take_no_search(tmp_path, monkeypatch):
     study = Study(_recipe, {}, _recipe().events, (), 30)
     judged = claims.claims(study, ["equations"])
     assert [claim.verdict for claim in judged] == [claims.REFUTED] * 2
-    text = paper.write(study, ["equations"], judged, tmp_path)[1].read_text()
+    text = paper.sheets(study, ["equations"], judged)[1].write(tmp_path / "paper.md").read_text()
     assert text.count("| does not agree |") == sum(not check.holds for check in equations.checks())
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from tractexp.api.arguments import Choice, public
 from tractexp.api.compose import LoadModel
-from tractexp.api.pages import Written
+from tractexp.api.pages import Drawing, Written
 from tractexp.api.read import dips_of
 from tractexp.api.response import Response, respond_to
 from tractexp.api.setup import Setup
@@ -241,12 +241,10 @@ class Identification(Written):
             found = Found(**found | {"values": np.array(found["values"], dtype=float), "history": history})
         return cls(Result(**content["result"]), setup and Asked.from_dict(setup), found)
 
-    def _write(self, folder: Path) -> list[Path]:
-        """result.json and history.csv, then report.html."""
-        return [*self.write_result(folder), *self.write_page(folder)]
+    def _drawings(self) -> Mapping[str, Drawing]:
+        return {"report.html": self._report}
 
-    def write_page(self, folder: Path) -> list[Path]:
-        """Write report.html."""
+    def _report(self, path: Path) -> Path:
         from tractexp.provenance import command
         from tractexp.report import identify
 
@@ -255,10 +253,9 @@ class Identification(Written):
             self.result, judged.fits, judged.estimated, judged.known, judged.together, judged.adequacy, self.advice,
             self.ended.history, about, self.search_told(), command(),
         )  # fmt: skip
-        return [made.write(folder / "report.html")]
+        return made.write(path)
 
-    def write_result(self, folder: Path) -> list[Path]:
-        """Write result.json and history.csv."""
+    def _results(self, folder: Path) -> list[Path]:
         from tractexp.identification.result import write_history
 
         return [

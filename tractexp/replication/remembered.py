@@ -87,7 +87,7 @@ class Remembered:
 
 def _keep(path: Path, content: bytes) -> None:
     with contextlib.suppress(UserError, OSError):
-        files.write(path, content)
+        files.write(path, content, lasting=False)
         _forget(path.parent)
 
 

@@ -1,10 +1,10 @@
 """Compare the runs of a sweep, or of any filter over MLflow."""
 
-import shutil
 from dataclasses import field
 from pathlib import Path
 from typing import Any
 
+from tractexp import files
 from tractexp.plugin import plugin
 from tractexp.tasks.console import listed, say, table
 from tractexp.tasks.task import Job, Task, call
@@ -42,12 +42,12 @@ class Compare(Task):
         told = ("filter", "data", "targets", "ties", "floor", "reference", "apart", "bbob", "cores")
         settings = {key: getattr(self, key) for key in told}
         made = call(compare, self.sweep, uri=node["uri"], experiment=node["experiment"], **settings)
+        paths = made.write_results(job.folder)
         report(made)
-        paths = made.write(job.folder)
-        if made.folder not in (None, job.folder):
-            paths = [Path(shutil.copy2(path, made.folder / path.name)) for path in paths] + paths
-        listed(paths)
-        track(job, made, paths[-2:])
+        paths += made.write_drawings(job.folder)
+        beside = made.folder not in (None, job.folder)
+        listed([files.copy(path, made.folder / path.name) for path in paths if beside] + paths)
+        track(job, made, paths)
 
 
 def report(made: Any) -> None:

@@ -52,8 +52,9 @@ class Survey(Task):
             model = [f"{key}={value}" for key, value in job.given.items() if key.partition(".")[0] == "model"]
             data = {"name": node["name"], "path": node["path"], "train": made.informative}
             made = type(made)({**made.content, "command": typed(data, *model)})
+        paths = made.write_results(job.folder)
         tell(made)
-        paths = made.write(job.folder)
+        paths += made.write_drawings(job.folder)
         listed(paths)
         rows = made.content["rows"]
         job.log(

@@ -15,7 +15,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from tractexp import files
 from tractexp.errors import UserError
+
+HELD = 120.0  # s to wait for another process that makes the store or opens it
 
 
 def default_uri(folder: Path) -> str:
@@ -58,7 +61,7 @@ def open_store(uri: str) -> Any:
             _reach(uri)
             return MlflowClient(uri, uri)
         database.parent.mkdir(parents=True, exist_ok=True)
-        with _lock(database.with_name(database.name + ".lock")):
+        with files.held(database.with_name(database.name + ".lock"), HELD):
             if not database.exists():
                 _create_database(database)
             _check_database(database)
@@ -81,7 +84,7 @@ def _create_database(database: Path) -> None:
     ):
         MlflowClient(f"sqlite:///{memory}&uri=true").search_experiments(max_results=1)
         connection.execute("VACUUM INTO ?", (str(Path(folder, "fresh.db")),))
-        os.replace(Path(folder, "fresh.db"), database)
+        files.move(Path(folder, "fresh.db"), database)
 
 
 def _check_database(database: Path) -> None:
@@ -122,27 +125,6 @@ def light_import() -> Iterator[None]:
         gc.freeze()
         if collecting:
             gc.enable()
-
-
-@contextlib.contextmanager
-def _lock(path: Path) -> Iterator[None]:
-    """Hold `path` exclusively among processes; a process that dies lets go of it."""
-    with path.open("a+b") as file:
-        if os.name == "nt":
-            import msvcrt
-
-            file.seek(0)
-            while True:
-                try:
-                    msvcrt.locking(file.fileno(), msvcrt.LK_LOCK, 1)  # gives up after ten seconds
-                    break
-                except OSError:
-                    continue
-        else:
-            import fcntl
-
-            fcntl.flock(file, fcntl.LOCK_EX)
-        yield
 
 
 @contextlib.contextmanager
