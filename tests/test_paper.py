@@ -254,9 +254,10 @@ def test_workers_change_no_result():
 @pytest.fixture
 def memory(tmp_path, monkeypatch):
     """A cache of its own, in which nothing is remembered yet; the kernels are those of the others."""
-    from tractexp.replication import remembered
 
-    monkeypatch.setattr(remembered, "cache_folder", lambda: tmp_path)
+    from tractexp.identification import shelf
+
+    monkeypatch.setattr(shelf, "cache_folder", lambda: tmp_path)
     return tmp_path / "searches"
 
 
@@ -297,14 +298,14 @@ def test_a_search_of_anything_else_is_never_read_back(memory, monkeypatch):
 
 
 def test_a_damaged_memory_is_made_anew_and_the_oldest_are_forgotten(memory, monkeypatch):
-    from tractexp.replication import remembered
+    from tractexp.identification import shelf
 
     searched(monkeypatch)
     for k, path in enumerate(memory.iterdir()):
         path.write_bytes([b"no zip", path.read_bytes()[:200]][k])
     assert searched(monkeypatch)[1] == 2
     assert searched(monkeypatch)[1] == 0
-    monkeypatch.setattr(remembered, "MOST", 3)
+    monkeypatch.setitem(shelf.SHELVES, "searches", 3)
     searched(monkeypatch, seeds=5)
     assert len(list(memory.iterdir())) == 3
 

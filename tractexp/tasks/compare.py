@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from tractexp import files
+from tractexp.errors import UserError
 from tractexp.plugin import plugin
 from tractexp.tasks.console import listed, say, table
 from tractexp.tasks.task import Job, Task, call
@@ -111,8 +112,12 @@ def track(job: Job, made: Any, paths: list[Path]) -> None:
     comparisons = made.comparisons
     known = {run.data for c in comparisons.values() for variant in c.gathered.variants for run in variant.runs}
     data = known.pop() if len(known) == 1 else f"{len(known)} records"
-    if parent is not None and attach(parent, job.store, paths):
-        say(f"logged on the run of the sweep; to see it: {job.look}")
+    try:
+        if parent is not None and attach(parent, job.store, paths):
+            say(f"logged on the run of the sweep; to see it: {job.look}")
+            return
+    except UserError as error:
+        say(f"not logged: {error}")
         return
     run = tracking.Run(
         experiment=node["experiment"] or f"compare {data}",

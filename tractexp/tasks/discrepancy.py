@@ -20,6 +20,7 @@ STAGES = ("before", "after")
 class Discrepancy(Task):
     """Investigate the training events, judge what is found on the held-out ones, tell it in one page."""
 
+    resumes = True
     reads = ("data", *LOAD, "model.bounds", "model.fixed", "model.substeps")
     instead = {"model.per_event": "its parameters are shared by all events, so leave it out"}
 

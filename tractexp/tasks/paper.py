@@ -16,6 +16,7 @@ from tractexp.tasks.task import Job, Task, call
 class Paper(Task):
     """Measure what the paper claims, on the shipped stand-ins or on records of your own: paper.json, .html and .md."""
 
+    resumes = True
     reads = ("data", "model", "objective", "budget", "time_limit", "target")
     instead = {"optimizer": "it compares the paper's three; task=generalise takes any"}
 

@@ -21,6 +21,7 @@ class Survey(Task):
     only at what is new or changed.
     """
 
+    resumes = True
     reads = ("data", "model")
 
     informative: int | None = None  # so many events that tell most about the model together

@@ -17,6 +17,7 @@ from typing import Any
 
 from tractexp import files
 from tractexp.errors import UserError
+from tractexp.tracking.owner import close_quietly
 
 HELD = 120.0  # s to wait for another process that makes the store or opens it
 
@@ -49,7 +50,10 @@ def database_of(uri: str) -> Path | None:
 
 @functools.cache
 def open_store(uri: str) -> Any:
-    """An open `MlflowClient`, the store behind it created or migrated. One per store and process."""
+    """An open `MlflowClient`, the store behind it created or migrated. One per store and process.
+
+    Runs that were left running by processes which have ended are closed.
+    """
     if not uri.strip():
         raise UserError("tracking: the address of the MLflow store is empty; it is like sqlite:////folder/mlflow.db")
     database = database_of(uri)
@@ -59,7 +63,9 @@ def open_store(uri: str) -> Any:
     with sentences(uri):
         if database is None:
             _reach(uri)
-            return MlflowClient(uri, uri)
+            client = MlflowClient(uri, uri)
+            close_quietly(client)
+            return client
         database.parent.mkdir(parents=True, exist_ok=True)
         with files.held(database.with_name(database.name + ".lock"), HELD):
             if not database.exists():
@@ -67,7 +73,8 @@ def open_store(uri: str) -> Any:
             _check_database(database)
             client = MlflowClient(uri, uri)
             client.search_experiments(max_results=1)
-            return client
+        close_quietly(client)
+        return client
 
 
 def _create_database(database: Path) -> None:
@@ -101,6 +108,8 @@ def import_mlflow(sql: bool = False) -> None:
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
     os.environ.setdefault("MLFLOW_LOGGING_LEVEL", "WARNING")
     os.environ.setdefault("MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR", "false")
+    os.environ.setdefault("MLFLOW_HTTP_REQUEST_MAX_RETRIES", "2")  # what cannot be sent now is kept and sent later
+    os.environ.setdefault("MLFLOW_HTTP_REQUEST_TIMEOUT", "30")
     with light_import():
         import mlflow
 
