@@ -5,7 +5,7 @@ import os
 import shutil
 import sqlite3
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -31,18 +31,23 @@ def doctor(arguments: list[str]) -> int:
     chosen = parser.parse_args(arguments)
     from tractexp import tracking
 
-    uri, wrong = tracking.address(chosen.uri), 0
-    checks: list[Callable[[], Iterator[Finding]]] = [
-        versions, cores, lambda: disk(chosen.folder), caches, lambda: leavings(chosen.folder), lambda: store(uri),
-        lambda: runs(uri),
-    ]  # fmt: skip
-    for check in checks:
-        for state, sentence in check():
-            say(f"{state:>6}  {sentence}")
-            wrong += state == WRONG
+    uri = tracking.address(chosen.uri)
+    wrong = sum(map(told, (versions(), cores(), disk(chosen.folder), caches(), leavings(chosen.folder))))
+    if told(store(uri)):
+        return 2
+    wrong += told(runs(uri))
     if chosen.folder.is_dir():
         wrong += brought(chosen.folder, chosen.uri)["not logged"]
     return 2 if wrong else 0
+
+
+def told(findings: Iterable[Finding]) -> int:
+    """Print findings; how many of them are wrong."""
+    wrong = 0
+    for state, sentence in findings:
+        say(f"{state:>6}  {sentence}")
+        wrong += state == WRONG
+    return wrong
 
 
 def versions() -> Iterator[Finding]:
@@ -171,13 +176,10 @@ def runs(uri: str) -> Iterator[Finding]:
     database = database_of(uri)
     if database is not None and not database.exists():
         return
-    try:
-        client: Any = open_store(uri)
-        with sentences(uri):
-            closed = [*getattr(client, "tractexp_closed", ()), *owner.close_stale(client)]
-            left = owner.running(client)
-    except UserError:
-        return  # told by `store`
+    client: Any = open_store(uri)
+    with sentences(uri):
+        closed = [*owner.closed, *owner.close_stale(client)]
+        left = owner.running(client)
     if closed:
         yield HEALED, f"{len(closed)} runs whose process had ended are closed as KILLED"
     unknown = [run for run in left if owner.gone(run.data.tags.get(owner.TAG, "")) is None]

@@ -9,6 +9,7 @@ from typing import Any
 
 TAG = "tractexp.process"
 PAGE = 1000  # runs asked for at a time
+closed: list[str] = []  # runs that this process has closed where it opened a store
 
 
 @functools.cache
@@ -65,12 +66,10 @@ def gone(told: str) -> bool | None:
 
 def close_stale(client: Any) -> list[str]:
     """Close runs as KILLED whose process has ended without a word, and return their ids."""
-    closed = []
-    for run in running(client):
-        if gone(run.data.tags.get(TAG, "")):
-            client.set_terminated(run.info.run_id, "KILLED")
-            closed.append(run.info.run_id)
-    return closed
+    stale = [run.info.run_id for run in running(client) if gone(run.data.tags.get(TAG, ""))]
+    for run_id in stale:
+        client.set_terminated(run_id, "KILLED")
+    return stale
 
 
 def running(client: Any) -> list[Any]:
@@ -89,4 +88,4 @@ def running(client: Any) -> list[Any]:
 def close_quietly(client: Any) -> None:
     """As `close_stale`, where something else is to be done: a store that refuses tells so then."""
     with contextlib.suppress(Exception):
-        close_stale(client)
+        closed.extend(close_stale(client))
