@@ -123,7 +123,7 @@ def test_each_job_leaves_its_status_and_what_it_printed(logged):
         assert end["seed"] == number % 2
         assert end["seconds"] > 0
         names = {path.name for path in (sweep / str(number)).iterdir()}
-        assert names == {".hydra", "history.csv", "output.txt", "result.json", "status.json"}
+        assert names == {".hydra", "history.csv", "mlflow.json", "output.txt", "result.json", "status.json"}
         assert f"seed {number % 2}" in (sweep / str(number) / "output.txt").read_text()
     assert len({end["configuration"] for end in ends.values()}) == 4
 

@@ -106,8 +106,10 @@ def track(job: Job, made: Any, paths: list[Path]) -> None:
         return
     from tractexp import tracking
     from tractexp.tracking.attach import attach
-    from tractexp.tracking.swept import parent_of
+    from tractexp.tracking.swept import parent_of, waits
 
+    if made.folder is not None and waits(made.folder):
+        return  # the page is sent with the run of the sweep
     parent = parent_of(made.folder) if made.folder is not None else None
     comparisons = made.comparisons
     known = {run.data for c in comparisons.values() for variant in c.gathered.variants for run in variant.runs}

@@ -14,6 +14,7 @@ from tractexp.tracking.run import finish_parent, log, reopen_parent, start_paren
 from tractexp.tracking.store import address, open_store, sentences
 from tractexp.tracking.swept import FILE, parent_of
 
+PAGES = ("comparison.json", "comparison.html")  # of a sweep, made when its jobs have ended
 THERE, BROUGHT, DELETED, NOT = "already there", "brought in", "deleted in MLflow and left so", "not logged"
 
 
@@ -73,7 +74,8 @@ def _sweep(one: Kept, known: Any, uri: str) -> str:
     run_id = one.run_id
     if known is None or not reopen_parent(run_id, uri):
         run_id = start_parent(replace(one.run, metrics={}), uri)
-    finish_parent(run_id, uri, one.run.status, one.run.metrics)
+    pages = [path for name in PAGES if (path := one.folder / name).is_file()]
+    finish_parent(run_id, uri, one.run.status, one.run.metrics, pages)
     one.logged(run_id, uri)
     told = one.folder / FILE
     files.write_json(told, {"run": run_id, "uri": uri, "overrides": one.run.tags.get("sweep", "").split()})
