@@ -68,7 +68,7 @@ def main() -> int:
 
 def terminated(*_: object) -> None:
     """End what runs in an orderly way when the system asks for it, as at a batch system's time limit."""
-    raise Stopped("ended by SIGTERM", code=143)
+    raise Stopped("ended by SIGTERM; nothing was logged for this run", code=143)
 
 
 def _run() -> int:
