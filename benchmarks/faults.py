@@ -22,6 +22,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -32,6 +33,7 @@ tractexp.__version__  # noqa: B018
 STORED = Path(__file__).with_name("faults.json")
 SEARCH = ("optimizer=pso", "optimizer.population=20", "budget=200")
 SWEEP = ("-m", *SEARCH, "seed=range(0,4)", "hydra.sweep.dir=sweep", "hydra.launcher.n_jobs=2")
+WORKERS, MACHINES, DISKS = 5, 5, (40, 400, 1100)  # kills of workers, of all; kB of a disk that is too small
 FULL = OSError(errno.ENOSPC, "No space left on device")
 
 
@@ -62,6 +64,7 @@ def forked(
             os.dup2(said.fileno(), 1)
             os.dup2(said.fileno(), 2)
             sys.stdout, sys.stderr = (io.TextIOWrapper(os.fdopen(k, "wb", 0), write_through=True) for k in (1, 2))
+            warnings.simplefilter("default")  # as users have it, whatever the tests set
             code = 1
             try:
                 code = act() or 0
@@ -408,7 +411,7 @@ def sweeps(work: Path, chance: random.Random) -> Iterator[Fault]:
     folder, process = made(work / "workers"), None
     process = begun(folder, *SWEEP)
     killed_at = []
-    for _ in range(6):
+    for _ in range(WORKERS):
         time.sleep(chance.uniform(0.1, 0.25) * took)
         if process.poll() is not None:
             break
@@ -428,7 +431,7 @@ def sweeps(work: Path, chance: random.Random) -> Iterator[Fault]:
         )  # fmt: skip
 
     folder, count = made(work / "machine"), 0
-    while count < 10:
+    while count < MACHINES:
         process, after = begun(folder, *SWEEP), chance.uniform(0.25, 0.95) * took
         time.sleep(after)
         if process.poll() is not None:
@@ -446,7 +449,7 @@ def sweeps(work: Path, chance: random.Random) -> Iterator[Fault]:
     code = begun(folder, *SWEEP).wait()
     said = (folder / "said.txt").read_text()
     yield told(
-        "the command repeated after ten kills of the whole machine", f"exit {code}, all four results the same",
+        f"the command repeated after {MACHINES} kills of the whole machine", f"exit {code}, all four results the same",
         "" if swept(folder) == found else "OTHER RESULTS", trace(said), halves(folder), running(folder),
     )  # fmt: skip
     yield from disks(work, found)
@@ -467,7 +470,7 @@ def running(folder: Path) -> str:
 
 def disks(work: Path, found: dict) -> Iterator[Fault]:
     """A sweep on a disk that is full at some time, given room, and repeated."""
-    for kilobytes in (40, 120, 400, 1100):
+    for kilobytes in DISKS:
         folder = made(work / f"disk{kilobytes}")
         mount = ["mount", "-t", "tmpfs", "-o"]
         if subprocess.run([*mount, f"size={kilobytes}k", "tmpfs", str(folder)], capture_output=True).returncode:
@@ -545,11 +548,12 @@ PARTS = {"jobs": jobs, "logging": logging, "stores": stores, "sweeps": sweeps, "
 def ready() -> None:
     """Import and compile what forked processes then have at hand."""
     import tractexp.__main__
-    from tractexp.tracking.store import import_mlflow
+    from tractexp.tracking.store import import_mlflow, light_import
 
     import_mlflow(sql=True)
+    with light_import():
+        import mlflow.pyfunc  # noqa: F401
     import hydra  # noqa: F401
-    import mlflow.pyfunc  # noqa: F401
     import plotly.graph_objects  # noqa: F401
     import scipy.optimize
     import scipy.stats  # noqa: F401
