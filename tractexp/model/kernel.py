@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import ModuleType
 
+from tractexp.files import write
 from tractexp.model.template import VECTORS
 from tractexp.model.vectors import width
 
@@ -115,8 +116,4 @@ def _name(source: str) -> str:
 
 def _write(path: Path, source: str) -> None:
     """Write in one move and with a fixed time stamp: Numba's cache is keyed by it, whoever writes first."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
-    with os.fdopen(handle, "w") as file:
-        file.write(source)
-    os.utime(temporary, (0, 0))
-    os.replace(temporary, path)
+    write(path, source, lasting=False, modified=0.0)
