@@ -4,8 +4,11 @@ import math
 
 from numba import njit
 
+from tractexp.extend import kept
 
-@njit(cache=True, nogil=True, error_model="numpy")
+
+@kept
+@njit(nogil=True, error_model="numpy")
 def earlier(y, lag, out):
     """Write y (C, n, N) as it was `lag` (n,) samples earlier to `out`; y keeps its first and last value beyond them.
 
@@ -25,7 +28,8 @@ def earlier(y, lag, out):
                 out[c, k, i] = far * a + near * b + here * d + ahead * e
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kept
+@njit(nogil=True, error_model="numpy")
 def averaged(y, window, out):
     """Write the mean of y (2, n, N) over `window` (n,) samples around each to `out`.
 

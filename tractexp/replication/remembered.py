@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 
 from tractexp import files, provenance
-from tractexp.errors import UserError
 from tractexp.identification.problem import Problem
 from tractexp.identification.search import Found, History, Limits
-from tractexp.model.kernel import cache_folder
+from tractexp.model import cache
+from tractexp.model.cache import cache_folder
 from tractexp.plugin import build
 
 MOST = 3000  # searches that are kept, of some 20 kB each, four studies of 30 seeds: beyond, the oldest go
@@ -45,9 +45,10 @@ class Remembered:
     def get(self, settings: Mapping[str, Any], seed: int) -> Found | None:
         """The search that was made before; None where there is none, or its file is damaged."""
         path = self._path(settings, seed)
-        if path is None or not path.is_file():
+        held = cache.read(path) if path else None
+        if held is None:
             return None
-        with contextlib.suppress(*DAMAGED), np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as kept:
+        with contextlib.suppress(*DAMAGED), np.load(io.BytesIO(held), allow_pickle=False) as kept:
             history = History(**{name: kept[name] for name in ARRAYS})
             return Found(**json.loads(str(kept["told"])), values=kept["found"], history=history)
         return None
@@ -68,7 +69,8 @@ class Remembered:
         if not self.on:
             return make()
         path = self._file(told)
-        with contextlib.suppress(*DAMAGED), np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as kept:
+        held = cache.read(path) or b""
+        with contextlib.suppress(*DAMAGED), np.load(io.BytesIO(held), allow_pickle=False) as kept:
             return tuple(kept[name] for name in kept.files)
         made = make()
         written = io.BytesIO()
@@ -82,12 +84,12 @@ class Remembered:
 
     def _file(self, told: str) -> Path:
         name = hashlib.sha256(f"{self.problem} {told}".encode()).hexdigest()[:40]
-        return cache_folder() / "searches" / f"{name}.npz"
+        return cache_folder() / "searches" / f"{name}.kept"
 
 
 def _keep(path: Path, content: bytes) -> None:
-    with contextlib.suppress(UserError, OSError):
-        files.write(path, content)
+    cache.write(path, content)
+    with contextlib.suppress(OSError):
         _forget(path.parent)
 
 
@@ -113,7 +115,7 @@ def _digest(problem: Problem, limits: Limits) -> str:
 
 def _forget(folder: Path) -> None:
     """Remove the oldest searches where there are too many."""
-    kept = list(folder.glob("*.npz"))
+    kept = list(folder.glob("*.kept"))
     if len(kept) > MOST:
         kept.sort(key=lambda path: path.stat().st_mtime)
         for path in kept[: len(kept) - MOST]:
