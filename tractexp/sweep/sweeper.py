@@ -19,6 +19,7 @@ from hydra.core.plugins import Plugins
 from hydra.plugins.sweeper import Sweeper
 from omegaconf import OmegaConf
 
+from tractexp import files
 from tractexp.doors.hydra_plugins import NAMESPACE
 from tractexp.errors import UserError
 from tractexp.plugin import build, get
@@ -77,8 +78,7 @@ class Grid(Sweeper):
         if len(left) < len(jobs):
             say(f"  {len(jobs) - len(left)} of them are finished and kept; hydra.sweeper.redo=true runs them again")
         if left:
-            folder.mkdir(parents=True, exist_ok=True)
-            OmegaConf.save(self.config, folder / "multirun.yaml")
+            files.write(folder / "multirun.yaml", OmegaConf.to_yaml(self.config))
             with terminating(), parent_run(folder, jobs, told, afresh=self.redo):
                 self._run(left)
         self._conclude(jobs, comparison)
