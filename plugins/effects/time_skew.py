@@ -25,6 +25,7 @@ class TimeSkew(Measurement):
 
     skew = Parameter(0.0, (-0.02, 0.02), "s", "delay of power behind voltage", "IEC/IEEE 60255-118-1", r"\tau", 0.0)
 
+    places, kind = ("measurement",), "delay"
     relevant = {"skew": 0.001}
     confused_with = ("stator_resistance", "dc_link_lag", "measurement_window")
 
