@@ -1,8 +1,10 @@
-"""How long ago the dip began, and how long ago the voltage returned: told from the voltage, sample by sample."""
+"""What begins with a dip or after it, told from the voltage, sample by sample."""
 
-from tractexp_plugins.effects._operators import gate
+from tractexp.extend import sites
+from tractexp_plugins.effects._operators import gate, larger, smaller
 
 LEVEL, BEGUN = 0.0015, 0.96  # how sharp a level is, and the voltage over U_0 below which a dip has begun
+WIDTH = 0.02  # of a change: how rounded its corners are
 
 
 def since(eq, returned, name):
@@ -16,3 +18,21 @@ def since(eq, returned, name):
     over = begun * gate(u - (1 + lowest) / 2, LEVEL) if returned else begun
     eq.renews(time, time + eq.step * sympy.Max(over, gate(time - eq.step, 0.04 * eq.step)), 0)
     return time
+
+
+def changes(eq, returned, name, sizes, wait, duration, static):
+    """Let P and Q change by `sizes` within `duration` [s], `wait` [s] after the time of `since`.
+
+    Where `static` is 1 all but the motors change.
+    """
+    time = since(eq, returned, name)
+    ramp = lambda t: smaller(1, larger(0, (t - wait) / duration, WIDTH), WIDTH)  # noqa: E731
+    way = eq.define(f"changed_{name}", ramp(time) - ramp(0), "r")
+    if eq.waves:
+        places = ((sites.current, sites.motor_current, sizes[0]),)
+    else:
+        places = ((sites.P, sites.P_motor, sizes[0]), (sites.Q, sites.Q_motor, sizes[1]))
+    for site, motor, size in places:
+        there = motor in eq
+        spared = static * eq[motor] if there else 0
+        eq.edit(site, lambda drawn, size=size, spared=spared: drawn + size * way * (drawn - spared))

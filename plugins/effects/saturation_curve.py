@@ -11,12 +11,14 @@ KNOTS, WIDTH = (0.15, 0.4), 0.08  # pu² of flux fallen
 
 @plugin
 class SaturationCurve(Effect):
-    r"""The magnetizing reactance grows as the flux falls, as `magnetic_saturation` has it, but by a monotone curve.
+    r"""The magnetizing reactance grows as the flux falls, as in `magnetic_saturation`, by a monotone curve.
 
-        sigma = 1 - k (h(x) - h(0)),   x = |E_0|^2 - |E|^2
+        sigma = 1 - k h(x),   x = |psi_0|^2 - |psi|^2,   psi = (1 - a) V + a E,   E -> E (1 - (1 - a)(1 - C)(sigma - 1))
 
-    h has slope 1 up to a fall of 0.15 pu², exp(b_1) to 0.4 and exp(b_2) beyond, its corners rounded over 0.08: a knee,
-    where it flattens, or a curve that steepens. At b_1 = b_2 = 0 it is `magnetic_saturation`, at k = 0 the base model.
+    psi is the flux of the core, between the terminals and E: 1 - a is the rotor's part of X', by which what the core
+    takes changes the voltage behind X' at once, in current and torque. h has slope 1 up to a fall of 0.15 pu², exp(b_1)
+    to 0.4 and exp(b_2) beyond, its corners rounded over 0.08: a knee, where it flattens, or a curve that steepens. At
+    a = 1 and b_1 = b_2 = 0 it is `magnetic_saturation`, at k = 0 the base model.
 
     Source: saturation factors by table, Kundur 1994, ch. 3; Milano 2010, ch. 15.
     Departures: those of `magnetic_saturation`; three slopes stand for the curve.
@@ -28,27 +30,30 @@ class SaturationCurve(Effect):
     saturation_bend_1 = Parameter(0.0, (-4.0, 1.5), "1", "logarithm of the next slope over it", SOURCE, "b_1")
     saturation_bend_2 = Parameter(0.0, (-4.0, 1.5), "1", "logarithm of the last slope over it", SOURCE, "b_2")
 
-    places, kind = ("coupling", "flux decay"), "law"
+    flux_depth = Parameter(1.0, (0.0, 1.0), "1", "where between terminals and E the core is", SOURCE, "a_s")
+
+    places, kind = ("coupling", "flux decay", "stator impedance", "load torque"), "law"
     family, differs, nests_textbook = "magnetic_saturation", "but not by the catalogue's law", True
     as_textbook = {"curve_saturation": "saturation"}
-    grid = {"saturation_bend_1": (-2.0, 0.0, 1.0), "saturation_bend_2": (-2.0, 0.0, 1.0)}
-    likely = {"saturation_bend_1": 1.5, "saturation_bend_2": 1.5}
+    grid = {"saturation_bend_1": (-2.0, 0.0), "saturation_bend_2": (-2.0, 0.0), "flux_depth": (1.0, 0.6)}
+    likely = {"saturation_bend_1": 1.5, "saturation_bend_2": 1.5, "flux_depth": 1.0}
     relevant = {"curve_saturation": 0.2}
     confused_with = ("magnetic_saturation", "feeder_impedance", "speed_dependent_torque")
 
-    def edit(self, eq, curve_saturation, saturation_bend_1, saturation_bend_2):
+    def edit(self, eq, curve_saturation, saturation_bend_1, saturation_bend_2, flux_depth):
         from sympy import conjugate, re
 
-        E = eq["E"]
+        psi = eq.define("gap_flux", (1 - flux_depth) * eq.V + flux_depth * eq["E"], r"\psi")
         square = lambda x: re(x * conjugate(x))  # noqa: E731
-        fall = eq.define("flux_fall", square(eq.before(E)) - square(E), r"\Delta E^2")
-        unsaturated = 1 - (1 - eq["C"]) * curve_saturation * bent(
-            fall, KNOTS, (saturation_bend_1, saturation_bend_2), WIDTH
-        )
+        fall = eq.define("flux_fall", square(eq.before(psi)) - square(psi), r"\Delta E^2")
+        less = (1 - eq["C"]) * curve_saturation * bent(fall, KNOTS, (saturation_bend_1, saturation_bend_2), WIDTH)
         for site in (sites.coupling, sites.time_constant):
-            eq.edit(site, lambda x: x / unsaturated)
+            eq.edit(site, lambda x: x / (1 - less))
+        taken = (1 - flux_depth) * less
+        eq.edit(sites.stator_current, lambda current: current - eq["E"] * taken / eq[sites.stator_impedance])
+        eq.edit(sites.electrical_torque, lambda torque: torque * (1 + taken))
 
-    def curve(self, curve_saturation, saturation_bend_1, saturation_bend_2):
+    def curve(self, curve_saturation, saturation_bend_1, saturation_bend_2, flux_depth):
         x = np.linspace(0.0, 0.7, 71)
         y = -curve_saturation * drawn(lambda x: bent(x, KNOTS, (saturation_bend_1, saturation_bend_2), WIDTH), x)
         return Curve(x, y, "fall of the flux squared, pu²", "change of the saturation factor")

@@ -34,7 +34,8 @@ class TwoStageTrip(Effect):
     family, differs, nests_textbook = "undervoltage_trip", "in two stages", True
     as_textbook = {
         "stage_1_tripped": "tripped_share", "stage_1_level": "trip_level", "stage_1_delay": "trip_delay",
-        "stage_1_wait": "reconnect_delay", "stage_2_wait": "reconnect_delay", "stage_margin": "reconnect_margin", "stage_ramp": "reconnect_ramp",
+        "stage_1_wait": "reconnect_delay", "stage_2_wait": "reconnect_delay",
+        "stage_margin": "reconnect_margin", "stage_ramp": "reconnect_ramp",
     }  # fmt: skip
     grid = {"stage_2_level": (0.5, 0.6, 0.7, 0.85), "stage_2_delay": (0.03, 0.15)}
     relevant = {"stage_1_tripped": 0.04, "stage_2_tripped": 0.04}

@@ -193,7 +193,7 @@ def _forms(made: Page, found: Investigation) -> None:
         if form.found is not None:
             made.chart(
                 _curve(form.found),
-                f"{form.name}: the law found, with its 95 % band, beside the catalogue's law as it fits these events best.",
+                f"{form.name}: the law found, with its 95 % band, beside the catalogue's as it fits these events best.",
             )
 
 
