@@ -13,15 +13,16 @@ KNOTS, WIDTH = (0.15, 0.4), 0.08  # pu² of flux fallen
 class SaturationCurve(Effect):
     r"""The magnetizing reactance grows as the flux falls, as in `magnetic_saturation`, by a monotone curve.
 
-        sigma = 1 - k h(x),   x = |psi_0|^2 - |psi|^2,   psi = (1 - a) V + a E,   E -> E (1 - (1 - a)(1 - C)(sigma - 1))
+        sigma = 1 - k h(x),   x = |psi_0|^2 - |psi|^2,   psi = (1 - a) U + a E,   E -> E (1 - (1 - a)(1 - C)(sigma - 1))
 
-    psi is the flux of the core, between the terminals and E: 1 - a is the rotor's part of X', by which what the core
+    psi is the flux of the core, between the bus and E: 1 - a is the rotor's part of X', by which what the core
     takes changes the voltage behind X' at once, in current and torque. h has slope 1 up to a fall of 0.15 pu², exp(b_1)
     to 0.4 and exp(b_2) beyond, its corners rounded over 0.08: a knee, where it flattens, or a curve that steepens. At
     a = 1 and b_1 = b_2 = 0 it is `magnetic_saturation`, at k = 0 the base model.
 
     Source: saturation factors by table, Kundur 1994, ch. 3; Milano 2010, ch. 15.
-    Departures: those of `magnetic_saturation`; three slopes stand for the curve.
+    Departures: those of `magnetic_saturation`; three slopes stand for the curve; behind a feeder the core still sees
+    the bus.
     """
 
     curve_saturation = Parameter(
@@ -43,7 +44,7 @@ class SaturationCurve(Effect):
     def edit(self, eq, curve_saturation, saturation_bend_1, saturation_bend_2, flux_depth):
         from sympy import conjugate, re
 
-        psi = eq.define("gap_flux", (1 - flux_depth) * eq.V + flux_depth * eq["E"], r"\psi")
+        psi = eq.define("gap_flux", (1 - flux_depth) * eq.v + flux_depth * eq["E"], r"\psi")
         square = lambda x: re(x * conjugate(x))  # noqa: E731
         fall = eq.define("flux_fall", square(eq.before(psi)) - square(psi), r"\Delta E^2")
         less = (1 - eq["C"]) * curve_saturation * bent(fall, KNOTS, (saturation_bend_1, saturation_bend_2), WIDTH)

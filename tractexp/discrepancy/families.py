@@ -44,7 +44,7 @@ def member_that_suffices(
     least = min(f.cost for f in begun)
     fits = refit(bench, noise, [(f.names, f.unit) for f in begun if f.cost < least + CLOSE])
     for k, fit in enumerate(fits[:EXAMINED]):
-        if not worth(fit, tests.fit, bench.criteria.second_name_p):
+        if not worth(fit, tests.fit, bench.criteria.family_p) or not bench.kernels.family.joins(fit.names[0]):
             continue
         bench.kernels.family.compile_members(fit.names, bench.effort.say, whole=True)
         there = examined(base.quiet, fit, noise, seed + k)

@@ -81,6 +81,10 @@ class Family:
         """Compile what is not in the cache yet, side by side."""
         compile_missing(self._sources(), lambda: say("compiling kernels, once for this base model and these channels"))
 
+    def joins(self, name: str) -> bool:
+        """Whether a member of a family goes with the model of everything, by which what it leaves is tested."""
+        return self.whole.acceptance(self.catalogue[name].effect).refusal is None
+
     def compile_members(self, names: Iterable[str], say: Callable[[str], None], *, whole: bool = False) -> None:
         """Compile what members of families need, side by side: a kernel each, or with everything where `whole`."""
         load = self.catalogue.of_load
