@@ -8,7 +8,7 @@ import numpy as np
 
 from tractexp import files
 from tractexp.discrepancy import recommended
-from tractexp.discrepancy.forms import forms
+from tractexp.discrepancy.forms import forms, told_by_name
 from tractexp.discrepancy.gap import Curves, Gap
 from tractexp.discrepancy.investigate import Investigation
 from tractexp.discrepancy.judgement import judgements
@@ -25,9 +25,9 @@ def content(investigation: Investigation) -> dict[str, Any]:
     return {
         "verdict": investigation.verdict.word,
         "reason": investigation.verdict.reason,
-        "effects": list(investigation.catalogue.textbook(investigation.names)),
+        "effects": list(dict.fromkeys(investigation.catalogue.textbook(investigation.names))),
         "name_sets": [list(investigation.catalogue.textbook(names)) for names in investigation.verdict.sets],
-        "forms": {form.name: form.told() for form in forms(investigation)},
+        "forms": told_by_name(forms(investigation)),
         "where": [asdict(place) for place in investigation.places],
         "gap": {
             "train": _gap(investigation.train),

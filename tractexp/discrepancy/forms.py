@@ -1,6 +1,6 @@
 """The form of each effect named: where it acts, what it does there, and by which law, with the curve found."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -59,6 +59,14 @@ def forms(found: Investigation) -> list[Form]:
     return [Form(at.family(name), at[name].effect, _curve(found, at[name].effect)) for name in found.names]
 
 
+def told_by_name(found: Sequence[Form]) -> dict[str, dict[str, Any]]:
+    """Forms by the catalogue's names; a second one of a family by its own."""
+    told: dict[str, dict[str, Any]] = {}
+    for form in found:
+        told[form.effect.name if form.name in told else form.name] = form.told()
+    return told
+
+
 def _curve(found: Investigation, effect: Effect) -> Found | None:
     """The law found with its band, by the slopes of the curve along the parameters; None of what is no curve."""
     at, unit, tests = found.bench.coordinates, found.extended.unit, found.verdict.chosen.tests or found.last
@@ -67,8 +75,9 @@ def _curve(found: Investigation, effect: Effect) -> Found | None:
     if curve is None:
         return None
     names, spread = covariance(tests, list(values))
-    J = np.array([_slope(effect, values, name, spread[k, k] ** 0.5) for k, name in enumerate(names)])
-    half = WIDE * np.sqrt(np.einsum("kn,kl,ln->n", J, spread, J)) if len(names) else np.zeros_like(curve.y)
+    told = [k for k in range(len(names)) if spread[k, k] > 0]
+    J = np.array([_slope(effect, values, names[k], spread[k, k] ** 0.5) for k in told]).reshape(-1, len(curve.y))
+    half = WIDE * np.sqrt(np.einsum("kn,kl,ln->n", J, spread[np.ix_(told, told)], J))
     return Found(curve, np.stack([curve.y - half, curve.y + half]), _textbook(found, effect, values, curve))
 
 
