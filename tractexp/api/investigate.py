@@ -93,8 +93,18 @@ class Investigation(Written):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The effects added to the model."""
+        """The effects added to the model, by the catalogue's names; `forms` says at which place and by which law."""
         return tuple(self.content["effects"])
+
+    @property
+    def forms(self) -> Mapping[str, Mapping[str, Any]]:
+        """{name: {place, kind, law, differs, effect, curve}} of each effect added, as `discrepancy.json` holds it."""
+        return self.content["forms"]
+
+    @property
+    def members(self) -> tuple[str, ...]:
+        """The effects added as `model.effects` takes them: of another law or place, the family's member."""
+        return tuple(form["effect"] for form in self.forms.values())
 
     @property
     def recommendation(self) -> str:
@@ -125,7 +135,7 @@ class Investigation(Written):
     @property
     def sizes(self) -> list[str]:
         """How large the effects named are, with standard errors, as text: their parameters that have a null."""
-        return self._sizes(self.names, self.content["parameters"])
+        return self._sizes(self.members, self.content["parameters"])
 
     @property
     def sizes_of_nearest(self) -> list[str]:
@@ -165,7 +175,7 @@ class Investigation(Written):
                 f"there is no extended model: the verdict is '{self.verdict}', and nothing was added; go on with the"
                 " base model (.question.model), or give records that show more"
             )
-        return model.with_(effects=sorted({*model.effects, *self.names}), fixed=self.content["held"])
+        return model.with_(effects=sorted({*model.effects, *self.members}), fixed=self.content["held"])
 
     @functools.cached_property
     def fit(self) -> Identification:
