@@ -11,7 +11,7 @@ class StatorTransients(Effect):
     r"""The stator flux moves by a balance of its own, where the base model lets it jump with the voltage.
 
         I -> I + lambda (I_psi - I_r),   I_psi = (psi + j E)/X,   Z = R + j X
-        dpsi/dt = omega_n (V - (R + R_a) I_psi) - j (omega_n + omega_s) psi + omega_n R_a I_r,   R_a = X/(omega_n T_a)
+        dpsi/dt = omega_n (V - (R + R_a) I_psi) - j (omega_n + omega_s) psi + omega_n R_a I_r,   R_a = r X/omega_n
         I_r = (V - n E)/(R + j n X),   n = 1 + omega_s/omega_n
 
     E is the voltage behind the motor's impedance Z, whatever states it is made of, and I_r the current at which the
@@ -19,7 +19,7 @@ class StatorTransients(Effect):
     nominal frequency and without R_a, the fifth-order motor `stator_flux`, whose R_s is then the effect
     `stator_resistance`. While the voltage moves the motor draws lambda (dU/dt)/(omega_n X) more; after an edge the
     offset of its flux turns backwards in the frame of the voltage, a ring at the supply frequency that ends by R or by
-    T_a, and that phasors averaged over a cycle hide. The steady state is the base model's for every lambda.
+    r, and that phasors averaged over a cycle hide. The steady state is the base model's for every lambda.
 
     Why lambda and not the textbook's small parameter, lambda dpsi/dt: that one is stiff at the null and has no
     derivative there that a record could show. Between 0 and 1 lambda is a mixture of two motors that share a rotor and
@@ -31,16 +31,16 @@ class StatorTransients(Effect):
     susceptance and not by 1/X.
 
     Source: Krause, Wasynczuk, Sudhoff 2002, ch. 4 (flux linkages) and ch. 8 (stator transients neglected).
-    Departures: the mixture; T_a damps the offset and loses nothing at rest, which is left to `stator_resistance`.
+    Departures: the mixture; r damps the offset and loses nothing at rest, which is left to `stator_resistance`.
     """
 
     stator_share = Parameter(
         0.0, (0.0, 1.5), "1", "share of stator transients in the current", SOURCE, r"\lambda_s", 0.0
     )
-    offset_time = Parameter(0.05, (0.005, 2.0), "s", "time constant of the offset of the flux", SOURCE, "T_a")
+    offset_decay = Parameter(10.0, (0.0, 150.0), "1/s", "rate at which the offset of the flux decays", SOURCE, "r")
 
     phasors_only = "of waveforms the stator flux of every motor moves already"
-    grid = {"offset_time": (0.02, 0.2)}
+    grid = {"offset_decay": (3.0, 40.0)}
     relevant = {"stator_share": 0.1}
     confused_with = ("time_skew", "stator_resistance", "shunt_capacitor", "static_var_compensator")
 
@@ -51,7 +51,7 @@ class StatorTransients(Effect):
             return "its rotor flux does not move, beside which a stator flux would turn by itself; add rotor_flux first"
         return None
 
-    def edit(self, eq, stator_share, offset_time):
+    def edit(self, eq, stator_share, offset_decay):
         from sympy import I, expand, im, re
 
         Z, V, at_once = eq[sites.stator_impedance], eq.V, eq.expression(sites.stator_current)
@@ -60,6 +60,6 @@ class StatorTransients(Effect):
         psi = eq.lag_vector("stator_flux", r"\psi")
         flowing = eq.define("flux_current", (psi + I * E) / X, r"I_\psi")
         resting = eq.define("resting_current", (V - speed * E) / (R + I * speed * X), "I_r")
-        decay = X / offset_time * (flowing - resting)
+        decay = X * offset_decay * (flowing - resting)
         eq.moves(psi, eq.omega_n * (V - R * flowing - I * speed * psi) - decay, -I * eq.U0)  # about, where R is not 0
         eq.edit(sites.stator_current, lambda own: own + stator_share * (flowing - resting))
