@@ -111,7 +111,7 @@ def test_a_motor_that_has_the_balance_or_lacks_what_it_needs_refuses(motor, name
     assert why in model(motor).acceptance(get("effect", name)()).refusal
 
 
-@pytest.mark.parametrize("name", ["stator_transients", "second_cage"])
+@pytest.mark.parametrize("name", ["rotor_flux", "second_cage", "stator_transients"])
 def test_of_waveforms_they_refuse_and_say_what_to_take(name):
     parts = get("model/motor", "electromechanical")(), get("model/static", "exponential")()
     assert "of waveforms" in compose(*parts, domain="waves").acceptance(get("effect", name)()).refusal

@@ -26,6 +26,7 @@ class RotorFlux(Effect):
     flux_share = Parameter(0.0, (0.0, 1.5), "1", "share of the flux that moves by a balance", SOURCE, r"\lambda_r", 0.0)
 
     order = -1
+    phasors_only = "of waveforms the rotor flux of every motor moves already"
     relevant = {"flux_share": 0.1}
     confused_with = ("exponential_recovery", "dc_link_lag", "time_skew")
 
@@ -35,9 +36,10 @@ class RotorFlux(Effect):
         return None
 
     def edit(self, eq, flux_share):
-        from sympy import I
+        from sympy import I, im
 
-        at_once, Z, V, X = eq.expression(sites.internal_voltage), eq[sites.stator_impedance], eq.V, eq["X_prime"]
+        at_once, Z, V = eq.expression(sites.internal_voltage), eq[sites.stator_impedance], eq.V
+        X = im(eq.expression(sites.stator_impedance))
         coupling, slip = eq[sites.coupling], eq["omega"] - eq.omega_s
         E = eq.lag_vector("rotor_flux", "E_m")
         driven = I * X * coupling * (V - E) / Z - (1 - coupling) * E

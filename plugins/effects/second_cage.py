@@ -42,10 +42,10 @@ class SecondCage(Effect):
         return None
 
     def edit(self, eq, cage_share, cage_time):
-        from sympy import I, conjugate, re
+        from sympy import I, conjugate, im, re
 
         current, Z, omega = eq[sites.stator_current], eq[sites.stator_impedance], eq["omega"]
-        X, slip, open_time = eq["X_prime"], omega - eq.omega_s, cage_time / (1 - cage_share)
+        X, slip, open_time = im(eq.expression(sites.stator_impedance)), omega - eq.omega_s, cage_time / (1 - cage_share)
         D = eq.lag_vector("D", "D")
         eq.edit(sites.stator_impedance, lambda own: own - I * cage_share * X)
         eq.edit(sites.stator_current, lambda own: own - D / Z)
