@@ -27,6 +27,7 @@ from tractexp.discrepancy.verdict import UNEXPLAINED, Nearest
 from tractexp.report.chart import Chart
 from tractexp.report.overlay import overlaid
 from tractexp.report.page import Page
+from tractexp.report.proposal import headlines, proposed
 from tractexp.wording import as_sentence, in_words, joined, percent, with_error
 
 KIND = {"none": "good", "named": "good", "tied": "plain", "unexplained": "bad"}
@@ -53,11 +54,18 @@ def page(path: Path, found: Investigation, title: str) -> Path:
     made = Page(f"Missing effect: {title}", lead)
     head = f"{found.verdict.word.upper()} {' or '.join(joined(names) for names in found.verdict.sets)}".strip()
     left = [as_sentence(found.headline)] if found.headline else []
-    said = [as_sentence(found.verdict.reason), *left, _graded(found), f"Next: {recommendation(found)}."]
+    said = [
+        as_sentence(found.verdict.reason),
+        *left,
+        *headlines(found),
+        _graded(found),
+        f"Next: {recommendation(found)}.",
+    ]
     made.verdict(head, *said, kind=KIND[found.verdict.word])
     overlaid(made.heading("Measured, before, after" if found.names else "Measured and calculated"), found.overlays)
     _smaller(made, found)
     if found.verdict.word == UNEXPLAINED:
+        proposed(made, found)
         _left(made, found)
     _candidates(made, found)
     _parameters(made, found)
