@@ -124,7 +124,7 @@ class Investigation(Written):
 
     @property
     def proposal(self) -> Mapping[str, Any] | None:
-        """The term that an unexplained disagreement asks for, as `discrepancy.json` has it; None where there is none."""
+        """The term proposed for an unexplained disagreement, as `discrepancy.json` has it; None where there is none."""
         return self.content["proposal"]
 
     @property

@@ -115,7 +115,7 @@ def _tried(made: Page, tried: Sequence[tuple[Term, Weighed]]) -> None:
         return
     with made.folded("The best terms of the library, judged"):
         made.table(
-            ["term", "closed on the fitted events", "on the held-out events", "left, fitted", "left, held out", "chance"],
+            ["term", "closed, fitted", "closed, held out", "left, fitted", "left, held out", "chance"],
             [[t.words, percent(w.train.closed), percent(w.validate.closed), f"{w.train.left:.2f}",
               f"{w.validate.left:.2f}", in_words(w.p)] for t, w in tried],
             "Shares of the excess closed, and what is left over the variance of the noise.",

@@ -3,8 +3,6 @@
 Every function takes the equations, the signal g (real, 0 before the event) and its sizes by name.
 """
 
-
-
 from tractexp.extend import sites
 
 

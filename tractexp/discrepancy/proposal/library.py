@@ -96,7 +96,7 @@ class Balance:
     sizes: tuple[Size, ...]
     places: tuple[sites.Site, ...] = ()
     kinds: tuple[str, ...] = (ANSWER,)
-    without: tuple[str, ...] = ("constant",)  # signals that make no sense here
+    without: tuple[str, ...] = ("constant", "relay", "below")  # signals that make no sense here: a flux is not switched
 
     @property
     def build(self) -> Callable[..., Any]:
@@ -159,12 +159,12 @@ def _instant(grid: Grid) -> Shape:
     return Shape("instant", grid, (0.0, 30.0), "s", "instant at which it begins", "t_1")
 
 
-_FREQUENCY = Shape("frequency", _spread(2.0, 45.0, 1.0), (0.5, 100.0), "Hz", "frequency", "f")
+_FREQUENCY = Shape("frequency", _spread(2.0, 44.0, 1.5), (0.5, 100.0), "Hz", "frequency", "f")
 _PHASE = Shape("phase", (0.0, 1.5707963), (-6.3, 6.3), "rad", "phase", r"\varphi")
 _SQUARE = r"\frac{|E|^2}{|E_0|^2}"
 _LAGS = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 _LEVELS = (0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95)
-_DELAYS = (0.0, 0.02, 0.04, 0.06, 0.09, 0.13, 0.2, 0.3)
+_DELAYS = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3)
 
 SIGNALS = (
     Signal("power", ANSWER, "a power of the voltage", r"(u^{a} - 1)",
@@ -180,9 +180,11 @@ SIGNALS = (
            (_time(_LAGS),)),
     Signal("relay", ANSWER, "a relay that trips below a level and returns", r"g,\quad g \in \{0, 1\}", (
         _level(0.3, 0.97, (0.55, 0.7, 0.8, 0.9), "u_1"),
+        Shape("margin", (0.03, 0.1), (0.005, 0.4), "1", "recovered is this much above the level", "h"),
         Shape("delay", _DELAYS, (0.0, 1.0), "s", "time below the level before it trips", "T_1"),
-        Shape("wait", (0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.45, 0.7, 5.0), (0.0, 10.0), "s",
+        Shape("wait", (0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.7, 5.0), (0.0, 10.0), "s",
               "time back before it returns", "T_2"),
+        Shape("ramp", (0.03,), (0.0, 2.0), "s", "time in which it returns", "T_3"),
     )),
     Signal("field", ANSWER, "the square of the flux", rf"({_SQUARE} - 1)", needs="E"),
     Signal("field_knee", ANSWER, "the square of the flux beyond a level",
@@ -194,10 +196,10 @@ SIGNALS = (
     Signal("current_squared", ANSWER, "the square of the motor's current", r"(\frac{|I|^2}{|I_0|^2} - 1)",
            needs="stator_current"),
     Signal("constant", ANSWER, "a constant", ""),
-    Signal("step", TIMED, "a step", r"1_{t \geq t_1}", (_instant(_spread(0.0, 1.8, 0.006)),)),
-    Signal("ramp", TIMED, "a straight line that begins", r"[t - t_1]_+", (_instant(_spread(0.0, 1.8, 0.03)),)),
+    Signal("step", TIMED, "a step", r"1_{t \geq t_1}", (_instant(_spread(0.0, 1.8, 0.01)),)),
+    Signal("ramp", TIMED, "a straight line that begins", r"[t - t_1]_+", (_instant(_spread(0.0, 1.8, 0.04)),)),
     Signal("decay", TIMED, "a step that decays", r"1_{t \geq t_1}\,e^{-(t - t_1)/T}",
-           (_instant(_spread(0.0, 0.9, 0.02)), _time((0.03, 0.1, 0.3)))),
+           (_instant(_spread(0.0, 0.9, 0.03)), _time((0.03, 0.1, 0.3)))),
     Signal("ring", TIMED, "an oscillation that begins and decays",
            r"1_{t \geq t_1}\,e^{-(t - t_1)/T} \cos(2 \pi f (t - t_1) + \varphi)",
            (_instant((0.0, 0.15, 0.3, 0.45)), _time((0.06, 0.25)), _FREQUENCY, _PHASE)),
@@ -213,26 +215,27 @@ _PU, _SHARE = Size("size", 2.0, "pu", 0.02), Size("size", 3.0, "1", 0.05)
 _BOTH = (Size("size_P", 2.0, "pu", 0.02, "k_P"), Size("size_Q", 2.0, "pu", 0.02, "k_Q"))
 _ANY = (ANSWER, TIMED)
 _Z = sites.stator_impedance
-_OWN_CURRENT = ("current", "current_squared")
+_OWN_CURRENT = ("current", "current_squared", "relay", "below")
+_SWITCHED = ("constant",)
 BALANCES = (
-    Balance("power_P", "the active power", r"P \rightarrow P + k\,{g}", (_PU,), kinds=_ANY),
-    Balance("power_Q", "the reactive power", r"Q \rightarrow Q + k\,{g}", (_PU,), kinds=_ANY),
+    Balance("power_P", "the active power", r"P \rightarrow P + k\,{g}", (_PU,), kinds=_ANY, without=_SWITCHED),
+    Balance("power_Q", "the reactive power", r"Q \rightarrow Q + k\,{g}", (_PU,), kinds=_ANY, without=_SWITCHED),
     Balance("power", "active and reactive power", r"P + \mathrm{j} Q \rightarrow P + \mathrm{j} Q"
-            r" + (k_P + \mathrm{j} k_Q)\,{g}", _BOTH, kinds=_ANY),
+            r" + (k_P + \mathrm{j} k_Q)\,{g}", _BOTH, kinds=_ANY, without=_SWITCHED),
     Balance("whole", "the whole load by one share", r"P + \mathrm{j} Q \rightarrow (P + \mathrm{j} Q)(1 + k\,{g})",
-            (_SHARE,)),
+            (_SHARE,), without=_SWITCHED),
     Balance("static", "the static load by one share",
             r"P_s + \mathrm{j} Q_s \rightarrow (P_s + \mathrm{j} Q_s)(1 + k\,{g})", (_SHARE,),
-            (sites.P_static, sites.Q_static)),
+            (sites.P_static, sites.Q_static), without=_SWITCHED),
     Balance("static_P", "the static load's active power", r"P_s \rightarrow P_s (1 + k\,{g})", (_SHARE,),
-            (sites.P_static,)),
+            (sites.P_static,), without=_SWITCHED),
     Balance("static_Q", "the static load's reactive power", r"Q_s \rightarrow Q_s (1 + k\,{g})", (_SHARE,),
-            (sites.Q_static,)),
+            (sites.Q_static,), without=_SWITCHED),
     Balance("motor", "the motors' power by one share",
             r"P_d + \mathrm{j} Q_d \rightarrow (P_d + \mathrm{j} Q_d)(1 + k\,{g})", (_SHARE,),
-            (sites.P_motor, sites.Q_motor)),
+            (sites.P_motor, sites.Q_motor), without=_SWITCHED),
     Balance("torque", "the load torque", r"T_L \rightarrow T_L + k\,{g}", (Size("size", 20.0, "pu", 0.05),),
-            (sites.load_torque,)),
+            (sites.load_torque,), without=_SWITCHED),
     Balance("coupling", "the coupling of rotor and stator", r"c \rightarrow c\,(1 + k\,{g})",
             (Size("size", 3.0, "1", 0.02),), (sites.coupling,)),
     Balance("decay", "the decay of the rotor's flux", r"\frac{1}{\tau'} \rightarrow \frac{1}{\tau'}\,(1 + k\,{g})",

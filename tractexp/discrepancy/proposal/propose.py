@@ -80,9 +80,13 @@ class Proposed:
 
 
 def propose(
-    base: BaseFit, first: Disagreement, bare: Refit, noise: Noise, validate: Sequence[Event], seed: int
-) -> Proposed:
-    """Search a term for what the model lacks; `bare` is the base model's fit, `noise` that of the last tests."""
+    base: BaseFit, first: Disagreement, bare: Refit, noise: Noise, validate: Sequence[Event], seed: int,
+    among: Sequence[Term] = (),
+) -> Proposed:  # fmt: skip
+    """Search a term for what the model lacks; `bare` is the base model's fit, `noise` that of the last tests.
+
+    `among` are the terms that are tried, by default the whole library.
+    """
     bench = base.bench
     if bench.waves:
         return Proposed(why="proposals are of phasors: what waveforms lack is told by where and what is left")
@@ -91,7 +95,7 @@ def propose(
     under = bench_of_terms(bench)
     ground = Ground.at(under, carried_over(under, bench, bare.unit), noise)
     bench.effort.say("screening a library of terms")
-    screened = screen(ground, terms(), seed, DRAWS)
+    screened = screen(ground, among or terms(), seed, DRAWS)
     bench.effort.say("refitting the most promising terms")
     made = fitted(screened, [carried_over(under, bench, v) for v in base.valleys_but(bare.unit)[:1]])
     bench.effort.say("judging terms on the held-out events")
@@ -171,30 +175,29 @@ def told(proposed: Proposed, plugin: str) -> Mapping[str, object] | None:
         return None
     return {
         "terms": [
-            {
-                "balance": made.term.balance.name,
-                "signal": made.term.signal.name,
-                "clock": made.term.clock and made.term.clock.name,
-                "words": made.term.words,
-                "function_of_voltage": not made.term.exogenous,
-                "parameters": {
-                    k.name: {"value": k.value, "standard_error": _finite(k.error), "interval": [*map(_finite, k.interval)]}
-                    for k in made.known
-                },
-                "latex": made.term.latex,
-            }
+            _named(made.term)
+            | {"function_of_voltage": not made.term.exogenous, "parameters": {k.name: _number(k) for k in made.known}}
         ],
         "closed": {"train": made.train.closed, "validate": made.validate.closed},
         "left": {"train": made.train.left, "validate": made.validate.left},
         "p": made.p,
         "when": [vars(a) for a in made.acting],
-        "ties": [
-            {"words": t.words, "balance": t.balance.name, "signal": t.signal.name, "latex": t.latex, "closed": {"train": a, "validate": b}}
-            for t, a, b in made.ties
-        ],
+        "ties": [_named(t) | {"closed": {"train": near, "validate": held}} for t, near, held in made.ties],
         "alike": dict(made.alike),
         "plugin": plugin,
-    }  # fmt: skip
+    }
+
+
+def _named(term: Term) -> dict[str, object]:
+    """A term as machines and people call it."""
+    clock = term.clock and term.clock.name
+    names = {"balance": term.balance.name, "signal": term.signal.name, "clock": clock}
+    return names | {"words": term.words, "latex": term.latex}
+
+
+def _number(known: Known) -> dict[str, object]:
+    interval = [_finite(end) for end in known.interval]
+    return {"value": known.value, "standard_error": _finite(known.error), "interval": interval}
 
 
 def _finite(value: float) -> float | None:

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.bench import Bench
-from tractexp.discrepancy.fitting import Refit, refit, rough_refit
+from tractexp.discrepancy.fitting import Refit, Start, best_of, refit, rough_refit
 from tractexp.discrepancy.proposal.bed import place, values_of, with_terms
-from tractexp.discrepancy.proposal.library import ANSWER, Term, term
+from tractexp.discrepancy.proposal.library import ANSWER, Shape, Term, term
 from tractexp.discrepancy.proposal.screen import Ground, Scored, Screened, linearised, scores
 from tractexp.discrepancy.tangent import WALL
 from tractexp.noise import Noise
@@ -21,7 +21,10 @@ MOST, ANSWERS = 30, 15  # terms refitted, and how many at least are functions of
 ALIKE = 4  # of one signal and clock at most, so that others are tried, too
 ROUNDS, FINER = 3, (-0.75, -0.5, -0.25, 0.25, 0.5, 0.75)  # of the zoom; of the distance to the grid's neighbors
 CLOSE = 0.05  # of what the best explains: the terms that are fitted exactly
-EXACT = 8  # of them at most
+EXACT = 6  # of them at most
+PEAKS, PROMISING = 3, 0.7  # settings of one term, and how good the further ones are of the best
+REGRIDDED = 3  # terms whose grid is searched anew where the base model is that of their refit
+AGAIN = 10  # terms that start from the other fits of the base model, too
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +62,25 @@ def shortlist(screened: Screened) -> list[Scored]:
     return sorted([*answers, *rest], key=lambda f: -f.drop)
 
 
+def others(screened: Screened, listed: Sequence[Scored]) -> list[Scored]:
+    """Further settings of terms, far from those listed on the grid of some parameter: peaks of their own."""
+    more: dict[str, list[Scored]] = {f.term.name: [f] for f in listed}
+    for found in screened.scored:
+        there = more.get(found.term.name)
+        if there and len(there) < PEAKS and all(_far(found, f) for f in there):
+            there.append(found)
+    return [f for there in more.values() for f in there[1:] if f.drop > PROMISING * there[0].drop]
+
+
+def _far(a: Scored, b: Scored) -> bool:
+    """Whether two settings differ by two places of the grid in some parameter."""
+
+    def places(s: Shape) -> int:
+        return abs(*np.diff([int(np.abs(np.array(s.grid) - f.setting[s.name]).argmin()) for f in (a, b)]))
+
+    return any(places(s) >= 2 for s in a.term.signal.shapes if s.name != "phase")
+
+
 def zoomed(ground: Ground, found: Sequence[Scored]) -> list[Scored]:
     """The same terms at better settings, each parameter moved by itself on ever finer grids."""
     best = list(found)
@@ -88,18 +110,42 @@ def _finer(found: Scored, which: int, scale: float) -> list[dict[str, float]]:
 def fitted(screened: Screened, valleys: Sequence[np.ndarray]) -> Fitted:
     """Refit the shortlist; `valleys` (D,) are other fits of the base model in the coordinates of the terms' bench."""
     ground = screened.ground
-    chosen = zoomed(ground, shortlist(screened))
+    listed = shortlist(screened)
+    chosen = zoomed(ground, [*listed, *others(screened, listed[:AGAIN])])
     bench, noise = with_terms(ground.bench, [f.term for f in chosen]), ground.noise
     bare = refit(bench, noise, [((), ground.unit)])[0]
-    begin = [ground.unit, *off_bounds(bench, ground.unit), *valleys]
-    starts = [
-        ((f.term.name,), place(bench.coordinates, unit, f.term, f.setting, f.sizes)) for f in chosen for unit in begin
-    ]
-    fits = rough_refit(bench, noise, starts)
+    fits = rough_refit(bench, noise, _starts(bench, chosen, [ground.unit]))
+    best = {f.names[0] for f in fits[:AGAIN]}
+    others = [*off_bounds(bench, ground.unit), *valleys]
+    again = _starts(bench, [f for f in chosen if f.term.name in best], others)
+    fits = best_of([*fits, *(rough_refit(bench, noise, again) if again else [])])
+    better = [regridded(bench, noise, f) for f in fits[:REGRIDDED] if term(f.names[0]).signal.shapes]
+    fits = best_of([*fits, *(rough_refit(bench, noise, better) if better else [])])
     near = fits[0].cost + max(CLOSE * (bare.deviance - fits[0].deviance), 20.0)
     exact = {f.names: f for f in refit(bench, noise, [(f.names, f.unit) for f in fits[:EXACT] if f.cost <= near])}
     ranked = sorted((exact.get(f.names, f) for f in fits), key=lambda f: f.cost)
     return Fitted(bench, noise, bare, tuple(ranked))
+
+
+def regridded(bench: Bench, noise: Noise, fit: Refit) -> Start:
+    """A start for a term at the best setting of its whole grid where the base model is that of its own refit.
+
+    At the first fit of the base model, which something missing bends, another setting may have seemed the best.
+    """
+    chosen, at = term(fit.names[0]), bench.coordinates
+    sizes = [0.0] * len(chosen.balance.sizes)
+    values = values_of(at, fit.unit, chosen)
+    there = Ground.at(bench, place(at, fit.unit, chosen, values, sizes), noise)
+    tried = [(chosen, s) for s in chosen.signal.settings if s.get("phase", 0.0) == 0.0]
+    best = max(scores(there, tried), key=lambda f: f.drop)
+    (best,) = zoomed(there, [best])
+    return fit.names, place(at, fit.unit, chosen, best.setting, best.sizes)
+
+
+def _starts(bench: Bench, chosen: Sequence[Scored], units: Sequence[np.ndarray]) -> list[Start]:
+    """Each term at its one-step size on each of the base model's fits (D,)."""
+    at = bench.coordinates
+    return [((f.term.name,), place(at, unit, f.term, f.setting, f.sizes)) for f in chosen for unit in units]
 
 
 def off_bounds(bench: Bench, unit: np.ndarray) -> list[np.ndarray]:

@@ -20,6 +20,7 @@ from tractexp.noise import Noise
 STEP = 0.02  # of a size's relevant value: how large a term is whose column is taken
 TOGETHER = 384  # columns held at once
 QUARTER = float(np.pi / 2)
+LEAST = 1e-8  # of a column's square: what the nuisances leave of it at least
 
 
 def linearised(
@@ -70,13 +71,11 @@ class Ground:
         return rows - (rows @ self.Q) @ self.Q.T
 
     def columns(self, points: np.ndarray, spans: np.ndarray, kind: str) -> np.ndarray:
-        """What points (n, D) of one kind of terms change for each unit of their size, whitened and projected (n, R)."""
+        """What points (n, D) of one kind of terms change for each unit of their size, whitened (n, C N)."""
         raw = self.bench.residuals(points, (kind,))
         raw -= self.raw
         raw /= spans[:, None, None]
-        white = side_by_side(lambda part: self.bench.whiten(self.noise, part), np.nan_to_num(raw))
-        short = np.zeros((len(white), len(self.r) - white.shape[1]))
-        return self.off(np.concatenate([white, short], axis=1))
+        return side_by_side(lambda part: self.bench.whiten(self.noise, part), np.nan_to_num(raw, copy=False))
 
     def drawn(self, seed: int, draws: int) -> np.ndarray:
         """Noise (draws, R), whitened and projected as the fit's residual is."""
@@ -140,7 +139,7 @@ def _key(setting: Setting) -> tuple:
 def _scores(
     ground: Ground, wanted: Sequence[tuple[Term, Setting]], noise: np.ndarray
 ) -> Iterator[tuple[Scored, np.ndarray]]:
-    """Each term with its score, and what noise (b, R) would give it (b,). Balances that share a signal share columns."""
+    """Each term with its score, and what noise (b, R) would give it (b,). Balances of a signal share columns."""
     groups: dict[tuple, list[tuple[Term, Setting]]] = {}
     for t, s in wanted:
         groups.setdefault((t.signal.kind, t.signal.name, t.clock, _key(s)), []).append((t, s))
@@ -177,25 +176,24 @@ def _batch(
                     rows.append(index[key])
             blocks.append((t, s, rows))
     columns = ground.columns(np.array(points), np.array(spans), blocks[0][0].signal.kind)
-    side, drawn, power = columns @ ground.r, columns @ noise.T, np.einsum("nr,nr->n", columns, columns)
+    seen = columns.shape[1]
+    side, drawn = columns @ ground.r[:seen], columns @ noise[:, :seen].T
+    along = columns @ ground.Q[:seen]
     for t, s, rows in blocks:
-        sizes, drop, drops = _solved(columns, rows, side, drawn, power)
-        yield _told(t, s, sizes, drop), drops
+        gram = columns[rows] @ columns[rows].T - along[rows] @ along[rows].T  # what the nuisances explain taken away
+        inverse = _inverse(gram, np.einsum("nr,nr->n", columns[rows], columns[rows]).max())
+        sizes, chance = -inverse @ side[rows], drawn[rows]
+        drops = (chance * (inverse @ chance)).sum(axis=0)
+        yield _told(t, s, sizes, float(-sizes @ side[rows])), drops
 
 
-def _solved(
-    columns: np.ndarray, rows: list[int], side: np.ndarray, drawn: np.ndarray, power: np.ndarray
-) -> tuple[np.ndarray, float, np.ndarray]:
-    """Sizes (k,) that lower the deviance most, by how much, and what each draw would (b,)."""
-    gram = np.diag(power[rows])
-    for i in range(1, len(rows)):
-        for j in range(i):
-            gram[i, j] = gram[j, i] = columns[rows[i]] @ columns[rows[j]]
-    if not gram.max() > 1e-12:
-        return np.zeros(len(rows)), 0.0, np.zeros(drawn.shape[1])
-    inverse = np.linalg.pinv(gram, rcond=1e-8, hermitian=True)
-    sizes, chance = -inverse @ side[rows], drawn[rows]
-    return sizes, float(-sizes @ side[rows]), np.einsum("ib,ij,jb->b", chance, inverse, chance)
+def _inverse(gram: np.ndarray, whole: float) -> np.ndarray:
+    """The pseudo-inverse (k, k); directions of which the nuisances leave nothing of `whole` are none."""
+    if len(gram) == 1:
+        return 1 / gram if gram[0, 0] > LEAST * whole + 1e-12 else np.zeros((1, 1))
+    values, vectors = np.linalg.eigh(gram)
+    kept = values > max(LEAST * whole, 1e-12)
+    return (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
 
 
 def _told(t: Term, setting: Setting, sizes: np.ndarray, drop: float) -> Scored:

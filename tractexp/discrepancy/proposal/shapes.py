@@ -4,8 +4,6 @@ Every function takes the equations and its parameters by name and gives a real e
 Functions of time take the clock that they count by: 0 at the instant from which it counts, less than 0 before.
 """
 
-
-
 SHARP, FALLEN, RISEN = 1e4, 0.02, 0.1  # of decisions; a dip is this deep; it ends when this share of it is back
 
 
@@ -135,19 +133,19 @@ def washout(eq, time):
     return eq.U / eq.U0 - x
 
 
-def relay(eq, level, delay, wait):
-    """1 from when the voltage has been below a level for a delay until it has been back for a while."""
+def relay(eq, level, margin, delay, wait, ramp):
+    """1 from when the voltage has been below a level for a delay; back along a ramp once it has been up for a while."""
     import sympy
 
     u = eq.U / eq.U0
-    low, back = eq.memory("time_low", "t_-"), eq.memory("time_back", "t_+")
-    gone = eq.memory("gone", "g")
-    fallen, risen = decided(level - u), decided(u - level - 0.02)
+    low, up, gone = eq.memory("time_low", "t_-"), eq.memory("time_up", "t_+"), eq.memory("gone", "g")
+    fallen, risen = (sympy.Max(0, sympy.Min(1, x / 0.005 + 0.5)) for x in (level - u, u - level - margin))
     eq.renews(low, fallen * (low + eq.step), 0)
-    eq.renews(back, risen * (back + eq.step), 0)
+    eq.renews(up, risen * (up + eq.step), 0)
     goes = fallen * sympy.Max(0, sympy.Min(1, (low - delay) / eq.step + 1))
-    returns = risen * sympy.Max(0, sympy.Min(1, (back - wait) / eq.step + 1))
-    eq.renews(gone, sympy.Max(gone * (1 - returns), goes), 0)
+    returns = risen * sympy.Max(0, sympy.Min(1, (up - wait) / eq.step + 1))
+    left = sympy.Max(0, gone - returns * eq.step / (ramp + eq.step))
+    eq.renews(gone, sympy.Max(left, goes), 0)
     return gone
 
 
