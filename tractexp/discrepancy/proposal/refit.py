@@ -62,7 +62,7 @@ def shortlist(screened: Screened) -> list[Scored]:
     return sorted([*answers, *rest], key=lambda f: -f.drop)
 
 
-def others(screened: Screened, listed: Sequence[Scored]) -> list[Scored]:
+def further(screened: Screened, listed: Sequence[Scored]) -> list[Scored]:
     """Further settings of terms, far from those listed on the grid of some parameter: peaks of their own."""
     more: dict[str, list[Scored]] = {f.term.name: [f] for f in listed}
     for found in screened.scored:
@@ -111,7 +111,7 @@ def fitted(screened: Screened, valleys: Sequence[np.ndarray]) -> Fitted:
     """Refit the shortlist; `valleys` (D,) are other fits of the base model in the coordinates of the terms' bench."""
     ground = screened.ground
     listed = shortlist(screened)
-    chosen = zoomed(ground, [*listed, *others(screened, listed[:AGAIN])])
+    chosen = zoomed(ground, [*listed, *further(screened, listed[:AGAIN])])
     bench, noise = with_terms(ground.bench, [f.term for f in chosen]), ground.noise
     bare = refit(bench, noise, [((), ground.unit)])[0]
     fits = rough_refit(bench, noise, _starts(bench, chosen, [ground.unit]))
