@@ -13,6 +13,7 @@ import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import tractexp  # noqa: F401 before NumPy: it keeps BLAS to one thread
 from hidden_effects import EFFECTS, Case, Noise, make
 from hidden_effects.devices import Ring, Static, Switched
 from hidden_effects.hidden import Hidden, beside, lowest
