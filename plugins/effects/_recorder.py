@@ -6,10 +6,20 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def earlier(y, lag, out):
-    """Write y (C, n, N) as it was `lag` (n,) samples earlier to `out`; y keeps its first and last value beyond them.
+def _going_on(y, i):
+    """y (N,) at i, also before its first sample and after its last."""
+    last = len(y) - 1
+    if i < 0:
+        return 2 * y[0] - y[1]
+    return y[i] if i <= last else 2 * y[last] - y[last - 1]
 
-    Between samples y is the cubic of Catmull and Rom (1974).
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def earlier(y, lag, out):
+    """Write y (C, n, N) as it was `lag` (n,) samples earlier to `out`.
+
+    Between samples y is the cubic of Catmull and Rom (1974); beyond its ends it goes on by one step of its slope, and
+    stays there.
     """
     last = y.shape[2] - 1
     for k in range(y.shape[1]):
@@ -20,8 +30,8 @@ def earlier(y, lag, out):
         for c in range(y.shape[0]):
             for i in range(last + 1):
                 at = i - whole
-                a, b = y[c, k, min(max(at - 2, 0), last)], y[c, k, min(max(at - 1, 0), last)]
-                d, e = y[c, k, min(max(at, 0), last)], y[c, k, min(max(at + 1, 0), last)]
+                a, b = _going_on(y[c, k], at - 2), _going_on(y[c, k], at - 1)
+                d, e = _going_on(y[c, k], at), _going_on(y[c, k], at + 1)
                 out[c, k, i] = far * a + near * b + here * d + ahead * e
 
 

@@ -199,11 +199,10 @@ def offsets(drive: Drive) -> np.ndarray:
 
 
 def _struck(event: WaveEvent, vector: complex, zero: float) -> WaveEvent:
-    """The event with one sample of the lead's voltage off, in the stationary frame."""
-    v, v_zero = event.v.copy(), event.v_zero.copy()
-    v[ANSWERED] += vector * event.turn[ANSWERED].conj()
-    v_zero[ANSWERED] += zero
+    """The event with one sample of the lead's voltage off, in the stationary frame, and what of it is not smoothed."""
+    struck = np.zeros(len(event.v), dtype=complex)
+    struck[ANSWERED : ANSWERED + len(event.weights)] = event.weights
+    v = vector * struck
     if event.phases == 1:  # whose imaginary part is what the sample was a quarter of a cycle ago
-        later = ANSWERED + round(event.rate / event.f0 / 4)
-        v[later] += 1j * vector * event.turn[later].conj()
-    return replace(event, v=v, v_zero=v_zero)
+        v = v + 1j * np.roll(v, round(event.rate / event.f0 / 4))
+    return replace(event, v=event.v + v * event.turn.conj(), v_zero=event.v_zero + zero * struck.real)
