@@ -47,11 +47,21 @@ def proposed(made: Page, found: Investigation) -> None:
 
 
 def _numbers(made: Page, proposal: Proposal) -> None:
-    rows = [[k.name, k.about, k.unit, with_error(k.value, k.error), _interval(*k.interval)] for k in proposal.known]
+    rows = [
+        [
+            k.name,
+            k.symbol.replace("\\varphi", "φ"),
+            k.about,
+            k.unit,
+            with_error(k.value, k.error),
+            _interval(*k.interval),
+        ]
+        for k in proposal.known
+    ]
     made.table(
-        ["parameter", "meaning", "unit", "value", "95 % interval"], rows,
+        ["parameter", "in the equation", "meaning", "unit", "value", "95 % interval"], rows,
         "Intervals by the curvature of the fit to the fitted events, the base model and the faults of the measurement"
-        " left free beside it.", words=(1, 2),
+        " left free beside it.", words=(1, 2, 3),
     )  # fmt: skip
     made.table(
         ["event", "from t [s]", "to t [s]", "channel", "largest change [pu]"],

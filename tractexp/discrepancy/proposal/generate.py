@@ -81,7 +81,7 @@ def _copied(function: Callable[..., object], name: str) -> str:
 
 
 def _declared(term: Term, values: Mapping[str, float]) -> list[str]:
-    made = [s.parameter(s.name, f"size in {term.balance.words}", values[s.name]) for s in term.balance.sizes]
+    made = [s.parameter(s.name, f"size in {s.where or term.balance.words}", values[s.name]) for s in term.balance.sizes]
     made += [s.parameter(s.name, values[s.name]) for s in term.signal.shapes]
     lines = []
     for p in made:

@@ -72,13 +72,14 @@ class Clock:
 
 @dataclass(frozen=True)
 class Size:
-    """How large a term is: `relevant` is what a linear step uses as its unit."""
+    """How large a term is: `relevant` is what a linear step uses as its unit, `where` it acts if not in all."""
 
     name: str
     bound: float
     unit: str
     relevant: float
     latex: str = "k"
+    where: str = ""
 
     def parameter(self, name: str, about: str, default: float = 0.0) -> Parameter:
         """As a parameter of an effect."""
@@ -212,7 +213,10 @@ CLOCKS = (
 )
 
 _PU, _SHARE = Size("size", 2.0, "pu", 0.02), Size("size", 3.0, "1", 0.05)
-_BOTH = (Size("size_P", 2.0, "pu", 0.02, "k_P"), Size("size_Q", 2.0, "pu", 0.02, "k_Q"))
+_BOTH = (
+    Size("size_P", 2.0, "pu", 0.02, "k_P", "active power"),
+    Size("size_Q", 2.0, "pu", 0.02, "k_Q", "reactive power"),
+)
 _ANY = (ANSWER, TIMED)
 _Z = sites.stator_impedance
 _OWN_CURRENT = ("current", "current_squared", "relay", "below")

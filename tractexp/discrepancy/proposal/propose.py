@@ -33,6 +33,7 @@ class Known:
     error: float
     unit: str
     about: str
+    symbol: str
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -113,8 +114,8 @@ def _proposal(made: Fitted, first: Disagreement, standing: Sequence[Weighed], gr
     chosen, *others = standing
     term, values = made.term(chosen.fit), made.values(chosen.fit)
     errors = standard_errors(made, chosen.fit)
-    declared = {s.name: (s.unit, f"size in {term.balance.words}") for s in term.balance.sizes}
-    declared |= {s.name: (s.unit, s.about) for s in term.signal.shapes}
+    declared = {s.name: (s.unit, f"size in {s.where or term.balance.words}", s.latex) for s in term.balance.sizes}
+    declared |= {s.name: (s.unit, s.about, s.latex) for s in term.signal.shapes}
     known = tuple(Known(n, v, errors[n], *declared[n]) for n, v in values.items())
     records = joined([e.record.name for e in made.bench.events])
     return Proposal(
