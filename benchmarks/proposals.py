@@ -215,18 +215,22 @@ def main() -> None:
     chosen = parser.parse_args()
     if chosen.first < FIRST or chosen.count < 1 or set(chosen.cases) - set(CASES):
         parser.error(f"seeds begin at {FIRST}, there is at least one of each case, and cases are {', '.join(CASES)}")
-    rows = json.loads(TABLE.read_text()) if TABLE.exists() else []
     for seed in range(chosen.first, chosen.first + chosen.count):
         for case in chosen.cases or CASES:
-            if any((r["case"], r["seed"]) == (case, seed) for r in rows):
+            if any((r["case"], r["seed"]) == (case, seed) for r in kept()):
                 continue
             try:
                 made = row(case, seed)
             except (ValueError, ArithmeticError) as why:
                 made = {"case": case, "seed": seed, "failed": str(why)}
-            rows = sorted([*rows, made], key=lambda r: (list(CASES).index(r["case"]), r["seed"]))
+            rows = sorted([*kept(), made], key=lambda r: (list(CASES).index(r["case"]), r["seed"]))
             TABLE.write_text(json.dumps(rows, indent=1) + "\n")
             print({k: v for k, v in made.items() if k not in ("values", "why")}, flush=True)
+
+
+def kept() -> list[dict]:
+    """The rows made before, by this run or another beside it."""
+    return json.loads(TABLE.read_text()) if TABLE.exists() else []
 
 
 EFFECTS.update(OWN)
