@@ -25,6 +25,7 @@ class RotorFlux(Effect):
 
     flux_share = Parameter(0.0, (0.0, 1.5), "1", "share of the flux that moves by a balance", SOURCE, r"\lambda_r", 0.0)
 
+    places, kind = ("flux decay",), "lag"
     order = -1
     phasors_only = "of waveforms the rotor flux of every motor moves already"
     relevant = {"flux_share": 0.1}

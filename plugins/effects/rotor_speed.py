@@ -23,6 +23,7 @@ class RotorSpeed(Effect):
 
     swing = Parameter(0.0, (0.0, 2000.0), "rad/(s² pu)", "inverse of the inertia M", SOURCE, "w", null=0.0)
 
+    places, kind = ("speed",), "lag"
     order = -1
     relevant = {"swing": 10.0}
     confused_with = ("exponential_recovery", "second_motor_group", "load_drift")

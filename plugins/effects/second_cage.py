@@ -26,6 +26,7 @@ class SecondCage(Effect):
     cage_share = Parameter(0.0, (0.0, 0.8), "1", "share of X' that the second cage takes away", SOURCE, "s", null=0.0)
     cage_time = Parameter(0.01, (0.001, 0.05), "s", "subtransient time constant X''/X' T0''", SOURCE, "T''")
 
+    places, kind = ("stator impedance", "load torque"), "lag"
     order = -1
     phasors_only = "of waveforms take model/motor=double_cage, which has two cages and a stator flux"
     grid = {"cage_time": (0.003, 0.01, 0.03)}

@@ -50,7 +50,8 @@ Q = Site("Q", "Q", "real", "pu", "bus", "reactive power of all parts together")
 PLACES = {  # where an effect acts, in a reader's words, and the sites it edits there
     "stator impedance": ("stator_impedance", "stator_current"),
     "coupling": ("coupling",),
-    "flux decay": ("time_constant",),
+    "flux decay": ("time_constant", "internal_voltage"),
+    "speed": (),  # the rotor's balance, which is no site
     "load torque": ("electrical_torque", "load_torque"),
     "motor": ("motor_current", "P_motor", "Q_motor"),
     "static P": ("P_static",),
