@@ -320,11 +320,11 @@ def stores(work: Path, chance: random.Random) -> Iterator[Fault]:
         started = time.monotonic()
         code, said = forked(job(folder))
         took = time.monotonic() - started
-        sentence = next((s for s in said.splitlines() if s.startswith("not logged")), "")
+        sentence = next((s for s in said.splitlines() if s.startswith(("not logged", "logged in"))), "")
         mend()
         healed, doctor = forked(lambda: command(folder, "doctor", "."))
         return told(
-            fault, f"exit {code} after {took:.0f} s, '{shorter(sentence, folder)}'; brought in by doctor",
+            fault, f"exit {code} after {took:.0f} s, '{shorter(sentence, folder)}'; in the store after doctor",
             same(folder, found), trace(said + doctor), "" if sentence else "NO SENTENCE", in_store(folder, runs),
             "" if (code, healed) == (0, 0) else f"EXIT {code}, {healed}: {doctor}",
         )  # fmt: skip
