@@ -14,7 +14,7 @@ from tractexp.identification.search import REFUSED
 from tractexp.identification.starts import even
 from tractexp.model.drive import Drive, Excitation, Waveforms
 from tractexp.model.model import CLASSICAL, MOST_SUBSTEPS, Model
-from tractexp.model.parts import Effect
+from tractexp.model.parts import COMPARED, Effect
 from tractexp.parameter import Box, Parameter
 from tractexp.record import Event, WaveEvent, in_waves
 from tractexp.record.through import sharpened
@@ -87,9 +87,9 @@ def _known(name: str, known: Mapping[str, object], where: str) -> None:
 
 
 def _check_channels(model: Model, events: Sequence[Event]) -> None:
-    """Raise `UserError` where a part of the model reads a channel that an event does not have."""
+    """Raise `UserError` where a part of the model reads a channel that an event does not have, and that drives it."""
     for (channel, part), event in itertools.product(model.reads.items(), events):
-        if channel in event.channels:
+        if channel in event.channels or channel in COMPARED:
             continue
         if isinstance(part, Effect):
             what, mend = f"effect '{part.name}'", "leave the effect out of model.effects"
