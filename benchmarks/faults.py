@@ -30,6 +30,8 @@ import tractexp  # before NumPy: it keeps BLAS to one thread
 
 tractexp.__version__  # noqa: B018
 
+from tractexp import files  # noqa: E402
+
 STORED = Path(__file__).with_name("faults.json")
 SEARCH = ("optimizer=pso", "optimizer.population=20", "budget=200")
 SWEEP = ("-m", *SEARCH, "seed=range(0,4)", "hydra.sweep.dir=sweep", "hydra.launcher.n_jobs=2")
@@ -105,8 +107,6 @@ def command(folder: Path, *arguments: str) -> int:
 
 def nth_write(n: int, fails: Callable[[], None], for_good: bool) -> None:
     """Let the nth file that gets its name fail, and where it is `for_good` every later one."""
-    from tractexp import files
-
     replace, count = os.replace, 0
 
     def counted(*paths):
@@ -320,11 +320,11 @@ def stores(work: Path, chance: random.Random) -> Iterator[Fault]:
         started = time.monotonic()
         code, said = forked(job(folder))
         took = time.monotonic() - started
-        sentence = next((s for s in said.splitlines() if s.startswith("not logged")), "")
+        sentence = next((s for s in said.splitlines() if s.startswith(("not logged", "logged in"))), "")
         mend()
         healed, doctor = forked(lambda: command(folder, "doctor", "."))
         return told(
-            fault, f"exit {code} after {took:.0f} s, '{shorter(sentence, folder)}'; brought in by doctor",
+            fault, f"exit {code} after {took:.0f} s, '{shorter(sentence, folder)}'; in the store after doctor",
             same(folder, found), trace(said + doctor), "" if sentence else "NO SENTENCE", in_store(folder, runs),
             "" if (code, healed) == (0, 0) else f"EXIT {code}, {healed}: {doctor}",
         )  # fmt: skip
@@ -579,9 +579,9 @@ def main() -> int:
             for fault in PARTS[part](Path(work), random.Random(asked.seed)):
                 print(f"{'LOST' if fault['lost'] else 'held':>4}  {fault['fault']}: {fault['observed']}", flush=True)
                 found.append(fault)
-        known[part] = found
-        known = {name: known[name] for name in PARTS if name in known}
-        asked.store.write_text(json.dumps(known, indent=1) + "\n")
+                known[part] = found
+                known = {name: known[name] for name in PARTS if name in known}
+                files.write(asked.store, json.dumps(known, indent=1) + "\n")
     count, lost = sum(map(len, known.values())), sum(f["lost"] for faults in known.values() for f in faults)
     print(f"{count} faults, {lost} of which lost something")
     return 1 if lost else 0

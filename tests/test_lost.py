@@ -181,6 +181,26 @@ def test_a_store_that_is_away_is_asked_once_and_named_once(tmp_path):
     assert "refused" in told[0]
 
 
+@pytest.mark.parametrize(("harm", "reason"), [("locked", "database is locked"), ("torn", "malformed")])
+def test_a_store_that_is_locked_or_torn_is_told_before_mlflow_tries_for_minutes(harm, reason, uri, monkeypatch):
+    import mlflow
+
+    from tractexp.tracking import store
+
+    monkeypatch.setattr(store, "PATIENCE", 0.1)
+    monkeypatch.setattr(mlflow, "MlflowClient", None)  # not reached
+    database = Path(uri.removeprefix("sqlite:///"))
+    other = sqlite3.connect(database)
+    if harm == "torn":
+        content = bytearray(database.read_bytes())
+        content[100:3000] = bytes(range(1, 201)) * 14 + bytes(100)
+        database.write_bytes(content)
+    else:
+        other.execute("BEGIN EXCLUSIVE")
+    with contextlib.closing(other), pytest.raises(UserError, match=f"cannot be used: .*{reason}"):
+        tracking.prepare(uri)
+
+
 # Commands
 
 

@@ -19,6 +19,7 @@ from tractexp import files
 from tractexp.errors import UserError
 from tractexp.tracking.owner import close_quietly
 
+PATIENCE = 15.0  # s to wait for a process that writes to the database
 HELD = 120.0  # s to wait for another process that makes the store or opens it
 
 
@@ -95,9 +96,9 @@ def _create_database(database: Path) -> None:
 
 
 def _check_database(database: Path) -> None:
-    """Raise at once what MLflow would take minutes of retrying to find: no database, or one that is read-only."""
-    with contextlib.closing(sqlite3.connect(database)) as connection:
-        connection.execute("PRAGMA schema_version")
+    """Raise soon what MLflow would take minutes of retrying to find: no database, one damaged, locked or read-only."""
+    with contextlib.closing(sqlite3.connect(database, timeout=PATIENCE)) as connection:
+        connection.execute("SELECT count(*) FROM sqlite_master").fetchall()
     if not os.access(database, os.W_OK):
         raise PermissionError(f"{database} may not be written")
 
