@@ -66,7 +66,7 @@ def test_the_main_job_writes_the_contracted_result(main_job):
     assert event["epsilon_p"] == result["epsilon_p"] < 0.05
     assert event["epsilon_q"] == result["epsilon_q"] < 0.05
     assert {p.name for p in (folder / "run").iterdir()} == {
-        ".hydra", "history.csv", "result.json", "report.html",
+        ".hydra", "history.csv", "mlflow.json", "result.json", "report.html",
     }  # fmt: skip
     rows = np.genfromtxt(folder / "run" / "history.csv", delimiter=",", names=True)
     assert rows["objective"][-1] == result["search"]["objective"]

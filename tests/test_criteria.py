@@ -12,6 +12,8 @@ from tractexp.discrepancy.chance import Chance
 from tractexp.discrepancy.coordinates import Coordinates
 from tractexp.discrepancy.criteria import CHOSEN, DERIVED, Criteria
 from tractexp.discrepancy.disagreement import Disagreement
+from tractexp.discrepancy.families import worth
+from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.gap import Gap
 from tractexp.discrepancy.held_out import Judged, Together
 from tractexp.discrepancy.investigate import investigate
@@ -38,6 +40,11 @@ def at_fit(c, p, names=(), fault_p=1.0, blur=0.0, left=1.0):
         ),
         scores=[Score("an effect", 10.0, p, {}, {}, {})],
     )
+
+
+def refitted(deviance, parameters):
+    """A fit of one effect with so many parameters."""
+    return Refit(("one",), np.zeros(0), deviance, parameters)
 
 
 def judged_by(c, closed=1.0, gain=100.0, expected=100.0, p_left=1.0):
@@ -95,6 +102,7 @@ CASES = {  # criterion: a looser value, the decision, what it is by default
     "adequate_p": (0.002, lambda c: at_fit(c, 1.0, left=0.0025).adequate, False),
     "second_name_p": (3e-5, lambda c: at_fit(c, 2e-5, names=("one",)).asks_for_more, False),
     "third_name_p": (3e-9, lambda c: at_fit(c, 2e-9, names=("one", "two")).asks_for_more, False),
+    "family_p": (3e-5, lambda c: worth(refitted(181.8, 2), refitted(200.0, 1), c.family_p), False),
     "beside_measurement": (0.2, lambda c: at_fit(c, 0.006, fault_p=1e-9).asks_for_more, False),
     "rejected": (3.0, lambda c: c.rejects(10.0, 1.0, 2, 100.0), False),
     "alike": (0.04, lambda c: c.rejects(45.0, 1e4, 2, 1000.0), False),

@@ -85,7 +85,7 @@ def test_a_result_prints_and_tabulates(name, request):
 
 
 def test_a_comparison_holds_what_its_file_does(compared, tmp_path):
-    content = json.loads(compared.write(tmp_path)[1].read_text())
+    content = json.loads(compared.write(tmp_path)[0].read_text())
     assert content == compared.content
     frame = compared.to_frame().set_index("variant")
     assert list(frame.index[:2]) == ["good", "bad"]

@@ -13,7 +13,21 @@ import waves_hidden
 
 import tractexp
 from independent import Machine
-from independent.circuit import Branch, Core, Earthed, Group, Shunt, Switched, drawn
+from independent.circuit import (
+    Across,
+    Arc,
+    Branch,
+    Breaker,
+    Core,
+    Earthed,
+    Group,
+    Held,
+    Rectifier,
+    Relay,
+    Shunt,
+    Switched,
+    drawn,
+)  # fmt: skip
 from independent.fault import Fault, vector
 from independent.sampler import CurrentTransformer, Sampler
 from independent.source import OMEGA
@@ -72,9 +86,45 @@ def test_devices_that_may_be_hidden_do_what_they_are_named_for():
     earthed = drawn((Earthed(0.2, 1.0),), star, T)
     assert np.abs(earthed.current).max() == 0.0 < 0.05 < np.abs(earthed.current_zero).max()
     assert np.abs(drawn((Earthed(0.2, 1.0),), FAULT, T).current_zero).max() < 1e-9  # a delta keeps it out
-    tripped = drawn((Switched(Shunt(0.4), 1.0, 0.15, 0.2, 0.01),), FAULT, T)
-    assert np.abs(tripped.current[(T > 0.151) & (T < 0.2)]).max() == 0.0
+    relay = Relay(0.05, 0.04, 0.01)  # from 50 ms after the fault's start to 40 ms after its end
+    tripped = drawn((Switched(Shunt(0.4), 1.0, relay),), FAULT, T)
+    assert np.abs(tripped.current[(T > 0.151) & (FAULT.end + 0.04 > T)]).max() == 0.0
     assert np.abs(tripped.current[-1]) == pytest.approx(0.4, abs=1e-2)
+
+
+def test_what_may_be_hidden_in_one_phase_or_in_the_fault_alone_is_there():
+    before, late = T < 0.09, T > 0.25
+    across = drawn((Across(0.3, 0.8),), FAULT, T)
+    b, c = ((across.current * np.exp(-2j * np.pi / 3 * k)).real for k in (1, 2))
+    np.testing.assert_allclose(b, -c, atol=1e-12)
+    np.testing.assert_allclose(across.current.real, 0.0, atol=1e-12)
+    power = (across.voltage * across.current.conj()).real[before]
+    assert power.mean() == pytest.approx(2 / 3 * 3 / 2 * 0.3 / (0.3**2 + (0.8 * 1.002) ** 2), rel=2e-2)
+
+    held = drawn((Held(0.3 + 0.1j),), FAULT, T)
+    power = held.voltage * held.current.conj()
+    for part in (before, late):
+        np.testing.assert_allclose(power[part], 0.3 + 0.1j, atol=5e-3)
+
+    arc = drawn((Arc(0.5),), FAULT, T)
+    assert np.abs(arc.current[before | late]).max() == 0.0
+    there = (FAULT.start < T) & (FAULT.end > T)
+    np.testing.assert_allclose(arc.current[there], 0.5 * arc.voltage[there])
+
+    rectifier = drawn((Rectifier(0.06j, 0.03),), FAULT, T)
+    assert np.abs(rectifier.current).max() == pytest.approx(0.09, rel=1e-3)
+    sixth = 0.02 / 6 / 1.002  # s: fifth and seventh, of either sequence, are the same again after it but for the frame
+    shift = round(6 * sixth / 2e-5)
+    np.testing.assert_allclose(rectifier.current[shift:], rectifier.current[:-shift], atol=1e-3)
+
+    pole = Breaker((0.0, 1.0, 0.0), Relay(0.05))
+    whole, open_ = (drawn((Shunt(0.4), *more), FAULT, T) for more in ((), (pole,)))
+    phases = [
+        (made.current * np.exp(-2j * np.pi / 3 * np.arange(3))[:, None]).real + made.current_zero
+        for made in (whole, open_)
+    ]
+    assert np.abs(phases[1][1, T > 0.151]).max() < 1e-12 < np.abs(phases[0][1, T > 0.151]).max()
+    np.testing.assert_allclose(phases[1][[0, 2]], phases[0][[0, 2]], atol=1e-12)
 
 
 def test_the_sampler_adds_what_it_says():
@@ -172,7 +222,8 @@ def test_what_is_recorded_reaches_the_event_through_the_product():
 
 def test_nothing_is_named_where_nothing_is_hidden():
     """That what is hidden is named stands in test_wave_discrepancy."""
-    row = waves_hidden.run(waves_hidden.NULL, 0, only=["second_motor_group", "speed_dependent_torque"])
+    nothing = waves_hidden.HIDDEN[0]
+    row = waves_hidden.run(nothing, [3, 0], only=["second_motor_group", "speed_dependent_torque"])
     assert "failed" not in row
     assert row["names"] == []
 

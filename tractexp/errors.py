@@ -1,12 +1,30 @@
-"""The one exception a user may meet: a sentence that says what, where, the value, what is allowed, how to mend it."""
+"""What a user may meet: a sentence that says what, where, the value, what is allowed, how to mend it; and an end."""
 
 import difflib
 import math
 from collections.abc import Iterable
+from typing import Any
 
 
 class UserError(Exception):
     """Wrong input. The message is a complete sentence for the person who gave it; no traceback is shown."""
+
+
+class Stopped(KeyboardInterrupt):
+    """The user or the system ends what runs. `code` is the exit code, `result` what had been found by then, or None.
+
+    `found` is where a search was, as the search loop knows it.
+    """
+
+    def __init__(self, message: str = "", code: int = 130, found: Any = None, result: Any = None):
+        super().__init__(message)
+        self.code, self.found, self.result = code, found, result
+
+    @classmethod
+    def of(cls, stop: KeyboardInterrupt, **more: Any) -> "Stopped":
+        """The same end with more known of it."""
+        known = {name: getattr(stop, name, None) for name in ("found", "result")}
+        return cls(str(stop), getattr(stop, "code", 130), **{**known, **more})
 
 
 class Unknown(UserError, AttributeError):

@@ -9,7 +9,7 @@ from tractexp.identification.optimizer import Iterative, Optimizer
 from tractexp.model import sites
 from tractexp.model.drive import EVENT, INPUTS
 from tractexp.model.kernel import kept
-from tractexp.model.parts import Effect, Measurement, Motor, Static
+from tractexp.model.parts import Curve, Effect, Measurement, Motor, Static
 from tractexp.model.unfit import Unfit
 from tractexp.parameter import Parameter
 from tractexp.plugin import build, plugin
@@ -23,6 +23,7 @@ __all__ = [
     "Base",
     "Channel",
     "Connection",
+    "Curve",
     "Effect",
     "Estimator",
     "Events",

@@ -8,12 +8,29 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from independent.fault import Fault
+from independent.fault import Fault, vector
 from independent.machine import Machine
 from independent.source import NOMINAL_FREQUENCY, OMEGA
 
 EARLY = 0.55  # s before the record at which a simulation begins
 SETTLED = 60  # of the repeated substitutions in a saturated air gap, at most
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What a device feels at times t (n,) [s]: space vector, its slope [1/s] and zero sequence (n,) of the voltage."""
+
+    t: np.ndarray
+    v: np.ndarray
+    slope: np.ndarray
+    zero: np.ndarray
+    fault: Fault
+
+    @property
+    def turn(self) -> np.ndarray:
+        """A space vector of 1 that is in phase with the voltage before the fault (n,)."""
+        before = self.fault.before / abs(self.fault.before)
+        return before * np.exp(2j * np.pi * self.fault.frequency * self.t)
 
 
 @dataclass(frozen=True)
@@ -72,7 +89,7 @@ class Group:
             (developed - load) / (2 * m.H),
         ]
 
-    def current(self, x: np.ndarray, v: np.ndarray, slope: np.ndarray) -> np.ndarray:
+    def current(self, x: np.ndarray, at: Scene) -> np.ndarray:
         return self.rating * (x[0] - self.gap(x[0], x[1])) / self.machine.Xs
 
     def truth(self) -> dict[str, float]:
@@ -98,7 +115,7 @@ class Branch:
     def rates(self, x: list[complex], v: complex, zero: float) -> list[complex]:
         return [OMEGA * (v - self.R * x[0] / self.X)]
 
-    def current(self, x: np.ndarray, v: np.ndarray, slope: np.ndarray) -> np.ndarray:
+    def current(self, x: np.ndarray, at: Scene) -> np.ndarray:
         return x[0] / self.X
 
 
@@ -115,8 +132,8 @@ class Shunt:
     def rates(self, x: list[complex], v: complex, zero: float) -> list[complex]:
         return []
 
-    def current(self, x: np.ndarray, v: np.ndarray, slope: np.ndarray) -> np.ndarray:
-        return self.G * v + self.B * slope / OMEGA
+    def current(self, x: np.ndarray, at: Scene) -> np.ndarray:
+        return self.G * at.v + self.B * at.slope / OMEGA
 
 
 @dataclass(frozen=True)
@@ -138,7 +155,7 @@ class Core:
     def rates(self, x: list[complex], v: complex, zero: float) -> list[complex]:
         return [OMEGA * (v - self.R * complex(self._drawn(x[0])))]
 
-    def current(self, x: np.ndarray, v: np.ndarray, slope: np.ndarray) -> np.ndarray:
+    def current(self, x: np.ndarray, at: Scene) -> np.ndarray:
         return self._drawn(x[0])
 
 
@@ -155,23 +172,113 @@ class Earthed:
     def rates(self, x: list[complex], v: complex, zero: float) -> list[complex]:
         return [OMEGA * (zero - self.R * x[0] / self.X)]
 
-    def current(self, x: np.ndarray, v: np.ndarray, slope: np.ndarray) -> np.ndarray:
-        return np.zeros_like(v)
+    def current(self, x: np.ndarray, at: Scene) -> np.ndarray:
+        return np.zeros_like(at.v)
 
-    def zero(self, x: np.ndarray) -> np.ndarray:
+    def zero(self, x: np.ndarray, at: Scene) -> np.ndarray:
         """The zero sequence (n,) that it draws."""
         return x[0].real / self.X
 
 
 @dataclass(frozen=True)
-class Switched:
-    """A share of a device that is off between two times [s]: a relay's doing."""
+class Across:
+    """Resistance and reactance [pu] in series between phases b and c: a load of one phase."""
 
-    device: Branch | Shunt | Group
+    R: float
+    X: float
+
+    def settled(self, voltage: complex, frequency: float) -> tuple["Across", np.ndarray]:
+        a, z = np.exp(2j * np.pi / 3), self.R + 1j * self.X * frequency
+        drawn = voltage * (a**2 - a) / z  # phasor of what flows from b to c
+        return self, np.array([complex((self.X * drawn).real)])
+
+    def rates(self, x: list[complex], v: complex, zero: float) -> list[complex]:
+        return [OMEGA * (np.sqrt(3) * v.imag - self.R * x[0] / self.X)]  # u_b - u_c
+
+    def current(self, x: np.ndarray, at: Scene) -> np.ndarray:
+        return 2j / np.sqrt(3) * x[0].real / self.X
+
+
+@dataclass(frozen=True)
+class Held:
+    """A converter that draws `power` [pu] whatever the voltage, which it knows with the lag `lag` [s], up to `most`."""
+
+    power: complex
+    lag: float = 0.004
+    most: float = 2.0  # times the current before
+
+    def settled(self, voltage: complex, frequency: float) -> tuple["Held", np.ndarray]:
+        return replace(self), np.array([complex(voltage)])
+
+    def rates(self, x: list[complex], v: complex, zero: float) -> list[complex]:
+        return [(v - x[0]) / self.lag + 1j * OMEGA * x[0]]
+
+    def current(self, x: np.ndarray, at: Scene) -> np.ndarray:
+        # The lag turns a voltage of nominal frequency by nothing; where the frequency is off, hardly.
+        wanted, most = np.conj(self.power / x[0]), self.most * abs(self.power)
+        return wanted * np.minimum(1.0, most / np.abs(wanted))
+
+
+@dataclass(frozen=True)
+class Arc:
+    """A conductance [pu] to earth in each phase, there while the fault is."""
+
+    G: float
+
+    def settled(self, voltage: complex, frequency: float) -> tuple["Arc", np.ndarray]:
+        return self, np.empty(0, dtype=complex)
+
+    def rates(self, x: list[complex], v: complex, zero: float) -> list[complex]:
+        return []
+
+    def _burning(self, at: Scene) -> np.ndarray:
+        return self.G * ((at.t >= at.fault.start) & (at.t < at.fault.end))
+
+    def current(self, x: np.ndarray, at: Scene) -> np.ndarray:
+        return self._burning(at) * at.v
+
+    def zero(self, x: np.ndarray, at: Scene) -> np.ndarray:
+        return self._burning(at) * at.zero
+
+
+@dataclass(frozen=True)
+class Rectifier:
+    """Currents of fifth and seventh order [pu] that go on through the fault."""
+
+    fifth: complex
+    seventh: complex
+
+    def settled(self, voltage: complex, frequency: float) -> tuple["Rectifier", np.ndarray]:
+        return self, np.empty(0, dtype=complex)
+
+    def rates(self, x: list[complex], v: complex, zero: float) -> list[complex]:
+        return []
+
+    def current(self, x: np.ndarray, at: Scene) -> np.ndarray:
+        return self.fifth * at.turn.conj() ** 5 + self.seventh * at.turn**7
+
+
+@dataclass(frozen=True)
+class Relay:
+    """Off `after` [s] after the fault's start; back, along a `ramp` [s], `back` [s] after its end."""
+
+    after: float
+    back: float = np.inf
+    ramp: float = 0.02
+
+    def off(self, at: Scene) -> np.ndarray:
+        """1 while off, 0 while on, (n,)."""
+        gone = at.t >= at.fault.start + self.after
+        return gone * (1 - np.clip((at.t - at.fault.end - self.back) / self.ramp, 0, 1))
+
+
+@dataclass(frozen=True)
+class Switched:
+    """A share of a device that a relay disconnects; its states run on."""
+
+    device: "Branch | Shunt | Group"
     share: float
-    off: float
-    on: float
-    ramp: float = 0.02  # s, in which it returns
+    relay: Relay
 
     def settled(self, voltage: complex, frequency: float) -> tuple["Switched", np.ndarray]:
         device, states = self.device.settled(voltage, frequency)
@@ -180,12 +287,30 @@ class Switched:
     def rates(self, x: list[complex], v: complex, zero: float) -> list[complex]:
         return self.device.rates(x, v, zero)
 
-    def left(self, t: np.ndarray) -> np.ndarray:
-        """What of the device is connected at times t (n,)."""
-        return 1 - self.share * ((t >= self.off) * (1 - np.clip((t - self.on) / self.ramp, 0, 1)))
+    def current(self, x: np.ndarray, at: Scene) -> np.ndarray:
+        return self.device.current(x, at) * (1 - self.share * self.relay.off(at))
 
 
-Device = Group | Branch | Shunt | Core | Earthed | Switched
+@dataclass(frozen=True)
+class Breaker:
+    """Takes away a share of each phase's current of the whole load, as a relay says."""
+
+    shares: tuple[float, float, float]
+    relay: Relay
+
+    def settled(self, voltage: complex, frequency: float) -> tuple["Breaker", np.ndarray]:
+        return self, np.empty(0, dtype=complex)
+
+    def rates(self, x: list[complex], v: complex, zero: float) -> list[complex]:
+        return []
+
+    def passed(self, current: np.ndarray, zero: np.ndarray, at: Scene) -> tuple[np.ndarray, np.ndarray]:
+        """What is left of a space vector and a zero sequence (n,)."""
+        phases = (current * np.exp(-2j * np.pi / 3 * np.arange(3))[:, None]).real + zero
+        return vector(phases * (1 - np.array(self.shares)[:, None] * self.relay.off(at)))
+
+
+Device = Group | Branch | Shunt | Core | Earthed | Across | Held | Arc | Rectifier | Switched | Breaker
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,13 +350,16 @@ def drawn(devices: tuple[Device, ...], fault: Fault, t: np.ndarray) -> Instants:
         if not solved.success:
             raise RuntimeError(f"the simulation stopped: {solved.message}")
         y = solved.y
-    v, zero, slope = v[early:], zero[early:], np.gradient(v, grid)[early:]
-    current, current_zero = np.zeros_like(v), np.zeros(len(t))
+    at = Scene(t, v[early:], np.gradient(v, grid)[early:], zero[early:], fault)
+    current, current_zero = np.zeros_like(at.v), np.zeros(len(t))
     for d, a, b in parts:
-        x, device = y[a:b], d.device if isinstance(d, Switched) else d
-        current += device.current(x, v, slope) * (d.left(t) if isinstance(d, Switched) else 1.0)
-        current_zero += device.zero(x) if isinstance(device, Earthed) else 0.0
-    return Instants(t, v, zero, current, current_zero)
+        if not isinstance(d, Breaker):
+            current += d.current(y[a:b], at)
+            current_zero += d.zero(y[a:b], at) if isinstance(d, Earthed | Arc) else 0.0
+    for d in devices:
+        if isinstance(d, Breaker):
+            current, current_zero = d.passed(current, current_zero, at)
+    return Instants(t, at.v, at.zero, current, current_zero)
 
 
 class Smooth:

@@ -1,7 +1,7 @@
 """Find where simulation and measurement disagree, name the missing effect, add it, show the gap shrink.
 
-The investigation itself is `tractexp.discrepancy`; everything this file asks of it stands in `_made`, `_estimated`
-and `Investigation._write`.
+The investigation itself is `tractexp.discrepancy`; everything this file asks of it stands in `_made`, `_estimated`,
+`Investigation._results` and `Investigation._drawings`.
 """
 
 import functools
@@ -16,7 +16,7 @@ from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.compose import LoadModel, model_of
 from tractexp.api.identify import Identification
-from tractexp.api.pages import Written
+from tractexp.api.pages import Drawing, Written
 from tractexp.api.read import dips_of
 from tractexp.api.response import Response
 from tractexp.api.setup import Given
@@ -93,8 +93,18 @@ class Investigation(Written):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The effects added to the model."""
+        """The effects added to the model, by the catalogue's names; `forms` says at which place and by which law."""
         return tuple(self.content["effects"])
+
+    @property
+    def forms(self) -> Mapping[str, Mapping[str, Any]]:
+        """{name: {place, kind, law, differs, effect, curve}} of each effect added, as `discrepancy.json` holds it."""
+        return self.content["forms"]
+
+    @property
+    def members(self) -> tuple[str, ...]:
+        """The effects added as `model.effects` takes them: of another law or place, the family's member."""
+        return tuple(form["effect"] for form in self.forms.values())
 
     @property
     def recommendation(self) -> str:
@@ -125,7 +135,7 @@ class Investigation(Written):
     @property
     def sizes(self) -> list[str]:
         """How large the effects named are, with standard errors, as text: their parameters that have a null."""
-        return self._sizes(self.names, self.content["parameters"])
+        return self._sizes(self.members, self.content["parameters"])
 
     @property
     def sizes_of_nearest(self) -> list[str]:
@@ -165,7 +175,7 @@ class Investigation(Written):
                 f"there is no extended model: the verdict is '{self.verdict}', and nothing was added; go on with the"
                 " base model (.question.model), or give records that show more"
             )
-        return model.with_(effects=sorted({*model.effects, *self.names}), fixed=self.content["held"])
+        return model.with_(effects=sorted({*model.effects, *self.members}), fixed=self.content["held"])
 
     @functools.cached_property
     def fit(self) -> Identification:
@@ -206,13 +216,12 @@ class Investigation(Written):
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         return cls(Question.from_dict(content["question"]), content["content"], Result(**content["result"]))
 
-    def _write(self, folder: Path) -> list[Path]:
-        """discrepancy.json, result.json and the page.
+    def _results(self, folder: Path) -> list[Path]:
+        """discrepancy.json and result.json.
 
         conf/model/extended.yaml where an effect was named, unexplained.csv where nothing explains.
         """
         from tractexp.discrepancy import discrepancy_json
-        from tractexp.report import discrepancy
 
         base = {**self.question.model.node, "bounds": self.question.model.bounds, "fixed": self.question.model.fixed}
         paths = [
@@ -223,8 +232,13 @@ class Investigation(Written):
             paths.append(discrepancy_json.write_model(self.steps, base, folder / "conf" / "model" / "extended.yaml"))
         if self.verdict == "unexplained":
             paths.append(discrepancy_json.write_left(self.steps, folder / "unexplained.csv"))
+        return paths
+
+    def _drawings(self) -> Mapping[str, Drawing]:
+        from tractexp.report import discrepancy
+
         records = ", ".join(e.record.name for e in self.question.train)
-        return [*paths, discrepancy.page(folder / "discrepancy.html", self.steps, records)]
+        return {"discrepancy.html": lambda path: discrepancy.page(path, self.steps, records)}
 
 
 def _size(name: str, at: Mapping[str, Any], unit: str) -> str:

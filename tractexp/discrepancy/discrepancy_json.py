@@ -8,6 +8,7 @@ import numpy as np
 
 from tractexp import files
 from tractexp.discrepancy import recommended
+from tractexp.discrepancy.forms import forms, told_by_name
 from tractexp.discrepancy.gap import Curves, Gap
 from tractexp.discrepancy.investigate import Investigation
 from tractexp.discrepancy.judgement import judgements
@@ -24,8 +25,9 @@ def content(investigation: Investigation) -> dict[str, Any]:
     return {
         "verdict": investigation.verdict.word,
         "reason": investigation.verdict.reason,
-        "effects": list(investigation.names),
-        "name_sets": [list(names) for names in investigation.verdict.sets],
+        "effects": list(dict.fromkeys(investigation.catalogue.textbook(investigation.names))),
+        "name_sets": [list(investigation.catalogue.textbook(names)) for names in investigation.verdict.sets],
+        "forms": told_by_name(forms(investigation)),
         "where": [asdict(place) for place in investigation.places],
         "gap": {
             "train": _gap(investigation.train),
@@ -51,7 +53,8 @@ def content(investigation: Investigation) -> dict[str, Any]:
 def recommendation(investigation: Investigation) -> str:
     """What to do next, one sentence."""
     if (dip := investigation.verdict.next_dip) is not None:
-        first, second = (joined(names) for names in investigation.verdict.sets[:2])
+        spoken = investigation.catalogue.spoken
+        first, second = (joined([spoken(n) for n in names]) for names in investigation.verdict.sets[:2])
         return dip.sentence(first, second, investigation.bench.criteria.decided)
     if investigation.verdict.word == UNEXPLAINED:
         return "look at what is left (unexplained.csv) and at what switched at that time"

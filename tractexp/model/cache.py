@@ -17,6 +17,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from tractexp import files
 from tractexp.errors import UserError
 
 CHOICE = "TRACTEXP_CACHE_DIR"
@@ -51,21 +52,9 @@ def read(path: Path) -> bytes | None:
 
 def write(path: Path, content: bytes) -> None:
     """Keep a file, whole or not at all; where that is impossible, it is made again next time."""
-    with contextlib.suppress(OSError):
+    with contextlib.suppress(OSError, UserError):
         path.parent.mkdir(mode=0o700, exist_ok=True)
-        put(path, _sum(path, content) + content)
-
-
-def put(path: Path, content: bytes) -> None:
-    """Write a file in one move, without a sum: what nothing is taken from but by people."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+        files.write(path, _sum(path, content) + content, lasting=False)
 
 
 def _sum(path: Path, content: bytes) -> bytes:

@@ -12,6 +12,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from tractexp import files
+from tractexp.errors import UserError
 from tractexp.model import cache
 from tractexp.model.cache import cache_folder
 from tractexp.model.template import VECTORS
@@ -29,11 +31,11 @@ def remembered(parts: Iterable[object], generate: Callable[[], str], what: str =
     """
     parts = tuple(one for part in parts for one in (part, *getattr(part, "members", ())))
     modules = [type(part).__module__ for part in parts]
-    files = [getattr(sys.modules.get(module), "__file__", None) for module in modules]
-    if None in files:
+    written = [getattr(sys.modules.get(module), "__file__", None) for module in modules]
+    if None in written:
         return generate()
     digest = hashlib.sha256(f"{importlib.metadata.version('sympy')} {modules} {parts!r}".encode())
-    for folder in sorted({Path(__file__).parent, *(Path(file or "").parent for file in files)}):
+    for folder in sorted({Path(__file__).parent, *(Path(file or "").parent for file in written)}):
         digest.update(_code(folder))
     path = cache_folder() / f"{what}_{digest.hexdigest()[:20]}.kept"
     if (held := cache.read(path)) is not None:
@@ -59,9 +61,9 @@ def load(source: str) -> ModuleType:
     source = _for_this_machine(source)
     name = _name(source)
     path = cache_folder() / f"{name}.py"
-    with contextlib.suppress(OSError):
+    with contextlib.suppress(OSError, UserError):
         if not path.exists() or path.read_bytes() != source.encode():
-            cache.put(path, source.encode())
+            files.write(path, source, lasting=False)
     module = ModuleType(f"tractexp_kernels.{name}")
     module.__file__ = str(path)
     sys.modules[module.__name__] = module
@@ -110,8 +112,8 @@ def _compiled(source: str) -> Iterable[Path]:
     """The sound files of a kernel for this machine."""
     from tractexp.doors.numba_cache import machine
 
-    files = cache_folder().glob(f"{_name(_for_this_machine(source))}.run.{machine()}.*.kept")
-    return (file for file in files if cache.read(file) is not None)
+    kernels = cache_folder().glob(f"{_name(_for_this_machine(source))}.run.{machine()}.*.kept")
+    return (file for file in kernels if cache.read(file) is not None)
 
 
 def _compile(source: str) -> None:

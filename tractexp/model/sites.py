@@ -44,6 +44,28 @@ zero_current = Site("zero_current", "i_0", "real", "pu", "bus", "zero-sequence c
 P = Site("P", "P", "real", "pu", "bus", "active power of all parts together")
 Q = Site("Q", "Q", "real", "pu", "bus", "reactive power of all parts together")
 
+PLACES = {  # where an effect acts, in a reader's words, and the sites it edits there
+    "stator impedance": ("stator_impedance", "stator_current"),
+    "coupling": ("coupling",),
+    "flux decay": ("time_constant",),
+    "load torque": ("electrical_torque", "load_torque"),
+    "motor": ("motor_current", "P_motor", "Q_motor"),
+    "static P": ("P_static",),
+    "static Q": ("Q_static",),
+    "converter share": ("P_static", "Q_static"),
+    "bus": ("motor_voltage", "static_voltage", "bus_voltage", "bus_voltage_rate", "current", "zero_current", "P", "Q"),
+    "measurement": ("current", "zero_current", "P", "Q"),
+}
+KINDS = {  # what an effect does there
+    "law": "depends on a local quantity by a law",
+    "lag": "lags",
+    "limit": "limits",
+    "trip": "trips and returns",
+    "delay": "delays",
+    "oscillation": "oscillates",
+    "drift": "drifts",
+}
+
 SITES = {site.name: site for site in list(globals().values()) if isinstance(site, Site)}
 
 

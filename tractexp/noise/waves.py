@@ -19,6 +19,7 @@ GAINED = 1.005  # times its least variance: a prediction as good is good enough
 SHARES = (0.0, 0.25, 0.5, 1.0)  # of the voltage's deviations from its periodic course that are noise
 CLEARLY = 4.0  # of twice the log-likelihood, by which anything else must be better than all of them
 FLOORS = np.geomspace(1.0, 0.01, 28)  # of the current's own noise over all that is left in quiet
+FINER = np.geomspace(FLOORS[1], 1 / FLOORS[1], 15)  # times the best of these
 
 
 def of_waves(
@@ -56,16 +57,20 @@ def _fitted(pieces: Sequence[np.ndarray], answer: np.ndarray) -> Autoregression:
     passed = covariances(answer, HIGHEST)
     if per == 1:
         passed = passed.real
-    best, chosen = np.inf, white_noise(level)
-    for share in SHARES if passed[0].real > (1e-3 * level) ** 2 else (0.0,):
-        for floor in FLOORS if share else (1.0,):
-            whole = share**2 * passed
-            whole[0] += (floor * level) ** 2
-            made = predicted(whole)
-            price = sum(_surprise(made, piece, per) for piece in pieces) - CLEARLY * (share == 1.0)
-            if price < best:
-                best, chosen = price, made
-    return chosen
+    shares = SHARES if passed[0].real > (1e-3 * level) ** 2 else (0.0,)
+
+    def of(share: float, floor: float) -> tuple[float, float, float, Autoregression]:
+        whole = share**2 * passed
+        whole[0] += (floor * level) ** 2
+        made = predicted(whole)
+        price = sum(_surprise(made, piece, per) for piece in pieces) - CLEARLY * (share == 1.0)
+        return price, share, floor, made
+
+    tried = [of(share, floor) for share in shares for floor in (FLOORS if share else (1.0,))]
+    best = min(tried, key=lambda t: t[:3])
+    if best[1]:
+        best = min((best, *(of(best[1], best[2] * step) for step in FINER)), key=lambda t: t[:3])
+    return best[3]
 
 
 def _surprise(made: Autoregression, piece: np.ndarray, per: int) -> float:

@@ -30,6 +30,6 @@ def balanced(
     i = (P0 - 1j * Q0) / U0 * turn
     return WaveEvent(
         record=record, **known, phasors=Event(record=record, **known), v=v.astype(complex), v_zero=np.zeros(len(t)),
-        turn=turn, currents=np.stack([i.real, i.imag, absent]), lead=0, omega_s0=0.0, random=(0.0, 0.0, 0.0),
-        unexplained=np.zeros((3, max(start, 1))), offsets=np.zeros(6), phases=3,
+        weights=np.ones(1), turn=turn, currents=np.stack([i.real, i.imag, absent]), lead=0, omega_s0=0.0,
+        random=(0.0, 0.0, 0.0), unexplained=np.zeros((3, max(start, 1))), offsets=np.zeros(6), phases=3,
     )  # fmt: skip

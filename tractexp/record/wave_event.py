@@ -13,6 +13,7 @@ import numpy as np
 from tractexp.errors import UserError
 from tractexp.record.event import Event
 from tractexp.record.phasor import TURN
+from tractexp.record.quieted import Quieting
 from tractexp.record.record import Record
 from tractexp.record.waves import Waves
 
@@ -29,7 +30,8 @@ SILENT, LOUDER = 0.02, 3.0  # of the current, and times what is there before: le
 class WaveEvent(Event):
     """An event in waveforms. `record` has t, U, P and Q on the waveforms' samples, as the last half cycle shows them.
 
-    v (N,) complex is the voltage's space vector in the frame [pu of its peak], v_zero (N,) its zero sequence, `turn`
+    v (N,) complex is the voltage's space vector in the frame [pu of its peak], v_zero (N,) its zero sequence, both
+    without the noise that can be told from them; `weights` (2 m + 1,) are what is left of that of one sample. `turn`
     (N,) turns into the stationary frame of phase a; currents (3, N) are alpha, beta and zero sequence there [pu], nan
     where not compared. The first `lead` samples stand before the record. `omega_s0` [rad/s] is the frame's speed
     relative to nominal; `random` (3,) is what is not periodic in the currents before the dip [pu], `noise_U` in either
@@ -48,6 +50,7 @@ class WaveEvent(Event):
     unexplained: np.ndarray
     offsets: np.ndarray
     phases: int
+    weights: np.ndarray
 
     @property
     def first(self) -> int:
@@ -170,6 +173,11 @@ def in_waves(event: Event) -> WaveEvent:
     V, I = (_positive(part) for part in np.split(periodic.fundamentals, 2))
     turn = np.exp(1j * (2 * np.pi * frequency * (time - periodic.origin) + np.angle(V)))
     (v, v_zero), (i, i_zero) = (stationary(part, waves.rate, frequency) for part in np.split(x, 2))
+    noise, noise_U = periodic.rest[K:], np.sqrt(np.mean(periodic.rest[:K] ** 2) * (2 / 3 if K == 3 else 1))
+    quieting = Quieting.at(waves.rate, frequency)
+    course, course_zero = stationary(periodic.at(time)[:K], waves.rate, frequency)
+    v = course + quieting(v - course, 2 * noise_U**2)
+    v_zero = course_zero + quieting(v_zero - course_zero, noise_U**2 / 2)
     power = V * np.conj(I)
     start = lead + _onset(t, x[:K, lead:], periodic, K, before)
     made = half_cycle(v / turn, i / turn, turn, waves.rate, frequency)
@@ -178,7 +186,6 @@ def in_waves(event: Event) -> WaveEvent:
     calm = _calm(i, i_zero, turn, I * np.exp(-1j * np.angle(V)), slice(lead, lead + np.count_nonzero(before)))
     compared = _compared(currents[:, start:], calm, K)
     currents[~compared] = np.nan
-    noise, noise_U = periodic.rest[K:], np.sqrt(np.mean(periodic.rest[:K] ** 2) * (2 / 3 if K == 3 else 1))
     levels = (noise.mean() * np.sqrt(2 / 3),) * 2 + (noise.mean() / np.sqrt(3),) if K == 3 else (noise[0], 1.0, 1.0)
     slow = replace(
         record, t=time, U=made[0], P=made[1].real, Q=made[1].imag, f=None, U2=made[2], window=None, more={}, waves=None
@@ -194,6 +201,7 @@ def in_waves(event: Event) -> WaveEvent:
         phasors=event, v=v / turn, v_zero=v_zero, turn=turn, currents=currents, lead=lead,
         omega_s0=2 * np.pi * (frequency - nominal), random=tuple(map(float, levels)), unexplained=calm,
         offsets=periodic.offsets * _scale(record, K), phases=K,
+        weights=quieting.weights,
     )  # fmt: skip
 
 
