@@ -218,7 +218,7 @@ def outcome(call, *given):
     signal.signal(signal.SIGPROF, late)
     signal.setitimer(signal.ITIMER_PROF, SECONDS)  # of this process: other work on the machine does not count
     signal.signal(signal.SIGALRM, late)
-    signal.alarm(60 * SECONDS)  # what waits for something takes no time of its own
+    signal.setitimer(signal.ITIMER_REAL, 60 * SECONDS)  # what waits for something takes no time of its own
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
@@ -234,7 +234,7 @@ def outcome(call, *given):
             return "traceback", traceback.format_exc()[-1500:]
         finally:
             signal.setitimer(signal.ITIMER_PROF, 0)
-            signal.alarm(0)
+            signal.setitimer(signal.ITIMER_REAL, 0)
     for one in (*map(str, given), *(str(each) for each in given[0])) if isinstance(given[0], list) else ():
         for part in {one, one.partition("=")[2], one.partition("=")[0]} - {""}:
             words = words.replace(part, "…") if len(part) > 3 else words
