@@ -16,7 +16,7 @@ from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.forms import forms
 from tractexp.discrepancy.investigate import investigate
 from tractexp.errors import UserError
-from tractexp.extend import Effect, Parameter
+from tractexp.extend import Effect, Parameter, plugin
 from tractexp.plugin import discover, get
 
 TRIPS = ("undervoltage_trip", "exponential_recovery")
@@ -154,11 +154,12 @@ def test_a_member_that_nests_the_textbook_starts_from_its_fit():
 
 
 def test_a_place_or_a_kind_that_there_is_not_is_refused_with_the_nearest():
-    size = {"a": Parameter(0.0, (0.0, 1.0), "1", "size", "here", null=0.0)}
+    about = {"__doc__": "a = b. Source: here.", "__module__": "elsewhere.stranger", "__annotations__": {}}
     for told, sentence in (({"places": ("static p",)}, "did you mean 'static P'"), ({"kind": "lags"}, "mean 'lag'")):
-        made = type("Stranger", (Effect,), {"edit": lambda self, eq, a: None, "parameters": (size["a"],), **told})
+        size = {"a": Parameter(0.0, (0.0, 1.0), "1", "size", "here", null=0.0)}
+        made = type("Stranger", (Effect,), about | size | {"edit": lambda self, eq, a: None} | told)
         with pytest.raises(UserError, match=sentence):
-            made.check_class("stranger")
+            plugin(made)
 
 
 @pytest.mark.parametrize("name", [n for n in MEMBERS if get("effect", n)().curve(**{
