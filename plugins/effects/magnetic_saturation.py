@@ -11,6 +11,9 @@ class MagneticSaturation(Effect):
 
         X - X' -> (X - X')/sigma,   T0' -> T0'/sigma,   sigma = 1 + k_s (|E|^2 - |E_0|^2)
 
+    In waveforms E + j X'/2 I, the voltage of the air gap with equal leakages, stands for E: in a dip's first cycles
+    stator and rotor flux are apart, and the main flux is between them.
+
     In the parameters of the model, C = (X - X')/X and T' = X'/X T0', both are divided by n = 1 + (1 - C)(sigma - 1).
     At k_s = 0 the base model.
 
@@ -25,9 +28,11 @@ class MagneticSaturation(Effect):
     confused_with = ("feeder_impedance", "speed_dependent_torque")
 
     def edit(self, eq, saturation):
-        from sympy import conjugate, re
+        from sympy import I, conjugate, re
 
         E = eq["E"]
+        if eq.waves and sites.stator_current in eq:
+            E = eq.define("air_gap", E + I * eq["X_prime"] / 2 * eq[sites.stator_current], "E_m")
         square = lambda x: re(x * conjugate(x))  # noqa: E731
         rise = eq.define("flux_rise", square(E) - square(eq.before(E)), r"\Delta E^2")
         unsaturated = 1 + (1 - eq["C"]) * saturation * rise

@@ -1,7 +1,7 @@
 """Find where simulation and measurement disagree, name the missing effect, add it, show the gap shrink.
 
-The investigation itself is `tractexp.discrepancy`; everything this file asks of it stands in `_made`, `_estimated`
-and `Investigation._write`.
+The investigation itself is `tractexp.discrepancy`; everything this file asks of it stands in `_made`, `_estimated`,
+`Investigation._results` and `Investigation._drawings`.
 """
 
 import functools
@@ -16,7 +16,7 @@ from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.compose import LoadModel, model_of
 from tractexp.api.identify import Identification
-from tractexp.api.pages import Written
+from tractexp.api.pages import Drawing, Written
 from tractexp.api.read import dips_of
 from tractexp.api.response import Response
 from tractexp.api.setup import Given
@@ -225,14 +225,13 @@ class Investigation(Written):
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         return cls(Question.from_dict(content["question"]), content["content"], Result(**content["result"]))
 
-    def _write(self, folder: Path) -> list[Path]:
-        """discrepancy.json, result.json and the page.
+    def _results(self, folder: Path) -> list[Path]:
+        """discrepancy.json and result.json.
 
         conf/model/extended.yaml where an effect was named, unexplained.csv where nothing explains, and the plugin of
         a term where one is proposed.
         """
         from tractexp.discrepancy import discrepancy_json
-        from tractexp.report import discrepancy
 
         base = {**self.question.model.node, "bounds": self.question.model.bounds, "fixed": self.question.model.fixed}
         paths = [
@@ -245,8 +244,13 @@ class Investigation(Written):
             paths.append(discrepancy_json.write_left(self.steps, folder / "unexplained.csv"))
         if self.content["proposal"]:
             paths.append(discrepancy_json.write_plugin(self.steps, folder / self.content["proposal"]["plugin"]))
+        return paths
+
+    def _drawings(self) -> Mapping[str, Drawing]:
+        from tractexp.report import discrepancy
+
         records = ", ".join(e.record.name for e in self.question.train)
-        return [*paths, discrepancy.page(folder / "discrepancy.html", self.steps, records)]
+        return {"discrepancy.html": lambda path: discrepancy.page(path, self.steps, records)}
 
 
 def _size(name: str, at: Mapping[str, Any], unit: str) -> str:

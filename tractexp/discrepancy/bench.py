@@ -13,6 +13,7 @@ from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.kernels import Family, Kernels
 from tractexp.discrepancy.records import Records
+from tractexp.identification import shelf
 from tractexp.identification.descent import Apart
 from tractexp.identification.problem import Problem
 from tractexp.model.drive import Drive
@@ -56,6 +57,16 @@ class Bench:
     def model(self) -> Model:
         """The base model, behind the recorder's window."""
         return self.kernels.family.model
+
+    @functools.cached_property
+    def told(self) -> str:
+        """SHA-256 of all that a fit on this bench depends on beside noise and starts; "" where that cannot be told."""
+        load, at = self.load, self.coordinates
+        parts = (load.motor, load.static, *load.effects, *self.catalogue.effects)
+        if not all(map(shelf.installed, parts)):
+            return ""
+        known = self.problem.digest(), self.kernels.bare.digest(), self.criteria, at.null, at.prior_deviation
+        return shelf.told(shelf.behind(), repr(parts), self.records.window, *known)
 
     @property
     def waves(self) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 from tractexp.errors import UserError, among
 from tractexp.model.drive import PHASORS
 from tractexp.model.model import compose
-from tractexp.model.parts import Effect, Measurement, Motor, Static
+from tractexp.model.parts import COMPARED, Effect, Measurement, Motor, Static
 from tractexp.parameter import Parameter
 from tractexp.plugin import discover, get
 from tractexp.record import Event
@@ -97,7 +97,8 @@ def catalogue(
 def missing_channel(effect: Effect, events: Sequence[Event], swing: float) -> str:
     """The sentence why the recorded channels do not show this effect, "" where they do."""
     for channel in effect.reads:
-        if any(channel not in e.channels for e in events):
+        enough = any if channel in COMPARED else all
+        if not enough(channel in e.channels for e in events):
             return f"it is seen through {channel}, which is not recorded"
         if channel == "f" and all(np.ptp(e.record.f) < swing for e in events):
             return f"it is seen through the frequency, which moves by less than {swing:g} Hz"

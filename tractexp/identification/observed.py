@@ -23,6 +23,9 @@ from tractexp.record import Event, WaveEvent
 
 DIVERGED = 10.0  # pu: a wrong sample of the voltage makes no such difference
 OFFSET = 0.005  # pu: what may be left of a channel's offset, which the mean before the dip took off
+MOST_BETWEEN = 12  # intervals between samples whose voltage is doubted
+ROUGH = 5.0  # standard deviations of its noise, from which a sample off its neighbors' cubic is no noise
+SMOOTHER = 8.0  # times the error of a cubic through every second sample over that through all
 LEFT = 2.0  # times what white noise leaves of an offset that the mean before the dip took off
 ANSWERED = 8  # samples of the lead after which a single wrong sample of the voltage is put there
 LEAST_KEPT = 0.2  # of a residual's variance: where the fit takes more, it tells nothing of the noise
@@ -163,10 +166,10 @@ def unsure(problem: Problem, values: np.ndarray) -> np.ndarray:
 
 
 def _of_voltage(problem: Problem, values: np.ndarray, event: int) -> np.ndarray:
-    """What offsets of the voltage do in one event, (k, 3, N)."""
+    """What offsets of the voltage do in one event, and what it may be between samples at its edges, (k, 3, N)."""
     drive, part = problem.drive, problem.drive.part(event)
     plain = problem.events[event]
-    one = Drive.of([excited(e, problem.model) for e in (plain, *_shifted(plain))])
+    one = Drive.of([excited(e, problem.model) for e in (plain, *_shifted(plain), *_between(plain))])
     own = np.tile(problem.by_event(values)[[event]], (one.events, 1, 1))
     made = problem.model.simulate(one, own, np.tile(problem.step.substeps[[event]], one.events)).outputs[:, 0]
     made = made.reshape(one.channels, one.events, -1).swapaxes(0, 1)
@@ -185,6 +188,30 @@ def _shifted(event: WaveEvent) -> list[WaveEvent]:
     size = LEFT * event.noise_U / np.sqrt(max(event.start - event.lead, 1))
     there = np.arange(len(event.v)) >= event.lead
     return [replace(event, v=event.v + there * size * way * event.turn.conj()) for way in (1.0, 1j)[: event.phases]]
+
+
+def _between(event: WaveEvent) -> list[WaveEvent]:
+    """The event with what its voltage may be besides between two samples, where it is least smooth.
+
+    How far each sample lies off a cubic through its neighbors tells how far the cubic may be off between samples.
+    """
+    off = np.abs(_off_neighbors(event.v * event.turn))
+    off[: event.lead + 3] = 0.0
+    seen = np.argsort(-off)[:MOST_BETWEEN]
+    seen = np.sort(seen[off[seen] > max(ROUGH * event.noise_U, SMALLEST)])
+    made = []
+    for k in seen.tolist():
+        bump = np.zeros(len(event.v), dtype=complex)
+        bump[k] = off[k] / SMOOTHER * event.turn[k].conj()
+        made += [replace(event, v=event.v + way * bump) for way in (1.0, 1j)[: event.phases]]
+    return made
+
+
+def _off_neighbors(v: np.ndarray) -> np.ndarray:
+    """How far each sample of v (N,) lies off the cubic through two on either side; 0 at the ends."""
+    off = np.zeros_like(v)
+    off[3:-3] = v[3:-3] - (9 * (v[2:-4] + v[4:-2]) - (v[:-6] + v[6:])) / 16
+    return off
 
 
 def offsets(drive: Drive) -> np.ndarray:

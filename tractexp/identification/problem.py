@@ -14,7 +14,7 @@ from tractexp.identification.search import REFUSED
 from tractexp.identification.starts import even
 from tractexp.model.drive import Drive, Excitation, Waveforms
 from tractexp.model.model import CLASSICAL, MOST_SUBSTEPS, Model
-from tractexp.model.parts import Effect
+from tractexp.model.parts import COMPARED, Effect
 from tractexp.parameter import Box, Parameter
 from tractexp.record import Event, WaveEvent, in_waves
 from tractexp.record.through import sharpened
@@ -87,9 +87,9 @@ def _known(name: str, known: Mapping[str, object], where: str) -> None:
 
 
 def _check_channels(model: Model, events: Sequence[Event]) -> None:
-    """Raise `UserError` where a part of the model reads a channel that an event does not have."""
+    """Raise `UserError` where a part of the model reads a channel that an event does not have, and that drives it."""
     for (channel, part), event in itertools.product(model.reads.items(), events):
-        if channel in event.channels:
+        if channel in event.channels or channel in COMPARED:
             continue
         if isinstance(part, Effect):
             what, mend = f"effect '{part.name}'", "leave the effect out of model.effects"
@@ -170,7 +170,7 @@ class Problem:
     def digest(self) -> str:
         """SHA-256 of the equations, the records and what is known of the parameters: of equal problems the same."""
         drive, known = self.drive, (self.space.names, sorted(self.fixed.items()), self.per_event)
-        told = self.model.source, [effect.name for effect in self.model.measurements], known
+        told = self.model.source, [repr(effect) for effect in self.model.measurements], known
         made = hashlib.sha256(repr(told).encode())
         arrays = drive.inputs, drive.measured, drive.weights, drive.first, drive.event, drive.before
         arrays += tuple(window for window in drive.windows if window is not None)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from tractexp.model.equations import Equations
 
 CHANNELS = ("f", "U2", "I0")  # recorded channels that not every record has; I0 of waveforms, where there is some
+COMPARED = ("I0",)  # of these, what is compared and drives nothing: an event may be without
 
 
 class Part(Plugin):
