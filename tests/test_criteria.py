@@ -12,12 +12,15 @@ from tractexp.discrepancy.chance import Chance
 from tractexp.discrepancy.coordinates import Coordinates
 from tractexp.discrepancy.criteria import CHOSEN, DERIVED, Criteria
 from tractexp.discrepancy.disagreement import Disagreement
+from tractexp.discrepancy.families import worth
+from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.gap import Gap
 from tractexp.discrepancy.held_out import Judged, Together
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.judgement import judged
 from tractexp.discrepancy.next_dip import NextDip, mildest
 from tractexp.discrepancy.projection import Score
+from tractexp.discrepancy.proposal.judge import Before, Weighed
 from tractexp.errors import UserError
 from tractexp.noise.wander import Rest, find
 from tractexp.plugin import get
@@ -38,6 +41,11 @@ def at_fit(c, p, names=(), fault_p=1.0, blur=0.0, left=1.0):
         ),
         scores=[Score("an effect", 10.0, p, {}, {}, {})],
     )
+
+
+def refitted(deviance, parameters):
+    """A fit of one effect with so many parameters."""
+    return Refit(("one",), np.zeros(0), deviance, parameters)
 
 
 def judged_by(c, closed=1.0, gain=100.0, expected=100.0, p_left=1.0):
@@ -89,12 +97,23 @@ def chosen_dip(c):
     return mildest([NextDip(0.2, 0.1, 0.93), NextDip(0.6, 0.1, 0.99)], c.decided).depth
 
 
+def proposed(closed=0.9, left=1.0, p=1e-6):
+    """A term that would be proposed."""
+
+    def curve(deviance):
+        return SimpleNamespace(deviance=deviance, chi2_per_sample=left)
+
+    before = Before(SimpleNamespace(samples=1000), curve(2000.0), curve(2000.0 - closed * 1000.0))
+    return Weighed(None, before, before, p, None)
+
+
 CASES = {  # criterion: a looser value, the decision, what it is by default
     "false_alarms": (0.06, lambda c: at_fit(c, 0.044).asks_for_more, False),
     "naming_share": (0.9, lambda c: at_fit(c, 0.042).asks_for_more, False),
     "adequate_p": (0.002, lambda c: at_fit(c, 1.0, left=0.0025).adequate, False),
     "second_name_p": (3e-5, lambda c: at_fit(c, 2e-5, names=("one",)).asks_for_more, False),
     "third_name_p": (3e-9, lambda c: at_fit(c, 2e-9, names=("one", "two")).asks_for_more, False),
+    "family_p": (3e-5, lambda c: worth(refitted(181.8, 2), refitted(200.0, 1), c.family_p), False),
     "beside_measurement": (0.2, lambda c: at_fit(c, 0.006, fault_p=1e-9).asks_for_more, False),
     "rejected": (3.0, lambda c: c.rejects(10.0, 1.0, 2, 100.0), False),
     "alike": (0.04, lambda c: c.rejects(45.0, 1e4, 2, 1000.0), False),
@@ -114,6 +133,9 @@ CASES = {  # criterion: a looser value, the decision, what it is by default
     "measurement_prior": (6.0, lambda c: prior_of_skew(c) < 0.0051, True),
     "frequency_swing": (0.04, lambda c: "moves by less than" in swinging(c), True),
     "testable": (0.7, status, "not testable"),
+    "proposal_closed": (0.58, lambda c: proposed(closed=0.59).stands(c), False),
+    "proposal_left": (1.8, lambda c: proposed(left=1.75).stands(c), False),
+    "proposal_p": (0.02, lambda c: proposed(p=0.011).stands(c), False),
     "decided": (0.9, chosen_dip, 0.6),
 }
 

@@ -58,6 +58,13 @@ def main() -> int:
         if traceback:
             raise
         print(f"tractexp: {error}", file=sys.stderr)
+    except MemoryError:
+        if traceback:
+            raise
+        print(
+            "tractexp: this takes more memory than there is; ask for less, such as a smaller population",
+            file=sys.stderr,
+        )
     except KeyboardInterrupt as stop:
         print(f"tractexp: {str(stop) or 'interrupted; nothing was logged for this run'}", file=sys.stderr)
         return getattr(stop, "code", 130)
@@ -88,8 +95,9 @@ def _run() -> int:
     register()
     started(sys.argv[1:])
     os.environ[FULL_ERROR] = "1"  # let exceptions through: they are told below, in one sentence
-    sys.argv[1:] = overrides(sys.argv[1:])
-    refusals: list[UserError] = []
+    with explained():
+        sys.argv[1:] = overrides(sys.argv[1:])
+    ended: list[Exception] = []
 
     @hydra.main(version_base="1.3", config_path=str(CONF), config_name="config")
     def job(config: object) -> None:
@@ -100,13 +108,14 @@ def _run() -> int:
         from tractexp.tasks.run import run
 
         try:
-            (run_job if HydraConfig.get().mode == RunMode.MULTIRUN else run)(config)
-        except UserError as error:  # raised again below, beyond the lines Hydra would print about it
-            refusals.append(error)
+            with explained():
+                (run_job if HydraConfig.get().mode == RunMode.MULTIRUN else run)(config)
+        except (UserError, OSError, MemoryError) as error:  # raised again below, beyond what Hydra would print about it
+            ended.append(error)
 
     with explained():
         job()
-    for error in refusals:
+    for error in ended:
         raise error
     return 0
 

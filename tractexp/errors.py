@@ -1,6 +1,7 @@
 """What a user may meet: a sentence that says what, where, the value, what is allowed, how to mend it; and an end."""
 
 import difflib
+import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -46,7 +47,9 @@ def check_choice(where: str, value: object, allowed: Iterable[str]) -> None:
     """Raise `UserError` unless `value` is one of `allowed`; `where` is the setting's full key."""
     allowed = tuple(allowed)
     if value not in allowed:
-        raise UserError(f"{where}={value} is not one of {', '.join(allowed)}{nearest(str(value), allowed)}")
+        raise UserError(
+            f"{where}={' '.join(str(value).split())} is not one of {', '.join(allowed)}{nearest(str(value), allowed)}"
+        )
 
 
 def check_distinct(where: str, values: Iterable[object]) -> None:
@@ -60,7 +63,7 @@ def check_distinct(where: str, values: Iterable[object]) -> None:
 
 
 def check_range(where: str, value: float, low: float = float("-inf"), high: float = float("inf")) -> None:
-    """Raise `UserError` unless low <= value <= high (nan fails); `where` is the setting's full key."""
-    if not low <= value <= high:
+    """Raise `UserError` unless low <= value <= high and it is finite; `where` is the setting's full key."""
+    if not low <= value <= high or math.isinf(value):
         limits = [f"at least {low:g}"] * (low > float("-inf")) + [f"at most {high:g}"] * (high < float("inf"))
-        raise UserError(f"{where}={value} is out of range: it must be {' and '.join(limits)}")
+        raise UserError(f"{where}={value} is out of range: it must be {' and '.join(limits) or 'finite'}")

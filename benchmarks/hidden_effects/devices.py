@@ -43,6 +43,7 @@ class Static(Device):
     k_p: float = 0.0  # exponent of frequency, active power
     k_q: float = 0.0  # reactive power
     growth: complex = 0j  # pu/s
+    grows_from: float | None = None  # s; None: from the start of the record
     recovery: float = 0.0
     pace: float = 1.0  # s, time constant of the recovery
 
@@ -56,7 +57,8 @@ class Static(Device):
         return self, [0j] if self.recovery else []
 
     def flow(self, now: Moment, V: complex, x: list[complex]) -> tuple[complex, list[complex]]:
-        u, S = abs(V) / self.V0, self.S + self.growth * now.t
+        since = now.t if self.grows_from is None else max(now.t - self.grows_from, 0.0)
+        u, S = abs(V) / self.V0, self.S + self.growth * since
         P, Q = S.real * u**self.p_v, S.imag * u**self.q_v
         if now.f != 1.0:
             P, Q = P * now.f**self.k_p, Q * now.f**self.k_q

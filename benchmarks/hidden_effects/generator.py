@@ -12,6 +12,7 @@ import numpy as np
 from hidden_effects import devices
 from hidden_effects.effects import CATALOG, NUISANCES
 from hidden_effects.hidden import Hidden
+from hidden_effects.laws import LAWS
 from hidden_effects.motor import Motor
 from hidden_effects.noise import Noise
 from hidden_effects.outside import OUTSIDE
@@ -19,7 +20,7 @@ from hidden_effects.recorder import Recorder
 from hidden_effects.site import Response, Site
 from independent import Dip, Load, Machine, Static
 
-EFFECTS: dict[str, type[Hidden]] = CATALOG | OUTSIDE | NUISANCES
+EFFECTS: dict[str, type[Hidden]] = CATALOG | OUTSIDE | LAWS | NUISANCES
 SLOWEST = 0.75  # pu: a base case whose motors get slower than this is drawn anew
 
 

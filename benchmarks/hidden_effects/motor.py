@@ -26,6 +26,7 @@ class Motor:
     torque: float  # pu of the rating, at the speed before the event
     fan: float = 0.0  # share of the torque that grows with the square of the speed
     saturation: float = 0.0  # relative growth of the magnetizing current per pu² of air-gap flux
+    knee: float = 0.0  # of the air-gap flux before the event: below it the core is straight, above it a table's line
     cage: float = 0.0  # a second, outer cage: its admittance over the standard one's
     cage_resistance: float = 6.0  # of the outer cage, over the inner one's, at cage = 1
     braking: float = 0.0  # share of the negative-sequence current and torque
@@ -82,10 +83,17 @@ class Motor:
         """The node with a magnetizing curve: i_m = psi/Xm (1 + k (|psi|² - |psi_0|²)), by repeated substitution."""
         Xm, k = self.machine.Xm, self.saturation
         for _ in range(60):
-            last, gap = gap, source / (admittance + (1 + k * (abs(gap) ** 2 - self.flux)) / Xm)
+            last, gap = gap, source / (admittance + self._magnetizing(abs(gap), k) / Xm)
             if abs(gap - last) < 1e-13:
                 return gap
         raise ArithmeticError(f"the saturated air gap does not settle at a flux of {abs(gap):.3g} pu")
+
+    def _magnetizing(self, psi: float, k: float) -> float:
+        """Magnetizing admittance over that before: cubic, or by the table (knee, 1 - k), (flux before, 1)."""
+        if not self.knee:
+            return 1 + k * (psi**2 - self.flux)
+        knee, before = self.knee * self.flux**0.5, self.flux**0.5
+        return 1 - k * (1 - max(psi - knee, 0.0) / (before - knee))
 
     def negative(self, now: Moment, speed: float) -> tuple[complex, float]:
         """Negative-sequence power [pu] and its braking torque, from the equivalent circuit at slip 2 - s."""

@@ -30,6 +30,8 @@ class Site:
     feeder: complex = 0j  # pu, series impedance
     tap: Profile = field(default_factory=lambda: Profile(values=(1.0,)))  # load voltage over bus voltage
     opened: Profile = field(default_factory=Profile)  # share of the whole load that relays hold open
+    static_opened: Profile = field(default_factory=Profile)  # share of the static load that is held open
+    motors_opened: Profile = field(default_factory=Profile)  # share of the motors
     angle: float = 0.0  # rad, how far the voltage's angle jumps with the dip
     breaks: tuple[float, ...] = ()  # s, further instants at which something jumps
 
@@ -65,8 +67,13 @@ class Response:
     def _parts(self, now: Moment, V: complex, x: list[complex]) -> tuple[complex, list[complex]]:
         """Current and derivative of everything behind the feeder."""
         total, rates = 0j, []
-        for part, own in zip(self.parts, self.slices, strict=True):
+        motors, last = len(self.site.motors), len(self.parts) - 1
+        for k, (part, own) in enumerate(zip(self.parts, self.slices, strict=True)):
             current, moves = part.flow(now, V, x[own])
+            if k < motors:
+                current *= 1 - self.site.motors_opened(now.t)
+            elif k == last:
+                current *= 1 - self.site.static_opened(now.t)
             total += current
             rates += moves
         return total * (1 - self.site.opened(now.t)), rates
@@ -104,6 +111,7 @@ class Response:
         site = self.site
         first, last = -MARGIN, site.recorder.duration + MARGIN
         knots = {*self.supply.breaks, *site.tap.times, *site.opened.times, *site.breaks}
+        knots |= {*site.static_opened.times, *site.motors_opened.times}
         self.edges = [first, *sorted(k for k in knots if first < k < last), last]
         self.pieces, x = [], begin
         for a, b in pairwise(self.edges):

@@ -23,3 +23,25 @@ def gate(x, width):
 def seen_late(eq, u, time):
     """u as a control sees it through a fast filter: where it was `time` ago, to first order in `time`."""
     return u * (1 - time * eq.U_rate / eq.U)
+
+
+def bent(x, knots, bends, width):
+    """x, but with the slope exp(bend) beyond each knot and rounded there: monotone, and x itself without bends.
+
+    0 at x = 0. `knots` ascend and are positive.
+    """
+    import sympy
+
+    y, slope = x, 1
+    for knot, bend in zip(knots, bends, strict=True):
+        y += (sympy.exp(bend) - slope) * (larger(x - knot, 0, width) - larger(-knot, 0, width))
+        slope = sympy.exp(bend)
+    return y
+
+
+def drawn(law, x):
+    """The values (n,) of a law at x (n,), for a page."""
+    import sympy
+
+    symbol = sympy.Symbol("x", real=True)
+    return sympy.lambdify(symbol, sympy.sympify(law(symbol)), "numpy")(x) + 0 * x

@@ -26,6 +26,7 @@ class ConstantPowerConverter(Effect):
     current_limit = Parameter(0.8, (0.3, 0.98), "1", "voltage over U_0 at which it is reached", SOURCE, "u_{lim}")
     control_delay = Parameter(0.003, (0.0, 0.01), "s", "delay of the voltage it acts on", SOURCE, "T_c")
 
+    places, kind = ("converter share",), "limit"
     grid = {"current_limit": (0.5, 0.7, 0.8, 0.9)}
     relevant = {"converter_share": 0.15}
     confused_with = ("voltage_dependent_power_limit", "dc_link_lag")

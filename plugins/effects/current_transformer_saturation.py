@@ -20,10 +20,11 @@ class CurrentTransformerSaturation(Effect):
     Departures: a burden of resistance, two slopes, no hysteresis.
     """
 
-    core_slope = Parameter(0.0, (0.0, 20.0), "1", "magnetizing over burden current beyond", SOURCE, "y_c", null=0.0)
+    core_slope = Parameter(0.0, (0.0, 6.0), "1", "magnetizing over burden current beyond", SOURCE, "y_c", null=0.0)
     core_knee = Parameter(4.0, (1.2, 40.0), "1", "current carried over that before", SOURCE, "k_c")
     core_decay = Parameter(0.2, (0.02, 10.0), "s", "time constant of the secondary", SOURCE, "T_c")
 
+    places, kind = ("measurement",), "law"
     order = 4
     waves_only = "phasors do not show the offset of the current that saturates a core"
     grid = {"core_knee": (1.5, 3.0, 6.0, 12.0), "core_decay": (0.05, 0.3, 3.0)}

@@ -24,6 +24,7 @@ class DcLinkLag(Effect):
     lag_time = Parameter(0.05, (0.005, 0.5), "s", "time constant of dc link and its control", SOURCE, "T_{dc}")
     held_current = Parameter(1.0, (0.0, 1.0), "1", "how far the control holds current, not power", SOURCE, "a")
 
+    places, kind = ("converter share",), "lag"
     grid = {"lag_time": (0.01, 0.03, 0.1, 0.3), "held_current": (0.0, 1.0)}
     relevant = {"lag_share": 0.1}
     confused_with = ("feeder_impedance", "stator_resistance", "time_skew")

@@ -23,6 +23,7 @@ class ExponentialRecovery(Effect):
     recovery_Q = Parameter(0.0, (-3.0, 3.0), "1", "long-run less immediate exponent of Q", SOURCE, r"D_q", null=0.0)
     recovery_time = Parameter(0.5, (0.05, 60.0), "s", "time constant of the recovery", SOURCE, "T_r")
 
+    places, kind = ("static P", "static Q"), "lag"
     grid = {"recovery_time": (0.1, 0.3, 1.0, 3.0, 10.0)}
     relevant = {"recovery_P": 0.2, "recovery_Q": 0.2}
     confused_with = ("undervoltage_trip", "load_drift", "second_motor_group")

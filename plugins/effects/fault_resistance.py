@@ -21,6 +21,7 @@ class FaultResistance(Effect):
 
     fault_conductance = Parameter(0.0, (0.0, 5.0), "pu", "on the record's base", SOURCE, "g_f", null=0.0)
 
+    places, kind = ("bus",), "law"
     waves_only = "phasors do not tell when a fault begins and ends"
     relevant = {"fault_conductance": 0.05}
     confused_with = ("undervoltage_trip",)

@@ -42,6 +42,7 @@ class FeederImpedance(Effect):
     R_f = Parameter(0.0, (-0.02, 0.1), "pu", "feeder resistance on the record's base", SOURCE, null=0.0)
     X_f = Parameter(0.0, (-0.05, 0.2), "pu", "feeder reactance on the record's base", SOURCE, null=0.0)
 
+    places, kind = ("bus",), "law"
     order = 2
     relevant = {"R_f": 0.01, "X_f": 0.02}
     confused_with = ("stator_resistance", "dc_link_lag", "magnetic_saturation", "speed_dependent_torque")

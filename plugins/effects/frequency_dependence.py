@@ -21,6 +21,7 @@ class FrequencyDependence(Effect):
     k_pf = Parameter(0.0, (-4.0, 4.0), "1", "relative change of P per relative change of frequency", SOURCE, null=0.0)
     k_qf = Parameter(0.0, (-6.0, 6.0), "1", "relative change of Q per relative change of frequency", SOURCE, null=0.0)
 
+    places, kind = ("static P", "static Q"), "law"
     reads = ("f",)
     phasors_only = (
         "the frame of waveforms turns at the frequency before the event, and what changes it is in the voltage"

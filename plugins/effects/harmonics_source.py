@@ -24,6 +24,7 @@ class HarmonicsSource(Measurement):
 
     harmonics = Parameter(0.0, (-0.5, 1.5), "1", "share that goes on", "Arrillaga, Watson 2003", "h", null=0.0)
 
+    places, kind = ("bus",), "oscillation"
     waves_only = "phasors have no harmonics"
     relevant = {"harmonics": 0.2}
     confused_with = ("transformer_saturation",)

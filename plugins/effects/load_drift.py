@@ -24,6 +24,7 @@ class LoadDrift(Measurement):
     drift_P = Parameter(0.0, (-0.05, 0.05), "1/s", "relative change of P per second", SOURCE, "d_P", null=0.0)
     drift_Q = Parameter(0.0, (-0.05, 0.05), "1/s", "relative change of Q per second", SOURCE, "d_Q", null=0.0)
 
+    places, kind = ("bus",), "drift"
     relevant = {"drift_P": 0.003, "drift_Q": 0.003}
     confused_with = ("exponential_recovery", "undervoltage_trip", "frequency_dependence")
 

@@ -26,6 +26,7 @@ class LowFrequencyOscillation(Effect):
     mode_damping = Parameter(0.1, (0.005, 0.5), "1", "damping ratio of the mode", SOURCE, r"\zeta")
     mode_phase = Parameter(0.0, (0.0, 3.141593), "rad", "phase of the mode", SOURCE, r"\varphi")
 
+    places, kind = ("bus",), "oscillation"
     grid = {"mode_frequency": (0.7, 1.0, 1.5, 2.2, 3.3, 5.0, 7.5), "mode_phase": (0.0, 1.570796)}
     relevant = {"oscillation_P": 0.05, "oscillation_Q": 0.05}
     confused_with = ("load_drift", "second_motor_group")

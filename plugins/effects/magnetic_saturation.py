@@ -24,6 +24,7 @@ class MagneticSaturation(Effect):
 
     saturation = Parameter(0.0, (0.0, 3.0), "1/pu²", "growth of sigma with flux squared", SOURCE, "k_s", null=0.0)
 
+    places, kind = ("coupling", "flux decay"), "law"
     relevant = {"saturation": 0.2}
     confused_with = ("feeder_impedance", "speed_dependent_torque")
 

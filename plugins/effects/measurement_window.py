@@ -20,6 +20,7 @@ class MeasurementWindow(Measurement):
 
     window = Parameter(0.0, (0.0, 0.12), "s", "length of the window", "IEC/IEEE 60255-118-1", "W", 0.0)
 
+    places, kind = ("measurement",), "lag"
     phasors_only = "waveforms are samples, which no window of phasors averages"
     relevant = {"window": 0.02}
     confused_with = ("time_skew", "stator_resistance")

@@ -22,6 +22,7 @@ class NegativeSequenceBraking(Effect):
 
     negative_sequence = Parameter(0.0, (0.0, 10.0), "1", "size relative to the theory", SOURCE, "k_2", null=0.0)
 
+    places, kind = ("load torque", "bus"), "law"
     reads = ("U2",)
     phasors_only = "in waveforms the motor's equations carry negative sequence and its torque themselves"
     relevant = {"negative_sequence": 0.5}

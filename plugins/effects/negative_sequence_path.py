@@ -24,6 +24,7 @@ class NegativeSequencePath(Effect):
     conjugate_susceptance = Parameter(0.0, (-3.0, 3.0), "pu", "of conj(v), its imaginary part", SOURCE, "b_n", null=0.0)
     conjugate_lag = Parameter(0.002, (0.0003, 0.03), "s", "time in which it follows", SOURCE, "T_n")
 
+    places, kind = ("bus",), "law"
     waves_only = "in phasors a law of U acts on the voltage's size already"
     grid = {"conjugate_lag": (0.0005, 0.002, 0.01)}
     relevant = {"conjugate_conductance": 0.05, "conjugate_susceptance": 0.05}

@@ -23,6 +23,7 @@ class SecondMotorGroup(Effect):
     group_share = Parameter(0.0, (0.0, 0.6), "1", "share of the second group in the motor load", SOURCE, "g", null=0.0)
     inertia_ratio = Parameter(4.0, (0.1, 12.0), "1", "inertia of the second group over the first's", SOURCE, "r")
 
+    places, kind = ("motor",), "lag"
     order = 1
     grid = {"inertia_ratio": (0.25, 0.5, 2.0, 4.0, 8.0)}
     relevant = {"group_share": 0.1}

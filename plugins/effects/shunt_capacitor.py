@@ -22,6 +22,7 @@ class ShuntCapacitor(Effect):
 
     capacitor = Parameter(0.0, (0.0, 1.0), "pu", "susceptance on the record's base", SOURCE, "b", null=0.0)
 
+    places, kind = ("bus",), "law"
     relevant = {"capacitor": 0.05}
     confused_with = ("static_var_compensator", "negative_sequence_braking")
 

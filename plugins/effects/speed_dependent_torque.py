@@ -19,6 +19,7 @@ class SpeedDependentTorque(Effect):
 
     quadratic_share = Parameter(0.0, (0.0, 1.0), "1", "share of the torque that is quadratic", SOURCE, "k", null=0.0)
 
+    places, kind = ("load torque",), "law"
     relevant = {"quadratic_share": 0.25}
     confused_with = ("feeder_impedance", "second_motor_group", "magnetic_saturation")
 

@@ -25,6 +25,7 @@ class StaticVarCompensator(Effect):
 
     compensator_exponent = Parameter(1.0, (1.0, 2.0), "1", "of voltage: 1 current, 2 susceptance", SOURCE, "n")
 
+    places, kind = ("bus",), "limit"
     grid = {"compensator_gain": (2.0, 10.0, 50.0), "compensator_time": (0.01, 0.03, 0.1)}
     relevant = {"compensator": 0.05}
     confused_with = ("shunt_capacitor", "time_skew")

@@ -25,6 +25,7 @@ class StuckPole(Effect):
     opened_phase = Parameter(0.0, (0.0, 2.0), "1", "0, 1 or 2: phase a, b or c", SOURCE, "k_p")
     opened_after = Parameter(0.06, (0.0, 0.5), "s", "time after the voltage left its course", SOURCE, "T_p")
 
+    places, kind = ("bus",), "trip"
     order = 3
     waves_only = "phasors of the positive sequence do not show a phase"
     grid = {"opened_phase": (0.0, 1.0, 2.0), "opened_after": (0.02, 0.06, 0.15)}

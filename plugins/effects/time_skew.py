@@ -3,6 +3,9 @@
 import numpy as np
 
 from tractexp.extend import Measurement, Parameter, plugin
+from tractexp.model.drive import INPUTS
+
+QUIET = 0.005  # of the voltage before: a change between samples that tells how the current follows it
 
 
 @plugin
@@ -11,8 +14,9 @@ class TimeSkew(Measurement):
 
         P_recorded(t) = P(t - tau)
 
-    At tau = 0 the base model. Between samples P is a cubic through its neighbors, so that the response has a
-    derivative in tau everywhere; before the first sample and after the last it is what it is there.
+    At tau = 0 the base model. It is the voltage that is moved: the current of the samples on either side follows it
+    there, so that an edge of the voltage within the interval is one of the power, not a curve that overshoots. In
+    waveforms the currents are cubics through their samples. Before the first sample and after the last all is as there.
 
     Source: instrument transformers and filters of unequal delay, IEC/IEEE 60255-118-1; the cubic is Catmull and
     Rom's 1974.
@@ -21,14 +25,20 @@ class TimeSkew(Measurement):
 
     skew = Parameter(0.0, (-0.02, 0.02), "s", "delay of power behind voltage", "IEC/IEEE 60255-118-1", r"\tau", 0.0)
 
+    places, kind = ("measurement",), "delay"
     relevant = {"skew": 0.001}
     confused_with = ("stator_resistance", "dc_link_lag", "measurement_window")
 
     def observe(self, power, drive, values):
-        from tractexp_plugins.effects._recorder import earlier
+        from tractexp_plugins.effects._recorder import earlier, moved
 
         out = np.empty_like(power)
         for e in range(drive.events):
-            part = drive.part(e)
-            earlier(power[:, :, part], values["skew"][e] / drive.event[e, -1], out[:, :, part])
+            part, step = drive.part(e), drive.event[e, -1]
+            lag, y = values["skew"][e] / step, power[:, :, part]
+            rows = dict(zip(INPUTS, drive.inputs[:, part], strict=False))
+            if "turn_re" in rows:
+                earlier(y, lag, out[:, :, part])
+            else:
+                moved(y, rows["U"], rows["U_rate"] * step, lag, QUIET * drive.event[e, 0], out[:, :, part])
         return out

@@ -22,6 +22,7 @@ class TransformerError(Measurement):
         0.0, (-0.1, 0.1), "rad", "phase displacement of the current", "IEC 61869-2", "e_a", null=0.0
     )
 
+    places, kind = ("measurement",), "law"
     waves_only = "in phasors P and Q are taken as they are, and an angle between them hides in the load"
     relevant = {"scale_error": 0.01, "angle_error": 0.01}
     confused_with = ("time_skew", "stator_resistance")

@@ -31,6 +31,7 @@ class TransformerInrush(Effect):
     offset_exponent = Parameter(1.0, (0.0, 1.5), "1", "how the offset grows with the rise", SOURCE, "g")
     inrush_loss = Parameter(0.05, (0.0, 0.3), "1", "active over reactive power", SOURCE, "r_i")
 
+    places, kind = ("bus",), "lag"
     phasors_only = "in waveforms the flux itself is there, and transformer_saturation says what it draws"
     grid = {"inrush_time": (0.1, 0.3, 1.0), "knee_margin": (0.02, 0.2), "offset_exponent": (0.0, 1.0)}
     relevant = {"inrush": 0.05}

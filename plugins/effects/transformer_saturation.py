@@ -25,6 +25,7 @@ class TransformerSaturation(Effect):
     flux_knee = Parameter(1.1, (1.0, 1.6), "1", "flux at the knee over its peak before", SOURCE, "k")
     flux_decay = Parameter(0.2, (0.02, 3.0), "s", "decay of the flux's offset", SOURCE, "T_l")
 
+    places, kind = ("bus",), "law"
     waves_only = "an offset of the flux is none of the fundamental; transformer_inrush stands for it in phasors"
     grid = {"flux_knee": (1.02, 1.15, 1.3), "flux_decay": (0.05, 0.2, 1.0)}
     relevant = {"saturated_admittance": 0.1}

@@ -1,10 +1,9 @@
 """Undervoltage trip of part of the load, and its reconnection."""
 
 from tractexp.extend import Effect, Parameter, plugin, sites
-from tractexp_plugins.effects._operators import gate
+from tractexp_plugins.effects._relay import opened
 
 SOURCE = "NERC 2016, Dynamic Load Modeling, app. A; WECC composite load model (Ftr1, Vtr1, Ttr1, Vrc1, Trc1)"
-LEVEL, TIME = 0.0025, 0.3  # how sharp the relay is: in voltage over U_0, and in samples
 
 
 @plugin
@@ -32,24 +31,13 @@ class UndervoltageTrip(Effect):
     reconnect_margin = Parameter(0.05, (0.01, 0.5), "1", "recovered is this much above the level", SOURCE, "h")
     reconnect_ramp = Parameter(0.1, (0.0, 2.0), "s", "time in which it returns", SOURCE, "T_b")
 
+    places, kind = ("bus",), "trip"
     order = 3
     grid = {"trip_level": (0.5, 0.7, 0.8, 0.9), "trip_delay": (0.02, 0.08), "reconnect_delay": (0.2, 1.0)}
     relevant = {"tripped_share": 0.02}
     confused_with = ("exponential_recovery", "second_motor_group", "load_drift")
 
     def edit(self, eq, tripped_share, trip_level, trip_delay, reconnect_delay, reconnect_margin, reconnect_ramp):
-        import sympy
-
-        u = eq.U / eq.U0
-        below, above = eq.memory("time_below", "t_b"), eq.memory("time_above", "t_a")
-        tripped = eq.memory("tripped", "g")
-        low = eq.define("voltage_low", gate(trip_level - u, LEVEL), r"\ell")
-        high = eq.define("voltage_back", gate(u - trip_level - reconnect_margin, LEVEL), "h")
-        goes = eq.define("relay_goes", low * gate(below - trip_delay, TIME * eq.step), "g_+")
-        returns = eq.define("relay_returns", high * gate(above - reconnect_delay, TIME * eq.step), "g_-")
-        eq.renews(below, low * (below + eq.step), 0)
-        eq.renews(above, high * (above + eq.step), 0)
-        left = sympy.Max(0, tripped - returns * eq.step / (reconnect_ramp + eq.step))
-        eq.renews(tripped, left + (1 - left) * goes, 0)
+        tripped = opened(eq, trip_level, trip_delay, reconnect_delay, reconnect_margin, reconnect_ramp)
         for site in (sites.current, sites.zero_current) if eq.waves else (sites.P, sites.Q):
             eq.edit(site, lambda drawn: drawn * (1 - tripped_share * tripped))

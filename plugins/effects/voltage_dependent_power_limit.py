@@ -27,6 +27,7 @@ class VoltageDependentPowerLimit(Effect):
     off_level = Parameter(0.65, (0.3, 0.74), "1", "voltage of no power, over U_0", SOURCE, "u_{off}")
     limit_delay = Parameter(0.003, (0.0, 0.01), "s", "delay of the voltage it acts on", SOURCE, "T_l")
 
+    places, kind = ("converter share",), "limit"
     grid = {"full_level": (0.8, 0.9, 0.97), "off_level": (0.4, 0.55, 0.7)}
     relevant = {"limited_share": 0.1}
     confused_with = ("constant_power_converter", "undervoltage_trip")

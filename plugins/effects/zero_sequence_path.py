@@ -21,6 +21,7 @@ class ZeroSequencePath(Effect):
     zero_susceptance = Parameter(0.0, (0.0, 100.0), "pu", "1/X_0 on the record's base", SOURCE, "b_0", null=0.0)
     zero_resistance = Parameter(0.05, (0.003, 3.0), "1", "R_0/X_0", SOURCE, "r_0")
 
+    places, kind = ("bus",), "law"
     waves_only = "phasors of the positive sequence show nothing of the zero sequence"
     reads = ("I0",)
     grid = {"zero_resistance": (0.02, 0.1, 0.5)}

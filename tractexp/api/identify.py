@@ -175,10 +175,13 @@ class Identification(Written):
     @functools.cached_property
     def advice(self) -> list[str]:
         """What to do next, the most pressing first."""
+        from tractexp.choices import set_holding
         from tractexp.identification.advice import advise
 
         judged = self.judged
-        return advise(judged.known, judged.adequacy, judged.together.odd if judged.together else ())
+        fitted = tuple(event.record.where for event in judged.known.likelihood.problem.events)
+        odd = judged.together.odd if judged.together else ()
+        return advise(judged.known, judged.adequacy, odd, data=set_holding(fitted))
 
     def predict(
         self, event: Any = None, *, t: Any = None, U: Any = None, f: Any = None, P0: float | None = None,

@@ -93,8 +93,18 @@ class Investigation(Written):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The effects added to the model."""
+        """The effects added to the model, by the catalogue's names; `forms` says at which place and by which law."""
         return tuple(self.content["effects"])
+
+    @property
+    def forms(self) -> Mapping[str, Mapping[str, Any]]:
+        """{name: {place, kind, law, differs, effect, curve}} of each effect added, as `discrepancy.json` holds it."""
+        return self.content["forms"]
+
+    @property
+    def members(self) -> tuple[str, ...]:
+        """The effects added as `model.effects` takes them: of another law or place, the family's member."""
+        return tuple(form["effect"] for form in self.forms.values())
 
     @property
     def recommendation(self) -> str:
@@ -123,9 +133,21 @@ class Investigation(Written):
         return Table(columns, [[shape[key] for key in columns] for shape in shapes], "what is left", said)
 
     @property
+    def proposal(self) -> Mapping[str, Any] | None:
+        """The term proposed for an unexplained disagreement, as `discrepancy.json` has it; None where there is none."""
+        return self.content["proposal"]
+
+    @property
+    def proposed(self) -> list[str]:
+        """The proposal as sentences; why there is none where nothing explains."""
+        from tractexp.discrepancy.proposal.wording import proposed_in_words
+
+        return proposed_in_words(self.proposal, self.content["no_proposal"])
+
+    @property
     def sizes(self) -> list[str]:
         """How large the effects named are, with standard errors, as text: their parameters that have a null."""
-        return self._sizes(self.names, self.content["parameters"])
+        return self._sizes(self.members, self.content["parameters"])
 
     @property
     def sizes_of_nearest(self) -> list[str]:
@@ -165,7 +187,7 @@ class Investigation(Written):
                 f"there is no extended model: the verdict is '{self.verdict}', and nothing was added; go on with the"
                 " base model (.question.model), or give records that show more"
             )
-        return model.with_(effects=sorted({*model.effects, *self.names}), fixed=self.content["held"])
+        return model.with_(effects=sorted({*model.effects, *self.members}), fixed=self.content["held"])
 
     @functools.cached_property
     def fit(self) -> Identification:
@@ -195,7 +217,14 @@ class Investigation(Written):
                 closed = f"{gap.closed:.0%}" if gap and stage == "after" and gap.closed is not None else ""
                 rows.append([label, stage, *errors, closed])
         left = self.remainder.said
-        said = [self.reason, *self.sizes, *left, f"noise: {self.content['noise']}", f"next: {self.recommendation}"]
+        said = [
+            self.reason,
+            *self.sizes,
+            *left,
+            *self.proposed,
+            f"noise: {self.content['noise']}",
+            f"next: {self.recommendation}",
+        ]
         columns = ["events", "", "epsilon_p", "epsilon_q", *["epsilon_i"] * waves, "chi2 per sample", "gap closed"]
         return Table(columns, rows, f"{self.verdict.upper()} {' and '.join(self.names)}".strip(), said)
 
@@ -209,7 +238,8 @@ class Investigation(Written):
     def _results(self, folder: Path) -> list[Path]:
         """discrepancy.json and result.json.
 
-        conf/model/extended.yaml where an effect was named, unexplained.csv where nothing explains.
+        conf/model/extended.yaml where an effect was named, unexplained.csv where nothing explains, and the plugin of
+        a term where one is proposed.
         """
         from tractexp.discrepancy import discrepancy_json
 
@@ -222,6 +252,8 @@ class Investigation(Written):
             paths.append(discrepancy_json.write_model(self.steps, base, folder / "conf" / "model" / "extended.yaml"))
         if self.verdict == "unexplained":
             paths.append(discrepancy_json.write_left(self.steps, folder / "unexplained.csv"))
+        if self.content["proposal"]:
+            paths.append(discrepancy_json.write_plugin(self.steps, folder / self.content["proposal"]["plugin"]))
         return paths
 
     def _drawings(self) -> Mapping[str, Drawing]:

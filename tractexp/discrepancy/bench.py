@@ -40,18 +40,18 @@ class Bench:
     def of(
         cls, load: Model, catalogue: Catalogue, records: Records, bounds: Mapping[str, Sequence[float]],
         fixed: Mapping[str, float], criteria: Criteria, effort: Effort, substeps: int | None = None,
+        family: type[Family] = Family,
     ) -> "Bench":  # fmt: skip
         """A bench for these records; the load is simulated behind the recorder's window, where there is one."""
-        kernels = Kernels(Family(load.behind(records.window), catalogue), records.events, bounds, fixed, substeps)
+        kernels = Kernels(family(load.behind(records.window), catalogue), records.events, bounds, fixed, substeps)
         coordinates = Coordinates.of(kernels.bare, kernels.whole, catalogue, criteria.measurement_prior)
         return cls(load, catalogue, records, kernels, coordinates, criteria, effort)
 
     def on(self, records: Records) -> "Bench":
         """The same model and catalogue on other records, with the same Runge-Kutta steps and a count of its own."""
         kernels, criteria, effort = self.kernels, self.criteria, self.effort.anew()
-        return Bench.of(
-            self.load, self.catalogue, records, kernels.bounds, kernels.fixed, criteria, effort, kernels.substeps
-        )
+        known = kernels.bounds, kernels.fixed, criteria, effort, kernels.substeps
+        return Bench.of(self.load, self.catalogue, records, *known, type(kernels.family))
 
     @property
     def model(self) -> Model:

@@ -44,13 +44,31 @@ class Candidate:
 
 @dataclass(frozen=True, eq=False)
 class Catalogue:
-    """All candidates that can be tested, and why the others cannot."""
+    """All candidates that can be tested, and why the others cannot.
+
+    `members` of their families have another place or another law; they are tried only where a textbook effect leaves
+    something.
+    """
 
     candidates: tuple[Candidate, ...]
     untestable: dict[str, str]
+    members: tuple[Candidate, ...] = ()
 
     def __getitem__(self, name: str) -> Candidate:
-        return next(c for c in self.candidates if c.name == name)
+        return next(c for c in (*self.candidates, *self.members) if c.name == name)
+
+    def family(self, name: str) -> str:
+        """The textbook effect whose family an effect belongs to: itself, where it is one."""
+        return self[name].effect.family or name
+
+    def textbook(self, names: Sequence[str]) -> tuple[str, ...]:
+        """The names by which effects are told, whatever place and law they were found at."""
+        return tuple(self.family(name) for name in names)
+
+    def spoken(self, name: str) -> str:
+        """An effect as a sentence tells it: by its textbook name, and what differs from that."""
+        differs = self[name].effect.differs
+        return f"{self.family(name)}{',' * differs.startswith('but')} {differs}" if differs else name
 
     @property
     def effects(self) -> list[Effect]:
@@ -82,16 +100,22 @@ def catalogue(
             raise UserError(f"task.effects names '{name}', which is no effect{among(name, registered)}")
     here = {effect.name for effect in present}
     base = compose(motor, static, present, domain=domain)
-    testable, untestable = [], {}
+    testable, untestable, members = [], {}, []
     for name in sorted(registered):
         effect = get("effect", name)()
+        if effect.family:
+            wanted = not only or name in only or effect.family in only
+            if wanted and not here & {name, effect.family} and not base.acceptance(effect).refusal:
+                members.append(candidate(effect))
+            continue
         if name in here or (only and name not in only and not isinstance(effect, Measurement)):
             continue
         if why := missing_channel(effect, events, swing) or base.acceptance(effect).refusal:
             untestable[name] = why
         else:
             testable.append(candidate(effect))
-    return Catalogue(tuple(testable), untestable)
+    heads = {c.name for c in testable}
+    return Catalogue(tuple(testable), untestable, tuple(m for m in members if m.effect.family in heads))
 
 
 def missing_channel(effect: Effect, events: Sequence[Event], swing: float) -> str:

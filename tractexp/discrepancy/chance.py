@@ -60,11 +60,15 @@ def _drawn(t: Tangent, noise: Noise, quiet: QuietNoise, seed: int, plain: bool, 
     rng = np.random.default_rng(seed)
     drawn = noise.draw(rng, draws, np.diff(bench.drive.first).tolist())
     drawn *= bench.known
-    worth = np.inf if bench.waves else noise.worth(sum(p.stop - p.start for p in bench.quiet))
-    if plain or bench.criteria.knows_noise(worth):  # two numbers tell that of waveforms
+    if plain or noise_known(bench, noise):
         return _collected(t, [t.whitened(noise, drawn)], noise)
     rest = rich_residuals(t, drawn)
     return _collected(t, [t.whitened(quiet.of(t.unit, rest[b]), drawn[b : b + 1]) for b in range(draws)], noise)
+
+
+def noise_known(bench: Bench, noise: Noise) -> bool:
+    """Whether quiet stretches tell the noise exactly enough; two numbers tell that of waveforms."""
+    return bench.waves or bench.criteria.knows_noise(noise.worth(sum(p.stop - p.start for p in bench.quiet)))
 
 
 def _collected(t: Tangent, projections: list[Projection], noise: Noise) -> Chance:

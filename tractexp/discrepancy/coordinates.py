@@ -18,7 +18,8 @@ from tractexp.identification.problem import Problem
 class Coordinates:
     """Coordinates (D,) lie in the unit cube: parameters `names` with these bounds, then P0 and Q0 of each event.
 
-    The parameters are the base model's free ones, in columns `base`, those of all candidates, and the pushes'.
+    The parameters are the base model's free ones, in columns `base`, those of all candidates, the pushes', and those of
+    the members of families.
     """
 
     names: tuple[str, ...]  # (d,)
@@ -33,17 +34,21 @@ class Coordinates:
     @classmethod
     def of(cls, bare: Problem, whole: Problem, catalogue: Catalogue, prior: float) -> "Coordinates":
         """Those of the problem of everything, `whole`, in which the problem of the base model is `bare`."""
-        names, d, events = whole.space.names, whole.space.dimension, whole.drive.events
-        chosen = {p.name: p.default if p.null is None else p.null for p in whole.parameters}
+        members = [p for member in catalogue.members for p in member.effect.parameters]
+        names, events = (*whole.space.names, *(p.name for p in members)), whole.drive.events
+        d = len(names)
+        own = np.array([p.bounds for p in members], dtype=float).reshape(-1, 2)
+        lower, upper = np.r_[whole.lower, own[:, 0]], np.r_[whole.upper, own[:, 1]]
+        chosen = {p.name: p.default if p.null is None else p.null for p in (*whole.parameters, *members)}
         values = np.array([chosen[name] for name in names])
         return cls(
             names=names,
-            lower=whole.lower,
-            upper=whole.upper,
+            lower=lower,
+            upper=upper,
             catalogue=catalogue,
             base=np.array([names.index(name) for name in bare.space.names]),
             before=np.arange(d, d + 2 * events),
-            null=np.r_[whole.space.to_unit(values), np.full(2 * events, 0.5)],
+            null=np.r_[(values - lower) / (upper - lower), np.full(2 * events, 0.5)],
             prior=prior,
         )
 
@@ -81,12 +86,18 @@ class Coordinates:
 
     @functools.cached_property
     def prior_deviation(self) -> dict[int, float]:
-        """Prior standard deviation of each size of a fault of the measurement, in the unit cube."""
-        return {
+        """Prior standard deviation of each size of a fault of the measurement and of each shape, in the unit cube."""
+        faults = {
             self.column[p.name]: self.prior * self.catalogue[name].relevant(p) / self.width(p.name)
             for name in self.catalogue.of_measurement
             for p in self.catalogue[name].sizes
         }
+        likely = [pair for member in self.catalogue.members for pair in member.effect.likely.items()]
+        return faults | {self.column[name]: spread / self.width(name) for name, spread in likely}
+
+    def shapes(self, effects: Sequence[str]) -> list[int]:
+        """Columns of the effects' parameters that are held to their defaults by what is likely."""
+        return [self.column[name] for n in effects for name in self.catalogue[n].effect.likely]
 
     def without_faults(self, unit: np.ndarray, kept: Sequence[str]) -> np.ndarray:
         """Coordinates (D,) with the faults of the measurement that are not `kept` back at their nulls."""

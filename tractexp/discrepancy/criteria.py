@@ -46,6 +46,10 @@ class Criteria:
     third_name_p: float = _criterion(
         1e-9, (0.0, 1.0), "p that a third name must undercut", CHOSEN, "as for the second, with hundreds of sets to try"
     )
+    family_p: float = _criterion(
+        1e-5, (0.0, 1.0), "p by which another law or place must explain more than the catalogue's, its further"
+        " parameters paid for", CHOSEN, "as for a second name: a member of a family is one more that could be wrong",
+    )  # fmt: skip
     beside_measurement: float = _criterion(
         0.1, (0.0, 1.0), "factor on the p of an effect of the load beside one of the measurement", CHOSEN,
         "what imitates a fault of the measurement badly leaves a little for an effect of the load",
@@ -121,6 +125,18 @@ class Criteria:
     testable: float = _criterion(
         0.8, (0.0, 1.0), "power at the smallest relevant size below which an effect is called not testable", DERIVED,
         "the usual power of a planned test (Saris, Satorra and van der Veld 2009)",
+    )  # fmt: skip
+    proposal_closed: float = _criterion(
+        0.6, (0.0, 1.0), "share of the excess on held-out events that a proposed term must close", CHOSEN,
+        "wrong terms on nulls made held-out events worse, right ones closed three quarters and more (prototype)",
+    )  # fmt: skip
+    proposal_left: float = _criterion(
+        1.7, (1.0, 1e6), "variance over the noise's that a proposed term may leave on any role's events", CHOSEN,
+        "right terms left 0.9 to 1.5, a wrong one that closed nine tenths left 3.3 (prototype)",
+    )  # fmt: skip
+    proposal_p: float = _criterion(
+        0.01, (0.0, 1.0), "how often noise may give the best term of the whole library as much", CHOSEN,
+        "it guards against the library's size alone; held-out events do the rest",
     )  # fmt: skip
     decided: float = _criterion(
         0.95, (0.0, 1.0), "probability with which a recommended dip must tell tied sets apart", DERIVED,

@@ -8,14 +8,19 @@ import numpy as np
 
 from tractexp import files
 from tractexp.discrepancy import recommended
+from tractexp.discrepancy.forms import forms, told_by_name
 from tractexp.discrepancy.gap import Curves, Gap
 from tractexp.discrepancy.investigate import Investigation
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import Estimate, estimates, own_parameters
+from tractexp.discrepancy.proposal import generate
+from tractexp.discrepancy.proposal.propose import told as told_of_proposal
 from tractexp.discrepancy.verdict import NAMED, UNEXPLAINED
 from tractexp.identification.adequacy import Grade
 from tractexp.model.drive import PHASORS
 from tractexp.wording import joined
+
+PLUGIN = f"{generate.NAME}.py"  # of a proposal, beside the page
 
 
 def content(investigation: Investigation) -> dict[str, Any]:
@@ -24,8 +29,9 @@ def content(investigation: Investigation) -> dict[str, Any]:
     return {
         "verdict": investigation.verdict.word,
         "reason": investigation.verdict.reason,
-        "effects": list(investigation.names),
-        "name_sets": [list(names) for names in investigation.verdict.sets],
+        "effects": list(dict.fromkeys(investigation.catalogue.textbook(investigation.names))),
+        "name_sets": [list(investigation.catalogue.textbook(names)) for names in investigation.verdict.sets],
+        "forms": told_by_name(forms(investigation)),
         "where": [asdict(place) for place in investigation.places],
         "gap": {
             "train": _gap(investigation.train),
@@ -36,6 +42,8 @@ def content(investigation: Investigation) -> dict[str, Any]:
         "nearest": _nearest(investigation),
         "candidates": [*sets(investigation), *_singles(investigation)],
         "remainder": _remainder(investigation),
+        "proposal": told_of_proposal(investigation.proposed, PLUGIN),
+        "no_proposal": investigation.proposed.why or None,
         "recommendation": recommendation(investigation),
         "adequacy": recommended.adequacy(investigation).told(),
         "held": recommended.held(investigation),
@@ -51,8 +59,11 @@ def content(investigation: Investigation) -> dict[str, Any]:
 def recommendation(investigation: Investigation) -> str:
     """What to do next, one sentence."""
     if (dip := investigation.verdict.next_dip) is not None:
-        first, second = (joined(names) for names in investigation.verdict.sets[:2])
+        spoken = investigation.catalogue.spoken
+        first, second = (joined([spoken(n) for n in names]) for names in investigation.verdict.sets[:2])
         return dip.sentence(first, second, investigation.bench.criteria.decided)
+    if (made := investigation.proposed.proposal) is not None:
+        return f"ask what on site acts like {made.term.words}; {PLUGIN} adds it to a model (docs/missing-effects.md)"
     if investigation.verdict.word == UNEXPLAINED:
         return "look at what is left (unexplained.csv) and at what switched at that time"
     if investigation.verdict.word == NAMED:
@@ -120,6 +131,13 @@ def write_left(investigation: Investigation, path: Path) -> Path:
         rows = list(zip(event.record.t, *left, strict=True))[event.first :]
         lines += [",".join([event.record.name, *(f"{x:.9g}" for x in row)]) for row in rows]
     return files.write(path, "\n".join(lines) + "\n")
+
+
+def write_plugin(investigation: Investigation, path: Path) -> Path:
+    """Write the plugin file of a proposal."""
+    made = investigation.proposed.proposal
+    assert made is not None
+    return files.write(path, made.source)
 
 
 def _curves(curves: Curves) -> dict[str, float]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from tractexp.discrepancy.base_fit import BaseFit
 from tractexp.discrepancy.disagreement import Disagreement, examined
+from tractexp.discrepancy.families import member_that_suffices
 from tractexp.discrepancy.fitting import Refit, Start, best_of, no_worse_than_subsets, refit, rough_refit
 from tractexp.discrepancy.projection import Score
 from tractexp.discrepancy.tangent import Column, tangent
@@ -24,6 +25,7 @@ COMBINED = 14  # effects whose sets are ranked exhaustively
 CLOSE = 12.0  # of the deviance: a rough refit this near the best is made exact
 PATCHED = 4  # sets of one size that are tried before a further effect is added
 RANKS = 2  # settings of a candidate to start from
+FAMILIES = 50  # added to the seed of the draws at members of families
 LEAST_START = 0.1  # smallest relevant sizes that a start moves at least
 
 Names = tuple[str, ...]
@@ -73,8 +75,28 @@ def explanations(base: BaseFit, first: Disagreement, seed: int) -> Explanations:
                 refits |= {f.names: f for f in better}
                 fits = best_of(f for f in refits.values() if f.names)
                 tests = sufficient(base, fits, first.noise, seed + size)
+        if size == 1:
+            tests = with_families(base, tests, refits, seed)
         steps.append(tests)
+    if len(steps) == 1:
+        tests = with_families(base, first, refits, seed)
+        steps += [tests] * (tests is not first)
     return Explanations(base, tuple(steps), refits)
+
+
+def with_families(base: BaseFit, tests: Disagreement, refits: dict[Names, Refit], seed: int) -> Disagreement:
+    """The tests at a member of a family where these leave something and it does not; else these. Adds to `refits`.
+
+    Of waveforms none is tried: their criteria were not calibrated with members.
+    """
+    if base.bench.waves or (tests.adequate and not tests.asks_for_more):
+        return tests
+    found = member_that_suffices(base, tests, refits, seed + FAMILIES)
+    if found is None:
+        return tests
+    tests, fits = found
+    refits |= {f.names: f for f in fits}
+    return tests
 
 
 def searched(steps: Sequence[Disagreement], refits: Refits, size: int, say: Callable[[str], None]) -> list[Refit]:

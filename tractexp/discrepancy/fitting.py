@@ -84,8 +84,9 @@ def _descended(
     """The end of a descent from each start; of one that was made before, as by a run that was stopped, as it was."""
     spent = 0
     at = bench.coordinates
-    prior = at.parameters(at.catalogue.of_measurement if faults is None else tuple(faults))
-    always = [*at.base, *at.before, *prior]
+    measured = at.parameters(at.catalogue.of_measurement if faults is None else tuple(faults))
+    prior = [*measured, *at.shapes(sorted({name for names, _ in wanted for name in names}))]
+    always = [*at.base, *at.before, *measured]
     columns = [[*always, *(k for k in at.parameters(names) if k not in always)] for names, _ in wanted]
     table = np.full((len(wanted), max(map(len, columns))), at.dimension)
     for lane, free in enumerate(columns):

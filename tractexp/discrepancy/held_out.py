@@ -79,9 +79,13 @@ class HeldOut:
     @property
     def kept(self) -> tuple[Rival, ...]:
         """The adequate explanations that the held-out events do not deny."""
-        return tuple(
+        helping = (
             s for s in self.survivors.adequate if s.fit.names not in self.judged or self.judged[s.fit.names].helps
         )
+        of_family: dict[Names, Rival] = {}
+        for rival in helping:  # the best first: places and laws of one family are told by one name
+            of_family.setdefault(self.survivors.explanations.base.bench.catalogue.textbook(rival.fit.names), rival)
+        return tuple(of_family.values())
 
 
 def held_out(surviving: Survivors, events: Sequence[Event], seed: int) -> HeldOut:
@@ -109,7 +113,7 @@ def weighed(
 
     Where the base model is `doubted` all events need only bear with them: the held-out ones may not show them at all.
     Several effects at once, chosen among hundreds of sets, must also leave nothing in a fit to all events, and so must
-    a single one that closes less of the gap there than a true one does.
+    a single one that closes less of the gap there than a true one does, and one of another place or law.
     """
     extended = list(as_fitted.extended.values())
     judged = judged_on(bench, events, as_fitted.bare, extended)
@@ -118,7 +122,12 @@ def weighed(
         fits = together(bench, events, as_fitted, extended, seed, anew=True)
         again = [fitted.fit for fitted in fits if fitted.confirmed(bench.criteria, doubted)]
         return judged | (judged_on(bench, events, as_fitted.bare, again) if again else {}), again
-    doubtful = [f for f in helping if len(f.names) + len(as_fitted.faults) > 1 or not judged[f.names].convincing]
+    found = bench.catalogue
+    doubtful = [
+        f for f in helping
+        if len(f.names) + len(as_fitted.faults) > 1 or f.names != found.textbook(f.names)
+        or not judged[f.names].convincing
+    ]  # fmt: skip
     for fitted in together(bench, events, as_fitted, doubtful, seed) if doubtful else ():
         judged[fitted.fit.names] = replace(judged[fitted.fit.names], p_left=fitted.p_left)
     return judged, []
@@ -144,7 +153,7 @@ def carried(bench: Bench, events: Sequence[Event], fits: Sequence[Refit]) -> tup
         unit = other.coordinates.null.copy()
         unit[:d] = fit.unit[:d]
         units.append(settled(other, unit, white(other), fit.names))
-    noise = QuietNoise.at(other, units[-1]).of_fit(units[-1])
+    noise = QuietNoise.at(other, units[-1]).of_fit(units[-1], fits[-1].names)
     return other, [settled(other, u, noise, fit.names) for u, fit in zip(units, fits, strict=True)], noise
 
 

@@ -64,8 +64,13 @@ class Family:
         return len(self.with_effects(names).source)
 
     def key(self, names: Iterable[str], pushed: bool = False) -> Key:
-        """The kernel that serves a set of names, with pushes or without."""
+        """The kernel that serves a set of names, with pushes or without.
+
+        A member of a family has one by itself, and one with everything.
+        """
         load = frozenset(names) - set(self.catalogue.of_measurement)
+        if members := load - set(self.catalogue.of_load):
+            return (load, False) if load == members and not pushed else (members.union(self.catalogue.of_load), True)
         if not pushed:
             for group in (frozenset(), *self.groups):
                 if load <= group:
@@ -75,6 +80,16 @@ class Family:
     def compile(self, say: Callable[[str], None]) -> None:
         """Compile what is not in the cache yet, side by side."""
         compile_missing(self._sources(), lambda: say("compiling kernels, once for this base model and these channels"))
+
+    def joins(self, name: str) -> bool:
+        """Whether a member of a family goes with the model of everything, by which what it leaves is tested."""
+        return self.whole.acceptance(self.catalogue[name].effect).refusal is None
+
+    def compile_members(self, names: Iterable[str], say: Callable[[str], None], *, whole: bool = False) -> None:
+        """Compile what members of families need, side by side: a kernel each, or with everything where `whole`."""
+        load = self.catalogue.of_load
+        sources = (self.with_effects((n, *load), True) if whole else self.with_effects((n,)) for n in names)
+        compile_missing((m.source for m in sources), lambda: say("compiling kernels of families, once for this model"))
 
     def _sources(self) -> Iterator[str]:
         """Two that are soon derived, so that something compiles while the largest is; then the largest first."""
@@ -101,7 +116,8 @@ class Kernels:
         self.bare = Problem(family.model, events, bounds, fixed, substeps)
         self.substeps = max(int(self.bare.step.substeps.max()), self._fewest() if substeps is None else 1)
         self.whole = Problem(family.whole, events, bounds, fixed, self.substeps)
-        self._column = {name: k for k, name in enumerate(self.whole.space.names)}
+        members = [p.name for member in family.catalogue.members for p in member.effect.parameters]
+        self._column = {name: k for k, name in enumerate((*self.whole.space.names, *members))}
         self._made: dict[Key, tuple[Likelihood, np.ndarray]] = {None: self._simulator(self.whole)}
 
     def _fewest(self) -> int:
@@ -140,5 +156,5 @@ class Kernels:
         return self._made[key]
 
     def _simulator(self, problem: Problem) -> tuple[Likelihood, np.ndarray]:
-        before = self.whole.space.dimension + np.arange(2 * len(self.events))
+        before = len(self._column) + np.arange(2 * len(self.events))
         return Likelihood.of(problem), np.r_[[self._column[n] for n in problem.space.names], before].astype(int)

@@ -5,6 +5,7 @@ short a record, and has the offsets that the channels may have kept.
 """
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,9 +40,9 @@ class QuietNoise:
         off = [_at_voltage(bench, bench.records.off_by(k), unit) - calm for k in range(most)]
         return cls(bench, np.nan_to_num(np.array(off)))
 
-    def of_fit(self, unit: np.ndarray) -> Noise:
-        """The noise of the quiet residuals at coordinates (D,)."""
-        return self.of(unit, self.bench.residuals(unit[None])[0])
+    def of_fit(self, unit: np.ndarray, names: Sequence[str] | None = None) -> Noise:
+        """The noise of the quiet residuals at coordinates (D,), of a fit with these effects, by default of any."""
+        return self.of(unit, self.bench.residuals(unit[None], names)[0])
 
     def of(
         self,

@@ -59,7 +59,10 @@ def on_held_out(
         gap = judged.gap
         return _each(judged.bench, gap.noise, (gap.before.calculated, gap.after.calculated, None), (), held_out=True)
     other, units, noise = carried(bench, withheld, [bare, *([nearest.rival.fit] if nearest else [])])
-    made = [other.residuals(unit[None])[0] + other.drive.measured for unit in units]
+    sets = [(), *([nearest.names] if nearest else [])]
+    made = [
+        other.residuals(unit[None], names)[0] + other.drive.measured for unit, names in zip(units, sets, strict=True)
+    ]
     return _each(other, noise, (made[0], None, made[1] if nearest else None), (), held_out=True)
 
 

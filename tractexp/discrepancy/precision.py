@@ -50,6 +50,16 @@ def standard_errors(tests: Disagreement) -> dict[str, float]:
     return {labels[k]: float(s * at.width(labels[k])) for k, s in zip(columns, spread, strict=True) if k in labels}
 
 
+def covariance(tests: Disagreement, names: Sequence[str]) -> tuple[list[str], np.ndarray]:
+    """Covariance (k, k) of those of the named parameters that the fit tells, and which they are."""
+    at, columns = tests.bench.coordinates, _columns(tests)
+    inverse = np.linalg.pinv(tests.projection.R, rcond=1e-10)
+    known = [n for n in names if at.column[n] in columns]
+    rows = inverse[[columns.index(at.column[n]) for n in known]]
+    width = np.array([at.width(n) for n in known])
+    return known, (rows @ rows.T) * np.outer(width, width)
+
+
 def estimates(tests: Disagreement, unit: np.ndarray, effects: Sequence[str]) -> list[Estimate]:
     """The base model's parameters and those of the named effects at coordinates (D,), as the tests of a fit know them.
 
@@ -57,7 +67,8 @@ def estimates(tests: Disagreement, unit: np.ndarray, effects: Sequence[str]) -> 
     """
     bench = tests.bench
     at, errors = bench.coordinates, standard_errors(tests)
-    declared = {p.name: p for p in bench.problem.parameters}
+    own = [p for name in effects for p in bench.catalogue[name].effect.parameters]
+    declared = {p.name: p for p in (*bench.problem.parameters, *own)}
     names = [*(at.names[k] for k in at.base), *own_parameters(bench, effects)]
     seen = [n for n in names if n in errors]
     values = {n: at.value(n, unit) for n in names}

@@ -98,7 +98,7 @@ def tangent(bench: Bench, fit: Refit, noise: Noise) -> Tangent:
     members = {name: [nuisances.index(c) for c in cols] for name, cols in faults.items()}
     white = bench.whiten(noise, np.concatenate([nuisance, base[None]]))
     held = set(np.flatnonzero(resting(bench, fit.unit, nuisances, white[:k] @ white[k])).tolist())
-    rows = sorted({*held, *(i for group in members.values() for i in group)})
+    rows = sorted({*held, *(i for i, c in enumerate(nuisances) if c in at.prior_deviation)})
     prior = np.zeros((len(rows), k))
     departure = np.zeros(k)
     for row, i in enumerate(rows):

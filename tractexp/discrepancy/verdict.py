@@ -100,6 +100,12 @@ def _sets(weighed: HeldOut) -> tuple[tuple[str, ...], ...]:
     return tuple(_with_faults(s, weighed) for s in weighed.kept)
 
 
+def _spoken(names: Sequence[str], weighed: HeldOut) -> list[str]:
+    """Effects as a sentence tells them: by the names of the catalogue, and what differs from its law or place."""
+    found = weighed.survivors.explanations.base.bench.catalogue
+    return [found.spoken(name) for name in names]
+
+
 def _with_faults(rival: Rival, weighed: HeldOut) -> tuple[str, ...]:
     return tuple(sorted((*rival.fit.names, *weighed.faults)))
 
@@ -109,13 +115,13 @@ def _reason(word: str, weighed: HeldOut, sets: Sequence[Sequence[str]], nearest:
     left = weighed.survivors
     first = left.explanations.steps[0]
     if word == NAMED:
-        return _named(sets[0], len(first.bench.catalogue.candidates))
+        return _named(_spoken(sets[0], weighed), len(first.bench.catalogue.candidates))
     if word == TIED:
-        return _tied(sets)
+        return _tied([_spoken(names, weighed) for names in sets])
     if word == UNEXPLAINED and not left.adequate:
         return _unexplained(weighed, nearest)
     if not weighed.kept and left.adequate and not left.explanations.empty:
-        seemed = " or ".join(joined(_with_faults(s, weighed)) for s in left.adequate)
+        seemed = " or ".join(joined(_spoken(_with_faults(s, weighed), weighed)) for s in left.adequate)
         if word == UNEXPLAINED:
             return f"what explains the fitted events, {seemed}, does not hold on the held-out ones: {_denied(weighed)}"
         return (
@@ -129,7 +135,7 @@ def _named(names: Sequence[str], tested: int) -> str:
     if len(names) > 1:
         return f"{joined(names)} explain the disagreement, and no other set of {len(names)} of the {tested} tested does"
     rest = f"none of the {tested - 1} other effects tested does" if tested > 1 else "no other effect was tested"
-    return f"{names[0]} explains the disagreement, and {rest}"
+    return f"{names[0]}{',' * (', ' in names[0])} explains the disagreement, and {rest}"
 
 
 def _tied(sets: Sequence[Sequence[str]]) -> str:
@@ -154,7 +160,7 @@ def _unexplained(weighed: HeldOut, nearest: Nearest | None) -> str:
         )
     most = len(best.fit.names)
     together = f", alone or up to {most} together," if most > 1 else ""
-    names = _with_faults(best, weighed)
+    names = _spoken(_with_faults(best, weighed), weighed)
     share = (
         f"explain{'s' * (len(names) == 1)} {percent(nearest.fitted)} of what exceeds the noise, and what"
         if nearest
@@ -184,12 +190,12 @@ def _nearest(
     best = rivals[0].fit
     if not best.names:
         return None
-    before, after = curves(bench, bare.unit, noise), curves(bench, best.unit, noise)
+    before, after = curves(bench, bare.unit, noise), curves(bench, best.unit, noise, best.names)
     excess = max(before.deviance - bench.samples, 1e-300)
     held, there = float("nan"), None
     if validate:
         other, (plain, near), level = carried(bench, validate, [bare, best])
-        there = curves(other, plain, level), curves(other, near, level)
+        there = curves(other, plain, level), curves(other, near, level, best.names)
         held = (there[0].deviance - there[1].deviance) / max(there[0].deviance - other.samples, 1e-300)
     others = [(r.fit.names, (before.deviance - r.fit.deviance) / excess) for r in rivals[1:4]]
     share = (before.deviance - after.deviance) / excess

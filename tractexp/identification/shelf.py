@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from tractexp import files, provenance
-from tractexp.errors import UserError
-from tractexp.model.kernel import cache_folder
+from tractexp import provenance
+from tractexp.model import cache
+from tractexp.model.cache import cache_folder
 
 BEHIND = ("numpy", "numba", "scipy", "llvmlite")  # whose versions may change the last digits
 DAMAGED = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile)
@@ -61,12 +61,13 @@ def _told(thing: Any) -> bytes:
 
 def place(shelf: str, what: str) -> Path:
     """Where what this text says is kept."""
-    return cache_folder() / shelf / f"{hashlib.sha256(what.encode()).hexdigest()[:40]}.npz"
+    return cache_folder() / shelf / f"{hashlib.sha256(what.encode()).hexdigest()[:40]}.kept"
 
 
 def read(path: Path) -> dict[str, np.ndarray] | None:
     """The arrays of a file by name; None where it is not there or damaged."""
-    with contextlib.suppress(*DAMAGED), np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as kept:
+    held = cache.read(path) or b""
+    with contextlib.suppress(*DAMAGED), np.load(io.BytesIO(held), allow_pickle=False) as kept:
         return {name: kept[name] for name in kept.files}
     return None
 
@@ -75,8 +76,8 @@ def keep(path: Path, **arrays: np.ndarray) -> None:
     """Keep arrays; where that is impossible, they are computed again next time."""
     packed = io.BytesIO()
     np.savez_compressed(packed, **arrays)  # type: ignore[arg-type]
-    with contextlib.suppress(UserError, OSError):
-        files.write(path, packed.getvalue(), lasting=False)
+    cache.write(path, packed.getvalue())
+    with contextlib.suppress(OSError):
         _forget(path.parent)
 
 
@@ -92,12 +93,12 @@ def arrays(shelf: str, what: str, make: Callable[[], tuple[np.ndarray, ...]]) ->
 
 def damaged(folder: Path) -> list[Path]:
     """The files of a cache's shelves that cannot be read."""
-    return [path for shelf in SHELVES for path in (folder / shelf).glob("*.npz") if read(path) is None]
+    return [path for shelf in SHELVES for path in (folder / shelf).glob("*.kept") if read(path) is None]
 
 
 def _forget(folder: Path) -> None:
     """Remove the oldest where there are too many."""
-    kept = list(folder.glob("*.npz"))
+    kept = list(folder.glob("*.kept"))
     if len(kept) > SHELVES.get(folder.name, 0):
         with contextlib.suppress(FileNotFoundError):  # another process forgets, too
             kept.sort(key=lambda path: path.stat().st_mtime)

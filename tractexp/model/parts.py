@@ -5,12 +5,14 @@ is registered. What `eq` offers is told in docs/plugins.md.
 """
 
 from abc import abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from tractexp.errors import UserError, among
+from tractexp.model import sites
 from tractexp.model.names import check_name
 from tractexp.model.signature import check_signature
 from tractexp.plugin import Plugin
@@ -99,13 +101,30 @@ class Static(Part):
         check_signature(cls, "damping", None, where, all_taken=False)
 
 
+@dataclass(frozen=True)
+class Curve:
+    """A law as it is drawn: `y` (n,) over `x` (n,), and what the axes say."""
+
+    x: np.ndarray
+    y: np.ndarray
+    x_label: str
+    y_label: str
+
+
 class Effect(Part):
     """Base of the effects a model may lack, named in `model.effects=[...]`: an edit of the equations.
 
     The parameters that say how large the effect is have a `null` at which the edited equations are the unedited
     ones; `relevant` is the smallest departure from it that matters. The others vanish there, and `grid` names the
     values of each at which to look for the effect. `reads` names the recorded channels without which it cannot be
-    seen, `confused_with` the effects that look alike on ordinary dips.
+    seen, `confused_with` the effects that look alike on ordinary dips. `places` and `kind` say where it acts and what
+    it does there, of `sites.PLACES` and `sites.KINDS`.
+
+    A member of a family names the textbook effect as its `family`: the same kind of effect at another place, or at the
+    same place by another law, tried only where the textbook one leaves something. `differs` ends the sentence that
+    begins with the textbook's name; `as_textbook` {own parameter: the textbook's} says where a search begins and, where
+    it `nests_textbook`, at which values it is the textbook effect, the other parameters at their defaults. `likely`
+    {parameter: standard deviation} holds shapes to their defaults, the textbook law, unless the data say otherwise.
     """
 
     group: ClassVar[str] = "effect"
@@ -114,6 +133,17 @@ class Effect(Part):
     grid: ClassVar[dict[str, tuple[float, ...]]] = {}
     relevant: ClassVar[dict[str, float]] = {}
     confused_with: ClassVar[tuple[str, ...]] = ()
+    places: ClassVar[tuple[str, ...]] = ()
+    kind: ClassVar[str] = ""
+    family: ClassVar[str] = ""
+    differs: ClassVar[str] = ""
+    as_textbook: ClassVar[Mapping[str, str]] = {}
+    nests_textbook: ClassVar[bool] = False
+    likely: ClassVar[Mapping[str, float]] = {}
+
+    def curve(self, **parameters: float) -> "Curve | None":
+        """The law found, where it is one that can be drawn, at these values of the parameters."""
+        return None
 
     @abstractmethod
     def edit(self, eq: "Equations", **parameters: Any) -> None:
@@ -133,6 +163,11 @@ class Effect(Part):
     def check_class(cls, where: str) -> None:
         super().check_class(where)
         check_signature(cls, "edit", "eq", where)
+        for place in cls.places:
+            if place not in sites.PLACES:
+                raise UserError(f"{where}: places names '{place}'{among(place, sites.PLACES, 'Places')}")
+        if cls.kind and cls.kind not in sites.KINDS:
+            raise UserError(f"{where}: kind is '{cls.kind}'{among(cls.kind, sites.KINDS, 'Kinds')}")
         own = {p.name: p for p in cls.parameters}
         sizes = [p.name for p in cls.parameters if p.null is not None]
         if not sizes:

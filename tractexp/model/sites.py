@@ -24,6 +24,9 @@ class Site:
 
 motor_voltage = Site("motor_voltage", "V", "phasor", "pu", "motor", "voltage at the motor's terminals")
 stator_impedance = Site("stator_impedance", "Z'", "phasor", "pu", "motor", "impedance from the terminals to the flux")
+internal_voltage = Site(
+    "internal_voltage", "E", "phasor", "pu", "motor", "voltage behind it, of motors where it is no state"
+)
 stator_current = Site("stator_current", "I", "phasor", "pu", "motor", "current into the motor's terminals")
 coupling = Site("coupling", "c", "real", "1", "motor", "(X - X')/X, the rotor's share in the reactance")
 time_constant = Site("time_constant", r"\tau'", "real", "s", "motor", "transient time constant X'/X T0'")
@@ -43,6 +46,29 @@ current = Site("current", "i", "phasor", "pu", "bus", "current of all parts toge
 zero_current = Site("zero_current", "i_0", "real", "pu", "bus", "zero-sequence current of all parts together (waves)")
 P = Site("P", "P", "real", "pu", "bus", "active power of all parts together")
 Q = Site("Q", "Q", "real", "pu", "bus", "reactive power of all parts together")
+
+PLACES = {  # where an effect acts, in a reader's words, and the sites it edits there
+    "stator impedance": ("stator_impedance", "stator_current"),
+    "coupling": ("coupling",),
+    "flux decay": ("time_constant", "internal_voltage"),
+    "speed": (),  # the rotor's balance, which is no site
+    "load torque": ("electrical_torque", "load_torque"),
+    "motor": ("motor_current", "P_motor", "Q_motor"),
+    "static P": ("P_static",),
+    "static Q": ("Q_static",),
+    "converter share": ("P_static", "Q_static"),
+    "bus": ("motor_voltage", "static_voltage", "bus_voltage", "bus_voltage_rate", "current", "zero_current", "P", "Q"),
+    "measurement": ("current", "zero_current", "P", "Q"),
+}
+KINDS = {  # what an effect does there
+    "law": "depends on a local quantity by a law",
+    "lag": "lags",
+    "limit": "limits",
+    "trip": "trips and returns",
+    "delay": "delays",
+    "oscillation": "oscillates",
+    "drift": "drifts",
+}
 
 SITES = {site.name: site for site in list(globals().values()) if isinstance(site, Site)}
 

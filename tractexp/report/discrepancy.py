@@ -17,6 +17,7 @@ from tractexp.discrepancy.evidence import (
     evidence,
     why_not_the_most_helpful,
 )
+from tractexp.discrepancy.forms import CATALOGUE, Found, forms
 from tractexp.discrepancy.gap import Curves
 from tractexp.discrepancy.investigate import Investigation
 from tractexp.discrepancy.judgement import judgements
@@ -24,14 +25,17 @@ from tractexp.discrepancy.precision import Estimate, estimates
 from tractexp.discrepancy.recommended import adequacy, held
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.verdict import UNEXPLAINED, Nearest
+from tractexp.model.sites import KINDS
 from tractexp.report.chart import Chart
 from tractexp.report.overlay import overlaid
 from tractexp.report.page import Page
+from tractexp.report.proposal import headlines, proposed
 from tractexp.wording import as_sentence, in_words, joined, percent, with_error
 
 KIND = {"none": "good", "named": "good", "tied": "plain", "unexplained": "bad"}
 COLORS = {CHOSEN: "#009E73", KEPT: "#E69F00"}
 REFITTED, ESTIMATED = "#0072B2", "#9A9A9A"
+CURVE, TEXTBOOK = "#0072B2", "#D55E00"
 BAR, ROOM = 24, 1.2  # pixels; of the longest bar, for what stands beside the bars
 NOISE_OF_WAVES = (
     "It is estimated before the dip and at the end of the record, from what the fit leaves there: harmonics that no"
@@ -51,14 +55,23 @@ def page(path: Path, found: Investigation, title: str) -> Path:
     events = len(found.bench.events)
     lead = f"{found.bench.model.title}, {events} event{'s' * (events > 1)} fitted, {len(found.withheld)} held out"
     made = Page(f"Missing effect: {title}", lead)
-    head = f"{found.verdict.word.upper()} {' or '.join(joined(names) for names in found.verdict.sets)}".strip()
+    spoken = [joined([found.catalogue.spoken(name) for name in names]) for names in found.verdict.sets]
+    head = f"{found.verdict.word.upper()} {' or '.join(spoken)}".strip()
     left = [as_sentence(found.headline)] if found.headline else []
-    said = [as_sentence(found.verdict.reason), *left, _graded(found), f"Next: {recommendation(found)}."]
+    said = [
+        as_sentence(found.verdict.reason),
+        *left,
+        *headlines(found),
+        _graded(found),
+        f"Next: {recommendation(found)}.",
+    ]
     made.verdict(head, *said, kind=KIND[found.verdict.word])
     overlaid(made.heading("Measured, before, after" if found.names else "Measured and calculated"), found.overlays)
     _smaller(made, found)
     if found.verdict.word == UNEXPLAINED:
+        proposed(made, found)
         _left(made, found)
+    _forms(made, found)
     _candidates(made, found)
     _parameters(made, found)
     if found.names:
@@ -166,6 +179,42 @@ def _nearest(made: Page, found: Investigation) -> None:
             "As if they were right; something else is missing, so that the intervals may miss the truth.",
             words=(1, 2, 5),
         )  # fmt: skip
+
+
+def _forms(made: Page, found: Investigation) -> None:
+    """Where each effect named acts, what it does there and by which law; curves that were found."""
+    if not found.names:
+        return
+    told = forms(found)
+    made.heading("Where it acts, and by which law")
+    rows = [
+        [f.name, joined(f.effect.places), KINDS[f.effect.kind] if f.effect.kind else "",
+         f"the {f.law}'s" if f.law == CATALOGUE else f.effect.differs, f.effect.name]
+        for f in told
+    ]  # fmt: skip
+    made.table(
+        ["effect", "where", "what it does there", "law", "effect in the model"], rows,
+        "The catalogue's law is tried first; another law or place of the same kind only where that leaves something.",
+        words=(1, 2, 3, 4),
+    )  # fmt: skip
+    for form in told:
+        if form.found is not None:
+            made.chart(
+                _curve(form.found),
+                f"{form.name}: the law found, with its 95 % band, beside the catalogue's as it fits these events best.",
+            )
+
+
+def _curve(found: Found) -> Chart:
+    """A law with its band, and the textbook's."""
+    law = found.curve
+    made = Chart(law.x_label, [law.y_label], pixels=320)
+    made.band("", law.x, found.band[0], found.band[1], CURVE)
+    made.line("the law found", law.x, law.y, CURVE, width=2.2)
+    made.line("the catalogue's law", law.x, found.textbook, TEXTBOOK, dash="dash")
+    shown = np.concatenate([law.y, found.textbook])
+    room = 0.25 * max(float(np.ptp(shown)), 1e-6)
+    return made.limits(0, float(shown.min()) - room, float(shown.max()) + room)
 
 
 def _candidates(made: Page, found: Investigation) -> None:

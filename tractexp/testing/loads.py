@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from tractexp.errors import UserError, among
+from tractexp.model import sites
 from tractexp.model.drive import INPUTS, PHASORS, WAVES, Drive
 from tractexp.model.model import Model, compose
 from tractexp.model.parts import Effect, Measurement, Motor, Part, Static
@@ -234,6 +235,45 @@ def has_sizes_that_matter(cls: type[Effect]) -> None:
         assert name in others, f"'{cls.name}' is confused with '{name}', no other effect{among(name, others)}"
 
 
+def acts_where_it_says(cls: type[Effect]) -> None:
+    """It declares where it acts and what it does there, and edits the sites of these places and no others."""
+    assert cls.places, f"'{cls.name}' does not say in 'places' where it acts; choose of {', '.join(sites.PLACES)}"
+    assert cls.kind, f"'{cls.name}' does not say in 'kind' what it does; choose of {', '.join(sites.KINDS)}"
+    edited = with_part(cls).equations.edits.get(cls.name, [])
+    for site in edited:
+        there = any(site in sites.PLACES[place] for place in cls.places)
+        assert there, f"'{cls.name}' edits the site {site}, which is in none of its places: {', '.join(cls.places)}"
+    for place in cls.places:
+        measures = place == "measurement" and issubclass(cls, Measurement)
+        free = place == "bus" or not sites.PLACES[place] or measures  # what it draws needs no site
+        there = free or any(site in sites.PLACES[place] for site in edited)
+        assert there, f"'{cls.name}' says that it acts on the {place}, and edits no site there"
+
+
+def belongs_to_its_family(cls: type[Effect]) -> None:
+    """A member of a family names a textbook effect of its kind, says what differs, and nests it where it says so."""
+    known = discover()["effect"]
+    if not cls.family:
+        return
+    assert cls.family in known, f"'{cls.name}' belongs to '{cls.family}', no effect{among(cls.family, known)}"
+    textbook = known[cls.family]
+    assert not textbook.family, f"'{cls.name}' belongs to '{cls.family}', which is itself a member of a family"
+    assert textbook.kind == cls.kind, f"'{cls.name}' is a {cls.kind}, and '{cls.family}' a {textbook.kind}"
+    assert cls.differs, f"'{cls.name}' does not say in 'differs' what differs from '{cls.family}'"
+    own, theirs = {p.name for p in cls.parameters}, {p.name for p in textbook.parameters}
+    assert cls.as_textbook.keys() <= own, f"'as_textbook' of '{cls.name}' names no parameter of it"
+    assert {*cls.as_textbook.values()} <= theirs, f"'as_textbook' of '{cls.name}' names no parameter of '{cls.family}'"
+    if not cls.nests_textbook:
+        return
+    of, book = with_part(cls), with_part(textbook)
+    sizes = {p.name: on(p) for p in textbook.parameters if p.null is not None}
+    chosen = {p.name: sizes.get(p.name, p.default) for p in textbook.parameters}
+    drive = drives.drive(0.3, 0.5, domain=of.domain)
+    mine = values(of, lambda p: chosen[cls.as_textbook[p.name]] if p.name in cls.as_textbook else p.default)
+    off = np.abs(play(of, drive, mine) - play(book, drive, values(book, lambda p: chosen.get(p.name, p.default)))).max()
+    assert off < SAME, f"'{cls.name}' does not nest '{cls.family}': {off:.2g} pu apart where both should be one"
+
+
 def is_the_base_model_at_its_null(cls: type[Effect]) -> None:
     """With its sizes at their nulls the load is the base model, whatever its other parameters: the two are nested."""
     of, bare = with_part(cls), without(cls)
@@ -287,7 +327,8 @@ EVERY: tuple[Check, ...] = (says_what_it_is, is_finite_or_refused_at_its_bounds)
 EQUATIONS: tuple[Check, ...] = (prints_its_equations, rests, converges_in_order_four)
 PARTS: tuple[Check, ...] = (*EVERY, *EQUATIONS, composes_with_every_other, takes_or_refuses_every_effect)
 EFFECTS: tuple[Check, ...] = (
-    *EVERY, has_sizes_that_matter, is_the_base_model_at_its_null, is_seen_in_a_dip, is_taken_or_refused_by_every_model,
+    *EVERY, acts_where_it_says, belongs_to_its_family, has_sizes_that_matter, is_the_base_model_at_its_null,
+    is_seen_in_a_dip, is_taken_or_refused_by_every_model,
 )  # fmt: skip
 SUITES: Sequence[tuple[type, tuple[type, ...], tuple[Check, ...]]] = (
     (Motor, (), PARTS),

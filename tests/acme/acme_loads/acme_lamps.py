@@ -21,6 +21,7 @@ class AcmeLamps(Effect):
     lamp_level = Parameter(0.7, (0.4, 0.9), "1", "voltage below which they go out, over U_0", HANDBOOK, "u_d")
     lamp_time = Parameter(0.5, (0.1, 5.0), "s", "time in which they strike again", HANDBOOK, "T_d")
 
+    places, kind = ("static P", "static Q"), "trip"
     relevant = {"lamp_share": 0.03}
     grid = {"lamp_level": (0.5, 0.7, 0.85), "lamp_time": (0.3, 1.0)}
     confused_with = ("undervoltage_trip", "exponential_recovery")

@@ -1,0 +1,38 @@
+"""What begins with a dip or after it, told from the voltage, sample by sample."""
+
+from tractexp.extend import sites
+from tractexp_plugins.effects._operators import gate, larger, smaller
+
+LEVEL, BEGUN = 0.0015, 0.96  # how sharp a level is, and the voltage over U_0 below which a dip has begun
+WIDTH = 0.02  # of a change: how rounded its corners are
+
+
+def since(eq, returned, name):
+    """Time [s] since the dip began, or since the voltage had `returned` from its lowest by more than half; 0 before."""
+    import sympy
+
+    u = eq.U / eq.U0
+    lowest, time = eq.memory(f"lowest_{name}", r"u_{min}"), eq.memory(f"time_{name}", "t_d")
+    eq.renews(lowest, sympy.Min(lowest, u), 1)
+    begun = gate(BEGUN - lowest, LEVEL)
+    over = begun * gate(u - (1 + lowest) / 2, LEVEL) if returned else begun
+    eq.renews(time, time + eq.step * sympy.Max(over, gate(time - eq.step, 0.04 * eq.step)), 0)
+    return time
+
+
+def changes(eq, returned, name, sizes, wait, duration, static):
+    """Let P and Q change by `sizes` within `duration` [s], `wait` [s] after the time of `since`.
+
+    Where `static` is 1 all but the motors change.
+    """
+    time = since(eq, returned, name)
+    ramp = lambda t: smaller(1, larger(0, (t - wait) / duration, WIDTH), WIDTH)  # noqa: E731
+    way = eq.define(f"changed_{name}", ramp(time) - ramp(0), "r")
+    if eq.waves:
+        places = ((sites.current, sites.motor_current, sizes[0]),)
+    else:
+        places = ((sites.P, sites.P_motor, sizes[0]), (sites.Q, sites.Q_motor, sizes[1]))
+    for site, motor, size in places:
+        there = motor in eq
+        spared = static * eq[motor] if there else 0
+        eq.edit(site, lambda drawn, size=size, spared=spared: drawn + size * way * (drawn - spared))

@@ -1,0 +1,26 @@
+"""An undervoltage relay and the contactors behind it, on the samples: what every effect that trips has in common."""
+
+from tractexp_plugins.effects._operators import gate
+
+LEVEL, TIME = 0.0025, 0.3  # how sharp a relay is: in voltage over U_0, and in samples
+
+
+def opened(eq, level, delay, wait, margin, ramp, stage=""):
+    """What is open, 0 to 1: all once the voltage stayed below `level` for `delay`, until it stayed above for `wait`.
+
+    Then it returns within `ramp`. `stage` ends the names of a second relay's states.
+    """
+    import sympy
+
+    u = eq.U / eq.U0
+    below, above = eq.memory(f"time_below{stage}", f"t_b{stage}"), eq.memory(f"time_above{stage}", f"t_a{stage}")
+    tripped = eq.memory(f"tripped{stage}", f"g{stage}")
+    low = eq.define(f"voltage_low{stage}", gate(level - u, LEVEL), rf"\ell{stage}")
+    high = eq.define(f"voltage_back{stage}", gate(u - level - margin, LEVEL), f"h{stage}")
+    goes = eq.define(f"relay_goes{stage}", low * gate(below - delay, TIME * eq.step), f"g{stage}_+")
+    returns = eq.define(f"relay_returns{stage}", high * gate(above - wait, TIME * eq.step), f"g{stage}_-")
+    eq.renews(below, low * (below + eq.step), 0)
+    eq.renews(above, high * (above + eq.step), 0)
+    left = sympy.Max(0, tripped - returns * eq.step / (ramp + eq.step))
+    eq.renews(tripped, left + (1 - left) * goes, 0)
+    return tripped

@@ -1,0 +1,172 @@
+"""Families of effects: another place or another law is named where the catalogue's leaves something, and only there."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from test_discrepancy import base, bench, events
+from test_discrepancy_page import page
+
+from tractexp.discrepancy import families
+from tractexp.discrepancy.catalogue import catalogue
+from tractexp.discrepancy.discrepancy_json import content, write_model
+from tractexp.discrepancy.families import open_settings, pointed_to, starts, worth
+from tractexp.discrepancy.fitting import Refit
+from tractexp.discrepancy.forms import forms
+from tractexp.discrepancy.investigate import investigate
+from tractexp.errors import UserError
+from tractexp.extend import Effect, Parameter, plugin
+from tractexp.plugin import discover, get
+
+TRIPS = ("undervoltage_trip", "exponential_recovery")
+CORE = ("magnetic_saturation", "stator_resistance")
+NODE = {"motor": {"name": "electromechanical"}, "static": {"name": "exponential"}, "bounds": {}, "fixed": {}}
+MEMBERS = sorted(name for name, cls in discover()["effect"].items() if cls.family)
+
+
+def found(effect, size, seed, only, **settings):
+    made = events(effect, size=size, seed=seed, count=3, **settings)
+    return investigate(base(), made[:2], made[2:], {}, {}, only=only)
+
+
+@pytest.fixture(scope="module")
+def static_part():
+    return found("static_part_trip", 1.0, 800011, TRIPS)
+
+
+@pytest.fixture(scope="module")
+def knee():
+    return found("knee_saturation", 1.5, 800012, CORE)
+
+
+def test_a_trip_of_the_static_part_is_a_trip_elsewhere(static_part):
+    assert static_part.verdict.word == "named"
+    assert static_part.names == ("static_trip",)
+    assert "undervoltage_trip of the static load only explains" in static_part.verdict.reason
+    share = next(e for e in static_part.after if e.parameter.name == "static_tripped")
+    assert share.value == pytest.approx(0.1, abs=4 * share.error)
+
+
+def test_what_machines_read_has_the_catalogues_name_and_the_form_beside_it(static_part, tmp_path):
+    made = json.loads(json.dumps(content(static_part), default=str))
+    assert made["effects"] == ["undervoltage_trip"]
+    assert made["name_sets"] == [["undervoltage_trip"]]
+    form = made["forms"]["undervoltage_trip"]
+    assert form["place"] == ["static P", "static Q"]
+    assert (form["kind"], form["law"], form["effect"], form["curve"]) == ("trip", "other", "static_trip", None)
+    path = write_model(static_part, NODE, tmp_path / "extended.yaml")
+    assert "effects:\n- static_trip" in path.read_text()
+
+
+def test_the_catalogues_own_trip_keeps_its_name():
+    made = found("undervoltage_trip", 1.0, 800011, TRIPS)
+    assert made.names == ("undervoltage_trip",)
+    (form,) = forms(made)
+    assert form.law == "catalogue"
+    assert not any(set(names) & set(MEMBERS) for names in made.explanations.refits)
+
+
+def test_nothing_is_tried_where_nothing_is_missing(monkeypatch):
+    monkeypatch.setattr(families, "rough_refit", lambda *_: pytest.fail("a member was fitted"))
+    assert found(None, 1.0, 3, TRIPS).verdict.word == "none"
+
+
+def test_a_core_with_a_knee_saturates_but_not_by_the_catalogues_law(knee):
+    assert knee.verdict.word == "named"
+    assert knee.names == ("saturation_curve",)
+    assert "magnetic_saturation, but not by the catalogue's law, explains" in knee.verdict.reason
+    (form,) = forms(knee)
+    curve, band = form.found.curve, form.found.band
+    assert np.all(np.diff(curve.y) <= 0)  # monotone
+    assert np.all(band[0] <= curve.y)
+    assert np.all(curve.y <= band[1])
+    early, late = np.diff(curve.y)[[2, -2]]
+    assert abs(late) < 0.7 * abs(early)  # it flattens below the knee
+    told = content(knee)["forms"]["magnetic_saturation"]
+    assert told["law"] == "other"
+    assert len(told["curve"]["lower"]) == len(told["curve"]["x"]) == len(told["curve"]["textbook"])
+
+
+def test_the_page_shows_the_law_found_beside_the_catalogues(knee, tmp_path):
+    words, charts = page(knee, tmp_path)
+    assert "NAMED magnetic_saturation, but not by the catalogue's law" in words
+    assert "Where it acts, and by which law" in words
+    drawn = next(c for c in charts if any(t["name"] == "the law found" for t in c["data"]))
+    assert {"the law found", "the catalogue's law"} <= {t["name"] for t in drawn["data"]}
+    assert any(t.get("fill") == "tonexty" for t in drawn["data"])  # the band
+
+
+def fit(deviance, parameters, *names):
+    return Refit(names, np.zeros(0), deviance, parameters)
+
+
+def test_a_member_pays_for_its_further_parameters():
+    """The same gain is worth one further parameter and not three; none where it is no better."""
+    textbook = fit(200.0, 1, "one")
+    assert worth(fit(178.0, 2, "other"), textbook, 1e-5)
+    assert not worth(fit(178.0, 4, "other"), textbook, 1e-5)
+    assert not worth(fit(201.0, 2, "other"), textbook, 1.0)
+
+
+def test_members_are_tried_only_around_what_comes_near():
+    made = events(count=1)
+    missing = catalogue(base().motor, base().static, (), made)
+    at = SimpleNamespace(catalogue=missing)
+    tests = SimpleNamespace(fit=fit(1.0, 1, "stator_resistance"), faults=(), loudest="the loudest window")
+    refits = {("stator_resistance",): fit(1.0, 1, "stator_resistance")}
+    assert pointed_to(at, tests, refits) == []
+    refits["magnetic_saturation",] = fit(2.0, 1, "magnetic_saturation")
+    assert [m.name for m in pointed_to(at, tests, refits)] == ["saturation_curve"]
+    tests.faults = ("load_drift",)
+    assert {m.effect.family for m in pointed_to(at, tests, refits)} == {"load_drift", "magnetic_saturation"}
+    tests.faults, tests.loudest = (), "a step or a pulse"
+    assert {m.effect.kind for m in pointed_to(at, tests, refits)} == {"law", "trip", "drift"}
+
+
+def test_members_belong_to_the_effects_that_are_asked_for():
+    made = events(count=1)
+    names = lambda only: {m.name for m in catalogue(base().motor, base().static, (), made, only).members}  # noqa: E731
+    assert names(("magnetic_saturation",)) == {"saturation_curve"}
+    assert names(("stator_resistance",)) == set()
+    assert names(()) == set(MEMBERS)
+
+
+def test_a_member_is_no_candidate_of_the_first_search():
+    missing = catalogue(base().motor, base().static, (), events(count=1))
+    assert not {c.name for c in missing.candidates} & set(MEMBERS)
+    assert missing.textbook(("saturation_curve", "load_drift")) == ("magnetic_saturation", "load_drift")
+
+
+def test_a_member_that_nests_the_textbook_starts_from_its_fit():
+    """There it calculates what the textbook does, so that it can only fit better."""
+    at = bench(base(), events(), CORE)
+    unit = at.coordinates.null.copy()
+    unit[at.coordinates.column["saturation"]] = at.coordinates.to_unit("saturation", 0.5)
+    refits = {(): Refit((), at.coordinates.null, 0.0, 0), ("magnetic_saturation",): Refit(CORE[:1], unit, 0.0, 1)}
+    member = at.catalogue["saturation_curve"]
+    begun = [point for _, point in starts(at, member, refits)]
+    assert len(begun) == len(open_settings(member, ("curve_saturation",)))
+    textbook = at.residuals(unit[None], CORE[:1])[0]
+    apart = [np.abs(at.residuals(point[None], (member.name,))[0] - textbook).max() for point in begun]
+    assert min(apart) < 1e-12
+    assert max(apart) > 1e-4
+
+
+def test_a_place_or_a_kind_that_there_is_not_is_refused_with_the_nearest():
+    about = {"__doc__": "a = b. Source: here.", "__module__": "elsewhere.stranger", "__annotations__": {}}
+    for told, sentence in (({"places": ("static p",)}, "did you mean 'static P'"), ({"kind": "lags"}, "mean 'lag'")):
+        size = {"a": Parameter(0.0, (0.0, 1.0), "1", "size", "here", null=0.0)}
+        made = type("Stranger", (Effect,), about | size | {"edit": lambda self, eq, a: None} | told)
+        with pytest.raises(UserError, match=sentence):
+            plugin(made)
+
+
+@pytest.mark.parametrize("name", [n for n in MEMBERS if get("effect", n)().curve(**{
+    p.name: p.default for p in get("effect", n)().parameters}) is not None])  # fmt: skip
+def test_every_curve_is_monotone_whatever_its_bends(name):
+    effect, rng = get("effect", name)(), np.random.default_rng(1)
+    for _ in range(20):
+        law = effect.curve(**{p.name: rng.uniform(*p.bounds) for p in effect.parameters})
+        slopes = np.diff(law.y)
+        assert (slopes <= 1e-9).all() or (slopes >= -1e-9).all()

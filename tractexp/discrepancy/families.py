@@ -1,0 +1,96 @@
+"""Members of families: the kind of a textbook effect at another place, or its place with another law.
+
+They are tried only where the best single textbook effect leaves something, and only around what it points to: the
+families of the nearest effects, of the faults of the measurement that stand out, and of the kinds that the loudest test
+of what is left speaks for. A member must explain more than the textbook effect beyond what its further parameters cost,
+and leave nothing.
+"""
+
+import itertools
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.special import chdtrc
+
+from tractexp.discrepancy.base_fit import BaseFit
+from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.catalogue import Candidate
+from tractexp.discrepancy.disagreement import Disagreement, examined
+from tractexp.discrepancy.fitting import Refit, Start, refit, rough_refit
+
+NEAREST = 5  # textbook effects whose families are tried
+EXAMINED = 3  # members whose remainder is tested
+CLOSE = 12.0  # of the deviance: a rough refit this near the best is made exact
+BEGUN = 0.5  # smallest relevant sizes at which a size without a textbook value starts
+POINTS = {"a step or a pulse": ("trip", "drift"), "an oscillation": ("oscillation",)}  # kinds that a test speaks for
+
+Names = tuple[str, ...]
+
+
+def member_that_suffices(
+    base: BaseFit, tests: Disagreement, refits: Mapping[Names, Refit], seed: int
+) -> tuple[Disagreement, list[Refit]] | None:
+    """The tests at the best member that leaves nothing where `tests` of the best textbook effect leave something.
+
+    With the fits of the members that were compared; None where no member suffices.
+    """
+    bench, noise = base.bench, tests.noise
+    wanted = pointed_to(bench, tests, refits)
+    if not wanted:
+        return None
+    bench.effort.say(f"trying {len(wanted)} other places and laws of what comes near")
+    bench.kernels.family.compile_members([m.name for m in wanted], bench.effort.say)
+    begun = [rough_refit(bench, noise, starts(bench, member, refits))[0] for member in wanted]
+    least = min(f.cost for f in begun)
+    fits = refit(bench, noise, [(f.names, f.unit) for f in begun if f.cost < least + CLOSE])
+    for k, fit in enumerate(fits[:EXAMINED]):
+        if not worth(fit, tests.fit, bench.criteria.family_p) or not bench.kernels.family.joins(fit.names[0]):
+            continue
+        bench.kernels.family.compile_members(fit.names, bench.effort.say, whole=True)
+        there = examined(base.quiet, fit, noise, seed + k)
+        if there.adequate and not there.asks_for_more:
+            return there, [there.fit, *(f for f in fits if f is not fit)]
+    return None
+
+
+def worth(member: Refit, textbook: Refit, p: float) -> bool:
+    """Whether a member explains more than the best textbook effect by more than its further parameters cost."""
+    further = max(member.parameters - textbook.parameters, 1)
+    gained = textbook.deviance - member.deviance
+    return gained > 0 and float(chdtrc(further, gained)) < p
+
+
+def pointed_to(bench: Bench, tests: Disagreement, refits: Mapping[Names, Refit]) -> list[Candidate]:
+    """The members of the families around what the search selected and what its remainder speaks for."""
+    singles = sorted((f for f in refits.values() if len(f.names) == 1), key=lambda f: f.cost)
+    heads = {f.names[0] for f in singles[:NEAREST]} | {*tests.fit.names, *tests.faults}
+    kinds = POINTS.get(tests.loudest, ())
+    return [m for m in bench.catalogue.members if m.effect.family in heads or m.effect.kind in kinds]
+
+
+def starts(bench: Bench, member: Candidate, refits: Mapping[Names, Refit]) -> list[Start]:
+    """Starts of a member: from the textbook's fit, or the base model's, with every setting that it leaves open."""
+    at, effect = bench.coordinates, member.effect
+    textbook = refits.get((effect.family,)) if effect.as_textbook else None
+    ground, known = refits[()].unit.copy(), {}
+    if textbook is not None:
+        known = {own: at.value(theirs, textbook.unit) for own, theirs in effect.as_textbook.items()}
+        ground = textbook.unit.copy()
+        ground[at.parameters([effect.family])] = at.null[at.parameters([effect.family])]
+    for size in member.sizes:
+        low, high = size.bounds
+        known.setdefault(size.name, float(np.clip(size.null + BEGUN * member.relevant(size), low, high)))
+    made = []
+    for begin in (ground, refits[()].unit)[: 1 + (textbook is not None and not effect.nests_textbook)]:
+        for setting in open_settings(member, tuple(known)):
+            point = begin.copy()
+            for p in effect.parameters:
+                point[at.column[p.name]] = at.to_unit(p.name, (setting | known).get(p.name, p.default))
+            made.append(((member.name,), point))
+    return made
+
+
+def open_settings(member: Candidate, known: Sequence[str]) -> list[dict[str, float]]:
+    """Every combination of the scanned values of the parameters that the textbook's fit does not tell."""
+    grid = {name: values for name, values in member.effect.grid.items() if name not in known}
+    return [dict(zip(grid, choice, strict=True)) for choice in itertools.product(*grid.values())]
