@@ -73,8 +73,8 @@ REFUSED = [
     (["data=csv", "data.train=dip.csv"], "data.train takes a list, such as data.train=[a,b]"),
     (["~seed"], "~seed takes out what every run needs"),
     (["~model"], "~model takes out what every run needs"),
-    (["~model.effects"], "model.effects is taken out, and every run needs it"),
-    (["~optimizer.name"], "optimizer lacks the name of what is chosen; write optimizer=NAME"),
+    (["~model.effects"], "~model.effects cannot be applied"),
+    (["~optimizer.name"], "~optimizer.name cannot be applied"),
     (["optimizer=-1"], "optimizer=-1: what is chosen there has a name"),
     (["model=null"], "model=null: what is chosen there has a name"),
     (["task=[profile]"], "task=[profile]: what is chosen there has a name"),
@@ -88,7 +88,7 @@ REFUSED = [
     (["tracking.uri=a\nb"], "tracking.uri=a b has a line break"),
     (["optimizer.population=99999999999"], "optimizer.population=99999999999 is out of range"),
     (["hydra.run.dir=/dev/null/x"], "/dev/null/x cannot be made (Not a directory); choose another folder"),
-    (["-m", "hydra.sweep.dir=/dev/null/x", "seed=1,2"], "/dev/null/x"),
+    (["-m", "hydra.sweep.dir=/dev/null/x", "seed=1,2"], "/dev/null/x/multirun.yaml cannot be written"),
 ]
 # one process for all: what takes time is to start
 SESSION = """if True:

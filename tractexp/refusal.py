@@ -119,6 +119,8 @@ def _plain(error: BaseException) -> str:
         return (
             f"{_short(found[1])} cannot be read; an argument is KEY=VALUE, and other signs go in quotes: KEY='a \"b\"'"
         )
+    if found := re.match(r"Error merging override (.*)", text, re.DOTALL):
+        return f"{_short(found[1])} cannot be applied: every run may need that setting, or it holds no such value"
     return text if not PYTHON.search(text) else _unforeseen(error)
 
 

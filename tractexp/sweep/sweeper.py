@@ -76,7 +76,6 @@ class Grid(Sweeper):
         if len(left) < len(jobs):
             say(f"  {len(jobs) - len(left)} of them are finished and kept; hydra.sweeper.redo=true runs them again")
         if left:
-            folder.mkdir(parents=True, exist_ok=True)
             files.write(folder / "multirun.yaml", OmegaConf.to_yaml(self.config))
             with parent_run(folder, jobs, told, afresh=self.redo):
                 self._run(left)
