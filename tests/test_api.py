@@ -231,10 +231,10 @@ REFUSED = {
         d, model=tractexp.compose(per_event=["T_m"])
     ),
     "identify(): missing a required argument: 'records'": lambda d: tractexp.identify(),
-    "seed='x' is a str, but it must be a whole number": lambda d: tractexp.identify(d, seed="x"),
+    "seed='x' is a text, but it must be a whole number": lambda d: tractexp.identify(d, seed="x"),
     "seed=-1 is out of range": lambda d: tractexp.identify(d, seed=-1),
     "budget=0 is out of range": lambda d: tractexp.identify(d, budget=0),
-    "bounds={'C': 3} is a dict, but it must be a mapping": lambda d: tractexp.identify(d, bounds={"C": 3}),
+    "bounds={'C': 3} is a mapping, but it must be a mapping": lambda d: tractexp.identify(d, bounds={"C": 3}),
     "bounds.C: bounds [0.9, 0.5] must be two finite numbers": lambda d: tractexp.identify(d, bounds={"C": [0.9, 0.5]}),
     "fixed.Cc: this model has no parameter 'Cc'; did you mean 'C'?": lambda d: tractexp.identify(d, fixed={"Cc": 1.0}),
     "substeps=0 is out of range": lambda d: tractexp.identify(d, substeps=0),
@@ -246,11 +246,11 @@ REFUSED = {
     "optimizer 'pso' has no setting 'populaton'; did you mean 'population'?": lambda d: tractexp.identify(
         d, optimizer={"name": "pso", "populaton": 3}
     ),
-    "optimizer.population='many' is a str": lambda d: tractexp.identify(
+    "optimizer.population='many' is a text": lambda d: tractexp.identify(
         d, optimizer={"name": "pso", "population": "many"}
     ),
-    "objective=3 is an int, but it must be a text or a mapping": lambda d: tractexp.identify(d, objective=3),
-    "per_event='T_m' is a str, but it must be a list, each a text": lambda d: tractexp.identify(d, per_event="T_m"),
+    "objective=3 is a whole number, but it must be a text or a mapping": lambda d: tractexp.identify(d, objective=3),
+    "per_event='T_m' is a text, but it must be a list, each a text": lambda d: tractexp.identify(d, per_event="T_m"),
     "records is empty": lambda d: tractexp.identify([]),
     "false_alarms=0.9 is out of range": lambda d: tractexp.investigate(d, false_alarms=0.9),
     "names 'stator_resistence', which is no effect": lambda d: tractexp.investigate(d, effects=["stator_resistence"]),
@@ -269,7 +269,7 @@ REFUSED = {
     "either records to play, or the depth of a dip": lambda d: tractexp.simulate(values=MOTOR),
     "duration describes a dip made by hand": lambda d: tractexp.simulate(values=MOTOR, records=d, duration=0.3),
     "parameter=X_prim is not a free parameter": lambda d: tractexp.plan(d, parameter="X_prim"),
-    "fit='result.json' is a str, but it must be an Identification": lambda d: tractexp.profile("result.json"),
+    "fit='result.json' is a text, but it must be an Identification": lambda d: tractexp.profile("result.json"),
     "nowhere.json cannot be read": lambda d: tractexp.load("nowhere.json"),
 }  # fmt: skip
 

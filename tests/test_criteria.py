@@ -20,6 +20,7 @@ from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.judgement import judged
 from tractexp.discrepancy.next_dip import NextDip, mildest
 from tractexp.discrepancy.projection import Score
+from tractexp.discrepancy.proposal.judge import Before, Weighed
 from tractexp.errors import UserError
 from tractexp.noise.wander import Rest, find
 from tractexp.plugin import get
@@ -96,6 +97,16 @@ def chosen_dip(c):
     return mildest([NextDip(0.2, 0.1, 0.93), NextDip(0.6, 0.1, 0.99)], c.decided).depth
 
 
+def proposed(closed=0.9, left=1.0, p=1e-6):
+    """A term that would be proposed."""
+
+    def curve(deviance):
+        return SimpleNamespace(deviance=deviance, chi2_per_sample=left)
+
+    before = Before(SimpleNamespace(samples=1000), curve(2000.0), curve(2000.0 - closed * 1000.0))
+    return Weighed(None, before, before, p, None)
+
+
 CASES = {  # criterion: a looser value, the decision, what it is by default
     "false_alarms": (0.06, lambda c: at_fit(c, 0.044).asks_for_more, False),
     "naming_share": (0.9, lambda c: at_fit(c, 0.042).asks_for_more, False),
@@ -122,6 +133,9 @@ CASES = {  # criterion: a looser value, the decision, what it is by default
     "measurement_prior": (6.0, lambda c: prior_of_skew(c) < 0.0051, True),
     "frequency_swing": (0.04, lambda c: "moves by less than" in swinging(c), True),
     "testable": (0.7, status, "not testable"),
+    "proposal_closed": (0.58, lambda c: proposed(closed=0.59).stands(c), False),
+    "proposal_left": (1.8, lambda c: proposed(left=1.75).stands(c), False),
+    "proposal_p": (0.02, lambda c: proposed(p=0.011).stands(c), False),
     "decided": (0.9, chosen_dip, 0.6),
 }
 

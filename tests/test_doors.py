@@ -139,6 +139,31 @@ def test_what_numba_compiles_for_is_what_it_keeps_code_apart_by():
     assert all(f[0] in "+-" for f in features.split(",") if f)
 
 
+def test_numba_still_loads_what_it_kept_without_a_look(tmp_path):
+    """With the door shut a planted pickle is a miss: tests/test_cache.py."""
+    import importlib.util
+    import pickle
+
+    class Planted:
+        def __reduce__(self):
+            return Path.touch, (tmp_path / "mark",)
+
+    (tmp_path / "made.py").write_text("from numba import njit\n@njit(cache=True)\ndef same(x):\n    return x\n")
+
+    def loaded():
+        spec = importlib.util.spec_from_file_location("made", tmp_path / "made.py")
+        assert spec
+        assert spec.loader
+        spec.loader.exec_module(module := importlib.util.module_from_spec(spec))
+        return module.same
+
+    loaded()(1.0)
+    (index,) = tmp_path.rglob("*.nbi")
+    index.write_bytes(pickle.dumps(Planted()))
+    loaded()(1.0)
+    assert (tmp_path / "mark").exists(), MENDED.format("numba/numba#10839", "numba_cache")
+
+
 def test_differential_evolution_goes_a_generation_at_a_time_as_the_public_function_goes_in_one():
     import numpy as np
     from scipy.optimize import differential_evolution

@@ -66,7 +66,7 @@ def test_the_estimate_fits_no_worse_than_any_search_by_its_own_likelihood(fit):
 
 
 def test_result_json_tells_estimate_search_and_origin(fit, tmp_path):
-    fit.write_result(tmp_path)
+    fit.write_results(tmp_path)
     told = json.loads((tmp_path / "result.json").read_text())
     assert told["parameters"].keys() == told["intervals"].keys() == told["search"]["parameters"].keys()
     assert set(told["search"]) >= {"objective", "epsilon_p", "epsilon_q", "simulations", "seconds"}

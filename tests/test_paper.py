@@ -254,9 +254,10 @@ def test_workers_change_no_result():
 @pytest.fixture
 def memory(tmp_path, monkeypatch):
     """A cache of its own, in which nothing is remembered yet; the kernels are those of the others."""
-    from tractexp.replication import remembered
 
-    monkeypatch.setattr(remembered, "cache_folder", lambda: tmp_path)
+    from tractexp.identification import shelf
+
+    monkeypatch.setattr(shelf, "cache_folder", lambda: tmp_path)
     return tmp_path / "searches"
 
 
@@ -297,14 +298,14 @@ def test_a_search_of_anything_else_is_never_read_back(memory, monkeypatch):
 
 
 def test_a_damaged_memory_is_made_anew_and_the_oldest_are_forgotten(memory, monkeypatch):
-    from tractexp.replication import remembered
+    from tractexp.identification import shelf
 
     searched(monkeypatch)
     for k, path in enumerate(memory.iterdir()):
         path.write_bytes([b"no zip", path.read_bytes()[:200]][k])
     assert searched(monkeypatch)[1] == 2
     assert searched(monkeypatch)[1] == 0
-    monkeypatch.setattr(remembered, "MOST", 3)
+    monkeypatch.setitem(shelf.SHELVES, "searches", 3)
     searched(monkeypatch, seeds=5)
     assert len(list(memory.iterdir())) == 3
 
@@ -323,7 +324,7 @@ def test_a_figure_of_one_run_makes_one_search(memory, tmp_path, monkeypatch):
     for _ in range(2):
         study = Study(_recipe, {}, _recipe().events, (), 30, workers=1, limits=searches.Limits(150), tell=told.append)
         study.prepare(["figure8"])
-        paper.write(study, ["figure8"], claims.claims(study, ["figure8"]), tmp_path)
+        paper.sheets(study, ["figure8"], claims.claims(study, ["figure8"]))
     assert made == [(["issa"], 1)] * 2
     again = "  1 of them were made before by the same code on the same records, and are read back"
     searched_, wrote = "searches of issa: seed 0, 300 iterations of 50", "writing Figure 8"
@@ -676,7 +677,7 @@ def test_the_equations_alone_take_no_search(tmp_path, monkeypatch):
     study = Study(_recipe, {}, _recipe().events, (), 30)
     judged = claims.claims(study, ["equations"])
     assert [claim.verdict for claim in judged] == [claims.REFUTED] * 2
-    text = paper.write(study, ["equations"], judged, tmp_path)[1].read_text()
+    text = paper.sheets(study, ["equations"], judged)[1].write(tmp_path / "paper.md").read_text()
     assert text.count("| does not agree |") == sum(not check.holds for check in equations.checks())
 
 

@@ -95,7 +95,8 @@ TestDocumented = tractexp.testing.contract(
 @pytest.mark.parametrize("name", sorted(discover()["effect"]))
 def test_every_effect_edits_a_load_that_gives_a_law_only(name):
     effect = get("effect", name)()
-    parts = get("model/motor", "electromechanical")(), get("model/static", "linear_load")()
+    motor = {"rotor_flux": "mechanical", "rotor_speed": "voltage"}.get(name, "electromechanical")
+    parts = get("model/motor", motor)(), get("model/static", "linear_load")()
     model = compose(*parts, domain="waves" if effect.waves_only else "phasors")
     assert model.acceptance(effect).refusal is None
 
@@ -107,6 +108,8 @@ def test_a_motor_takes_what_its_sites_allow_and_says_why_not():
     assert {name: why for name, why in refusals.items() if why} == {
         "magnetic_saturation": "its equations have no C",
         "negative_sequence_braking": "its equations have no coupling ((X - X')/X, the rotor's share in the reactance)",
+        "rotor_flux": "its rotor flux moves already",
+        "rotor_speed": "its speed moves already",
     }
 
 

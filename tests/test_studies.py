@@ -85,7 +85,7 @@ def test_a_result_prints_and_tabulates(name, request):
 
 
 def test_a_comparison_holds_what_its_file_does(compared, tmp_path):
-    content = json.loads(compared.write(tmp_path)[1].read_text())
+    content = json.loads(compared.write(tmp_path)[0].read_text())
     assert content == compared.content
     frame = compared.to_frame().set_index("variant")
     assert list(frame.index[:2]) == ["good", "bad"]
@@ -194,7 +194,7 @@ def test_a_study_takes_a_model_in_every_form(forms, dips, model):
         (lambda d: tractexp.compare("x", filter="y"), "sweep and filter are both given"),
         (lambda d: tractexp.compare("missing"), "sweep=missing is not a folder"),
         (lambda d: tractexp.compare("x", targets=[0.5]), "targets=0.5 is out of range"),
-        (lambda d: tractexp.compare("x", targets="2"), "targets='2' is a str, but it must be a list, each a number"),
+        (lambda d: tractexp.compare("x", targets="2"), "targets='2' is a text, but it must be a list, each a number"),
         (lambda d: tractexp.compare("x", floor=0), "floor=0 must be an objective above 0"),
         (lambda d: tractexp.compare("x", tie=1), "compare() has no argument 'tie'; did you mean 'ties'?"),
         (lambda d: tractexp.benchmark([]), "optimizers is empty"),
@@ -215,7 +215,7 @@ def test_a_study_takes_a_model_in_every_form(forms, dips, model):
         (lambda d: tractexp.generalise(d, validate=d, fixed={"c": 1}), "fixed.c: this model has no parameter 'c'"),
         (lambda d: tractexp.generalise(d, "third", validate=d), "model=third: there is no such choice"),
         (lambda d: tractexp.paper(d[:1], parts=["table6"]), "parts=table6 is not one of"),
-        (lambda d: tractexp.paper(d[:1], parts="table2"), "parts='table2' is a str, but it must be a list"),
+        (lambda d: tractexp.paper(d[:1], parts="table2"), "parts='table2' is a text, but it must be a list"),
         (lambda d: tractexp.paper(d[:1], parts=["table5"]), "name one in validate, or leave the table out with parts"),
         (lambda d: tractexp.paper(d[:1], seeds=0), "seeds=0 is out of range"),
     ],

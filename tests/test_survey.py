@@ -85,12 +85,12 @@ def test_processes_give_the_rows_of_one(surveyed, field):
 
 
 def test_the_table_is_written_for_people_and_machines(surveyed, tmp_path):
-    page, *tables = surveyed.write(tmp_path)
-    assert [p.name for p in tables] == ["survey.csv", "survey.parquet", "survey.json"]
+    whole, *tables, page = surveyed.write(tmp_path)
+    assert [p.name for p in (whole, *tables)] == ["survey.json", "survey.csv", "survey.parquet"]
     for frame in (pandas.read_csv(tables[0]), pandas.read_parquet(tables[1])):
         assert list(frame["file"]) == [row["file"] for row in surveyed.rows]
         assert frame["worth"].sum() == 6
-    assert json.loads(tables[2].read_text())["rows"][0]["kind"] == "not read"
+    assert json.loads(whole.read_text())["rows"][0]["kind"] == "not read"
     text = page.read_text(encoding="utf-8")
     data = json.loads(text.partition('id="rows">')[2].partition("</script>")[0])
     assert len(data["rows"]) == len(surveyed.rows)

@@ -123,7 +123,7 @@ def test_each_job_leaves_its_status_and_what_it_printed(logged):
         assert end["seed"] == number % 2
         assert end["seconds"] > 0
         names = {path.name for path in (sweep / str(number)).iterdir()}
-        assert names == {".hydra", "history.csv", "output.txt", "result.json", "status.json"}
+        assert names == {".hydra", "history.csv", "mlflow.json", "output.txt", "result.json", "status.json"}
         assert f"seed {number % 2}" in (sweep / str(number) / "output.txt").read_text()
     assert len({end["configuration"] for end in ends.values()}) == 4
 
@@ -335,7 +335,7 @@ def test_a_sweep_that_is_ended_keeps_what_is_finished_and_closes_its_parent(way,
         time.sleep(0.2)
     process.send_signal(way)
     _, err = process.communicate(timeout=60)
-    assert process.returncode == 130
+    assert process.returncode == 128 + way
     assert err.startswith("tractexp: the sweep is interrupted; repeat the command")
     assert err.count("\n") == 1, err
     ends = statuses(tmp_path / "sweep").values()

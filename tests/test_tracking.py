@@ -393,6 +393,25 @@ def answers(address: str) -> bool:
         return False
 
 
+def refused(address: str, headers: dict) -> int:
+    """The status of a request that would make an experiment without a name, which is itself refused as 400."""
+    request = urllib.request.Request(address, b"{}", {"Content-Type": "application/json", **headers})
+    try:
+        with urllib.request.urlopen(request, timeout=20) as answer:
+            return answer.status
+    except urllib.error.HTTPError as error:
+        return error.code
+
+
+FOREIGN = [
+    ({}, 400),
+    ({"Host": "evil.example"}, 403),  # a name that was made to lead here
+    ({"Host": "192.168.1.7"}, 403),
+    ({"Origin": "https://evil.example"}, 403),  # a page from elsewhere, in the same browser
+    ({"Origin": "null"}, 403),
+]
+
+
 @pytest.mark.skipif(os.name == "nt", reason="ends the server by a signal")
 def test_the_ui_answers_on_loopback_and_leaves_nothing_behind(tmp_path, uri):
     (tmp_path / "note.txt").write_text("hello")
@@ -402,7 +421,12 @@ def test_the_ui_answers_on_loopback_and_leaves_nothing_behind(tmp_path, uri):
     port = free_port()
     script = "import sys; from tractexp.tracking.ui import serve; sys.exit(serve(sys.argv[1], port=int(sys.argv[2])))"
     ui = subprocess.Popen(
-        [sys.executable, "-c", script, uri, str(port)], stdout=-1, stderr=-1, text=True, cwd=elsewhere
+        [sys.executable, "-c", script, uri, str(port)],
+        stdout=-1,
+        stderr=-1,
+        text=True,
+        cwd=elsewhere,
+        env=os.environ | {"MLFLOW_SERVER_ALLOWED_HOSTS": "*", "MLFLOW_SERVER_DISABLE_SECURITY_MIDDLEWARE": "true"},
     )
     try:
         said = ui.stdout.readline()
@@ -414,6 +438,8 @@ def test_the_ui_answers_on_loopback_and_leaves_nothing_behind(tmp_path, uri):
         artifact = f"http://127.0.0.1:{port}/get-artifact?path=note.txt&run_uuid={run_id}"
         with urllib.request.urlopen(artifact, timeout=20) as answer:
             assert answer.read() == b"hello"
+        for headers, status in FOREIGN:
+            assert refused(f"http://127.0.0.1:{port}/api/2.0/mlflow/experiments/create", headers) == status, headers
         with pytest.raises(UserError, match=f"port {port} on 127.0.0.1 cannot be used"):
             serve(uri, port=port)
     finally:

@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 
+from tractexp import files
 from tractexp.doors import numba_vector_width
 from tractexp.model import kernel, vectors
 from tractexp.model.drive import Drive, Excitation
@@ -84,9 +85,9 @@ def test_a_file_system_without_links_keeps_the_first_choice_too(monkeypatch, tmp
     def refused(*_):
         raise PermissionError
 
-    monkeypatch.setattr(vectors.os, "link", refused)
+    monkeypatch.setattr(files.os, "link", refused)
     for bits in (512, 256):
-        vectors._offer(tmp_path / "chosen", bits)
+        files.offer(tmp_path / "chosen", f"{bits}\n")
     assert [path.read_text() for path in tmp_path.iterdir()] == ["512\n"]
 
 

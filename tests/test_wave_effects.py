@@ -16,7 +16,8 @@ from tractexp.testing import drives
 OMEGA_N, P0, Q0 = 100 * np.pi, drives.P0, drives.Q0
 OMEGA = OMEGA_N - 1.5  # of the frame of the drives
 NAMES = sorted(discover()["effect"])
-PHASORS_ONLY = {"frequency_dependence", "measurement_window", "negative_sequence_braking", "transformer_inrush"}
+PHASORS_ONLY = {"frequency_dependence", "measurement_window", "negative_sequence_braking", "transformer_inrush",
+                 "rotor_flux", "second_cage", "stator_transients"}  # fmt: skip
 WAVES_ONLY = {"zero_sequence_path", "transformer_saturation", "negative_sequence_path", "fault_resistance",
               "stuck_pole", "current_transformer_saturation", "transformer_error", "harmonics_source"}  # fmt: skip
 STACK = ("feeder_impedance", "shunt_capacitor", "second_motor_group", "undervoltage_trip", "transformer_saturation",
@@ -68,6 +69,7 @@ def solved(slope, start):
 def test_each_is_taken_or_refused_for_a_reason_of_its_own():
     """Those of one domain say so in the other."""
     refused = {n: model(motor="electromechanical").acceptance(effect(n)).refusal for n in NAMES}
+    assert refused.pop("rotor_speed") == "its speed moves already"
     assert {n for n, why in refused.items() if why} == PHASORS_ONLY
     assert all(why == effect(n).phasors_only for n, why in refused.items() if why)
     assert {n for n in NAMES if effect(n).waves_only} == WAVES_ONLY

@@ -64,7 +64,7 @@ def _truth(name):
 
 
 def test_the_page_shows_currents_spectra_and_the_power_of_the_same_estimator(fit, tmp_path):
-    (path,) = fit.write_page(tmp_path)
+    (path,) = fit.write_drawings(tmp_path)
     text = path.read_text(encoding="utf-8")
     for told in ("In waveforms the sampled currents are compared", "epsilon_i", "offsets of up to", "Runge-Kutta steps",
                  "cycles before the dip", "still change by", "phasors of the currents above"):  # fmt: skip

@@ -2,6 +2,7 @@
 
 import gc
 import os
+import signal
 import sys
 
 # The matrices of a fit are small: threads of a BLAS cost more than they bring (30 times on two busy cores), and the
@@ -9,7 +10,7 @@ import sys
 for library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
-from tractexp.errors import UserError  # noqa: E402
+from tractexp.errors import Stopped, UserError  # noqa: E402
 
 UNLOGGED = (
     "-",
@@ -35,6 +36,14 @@ def main() -> int:
             from tractexp.tasks.look import look
 
             return look(sys.argv[2:])
+        if sys.argv[1:2] == ["sync"]:
+            from tractexp.tasks.sync import sync
+
+            return sync(sys.argv[2:])
+        if sys.argv[1:2] == ["doctor"]:
+            from tractexp.tasks.doctor import doctor
+
+            return doctor(sys.argv[2:])
         if sys.argv[1:2] == ["list"]:
             from tractexp.usage import listed
 
@@ -49,18 +58,28 @@ def main() -> int:
         if traceback:
             raise
         print(f"tractexp: {error}", file=sys.stderr)
-    except KeyboardInterrupt as stop:
+    except MemoryError:
+        if traceback:
+            raise
         print(
-            f"tractexp: {stop}" if str(stop) else "tractexp: interrupted; nothing was logged for this run",
+            "tractexp: this takes more memory than there is; ask for less, such as a smaller population",
             file=sys.stderr,
         )
-        return 130
+    except KeyboardInterrupt as stop:
+        print(f"tractexp: {str(stop) or 'interrupted; nothing was logged for this run'}", file=sys.stderr)
+        return getattr(stop, "code", 130)
     finally:
         gc.freeze()  # nor at the end, when everything goes anyway
     return 2
 
 
+def terminated(*_: object) -> None:
+    """End what runs in an orderly way when the system asks for it, as at a batch system's time limit."""
+    raise Stopped("ended by SIGTERM; nothing was logged for this run", code=143)
+
+
 def _run() -> int:
+    signal.signal(signal.SIGTERM, terminated)
     if not any(argument.startswith(UNLOGGED) for argument in sys.argv[1:]):
         from tractexp.tracking.process import start_ahead
 
@@ -76,8 +95,9 @@ def _run() -> int:
     register()
     started(sys.argv[1:])
     os.environ[FULL_ERROR] = "1"  # let exceptions through: they are told below, in one sentence
-    sys.argv[1:] = overrides(sys.argv[1:])
-    refusals: list[UserError] = []
+    with explained():
+        sys.argv[1:] = overrides(sys.argv[1:])
+    ended: list[Exception] = []
 
     @hydra.main(version_base="1.3", config_path=str(CONF), config_name="config")
     def job(config: object) -> None:
@@ -88,13 +108,14 @@ def _run() -> int:
         from tractexp.tasks.run import run
 
         try:
-            (run_job if HydraConfig.get().mode == RunMode.MULTIRUN else run)(config)
-        except UserError as error:  # raised again below, beyond the lines Hydra would print about it
-            refusals.append(error)
+            with explained():
+                (run_job if HydraConfig.get().mode == RunMode.MULTIRUN else run)(config)
+        except (UserError, OSError, MemoryError) as error:  # raised again below, beyond what Hydra would print about it
+            ended.append(error)
 
     with explained():
         job()
-    for error in refusals:
+    for error in ended:
         raise error
     return 0
 

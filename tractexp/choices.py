@@ -65,6 +65,18 @@ def replaced(group: str, name: str) -> dict[str, str]:
     return {key.removeprefix("override /"): chosen for item in items for key, chosen in item.items()}
 
 
+@functools.cache
+def set_holding(sources: tuple[str, ...]) -> str:
+    """The shipped choice of data that fits these files and holds further ones out; "" where there is none."""
+    import yaml
+
+    for file in sorted((CONF / "data").glob("*.yaml")):
+        content = yaml.safe_load(file.read_text(encoding="utf-8"))
+        if content.get("validate") and set(sources) <= set(content.get("train") or ()):
+            return file.stem
+    return ""
+
+
 def entry_points() -> list[importlib.metadata.EntryPoint]:
     """The plugin packages that are installed, in order of name."""
     return sorted(importlib.metadata.entry_points(group=ENTRY_POINTS), key=lambda p: (p.name, p.value))

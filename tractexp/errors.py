@@ -1,11 +1,30 @@
-"""The one exception a user may meet: a sentence that says what, where, the value, what is allowed, how to mend it."""
+"""What a user may meet: a sentence that says what, where, the value, what is allowed, how to mend it; and an end."""
 
 import difflib
+import math
 from collections.abc import Iterable
+from typing import Any
 
 
 class UserError(Exception):
     """Wrong input. The message is a complete sentence for the person who gave it; no traceback is shown."""
+
+
+class Stopped(KeyboardInterrupt):
+    """The user or the system ends what runs. `code` is the exit code, `result` what had been found by then, or None.
+
+    `found` is where a search was, as the search loop knows it.
+    """
+
+    def __init__(self, message: str = "", code: int = 130, found: Any = None, result: Any = None):
+        super().__init__(message)
+        self.code, self.found, self.result = code, found, result
+
+    @classmethod
+    def of(cls, stop: KeyboardInterrupt, **more: Any) -> "Stopped":
+        """The same end with more known of it."""
+        known = {name: getattr(stop, name, None) for name in ("found", "result")}
+        return cls(str(stop), getattr(stop, "code", 130), **{**known, **more})
 
 
 class Unknown(UserError, AttributeError):
@@ -28,7 +47,9 @@ def check_choice(where: str, value: object, allowed: Iterable[str]) -> None:
     """Raise `UserError` unless `value` is one of `allowed`; `where` is the setting's full key."""
     allowed = tuple(allowed)
     if value not in allowed:
-        raise UserError(f"{where}={value} is not one of {', '.join(allowed)}{nearest(str(value), allowed)}")
+        raise UserError(
+            f"{where}={' '.join(str(value).split())} is not one of {', '.join(allowed)}{nearest(str(value), allowed)}"
+        )
 
 
 def check_distinct(where: str, values: Iterable[object]) -> None:
@@ -42,7 +63,7 @@ def check_distinct(where: str, values: Iterable[object]) -> None:
 
 
 def check_range(where: str, value: float, low: float = float("-inf"), high: float = float("inf")) -> None:
-    """Raise `UserError` unless low <= value <= high (nan fails); `where` is the setting's full key."""
-    if not low <= value <= high:
+    """Raise `UserError` unless low <= value <= high and it is finite; `where` is the setting's full key."""
+    if not low <= value <= high or math.isinf(value):
         limits = [f"at least {low:g}"] * (low > float("-inf")) + [f"at most {high:g}"] * (high < float("inf"))
-        raise UserError(f"{where}={value} is out of range: it must be {' and '.join(limits)}")
+        raise UserError(f"{where}={value} is out of range: it must be {' and '.join(limits) or 'finite'}")

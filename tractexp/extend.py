@@ -8,6 +8,7 @@ from tractexp.identification.loss import Loss
 from tractexp.identification.optimizer import Iterative, Optimizer
 from tractexp.model import sites
 from tractexp.model.drive import EVENT, INPUTS
+from tractexp.model.kernel import kept
 from tractexp.model.parts import Curve, Effect, Measurement, Motor, Static
 from tractexp.model.unfit import Unfit
 from tractexp.parameter import Parameter
@@ -44,6 +45,7 @@ __all__ = [
     "build",
     "check_choice",
     "check_range",
+    "kept",
     "plugin",
     "sites",
 ]

@@ -1,16 +1,26 @@
-"""Where files are, and the one door through which they are written: whole, or not at all."""
+"""Where files are, and the one door through which they are written: whole, or not at all.
 
+Nothing else in the package opens a file to write. What grows, a journal and what a job prints, has its own way in.
+"""
+
+import contextlib
+import errno
 import importlib.resources
+import io
 import json
 import math
 import os
 import tempfile
+import time
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from tractexp.errors import UserError
 
 PACKAGE = "pkg://"  # starts the path of a file inside an installed package
+PART = ".part"  # ends the name of a file that is being written
+SYNCED = 1.0  # s: what is added to a growing file is on the disk after so long
 
 
 def located(path: str) -> Path:
@@ -24,27 +34,206 @@ def located(path: str) -> Path:
         raise UserError(f"{path}: there is no installed package '{package}'") from error
 
 
-def write(path: Path | str, content: str | bytes) -> Path:
+def write(path: Path | str, content: str | bytes, *, lasting: bool = True, modified: float | None = None) -> Path:
     """Write a file in one move and return its path: a reader never sees half of it, a full disk leaves none.
 
+    What is `lasting` has reached the disk when this returns, and outlives a loss of power; what can be made again
+    (a cache, what a program was told) need not wait for that. `modified` [s since 1970] is a time stamp to give it.
     Raises `UserError` where the folder or the file cannot be written.
     """
     path = Path(path)
     data = content.encode() if isinstance(content, str) else content
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+    with _told(path), _beside(path) as temporary:
+        _fill(temporary, data, lasting)
+        if modified is not None:
+            os.utime(temporary, (modified, modified))
+        os.replace(temporary, path)
+        if lasting:
+            _settle(path.parent)
+    return path
+
+
+def offer(path: Path | str, content: str | bytes) -> None:
+    """As `write`, but a file that is there already stays: of several processes the first one's stands."""
+    path = Path(path)
+    data = content.encode() if isinstance(content, str) else content
+    with _told(path), _beside(path) as temporary:
+        _fill(temporary, data, lasting=False)
         try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(data)
-            os.chmod(temporary, 0o666 & ~_umask())
-            os.replace(temporary, path)
-        except BaseException:
-            Path(temporary).unlink(missing_ok=True)
-            raise
+            os.link(temporary, path)  # fails where the file exists, unlike os.replace
+        except FileExistsError:
+            pass
+        except OSError:  # a file system without links
+            if not path.exists():
+                os.replace(temporary, path)
+
+
+def copy(source: Path | str, target: Path | str) -> Path:
+    """Copy a file, whole or not at all. Raises `UserError` where it cannot be read or written."""
+    with _told(Path(target)):
+        content = Path(source).read_bytes()
+    return write(target, content)
+
+
+def move(source: Path | str, target: Path | str) -> Path:
+    """Give a file that is whole its place, in one move within a disk. Raises `UserError` where that is impossible."""
+    target = Path(target)
+    with _told(target):
+        os.replace(source, target)
+        _settle(target.parent)
+    return target
+
+
+class Growing:
+    """A file that is added to: a kill or a full disk costs the last line at most. Raises `UserError` of a full disk."""
+
+    def __init__(self, path: Path):
+        self.path, self._synced = path, time.monotonic()
+        with _told(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = path.open("ab+")
+            self._mend()
+
+    def _mend(self) -> None:
+        """End a line that was cut short."""
+        size = self._file.seek(0, os.SEEK_END)
+        if size:
+            self._file.seek(size - 1)
+            if self._file.read(1) != b"\n":
+                self._file.write(b"\n")
+
+    def add(self, line: str) -> None:
+        """Add a line. It outlives the death of the process at once, a loss of power after `SYNCED` seconds."""
+        with _told(self.path):
+            self._file.write(line.encode() + b"\n")
+            self._file.flush()
+            if time.monotonic() > self._synced + SYNCED:
+                os.fsync(self._file.fileno())
+                self._synced = time.monotonic()
+
+    def __enter__(self) -> "Growing":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with contextlib.suppress(OSError):  # what could not be written was told when it was added
+            self._file.close()
+
+
+class Said(io.TextIOBase):
+    """What a program prints, into a file: where that cannot be kept, as on a full disk, it is lost and nothing else."""
+
+    def __init__(self, path: Path):
+        super().__init__()
+        try:
+            self._file: IO[str] | None = path.open("w", encoding="utf-8", buffering=1)
+        except OSError:
+            self._file = None
+
+    def write(self, text: str) -> int:
+        with contextlib.suppress(OSError):
+            if self._file is not None:
+                self._file.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        with contextlib.suppress(OSError):
+            if self._file is not None:
+                self._file.flush()
+
+    def close(self) -> None:
+        with contextlib.suppress(OSError):
+            if self._file is not None:
+                self._file.close()
+        self._file = None
+        super().close()
+
+
+@contextlib.contextmanager
+def held(path: Path, seconds: float) -> Iterator[None]:
+    """Hold the file `path` exclusively among processes; one that dies lets go of it.
+
+    Raises `TimeoutError` where another process holds it for so long.
+    """
+    deadline = time.monotonic() + seconds
+    with path.open("a+b") as file:
+        while not _locked(file):
+            if time.monotonic() > deadline:
+                raise TimeoutError(f"another process has held {path} for {seconds:.0f} s")
+            time.sleep(0.05)
+        yield
+
+
+def _locked(file: IO[bytes]) -> bool:
+    try:
+        if os.name == "nt":
+            import msvcrt
+
+            file.seek(0)
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        if error.errno in (errno.EACCES, errno.EAGAIN, errno.EDEADLK):
+            return False
+        raise
+    return True
+
+
+def leftovers(folder: Path, older: float = 3600.0) -> list[Path]:
+    """Halves of files in `folder` and below that a process left which was killed, `older` seconds at least."""
+    now = time.time()
+    found = []
+    for path in folder.rglob(f"*{PART}"):
+        with contextlib.suppress(OSError):
+            if path.is_file() and now - path.stat().st_mtime > older:
+                found.append(path)
+    return found
+
+
+@contextlib.contextmanager
+def _told(path: Path) -> Iterator[None]:
+    try:
+        yield
     except OSError as error:
         raise UserError(f"{path} cannot be written: {error.strerror or error}") from error
-    return path
+
+
+@contextlib.contextmanager
+def _beside(path: Path) -> Iterator[Path]:
+    """A new file in the folder of `path`, which is made where it is not there; gone at the end."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name[:100]}.", suffix=PART)
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _fill(temporary: Path, data: bytes, lasting: bool) -> None:
+    with temporary.open("wb") as file:
+        file.write(data)
+        file.flush()
+        if lasting:
+            os.fsync(file.fileno())
+    os.chmod(temporary, 0o666 & ~_umask())
+
+
+def _settle(folder: Path) -> None:
+    """Let a folder's own entries reach the disk, where the system can."""
+    if os.name == "nt":
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # a file system that knows no such thing
+            raise
+    finally:
+        os.close(handle)
 
 
 def write_json(path: Path | str, content: Any) -> Path:

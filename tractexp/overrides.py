@@ -1,5 +1,7 @@
 """Arguments as people write them, made into overrides that Hydra reads."""
 
+import functools
+import itertools
 import re
 import shlex
 from collections.abc import Iterable, Mapping
@@ -13,6 +15,10 @@ OPEN = (
     "data.units",
 )  # fmt: skip
 NAMING = ("data.", "task.", "tracking.", "hydra.run.dir", "hydra.sweep.dir")  # settings that name files and channels
+MISSING = re.compile(r"(^|[=\[,{:\s])\?\?\?($|[\],}\s])")
+DEEPEST = 20  # brackets within one another
+NEEDED = ("seed", "budget", "time_limit", "target", "task", "model", "optimizer", "data", "objective", "tracking")
+NO_NAME = re.compile(r"(?!\[.*\],\[)\[.*\]|[-+.]?[\d_]+[\d_.e+-]*|[-+]?(nan|inf)|null|true|false", re.IGNORECASE)
 MARKS = set(",'\"[](){}\\")  # which a name within a list cannot have as it stands
 WORD = re.compile(r"[^\W\d_].*[^\W\d_]|[^\w.+\-]")  # in what is no number
 PLAIN = re.compile(r"[A-Za-z0-9_./:\-]*", re.ASCII)  # what Hydra's grammar takes as it stands
@@ -26,8 +32,37 @@ def overrides(arguments: Iterable[str]) -> list[str]:
     made = []
     for argument in arguments:
         group, _, value = argument.partition("=")
-        made += _several(group, value) if group == "model/motor" and "[" in value else [override(argument)]
+        if group == "model/motor" and "[" in value:
+            made += _several(group, value)
+        else:
+            _check(argument, group, value)
+            made.append(override(argument))
     return made
+
+
+def _check(argument: str, key: str, value: str) -> None:
+    """Raise `UserError` for what Hydra takes without a word, or refuses in words of its own code."""
+    depth = max(itertools.accumulate((c in "[({") - (c in "])}") for c in value), default=0)
+    if depth > DEEPEST:
+        raise UserError(f"{key:.80} has brackets {depth} deep within one another; no setting needs more than {DEEPEST}")
+    if not argument.isprintable():
+        raise UserError(f"{' '.join(argument.split()):.80} has a line break or another sign that cannot be printed")
+    if MISSING.search(value):
+        raise UserError(f"{argument:.200}: ??? stands for a value that is missing; give one, or leave the setting out")
+    if key[:1] == "~" and key[1:] in NEEDED:
+        raise UserError(f"{argument:.200} takes out what every run needs; give {key[1:]} a value, or leave it as it is")
+    group = key.lstrip("+").partition("@")[0].replace("model.", "model/")
+    if NO_NAME.fullmatch(value) and group in groups():
+        raise UserError(f"{group}={value:.80}: what is chosen there has a name; tractexp --help shows the names")
+
+
+@functools.cache
+def groups() -> tuple[str, ...]:
+    """What is chosen by a name."""
+    from tractexp.choices import defaults
+
+    own = (name.removeprefix("override ") for name in defaults())
+    return ("hydra", *own, "model/motor", "model/static")
 
 
 def _several(group: str, value: str) -> list[str]:

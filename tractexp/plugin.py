@@ -240,8 +240,11 @@ def get(group: str, name: str) -> type[Any]:
 
 def build(group: str, settings: Mapping[str, Any]) -> Any:
     """The plugin described by a configuration node: `name` chooses the class, the rest are its settings."""
-    chosen = dict(settings)
-    cls = get(group, chosen.pop("name"))
+    chosen = dict(settings) if isinstance(settings, Mapping) else {}
+    name = chosen.pop("name", None)
+    if not isinstance(name, str):
+        raise UserError(f"{group} lacks the name of what is chosen; write {group}=NAME")
+    cls = get(group, name)
     allowed = [item.name for item in dataclasses.fields(cls)]
     for key in chosen:
         if key not in allowed:

@@ -1,16 +1,24 @@
 """Hydra's refusals of a configuration, told as one sentence with the nearest name."""
 
 import re
+import sysconfig
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from tractexp.errors import UserError, among
 
+HYDRA = ("hydra", "omegaconf", "antlr4")  # whose code composes configurations
+KINDS = {"Integer": "a whole number", "Float": "a number", "Boolean": "true or false", "String": "a text"}
+PYTHON = re.compile(r"Config\b|Exception|Error:|\btype '|\b(?:dict|list|tuple|int|str|float|None\w*)\b|__")
+LONGEST = 80  # characters of a value that are repeated
+
 
 @contextmanager
 def explained() -> Iterator[None]:
-    """Turn Hydra's and OmegaConf's exceptions into `UserError`."""
+    """Turn Hydra's and OmegaConf's exceptions into `UserError`, and those that they forgot to foresee."""
     from hydra.errors import HydraException, MissingConfigException
     from omegaconf.errors import OmegaConfBaseException
 
@@ -20,6 +28,48 @@ def explained() -> Iterator[None]:
         raise UserError(_missing(error)) from error
     except (HydraException, OmegaConfBaseException) as error:
         raise UserError(_told(error)) from error
+    except OSError as error:
+        if not _of_hydra(error):
+            raise
+        raise UserError(
+            f"{error.filename} cannot be made ({error.strerror}); choose another folder for hydra.run.dir"
+        ) from error
+    except Exception as error:
+        if not _of_hydra(error):
+            raise
+        raise UserError(_unforeseen(error)) from error
+
+
+def _of_hydra(error: BaseException) -> bool:
+    """Whether an exception comes from what composes configurations: Python's own library apart, it is the last one."""
+    own = sysconfig.get_path("stdlib")
+    files = [Path(frame.f_code.co_filename) for frame, _ in traceback.walk_tb(error.__traceback__)]
+    foreign = [f for f in files if "site-packages" in f.parts or not f.is_relative_to(own)]
+    return bool(foreign) and bool(set(HYDRA) & set(foreign[-1].parts))
+
+
+def _unforeseen(error: BaseException) -> str:
+    if isinstance(error, RecursionError):
+        return "an argument has brackets within brackets, or a reference to itself, deeper than can be read"
+    argument = _argument(error)
+    if argument is None:
+        return "the arguments make no configuration: one names a part of a value that has no parts, or a wrong value"
+    return f"{argument}: no such value can be set there; it may name a part of a value that has no parts"
+
+
+def _argument(error: BaseException | None) -> str | None:
+    """The argument that Hydra was about to apply."""
+    while error is not None:
+        for frame, _ in reversed(list(traceback.walk_tb(error.__traceback__))):
+            if line := getattr(frame.f_locals.get("override"), "input_line", None):
+                return _short(line)
+        error = error.__cause__ or error.__context__
+    return None
+
+
+def _short(text: object) -> str:
+    text = " ".join(str(text).split())
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}…"
 
 
 def _missing(error: Any) -> str:
@@ -40,13 +90,36 @@ def _told(error: BaseException) -> str:
         text = _first_line(link)
         if key and ("not in" in text or "is not in struct" in text):
             return _unknown_key(key, link)
-        if key and ("could not be converted" in text or "incompatible" in text or "not supported" in text):
-            return f"{key}: {_decapitalized(text)}"
+        if told := _wrong_value(key or _key_of(error), text):
+            return told
     group = re.search(r"Could not override '([^']*)'", _first_line(error))
     if group and "No match in the defaults list" in str(error):
         groups = _groups()
         return f"there is no group '{group[1]}'{among(group[1], groups, 'Groups')}"
-    return _first_line(error)
+    return _plain(error)
+
+
+def _key_of(error: BaseException) -> str:
+    return (_argument(error) or "").lstrip("+~").partition("=")[0]
+
+
+def _wrong_value(key: str, text: str) -> str:
+    """The sentence about a value of another kind than its setting; "" for another exception."""
+    if found := re.search(r"[Vv]alue '(.*)' of type '.*' could not be converted to (\w+)", text, re.DOTALL):
+        return f"{key}={_short(found[1])} is not {KINDS.get(found[2], 'what this setting takes')}"
+    if "is not a ListConfig" in text:
+        return f"{key} takes a list, such as {key}=[a,b]"
+    return ""
+
+
+def _plain(error: BaseException) -> str:
+    """The first line of an exception where it is in plain words, else what can be said in its place."""
+    text = _first_line(error)
+    if found := re.match(r"LexerNoViableAltException: (.*)", text, re.DOTALL):
+        return (
+            f"{_short(found[1])} cannot be read; an argument is KEY=VALUE, and other signs go in quotes: KEY='a \"b\"'"
+        )
+    return text if not PYTHON.search(text) else _unforeseen(error)
 
 
 def _unknown_key(key: str, error: Any) -> str:
@@ -68,7 +141,3 @@ def _groups() -> list[str]:
 
 def _first_line(error: BaseException) -> str:
     return str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
-
-
-def _decapitalized(text: str) -> str:
-    return text[:1].lower() + text[1:]

@@ -49,12 +49,19 @@ class Config:
 
 
 def check(config: Mapping[str, Any]) -> None:
-    """Raise `UserError` for a key nobody reads (as `+sede=3` makes one) or a value out of range."""
-    for where, part, kind in (("", config, Config), ("model.", config["model"], ModelConfig)):
+    """Raise `UserError` for a key nobody reads (as `+sede=3` makes one), one taken out, or a value out of range."""
+    sections = {"model.": ModelConfig, "tracking.": TrackingConfig}
+    for where, kind in {"": Config, **sections}.items():
+        part = config.get(where[:-1]) if where else config
         known = [item.name for item in dataclasses.fields(kind)]
+        if not isinstance(part, Mapping):
+            raise UserError(f"{where.rstrip('.')} holds no settings; leave it as it is")
         for key in part:
             if key not in known:
                 raise UserError(f"{where}{key}: there is no such key{among(key, known, 'Keys')}")
+        for key in known:
+            if key not in part:
+                raise UserError(f"{where}{key} is taken out, and every run needs it; leave it as it is")
     for key, least in {"seed": 0, "budget": 1, "time_limit": 0, "target": 0}.items():
         if config[key] is not None:
             check_range(key, config[key], least)

@@ -50,6 +50,8 @@ The commonest
       name the effect that the model lacks, and show the gap shrink
   tractexp ui
       look at everything that was logged, in a browser on this computer only
+  tractexp doctor
+      whether everything here is sound; heal what can be (tractexp sync: log what could not be logged)
 
 Tasks, chosen by task=NAME; {task} by default
 {tasks}

@@ -4,8 +4,10 @@ import math
 
 from numba import njit
 
+from tractexp.extend import kept
 
-@njit(cache=True, nogil=True, error_model="numpy")
+
+@njit(nogil=True, error_model="numpy")
 def _going_on(y, i):
     """y (N,) at i, also before its first sample and after its last."""
     last = len(y) - 1
@@ -14,7 +16,8 @@ def _going_on(y, i):
     return y[i] if i <= last else 2 * y[last] - y[last - 1]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kept
+@njit(nogil=True, error_model="numpy")
 def earlier(y, lag, out):
     """Write y (C, n, N) as it was `lag` (n,) samples earlier to `out`.
 
@@ -35,7 +38,8 @@ def earlier(y, lag, out):
                 out[c, k, i] = far * a + near * b + here * d + ahead * e
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kept
+@njit(nogil=True, error_model="numpy")
 def moved(y, U, slope, lag, quiet, out):
     """Write power y (C, n, N) as the voltage U (N,), `lag` (n,) samples earlier, draws it to `out`.
 
@@ -71,7 +75,8 @@ def moved(y, U, slope, lag, quiet, out):
                 out[c, k, i] = u * (p + r * (s - p) - r * (1 - r) / 2 * weaker + answer * u)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kept
+@njit(nogil=True, error_model="numpy")
 def averaged(y, window, out):
     """Write the mean of y (2, n, N) over `window` (n,) samples around each to `out`.
 

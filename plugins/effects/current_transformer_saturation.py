@@ -20,7 +20,7 @@ class CurrentTransformerSaturation(Effect):
     Departures: a burden of resistance, two slopes, no hysteresis.
     """
 
-    core_slope = Parameter(0.0, (0.0, 20.0), "1", "magnetizing over burden current beyond", SOURCE, "y_c", null=0.0)
+    core_slope = Parameter(0.0, (0.0, 6.0), "1", "magnetizing over burden current beyond", SOURCE, "y_c", null=0.0)
     core_knee = Parameter(4.0, (1.2, 40.0), "1", "current carried over that before", SOURCE, "k_c")
     core_decay = Parameter(0.2, (0.02, 10.0), "s", "time constant of the secondary", SOURCE, "T_c")
 

@@ -40,7 +40,7 @@ class DoubleCage(Motor):
         E, D, omega = eq.flux("E", "E"), eq.flux("D", "D"), eq.speed(r"\omega")
         V = eq.V
         Z = eq.place(sites.stator_impedance, I * X_second, "Z''")
-        inner = eq.define("internal_voltage", E + D, "E''")
+        inner = eq.place(sites.internal_voltage, E + D, "E''")
         current = eq.place(sites.stator_current, eq.branch("psi", r"\psi", V, Z, behind=inner))
         coupling = eq.place(sites.coupling, C)
         time_constant = eq.place(sites.time_constant, T_prime)

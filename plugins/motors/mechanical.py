@@ -48,7 +48,7 @@ class Mechanical(Motor):
         source = I * X_prime * coupling
         slip = eq.define("slip", omega - eq.omega_s, "s")
         turning = I * slip * time_constant
-        E = eq.define("internal_voltage", source * V / (Z * (1 - coupling - turning) + source), "E")
+        E = eq.place(sites.internal_voltage, source * V / (Z * (1 - coupling - turning) + source))
         current = eq.place(sites.stator_current, (V - E) / Z)
         electrical_torque = eq.place(sites.electrical_torque, re(E * conjugate(current)))
         load_torque = eq.place(sites.load_torque, T_m)

@@ -96,7 +96,7 @@ class Sparrow(Iterative):
 
     def check(self) -> None:
         super().check()
-        check_range("optimizer.population", self.population, 2)
+        check_range("optimizer.population", self.population, 2, 100_000)
         check_range("optimizer.producers", self.producers, 0, 1)
         check_range("optimizer.perceivers", self.perceivers, 0, 1)
         check_range("optimizer.safety_threshold", self.safety_threshold, 0, 1)

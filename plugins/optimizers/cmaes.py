@@ -36,7 +36,7 @@ class CMAES(Iterative):
     def check(self) -> None:
         super().check()
         if self.population != 0:
-            check_range("optimizer.population", self.population, 4)
+            check_range("optimizer.population", self.population, 4, 100_000)
         check_range("optimizer.restarts", self.restarts, 0)
         check_range("optimizer.sigma", self.sigma, 1e-6, 1)
 

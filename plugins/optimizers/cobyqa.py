@@ -35,7 +35,7 @@ class COBYQA(Iterative):
 
     def check(self) -> None:
         super().check()
-        check_range("optimizer.scatter", self.scatter, 1)
+        check_range("optimizer.scatter", self.scatter, 1, 100_000)
         check_range("optimizer.radius", self.radius, 1e-6, 0.5)
         check_range("optimizer.precision", self.precision, 1e-15, self.radius)
 

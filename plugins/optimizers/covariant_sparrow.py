@@ -63,7 +63,7 @@ class CovariantSparrow(Iterative):
 
     def check(self) -> None:
         super().check()
-        check_range("optimizer.population", self.population, 4)
+        check_range("optimizer.population", self.population, 4, 100_000)
         check_range("optimizer.producers", self.producers, 0, 1)
         check_range("optimizer.perceivers", self.perceivers, 0, 1)
         check_range("optimizer.factor", self.factor, 0, 2)

@@ -36,7 +36,7 @@ class DifferentialEvolution(Iterative):
 
     def check(self) -> None:
         super().check()
-        check_range("optimizer.population", self.population, 5)
+        check_range("optimizer.population", self.population, 5, 100_000)
         check_choice("optimizer.strategy", self.strategy, STRATEGIES)
         check_range("optimizer.mutation_low", self.mutation_low, 0, self.mutation_high)
         check_range("optimizer.mutation_high", self.mutation_high, 0, 1.99)

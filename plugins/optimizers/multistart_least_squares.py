@@ -47,7 +47,7 @@ class MultistartLeastSquares(Optimizer):
 
     def check(self) -> None:
         super().check()
-        check_range("optimizer.scatter", self.scatter, 1)
+        check_range("optimizer.scatter", self.scatter, 1, 100_000)
         check_range("optimizer.starts", self.starts, 1, self.scatter)
         check_range("optimizer.trials", self.trials, 1)
         check_range("optimizer.tolerance", self.tolerance, 1e-15, 0.1)

@@ -31,7 +31,7 @@ class PSO(Iterative):
 
     def check(self) -> None:
         super().check()
-        check_range("optimizer.population", self.population, 1)
+        check_range("optimizer.population", self.population, 1, 100_000)
         check_range("optimizer.inertia", self.inertia, 0)
         check_range("optimizer.cognitive", self.cognitive, 0)
         check_range("optimizer.social", self.social, 0)

@@ -22,7 +22,7 @@ class RandomSearch(Iterative):
 
     def check(self) -> None:
         super().check()
-        check_range("optimizer.population", self.population, 1)
+        check_range("optimizer.population", self.population, 1, 100_000)
 
     def search(self, evaluate: Evaluate, box: Box, rng: np.random.Generator) -> Iterator[None]:
         _, steps = self.laid_out(evaluate.budget, self.population, self.population)

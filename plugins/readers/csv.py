@@ -11,6 +11,7 @@ from tractexp.filetypes.tabulated import Powers, Tabular, kind_of, powers
 from tractexp.plugin import plugin
 from tractexp.record import Base, Events, Reader, Record
 from tractexp.record.dips import Dip, check_numbers, chosen, level, numbered
+from tractexp.record.record import SIZES
 from tractexp.wording import counted
 
 PRE, POST = 1.0, 10.0  # s kept of a table that holds several dips
@@ -59,11 +60,11 @@ class CSV(Tabular, Reader):
             if path in seen:
                 raise UserError(f"data.train and data.validate name '{path}' twice; a record may serve only once")
             seen.add(path)
-        limits = {"base_voltage": 1e-6, "base_power": 1e-6, "frequency": 1e-6, "pre": 0.05, "post": 0.1}
-        for key, least in limits.items():
+        limits = {"base_voltage": SIZES["voltage"], "base_power": SIZES["power"], "frequency": SIZES["frequency"]}
+        for key, allowed in (limits | {"pre": (0.05,), "post": (0.1,)}).items():
             value = getattr(self, key)
             if value is not None:
-                check_range(f"data.{key}", value, least)
+                check_range(f"data.{key}", value, *allowed)
         self.check_table()
 
     def _check_numbers(self) -> None:

@@ -5,6 +5,7 @@ from tractexp.filetypes.sidecar import beside
 from tractexp.filetypes.tabulated import Tabular, kind_of, recording
 from tractexp.filetypes.tidy import restored
 from tractexp.plugin import plugin
+from tractexp.record.record import SIZES
 from tractexp.recording import Recording
 from tractexp.recording.reader import WaveformReader
 
@@ -32,7 +33,7 @@ class Waveforms(Tabular, WaveformReader):
 
     def check(self) -> None:
         super().check()
-        check_range("data.frequency", self.frequency, 1e-6)
+        check_range("data.frequency", self.frequency, *SIZES["frequency"])
         self.check_table()
 
     def recording(self) -> Recording:

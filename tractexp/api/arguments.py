@@ -22,6 +22,7 @@ SECTIONS = "task|model|data"  # of the configuration, whose keys the arguments o
 WORDS = {
     int: "a whole number", float: "a number", bool: "True or False", str: "a text", type(None): "None", Any: "anything",
 }  # fmt: skip
+GIVEN = {bool: "a truth value", type(None): "nothing", dict: "a mapping", list: "a list", tuple: "a list"}
 
 
 def public(function: Callable[P, R]) -> Callable[P, R]:
@@ -65,7 +66,7 @@ def check_kind(name: str, value: Any, annotation: Any) -> None:
     if not _is(value, annotation):
         kinds = get_args(annotation) if get_origin(annotation) in (Union, types.UnionType) else (annotation,)
         allowed = " or ".join(dict.fromkeys(_word(kind) for kind in kinds))
-        raise UserError(f"{name}={value!r:.60} is {_article(type(value).__name__)}, but it must be {allowed}")
+        raise UserError(f"{name}={value!r:.60} is {_kind(value)}, but it must be {allowed}")
 
 
 def _is(value: Any, kind: Any) -> bool:
@@ -90,6 +91,11 @@ def _word(kind: Any) -> str:
     if origin is Mapping or origin is dict:
         return f"a mapping, each value {_word(get_args(kind)[1])}"
     return WORDS.get(kind) or _article(getattr(kind, "__name__", str(kind)))
+
+
+def _kind(value: Any) -> str:
+    """What a value is, in the words in which it is said what it must be."""
+    return GIVEN.get(type(value)) or WORDS.get(type(value)) or _article(type(value).__name__)
 
 
 def _article(name: str) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from tractexp.api.arguments import Choice, public
-from tractexp.api.pages import Written
+from tractexp.api.pages import Drawing, Written
 from tractexp.errors import UserError, check_distinct, check_range
 from tractexp.outcome import Table
 from tractexp.progress import counting
@@ -50,12 +50,15 @@ class Benchmarked(Written):
         columns = ["optimizer", "dimension", "all", *made.groups(), "solved"]
         return Table(columns, rows, f"share of targets met, functions solved: {scale(made)}", self.sentences)
 
-    def _write(self, folder: Path) -> list[Path]:
-        """benchmark.html and benchmark.json."""
+    def _results(self, folder: Path) -> list[Path]:
         from tractexp.report import benchmark as report
 
-        page = report.write_page(self.made, folder / "benchmark.html")
-        return [page, report.write_json(self.made, self.optimizers, folder / "benchmark.json")]
+        return [report.write_json(self.made, self.optimizers, folder / "benchmark.json")]
+
+    def _drawings(self) -> Mapping[str, Drawing]:
+        from tractexp.report import benchmark as report
+
+        return {"benchmark.html": lambda path: report.write_page(self.made, path)}
 
     def to_dict(self) -> dict[str, Any]:
         from tractexp.report.benchmark import content

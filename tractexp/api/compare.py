@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from tractexp.api.arguments import public
-from tractexp.api.pages import Written
+from tractexp.api.pages import Drawing, Written
 from tractexp.errors import UserError, check_choice, check_range
 from tractexp.outcome import Table
 
@@ -69,13 +69,16 @@ class Compared(Written):
         said = [self.answer, *self.sentences, *self.content["notes"]]
         return Table(["problem", *columns] if several else columns, rows, title, said)
 
-    def _write(self, folder: Path) -> list[Path]:
-        """comparison.html and comparison.json."""
+    def _results(self, folder: Path) -> list[Path]:
         from tractexp import files
 
-        data = files.write_json(folder / "comparison.json", self.content)
-        page = _report(self.comparison).write_page(self.comparison, folder / "comparison.html", self.source)
-        return [page, data]
+        return [files.write_json(folder / "comparison.json", self.content)]
+
+    def _drawings(self) -> Mapping[str, Drawing]:
+        def page(path: Path) -> Path:
+            return _report(self.comparison).write_page(self.comparison, path, self.source)
+
+        return {"comparison.html": page}
 
     def to_dict(self) -> dict[str, Any]:
         return {"call": dict(self.call), **self.content}

@@ -1,5 +1,6 @@
 """Identify on some dips, judge on milder and deeper ones, for any optimizers."""
 
+import functools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 
 from tractexp import files
 from tractexp.api.arguments import Choice, public
-from tractexp.api.pages import Written
+from tractexp.api.pages import Drawing, Written
 from tractexp.api.setup import Setup
 from tractexp.errors import UserError, check_range
 from tractexp.outcome import Table
@@ -65,10 +66,13 @@ class Generalised(Written):
         said = [TOLD]
         return Table(columns, [[row[c] for c in columns] for row in self.medians], "on dips not fitted", said)
 
-    def _write(self, folder: Path) -> list[Path]:
-        """generalise.json, and a figure for each optimizer and held-out dip."""
+    def _results(self, folder: Path) -> list[Path]:
         told = {"residuals": self.residuals, "identified": self.identified}
-        return [files.write_json(folder / "generalise.json", told), *_draw(folder, self.curves)]
+        return [files.write_json(folder / "generalise.json", told)]
+
+    def _drawings(self) -> Mapping[str, Drawing]:
+        """A figure for each optimizer and held-out dip, of curves and residuals: issa_interpolation.svg, ..."""
+        return {told["file"]: functools.partial(_draw, told) for told in self.curves}
 
     def to_dict(self) -> dict[str, Any]:
         return {"residuals": self.residuals, "identified": self.identified, "curves": self.curves}
@@ -188,17 +192,12 @@ def _curve(result: "Result", fits: "Sequence[Fit]", kinds: Sequence[str], k: int
     }
 
 
-def _draw(folder: Path, curves: Sequence[Mapping[str, Any]]) -> list[Path]:
-    """Curves and residuals: issa_interpolation.svg, ..."""
+def _draw(told: Mapping[str, Any], path: Path) -> Path:
     from tractexp.report import figures
 
-    drawn = []
-    for told in curves:
-        t, U, P, Q, *calculated = (np.array(told[key], dtype=float) for key in ARRAYS)
-        epsilon_p, epsilon_q = told["epsilon"]
-        path = figures.fit(
-            folder / told["file"], t, U, (P, Q), (calculated[0], calculated[1]), title=told["title"],
-            epsilon=(epsilon_p, epsilon_q), notes=told["notes"],
-        )  # fmt: skip
-        drawn.append(path)
-    return drawn
+    t, U, P, Q, *calculated = (np.array(told[key], dtype=float) for key in ARRAYS)
+    epsilon_p, epsilon_q = told["epsilon"]
+    return figures.fit(
+        path, t, U, (P, Q), (calculated[0], calculated[1]), title=told["title"], epsilon=(epsilon_p, epsilon_q),
+        notes=told["notes"],
+    )  # fmt: skip

@@ -10,11 +10,11 @@ import numpy as np
 
 from tractexp.api.arguments import Choice, public
 from tractexp.api.compose import LoadModel
-from tractexp.api.pages import Written
+from tractexp.api.pages import Drawing, Written
 from tractexp.api.read import dips_of
 from tractexp.api.response import Response, respond_to
 from tractexp.api.setup import Setup
-from tractexp.errors import UserError
+from tractexp.errors import Stopped, UserError
 from tractexp.identification.result import Result, by_event
 from tractexp.outcome import Table
 from tractexp.progress import Progress, tell
@@ -42,6 +42,16 @@ class Asked(Setup):
         """Where the search ends; raises `UserError` where the input is wrong, before anything is told."""
         tell(progress, [*self.lines(), f"optimizer: {self.optimizer.name}, seed {self.seed}"])
         return self.search(self.optimizer, self.seed, progress)
+
+    def so_far(self, found: "Found | None") -> "Identification | None":
+        """Where a search was when it was stopped, as an identification that nothing is judged of."""
+        from tractexp.identification.result import conclude
+        from tractexp.identification.search import REFUSED
+
+        if found is None or not found.objective < REFUSED:
+            return None
+        node, name = self.model.node, self.optimizer.name
+        return Identification(conclude(self.problem, found, self.validate, self.seed, node, name)[0], self, found)
 
 
 @dataclass(frozen=True)
@@ -165,10 +175,13 @@ class Identification(Written):
     @functools.cached_property
     def advice(self) -> list[str]:
         """What to do next, the most pressing first."""
+        from tractexp.choices import set_holding
         from tractexp.identification.advice import advise
 
         judged = self.judged
-        return advise(judged.known, judged.adequacy, judged.together.odd if judged.together else ())
+        fitted = tuple(event.record.where for event in judged.known.likelihood.problem.events)
+        odd = judged.together.odd if judged.together else ()
+        return advise(judged.known, judged.adequacy, odd, data=set_holding(fitted))
 
     def predict(
         self, event: Any = None, *, t: Any = None, U: Any = None, f: Any = None, P0: float | None = None,
@@ -241,12 +254,10 @@ class Identification(Written):
             found = Found(**found | {"values": np.array(found["values"], dtype=float), "history": history})
         return cls(Result(**content["result"]), setup and Asked.from_dict(setup), found)
 
-    def _write(self, folder: Path) -> list[Path]:
-        """result.json and history.csv, then report.html."""
-        return [*self.write_result(folder), *self.write_page(folder)]
+    def _drawings(self) -> Mapping[str, Drawing]:
+        return {"report.html": self._report}
 
-    def write_page(self, folder: Path) -> list[Path]:
-        """Write report.html."""
+    def _report(self, path: Path) -> Path:
         from tractexp.provenance import command
         from tractexp.report import identify
 
@@ -255,10 +266,9 @@ class Identification(Written):
             self.result, judged.fits, judged.estimated, judged.known, judged.together, judged.adequacy, self.advice,
             self.ended.history, about, self.search_told(), command(),
         )  # fmt: skip
-        return [made.write(folder / "report.html")]
+        return made.write(path)
 
-    def write_result(self, folder: Path) -> list[Path]:
-        """Write result.json and history.csv."""
+    def _results(self, folder: Path) -> list[Path]:
         from tractexp.identification.result import write_history
 
         return [
@@ -300,14 +310,19 @@ def identify(
     search is, False does not; a callable is told what is read and done, a sentence at a time.
 
     Raises `UserError` for wrong names or values, records that lack what the model reads, and where nothing tried can be
-    simulated.
+    simulated. Ctrl-C raises `tractexp.errors.Stopped`, a KeyboardInterrupt whose `result` holds what was found so far.
     """
     known = {"bounds": bounds, "fixed": fixed, "per_event": per_event, "substeps": substeps, "domain": domain}
     setup = Asked.of(
         records, model, validate, objective, known, seed=seed, budget=budget, time_limit=time_limit, target=target,
         optimizer=Choice.of("optimizer", optimizer), check_intervals=check_intervals,
     )  # fmt: skip
-    return Identification.of(setup, setup.found(progress))
+    found = None
+    try:
+        found = setup.found(progress)
+        return Identification.of(setup, found)
+    except KeyboardInterrupt as stop:
+        raise Stopped.of(stop, result=setup.so_far(found or getattr(stop, "found", None))) from None
 
 
 def _judge(setup: Asked, found: "Found") -> tuple[Result, Judged]:

@@ -1,7 +1,7 @@
 """Find where simulation and measurement disagree, name the missing effect, add it, show the gap shrink.
 
-The investigation itself is `tractexp.discrepancy`; everything this file asks of it stands in `_made`, `_estimated`
-and `Investigation._write`.
+The investigation itself is `tractexp.discrepancy`; everything this file asks of it stands in `_made`, `_estimated`,
+`Investigation._results` and `Investigation._drawings`.
 """
 
 import functools
@@ -16,7 +16,7 @@ from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.compose import LoadModel, model_of
 from tractexp.api.identify import Identification
-from tractexp.api.pages import Written
+from tractexp.api.pages import Drawing, Written
 from tractexp.api.read import dips_of
 from tractexp.api.response import Response
 from tractexp.api.setup import Given
@@ -133,6 +133,18 @@ class Investigation(Written):
         return Table(columns, [[shape[key] for key in columns] for shape in shapes], "what is left", said)
 
     @property
+    def proposal(self) -> Mapping[str, Any] | None:
+        """The term proposed for an unexplained disagreement, as `discrepancy.json` has it; None where there is none."""
+        return self.content["proposal"]
+
+    @property
+    def proposed(self) -> list[str]:
+        """The proposal as sentences; why there is none where nothing explains."""
+        from tractexp.discrepancy.proposal.wording import proposed_in_words
+
+        return proposed_in_words(self.proposal, self.content["no_proposal"])
+
+    @property
     def sizes(self) -> list[str]:
         """How large the effects named are, with standard errors, as text: their parameters that have a null."""
         return self._sizes(self.members, self.content["parameters"])
@@ -205,7 +217,14 @@ class Investigation(Written):
                 closed = f"{gap.closed:.0%}" if gap and stage == "after" and gap.closed is not None else ""
                 rows.append([label, stage, *errors, closed])
         left = self.remainder.said
-        said = [self.reason, *self.sizes, *left, f"noise: {self.content['noise']}", f"next: {self.recommendation}"]
+        said = [
+            self.reason,
+            *self.sizes,
+            *left,
+            *self.proposed,
+            f"noise: {self.content['noise']}",
+            f"next: {self.recommendation}",
+        ]
         columns = ["events", "", "epsilon_p", "epsilon_q", *["epsilon_i"] * waves, "chi2 per sample", "gap closed"]
         return Table(columns, rows, f"{self.verdict.upper()} {' and '.join(self.names)}".strip(), said)
 
@@ -216,13 +235,13 @@ class Investigation(Written):
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         return cls(Question.from_dict(content["question"]), content["content"], Result(**content["result"]))
 
-    def _write(self, folder: Path) -> list[Path]:
-        """discrepancy.json, result.json and the page.
+    def _results(self, folder: Path) -> list[Path]:
+        """discrepancy.json and result.json.
 
-        conf/model/extended.yaml where an effect was named, unexplained.csv where nothing explains.
+        conf/model/extended.yaml where an effect was named, unexplained.csv where nothing explains, and the plugin of
+        a term where one is proposed.
         """
         from tractexp.discrepancy import discrepancy_json
-        from tractexp.report import discrepancy
 
         base = {**self.question.model.node, "bounds": self.question.model.bounds, "fixed": self.question.model.fixed}
         paths = [
@@ -233,8 +252,15 @@ class Investigation(Written):
             paths.append(discrepancy_json.write_model(self.steps, base, folder / "conf" / "model" / "extended.yaml"))
         if self.verdict == "unexplained":
             paths.append(discrepancy_json.write_left(self.steps, folder / "unexplained.csv"))
+        if self.content["proposal"]:
+            paths.append(discrepancy_json.write_plugin(self.steps, folder / self.content["proposal"]["plugin"]))
+        return paths
+
+    def _drawings(self) -> Mapping[str, Drawing]:
+        from tractexp.report import discrepancy
+
         records = ", ".join(e.record.name for e in self.question.train)
-        return [*paths, discrepancy.page(folder / "discrepancy.html", self.steps, records)]
+        return {"discrepancy.html": lambda path: discrepancy.page(path, self.steps, records)}
 
 
 def _size(name: str, at: Mapping[str, Any], unit: str) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from tractexp import files, plugin
 from tractexp.api.arguments import public
-from tractexp.api.pages import Written
+from tractexp.api.pages import Drawing, Written
 from tractexp.api.read import kept_record, node_of, record_again, table
 from tractexp.errors import UserError
 from tractexp.outcome import Table, Tabulated
@@ -144,12 +144,13 @@ class Look(Written):
         sources = [s if isinstance(s, str) else record_again(s) for s in content["sources"]]
         return cls(sources, content["settings"], content["content"])
 
-    def _write(self, folder: Path) -> list[Path]:
-        """look.html and look.json."""
+    def _results(self, folder: Path) -> list[Path]:
+        return [files.write_json(folder / "look.json", self.content)]
+
+    def _drawings(self) -> Mapping[str, Drawing]:
         from tractexp.report import look
 
-        return [look.page(folder / "look.html", self.views, self.content),
-                files.write_json(folder / "look.json", self.content)]  # fmt: skip
+        return {"look.html": lambda path: look.page(path, self.views, self.content)}
 
 
 @public

@@ -2,12 +2,14 @@
 
 import html
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from tractexp import files
+from tractexp.errors import UserError
 from tractexp.outcome import Outcome
+from tractexp.progress import say
 
 
 @dataclass(frozen=True)
@@ -27,23 +29,53 @@ class Shown:
         return f'<iframe srcdoc="{html.escape(self.html)}" style="width:100%;height:40rem;border:0"></iframe>'
 
 
+Drawing = Callable[[Path], Path]  # makes the file of this path
+
+
 class Written(Outcome):
-    """Base of the results that are told in a folder. A subclass says in `_write` what it writes."""
+    """Base of the results that are told in a folder.
+
+    A subclass writes in `_results` what cannot be had again without the computation, and names in `_drawings` what is
+    made from it.
+    """
 
     def write(self, folder: Path | str) -> list[Path]:
-        """Write everything into a folder: the page where there is one, figures, files for machines; their paths."""
-        return self._write(Path(folder))
+        """Write everything into a folder, and return the paths: files for machines first, then pages and figures.
+
+        Raises `UserError` where the results cannot be written. A page or a figure that fails is a sentence on the
+        terminal, for the results are on the disk by then.
+        """
+        return [*self.write_results(folder), *self.write_drawings(folder)]
+
+    def write_results(self, folder: Path | str) -> list[Path]:
+        """Write the files for machines; their paths. Raises `UserError` where they cannot be written."""
+        return self._results(Path(folder))
+
+    def write_drawings(self, folder: Path | str) -> list[Path]:
+        """Write pages and figures; the paths of those that could be made. Of each of the others a sentence is told."""
+        made = []
+        for name, draw in self._drawings().items():
+            try:
+                made.append(draw(Path(folder) / name))
+            except Exception as error:  # whatever it is, the results stand
+                say(f"note: {not_drawn(Path(folder) / name, error)}")
+        return made
 
     def report(self) -> Shown:
         """The page, as a notebook shows it; `save(path)` writes it. Without a page of its own: table and figures."""
         with tempfile.TemporaryDirectory() as folder:
-            paths = self._write(Path(folder))
+            paths = self._results(Path(folder))
+            paths += [draw(Path(folder) / name) for name, draw in self._drawings().items()]
             pages = [path for path in paths if path.suffix == ".html"]
             page = pages[0] if pages else self._page(paths, Path(folder) / "page.html")
             return Shown(page.read_text(encoding="utf-8"))
 
-    def _write(self, folder: Path) -> list[Path]:
+    def _results(self, folder: Path) -> list[Path]:
         raise NotImplementedError
+
+    def _drawings(self) -> Mapping[str, Drawing]:
+        """Pages and figures, {name of the file: what makes it}."""
+        return {}
 
     def _page(self, paths: Sequence[Path], path: Path) -> Path:
         """A page of the table and of the figures among `paths`."""
@@ -55,3 +87,9 @@ class Written(Outcome):
             if figure.suffix == ".svg":
                 page.figure(figure)
         return page.write(path)
+
+
+def not_drawn(path: Path, error: Exception) -> str:
+    """Why a page or a figure is missing, as a sentence."""
+    reason = str(error) if isinstance(error, UserError) else f"{type(error).__name__}: {error}".strip()
+    return f"{path.name} could not be made, while the results are whole ({reason.partition(chr(10))[0]})"

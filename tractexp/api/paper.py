@@ -8,8 +8,9 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
+from tractexp import files
 from tractexp.api.arguments import public
-from tractexp.api.pages import Written
+from tractexp.api.pages import Drawing, Written
 from tractexp.api.setup import Setup
 from tractexp.errors import check_choice, check_range
 from tractexp.outcome import Table
@@ -18,6 +19,8 @@ from tractexp.progress import NEXT_LINES, telling
 if TYPE_CHECKING:
     from tractexp.replication.claims import Claim
     from tractexp.replication.study import Study
+    from tractexp.report.markdown import Markdown
+    from tractexp.report.page import Page
 
 PARTS = (
     "table1", "table2", "table3", "table4", "table5", "figure3", "figure4", "figure6", "figure8", "figure9", "figure10",
@@ -54,11 +57,22 @@ class Replicated(Written):
         rows = [[claim.part, claim.text, claim.verdict, claim.measured] for claim in self.claims]
         return Table(["where", "the paper's claim", "verdict", "measured"], rows, counted(self.claims))
 
-    def _write(self, folder: Path) -> list[Path]:
-        """paper.html and paper.md."""
-        from tractexp.report.paper import write
+    @functools.cached_property
+    def _sheets(self) -> "tuple[Page, Markdown]":
+        from tractexp.report.paper import sheets
 
-        return write(self.study, self.parts, self.claims, folder)
+        return sheets(self.study, self.parts, self.claims)
+
+    def _results(self, folder: Path) -> list[Path]:
+        """paper.json: the claims and what was measured."""
+        told = {key: value for key, value in self.to_dict().items() if key != "setup"}
+        return [files.write_json(folder / "paper.json", told)]
+
+    def _drawings(self) -> Mapping[str, Drawing]:
+        return {
+            "paper.html": lambda path: self._sheets[0].write(path),
+            "paper.md": lambda path: self._sheets[1].write(path),
+        }
 
     def to_dict(self) -> dict[str, Any]:
         told = {"settings": dict(self.settings), "parts": list(self.parts)}

@@ -11,7 +11,7 @@ import numpy as np
 from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.identify import Identification
-from tractexp.api.pages import Written
+from tractexp.api.pages import Drawing, Written
 from tractexp.api.setup import Setup
 from tractexp.errors import UserError, check_range
 from tractexp.outcome import Table
@@ -70,11 +70,13 @@ class Forecasts(Written):
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         return cls(Setup.from_dict(content["setup"]), content["asked"], content["content"])
 
-    def _write(self, folder: Path) -> list[Path]:
-        """plan.html and plan.json."""
+    def _results(self, folder: Path) -> list[Path]:
+        return [files.write_json(folder / "plan.json", self.content)]
+
+    def _drawings(self) -> Mapping[str, Drawing]:
         from tractexp.report import plan
 
-        return [plan.page(folder / "plan.html", self.planned), files.write_json(folder / "plan.json", self.content)]
+        return {"plan.html": lambda path: plan.page(path, self.planned)}
 
 
 @public

@@ -13,7 +13,7 @@ import numpy as np
 from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.identify import Identification
-from tractexp.api.pages import Written
+from tractexp.api.pages import Drawing, Written
 from tractexp.errors import check_range
 from tractexp.outcome import Table
 
@@ -61,18 +61,20 @@ class Sampled(Written):
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         return cls(Identification.from_dict(content["fit"]), content["settings"], content["content"])
 
-    def _write(self, folder: Path) -> list[Path]:
-        """posterior.html, posterior.json, posterior.npz, history.csv and result.json."""
-        from tractexp.report import posterior
-
+    def _results(self, folder: Path) -> list[Path]:
         packed = io.BytesIO()
         np.savez_compressed(packed, **self.draws)  # type: ignore[arg-type]
         path = files.write_json(folder / "posterior.json", self.content)
         draws = files.write(folder / "posterior.npz", packed.getvalue())
-        fit, known = self.fit, self.fit.judged.known
-        page = posterior.page(folder / "posterior.html", known, self.drawn, fit.headline, fit.trusted)
-        result = replace(fit.result, **known.fields())
-        return [page, path, draws, *replace(fit, result=result).write_result(folder)]
+        result = replace(self.fit.result, **self.fit.judged.known.fields())
+        return [path, draws, *replace(self.fit, result=result).write_results(folder)]
+
+    def _drawings(self) -> Mapping[str, Drawing]:
+        from tractexp.report import posterior
+
+        fit = self.fit
+        known, told = fit.judged.known, (fit.headline, fit.trusted)
+        return {"posterior.html": lambda path: posterior.page(path, known, self.drawn, *told)}
 
 
 @public

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.identify import Identification
-from tractexp.api.pages import Written
+from tractexp.api.pages import Drawing, Written
 from tractexp.errors import check_range
 from tractexp.identification.result import Result
 from tractexp.outcome import Table
@@ -72,13 +72,15 @@ class Profiled(Written):
         fit, result = Identification.from_dict(content["fit"]), Result(**content["result"])
         return cls(fit, content["points"], content["content"], result, content["curvature"])
 
-    def _write(self, folder: Path) -> list[Path]:
-        """profile.html, profile.json, history.csv and result.json."""
+    def _results(self, folder: Path) -> list[Path]:
+        path = files.write_json(folder / "profile.json", self.content)
+        return [path, *self.identification.write_results(folder)]
+
+    def _drawings(self) -> Mapping[str, Drawing]:
         from tractexp.report import profile
 
-        path = files.write_json(folder / "profile.json", self.content)
-        page = profile.page(folder / "profile.html", self.made, self.fit.headline, self.fit.trusted)
-        return [page, path, *self.identification.write_result(folder)]
+        told = self.fit.headline, self.fit.trusted
+        return {"profile.html": lambda path: profile.page(path, self.made, *told)}
 
 
 @public

@@ -62,10 +62,9 @@ class Response:
 
         return pandas.DataFrame(self.columns)
 
-    def write(self, folder: Path, number: int) -> list[Path]:
-        """Write response.csv and response.svg, with a number from the second event on; of waveforms currents, too."""
-        stem = folder / ("response" if number == 1 else f"response_{number}")
-        made = [_csv(stem.with_suffix(".csv"), self.columns), self.draw(stem.with_suffix(".svg"))]
+    def write(self, stem: Path) -> list[Path]:
+        """Write columns to `stem`.csv; of waveforms currents, too."""
+        made = [_csv(stem.with_suffix(".csv"), self.columns)]
         return made + ([_csv(stem.with_name(f"{stem.name}_currents.csv"), self.currents)] if self.currents else [])
 
     def draw(self, path: Path) -> Path:

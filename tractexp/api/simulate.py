@@ -10,7 +10,7 @@ import numpy as np
 from tractexp.api.arguments import public
 from tractexp.api.compose import LoadModel, model_of
 from tractexp.api.identify import Identification
-from tractexp.api.pages import Written
+from tractexp.api.pages import Drawing, Written
 from tractexp.api.read import dips_of
 from tractexp.api.response import Response, respond_to
 from tractexp.errors import UserError, among, check_range
@@ -88,9 +88,17 @@ class Simulation(Written):
         responses = tuple(map(response, content["responses"]))
         return cls(LoadModel(**content["model"]), content["values"], responses)
 
-    def _write(self, folder: Path) -> list[Path]:
-        """response.csv and response.svg, with a number from the second event on."""
-        return [path for k, one in enumerate(self.responses, start=1) for path in one.write(folder, k)]
+    def _results(self, folder: Path) -> list[Path]:
+        """response.csv, with a number from the second event on; of waveforms currents, too."""
+        return [path for k, one in enumerate(self.responses, start=1) for path in one.write(folder / _stem(k))]
+
+    def _drawings(self) -> Mapping[str, Drawing]:
+        """response.svg, with a number from the second event on."""
+        return {f"{_stem(k)}.svg": one.draw for k, one in enumerate(self.responses, start=1)}
+
+
+def _stem(number: int) -> str:
+    return "response" if number == 1 else f"response_{number}"
 
 
 @public

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Self
 from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.look import Listed
-from tractexp.api.pages import Written
+from tractexp.api.pages import Drawing, Written
 from tractexp.api.surveying import QUIET, UNREAD, kept, looked, states, writing
 from tractexp.errors import UserError, check_range
 from tractexp.outcome import Table
@@ -90,17 +90,18 @@ class Survey(Written):
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         return cls(content["content"])
 
-    def _write(self, folder: Path) -> list[Path]:
-        """survey.html, survey.csv, survey.parquet and survey.json."""
-        from tractexp.report import survey
-
+    def _results(self, folder: Path) -> list[Path]:
         frame = self.to_frame()
         return [
-            survey.page(folder / "survey.html", self.content),
+            files.write_json(folder / "survey.json", self.content),
             files.write(folder / "survey.csv", frame.to_csv(index=False)),
             files.write(folder / "survey.parquet", frame.to_parquet(index=False)),
-            files.write_json(folder / "survey.json", self.content),
         ]
+
+    def _drawings(self) -> Mapping[str, Drawing]:
+        from tractexp.report import survey
+
+        return {"survey.html": lambda path: survey.page(path, self.content)}
 
 
 @public

@@ -179,27 +179,10 @@ def writing(journal: Path | None) -> Iterator[Callable[[str, list[Any], Rows], N
     if journal is None:
         yield lambda name, state, rows: None
         return
-    try:
-        journal.parent.mkdir(parents=True, exist_ok=True)
-        file = journal.open("ab+")
-    except OSError as error:
-        raise UserError(f"{journal} cannot be written: {error.strerror or error}") from error
-    with file:
-        file.write(_ended(journal))
+    with files.Growing(journal) as growing:
 
         def write(name: str, state: list[Any], rows: Rows) -> None:
             told = files.plain({"file": name, "state": state, "rows": rows})
-            file.write(json.dumps(told, ensure_ascii=False).encode() + b"\n")
-            file.flush()
+            growing.add(json.dumps(told, ensure_ascii=False))
 
         yield write
-
-
-def _ended(journal: Path) -> bytes:
-    """What ends a line that was cut short."""
-    size = journal.stat().st_size
-    if size == 0:
-        return b""
-    with journal.open("rb") as file:
-        file.seek(size - 1)
-        return b"" if file.read(1) == b"\n" else b"\n"

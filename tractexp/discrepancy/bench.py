@@ -13,6 +13,7 @@ from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.kernels import Family, Kernels
 from tractexp.discrepancy.records import Records
+from tractexp.identification import shelf
 from tractexp.identification.descent import Apart
 from tractexp.identification.problem import Problem
 from tractexp.model.drive import Drive
@@ -39,23 +40,33 @@ class Bench:
     def of(
         cls, load: Model, catalogue: Catalogue, records: Records, bounds: Mapping[str, Sequence[float]],
         fixed: Mapping[str, float], criteria: Criteria, effort: Effort, substeps: int | None = None,
+        family: type[Family] = Family,
     ) -> "Bench":  # fmt: skip
         """A bench for these records; the load is simulated behind the recorder's window, where there is one."""
-        kernels = Kernels(Family(load.behind(records.window), catalogue), records.events, bounds, fixed, substeps)
+        kernels = Kernels(family(load.behind(records.window), catalogue), records.events, bounds, fixed, substeps)
         coordinates = Coordinates.of(kernels.bare, kernels.whole, catalogue, criteria.measurement_prior)
         return cls(load, catalogue, records, kernels, coordinates, criteria, effort)
 
     def on(self, records: Records) -> "Bench":
         """The same model and catalogue on other records, with the same Runge-Kutta steps and a count of its own."""
         kernels, criteria, effort = self.kernels, self.criteria, self.effort.anew()
-        return Bench.of(
-            self.load, self.catalogue, records, kernels.bounds, kernels.fixed, criteria, effort, kernels.substeps
-        )
+        known = kernels.bounds, kernels.fixed, criteria, effort, kernels.substeps
+        return Bench.of(self.load, self.catalogue, records, *known, type(kernels.family))
 
     @property
     def model(self) -> Model:
         """The base model, behind the recorder's window."""
         return self.kernels.family.model
+
+    @functools.cached_property
+    def told(self) -> str:
+        """SHA-256 of all that a fit on this bench depends on beside noise and starts; "" where that cannot be told."""
+        load, at = self.load, self.coordinates
+        parts = (load.motor, load.static, *load.effects, *self.catalogue.effects)
+        if not all(map(shelf.installed, parts)):
+            return ""
+        known = self.problem.digest(), self.kernels.bare.digest(), self.criteria, at.null, at.prior_deviation
+        return shelf.told(shelf.behind(), repr(parts), self.records.window, *known)
 
     @property
     def waves(self) -> bool:

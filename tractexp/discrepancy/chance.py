@@ -4,7 +4,7 @@ Thresholds hold for the largest of all candidates at once, for the noise as it w
 samples are few, for the error of that estimate too: each draw then estimates its noise anew.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.noise_in_quiet import QuietNoise
 from tractexp.discrepancy.projection import Projection
 from tractexp.discrepancy.tangent import Tangent, rich_residuals
+from tractexp.identification import shelf
 from tractexp.identification.surprises import SMALLEST_P, tail
 from tractexp.noise import Noise
 
@@ -36,16 +37,38 @@ class Chance:
 
 
 def chance_at(t: Tangent, noise: Noise, quiet: QuietNoise, seed: int, plain: bool, draws: int = DRAWS) -> Chance:
-    """Draw every statistic at a fit as chance makes it; where the case is `plain`, with the noise taken as known."""
+    """Draw every statistic at a fit as chance makes it; where the case is `plain`, with the noise taken as known.
+
+    What was drawn for the same fit before, as by a run that was stopped, is read back.
+    """
+    bench = t.bench
+
+    def made() -> tuple[np.ndarray, ...]:
+        chance = _drawn(t, noise, quiet, seed, plain, draws)
+        return chance.least_p, np.array([*chance.left]), *chance.left.values()
+
+    if not bench.told:
+        return _drawn(t, noise, quiet, seed, plain, draws)
+    fit = {field.name: getattr(t, field.name) for field in fields(t) if field.name != "bench"}
+    what = shelf.told("chance", bench.told, fit, noise, quiet.blur, seed, plain, draws)
+    least, names, *left = shelf.arrays("descents", what, made)
+    return Chance(least, dict(zip(names.tolist(), left, strict=True)))
+
+
+def _drawn(t: Tangent, noise: Noise, quiet: QuietNoise, seed: int, plain: bool, draws: int) -> Chance:
     bench = t.bench
     rng = np.random.default_rng(seed)
     drawn = noise.draw(rng, draws, np.diff(bench.drive.first).tolist())
     drawn *= bench.known
-    worth = np.inf if bench.waves else noise.worth(sum(p.stop - p.start for p in bench.quiet))
-    if plain or bench.criteria.knows_noise(worth):  # two numbers tell that of waveforms
+    if plain or noise_known(bench, noise):
         return _collected(t, [t.whitened(noise, drawn)], noise)
     rest = rich_residuals(t, drawn)
     return _collected(t, [t.whitened(quiet.of(t.unit, rest[b]), drawn[b : b + 1]) for b in range(draws)], noise)
+
+
+def noise_known(bench: Bench, noise: Noise) -> bool:
+    """Whether quiet stretches tell the noise exactly enough; two numbers tell that of waveforms."""
+    return bench.waves or bench.criteria.knows_noise(noise.worth(sum(p.stop - p.start for p in bench.quiet)))
 
 
 def _collected(t: Tangent, projections: list[Projection], noise: Noise) -> Chance:

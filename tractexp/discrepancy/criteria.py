@@ -126,6 +126,18 @@ class Criteria:
         0.8, (0.0, 1.0), "power at the smallest relevant size below which an effect is called not testable", DERIVED,
         "the usual power of a planned test (Saris, Satorra and van der Veld 2009)",
     )  # fmt: skip
+    proposal_closed: float = _criterion(
+        0.6, (0.0, 1.0), "share of the excess on held-out events that a proposed term must close", CHOSEN,
+        "wrong terms on nulls made held-out events worse, right ones closed three quarters and more (prototype)",
+    )  # fmt: skip
+    proposal_left: float = _criterion(
+        1.7, (1.0, 1e6), "variance over the noise's that a proposed term may leave on any role's events", CHOSEN,
+        "right terms left 0.9 to 1.5, a wrong one that closed nine tenths left 3.3 (prototype)",
+    )  # fmt: skip
+    proposal_p: float = _criterion(
+        0.01, (0.0, 1.0), "how often noise may give the best term of the whole library as much", CHOSEN,
+        "it guards against the library's size alone; held-out events do the rest",
+    )  # fmt: skip
     decided: float = _criterion(
         0.95, (0.0, 1.0), "probability with which a recommended dip must tell tied sets apart", DERIVED,
         "one miss in twenty, as for the tests",

@@ -5,11 +5,10 @@ from dataclasses import dataclass, replace
 
 from tractexp.discrepancy.base_fit import BaseFit
 from tractexp.discrepancy.bench import Bench
-from tractexp.discrepancy.chance import Chance, chance_at
+from tractexp.discrepancy.chance import Chance, chance_at, noise_known
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.fitting import Refit, refit
 from tractexp.discrepancy.noise_in_quiet import QuietNoise
-from tractexp.discrepancy.own_noise import gained, surprise, under_own
 from tractexp.discrepancy.projection import Projection, Score
 from tractexp.discrepancy.tangent import Tangent, rich_residuals, tangent
 from tractexp.noise import Noise
@@ -27,8 +26,6 @@ class Disagreement:
     projection: Projection
     chance: Chance
     scores: list[Score]  # of the candidates outside the fit, the rarest by chance first
-    surprise: float  # minus twice the log-likelihood of the fit
-    unborne: frozenset[str] = frozenset()  # faults of the measurement that the fit's own noise does not bear out
 
     @property
     def bench(self) -> Bench:
@@ -67,18 +64,17 @@ class Disagreement:
     @property
     def asks_for_more(self) -> bool:
         """Whether any further effect of the load helps more than chance does."""
-        return bool(self.scores) and self.scores[0].p < self.asked
-
-    @property
-    def asked(self) -> float:
-        """The p that one more effect of the load must undercut."""
-        beside = self.criteria.beside_measurement if self.faults and not self.fit.names else 1.0
-        return beside * self._level  # small p are uniform where nothing is missing
-
-    @property
-    def _level(self) -> float:
         level = self.chance.critical_p(self.criteria.naming)
-        return min(level, self.criteria.further_name(len(self.fit.names))) if self.fit.names else level
+        if self.fit.names:
+            level = min(level, self.criteria.further_name(len(self.fit.names)))
+        elif self.faults:
+            level *= self.criteria.beside_measurement  # small p are uniform where nothing is missing
+        return bool(self.scores) and self.scores[0].p < level
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether anything says that more is missing."""
+        return self.asks_for_more or not self.adequate or bool(self.faults)
 
     @functools.cached_property
     def faults(self) -> tuple[str, ...]:
@@ -88,8 +84,10 @@ class Disagreement:
         """
         if self.noise.loudest_blur > self.criteria.blurred:
             return ()
-        seen = {name for name, p in self.projection.fault_p().items() if p[0] < self._level}
-        return tuple(sorted(seen - self.unborne))
+        level = self.chance.critical_p(self.criteria.naming)
+        if self.fit.names:
+            level = min(level, self.criteria.further_name(len(self.fit.names)))
+        return tuple(sorted(name for name, p in self.projection.fault_p().items() if p[0] < level))
 
 
 def disagreement(base: BaseFit, seed: int) -> Disagreement:
@@ -98,7 +96,11 @@ def disagreement(base: BaseFit, seed: int) -> Disagreement:
 
 
 def examined(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int, plain: bool = False) -> Disagreement:
-    """All tests at one fit, under the noise of what no candidate explains there; `plain` takes it as known."""
+    """All tests at one fit, under the noise of what no candidate explains there; `plain` takes it as known.
+
+    Taken as known the noise makes every test sharper: what even those do not doubt needs no draws that estimate it
+    anew, which cost a hundred times as much.
+    """
     bench = quiet.bench
     t = tangent(bench, fit, noise)
     noise = quiet.of(fit.unit, rich_residuals(t, t.residual[None])[0], t.residual, t.explaining)
@@ -106,20 +108,9 @@ def examined(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int, plain: bool
     t = tangent(bench, fit, noise)
     projection = t.whitened(noise)
     scores = projection.scores()
-    plain = plain or (bool(scores) and scores[0].p < PLAIN)
-    chance = chance_at(t, noise, quiet, seed, plain)
-    found = Disagreement(fit, noise, t, projection, chance, scores, surprise(quiet, fit, noise))
-    return replace(found, unborne=_unborne(quiet, found)) if bench.waves else found
-
-
-def _unborne(quiet: QuietNoise, found: Disagreement) -> frozenset[str]:
-    """Faults of the measurement that seem to be there, and are not under the noise of a fit without them."""
-    every, doubted = found.bench.catalogue.of_measurement, set()
-    for name in found.faults:
-        others = tuple(n for n in every if n != name)
-        unit = found.bench.coordinates.without_faults(found.fit.unit, others)
-        _, without = under_own(quiet, replace(found.fit, unit=unit), others)
-        size = len(found.projection.faults[name])
-        if gained(without, found.surprise, size) >= found._level:
-            doubted.add(name)
-    return frozenset(doubted)
+    chance = chance_at(t, noise, quiet, seed, plain=True)
+    found = Disagreement(fit, noise, t, projection, chance, scores)
+    plain = plain or noise_known(bench, noise) or (bool(scores) and scores[0].p < PLAIN)
+    if not plain and found.doubtful:
+        found = replace(found, chance=chance_at(t, noise, quiet, seed, plain=False))
+    return found

@@ -13,10 +13,14 @@ from tractexp.discrepancy.gap import Curves, Gap
 from tractexp.discrepancy.investigate import Investigation
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import Estimate, estimates, own_parameters
+from tractexp.discrepancy.proposal import generate
+from tractexp.discrepancy.proposal.propose import told as told_of_proposal
 from tractexp.discrepancy.verdict import NAMED, UNEXPLAINED
 from tractexp.identification.adequacy import Grade
 from tractexp.model.drive import PHASORS
 from tractexp.wording import joined
+
+PLUGIN = f"{generate.NAME}.py"  # of a proposal, beside the page
 
 
 def content(investigation: Investigation) -> dict[str, Any]:
@@ -38,6 +42,8 @@ def content(investigation: Investigation) -> dict[str, Any]:
         "nearest": _nearest(investigation),
         "candidates": [*sets(investigation), *_singles(investigation)],
         "remainder": _remainder(investigation),
+        "proposal": told_of_proposal(investigation.proposed, PLUGIN),
+        "no_proposal": investigation.proposed.why or None,
         "recommendation": recommendation(investigation),
         "adequacy": recommended.adequacy(investigation).told(),
         "held": recommended.held(investigation),
@@ -56,6 +62,8 @@ def recommendation(investigation: Investigation) -> str:
         spoken = investigation.catalogue.spoken
         first, second = (joined([spoken(n) for n in names]) for names in investigation.verdict.sets[:2])
         return dip.sentence(first, second, investigation.bench.criteria.decided)
+    if (made := investigation.proposed.proposal) is not None:
+        return f"ask what on site acts like {made.term.words}; {PLUGIN} adds it to a model (docs/missing-effects.md)"
     if investigation.verdict.word == UNEXPLAINED:
         return "look at what is left (unexplained.csv) and at what switched at that time"
     if investigation.verdict.word == NAMED:
@@ -123,6 +131,13 @@ def write_left(investigation: Investigation, path: Path) -> Path:
         rows = list(zip(event.record.t, *left, strict=True))[event.first :]
         lines += [",".join([event.record.name, *(f"{x:.9g}" for x in row)]) for row in rows]
     return files.write(path, "\n".join(lines) + "\n")
+
+
+def write_plugin(investigation: Investigation, path: Path) -> Path:
+    """Write the plugin file of a proposal."""
+    made = investigation.proposed.proposal
+    assert made is not None
+    return files.write(path, made.source)
 
 
 def _curves(curves: Curves) -> dict[str, float]:

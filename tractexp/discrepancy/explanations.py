@@ -14,8 +14,6 @@ from tractexp.discrepancy.base_fit import BaseFit
 from tractexp.discrepancy.disagreement import Disagreement, examined
 from tractexp.discrepancy.families import member_that_suffices
 from tractexp.discrepancy.fitting import Refit, Start, best_of, no_worse_than_subsets, refit, rough_refit
-from tractexp.discrepancy.noise_in_quiet import QuietNoise
-from tractexp.discrepancy.own_noise import gained, under_own
 from tractexp.discrepancy.projection import Score
 from tractexp.discrepancy.tangent import Column, tangent
 from tractexp.identification.valleys import DISTINCT
@@ -79,8 +77,6 @@ def explanations(base: BaseFit, first: Disagreement, seed: int) -> Explanations:
                 tests = sufficient(base, fits, first.noise, seed + size)
         if size == 1:
             tests = with_families(base, tests, refits, seed)
-        if base.bench.waves and not borne_out(steps[-1], tests):
-            break
         steps.append(tests)
     if len(steps) == 1:
         tests = with_families(base, first, refits, seed)
@@ -138,19 +134,11 @@ def from_other_valleys(base: BaseFit, first: Disagreement, refits: Refits) -> tu
     return ground, [f for f in singles if refits.get(f.names) is not f]
 
 
-def borne_out(before: Disagreement, after: Disagreement) -> bool:
-    """Whether one more effect helps more than chance does when each fit has the noise that its own model passes on."""
-    parameters = after.fit.parameters - before.fit.parameters
-    return gained(before.surprise, after.surprise, parameters) < before.asked
-
-
 def sufficient(base: BaseFit, ranked: Sequence[Refit], noise: Noise, seed: int) -> Disagreement:
     """The tests at the best fit, or at the first of those close to it that asks for no further effect where it does.
 
     Formulas are not the physics: of two that fit nearly alike, the one that needs no patch is the better.
     """
-    if base.bench.waves:
-        ranked = by_own_noise(base.quiet, ranked)
     best = examined(base.quiet, ranked[0], noise, seed)
     if not best.asks_for_more:
         return best
@@ -159,12 +147,6 @@ def sufficient(base: BaseFit, ranked: Sequence[Refit], noise: Noise, seed: int) 
         if not there.asks_for_more and there.p_left > best.p_left:
             return there
     return best
-
-
-def by_own_noise(quiet: QuietNoise, ranked: Sequence[Refit]) -> list[Refit]:
-    """The first of ranked fits in the order of their surprise under their own noise, then the others."""
-    costs = {f.names: under_own(quiet, f)[1] + 2 * f.parameters for f in ranked[:PATCHED]}
-    return [*sorted(ranked[:PATCHED], key=lambda f: costs[f.names]), *ranked[PATCHED:]]
 
 
 def shortlist(steps: Sequence[Disagreement], size: int) -> list[Names]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.bench import Bench
+from tractexp.identification import shelf
 from tractexp.identification.descent import descend
 from tractexp.noise import Noise
 
@@ -80,7 +81,8 @@ def no_worse_than_subsets(
 def _descended(
     bench: Bench, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None, effort: tuple[int, float]
 ) -> list[Refit]:
-    """The end of a descent from each start."""
+    """The end of a descent from each start; of one that was made before, as by a run that was stopped, as it was."""
+    spent = 0
     at = bench.coordinates
     measured = at.parameters(at.catalogue.of_measurement if faults is None else tuple(faults))
     prior = [*measured, *at.shapes(sorted({name for names, _ in wanted for name in names}))]
@@ -92,15 +94,23 @@ def _descended(
     starts = np.array([np.r_[start, 0.0] for _, start in wanted])  # the last column takes what no lane has
 
     def rows(x: np.ndarray, lanes: np.ndarray) -> np.ndarray:
+        nonlocal spent
+        spent += len(x)
         whole = starts[lanes]
         np.put_along_axis(whole, table[lanes], x, axis=1)
         return bench.rows(whole[:, :-1], noise, prior, [wanted[lane][0] for lane in lanes])
 
-    begin = np.take_along_axis(starts, table, axis=1)
-    done = descend(rows, begin, table == at.dimension, *effort, bench.apart(len(prior)))
-    np.put_along_axis(starts, table, done.unit, axis=1)
+    def made() -> tuple[np.ndarray, ...]:
+        begin = np.take_along_axis(starts, table, axis=1)
+        done = descend(rows, begin, table == at.dimension, *effort, bench.apart(len(prior)))
+        return done.unit, done.deviance, np.array(spent)
+
+    what = bench.told and shelf.told(bench.told, noise, [(tuple(names), unit) for names, unit in wanted], prior, effort)
+    unit, deviance, simulations = shelf.arrays("descents", what, made) if what else made()
+    bench.effort.spend(int(simulations) - spent)  # of what was made before, what it took then
+    np.put_along_axis(starts, table, unit, axis=1)
     return [
-        Refit(tuple(sorted(names)), starts[lane, :-1].copy(), float(done.deviance[lane]), len(at.parameters(names)))
+        Refit(tuple(sorted(names)), starts[lane, :-1].copy(), float(deviance[lane]), len(at.parameters(names)))
         for lane, (names, _) in enumerate(wanted)
     ]
 

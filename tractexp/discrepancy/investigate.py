@@ -18,6 +18,7 @@ from tractexp.discrepancy.kernels import Family
 from tractexp.discrepancy.overlay import Overlay, left, on_fitted, on_held_out
 from tractexp.discrepancy.places import Place, places
 from tractexp.discrepancy.precision import Estimate, estimates
+from tractexp.discrepancy.proposal.propose import Proposed, propose
 from tractexp.discrepancy.records import Records, check_events, in_waves_of
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.survivors import Survivors, survivors
@@ -40,6 +41,7 @@ class Investigation:
     verdict: Verdict
     train: Gap  # on the fitted events
     withheld: tuple[Event, ...]  # the held-out events
+    proposed: Proposed  # the term that an unexplained disagreement asks for
 
     @property
     def bench(self) -> Bench:
@@ -174,6 +176,9 @@ def investigate(
         surviving = survivors(explained, seed)
         weighed = held_out(surviving, validate, seed)
         said = verdict(weighed, validate)
+        proposed = Proposed()
+        if said.word == UNEXPLAINED:
+            proposed = propose(base, first, weighed.bare, explained.last.noise, validate, seed)
         return Investigation(
             base=base,
             first=first,
@@ -184,6 +189,7 @@ def investigate(
             verdict=said,
             train=_gap(base.bench, weighed, said),
             withheld=tuple(validate),
+            proposed=proposed,
         )
 
 

@@ -6,37 +6,71 @@ without. So one is believed that helps clearly, or at least as much as the best 
 where it helps at all, for a model may lack what a sharper voltage calls for.
 """
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
 from tractexp.discrepancy.base_fit import BaseFit, fitted_from
+from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.disagreement import Disagreement, disagreement
-from tractexp.discrepancy.fitting import refit, rough_refit
+from tractexp.discrepancy.explanations import starts
+from tractexp.discrepancy.fitting import Refit, refit, rough_refit
 from tractexp.discrepancy.recorder_window import windows_of
 from tractexp.discrepancy.records import Records
+
+FAR = 2.0  # times the deviance that a window explains: no effect that only imitates a window explains as much
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """A window: the bench behind it, the base model's fit there, and by how much it lowers the deviance."""
+
+    behind: Bench
+    fit: Refit
+    gained: float
 
 
 def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[BaseFit, Disagreement]:
     """The base model's fit and tests behind the recorder's window, where there is one; else those given."""
-    bench, noise, best = base.bench, first.noise, None
+    bench, noise = base.bench, first.noise
     if bench.waves:  # samples have no window
         return base, first
     if bench.drive.windows:  # the model is of a kind that is always looked at through what the records say
         return base, first
     if noise.loudest_blur > bench.criteria.blurred:  # noise of the voltage would pass for a window
         return base, first
-    least = bench.criteria.least_window(max((s.drop for s in first.scores), default=0.0))
-    for k, window in enumerate(windows_of(bench.events)):
+    tried: list[Tried] = []
+    for window in windows_of(bench.events):
         behind = bench.on(Records.of(bench.records.recorded, window))
-        starts = (first.fit.unit, *base.valleys)  # the load's valleys: no window moves them far
-        begun = rough_refit(behind, noise, [((), start) for start in starts])[0]
+        valleys = (first.fit.unit, *base.valleys)  # the load's: no window moves them far
+        begun = rough_refit(behind, noise, [((), start) for start in valleys])[0]
         fit = refit(behind, noise, [((), begun.unit)])[0]
-        gained = first.fit.deviance - fit.deviance
-        if k == 0 and gained <= 0:
-            break  # an average over several cycles is one of averages over one
-        if gained > (0.0 if window.known else least):  # that the recorder has a window it says is no guess
-            best, least = (behind, fit), gained
-    if best is None:
+        tried.append(Tried(behind, fit, first.fit.deviance - fit.deviance))
+        if tried[0].gained <= 0:
+            return base, first  # an average over several cycles is one of averages over one
+    found = _believed(tried, first) if tried else None
+    if found is None:
         return base, first
-    behind, fit = best
-    assert behind.records.window is not None
-    bench.effort.say(f"{behind.records.window.describe()}: taken into account from here on")
-    base = fitted_from(behind, [fit.unit], base.valleys)
+    assert found.behind.records.window is not None
+    bench.effort.say(f"{found.behind.records.window.describe()}: taken into account from here on")
+    base = fitted_from(found.behind, [found.fit.unit], base.valleys)
     return base, disagreement(base, seed)
+
+
+def _believed(tried: Sequence[Tried], first: Disagreement) -> Tried | None:
+    """The window that helps most, where it helps enough.
+
+    Where an effect explains far more than any window does, they are judged with it in the model: what lacks something
+    large takes a wrong window for a part of it. Without stator transients one of two cycles fits better than the right.
+    """
+    best = max(tried, key=lambda one: one.gained)
+    most, criteria = max((s.drop for s in first.scores), default=0.0), first.criteria
+    window = best.behind.records.window
+    if window is not None and window.known:  # that the recorder has a window it says is no guess
+        return best if best.gained > 0 else None
+    if most < FAR * best.gained:
+        return best if best.gained > criteria.least_window(most) else None
+    begun = starts([first], {}, (max(first.scores, key=lambda s: s.drop).name,))
+    without = refit(first.bench, first.noise, begun)[0].deviance
+    beside = [replace(one, gained=without - refit(one.behind, first.noise, begun)[0].deviance) for one in tried]
+    best = max(beside, key=lambda one: one.gained)
+    return best if best.gained > criteria.window_clear else None

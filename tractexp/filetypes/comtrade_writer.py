@@ -37,7 +37,8 @@ def write(recording: Recording, path: Path, kind: str = "BINARY", revision: int 
     if path.suffix.lower() == ".cff":
         return [files.write(path, _combined(recording, text, kind, data))]
     dat = path.with_suffix(".DAT" if path.suffix.isupper() else ".dat")
-    return [files.write(path, text), files.write(dat, data)]
+    files.write(dat, data)  # first: whoever finds the description finds the samples
+    return [files.write(path, text), dat]
 
 
 def _even_stamps(segments: Sequence[Segment], timemult: float) -> np.ndarray:

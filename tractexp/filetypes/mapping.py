@@ -68,6 +68,9 @@ def mapped(table: Table, columns: Mapping[str, Any], units: Mapping[str, str], k
 
 def check_mapping(columns: Mapping[str, Any], units: Mapping[str, str]) -> None:
     """Raise `UserError` for a key or a unit that there is not."""
+    for name, given in {"columns": columns, "units": units}.items():
+        if not isinstance(given, Mapping):
+            raise UserError(f"data.{name}={given!s:.60} must be a mapping, such as data.{name}={{U: ...}}")
     for key in columns:
         _key(key)
     for quantity, unit in units.items():

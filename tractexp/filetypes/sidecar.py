@@ -7,7 +7,7 @@ from typing import Any
 
 from tractexp.errors import UserError
 from tractexp.files import located
-from tractexp.record.record import Base
+from tractexp.record.record import SIZES, Base
 from tractexp.record.window import Window
 
 
@@ -38,10 +38,14 @@ def beside(path: str) -> Sidecar:
         raise UserError(f"{file}: line {error.lineno}: not valid JSON ({error.msg})") from error
     except UnicodeDecodeError as error:
         raise UserError(f"{file}: byte {error.start + 1} is not UTF-8 text; JSON is written in UTF-8") from error
+    except RecursionError as error:
+        raise UserError(f"{file}: its brackets lie deeper within one another than can be read") from error
+    except ValueError as error:  # what Python's reader of whole numbers refuses
+        raise UserError(f"{file}: a whole number in it has more digits than can be read") from error
     if not isinstance(told, dict):
         return Sidecar()
     notes = [told["note"]] if isinstance(told.get("note"), str) else []
-    notes += [note for note in told.get("notes") or [] if isinstance(note, str)]
+    notes += [note for note in _list(told, "notes") if isinstance(note, str)]
     return Sidecar(
         str(told["name"]) if "name" in told else None,
         tuple(notes),
@@ -50,7 +54,7 @@ def beside(path: str) -> Sidecar:
         {key: str(unit) for key, unit in _mapping(told, "units").items()},
         told.get("uniform") is True,
         _window(file, told.get("window")),
-        tuple(str(name) for name in told.get("more") or []),
+        tuple(str(name) for name in _list(told, "more")),
         _mapping(told, "recording") or None,
     )
 
@@ -59,12 +63,16 @@ def _mapping(told: Mapping[str, Any], key: str) -> dict[str, Any]:
     return dict(told[key]) if isinstance(told.get(key), dict) else {}
 
 
+def _list(told: Mapping[str, Any], key: str) -> list[Any]:
+    return list(told[key]) if isinstance(told.get(key), list) else []
+
+
 def _window(file: Any, told: Any) -> Window | None:
     if not isinstance(told, dict):
         return None
     try:
         return Window.of(told)
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise UserError(f"{file}: window is not as task=convert writes it; leave it out") from error
 
 
@@ -74,6 +82,9 @@ def _base(file: Any, told: Any) -> Base | None:
         return None
     numbers = {key: told[key] for key in ("voltage", "power", "frequency") if key in told}
     for key, value in numbers.items():
-        if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0:
-            raise UserError(f"{file}: base.{key} = {value!r} must be a number above zero (kV, MVA, Hz)")
+        low, high = SIZES[key]
+        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+            raise UserError(
+                f"{file}: base.{key} = {json.dumps(value):.60} must be a number from {low:g} to {high:g} (kV, MVA, Hz)"
+            )
     return Base(**{key: float(value) for key, value in numbers.items()})

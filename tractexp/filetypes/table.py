@@ -70,7 +70,7 @@ class Table(ABC):
     def numbers(self, names: Sequence[str]) -> dict[str, np.ndarray]:
         """The columns (N,) of some names; raises `UserError` for one that is not there."""
         if missing := [name for name in names if name not in self.heading.names]:
-            raise UserError(f"{self.source}: its sidecar tells of a column {missing[0]}, which is not there")
+            raise UserError(f"{self.source}: its sidecar tells of a column '{missing[0]}', which is not there")
         wanted = {name: self.heading.names.index(name) for name in names}
         cells = self.read(dict.fromkeys(wanted.values(), "gaps")) if wanted else {}
         return {name: cells[number].values for name, number in wanted.items()}

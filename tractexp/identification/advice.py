@@ -18,18 +18,20 @@ SHORT = 5.0  # cycles: of a shorter dip phasors of one cycle show little but the
 UNBALANCED = 0.1  # of the voltage before
 
 
-def advise(known: Uncertainty, adequacy: Adequacy, odd: Sequence[str] = ()) -> list[str]:
-    """Sentences, the most pressing first. `odd` events do not fit with the rest.
+def advise(known: Uncertainty, adequacy: Adequacy, odd: Sequence[str] = (), data: str = "") -> list[str]:
+    """Sentences, the most pressing first. `odd` events do not fit with the rest; `data` is the choice of data that
+    holds further events of the load, where one is known.
 
     Of a model that does not describe the load nothing is said that would only hold if it did.
     """
     better = waves_better(known.likelihood.problem)
     said = [f"leave {name} out, or free what differs there by model.per_event" for name in odd]
+    search = f"task=discrepancy data={data}" if data else "task=discrepancy"
     if adequacy.grade is Grade.WRONG_MODEL:
-        missing = "find what is missing: task=discrepancy; or choose another model: tractexp list model"
+        missing = f"find what is missing: {search}; or choose another model: tractexp list model"
         return [*better, missing, *said]
     if adequacy.grade is Grade.EFFECT_MISSING:
-        return [*better, "find the missing effect: task=discrepancy", *said]
+        return [*better, f"find the missing effect: {search}", *said]
     said += [
         f"widen model.bounds.{name}, or ask whether the model is the right one"
         for name, verdict in known.verdicts.items()

@@ -170,7 +170,7 @@ class Problem:
     def digest(self) -> str:
         """SHA-256 of the equations, the records and what is known of the parameters: of equal problems the same."""
         drive, known = self.drive, (self.space.names, sorted(self.fixed.items()), self.per_event)
-        told = self.model.source, [effect.name for effect in self.model.measurements], known
+        told = self.model.source, [repr(effect) for effect in self.model.measurements], known
         made = hashlib.sha256(repr(told).encode())
         arrays = drive.inputs, drive.measured, drive.weights, drive.first, drive.event, drive.before
         arrays += tuple(window for window in drive.windows if window is not None)

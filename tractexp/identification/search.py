@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from tractexp.errors import UserError
+from tractexp.errors import Stopped, UserError
 from tractexp.identification.least_squares import Elite, polish
 from tractexp.identification.optimizer import REFUSED, Box, Optimizer
 
@@ -180,7 +180,8 @@ def search(
 ) -> Found:
     """Run `optimizer` on `problem` with one seed. The same seed gives the same history, bit for bit.
 
-    `progress(iteration, best objective, simulations)` is called after each iteration.
+    `progress(iteration, best objective, simulations)` is called after each iteration. Ctrl-C is raised as `Stopped`,
+    with what was found so far.
     """
     counter = _Counter(problem, optimizer.space == "unit", limits)
     rows: list[tuple[int, float, np.ndarray, float]] = []
@@ -196,8 +197,17 @@ def search(
         status = f"finished its {max(len(rows) - 1, 0)} iterations"
     except _Stop as stop:
         status = str(stop)
+    except KeyboardInterrupt as stop:
+        ended = _found(counter, rows, f"was stopped after {counter.simulations} simulations")
+        raise Stopped.of(stop, found=ended) from None
     if not rows or rows[-1][0] < counter.simulations:
         note()
+    return _found(counter, rows, status)
+
+
+def _found(counter: _Counter, rows: list[tuple[int, float, np.ndarray, float]], status: str) -> Found:
+    """Where a search is."""
+    rows = rows or [(counter.simulations, counter.best, counter.best_values, counter.seconds)]
     simulations, best, values, seconds = zip(*rows, strict=True)
     history = History(np.array(simulations), np.array(best), np.array(values), np.array(seconds))
     return Found(

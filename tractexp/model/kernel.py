@@ -1,36 +1,25 @@
-"""Kernel modules on disk: named by the hash of their source, imported as real modules, compiled once."""
+"""Kernel modules: named by the hash of their source, compiled once, kept on disk and checked when they are read."""
 
+import contextlib
 import functools
 import hashlib
 import importlib.metadata
-import importlib.util
 import itertools
 import os
 import sys
-import tempfile
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
+from tractexp import files
+from tractexp.errors import UserError
+from tractexp.model import cache
+from tractexp.model.cache import cache_folder
 from tractexp.model.template import VECTORS
 from tractexp.model.vectors import width
 
-
-def cache_folder() -> Path:
-    """Where kernels are kept: $TRACTEXP_CACHE_DIR, or `tractexp` in the user's cache folder, or a temporary one."""
-    if chosen := os.environ.get("TRACTEXP_CACHE_DIR"):
-        candidates = [Path(chosen)]
-    else:
-        user = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or Path.home() / ".cache"
-        candidates = [Path(user) / "tractexp", Path(tempfile.gettempdir()) / f"tractexp-{os.getpid()}"]
-    for folder in candidates:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError:
-            continue
-        if os.access(folder, os.W_OK):
-            return folder
-    raise OSError(f"no kernel cache can be written; tried {', '.join(map(str, candidates))}; set TRACTEXP_CACHE_DIR")
+NUMBA_KEEPS, WE_KEEP = "njit(cache=True, ", "njit("  # of a kernel's text
 
 
 def remembered(parts: Iterable[object], generate: Callable[[], str], what: str = "source") -> str:
@@ -42,17 +31,17 @@ def remembered(parts: Iterable[object], generate: Callable[[], str], what: str =
     """
     parts = tuple(one for part in parts for one in (part, *getattr(part, "members", ())))
     modules = [type(part).__module__ for part in parts]
-    files = [getattr(sys.modules.get(module), "__file__", None) for module in modules]
-    if None in files:
+    written = [getattr(sys.modules.get(module), "__file__", None) for module in modules]
+    if None in written:
         return generate()
     digest = hashlib.sha256(f"{importlib.metadata.version('sympy')} {modules} {parts!r}".encode())
-    for folder in sorted({Path(__file__).parent, *(Path(file or "").parent for file in files)}):
+    for folder in sorted({Path(__file__).parent, *(Path(file or "").parent for file in written)}):
         digest.update(_code(folder))
-    path = cache_folder() / f"{what}_{digest.hexdigest()[:20]}.txt"
-    if path.exists():
-        return path.read_text()
+    path = cache_folder() / f"{what}_{digest.hexdigest()[:20]}.kept"
+    if (held := cache.read(path)) is not None:
+        return held.decode()
     text = generate()
-    _write(path, text)
+    cache.write(path, text.encode())
     return text
 
 
@@ -64,19 +53,45 @@ def _code(folder: Path) -> bytes:
 
 @functools.cache
 def load(source: str) -> ModuleType:
-    """Import the kernel with this source, writing it first where it is new. Safe in parallel processes."""
+    """The kernel with this source. Safe in parallel processes.
+
+    The source is executed as it is given; the file of the same text is for people. What Numba compiles of it is kept in
+    files of ours instead of Numba's own, which are loaded unseen.
+    """
     source = _for_this_machine(source)
     name = _name(source)
     path = cache_folder() / f"{name}.py"
-    if not path.exists() or path.read_text() != source:
-        _write(path, source)
-    spec = importlib.util.spec_from_file_location(f"tractexp_kernels.{name}", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
+    with contextlib.suppress(OSError, UserError):
+        if not path.exists() or path.read_bytes() != source.encode():
+            files.write(path, source, lasting=False)
+    module = ModuleType(f"tractexp_kernels.{name}")
+    module.__file__ = str(path)
+    sys.modules[module.__name__] = module
+    exec(compile(source.replace(NUMBA_KEEPS, WE_KEEP), path, "exec"), vars(module))
+    if NUMBA_KEEPS in source:
+        for function in [f for f in vars(module).values() if hasattr(f, "py_func")]:
+            _keep(function, name)
     return module
+
+
+def kept(function: Any) -> Any:
+    """A function that Numba compiles, kept as kernels are; for the loops of a plugin.
+
+    It takes the place of `cache=True`, and is written above `@njit(...)`. The names it hangs on must stand in its file.
+    """
+    path = Path(function.py_func.__code__.co_filename)
+    return _keep(function, f"{path.stem}_{hashlib.sha256(path.read_bytes()).hexdigest()[:20]}")
+
+
+def _keep(function: Any, name: str) -> Any:
+    from tractexp.doors.numba_cache import keep
+
+    return keep(
+        function,
+        name,
+        lambda file: cache.read(cache_folder() / file),
+        lambda file, content: cache.write(cache_folder() / file, content),
+    )
 
 
 def compile_missing(sources: Iterable[str], tell: Callable[[], None] = lambda: None) -> None:
@@ -94,7 +109,11 @@ def compile_missing(sources: Iterable[str], tell: Callable[[], None] = lambda: N
 
 
 def _compiled(source: str) -> Iterable[Path]:
-    return (cache_folder() / "__pycache__").glob(f"{_name(_for_this_machine(source))}.run-*.nbc")
+    """The sound files of a kernel for this machine."""
+    from tractexp.doors.numba_cache import machine
+
+    kernels = cache_folder().glob(f"{_name(_for_this_machine(source))}.run.{machine()}.*.kept")
+    return (file for file in kernels if cache.read(file) is not None)
 
 
 def _compile(source: str) -> None:
@@ -111,12 +130,3 @@ def _for_this_machine(source: str) -> str:
 
 def _name(source: str) -> str:
     return f"kernel_{hashlib.sha256(source.encode()).hexdigest()[:20]}"
-
-
-def _write(path: Path, source: str) -> None:
-    """Write in one move and with a fixed time stamp: Numba's cache is keyed by it, whoever writes first."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
-    with os.fdopen(handle, "w") as file:
-        file.write(source)
-    os.utime(temporary, (0, 0))
-    os.replace(temporary, path)

@@ -24,6 +24,9 @@ class Site:
 
 motor_voltage = Site("motor_voltage", "V", "phasor", "pu", "motor", "voltage at the motor's terminals")
 stator_impedance = Site("stator_impedance", "Z'", "phasor", "pu", "motor", "impedance from the terminals to the flux")
+internal_voltage = Site(
+    "internal_voltage", "E", "phasor", "pu", "motor", "voltage behind it, of motors where it is no state"
+)
 stator_current = Site("stator_current", "I", "phasor", "pu", "motor", "current into the motor's terminals")
 coupling = Site("coupling", "c", "real", "1", "motor", "(X - X')/X, the rotor's share in the reactance")
 time_constant = Site("time_constant", r"\tau'", "real", "s", "motor", "transient time constant X'/X T0'")
@@ -47,7 +50,8 @@ Q = Site("Q", "Q", "real", "pu", "bus", "reactive power of all parts together")
 PLACES = {  # where an effect acts, in a reader's words, and the sites it edits there
     "stator impedance": ("stator_impedance", "stator_current"),
     "coupling": ("coupling",),
-    "flux decay": ("time_constant",),
+    "flux decay": ("time_constant", "internal_voltage"),
+    "speed": (),  # the rotor's balance, which is no site
     "load torque": ("electrical_torque", "load_torque"),
     "motor": ("motor_current", "P_motor", "Q_motor"),
     "static P": ("P_static",),

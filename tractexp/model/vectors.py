@@ -4,15 +4,16 @@ Compilers avoid vectors of 512 bits because some processors lower their clock fo
 gains depends on the processor. A kernel is the same to the bit with either, so only time is at stake.
 """
 
+import contextlib
 import functools
 import hashlib
 import math
-import os
-import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
 
+from tractexp import files
+from tractexp.errors import UserError
 from tractexp.model.template import FAST, GROUP, LANES
 
 WIDTHS: tuple[int, ...] = (256, 512)  # bits
@@ -39,10 +40,10 @@ def width(folder: Path) -> int:
     path = folder / f"vectors_{key}.txt"
     chosen = _read(path)
     if chosen is None:
-        _offer(path, faster())
-        chosen = _read(path)
-    if chosen is None:
-        raise OSError(f"{path} cannot be read back; set TRACTEXP_CACHE_DIR to a folder that keeps what is written")
+        measured = faster()
+        with contextlib.suppress(UserError):  # a full disk: the bits are the same with either
+            files.offer(path, f"{measured}\n")
+        chosen = _read(path) or measured
     return chosen
 
 
@@ -56,21 +57,6 @@ def _read(path: Path) -> int | None:
     if chosen is None:
         path.unlink(missing_ok=True)
     return chosen
-
-
-def _offer(path: Path, bits: int) -> None:
-    """Write whole or not at all, and only where no other process has."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
-    with os.fdopen(handle, "wb") as file:
-        file.write(f"{bits}\n".encode())
-    try:
-        os.link(temporary, path)  # fails where the file exists, unlike os.replace
-    except FileExistsError:
-        pass
-    except OSError:  # a file system without links
-        if not path.exists():
-            os.replace(temporary, path)
-    Path(temporary).unlink(missing_ok=True)
 
 
 def faster() -> int:

@@ -56,11 +56,6 @@ class Autoregression:
             white[..., pick(0)] = error / self.deviation[k]
         return white
 
-    def log_determinant(self, known: np.ndarray) -> float:
-        """Logarithm of the determinant of the covariance of the known samples of `known` (N,)."""
-        history = np.minimum(_run_lengths(known), self.order)[known]
-        return 2 * float(np.log(self.deviation)[history].sum())
-
     def recurring(self, shocks: np.ndarray) -> np.ndarray:
         """What the recurrence of full order makes of shocks (n, N) from rest: the banded system that whitens."""
         from scipy.linalg import solve_banded

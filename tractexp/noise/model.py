@@ -86,15 +86,6 @@ class Noise:
                 rows[:, :, part] = self._without_shapes(white, known[:, part], part, e)
         return rows.reshape(len(rows), -1)
 
-    def log_determinant(self, drive: Drive, known: np.ndarray) -> float:
-        """Logarithm of the determinant of the covariance of the known samples of `known` (C, N), whitened before."""
-        known, total = known if self.mix is None else self._together(known, drive), 0.0
-        for e in range(drive.events):
-            part = known[:, drive.part(e)]
-            total += sum(channel.log_determinant(at) for channel, at in zip(self.pair(e), part, strict=True))
-            total -= sum(2 * float(np.log1p(-share).sum()) for _, _, share in self._shrunk.get(e, ()))
-        return total
-
     def _together(self, known: np.ndarray, drive: Drive) -> np.ndarray:
         """Samples (C, N) that count where channels are mixed: those at which all count that are measured.
 

@@ -19,6 +19,7 @@ FEWEST_SAMPLES = 20
 PLAUSIBLE_VOLTAGE = (0.5, 1.5)  # pu, at the start of a record
 DEAD = 0.05  # of the voltage at the start: less is no voltage at all
 PLAUSIBLE_POWER = 20.0  # pu, at the start of a record
+SIZES = {"voltage": (1e-6, 1e5), "power": (1e-6, 1e7), "frequency": (0.1, 1e4)}  # of a base [kV, MVA, Hz]
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+LONGEST = 10.0  # s about a time stamp: far more than any recorder averages over
+
 
 @dataclass(frozen=True, eq=False)
 class Window:
@@ -35,5 +37,10 @@ class Window:
 
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> "Window":
-        """What `to_dict` told."""
-        return cls(content["name"], np.array(content["at"]), np.array(content["weights"]))
+        """What `to_dict` told; of anything else a `ValueError`, `TypeError`, `KeyError` or `OverflowError`."""
+        at, weights = (np.array(content[key], dtype=float) for key in ("at", "weights"))
+        if at.ndim != 1 or at.shape != weights.shape or len(at) < 2 or not np.isfinite(weights).all():
+            raise ValueError("times and weights are two lists of as many numbers")
+        if not (np.abs(at) <= LONGEST).all() or not (np.diff(at) > 0).all():
+            raise ValueError("times increase")
+        return cls(str(content["name"]), at, weights)

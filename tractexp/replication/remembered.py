@@ -5,28 +5,21 @@ The paper's tables and figures show the same searches over and over, and each is
 
 import contextlib
 import hashlib
-import importlib.metadata
-import io
 import json
-import platform
-import sys
-import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tractexp import files, provenance
-from tractexp.errors import UserError
+from tractexp import files
+from tractexp.identification import shelf
 from tractexp.identification.problem import Problem
 from tractexp.identification.search import Found, History, Limits
-from tractexp.model.kernel import cache_folder
+from tractexp.identification.shelf import DAMAGED, installed
 from tractexp.plugin import build
 
-MOST = 3000  # searches that are kept, of some 20 kB each, four studies of 30 seeds: beyond, the oldest go
-BEHIND = ("numpy", "numba", "scipy", "llvmlite")  # whose versions may change the last digits
-DAMAGED = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile)
+SHELF = "searches"
 ARRAYS = ("simulations", "objective", "values", "seconds")  # of a history
 
 
@@ -39,15 +32,15 @@ class Remembered:
     """
 
     def __init__(self, problem: Problem, limits: Limits, on: bool = True):
-        self.on = on and limits.seconds is None and all(map(_installed, (*_parts(problem), problem.loss)))
+        self.on = on and limits.seconds is None and all(map(installed, (*_parts(problem), problem.loss)))
         self.problem = _digest(problem, limits) if self.on else ""
 
     def get(self, settings: Mapping[str, Any], seed: int) -> Found | None:
         """The search that was made before; None where there is none, or its file is damaged."""
         path = self._path(settings, seed)
-        if path is None or not path.is_file():
+        if path is None or (kept := shelf.read(path)) is None:
             return None
-        with contextlib.suppress(*DAMAGED), np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as kept:
+        with contextlib.suppress(*DAMAGED):
             history = History(**{name: kept[name] for name in ARRAYS})
             return Found(**json.loads(str(kept["told"])), values=kept["found"], history=history)
         return None
@@ -58,63 +51,26 @@ class Remembered:
         if path is None:
             return
         told = {k: v for k, v in vars(found).items() if k not in ("values", "history")}
-        made = io.BytesIO()
         arrays = {name: getattr(found.history, name) for name in ARRAYS}
-        np.savez_compressed(made, told=np.array(json.dumps(files.plain(told))), found=found.values, **arrays)
-        _keep(path, made.getvalue())
+        shelf.keep(path, told=np.array(json.dumps(files.plain(told))), found=found.values, **arrays)
 
     def arrays(self, told: str, make: Callable[[], tuple[np.ndarray, ...]]) -> tuple[np.ndarray, ...]:
         """What else was computed for this problem from what is `told`, made only where it was not before."""
-        if not self.on:
-            return make()
-        path = self._file(told)
-        with contextlib.suppress(*DAMAGED), np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as kept:
-            return tuple(kept[name] for name in kept.files)
-        made = make()
-        written = io.BytesIO()
-        np.savez_compressed(written, *made)
-        _keep(path, written.getvalue())
-        return made
+        return shelf.arrays(SHELF, f"{self.problem} {told}", make) if self.on else make()
 
     def _path(self, settings: Mapping[str, Any], seed: int) -> Path | None:
         optimizer = build("optimizer", dict(settings))
-        return self._file(f"{optimizer!r} {seed}") if self.on and _installed(optimizer) else None
+        return self._file(f"{optimizer!r} {seed}") if self.on and installed(optimizer) else None
 
     def _file(self, told: str) -> Path:
-        name = hashlib.sha256(f"{self.problem} {told}".encode()).hexdigest()[:40]
-        return cache_folder() / "searches" / f"{name}.npz"
-
-
-def _keep(path: Path, content: bytes) -> None:
-    with contextlib.suppress(UserError, OSError):
-        files.write(path, content)
-        _forget(path.parent)
+        return shelf.place(SHELF, f"{self.problem} {told}")
 
 
 def _parts(problem: Problem) -> tuple[Any, ...]:
     return problem.model.motor, problem.model.static, *problem.model.effects
 
 
-def _installed(part: Any) -> bool:
-    """Whether a part's code is among that whose digest is taken."""
-    file = getattr(sys.modules.get(type(part).__module__), "__file__", None)
-    return file is not None and any(Path(file).is_relative_to(folder) for folder in provenance.folders())
-
-
 def _digest(problem: Problem, limits: Limits) -> str:
     """SHA-256 of all that a search of this problem depends on, but for the optimizer and the seed."""
-    versions = [f"{name} {importlib.metadata.version(name)}" for name in BEHIND]
-    told = (
-        provenance.code(), versions, sys.version, platform.machine(), platform.processor(), _parts(problem),
-        problem.loss, limits, problem.digest(),
-    )  # fmt: skip
+    told = shelf.behind(), _parts(problem), problem.loss, limits, problem.digest()
     return hashlib.sha256(repr(told).encode()).hexdigest()
-
-
-def _forget(folder: Path) -> None:
-    """Remove the oldest searches where there are too many."""
-    kept = list(folder.glob("*.npz"))
-    if len(kept) > MOST:
-        kept.sort(key=lambda path: path.stat().st_mtime)
-        for path in kept[: len(kept) - MOST]:
-            path.unlink(missing_ok=True)

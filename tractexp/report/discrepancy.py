@@ -29,6 +29,7 @@ from tractexp.model.sites import KINDS
 from tractexp.report.chart import Chart
 from tractexp.report.overlay import overlaid
 from tractexp.report.page import Page
+from tractexp.report.proposal import headlines, proposed
 from tractexp.wording import as_sentence, in_words, joined, percent, with_error
 
 KIND = {"none": "good", "named": "good", "tied": "plain", "unexplained": "bad"}
@@ -57,11 +58,18 @@ def page(path: Path, found: Investigation, title: str) -> Path:
     spoken = [joined([found.catalogue.spoken(name) for name in names]) for names in found.verdict.sets]
     head = f"{found.verdict.word.upper()} {' or '.join(spoken)}".strip()
     left = [as_sentence(found.headline)] if found.headline else []
-    said = [as_sentence(found.verdict.reason), *left, _graded(found), f"Next: {recommendation(found)}."]
+    said = [
+        as_sentence(found.verdict.reason),
+        *left,
+        *headlines(found),
+        _graded(found),
+        f"Next: {recommendation(found)}.",
+    ]
     made.verdict(head, *said, kind=KIND[found.verdict.word])
     overlaid(made.heading("Measured, before, after" if found.names else "Measured and calculated"), found.overlays)
     _smaller(made, found)
     if found.verdict.word == UNEXPLAINED:
+        proposed(made, found)
         _left(made, found)
     _forms(made, found)
     _candidates(made, found)

@@ -7,7 +7,7 @@ typesetting, whose parser costs more than a figure.
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -96,8 +96,9 @@ def _page(width: float, height: float, title: str, notes: Sequence[str]) -> "tup
 
     figure = Figure(figsize=(width, height))
     lines = [line for note in notes for line in textwrap.wrap(note, 118)]
-    figure.text(0.015, 1 - 0.1 / height, title, va="top", fontsize=11, fontweight="bold")
-    figure.text(0.015, 1 - 0.31 / height, "\n".join(lines), va="top", color=style.FAINT, fontsize=8, linespacing=1.25)
+    written: Any = {"va": "top", "parse_math": False}  # a record's name is no formula, whatever stands in it
+    figure.text(0.015, 1 - 0.1 / height, title, fontsize=11, fontweight="bold", **written)
+    figure.text(0.015, 1 - 0.31 / height, "\n".join(lines), color=style.FAINT, fontsize=8, linespacing=1.25, **written)
     return figure, 1 - (0.52 + 0.14 * len(lines)) / height
 
 

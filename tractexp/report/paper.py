@@ -1,7 +1,6 @@
 """The paper beside our measurements: one section for each of its tables and figures, and a verdict for each claim."""
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,15 +26,15 @@ LEAD = (
 SHOWN = ("0.3", "0.5", "0.7")  # alphas whose orbits are drawn
 
 
-def write(study: Study, parts: Sequence[str], judged: Sequence[Claim], folder: Path) -> list[Path]:
-    """Measure and write `parts` and their claims into a folder: paper.html and paper.md."""
+def sheets(study: Study, parts: Sequence[str], judged: Sequence[Claim]) -> tuple[Page, Markdown]:
+    """Measure `parts` and tell them with their claims, as a page and in Markdown."""
     page, text = Page(TITLE, LEAD), Markdown(TITLE, LEAD)
     sheet: Any = Together(page, text)
     _top(sheet, study, judged)
     for part in parts:
         study.tell(f"writing {_place(part)}")
         SECTIONS[part](sheet, study)
-    return [page.write(folder / "paper.html"), text.write(folder / "paper.md")]
+    return page, text
 
 
 def _top(sheet: Any, study: Study, judged: Sequence[Claim]) -> None:

@@ -67,7 +67,7 @@ def work(job: SweepJob) -> Status:
     _prepare(job)
     job.status.write(job.folder)
     started = time.perf_counter()
-    output = (job.folder / OUTPUT).open("w", encoding="utf-8")
+    output = files.Said(job.folder / OUTPUT)
     with output, contextlib.redirect_stdout(output), contextlib.redirect_stderr(output):
         message = _run(job)
     status = FAILED if message else FINISHED
@@ -114,4 +114,5 @@ def _prepare(job: SweepJob) -> None:
     contents = {"config": dict(job.config), "overrides": list(job.overrides), "hydra": around}
     dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)  # ten times as fast, where PyYAML was built with it
     for name, content in contents.items():
-        files.write(hydra / f"{name}.yaml", yaml.dump(content, Dumper=dumper, sort_keys=False, allow_unicode=True))
+        text = yaml.dump(content, Dumper=dumper, sort_keys=False, allow_unicode=True)
+        files.write(hydra / f"{name}.yaml", text, lasting=False)

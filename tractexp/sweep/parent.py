@@ -2,12 +2,15 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from tractexp import provenance
+from tractexp.errors import UserError
 from tractexp.files import write_json
 from tractexp.sweep.status import FAILED, FINISHED, INTERRUPTED, objective, read
+from tractexp.tasks.console import say
 from tractexp.tracking.swept import FILE, parent_of
 
 
@@ -25,10 +28,8 @@ def parent_run(folder: Path, jobs: list[Any], overrides: list[str], afresh: bool
         return
     from tractexp import tracking
 
-    uri = tracking.address(node["uri"])
-    run_id = parent_of(folder)
-    if afresh or run_id is None or not tracking.reopen_parent(run_id, uri):
-        run_id = tracking.start_parent(_described(folder, jobs, overrides), uri)
+    uri, run = tracking.address(node["uri"]), _described(folder, jobs, overrides)
+    run_id = _opened(folder, run, uri, afresh)
     write_json(folder / FILE, {"run": run_id, "uri": uri, "jobs": len(jobs), "overrides": overrides})
     status = "FAILED"
     try:
@@ -40,7 +41,39 @@ def parent_run(folder: Path, jobs: list[Any], overrides: list[str], afresh: bool
         status = "KILLED"
         raise
     finally:
-        tracking.finish_parent(run_id, uri, status, metrics(jobs))
+        _closed(folder, replace(run, status=status, metrics=metrics(jobs)), run_id, uri)
+
+
+def _opened(folder: Path, run: Any, uri: str, afresh: bool) -> str | None:
+    """The id of the parent run, opened or opened again; None, and a sentence, where the store cannot be used."""
+    from tractexp import tracking
+
+    try:
+        run_id = parent_of(folder)
+        if afresh or run_id is None or not tracking.reopen_parent(run_id, uri):
+            run_id = tracking.start_parent(run, uri)
+    except UserError as error:
+        say(f"not logged yet: {error}")
+        return None
+    return run_id
+
+
+def _closed(folder: Path, run: Any, run_id: str | None, uri: str) -> None:
+    """Close the parent run, and send what could not be sent before; what still cannot be is kept."""
+    from tractexp import tracking
+    from tractexp.tracking.kept import keep
+    from tractexp.tracking.sync import NOT, sync, waiting
+
+    try:
+        kept = keep(folder, run, uri, sweep=True)
+        if run_id is not None:
+            tracking.finish_parent(run_id, uri, run.status, run.metrics)
+            kept.logged(run_id)
+    except UserError as error:
+        say(f"not logged: {error}")
+    left = waiting(folder)
+    if left and sync(folder, tell=lambda line: None)[NOT]:
+        say(f"{left} runs are not logged; they are kept in {folder}, and 'tractexp sync' logs them")
 
 
 def metrics(jobs: list[Any]) -> dict[str, float]:

@@ -1,13 +1,11 @@
 """`hydra/sweeper=grid`: every combination once, whatever launcher runs it."""
 
-import contextlib
 import itertools
 import os
 import shutil
-import signal
 import sys
 import webbrowser
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from statistics import median
@@ -19,8 +17,9 @@ from hydra.core.plugins import Plugins
 from hydra.plugins.sweeper import Sweeper
 from omegaconf import OmegaConf
 
+from tractexp import files
 from tractexp.doors.hydra_plugins import NAMESPACE
-from tractexp.errors import UserError
+from tractexp.errors import Stopped, UserError
 from tractexp.plugin import build, get
 from tractexp.sweep import status
 from tractexp.sweep.compose import Composer
@@ -78,8 +77,8 @@ class Grid(Sweeper):
             say(f"  {len(jobs) - len(left)} of them are finished and kept; hydra.sweeper.redo=true runs them again")
         if left:
             folder.mkdir(parents=True, exist_ok=True)
-            OmegaConf.save(self.config, folder / "multirun.yaml")
-            with terminating(), parent_run(folder, jobs, told, afresh=self.redo):
+            files.write(folder / "multirun.yaml", OmegaConf.to_yaml(self.config))
+            with parent_run(folder, jobs, told, afresh=self.redo):
                 self._run(left)
         self._conclude(jobs, comparison)
 
@@ -125,9 +124,9 @@ class Grid(Sweeper):
             else:
                 batch = [[*job.overrides, *placement(job)] for job in jobs]
                 self.launcher.launch(batch, initial_job_idx=0)
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as stop:
             end, problem = INTERRUPTED, ""
-            raise KeyboardInterrupt(f"the sweep is interrupted; {REPEAT}") from None
+            raise Stopped(f"the sweep is interrupted; {REPEAT}", getattr(stop, "code", 130)) from None
         except UserError:
             raise
         except Exception as error:
@@ -191,20 +190,6 @@ def settle(job: SweepJob, end: str, problem: str) -> None:
     if found is None or found.status == RUNNING:
         job.folder.mkdir(parents=True, exist_ok=True)
         replace(job.status, status=end, message=problem).write(job.folder)
-
-
-@contextlib.contextmanager
-def terminating() -> Iterator[None]:
-    """Let SIGTERM (a batch system's time limit) end the sweep in an orderly way, as Ctrl-C does."""
-
-    def interrupt(*_: Any) -> None:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 def comparable(jobs: Sequence[SweepJob]) -> bool:

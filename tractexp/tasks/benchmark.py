@@ -42,8 +42,9 @@ class Benchmark(Task):
         plan = {key: getattr(self, key) for key in ("functions", "instances", "dimensions", "multiplier", "targets")}
         cores = self.cores or (1 if job.in_sweep else None)
         made = call(benchmark, self.optimizers(job), **plan, seed=job.seed, cores=cores)
+        paths = made.write_results(job.folder)
         show(made.made)
-        paths = made.write(job.folder)
+        paths += made.write_drawings(job.folder)
         listed(paths)
         track(job, made.made, paths)
 

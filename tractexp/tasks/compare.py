@@ -1,10 +1,11 @@
 """Compare the runs of a sweep, or of any filter over MLflow."""
 
-import shutil
 from dataclasses import field
 from pathlib import Path
 from typing import Any
 
+from tractexp import files
+from tractexp.errors import UserError
 from tractexp.plugin import plugin
 from tractexp.tasks.console import listed, say, table
 from tractexp.tasks.task import Job, Task, call
@@ -42,12 +43,12 @@ class Compare(Task):
         told = ("filter", "data", "targets", "ties", "floor", "reference", "apart", "bbob", "cores")
         settings = {key: getattr(self, key) for key in told}
         made = call(compare, self.sweep, uri=node["uri"], experiment=node["experiment"], **settings)
+        paths = made.write_results(job.folder)
         report(made)
-        paths = made.write(job.folder)
-        if made.folder not in (None, job.folder):
-            paths = [Path(shutil.copy2(path, made.folder / path.name)) for path in paths] + paths
-        listed(paths)
-        track(job, made, paths[-2:])
+        paths += made.write_drawings(job.folder)
+        beside = made.folder not in (None, job.folder)
+        listed([files.copy(path, made.folder / path.name) for path in paths if beside] + paths)
+        track(job, made, paths)
 
 
 def report(made: Any) -> None:
@@ -105,14 +106,20 @@ def track(job: Job, made: Any, paths: list[Path]) -> None:
         return
     from tractexp import tracking
     from tractexp.tracking.attach import attach
-    from tractexp.tracking.swept import parent_of
+    from tractexp.tracking.swept import parent_of, waits
 
+    if made.folder is not None and waits(made.folder):
+        return  # the page is sent with the run of the sweep
     parent = parent_of(made.folder) if made.folder is not None else None
     comparisons = made.comparisons
     known = {run.data for c in comparisons.values() for variant in c.gathered.variants for run in variant.runs}
     data = known.pop() if len(known) == 1 else f"{len(known)} records"
-    if parent is not None and attach(parent, job.store, paths):
-        say(f"logged on the run of the sweep; to see it: {job.look}")
+    try:
+        if parent is not None and attach(parent, job.store, paths):
+            say(f"logged on the run of the sweep; to see it: {job.look}")
+            return
+    except UserError as error:
+        say(f"not logged: {error}")
         return
     run = tracking.Run(
         experiment=node["experiment"] or f"compare {data}",

@@ -20,6 +20,7 @@ STAGES = ("before", "after")
 class Discrepancy(Task):
     """Investigate the training events, judge what is found on the held-out ones, tell it in one page."""
 
+    resumes = True
     reads = ("data", *LOAD, "model.bounds", "model.fixed", "model.substeps")
     instead = {"model.per_event": "its parameters are shared by all events, so leave it out"}
 
@@ -38,7 +39,8 @@ class Discrepancy(Task):
             false_alarms=self.false_alarms, criteria=self.criteria, seed=job.seed,
             progress=lambda line: say(f"  {line}"),
         )  # fmt: skip
-        paths = found.write(job.folder)
+        paths = found.write_results(job.folder)
+        paths += found.write_drawings(job.folder)
         tell(found, paths)
         conf = job.folder / "conf"
         log(job, found, [*(p for p in paths if conf not in p.parents), *([conf] if found.names else [])])
@@ -83,7 +85,8 @@ def tell(found: "Investigation", paths: Sequence[Path]) -> None:
     say(noise)
     say(following)
     by_name = {path.name: path for path in paths}
-    say(f"page: {by_name.pop('discrepancy.html')}")
+    if page := by_name.pop("discrepancy.html", None):
+        say(f"page: {page}")
     say(f"beside it: {', '.join(sorted(by_name))}")
     if model := by_name.get("extended.yaml"):
         which = f", which has {joined(found.names)}" * (found.verdict == "tied")

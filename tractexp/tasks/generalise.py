@@ -37,8 +37,9 @@ class Generalise(Task):
 
         asked = job.holding_out(self.held_out).asked
         made = call(generalise, **asked, optimizers=self.compared(job), seeds=self.seeds, progress=told)
+        paths = made.write_results(job.folder)
         show(made.medians)
-        paths = made.write(job.folder)
+        paths += made.write_drawings(job.folder)
         listed(paths)
         job.log(name="generalisation", values={}, metrics=metrics(made.residuals), artifacts=paths)
 

@@ -24,8 +24,10 @@ class Identify(Task):
 
     def run(self, job: Job) -> None:
         fit = job.identified(say)
+        paths = fit.write_results(job.folder)
         report(fit)
-        paths = fit.write(job.folder) if _wanted(self.figures, job) else fit.write_result(job.folder)
+        if _wanted(self.figures, job):
+            paths += fit.write_drawings(job.folder)
         listed(paths)
         track(job, fit, paths, _wanted(self.predictor, job))
 

@@ -14,8 +14,9 @@ from tractexp.tasks.task import Job, Task, call
 
 @plugin
 class Paper(Task):
-    """Measure what the paper claims, on the shipped stand-ins or on records of your own: paper.html and paper.md."""
+    """Measure what the paper claims, on the shipped stand-ins or on records of your own: paper.json, .html and .md."""
 
+    resumes = True
     reads = ("data", "model", "objective", "budget", "time_limit", "target")
     instead = {"optimizer": "it compares the paper's three; task=generalise takes any"}
 
@@ -39,23 +40,23 @@ class Paper(Task):
             paper, **job.asked, parts=self.parts, seeds=self.seeds, workers=self.workers,
             progress=lambda line: say(f"  {line}"),
         )  # fmt: skip
-        paths = made.write(job.folder)
+        paths = made.write_results(job.folder)
         for claim in made.claims:
             say(f"  {claim.verdict}: {claim.text}")
             say(f"    {claim.measured}")
         if made.claims:
             say(made.table().title)
         say(f"in {time.perf_counter() - started:.0f} s")
+        paths += made.write_drawings(job.folder)
         if self.docs is not None:
-            paths.append(publish(paths, Path(self.docs)))
+            paths += publish(paths, Path(self.docs))
         listed(paths)
         log(job, paths, made.counts)
 
 
-def publish(paths: list[Path], docs: Path) -> Path:
-    """Write the Markdown page to `docs`."""
-    text = next(path for path in paths if path.suffix == ".md").read_text(encoding="utf-8")
-    return files.write(docs, text)
+def publish(paths: list[Path], docs: Path) -> list[Path]:
+    """Write the Markdown page to `docs`, where it could be made."""
+    return [files.copy(path, docs) for path in paths if path.suffix == ".md"]
 
 
 def log(job: Job, paths: list[Path], counts: Counter[str]) -> None:

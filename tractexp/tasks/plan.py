@@ -43,8 +43,9 @@ class Plan(Task):
 
         asked = {key: getattr(self, key) for key in ASKED}
         made = call(plan, job.events.train, job.config["model"], **asked)
+        paths = made.write_results(job.folder)
         tell(made.planned)
-        paths = made.write(job.folder)
+        paths += made.write_drawings(job.folder)
         listed(paths)
         job.log(
             name=f"plan for {self.parameter}",

@@ -23,6 +23,7 @@ class Posterior(Task):
 
         fit = job.identified(say)
         sampled = call(posterior, fit, walkers=self.walkers, steps=self.steps)
+        paths = sampled.write_results(job.folder)
         report(fit)
         shown, drawn = sampled.table(), sampled.drawn
         table(shown.columns, shown.rows)
@@ -34,6 +35,6 @@ class Posterior(Task):
         if not drawn.converged:
             say("  note: the chain is shorter than 50 autocorrelation times; raise task.steps")
         say()
-        paths = sampled.write(job.folder)
+        paths += sampled.write_drawings(job.folder)
         listed(paths)
         track(job, fit, paths, predictor=False)

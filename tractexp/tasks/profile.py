@@ -21,6 +21,7 @@ class Profile(Task):
 
         fit = job.identified(say)
         profiled = call(profile, fit, points=self.points)
+        paths = profiled.write_results(job.folder)
         report(fit)
         shown = profiled.table()
         table(shown.columns, shown.rows)
@@ -29,6 +30,6 @@ class Profile(Task):
         content = profiled.content
         say(f"{len(shown.rows)} profiles: {content['simulations']} simulations in {content['seconds']:.2f} s")
         say()
-        paths = profiled.write(job.folder)
+        paths += profiled.write_drawings(job.folder)
         listed(paths)
         track(job, profiled.identification, paths, predictor=False)

@@ -50,12 +50,13 @@ class Simulate(Task):
         records = [*events.train, *events.validate] if events else ()
         dip = {key: getattr(self, key) for key in DIP}
         made = call(simulate, model, self.values, records=records, **dip)
+        paths = made.write_results(job.folder)
         load_model, shown = made.model.model, made.table()
         say(f"model: {load_model.title}")
         rows = [[p.name, f"{made.values[p.name]:.6g}", p.unit] for p in load_model.parameters]
         table(["parameter", "value", "unit"], rows)
         table(shown.columns, shown.rows)
-        paths = made.write(job.folder)
+        paths += made.write_drawings(job.folder)
         listed(paths)
         metrics = {
             f"event_{k}_epsilon_{c}": error

@@ -21,6 +21,7 @@ class Survey(Task):
     only at what is new or changed.
     """
 
+    resumes = True
     reads = ("data", "model")
 
     informative: int | None = None  # so many events that tell most about the model together
@@ -52,8 +53,9 @@ class Survey(Task):
             model = [f"{key}={value}" for key, value in job.given.items() if key.partition(".")[0] == "model"]
             data = {"name": node["name"], "path": node["path"], "train": made.informative}
             made = type(made)({**made.content, "command": typed(data, *model)})
+        paths = made.write_results(job.folder)
         tell(made)
-        paths = made.write(job.folder)
+        paths += made.write_drawings(job.folder)
         listed(paths)
         rows = made.content["rows"]
         job.log(

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
 from tractexp import provenance
+from tractexp.errors import UserError
 from tractexp.plugin import Plugin, build
 from tractexp.tasks.given import variant
 
@@ -27,6 +28,7 @@ class Task(Plugin):
 
     group: ClassVar[str] = "task"
     sourced: ClassVar[bool] = False
+    resumes: ClassVar[bool] = False  # whether the same command goes on where it was stopped
     reads: ClassVar[tuple[str, ...]] = ("data", "model", *SEARCH)  # what is chosen beside these is refused
     instead: ClassVar[Mapping[str, str]] = {}  # {setting it does not read: what to do, as the refusal's last words}
 
@@ -166,12 +168,25 @@ class Job:
         return f"tractexp ui --uri {uri}" if uri else "tractexp ui"
 
     def send(self, run: Any) -> None:
-        """Log a run (`tracking.Run`), and say how to look at it."""
+        """Log a run (`tracking.Run`), and say how to look at it.
+
+        It is kept in the folder first. Where the store cannot be used, that is a sentence: the results are there.
+        """
         from tractexp import tracking
         from tractexp.tasks.console import say
+        from tractexp.tracking import swept
+        from tractexp.tracking.kept import keep
 
-        if "_logger" in self.__dict__:
-            self._logger.log(run)
-        else:
-            tracking.log(run, self.store)
+        kept = None
+        try:
+            kept = keep(self.folder, run, self.store)
+            if self.in_sweep and swept.waits(self.folder.parent):
+                return
+            run_id = self._logger.log(kept.run) if "_logger" in self.__dict__ else tracking.log(kept.run, self.store)
+            kept.logged(run_id)
+        except UserError as error:
+            say(f"not logged: {error}")
+            later = "; 'tractexp sync' logs them when that is mended" if kept else ""
+            say(f"  the results are in {self.folder}{later}")
+            return
         say(f"logged in experiment '{run.experiment}'; to see it: {self.look}")

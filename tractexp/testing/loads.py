@@ -244,9 +244,8 @@ def acts_where_it_says(cls: type[Effect]) -> None:
         there = any(site in sites.PLACES[place] for place in cls.places)
         assert there, f"'{cls.name}' edits the site {site}, which is in none of its places: {', '.join(cls.places)}"
     for place in cls.places:
-        free = place == "bus" or (
-            place == "measurement" and issubclass(cls, Measurement)
-        )  # what it draws needs no site
+        measures = place == "measurement" and issubclass(cls, Measurement)
+        free = place == "bus" or not sites.PLACES[place] or measures  # what it draws needs no site
         there = free or any(site in sites.PLACES[place] for site in edited)
         assert there, f"'{cls.name}' says that it acts on the {place}, and edits no site there"
 

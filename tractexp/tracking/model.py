@@ -3,13 +3,13 @@
 What is stored is the result file, the name of this module and the versions it needs: data, no pickled code.
 """
 
-import shutil
 import sys
 import tempfile
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tractexp import files
 from tractexp.tracking.store import light_import
 
 if TYPE_CHECKING:
@@ -55,12 +55,12 @@ def _save(folder: Path, result: Path, run_id: str, logged: Any) -> None:
     )
     environment = "python_env.yaml"
     mlflow.pyfunc.add_to_model(model, loader_module=__name__, data=RESULT, python_env=environment)
-    model.save(str(folder / "MLmodel"))
-    shutil.copyfile(result, folder / RESULT)
+    files.write(folder / "MLmodel", model.to_yaml())
+    files.copy(result, folder / RESULT)
     packages = {f"{p.dist.name}=={p.dist.version}" for p in entry_points(group="tractexp.plugins") if p.dist}
-    (folder / "requirements.txt").write_text("\n".join([f"mlflow=={mlflow.__version__}", *sorted(packages)]))
+    files.write(folder / "requirements.txt", "\n".join([f"mlflow=={mlflow.__version__}", *sorted(packages)]))
     python = ".".join(map(str, sys.version_info[:3]))
-    (folder / environment).write_text(f"python: {python}\ndependencies:\n- -r requirements.txt\n")
+    files.write(folder / environment, f"python: {python}\ndependencies:\n- -r requirements.txt\n")
 
 
 def _load_pyfunc(path: str) -> "Predictor":

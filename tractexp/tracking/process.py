@@ -10,6 +10,7 @@ import atexit
 import contextlib
 import os
 import pickle
+import signal
 import subprocess
 import sys
 from types import TracebackType
@@ -100,13 +101,18 @@ class Logger:
 
 
 def main() -> None:
-    """Get ready, wait for an address and a run on standard input, log the run, answer on standard output."""
+    """Get ready, wait for an address and a run on standard input, log the run, answer on standard output.
+
+    What ends the job may be sent to all its processes. This one ends when the job does, by the end of its input, and
+    finishes a run that it was given.
+    """
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
     import_mlflow()
     run_id = problem = ""
     try:
         prepare(uri := pickle.load(sys.stdin.buffer))
         run_id = log(pickle.load(sys.stdin.buffer), uri)
-    except EOFError:
+    except (EOFError, pickle.UnpicklingError):
         os._exit(0)  # nothing to log, and perhaps nobody to tell
     except UserError as error:
         problem = str(error)

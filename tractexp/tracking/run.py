@@ -1,8 +1,10 @@
 """A run as plain data, and how it is written: at its end and in one go.
 
-A job that is killed therefore leaves no run that claims to be running. Only the run of a sweep is opened first.
+MLflow knows no transaction over a whole run. One whose writer is killed meanwhile stays RUNNING until the store is
+opened next, which closes it (`owner`); what it was to hold is kept beside the results (`kept`).
 """
 
+import contextlib
 import getpass
 import json
 import re
@@ -15,12 +17,14 @@ from typing import TYPE_CHECKING, Any
 
 from tractexp import provenance
 from tractexp.errors import UserError, check_choice
+from tractexp.tracking import owner
 from tractexp.tracking.store import database_of, open_store, sentences
 
 if TYPE_CHECKING:
     import numpy as np
 
 STATUSES = ("FINISHED", "FAILED", "KILLED")
+KEY = "tractexp.key"  # a tag
 PER_DECADE = 40  # steps that curves share
 CURVE_POINTS = 1000  # a longer curve is thinned evenly; the files of the run keep every point
 BATCH_METRICS, BATCH_PARAMETERS = 900, 100  # MLflow takes at most 1000 entries a batch, 100 of them parameters
@@ -54,6 +58,8 @@ class Run:
     model: Path | None = None
     records: "Sequence[Mapping[str, str]]" = ()  # name, role, sha256: MLflow's inputs
     children: "Sequence[Run]" = ()
+    key: str = ""  # by which a run is known that is sent again
+    ended: float | None = None  # s since 1970; None: now
 
     def check(self) -> None:
         """Raise `UserError` for a missing name, an unknown status, a file that is not there or a lopsided curve."""
@@ -108,21 +114,39 @@ def at_common_steps(steps: "np.ndarray", values: "np.ndarray") -> "tuple[np.ndar
     return common, values[np.searchsorted(steps, common, side="right") - 1]
 
 
-def log(run: Run, uri: str) -> str:
-    """Write one finished run and return its id. Raises `UserError`; nothing is logged for a run that fails `check`."""
+def log(run: Run, uri: str, *, again: bool = False) -> str:
+    """Write one finished run and return its id. Raises `UserError`; nothing is logged for a run that fails `check`.
+
+    A run that is sent `again` is written once: what is left of an earlier attempt goes, a whole one stays.
+    """
     run.check()
     client = open_store(uri)
     with sentences(uri):
-        run_id, ended = _create(client, run, uri), _milliseconds()
+        if again and (whole := _swept(client, run)):
+            return whole
+        run_id, ended = _create(client, run, uri), _milliseconds(run.ended)
         try:
             _write(client, run_id, run)
+            for child in run.children:
+                log(replace(child, parent=run_id, ended=run.ended), uri)
         except BaseException:
-            client.set_terminated(run_id, "FAILED")
+            with contextlib.suppress(Exception):  # of a store that is away the first word counts
+                client.set_terminated(run_id, "FAILED")
             raise
         client.set_terminated(run_id, run.status, end_time=ended)
-    for child in run.children:
-        log(replace(child, parent=run_id), uri)
     return run_id
+
+
+def _swept(client: Any, run: Run) -> str:
+    """The run of this key where the store has it whole, else ""; what an earlier attempt left is deleted."""
+    experiments = [found.experiment_id for found in client.search_experiments()]
+    for found in client.search_runs(experiments, f"tags.`{KEY}` = '{run.key}'") if run.key else ():
+        if found.info.status == run.status:
+            return found.info.run_id
+        for child in client.search_runs(experiments, f"tags.`mlflow.parentRunId` = '{found.info.run_id}'"):
+            client.delete_run(child.info.run_id)
+        client.delete_run(found.info.run_id)
+    return ""
 
 
 def start_parent(run: Run, uri: str) -> str:
@@ -141,6 +165,9 @@ def reopen_parent(run_id: str, uri: str) -> bool:
     from mlflow.exceptions import MlflowException
 
     try:
+        if client.get_run(run_id).info.lifecycle_stage == "deleted":
+            return False
+        client.set_tag(run_id, owner.TAG, owner.signature())
         client.update_run(run_id, status="RUNNING")
     except MlflowException:
         return False
@@ -177,9 +204,11 @@ def _create(client: Any, run: Run, uri: str) -> str:
         "mlflow.source.git.commit": provenance.commit(),
         "mlflow.note.content": run.description,
         "mlflow.parentRunId": run.parent or "",
+        KEY: run.key,
+        owner.TAG: owner.signature(),
     }
     tags = {key: value for key, value in tags.items() if value} | {k: str(v) for k, v in run.tags.items()}
-    started = _milliseconds() - round(1000 * run.seconds)
+    started = _milliseconds(run.ended) - round(1000 * run.seconds)
     return client.create_run(_experiment(client, run.experiment, uri), started, tags, run.name).info.run_id
 
 
@@ -187,7 +216,7 @@ def _write(client: Any, run_id: str, run: Run) -> None:
     import numpy as np
     from mlflow.entities import Metric, Param
 
-    now = _milliseconds()
+    now = _milliseconds(run.ended)
     points = [(name, value, 0) for name, value in run.metrics.items()]
     for name, (steps, values) in run.curves.items():
         keep = np.unique(np.linspace(0, len(steps) - 1, min(len(steps), CURVE_POINTS)).round().astype(int))
@@ -253,8 +282,8 @@ def _experiment(client: Any, name: str, uri: str) -> str:
     return found.experiment_id
 
 
-def _milliseconds() -> int:
-    return round(1000 * time.time())
+def _milliseconds(time_of: float | None = None) -> int:
+    return round(1000 * (time.time() if time_of is None else time_of))
 
 
 def _user() -> str:

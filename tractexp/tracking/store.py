@@ -15,7 +15,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from tractexp import files
 from tractexp.errors import UserError
+from tractexp.tracking.owner import close_quietly
+
+PATIENCE = 15.0  # s to wait for a process that writes to the database
+HELD = 120.0  # s to wait for another process that makes the store or opens it
 
 
 def default_uri(folder: Path) -> str:
@@ -46,7 +51,10 @@ def database_of(uri: str) -> Path | None:
 
 @functools.cache
 def open_store(uri: str) -> Any:
-    """An open `MlflowClient`, the store behind it created or migrated. One per store and process."""
+    """An open `MlflowClient`, the store behind it created or migrated. One per store and process.
+
+    Runs that were left running by processes which have ended are closed.
+    """
     if not uri.strip():
         raise UserError("tracking: the address of the MLflow store is empty; it is like sqlite:////folder/mlflow.db")
     database = database_of(uri)
@@ -56,15 +64,18 @@ def open_store(uri: str) -> Any:
     with sentences(uri):
         if database is None:
             _reach(uri)
-            return MlflowClient(uri, uri)
+            client = MlflowClient(uri, uri)
+            close_quietly(client)
+            return client
         database.parent.mkdir(parents=True, exist_ok=True)
-        with _lock(database.with_name(database.name + ".lock")):
+        with files.held(database.with_name(database.name + ".lock"), HELD):
             if not database.exists():
                 _create_database(database)
             _check_database(database)
             client = MlflowClient(uri, uri)
             client.search_experiments(max_results=1)
-            return client
+        close_quietly(client)
+        return client
 
 
 def _create_database(database: Path) -> None:
@@ -81,13 +92,13 @@ def _create_database(database: Path) -> None:
     ):
         MlflowClient(f"sqlite:///{memory}&uri=true").search_experiments(max_results=1)
         connection.execute("VACUUM INTO ?", (str(Path(folder, "fresh.db")),))
-        os.replace(Path(folder, "fresh.db"), database)
+        files.move(Path(folder, "fresh.db"), database)
 
 
 def _check_database(database: Path) -> None:
-    """Raise at once what MLflow would take minutes of retrying to find: no database, or one that is read-only."""
-    with contextlib.closing(sqlite3.connect(database)) as connection:
-        connection.execute("PRAGMA schema_version")
+    """Raise soon what MLflow would take minutes of retrying to find: no database, one damaged, locked or read-only."""
+    with contextlib.closing(sqlite3.connect(database, timeout=PATIENCE)) as connection:
+        connection.execute("SELECT count(*) FROM sqlite_master").fetchall()
     if not os.access(database, os.W_OK):
         raise PermissionError(f"{database} may not be written")
 
@@ -98,6 +109,8 @@ def import_mlflow(sql: bool = False) -> None:
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
     os.environ.setdefault("MLFLOW_LOGGING_LEVEL", "WARNING")
     os.environ.setdefault("MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR", "false")
+    os.environ.setdefault("MLFLOW_HTTP_REQUEST_MAX_RETRIES", "2")  # what cannot be sent now is kept and sent later
+    os.environ.setdefault("MLFLOW_HTTP_REQUEST_TIMEOUT", "30")
     with light_import():
         import mlflow
 
@@ -122,27 +135,6 @@ def light_import() -> Iterator[None]:
         gc.freeze()
         if collecting:
             gc.enable()
-
-
-@contextlib.contextmanager
-def _lock(path: Path) -> Iterator[None]:
-    """Hold `path` exclusively among processes; a process that dies lets go of it."""
-    with path.open("a+b") as file:
-        if os.name == "nt":
-            import msvcrt
-
-            file.seek(0)
-            while True:
-                try:
-                    msvcrt.locking(file.fileno(), msvcrt.LK_LOCK, 1)  # gives up after ten seconds
-                    break
-                except OSError:
-                    continue
-        else:
-            import fcntl
-
-            fcntl.flock(file, fcntl.LOCK_EX)
-        yield
 
 
 @contextlib.contextmanager

@@ -2,13 +2,24 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 FILE = "sweep.json"
 
 
 def parent_of(folder: Path) -> str | None:
     """The run id of the sweep in `folder`; None where it is not logged."""
+    return _told(folder).get("run")
+
+
+def waits(folder: Path) -> bool:
+    """Whether the run of the sweep in `folder` is still to be logged: its jobs then wait, too."""
+    return "run" in (told := _told(folder)) and told["run"] is None
+
+
+def _told(folder: Path) -> dict[str, Any]:
     try:
-        return json.loads((folder / FILE).read_text(encoding="utf-8"))["run"]
-    except (OSError, ValueError, KeyError):
-        return None
+        told = json.loads((folder / FILE).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return told if isinstance(told, dict) else {}

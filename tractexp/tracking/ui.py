@@ -33,13 +33,12 @@ def serve(
     print(f"starting the MLflow UI on {address}, which takes about {USUAL} s; it shows {uri}", flush=True)
     started = time.monotonic()
     command = [sys.executable, "-m", "mlflow", "server", "--backend-store-uri", uri, "--registry-store-uri", uri]
-    command += ["--host", host, "--port", str(port), "--workers", "1"]
-    settings = {"MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false", "MLFLOW_DISABLE_TELEMETRY": "true"}
+    command += ["--host", host, "--port", str(port), "--workers", "1", *_guard(host, port)]
+    settings = {"MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false", "MLFLOW_DISABLE_TELEMETRY": "true"} | os.environ
+    settings["MLFLOW_SERVER_DISABLE_SECURITY_MIDDLEWARE"] = "false"
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     with tempfile.TemporaryFile() as output:
-        server = subprocess.Popen(
-            command, env=settings | os.environ, stdout=output, stderr=output, start_new_session=True
-        )
+        server = subprocess.Popen(command, env=settings, stdout=output, stderr=output, start_new_session=True)
         try:
             opened = address + page(uri)
             _wait_until_up(server, address, output)
@@ -51,6 +50,24 @@ def serve(
             return 0
         finally:
             _end(server)
+
+
+def _guard(host: str, port: int) -> list[str]:
+    """Options by which pages from elsewhere are refused: by the name they call this computer, and by their origin.
+
+    MLflow's own choice lets in every name of a private network; and the settings of a server of the user's own, which
+    may stand in the environment, are not meant for this one.
+    """
+    names = [name for each in dict.fromkeys((host, "localhost")) for name in (each, f"{each}:{port}")]
+    origins = [f"http://{name}" for name in names]
+    return [
+        "--allowed-hosts",
+        ",".join(names),
+        "--cors-allowed-origins",
+        ",".join(origins),
+        "--x-frame-options",
+        "DENY",
+    ]
 
 
 def check_servable(uri: str, host: str = "127.0.0.1", port: int = 5000) -> None:

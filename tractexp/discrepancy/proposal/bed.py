@@ -1,0 +1,129 @@
+"""A bench on which terms are simulated and fitted: the investigation's own, with the library in place of the catalogue.
+
+A term is a candidate like any other. All of a kind share one kernel, in which parameters choose what acts.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.catalogue import Candidate, Catalogue
+from tractexp.discrepancy.coordinates import Coordinates
+from tractexp.discrepancy.kernels import Family, Key
+from tractexp.discrepancy.proposal.effect import Library
+from tractexp.discrepancy.proposal.library import ANSWER, TIMED, Size, Term, shape_of
+from tractexp.model.kernel import compile_missing
+from tractexp.model.model import Model
+from tractexp.model.parts import Effect
+from tractexp.parameter import Parameter
+
+KINDS = (ANSWER, TIMED)
+Setting = Mapping[str, float]  # the parameters of a signal by their own names
+
+
+class Terms(Family):
+    """A base model with the library: terms, named `kind:balance:signal[:clock]`, by the kernel of their kind."""
+
+    def with_effects(self, names: Iterable[str], pushed: bool = False) -> Model:
+        return super().with_effects({kind_of(n) for n in names}, pushed)
+
+    def key(self, names: Iterable[str], pushed: bool = False) -> Key:
+        return frozenset(kind_of(n) for n in set(names) - set(self.catalogue.of_measurement)), pushed
+
+    def compile_kinds(self, say: object) -> None:
+        """Compile both kernels, side by side, where the cache lacks them."""
+        compile_missing((self.with_effects((kind,)).source for kind in KINDS), say)  # type: ignore[arg-type]
+
+
+def kind_of(name: str) -> str:
+    """The library's effect that a term belongs to; of any other effect its own name."""
+    return name.partition(":")[0]
+
+
+def sizes_of(chosen: Term) -> list[tuple[Size, str]]:
+    """The sizes of a term, and what the library calls each."""
+    balance, kind = chosen.balance, chosen.signal.kind
+    if len(balance.sizes) == 1:
+        return [(balance.sizes[0], f"{kind}_{balance.name}_size")]
+    return [(size, f"{kind}_{balance.name}_{size.name.removeprefix('size_')}_size") for size in balance.sizes]
+
+
+def shapes_of(chosen: Term) -> dict[str, str]:
+    """The parameters of a term's signal by their own names, and what the library calls each."""
+    return {s.name: f"{chosen.signal.kind}_{shape_of(chosen.signal, s)}" for s in chosen.signal.shapes}
+
+
+def choice_of(chosen: Term) -> list[str]:
+    """The library's parameters that choose a term."""
+    picked = [chosen.signal.name, *([chosen.clock.name] if chosen.clock else [])]
+    return [f"{chosen.signal.kind}_pick_{name}" for name in picked]
+
+
+def bench_of_terms(found: Bench) -> Bench:
+    """The same events, base model and faults of the measurement with the library."""
+    faults = tuple(c for c in found.catalogue.candidates if c.measurement)
+    whole = tuple(Candidate(kind, effect, (), ({},)) for kind, effect in ((k, Library(k)) for k in KINDS))
+    kernels = found.kernels
+    bench = Bench.of(
+        found.load, Catalogue((*faults, *whole), {}), found.records, kernels.bounds, kernels.fixed, found.criteria,
+        found.effort, kernels.substeps, Terms,
+    )  # fmt: skip
+    bench.kernels.family.compile_kinds(lambda: found.effort.say("compiling the library of terms, once for this model"))
+    return bench
+
+
+def with_terms(bench: Bench, chosen: Sequence[Term]) -> Bench:
+    """A bench of the library on which these terms are candidates, each with its own parameters free."""
+    there = {c.name for c in bench.catalogue.candidates}
+    more = tuple(_candidate(bench, t) for t in dict.fromkeys(chosen) if t.name not in there)
+    catalogue = replace(bench.catalogue, candidates=(*bench.catalogue.candidates, *more))
+    return replace(bench, catalogue=catalogue, coordinates=replace(bench.coordinates, catalogue=catalogue))
+
+
+def _candidate(bench: Bench, chosen: Term) -> Candidate:
+    declared = {p.name: p for p in bench.problem.parameters}
+    sizes = tuple(declared[label] for _, label in sizes_of(chosen))
+    shapes = tuple(declared[label] for label in shapes_of(chosen).values())
+    relevant = {label: size.relevant for size, label in sizes_of(chosen)}
+    return Candidate(chosen.name, _Part(chosen.name, (*sizes, *shapes), relevant), sizes, ({},))
+
+
+class _Part(Effect):
+    """One term within the library: what a fit needs to know of it."""
+
+    def __init__(self, name: str, parameters: tuple[Parameter, ...], relevant: dict[str, float]):
+        self.name, self.parameters, self.relevant = name, parameters, relevant  # type: ignore[misc]
+
+    def edit(self, eq: object, **parameters: object) -> None:  # type: ignore[override]
+        """The library's kernel has it."""
+
+
+def place(at: Coordinates, unit: np.ndarray, chosen: Term, setting: Setting, sizes: Sequence[float]) -> np.ndarray:
+    """Coordinates (D,) with a term of these sizes and this setting."""
+    moved = unit.copy()
+    for label in choice_of(chosen):
+        moved[at.column[label]] = at.to_unit(label, 1.0)
+    for name, label in shapes_of(chosen).items():
+        moved[at.column[label]] = np.clip(at.to_unit(label, setting[name]), 0.0, 1.0)
+    for (_, label), size in zip(sizes_of(chosen), sizes, strict=True):
+        moved[at.column[label]] = np.clip(at.to_unit(label, size), 0.0, 1.0)
+    return moved
+
+
+def values_of(at: Coordinates, unit: np.ndarray, chosen: Term) -> dict[str, float]:
+    """Sizes and setting of a term at coordinates (D,), by their own names."""
+    sizes = {size.name: at.value(label, unit) for size, label in sizes_of(chosen)}
+    return sizes | {name: at.value(label, unit) for name, label in shapes_of(chosen).items()}
+
+
+def carried_over(other: Bench, found: Bench, unit: np.ndarray) -> np.ndarray:
+    """Coordinates (D',) of the bench of terms with base model, faults and power before as at coordinates (D,)."""
+    to, old = other.coordinates, found.coordinates
+    moved = to.null.copy()
+    faults = [p.name for n in to.catalogue.of_measurement for p in to.catalogue[n].effect.parameters]
+    for name in (*(to.names[k] for k in to.base), *faults):
+        moved[to.column[name]] = unit[old.column[name]]
+    moved[to.before] = unit[old.before]
+    return moved

@@ -1,0 +1,85 @@
+"""The whole library as two effects, each one kernel: parameters choose which signal acts, and how much in each balance.
+
+So a shortlist of any terms is simulated side by side, and nothing is compiled for a data set.
+"""
+
+from typing import Any
+
+from tractexp.discrepancy.proposal.library import (
+    BALANCES,
+    CLOCKS,
+    SIGNALS,
+    SOURCE,
+    TIMED,
+    Balance,
+    Signal,
+    shape_of,
+    size_of,
+)
+from tractexp.model.parts import Effect
+from tractexp.model.unfit import Unfit
+from tractexp.parameter import Parameter
+
+
+def picks(name: str) -> str:
+    """The parameter that chooses a signal or a clock: 1 where it is chosen."""
+    return f"pick_{name}"
+
+
+class Library(Effect):
+    """All signals of one kind in all balances that take them. Every size has the null 0."""
+
+    order = 2
+
+    def __init__(self, kind: str):
+        self.name = kind  # type: ignore[misc]
+        self.signals = tuple(s for s in SIGNALS if s.kind == kind)
+        self.clocks = CLOCKS if kind == TIMED else ()
+        self.balances = tuple(b for b in BALANCES if kind in b.kinds and len(b.sizes) == 1)
+        self.parameters = tuple(self._parameters())  # type: ignore[misc]
+
+    def __repr__(self) -> str:
+        return f"Library({self.name!r})"
+
+    def _parameters(self) -> Any:
+        for balance in self.balances:
+            for size in balance.sizes:
+                yield size.parameter(self.size(balance, size.name), f"size in {balance.words}")
+        for chosen in (*self.signals, *self.clocks):
+            yield Parameter(0.0, (0.0, 1.0), "1", f"whether it is {chosen.words}", SOURCE, name=self.pick(chosen.name))
+        for signal in self.signals:
+            for shape in signal.shapes:
+                yield shape.parameter(f"{self.name}_{shape_of(signal, shape)}")
+
+    def pick(self, chosen: str) -> str:
+        return f"{self.name}_{picks(chosen)}"
+
+    def size(self, balance: Balance, size: str) -> str:
+        return f"{self.name}_{size_of(balance, next(s for s in balance.sizes if s.name == size))}"
+
+    def edit(self, eq: Any, **parameters: Any) -> None:
+        clock = {"clock": self._clock(eq, parameters)} if self.clocks else {}
+        total = 0
+        for signal in self.signals:
+            own = {s.name: parameters[f"{self.name}_{shape_of(signal, s)}"] for s in signal.shapes}
+            if present(eq, signal):
+                total += parameters[self.pick(signal.name)] * signal.build(eq, **clock, **own)
+        g = eq.define(f"{self.name}_signal", total, "g")
+        for balance in self.balances:
+            if all(site in eq for site in balance.places):
+                own = {s.name: parameters[self.size(balance, s.name)] for s in balance.sizes}
+                balance.build(eq, g, **own)
+
+    def _clock(self, eq: Any, parameters: dict[str, Any]) -> Any:
+        times = (parameters[self.pick(c.name)] * c.build(eq) for c in self.clocks)
+        return eq.define(f"{self.name}_clock", sum(times), "t")
+
+
+def present(eq: Any, signal: Signal) -> bool:
+    """Whether the equations have what a signal follows."""
+    if signal.needs == "omega":
+        try:
+            return bool(eq.omega)
+        except Unfit:
+            return False
+    return not signal.needs or signal.needs in eq

@@ -1,0 +1,106 @@
+"""A term as a plugin: an effect of its own, with the functions of the library copied into its file.
+
+The file needs nothing of the library. Its parameters start at what was fitted; the size has the null 0.
+"""
+
+import inspect
+import re
+from collections.abc import Callable, Mapping
+
+from tractexp.discrepancy.proposal import shapes
+from tractexp.discrepancy.proposal.library import Term
+
+NAME = "proposed_effect"  # of the file, and so of the effect
+PREFIX = "proposed_"  # of the parameters, which share a model with others
+HELPERS = ("decided", "rounded", "reached")
+CONSTANTS = ("SHARP", "FALLEN", "RISEN")
+HEAD = '''"""{headline}, as the data propose it."""
+
+{imports}
+
+SOURCE = "proposed by the data; tractexp, docs/missing-effects.md"
+{constants}
+'''
+CLASS = '''
+@plugin
+class ProposedEffect(Effect):
+    r"""{headline}.
+
+        {latex}
+
+    {time}At a size of 0 the base model.
+
+    Source: proposed by tractexp's missing-effect workflow from {records}; no textbook.
+    Departures: what it stands for physically is for an engineer to say.
+    """
+
+{parameters}
+
+    order = 2
+    relevant = {relevant}
+
+    def edit(self, eq, {arguments}):
+{body}
+'''
+TIME = "It is a function of time, not of the voltage: it holds for events that it happens in.\n\n    "
+
+
+def parameters_of(term: Term) -> dict[str, str]:
+    """The parameters of a term by the names they have in its plugin, to their own names."""
+    own = [*(s.name for s in term.balance.sizes), *(s.name for s in term.signal.shapes)]
+    return {PREFIX + name: name for name in own}
+
+
+def source(term: Term, values: Mapping[str, float], records: str) -> str:
+    """The text of a plugin file for a term with these sizes and this setting."""
+    functions = [_copied(term.signal.build, "signal"), _copied(term.balance.build, "balance")]
+    if term.clock is not None:
+        functions.insert(0, _copied(term.clock.build, "clock"))
+    helpers = [inspect.getsource(getattr(shapes, h)) for h in HELPERS if any(f"{h}(" in f for f in functions)]
+    functions = [*helpers, *functions]
+    constants = [
+        f"{c} = {getattr(shapes, c):g}" for c in CONSTANTS if any(re.search(rf"\b{c}\b", f) for f in functions)
+    ]
+    sites = ", sites" * any("sites." in f for f in functions)
+    headline = f"{term.words[:1].upper()}{term.words[1:]}"
+    text = HEAD.format(
+        headline=headline, constants="\n".join(constants),
+        imports=f"from tractexp.extend import Effect, Parameter, plugin{sites}",
+    )  # fmt: skip
+    text += "".join(f"\n\n{f}" for f in functions)
+    return text.replace("\n\n\n\n", "\n\n\n") + "\n" + CLASS.format(
+        headline=headline, latex=term.latex, time=TIME * term.exogenous, records=records,
+        parameters="\n".join(_declared(term, values)), relevant=_relevant(term),
+        arguments=", ".join(parameters_of(term)), body="\n".join(_body(term)),
+    )  # fmt: skip
+
+
+def _copied(function: Callable[..., object], name: str) -> str:
+    """The text of a function under another name."""
+    return re.sub(r"^def \w+", f"def {name}", inspect.getsource(function)).replace("  # noqa: N802", "")
+
+
+def _declared(term: Term, values: Mapping[str, float]) -> list[str]:
+    made = [s.parameter(s.name, f"size in {s.where or term.balance.words}", values[s.name]) for s in term.balance.sizes]
+    made += [s.parameter(s.name, values[s.name]) for s in term.signal.shapes]
+    lines = []
+    for p in made:
+        null = "" if p.null is None else f", null={p.null}"
+        told = f'"{p.unit}", "{p.about}", SOURCE, r"{p.symbol}"{null}'
+        lines.append(f"    {PREFIX}{p.name} = Parameter({p.default!r}, {p.bounds!r}, {told})")
+    return lines
+
+
+def _relevant(term: Term) -> str:
+    told = ", ".join(f'"{PREFIX}{s.name}": {s.relevant!r}' for s in term.balance.sizes)
+    return f"{{{told}}}"
+
+
+def _body(term: Term) -> list[str]:
+    shaped = [f"{s.name}={PREFIX}{s.name}" for s in term.signal.shapes]
+    clock = ["clock=clock(eq)"] if term.clock else []
+    sized = [f"{s.name}={PREFIX}{s.name}" for s in term.balance.sizes]
+    return [
+        f'        g = eq.define("{PREFIX}signal", signal({", ".join(["eq", *clock, *shaped])}), "g")',
+        f"        balance({', '.join(['eq', 'g', *sized])})",
+    ]

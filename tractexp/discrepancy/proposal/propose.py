@@ -1,0 +1,205 @@
+"""The story of a proposal: screen the library at the base fit, refit the best, let held-out events and chance judge."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tractexp.discrepancy.base_fit import BaseFit
+from tractexp.discrepancy.disagreement import Disagreement
+from tractexp.discrepancy.fitting import Refit
+from tractexp.discrepancy.precision import WIDE
+from tractexp.discrepancy.proposal import generate
+from tractexp.discrepancy.proposal.bed import bench_of_terms, carried_over, sizes_of
+from tractexp.discrepancy.proposal.judge import Before, Weighed, tied, weighed
+from tractexp.discrepancy.proposal.library import Term, terms
+from tractexp.discrepancy.proposal.refit import Fitted, fitted, standard_errors
+from tractexp.discrepancy.proposal.screen import Ground, screen
+from tractexp.noise import Noise
+from tractexp.record import Event
+from tractexp.wording import joined
+
+DRAWS = 99  # of noise, for the best of the whole library
+SEEN = 0.1  # of the largest change: from where a term is said to act
+LOOKS_LIKE = 0.5  # of a term's change that a textbook effect could have made
+
+
+@dataclass(frozen=True)
+class Known:
+    """One number of a term: its value, and half of its 95 % interval (nan where nothing is known)."""
+
+    name: str
+    value: float
+    error: float
+    unit: str
+    about: str
+    symbol: str
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 %."""
+        return self.value - WIDE * self.error, self.value + WIDE * self.error
+
+
+@dataclass(frozen=True)
+class Acting:
+    """When a term acts in one event: the times of the record [s] between which it changes the power, and how much."""
+
+    event: str
+    start: float
+    end: float
+    channel: str
+    most: float  # pu
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """A term that held-out events confirm."""
+
+    term: Term
+    known: tuple[Known, ...]
+    train: Before
+    validate: Before
+    p: float
+    acting: tuple[Acting, ...]
+    ties: tuple[tuple[Term, float, float], ...]  # with the shares they close on fitted and on held-out events
+    alike: tuple[tuple[str, float], ...]  # textbook effects, and the share of its change that each could have made
+    source: str  # of a plugin file
+
+    @property
+    def values(self) -> dict[str, float]:
+        return {k.name: k.value for k in self.known}
+
+
+@dataclass(frozen=True, eq=False)
+class Proposed:
+    """What became of the search for a term: a proposal, or the sentence why there is none."""
+
+    proposal: Proposal | None = None
+    why: str = ""
+    tried: tuple[tuple[Term, Weighed], ...] = field(default=())
+
+
+def propose(
+    base: BaseFit, first: Disagreement, bare: Refit, noise: Noise, validate: Sequence[Event], seed: int,
+    among: Sequence[Term] = (),
+) -> Proposed:  # fmt: skip
+    """Search a term for what the model lacks; `bare` is the base model's fit, `noise` that of the last tests.
+
+    `among` are the terms that are tried, by default the whole library.
+    """
+    bench = base.bench
+    if bench.waves:
+        return Proposed(why="proposals are of phasors: what waveforms lack is told by where and what is left")
+    if not validate:
+        return Proposed(why="a term is proposed only where a held-out event confirms it, and none was held out")
+    under = bench_of_terms(bench)
+    ground = Ground.at(under, carried_over(under, bench, bare.unit), noise)
+    bench.effort.say("screening a library of terms")
+    screened = screen(ground, among or terms(), seed, DRAWS)
+    bench.effort.say("refitting the most promising terms")
+    made = fitted(screened, [carried_over(under, bench, v) for v in base.valleys_but(bare.unit)[:1]])
+    bench.effort.say("judging terms on the held-out events")
+    lowered = [made.bare.deviance - fit.deviance for fit in made.fits]
+    told = weighed(made, validate, [screened.p(drop) for drop in lowered])
+    tried = tuple((made.term(w.fit), w) for w in told)
+    standing = [w for w in told if w.stands(bench.criteria)]
+    if not standing:
+        objections = joined(told[0].objections(bench.criteria))
+        return Proposed(None, f"of the terms tried the best is {made.term(told[0].fit).words}, but {objections}", tried)
+    return Proposed(_proposal(made, first, standing, screened.ground), "", tried)
+
+
+def _proposal(made: Fitted, first: Disagreement, standing: Sequence[Weighed], ground: Ground) -> Proposal:
+    chosen, *others = standing
+    term, values = made.term(chosen.fit), made.values(chosen.fit)
+    errors = standard_errors(made, chosen.fit)
+    declared = {s.name: (s.unit, f"size in {s.where or term.balance.words}", s.latex) for s in term.balance.sizes}
+    declared |= {s.name: (s.unit, s.about, s.latex) for s in term.signal.shapes}
+    known = tuple(Known(n, v, errors[n], *declared[n]) for n, v in values.items())
+    records = joined([e.record.name for e in made.bench.events])
+    return Proposal(
+        term=term, known=known, train=chosen.train, validate=chosen.validate, p=chosen.p,
+        acting=tuple(_acting(made, chosen.fit)),
+        ties=tuple((made.term(o.fit), o.train.closed, o.validate.closed) for o in tied(made, chosen, others)),
+        alike=tuple(alike(made, chosen.fit, first)),
+        source=generate.source(term, values, records),
+    )  # fmt: skip
+
+
+def change(made: Fitted, fit: Refit) -> np.ndarray:
+    """What a term adds to the calculated power (C, N) [pu], all else as it was fitted with it."""
+    at, without = made.bench.coordinates, fit.unit.copy()
+    for _, label in sizes_of(made.term(fit)):
+        without[at.column[label]] = at.to_unit(label, 0.0)
+    with_it, alone = made.bench.residuals(np.array([fit.unit, without]), fit.names)
+    return with_it - alone
+
+
+def _acting(made: Fitted, fit: Refit) -> list[Acting]:
+    """Where in each event a term changes the power by more than a tenth of the most it does."""
+    bench, added, told = made.bench, change(made, fit), []
+    for e, event in enumerate(bench.events):
+        own = added[:, bench.drive.part(e)]
+        channel, _ = np.unravel_index(np.abs(own).argmax(), own.shape)
+        seen = np.flatnonzero((np.abs(own) > SEEN * np.abs(added).max()).any(axis=0))
+        if len(seen):
+            t = event.record.t[event.record.samples - own.shape[1] :]
+            most = float(own[channel][np.abs(own[channel]).argmax()])
+            told.append(
+                Acting(event.record.name, float(t[seen[0]]), float(t[seen[-1]]), bench.drive.names[channel], most)
+            )
+    return told
+
+
+def alike(made: Fitted, fit: Refit, first: Disagreement) -> list[tuple[str, float]]:
+    """Textbook effects that could make most of what a term changes, the base model giving way: best first."""
+    bench = made.bench
+    rows = bench.whiten(made.noise, change(made, fit)[None])
+    projection = first.projection
+    size = rows.shape[1]
+    wide = np.concatenate([rows, np.zeros((1, projection.Q.shape[0] - size))], axis=1)
+    s = (wide - (wide @ projection.Q) @ projection.Q.T)[0]
+    shares: dict[str, float] = {}
+    for column, block in zip(projection.columns, projection.blocks, strict=True):
+        gram = block @ block.T
+        if np.diag(gram).max(initial=0.0) > 1e-12:
+            side = block @ s
+            share = float(side @ np.linalg.pinv(gram, rcond=1e-10, hermitian=True) @ side / max(s @ s, 1e-300))
+            shares[column.candidate.name] = max(shares.get(column.candidate.name, 0.0), share)
+    return sorted(((n, v) for n, v in shares.items() if v >= LOOKS_LIKE), key=lambda pair: -pair[1])[:4]
+
+
+def told(proposed: Proposed, plugin: str) -> Mapping[str, object] | None:
+    """The proposal as `discrepancy.json` has it; `plugin` is the path of its file."""
+    if (made := proposed.proposal) is None:
+        return None
+    return {
+        "terms": [
+            _named(made.term)
+            | {"function_of_voltage": not made.term.exogenous, "parameters": {k.name: _number(k) for k in made.known}}
+        ],
+        "closed": {"train": made.train.closed, "validate": made.validate.closed},
+        "left": {"train": made.train.left, "validate": made.validate.left},
+        "p": made.p,
+        "when": [vars(a) for a in made.acting],
+        "ties": [_named(t) | {"closed": {"train": near, "validate": held}} for t, near, held in made.ties],
+        "alike": dict(made.alike),
+        "plugin": plugin,
+    }
+
+
+def _named(term: Term) -> dict[str, object]:
+    """A term as machines and people call it."""
+    clock = term.clock and term.clock.name
+    names = {"balance": term.balance.name, "signal": term.signal.name, "clock": clock}
+    return names | {"words": term.words, "latex": term.latex}
+
+
+def _number(known: Known) -> dict[str, object]:
+    interval = [_finite(end) for end in known.interval]
+    return {"value": known.value, "standard_error": _finite(known.error), "interval": interval}
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,174 @@
+"""The shortlist refitted: the linear rank is none, for where something large is missing the base fit is biased.
+
+The best terms get their instants, levels and times from ever finer grids, then everything is fitted at once, from the
+base fit, from the same with what rests on its bounds moved into the middle, and from the base model's other valleys.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.fitting import Refit, Start, best_of, refit, rough_refit
+from tractexp.discrepancy.proposal.bed import place, values_of, with_terms
+from tractexp.discrepancy.proposal.library import ANSWER, Shape, Term, term
+from tractexp.discrepancy.proposal.screen import Ground, Scored, Screened, linearised, scores
+from tractexp.discrepancy.tangent import WALL
+from tractexp.noise import Noise
+
+MOST, ANSWERS = 30, 15  # terms refitted, and how many at least are functions of voltage and states
+ALIKE = 4  # of one signal and clock at most, so that others are tried, too
+ROUNDS, FINER = 3, (-0.75, -0.5, -0.25, 0.25, 0.5, 0.75)  # of the zoom; of the distance to the grid's neighbors
+CLOSE = 0.05  # of what the best explains: the terms that are fitted exactly
+EXACT = 6  # of them at most
+PEAKS, PROMISING = 3, 0.7  # settings of one term, and how good the further ones are of the best
+REGRIDDED = 3  # terms whose grid is searched anew where the base model is that of their refit
+AGAIN = 10  # terms that start from the other fits of the base model, too
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """Terms fitted under one noise, the best first, and the base model alone."""
+
+    bench: Bench  # with these terms as candidates
+    noise: Noise
+    bare: Refit
+    fits: tuple[Refit, ...]
+
+    def term(self, fit: Refit) -> Term:
+        return term(fit.names[0])
+
+    def values(self, fit: Refit) -> dict[str, float]:
+        """Sizes and setting of a fit's term, by their own names."""
+        return values_of(self.bench.coordinates, fit.unit, self.term(fit))
+
+
+def shortlist(screened: Screened) -> list[Scored]:
+    """The most promising terms, each at its best setting, so that no kind of signal crowds out the others."""
+    best: dict[str, Scored] = {}
+    for found in screened.scored:
+        if found.drop > 0:
+            best.setdefault(found.term.name, found)
+    alike: dict[tuple, int] = {}
+    diverse = []
+    for found in best.values():
+        key = found.term.signal.name, found.term.clock
+        alike[key] = alike.get(key, 0) + 1
+        if alike[key] <= ALIKE:
+            diverse.append(found)
+    answers = [f for f in diverse if f.term.signal.kind == ANSWER][:ANSWERS]
+    rest = [f for f in diverse if f not in answers][: MOST - len(answers)]
+    return sorted([*answers, *rest], key=lambda f: -f.drop)
+
+
+def further(screened: Screened, listed: Sequence[Scored]) -> list[Scored]:
+    """Further settings of terms, far from those listed on the grid of some parameter: peaks of their own."""
+    more: dict[str, list[Scored]] = {f.term.name: [f] for f in listed}
+    for found in screened.scored:
+        there = more.get(found.term.name)
+        if there and len(there) < PEAKS and all(_far(found, f) for f in there):
+            there.append(found)
+    return [f for there in more.values() for f in there[1:] if f.drop > PROMISING * there[0].drop]
+
+
+def _far(a: Scored, b: Scored) -> bool:
+    """Whether two settings differ by two places of the grid in some parameter."""
+
+    def places(s: Shape) -> int:
+        return abs(*np.diff([int(np.abs(np.array(s.grid) - f.setting[s.name]).argmin()) for f in (a, b)]))
+
+    return any(places(s) >= 2 for s in a.term.signal.shapes if s.name != "phase")
+
+
+def zoomed(ground: Ground, found: Sequence[Scored]) -> list[Scored]:
+    """The same terms at better settings, each parameter moved by itself on ever finer grids."""
+    best = list(found)
+    for turn in range(ROUNDS):
+        for k in range(max((len(f.term.signal.shapes) for f in best), default=0)):
+            tried = [(i, setting) for i, f in enumerate(best) for setting in _finer(f, k, 4.0**-turn)]
+            again = scores(ground, [(best[i].term, setting) for i, setting in tried])
+            for (i, _), other in zip(tried, again, strict=True):
+                if other.drop > best[i].drop:
+                    best[i] = other
+    return sorted(best, key=lambda f: -f.drop)
+
+
+def _finer(found: Scored, which: int, scale: float) -> list[dict[str, float]]:
+    """Settings between a setting and its neighbors on the grid, one parameter moved."""
+    shapes = found.term.signal.shapes
+    if which >= len(shapes) or shapes[which].name == "phase":
+        return []
+    shape = shapes[which]
+    grid, now = np.array(shape.grid), found.setting[shape.name]
+    near = np.sort(np.abs(grid - now))
+    reach = scale * (near[near > 0][0] if (near > 0).any() else 0.1 * np.ptp(shape.bounds))
+    moved = (float(np.clip(now + part * reach, *shape.bounds)) for part in FINER)
+    return [{**found.setting, shape.name: value} for value in dict.fromkeys(moved) if value != now]
+
+
+def fitted(screened: Screened, valleys: Sequence[np.ndarray]) -> Fitted:
+    """Refit the shortlist; `valleys` (D,) are other fits of the base model in the coordinates of the terms' bench."""
+    ground = screened.ground
+    listed = shortlist(screened)
+    chosen = zoomed(ground, [*listed, *further(screened, listed[:AGAIN])])
+    bench, noise = with_terms(ground.bench, [f.term for f in chosen]), ground.noise
+    bare = refit(bench, noise, [((), ground.unit)])[0]
+    fits = rough_refit(bench, noise, _starts(bench, chosen, [ground.unit]))
+    best = {f.names[0] for f in fits[:AGAIN]}
+    others = [*off_bounds(bench, ground.unit), *valleys]
+    again = _starts(bench, [f for f in chosen if f.term.name in best], others)
+    fits = best_of([*fits, *(rough_refit(bench, noise, again) if again else [])])
+    better = [regridded(bench, noise, f) for f in fits[:REGRIDDED] if term(f.names[0]).signal.shapes]
+    fits = best_of([*fits, *(rough_refit(bench, noise, better) if better else [])])
+    near = fits[0].cost + max(CLOSE * (bare.deviance - fits[0].deviance), 20.0)
+    exact = {f.names: f for f in refit(bench, noise, [(f.names, f.unit) for f in fits[:EXACT] if f.cost <= near])}
+    ranked = sorted((exact.get(f.names, f) for f in fits), key=lambda f: f.cost)
+    return Fitted(bench, noise, bare, tuple(ranked))
+
+
+def regridded(bench: Bench, noise: Noise, fit: Refit) -> Start:
+    """A start for a term at the best setting of its whole grid where the base model is that of its own refit.
+
+    At the first fit of the base model, which something missing bends, another setting may have seemed the best.
+    """
+    chosen, at = term(fit.names[0]), bench.coordinates
+    sizes = [0.0] * len(chosen.balance.sizes)
+    values = values_of(at, fit.unit, chosen)
+    there = Ground.at(bench, place(at, fit.unit, chosen, values, sizes), noise)
+    tried = [(chosen, s) for s in chosen.signal.settings if s.get("phase", 0.0) == 0.0]
+    best = max(scores(there, tried), key=lambda f: f.drop)
+    (best,) = zoomed(there, [best])
+    return fit.names, place(at, fit.unit, chosen, best.setting, best.sizes)
+
+
+def _starts(bench: Bench, chosen: Sequence[Scored], units: Sequence[np.ndarray]) -> list[Start]:
+    """Each term at its one-step size on each of the base model's fits (D,)."""
+    at = bench.coordinates
+    return [((f.term.name,), place(at, unit, f.term, f.setting, f.sizes)) for f in chosen for unit in units]
+
+
+def off_bounds(bench: Bench, unit: np.ndarray) -> list[np.ndarray]:
+    """The same coordinates with what rests on its bounds in the middle; none where nothing does."""
+    base = bench.coordinates.base
+    resting = base[(unit[base] <= WALL) | (unit[base] >= 1 - WALL)]
+    if not len(resting):
+        return []
+    moved = unit.copy()
+    moved[resting] = 0.5
+    return [moved]
+
+
+def standard_errors(made: Fitted, fit: Refit) -> dict[str, float]:
+    """Of a term's parameters, by their own names, all else free beside them; infinite where nothing is known."""
+    bench, chosen = made.bench, made.term(fit)
+    at = bench.coordinates
+    faults = [k for n in bench.catalogue.of_measurement for k in at.sizes([n])]
+    own = at.parameters(fit.names)
+    columns = [*at.base, *at.before, *faults, *own]
+    _, rows = linearised(bench, fit.unit, made.noise, columns, fit.names)
+    covariance = np.linalg.pinv(rows[1:] @ rows[1:].T, rcond=1e-14, hermitian=True)
+    spread = np.sqrt(np.diag(covariance))[-len(own) :] * [at.width(at.names[k]) for k in own]
+    known = np.linalg.norm(rows[1:], axis=1)[-len(own) :] > 0
+    names = values_of(at, fit.unit, chosen)
+    return {n: float(s) if seen else float("inf") for n, s, seen in zip(names, spread, known, strict=True)}

@@ -1,0 +1,216 @@
+"""The screen: what every term of the library would gain at the base fit, in one linear step.
+
+A term's column is what a small size of it changes, simulated along the fitted trajectory; thousands of them run side by
+side in the library's kernel, which costs less than assembling them of pushes. Columns are whitened and the base
+model's parameters, P0 and Q0 of each event and the faults of the measurement projected out. The rank is a shortlist.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.cores import side_by_side
+from tractexp.discrepancy.proposal.bed import Setting, place, sizes_of
+from tractexp.discrepancy.proposal.library import Term
+from tractexp.discrepancy.tangent import two_sided
+from tractexp.noise import Noise
+
+STEP = 0.02  # of a size's relevant value: how large a term is whose column is taken
+TOGETHER = 384  # columns held at once
+QUARTER = float(np.pi / 2)
+LEAST = 1e-8  # of a column's square: what the nuisances leave of it at least
+
+
+def linearised(
+    bench: Bench, unit: np.ndarray, noise: Noise, columns: Sequence[int], names: Sequence[str]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Residuals (C, N) of a fit with the named terms, and rows (1 + k, R): they and their differences, whitened.
+
+    R = C N rows of the records, then those of the priors of the faults of the measurement.
+    """
+    at = bench.coordinates
+    up, down = two_sided(unit, columns)
+    raw = bench.residuals(np.concatenate([unit[None], up, down]), names)
+    k = len(columns)
+    width = np.array([u[c] - d[c] for u, d, c in zip(up, down, columns, strict=True)])
+    moved = np.nan_to_num((raw[1 : 1 + k] - raw[1 + k :]) / width[:, None, None])
+    white = bench.whiten(noise, np.concatenate([raw[:1], moved]))
+    held = [(i, c) for i, c in enumerate(columns) if c in at.prior_deviation]
+    prior = np.zeros((1 + k, len(held)))
+    for row, (i, c) in enumerate(held):
+        prior[1 + i, row] = 1 / at.prior_deviation[c]
+        prior[0, row] = (unit[c] - at.null[c]) / at.prior_deviation[c]
+    return raw[0], np.concatenate([white, prior], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """A fit with all that may give way projected out. R = C N rows of the records, then those of the priors."""
+
+    bench: Bench  # of terms
+    unit: np.ndarray  # (D,)
+    noise: Noise
+    raw: np.ndarray  # (C, N) residuals of the fit
+    Q: np.ndarray  # (R, k) orthonormal nuisances
+    r: np.ndarray  # (R,) the fit's residual, projected
+
+    @classmethod
+    def at(cls, bench: Bench, unit: np.ndarray, noise: Noise) -> "Ground":
+        """At coordinates (D,). The base model's parameters give way though they rest on their bounds."""
+        at = bench.coordinates
+        faults = [k for n in bench.catalogue.of_measurement for k in at.sizes([n])]
+        raw, rows = linearised(bench, unit, noise, [*at.base, *at.before, *faults], ())
+        Q = np.linalg.qr(rows[1:].T)[0]
+        made = cls(bench, unit, noise, raw, Q, rows[0])
+        return replace(made, r=made.off(rows[:1])[0])
+
+    def off(self, rows: np.ndarray) -> np.ndarray:
+        """Rows (n, R) without what the nuisances explain."""
+        return rows - (rows @ self.Q) @ self.Q.T
+
+    def columns(self, points: np.ndarray, spans: np.ndarray, kind: str) -> np.ndarray:
+        """What points (n, D) of one kind of terms change for each unit of their size, whitened (n, C N)."""
+        raw = self.bench.residuals(points, (kind,))
+        raw -= self.raw
+        raw /= spans[:, None, None]
+        return side_by_side(lambda part: self.bench.whiten(self.noise, part), np.nan_to_num(raw, copy=False))
+
+    def drawn(self, seed: int, draws: int) -> np.ndarray:
+        """Noise (draws, R), whitened and projected as the fit's residual is."""
+        bench = self.bench
+        noise = self.noise.draw(np.random.default_rng(seed), draws, np.diff(bench.drive.first).tolist())
+        white = bench.whiten(self.noise, noise * bench.known)
+        return self.off(np.concatenate([white, np.zeros((draws, len(self.r) - white.shape[1]))], axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Scored:
+    """A term at one setting: by how much its best size lowers the deviance, and that size."""
+
+    term: Term
+    setting: Setting
+    drop: float
+    sizes: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """Every term of the library at every setting, the most promising first, and the best of each draw of noise (b,)."""
+
+    ground: Ground
+    scored: list[Scored]
+    chance: np.ndarray
+
+    def p(self, drop: float) -> float:
+        """How often noise alone lowers the deviance as much by the best of the whole library: a Gumbel tail."""
+        scale = max(float(self.chance.std()) * np.sqrt(6) / np.pi, 1e-9)
+        location = float(self.chance.mean()) - np.euler_gamma * scale
+        return float(-np.expm1(-np.exp(min(-(drop - location) / scale, 700.0))))
+
+
+def screen(ground: Ground, terms: Sequence[Term], seed: int, draws: int) -> Screened:
+    """Score terms on their grids."""
+    noise = ground.drawn(seed, draws)
+    best = np.zeros(draws)
+    scored = []
+    for found, drops in _scores(ground, [(t, s) for t in terms for s in t.signal.settings if _first(s)], noise):
+        scored.append(found)
+        best = np.maximum(best, drops)
+    return Screened(ground, sorted(scored, key=lambda s: -s.drop), best)
+
+
+def scores(ground: Ground, wanted: Sequence[tuple[Term, Setting]]) -> list[Scored]:
+    """Score terms at settings of their own, in this order; a phase is found, not given."""
+    made = {(s.term.name, _key(s.setting)): s for s, _ in _scores(ground, wanted, np.zeros((0, len(ground.r))))}
+    return [made[t.name, _key({k: v for k, v in s.items() if k != "phase"})] for t, s in wanted]
+
+
+def _first(setting: Setting) -> bool:
+    """Whether it is the first of a grid's settings that differ by their phase: both phases make one block."""
+    return setting.get("phase", 0.0) == 0.0
+
+
+def _key(setting: Setting) -> tuple:
+    return tuple(sorted((k, v) for k, v in setting.items() if k != "phase"))
+
+
+def _scores(
+    ground: Ground, wanted: Sequence[tuple[Term, Setting]], noise: np.ndarray
+) -> Iterator[tuple[Scored, np.ndarray]]:
+    """Each term with its score, and what noise (b, R) would give it (b,). Balances of a signal share columns."""
+    groups: dict[tuple, list[tuple[Term, Setting]]] = {}
+    for t, s in wanted:
+        groups.setdefault((t.signal.kind, t.signal.name, t.clock, _key(s)), []).append((t, s))
+    batch: list[list[tuple[Term, Setting]]] = []
+    kinds = sorted(groups.values(), key=lambda members: members[0][0].signal.kind)
+    for members in kinds:
+        full = sum(map(len, batch)) * 2 >= TOGETHER
+        if batch and (full or batch[0][0][0].signal.kind != members[0][0].signal.kind):
+            yield from _batch(ground, batch, noise)
+            batch = []
+        batch.append(members)
+    if batch:
+        yield from _batch(ground, batch, noise)
+
+
+def _batch(
+    ground: Ground, batch: list[list[tuple[Term, Setting]]], noise: np.ndarray
+) -> Iterator[tuple[Scored, np.ndarray]]:
+    at, index = ground.bench.coordinates, {}
+    points, spans = [], []
+    blocks = []
+    for members in batch:
+        for t, s in members:
+            rows = []
+            for (size, label), k in zip(sizes_of(t), range(len(t.balance.sizes)), strict=True):
+                for phase in (0.0, QUARTER) if "phase" in s else (None,):
+                    setting = dict(s) if phase is None else {**s, "phase": phase}
+                    key = (label, t.signal.name, t.clock, tuple(sorted(setting.items())))
+                    if key not in index:
+                        index[key] = len(points)
+                        sizes = [STEP * size.relevant if i == k else 0.0 for i in range(len(t.balance.sizes))]
+                        points.append(place(at, ground.unit, t, setting, sizes))
+                        spans.append(STEP * size.relevant)
+                    rows.append(index[key])
+            blocks.append((t, s, rows))
+    columns = ground.columns(np.array(points), np.array(spans), blocks[0][0].signal.kind)
+    seen = columns.shape[1]
+    side, drawn = columns @ ground.r[:seen], columns @ noise[:, :seen].T
+    along = columns @ ground.Q[:seen]
+    for t, s, rows in blocks:
+        gram = columns[rows] @ columns[rows].T - along[rows] @ along[rows].T  # what the nuisances explain taken away
+        inverse = _inverse(gram, np.einsum("nr,nr->n", columns[rows], columns[rows]).max())
+        sizes, chance = -inverse @ side[rows], drawn[rows]
+        drops = (chance * (inverse @ chance)).sum(axis=0)
+        yield _told(t, s, sizes, float(-sizes @ side[rows])), drops
+
+
+def _inverse(gram: np.ndarray, whole: float) -> np.ndarray:
+    """The pseudo-inverse (k, k); directions of which the nuisances leave nothing of `whole` are none."""
+    if len(gram) == 1:
+        return 1 / gram if gram[0, 0] > LEAST * whole + 1e-12 else np.zeros((1, 1))
+    values, vectors = np.linalg.eigh(gram)
+    kept = values > max(LEAST * whole, 1e-12)
+    return (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
+
+
+def _told(t: Term, setting: Setting, sizes: np.ndarray, drop: float) -> Scored:
+    """A score; of two phases the amplitude, and the phase of the larger balance."""
+    if "phase" not in setting:
+        return _within(Scored(t, dict(setting), drop, tuple(sizes.tolist())))
+    pairs = sizes.reshape(-1, 2)
+    turned = pairs[:, 0] + 1j * pairs[:, 1]
+    phase = float(np.angle(turned[np.abs(turned).argmax()]))
+    amplitudes = (turned * np.exp(-1j * phase)).real
+    return _within(Scored(t, {**setting, "phase": phase}, drop, tuple(amplitudes.tolist())))
+
+
+def _within(found: Scored) -> Scored:
+    """A score with sizes that its bounds allow: a column of nearly nothing needs a size beyond all of them."""
+    over = max(abs(k) / size.bound for k, size in zip(found.sizes, found.term.balance.sizes, strict=True))
+    if over <= 1:
+        return found
+    c = 1 / over
+    return replace(found, drop=found.drop * (2 * c - c**2), sizes=tuple(c * k for k in found.sizes))

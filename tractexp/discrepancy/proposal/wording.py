@@ -1,0 +1,39 @@
+"""A proposal in sentences, from what `discrepancy.json` holds of it."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from tractexp.wording import in_words, joined, percent, with_error
+
+
+def proposed_in_words(told: Mapping[str, Any] | None, why: str | None) -> list[str]:
+    """The proposal, or why there is none; nothing where none was asked for."""
+    if not told:
+        return [f"no term is proposed: {why}"] if why else []
+    (term,) = told["terms"]
+    closed = told["closed"]
+    sentences = [
+        f"proposed: {term['words']}, which closes {percent(closed['train'])} of the gap on the fitted events and"
+        f" {percent(closed['validate'])} on the held-out ones; {_numbers(term['parameters'])}",
+    ]
+    if not term["function_of_voltage"]:
+        sentences.append("it is not a function of the voltage: something happened by itself")
+    if told["ties"]:
+        names = joined([t["words"] for t in told["ties"]], "or")
+        sentences.append(f"these events cannot tell it from {names}")
+    if told["alike"]:
+        sentences.append(f"looks like it: {joined([f'{n} ({percent(v)})' for n, v in told['alike'].items()])}")
+    return sentences
+
+
+def chance(p: float) -> str:
+    """How often noise gives as much, as a clause."""
+    return f"noise gives the best of the whole library as much with a probability of {in_words(p)}"
+
+
+def _numbers(parameters: Mapping[str, Mapping[str, Any]]) -> str:
+    each: Sequence[str] = [
+        f"{n} = {with_error(p['value'], float('nan') if p['standard_error'] is None else p['standard_error'])}"
+        for n, p in parameters.items()
+    ]
+    return joined(each)
