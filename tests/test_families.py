@@ -155,7 +155,7 @@ def test_a_member_that_nests_the_textbook_starts_from_its_fit():
 
 def test_a_place_or_a_kind_that_there_is_not_is_refused_with_the_nearest():
     about = {"__doc__": "a = b. Source: here.", "__module__": "elsewhere.stranger", "__annotations__": {}}
-    for told, sentence in (({"places": ("static p",)}, "did you mean 'static P'"), ({"kind": "lags"}, "mean 'lag'")):
+    for told, sentence in (({"places": ("statc P",)}, "did you mean 'static P'"), ({"kind": "lags"}, "mean 'lag'")):
         size = {"a": Parameter(0.0, (0.0, 1.0), "1", "size", "here", null=0.0)}
         made = type("Stranger", (Effect,), about | size | {"edit": lambda self, eq, a: None} | told)
         with pytest.raises(UserError, match=sentence):
