@@ -10,6 +10,7 @@ from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.disagreement import examined
+from tractexp.discrepancy.explanations import Explanations
 from tractexp.discrepancy.fitting import Refit, refit, settled
 from tractexp.discrepancy.gap import Gap, gap
 from tractexp.discrepancy.noise_in_quiet import QuietNoise, white
@@ -91,9 +92,10 @@ class HeldOut:
 def held_out(surviving: Survivors, events: Sequence[Event], seed: int) -> HeldOut:
     """Refit the survivors without needless faults of the measurement, and judge them on held-out events, if any."""
     explained = surviving.explanations
-    bench, noise, faults = explained.base.bench, explained.last.noise, explained.faults
+    bench, noise = explained.base.bench, explained.last.noise
     at = bench.coordinates
     bare = refit(bench, noise, [((), at.without_faults(explained.steps[0].fit.unit, ()))], faults=())[0]
+    faults = telling(explained, bare)
     wanted = [(s.fit.names, at.without_faults(s.fit.unit, faults)) for s in (surviving.adequate or surviving.kept[:1])]
     exact = {f.names: f for f in refit(bench, noise, wanted, faults=faults)}
     as_fitted = HeldOut(surviving, noise, faults, bare, {names: exact[names] for names, _ in wanted})
@@ -104,6 +106,29 @@ def held_out(surviving: Survivors, events: Sequence[Event], seed: int) -> HeldOu
     judged, again = weighed(bench, events, as_fitted, seed, doubted=not explained.steps[0].adequate)
     extended = {**as_fitted.extended, **{f.names: f for f in again}}
     return replace(as_fitted, judged=judged, together=tuple(again), extended=extended)
+
+
+def telling(explained: Explanations, bare: Refit) -> Names:
+    """The faults of the measurement that stand out, but for those that only mend the formula of an effect.
+
+    Beside an effect of the load they must explain more, together with those left out before, than the part of all that
+    is explained to which no formula is exact (`alike`).
+    """
+    bench, noise, fit, faults = explained.base.bench, explained.last.noise, explained.chosen, explained.faults
+    if not fit.names:
+        return faults
+
+    def left(kept: Names) -> float:
+        unit = bench.coordinates.without_faults(fit.unit, kept)
+        return refit(bench, noise, [(fit.names, unit)], faults=kept)[0].deviance
+
+    most = left(faults) if faults else 0.0
+    while faults:
+        fewer = {left(rest): rest for rest in itertools.combinations(faults, len(faults) - 1)}
+        if min(fewer) - most > bench.criteria.alike * (bare.deviance - most):
+            break
+        faults = fewer[min(fewer)]
+    return faults
 
 
 def weighed(
