@@ -12,7 +12,12 @@ import tractexp
 from tractexp.errors import UserError, check_range
 
 
-def test_a_damaged_setting_works_or_is_refused_with_a_sentence():
+def test_a_damaged_setting_works_or_is_refused_with_a_sentence(monkeypatch):
+    """Without the moment's search of the long run, for which other kernels would be compiled."""
+    from tractexp.api.setup import Setup
+
+    monkeypatch.setattr(Setup, "problem", None)
+    monkeypatch.setattr("tractexp.identification.search.search", lambda *_: None)
     found = mutated_settings.run(160, 11)
     assert found["bad"] == []
     for counts in found["counts"].values():
