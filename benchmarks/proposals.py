@@ -15,50 +15,16 @@ from pathlib import Path
 
 import tractexp  # noqa: F401 before NumPy: it keeps BLAS to one thread
 from hidden_effects import EFFECTS, Case, Noise, make
-from hidden_effects.devices import Ring, Static, Switched
-from hidden_effects.hidden import Hidden, beside, lowest
+from hidden_effects.devices import Ring, Switched
+from hidden_effects.hidden import Hidden, beside
+from hidden_effects.laws import KneeSaturation, StaticTrip
 from hidden_effects.motor import Motor
 from hidden_effects.outside import after
 from hidden_effects.site import Site
-from hidden_effects.supply import Profile, Relay
+from hidden_effects.supply import Profile
 
 TABLE = Path(__file__).with_suffix(".json")
 FIRST, COUNT, NOISE = 900_000, 2, Noise(0.003)
-
-
-@dataclass(frozen=True)
-class Tripping(Static):
-    """A static load of which relays hold a share open."""
-
-    opened: Profile | None = None
-
-    def flow(self, now, V, x):
-        current, rates = super().flow(now, V, x)
-        return current * (1 - self.opened(now.t)), rates
-
-
-@dataclass(frozen=True)
-class StaticTrip(Hidden):
-    """A relay with timers opens a share of the static load alone, and lets it come back along a ramp."""
-
-    reference, largest, unit = 0.05, 0.9, "1"
-    level: float = 0.8
-    delay: float = 0.04
-    wait: float = 0.3
-
-    @classmethod
-    def details(cls, rng, dips):
-        level = max(0.45, 1 - float(rng.uniform(0.4, 0.8)) * (1 - lowest(dips)))
-        delay = float(rng.uniform(0.2, 0.5)) * min(d.duration for d in dips)
-        return {"level": level, "delay": delay, "wait": float(rng.uniform(0.1, 0.4))}
-
-    def apply(self, site: Site) -> Site:
-        opened = Relay(self.level, max(self.level, 0.85), self.delay, self.wait, 0.03).opened(
-            site.dip, site.recorder.duration
-        )
-        opened = replace(opened, values=tuple(self.amount * v for v in opened.values))
-        static = Tripping(site.static.p_v, site.static.q_v, opened=opened)
-        return replace(site, static=static, breaks=(*site.breaks, *opened.times))
 
 
 @dataclass(frozen=True)
@@ -90,34 +56,6 @@ class ReactiveRing(Hidden):
         start = after(site, self.delay)
         ring = Ring(1j * self.amount * site.S.real, start, self.frequency, self.decay)
         return replace(beside(site, ring), breaks=(*site.breaks, start))
-
-
-@dataclass(frozen=True)
-class KneeMotor(Motor):
-    """A motor whose iron saturates beyond a knee."""
-
-    knee: float = 0.7
-
-    def _saturated(self, gap, admittance, source):
-        m, before = self.machine, max(self.flux**0.5 - self.knee, 0.0) ** 2
-        for _ in range(200):
-            more = self.saturation * (max(abs(gap) - self.knee, 0.0) ** 2 - before)
-            last, gap = gap, source / (admittance + (1 + more) / m.Xm)
-            if abs(gap - last) < 1e-13:
-                return gap
-        raise ArithmeticError("the saturated air gap does not settle")
-
-
-@dataclass(frozen=True)
-class KneeSaturation(Hidden):
-    """The iron saturates beyond a knee, by the square of what exceeds it."""
-
-    reference, largest, unit = 4.0, 40.0, "1/pu²"
-    knee: float = 0.7
-
-    def apply(self, site: Site) -> Site:
-        motors = (KneeMotor(**{**vars(m), "saturation": self.amount}, knee=self.knee) for m in site.motors)
-        return replace(site, motors=tuple(motors))
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ import pickle
 import stat
 import subprocess
 import sys
+import types
 from pathlib import Path
 
 import pytest
@@ -115,8 +116,10 @@ def test_code_for_another_machine_or_of_another_source_is_another_file(folder, m
     from tractexp.doors import numba_cache
 
     def made(name, text):
-        exec(text, space := {})
-        kernel._keep(njit(space["f"]), name)(1.0)
+        module = types.ModuleType(f"made_{name}")
+        monkeypatch.setitem(sys.modules, module.__name__, module)
+        exec(text, vars(module))
+        kernel._keep(njit(module.f), name)(1.0)
         return len(list(folder.iterdir()))
 
     assert made("a", "def f(x):\n    return x") == 1

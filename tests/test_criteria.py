@@ -72,7 +72,8 @@ def wandering_within(c):
 def prior_of_skew(c):
     """How far clocks are believed to be off [s]."""
     skew = candidate(get("effect", "time_skew")())
-    catalogue = type("One", (), {"of_measurement": ("time_skew",), "__getitem__": lambda self, name: skew})()
+    known = {"of_measurement": ("time_skew",), "members": (), "__getitem__": lambda self, name: skew}
+    catalogue = type("One", (), known)()
     one = np.array([0.0])
     at = Coordinates(("skew",), one - 0.01, one + 0.01, catalogue, one, one, one, c.measurement_prior)
     return at.prior_deviation[0] * at.width("skew")

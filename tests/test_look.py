@@ -106,7 +106,7 @@ def test_a_file_without_events_or_loads_is_told_and_is_no_error(tmp_path):
     alone = tractexp.look(tmp_path / "volts.cfg")
     assert (len(alone.channels), len(alone.feeders)) == (3, 0)
     for made in (quiet, alone):
-        assert [p.name for p in made.write(tmp_path / "page")] == ["look.html", "look.json"]
+        assert [p.name for p in made.write(tmp_path / "page")] == ["look.json", "look.html"]
 
 
 def test_a_table_of_powers_is_looked_at_and_its_command_fits_it(resistive_dips, tmp_path):

@@ -249,7 +249,8 @@ def doctor(folder, *arguments, capsys):
     return code, " ".join(capsys.readouterr().out.split())
 
 
-def test_the_doctor_closes_stale_runs_sets_a_damaged_store_aside_and_makes_it_anew(tmp_path, uri, capsys):
+def test_the_doctor_closes_stale_runs_sets_a_damaged_store_aside_and_makes_it_anew(tmp_path, uri, capsys, monkeypatch):
+    monkeypatch.setattr(owner, "closed", [])  # of this process, whose other tests close runs, too
     keep(tmp_path / "outputs" / "job", run(), uri)
     sync(tmp_path)
     database = Path(uri.removeprefix("sqlite:///"))

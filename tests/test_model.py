@@ -355,7 +355,7 @@ def test_the_sites_of_a_model_are_a_table_of_what_stands_there(model):
     table = tractexp.sites(model)
     rows = {row[0]: dict(zip(table.columns, row, strict=True)) for row in table.rows}
     of_waves = {"bus_voltage", "bus_voltage_rate", "motor_current", "current", "zero_current"}
-    assert set(rows) == set(SITES) - of_waves
+    assert set(rows) == set(SITES) - of_waves - {"internal_voltage"}  # which this motor has as a state
     assert rows["coupling"]["expression"] == "C"
     assert rows["load_torque"]["could be edited by"] == "speed_dependent_torque"
     assert rows["P"]["could be edited by"] == "undervoltage_trip"

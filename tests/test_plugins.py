@@ -109,6 +109,7 @@ def test_a_motor_takes_what_its_sites_allow_and_says_why_not():
         "magnetic_saturation": "its equations have no C",
         "negative_sequence_braking": "its equations have no coupling ((X - X')/X, the rotor's share in the reactance)",
         "rotor_flux": "its rotor flux moves already",
+        "saturation_curve": "its equations have no C",
         "rotor_speed": "its speed moves already",
     }
 

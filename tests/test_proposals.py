@@ -181,16 +181,6 @@ def test_the_plugin_file_reproduces_the_fit(stepped, tmp_path, monkeypatch):
     assert any("proposed_size_P" in line or "k_P" in line for line in model.latex())
 
 
-def test_a_trip_of_the_static_load_alone_is_found():
-    made = events("static_trip", 4.0, seed=800002, count=4)
-    found = searched(made[:3], made[3:])
-    assert found.proposal is not None, found.why
-    assert found.proposal.term.name == TRIP
-    assert found.proposal.values["size"] == pytest.approx(-0.2, abs=0.03)
-    assert found.proposal.validate.closed > 0.9
-    assert not found.proposal.term.exogenous
-
-
 @pytest.mark.parametrize("seed", [800003, 800004])
 def test_nothing_is_proposed_where_nothing_is_missing(seed):
     made = events(seed=seed, count=3)

@@ -20,7 +20,7 @@ def test_the_average_is_the_integral_over_the_window(samples):
     rng = np.random.default_rng(0)
     y = rng.normal(size=60)
     curve = lambda x: np.interp(x, np.arange(60), y)  # noqa: E731
-    for at in (0, 7, 31, 59):
+    for at in (9, 31, 50):  # what it goes on with beyond its ends stands in test_orders
         low, high = at - samples / 2, at + samples / 2
         knots = np.arange(np.ceil(low), np.ceil(high))
         area, _ = quad(curve, low, high, points=knots, limit=200)

@@ -371,7 +371,7 @@ with processes(1) as executor:
         (["hydra.launcher.backend=threads"], "hydra.launcher.backend=threads is not one of processes, dask"),
         (["hydra.launcher.n_jobs=0"], "hydra.launcher.n_jobs=0 is out of range: it must be at least 1"),
         (["optimizer=issa,isa"], "optimizer=isa: there is no such choice; did you mean 'issa'?"),
-        (["seed=1,abc"], "seed: value 'abc' of type 'str' could not be converted to Integer"),
+        (["seed=1,abc"], "seed=abc is not a whole number"),
         (["optimizer.populatoin=9,10"], "'optimizer' has no key 'populatoin'; did you mean 'population'?"),
     ],
 )

@@ -24,7 +24,7 @@ from tractexp.record import in_waves
 from tractexp.report import overlay
 
 # Nothing but noise is left. Its level is estimated from quiet stretches; the later ones are louder by noise that the
-# machine's fluxes have summed up: on this record 8 % too loud, so that chi-squared is 0.84 where nothing is missing.
+# machine's fluxes have summed up, and edges of the voltage are left open: chi-squared is 0.77 where nothing is missing.
 QUIET, LOUD = 0.75, 1.15
 FEW = ("shunt_capacitor", "speed_dependent_torque")
 SEED, RATE, FAN = (4, 0), 3200.0, 0.9  # samples per second, share of the torque

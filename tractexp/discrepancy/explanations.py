@@ -87,9 +87,9 @@ def explanations(base: BaseFit, first: Disagreement, seed: int) -> Explanations:
 def with_families(base: BaseFit, tests: Disagreement, refits: dict[Names, Refit], seed: int) -> Disagreement:
     """The tests at a member of a family where these leave something and it does not; else these. Adds to `refits`.
 
-    Of waveforms none is tried: their criteria were not calibrated with members.
+    None is tried unless `family_p` asks for them, and none of waveforms: no criterion was calibrated with members.
     """
-    if base.bench.waves or (tests.adequate and not tests.asks_for_more):
+    if base.bench.waves or not base.bench.criteria.family_p or (tests.adequate and not tests.asks_for_more):
         return tests
     found = member_that_suffices(base, tests, refits, seed + FAMILIES)
     if found is None:

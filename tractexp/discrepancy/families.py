@@ -69,21 +69,25 @@ def pointed_to(bench: Bench, tests: Disagreement, refits: Mapping[Names, Refit])
 
 
 def starts(bench: Bench, member: Candidate, refits: Mapping[Names, Refit]) -> list[Start]:
-    """Starts of a member: from the textbook's fit, or the base model's, with every setting that it leaves open."""
-    at, effect = bench.coordinates, member.effect
+    """Starts of a member: from the textbook's fit, with every setting that it leaves open, and where the member does
+    not nest that, from the base model's with every setting, since the textbook's fit may have gone astray."""
+    at, effect, bare = bench.coordinates, member.effect, refits[()].unit
     textbook = refits.get((effect.family,)) if effect.as_textbook else None
-    ground, known = refits[()].unit.copy(), {}
+    begun: list[tuple[np.ndarray, dict[str, float]]] = []
     if textbook is not None:
-        known = {own: at.value(theirs, textbook.unit) for own, theirs in effect.as_textbook.items()}
         ground = textbook.unit.copy()
         ground[at.parameters([effect.family])] = at.null[at.parameters([effect.family])]
-    for size in member.sizes:
-        low, high = size.bounds
-        known.setdefault(size.name, float(np.clip(size.null + BEGUN * member.relevant(size), low, high)))
+        begun.append((ground, {own: at.value(theirs, textbook.unit) for own, theirs in effect.as_textbook.items()}))
+    if textbook is None or not effect.nests_textbook:
+        begun.append((bare, {}))
     made = []
-    for begin in (ground, refits[()].unit)[: 1 + (textbook is not None and not effect.nests_textbook)]:
+    for ground, told in begun:
+        known = dict(told)
+        for size in member.sizes:
+            low, high = size.bounds
+            known.setdefault(size.name, float(np.clip(size.null + BEGUN * member.relevant(size), low, high)))
         for setting in open_settings(member, tuple(known)):
-            point = begin.copy()
+            point = ground.copy()
             for p in effect.parameters:
                 point[at.column[p.name]] = at.to_unit(p.name, (setting | known).get(p.name, p.default))
             made.append(((member.name,), point))

@@ -15,7 +15,7 @@ from tractexp.noise.color import FEWEST, SMALLEST, Autoregression, white_noise
 from tractexp.noise.model import Noise
 
 HIGHEST = 48  # order of the autoregressions
-GAINED = 1.005  # times its least variance: a prediction as good is good enough
+GAINED = 1.001  # times its least variance: a prediction as good is good enough
 SHARES = (0.0, 0.25, 0.5, 1.0)  # of the voltage's deviations from its periodic course that are noise
 CLEARLY = 4.0  # of twice the log-likelihood, by which anything else must be better than all of them
 FLOORS = np.geomspace(1.0, 0.01, 28)  # of the current's own noise over all that is left in quiet

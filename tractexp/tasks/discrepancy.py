@@ -18,7 +18,7 @@ STAGES = ("before", "after")
 
 @plugin
 class Discrepancy(Task):
-    """Investigate the training events, judge what is found on the held-out ones, tell it in one page."""
+    """Investigate the training events and judge what is found on the held-out ones."""
 
     resumes = True
     reads = ("data", *LOAD, "model.bounds", "model.fixed", "model.substeps")

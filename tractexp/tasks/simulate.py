@@ -12,7 +12,7 @@ DIP = ("depth", "duration", "fall", "recovery", "start", "length", "rate", "U0",
 
 @plugin
 class Simulate(Task):
-    """Simulate recorded events (`data=...`) or, where a depth is given, the dip that `depth`, `duration` ... describe.
+    """Simulate recorded events, or the dip that `depth`, `duration` ... describe.
 
     The parameters are those of a `result.json`, with its model, or `values` for the model chosen; values also replace
     single parameters of the result.
