@@ -357,13 +357,13 @@ def test_the_sites_of_a_model_are_a_table_of_what_stands_there(model):
     of_waves = {"bus_voltage", "bus_voltage_rate", "motor_current", "current", "zero_current"}
     assert set(rows) == set(SITES) - of_waves - {"internal_voltage"}  # which this motor has as a state
     assert rows["coupling"]["expression"] == "C"
-    assert rows["load_torque"]["could be edited by"] == "speed_dependent_torque"
-    assert rows["P"]["could be edited by"] == "undervoltage_trip"
+    assert rows["load_torque"]["could be edited by"] == "speed_dependent_torque, torque_curve"
+    assert "undervoltage_trip" in rows["P"]["could be edited by"].split(", ")
     assert not any(row["edited by"] for row in rows.values())
     assert "phasor" in next(line for line in str(table).splitlines() if line.startswith("stator_impedance"))
     slowed = compose(model.motor, model.static, [get("effect", "speed_dependent_torque")()])
     (torque,) = (row for row in tractexp.sites(slowed).rows if row[0] == "load_torque")
-    assert torque[-2:] == ("speed_dependent_torque", "")
+    assert torque[-2:] == ("speed_dependent_torque", "torque_curve")
     alone = compose(get("model/motor", "none")(), get("model/static", "exponential")())
     assert [row[0] for row in tractexp.sites(alone).rows] == ["static_voltage", "P_static", "Q_static", "P", "Q"]
     with pytest.raises(UserError, match="sites\\(\\) takes a model"):

@@ -45,7 +45,7 @@ The commonest
   tractexp ui
       look at everything that was logged, in a browser on this computer only
   tractexp doctor
-      whether everything here is sound; heal what can be (tractexp sync: log what could not be logged)
+      whether everything here is sound; heal what can be (tractexp sync: log what was not logged)
 
 Tasks, chosen by task=NAME; {task} by default
 {tasks}

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @plugin
 class Identify(Task):
-    """Fit the free parameters to the training events, judge on all, show and log the outcome."""
+    """Fit free parameters to the training events, judge on all, show and log the outcome."""
 
     figures: bool | None = None  # write the page; null: in single runs, not in sweeps
     predictor: bool | None = None  # log the model for mlflow.pyfunc; null: in single runs, not in sweeps
