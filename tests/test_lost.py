@@ -9,6 +9,7 @@ import socket
 import sqlite3
 import subprocess
 import sys
+import tempfile
 import time
 import urllib.request
 from pathlib import Path
@@ -393,15 +394,13 @@ def free_port() -> int:
 
 
 @pytest.fixture(scope="module")
-def postgres(tmp_path_factory):
+def postgres():
     """A database server of our own on loopback, ended with the tests."""
     if POSTGRES is None:
         pytest.skip("PostgreSQL is not installed: apt-get install postgresql")
     pytest.importorskip("psycopg2", reason="psycopg2 is not installed: pip install psycopg2-binary")
-    folder, port = tmp_path_factory.mktemp("pg"), free_port()
+    folder, port = Path(tempfile.mkdtemp(prefix="tractexp-pg-")), free_port()  # where another user may go, too
     folder.chmod(0o777)
-    for above in folder.parents[:2]:
-        above.chmod(0o755)
     as_user = ["setpriv", "--reuid=postgres", "--regid=postgres", "--clear-groups"] if os.getuid() == 0 else []
     data = folder / "data"
     made = [POSTGRES / "initdb", "-D", data, "-A", "trust", "-U", "tester", "--no-sync"]
@@ -418,6 +417,7 @@ def postgres(tmp_path_factory):
     finally:
         server.send_signal(signal.SIGINT)
         server.wait(30)
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 @contextlib.contextmanager
