@@ -1,5 +1,6 @@
 """Fixtures that several test files share."""
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -35,3 +36,23 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"real recordings are not beside the repository ({folder.name} folder absent)")
     return folder
+
+
+@pytest.fixture(scope="session")
+def empty_store(tmp_path_factory) -> Path:
+    """One migrated database, copied by the tests that do not care how it came about."""
+    from tractexp import tracking
+
+    folder = tmp_path_factory.mktemp("store")
+    tracking.prepare(tracking.default_uri(folder))
+    return folder / "outputs" / "mlflow.db"
+
+
+@pytest.fixture
+def uri(tmp_path, empty_store) -> str:
+    """A store of its own under `tmp_path`."""
+    from tractexp import tracking
+
+    (tmp_path / "outputs").mkdir()
+    shutil.copy(empty_store, tmp_path / "outputs" / "mlflow.db")
+    return tracking.default_uri(tmp_path)

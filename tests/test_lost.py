@@ -28,20 +28,6 @@ VALUES = "T_prime: 0.05, X_prime: 0.2, C: 0.9, M: 0.01, T_m: 0.5, p_v: 1.5, q_v:
 SIMULATE = ("task=simulate", f"task.values={{{VALUES}}}", "task.depth=0.4", "task.rate=200", "hydra.run.dir=run")
 
 
-@pytest.fixture(scope="session")
-def empty_store(tmp_path_factory) -> Path:
-    folder = tmp_path_factory.mktemp("store")
-    tracking.prepare(tracking.default_uri(folder))
-    return folder / "outputs" / "mlflow.db"
-
-
-@pytest.fixture
-def uri(tmp_path, empty_store) -> str:
-    (tmp_path / "outputs").mkdir()
-    shutil.copy(empty_store, tmp_path / "outputs" / "mlflow.db")
-    return tracking.default_uri(tmp_path)
-
-
 def tractexp(*arguments, cwd, **more):
     command = [sys.executable, "-m", "tractexp", *arguments]
     return subprocess.run(command, cwd=cwd, capture_output=True, text=True, **more)

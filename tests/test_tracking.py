@@ -26,21 +26,6 @@ STEPS = np.arange(300)
 FITNESS = np.geomspace(1.0, 1e-5, 300)
 
 
-@pytest.fixture(scope="session")
-def empty_store(tmp_path_factory) -> Path:
-    """One migrated database, copied by the tests that do not care how it came about."""
-    folder = tmp_path_factory.mktemp("store")
-    tracking.prepare(tracking.default_uri(folder))
-    return folder / "outputs" / "mlflow.db"
-
-
-@pytest.fixture
-def uri(tmp_path, empty_store) -> str:
-    (tmp_path / "outputs").mkdir()
-    (tmp_path / "outputs" / "mlflow.db").write_bytes(empty_store.read_bytes())
-    return tracking.default_uri(tmp_path)
-
-
 def client(uri: str):
     from mlflow import MlflowClient
 

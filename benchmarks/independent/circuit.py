@@ -5,6 +5,7 @@ Per unit of the record's base, peaks; the voltage is given, so devices do not fe
 """
 
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -31,6 +32,16 @@ class Scene:
         """A space vector of 1 that is in phase with the voltage before the fault (n,)."""
         before = self.fault.before / abs(self.fault.before)
         return before * np.exp(2j * np.pi * self.fault.frequency * self.t)
+
+
+class Stateless:
+    """A device that remembers nothing."""
+
+    def settled(self, voltage: complex, frequency: float) -> tuple[Self, np.ndarray]:
+        return self, np.empty(0, dtype=complex)
+
+    def rates(self, x: list[complex], v: complex, zero: float) -> list[complex]:
+        return []
 
 
 @dataclass(frozen=True)
@@ -120,17 +131,11 @@ class Branch:
 
 
 @dataclass(frozen=True)
-class Shunt:
+class Shunt(Stateless):
     """Conductance and capacitive susceptance [pu]; no states."""
 
     G: float = 0.0
     B: float = 0.0
-
-    def settled(self, voltage: complex, frequency: float) -> tuple["Shunt", np.ndarray]:
-        return self, np.empty(0, dtype=complex)
-
-    def rates(self, x: list[complex], v: complex, zero: float) -> list[complex]:
-        return []
 
     def current(self, x: np.ndarray, at: Scene) -> np.ndarray:
         return self.G * at.v + self.B * at.slope / OMEGA
@@ -208,7 +213,7 @@ class Held:
     most: float = 2.0  # times the current before
 
     def settled(self, voltage: complex, frequency: float) -> tuple["Held", np.ndarray]:
-        return replace(self), np.array([complex(voltage)])
+        return self, np.array([complex(voltage)])
 
     def rates(self, x: list[complex], v: complex, zero: float) -> list[complex]:
         return [(v - x[0]) / self.lag + 1j * OMEGA * x[0]]
@@ -220,16 +225,10 @@ class Held:
 
 
 @dataclass(frozen=True)
-class Arc:
+class Arc(Stateless):
     """A conductance [pu] to earth in each phase, there while the fault is."""
 
     G: float
-
-    def settled(self, voltage: complex, frequency: float) -> tuple["Arc", np.ndarray]:
-        return self, np.empty(0, dtype=complex)
-
-    def rates(self, x: list[complex], v: complex, zero: float) -> list[complex]:
-        return []
 
     def _burning(self, at: Scene) -> np.ndarray:
         return self.G * ((at.t >= at.fault.start) & (at.t < at.fault.end))
@@ -242,17 +241,11 @@ class Arc:
 
 
 @dataclass(frozen=True)
-class Rectifier:
+class Rectifier(Stateless):
     """Currents of fifth and seventh order [pu] that go on through the fault."""
 
     fifth: complex
     seventh: complex
-
-    def settled(self, voltage: complex, frequency: float) -> tuple["Rectifier", np.ndarray]:
-        return self, np.empty(0, dtype=complex)
-
-    def rates(self, x: list[complex], v: complex, zero: float) -> list[complex]:
-        return []
 
     def current(self, x: np.ndarray, at: Scene) -> np.ndarray:
         return self.fifth * at.turn.conj() ** 5 + self.seventh * at.turn**7
@@ -292,17 +285,11 @@ class Switched:
 
 
 @dataclass(frozen=True)
-class Breaker:
+class Breaker(Stateless):
     """Takes away a share of each phase's current of the whole load, as a relay says."""
 
     shares: tuple[float, float, float]
     relay: Relay
-
-    def settled(self, voltage: complex, frequency: float) -> tuple["Breaker", np.ndarray]:
-        return self, np.empty(0, dtype=complex)
-
-    def rates(self, x: list[complex], v: complex, zero: float) -> list[complex]:
-        return []
 
     def passed(self, current: np.ndarray, zero: np.ndarray, at: Scene) -> tuple[np.ndarray, np.ndarray]:
         """What is left of a space vector and a zero sequence (n,)."""

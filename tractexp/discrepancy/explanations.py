@@ -13,7 +13,7 @@ import numpy as np
 from tractexp.discrepancy.base_fit import BaseFit
 from tractexp.discrepancy.disagreement import Disagreement, examined
 from tractexp.discrepancy.families import member_that_suffices
-from tractexp.discrepancy.fitting import Refit, Start, best_of, no_worse_than_subsets, refit, rough_refit
+from tractexp.discrepancy.fitting import CLOSE, Refit, Start, best_of, no_worse_than_subsets, refit, rough_refit
 from tractexp.discrepancy.projection import Score
 from tractexp.discrepancy.tangent import Column, tangent
 from tractexp.identification.valleys import DISTINCT
@@ -22,7 +22,6 @@ from tractexp.noise import Noise
 MOST_EFFECTS = 3
 SHORTLIST = {1: 10, 2: 8, 3: 6}  # sets of each size that are refitted
 COMBINED = 14  # effects whose sets are ranked exhaustively
-CLOSE = 12.0  # of the deviance: a rough refit this near the best is made exact
 PATCHED = 4  # sets of one size that are tried before a further effect is added
 RANKS = 2  # settings of a candidate to start from
 FAMILIES = 50  # added to the seed of the draws at members of families

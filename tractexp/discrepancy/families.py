@@ -16,11 +16,10 @@ from tractexp.discrepancy.base_fit import BaseFit
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.catalogue import Candidate
 from tractexp.discrepancy.disagreement import Disagreement, examined
-from tractexp.discrepancy.fitting import Refit, Start, refit, rough_refit
+from tractexp.discrepancy.fitting import CLOSE, Refit, Start, refit, rough_refit
 
 NEAREST = 5  # textbook effects whose families are tried
 EXAMINED = 3  # members whose remainder is tested
-CLOSE = 12.0  # of the deviance: a rough refit this near the best is made exact
 BEGUN = 0.5  # smallest relevant sizes at which a size without a textbook value starts
 POINTS = {"a step or a pulse": ("trip", "drift"), "an oscillation": ("oscillation",)}  # kinds that a test speaks for
 

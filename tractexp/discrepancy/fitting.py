@@ -12,6 +12,7 @@ from tractexp.noise import Noise
 
 ROUGH, EXACT = (12, 0.3), (40, 0.02)  # iterations and tolerance of the deviance
 FIRST = 4  # iterations after which the worse half of a set's starts is given up
+CLOSE = 12.0  # of the deviance: a rough refit this near the best is made exact
 HOPELESS, SLOW = 60.0, 0.3  # of the deviance, and of what it spans: a set this far behind then is not refined
 NESTED = 0.1  # of the deviance: a set that is worse than its own subset by more has not converged
 
