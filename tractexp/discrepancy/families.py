@@ -16,7 +16,8 @@ from tractexp.discrepancy.base_fit import BaseFit
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.catalogue import Candidate
 from tractexp.discrepancy.disagreement import Disagreement, examined
-from tractexp.discrepancy.fitting import CLOSE, Refit, Start, refit, rough_refit
+from tractexp.discrepancy.fitting import Refit, Start, best_of, wide_refit
+from tractexp.discrepancy.tangent import WALL
 
 NEAREST = 5  # textbook effects whose families are tried
 EXAMINED = 3  # members whose remainder is tested
@@ -39,9 +40,7 @@ def member_that_suffices(
         return None
     bench.effort.say(f"trying {len(wanted)} other places and laws of what comes near")
     bench.kernels.family.compile_members([m.name for m in wanted], bench.effort.say)
-    begun = [rough_refit(bench, noise, starts(bench, member, refits))[0] for member in wanted]
-    least = min(f.cost for f in begun)
-    fits = refit(bench, noise, [(f.names, f.unit) for f in begun if f.cost < least + CLOSE])
+    fits = best_of(f for member in wanted for f in wide_refit(bench, noise, starts(bench, member, refits)))
     for k, fit in enumerate(fits[:EXAMINED]):
         if not worth(fit, tests.fit, bench.criteria.family_p) or not bench.kernels.family.joins(fit.names[0]):
             continue
@@ -78,7 +77,7 @@ def starts(bench: Bench, member: Candidate, refits: Mapping[Names, Refit]) -> li
         ground[at.parameters([effect.family])] = at.null[at.parameters([effect.family])]
         begun.append((ground, {own: at.value(theirs, textbook.unit) for own, theirs in effect.as_textbook.items()}))
     if textbook is None or not effect.nests_textbook:
-        begun.append((bare, {}))
+        begun += [(bare, {}), (off_walls(bench, bare), {})]
     made = []
     for ground, told in begun:
         known = dict(told)
@@ -91,6 +90,14 @@ def starts(bench: Bench, member: Candidate, refits: Mapping[Names, Refit]) -> li
                 point[at.column[p.name]] = at.to_unit(p.name, (setting | known).get(p.name, p.default))
             made.append(((member.name,), point))
     return made
+
+
+def off_walls(bench: Bench, unit: np.ndarray) -> np.ndarray:
+    """Coordinates (D,) with what rests on a bound of the base model back at its default: there it has no slope."""
+    moved, base = unit.copy(), bench.coordinates.base
+    resting = base[(unit[base] <= WALL) | (unit[base] >= 1 - WALL)]
+    moved[resting] = bench.coordinates.null[resting]
+    return moved
 
 
 def open_settings(member: Candidate, known: Sequence[str]) -> list[dict[str, float]]:

@@ -14,6 +14,9 @@ ROUGH, EXACT = (12, 0.3), (40, 0.02)  # iterations and tolerance of the deviance
 FIRST = 4  # iterations after which the worse half of a set's starts is given up
 CLOSE = 12.0  # of the deviance: a rough refit this near the best is made exact
 HOPELESS, SLOW = 60.0, 0.3  # of the deviance, and of what it spans: a set this far behind then is not refined
+REACHES = 2.0 ** -np.arange(1, 10)  # of a parameter's range: how far one without a slope is moved
+MOVES, WORTH = 8, 1.0  # of such parameters in a row, and the deviance that one must gain
+TURNS, KEPT = 3, 6  # of moving and descending in turn, and the starts that take part
 NESTED = 0.1  # of the deviance: a set that is worse than its own subset by more has not converged
 
 Start = tuple[Sequence[str], np.ndarray]  # names of effects, and coordinates (D,) to start from
@@ -60,7 +63,45 @@ def rough_refit(bench: Bench, noise: Noise, wanted: Sequence[Start]) -> list[Ref
     for names in promising:
         starts = sorted((r for r in begun if r.names == names), key=lambda r: r.deviance)
         again += [(names, r.unit) for r in starts[: -(-len(starts) // 2)]]
+        if len(names) == 1:
+            again.append((names, moved_across(bench, noise, starts[0])))
     return best_of([*best, *_descended(bench, noise, again, None, (ROUGH[0] - FIRST, ROUGH[1]))])
+
+
+def wide_refit(bench: Bench, noise: Noise, wanted: Sequence[Start]) -> list[Refit]:
+    """As `refit`, for effects whose thresholds and times have hardly a slope: moved far and descended in turn.
+
+    A descent walks a relay's time by a sample a step, and a wrong time bends what else is fitted.
+    """
+    fits = sorted(_descended(bench, noise, wanted, None, (FIRST, ROUGH[1])), key=lambda f: f.cost)[:KEPT]
+    for _ in range(TURNS):
+        moved = [(f.names, moved_across(bench, noise, f)) for f in fits]
+        better = sorted(_descended(bench, noise, moved, None, ROUGH), key=lambda f: f.cost)
+        if better[0].deviance > fits[0].deviance - WORTH:
+            break
+        fits = better
+    return refit(bench, noise, [(f.names, f.unit) for f in fits if f.cost < fits[0].cost + CLOSE])
+
+
+def moved_across(bench: Bench, noise: Noise, fit: Refit) -> np.ndarray:
+    """Coordinates (D,) with what an effect has beside its sizes moved, one parameter at a time and by any reach."""
+    at = bench.coordinates
+    sizes = at.sizes(fit.names)
+    columns = [k for k in at.parameters(fit.names) if k not in sizes]
+    if not columns:
+        return fit.unit
+    prior = _with_prior(bench, [fit.names], None)[1]
+    unit, deviance = fit.unit, fit.deviance
+    for _ in range(MOVES):
+        trials = np.repeat(unit[None], 2 * len(columns) * len(REACHES), axis=0)
+        for k, mine in zip(columns, np.split(trials, len(columns)), strict=True):
+            mine[:, k] = np.clip(mine[:, k] + np.r_[REACHES, -REACHES], 0.0, 1.0)
+        rows = bench.rows(trials, noise, prior, [fit.names] * len(trials))
+        found = np.nan_to_num(np.einsum("nr,nr->n", rows, rows), nan=np.inf)
+        if not found.min() < deviance - WORTH:
+            break
+        unit, deviance = trials[found.argmin()], float(found.min())
+    return unit
 
 
 def no_worse_than_subsets(
@@ -85,8 +126,7 @@ def _descended(
     """The end of a descent from each start; of one that was made before, as by a run that was stopped, as it was."""
     spent = 0
     at = bench.coordinates
-    measured = at.parameters(at.catalogue.of_measurement if faults is None else tuple(faults))
-    prior = [*measured, *at.shapes(sorted({name for names, _ in wanted for name in names}))]
+    measured, prior = _with_prior(bench, [names for names, _ in wanted], faults)
     always = [*at.base, *at.before, *measured]
     columns = [[*always, *(k for k in at.parameters(names) if k not in always)] for names, _ in wanted]
     table = np.full((len(wanted), max(map(len, columns))), at.dimension)
@@ -114,6 +154,15 @@ def _descended(
         Refit(tuple(sorted(names)), starts[lane, :-1].copy(), float(deviance[lane]), len(at.parameters(names)))
         for lane, (names, _) in enumerate(wanted)
     ]
+
+
+def _with_prior(
+    bench: Bench, sets: Iterable[Sequence[str]], faults: Sequence[str] | None
+) -> tuple[list[int], list[int]]:
+    """The columns of the faults of the measurement that are free, and all that have a prior beside these sets."""
+    at = bench.coordinates
+    measured = at.parameters(at.catalogue.of_measurement if faults is None else tuple(faults))
+    return measured, [*measured, *at.shapes(sorted({name for names in sets for name in names}))]
 
 
 def settled(bench: Bench, unit: np.ndarray, noise: Noise, names: Sequence[str]) -> np.ndarray:
