@@ -16,8 +16,7 @@ from tractexp.discrepancy.base_fit import BaseFit
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.catalogue import Candidate
 from tractexp.discrepancy.disagreement import Disagreement, examined
-from tractexp.discrepancy.fitting import Refit, Start, best_of, wide_refit
-from tractexp.discrepancy.tangent import WALL
+from tractexp.discrepancy.fitting import Refit, Start, best_of, off_walls, wide_refit
 
 NEAREST = 5  # textbook effects whose families are tried
 EXAMINED = 3  # members whose remainder is tested
@@ -90,14 +89,6 @@ def starts(bench: Bench, member: Candidate, refits: Mapping[Names, Refit]) -> li
                 point[at.column[p.name]] = at.to_unit(p.name, (setting | known).get(p.name, p.default))
             made.append(((member.name,), point))
     return made
-
-
-def off_walls(bench: Bench, unit: np.ndarray) -> np.ndarray:
-    """Coordinates (D,) with what rests on a bound of the base model back at its default: there it has no slope."""
-    moved, base = unit.copy(), bench.coordinates.base
-    resting = base[(unit[base] <= WALL) | (unit[base] >= 1 - WALL)]
-    moved[resting] = bench.coordinates.null[resting]
-    return moved
 
 
 def open_settings(member: Candidate, known: Sequence[str]) -> list[dict[str, float]]:

@@ -17,6 +17,7 @@ HOPELESS, SLOW = 60.0, 0.3  # of the deviance, and of what it spans: a set this 
 REACHES = 2.0 ** -np.arange(1, 10)  # of a parameter's range: how far one without a slope is moved
 MOVES, WORTH = 8, 1.0  # of such parameters in a row, and the deviance that one must gain
 TURNS, KEPT = 3, 6  # of moving and descending in turn, and the starts that take part
+WALL = 1e-3  # of a coordinate's range: how near a bound a parameter rests on it
 NESTED = 0.1  # of the deviance: a set that is worse than its own subset by more has not converged
 
 Start = tuple[Sequence[str], np.ndarray]  # names of effects, and coordinates (D,) to start from
@@ -63,34 +64,34 @@ def rough_refit(bench: Bench, noise: Noise, wanted: Sequence[Start]) -> list[Ref
     for names in promising:
         starts = sorted((r for r in begun if r.names == names), key=lambda r: r.deviance)
         again += [(names, r.unit) for r in starts[: -(-len(starts) // 2)]]
-        if len(names) == 1:
-            again.append((names, moved_across(bench, noise, starts[0])))
     return best_of([*best, *_descended(bench, noise, again, None, (ROUGH[0] - FIRST, ROUGH[1]))])
 
 
-def wide_refit(bench: Bench, noise: Noise, wanted: Sequence[Start]) -> list[Refit]:
-    """As `refit`, for effects whose thresholds and times have hardly a slope: moved far and descended in turn.
+def wide_refit(
+    bench: Bench, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None = None
+) -> list[Refit]:  # fmt: skip
+    """As `refit`, for one set whose thresholds and times have hardly a slope: moved far and descended in turn.
 
     A descent walks a relay's time by a sample a step, and a wrong time bends what else is fitted.
     """
-    fits = sorted(_descended(bench, noise, wanted, None, (FIRST, ROUGH[1])), key=lambda f: f.cost)[:KEPT]
+    fits = sorted(_descended(bench, noise, wanted, faults, (FIRST, ROUGH[1])), key=lambda f: f.cost)[:KEPT]
     for _ in range(TURNS):
-        moved = [(f.names, moved_across(bench, noise, f)) for f in fits]
-        better = sorted(_descended(bench, noise, moved, None, ROUGH), key=lambda f: f.cost)
+        moved = [(f.names, moved_across(bench, noise, f, faults)) for f in fits]
+        better = sorted(_descended(bench, noise, moved, faults, ROUGH), key=lambda f: f.cost)
         if better[0].deviance > fits[0].deviance - WORTH:
             break
         fits = better
-    return refit(bench, noise, [(f.names, f.unit) for f in fits if f.cost < fits[0].cost + CLOSE])
+    return refit(bench, noise, [(f.names, f.unit) for f in fits if f.cost < fits[0].cost + CLOSE], faults)
 
 
-def moved_across(bench: Bench, noise: Noise, fit: Refit) -> np.ndarray:
+def moved_across(bench: Bench, noise: Noise, fit: Refit, faults: Sequence[str] | None = None) -> np.ndarray:
     """Coordinates (D,) with what an effect has beside its sizes moved, one parameter at a time and by any reach."""
     at = bench.coordinates
     sizes = at.sizes(fit.names)
     columns = [k for k in at.parameters(fit.names) if k not in sizes]
     if not columns:
         return fit.unit
-    prior = _with_prior(bench, [fit.names], None)[1]
+    prior = _with_prior(bench, [fit.names], faults)[1]
     unit, deviance = fit.unit, fit.deviance
     for _ in range(MOVES):
         trials = np.repeat(unit[None], 2 * len(columns) * len(REACHES), axis=0)
@@ -163,6 +164,14 @@ def _with_prior(
     at = bench.coordinates
     measured = at.parameters(at.catalogue.of_measurement if faults is None else tuple(faults))
     return measured, [*measured, *at.shapes(sorted({name for names in sets for name in names}))]
+
+
+def off_walls(bench: Bench, unit: np.ndarray) -> np.ndarray:
+    """Coordinates (D,) with what rests on a bound of the base model back at its default: there it has no slope."""
+    moved, base = unit.copy(), bench.coordinates.base
+    resting = base[(unit[base] <= WALL) | (unit[base] >= 1 - WALL)]
+    moved[resting] = bench.coordinates.null[resting]
+    return moved
 
 
 def settled(bench: Bench, unit: np.ndarray, noise: Noise, names: Sequence[str]) -> np.ndarray:

@@ -10,11 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.bench import Bench
-from tractexp.discrepancy.fitting import Refit, Start, best_of, refit, rough_refit, wide_refit
+from tractexp.discrepancy.fitting import WALL, Refit, Start, best_of, refit, rough_refit, wide_refit
 from tractexp.discrepancy.proposal.bed import place, values_of, with_terms
 from tractexp.discrepancy.proposal.library import ANSWER, Shape, Term, term, terms
 from tractexp.discrepancy.proposal.screen import Ground, Scored, Screened, linearised, scores
-from tractexp.discrepancy.tangent import WALL
 from tractexp.noise import Noise
 
 MOST, ANSWERS = 30, 15  # terms refitted, and how many at least are functions of voltage and states
