@@ -24,7 +24,7 @@ from tractexp.discrepancy.fitting import (
     off_walls,
     refit,
     rough_refit,
-    wide_refit,
+    wide_refits,
 )  # fmt: skip
 from tractexp.discrepancy.projection import Score
 from tractexp.discrepancy.tangent import Column, tangent
@@ -35,7 +35,7 @@ MOST_EFFECTS = 3
 SHORTLIST = {1: 10, 2: 8, 3: 6}  # sets of each size that are refitted
 COMBINED = 14  # effects whose sets are ranked exhaustively
 PATCHED = 4  # sets of one size that are tried before a further effect is added
-WIDELY = 3  # of the nearest single effects that are searched from all their settings
+WIDELY = 3  # single effects with thresholds or times that are searched to the end
 RANKS = 2  # settings of a candidate to start from
 FAMILIES = 50  # added to the seed of the draws at members of families
 LEAST_START = 0.1  # smallest relevant sizes that a start moves at least
@@ -127,16 +127,14 @@ def searched(steps: Sequence[Disagreement], refits: Refits, size: int, say: Call
 
 
 def searched_widely(base: BaseFit, first: Disagreement, refits: Refits) -> tuple[Disagreement, list[Refit]]:
-    """The nearest single effects that have thresholds or times, searched from all their settings, and `first`."""
-    bench, bare, better = base.bench, refits[()].unit, []
-    for fit in [f for f in best_of(refits.values()) if len(f.names) == 1][:WIDELY]:
-        if len(bench.catalogue[fit.names[0]].settings) == 1:
-            continue
-        grounds = bare, off_walls(bench, bare)
-        begun = [(fit.names, fit.unit), *(start for unit in grounds for start in _every_setting(bench, fit, unit))]
-        found = wide_refit(bench, first.noise, begun)[0]
-        better += [found] * (found.deviance < fit.deviance - NESTED)
-    return first, better
+    """Single effects that have thresholds or times, searched from all their settings, and `first`."""
+    bench, bare = base.bench, refits[()].unit
+    singles = {f.names: f for f in best_of(refits.values()) if len(f.names) == 1}
+    unlike = [f for f in singles.values() if len(bench.catalogue[f.names[0]].settings) > 1]
+    grounds = bare, off_walls(bench, bare)
+    wanted = [[(f.names, f.unit), *(s for unit in grounds for s in _every_setting(bench, f, unit))] for f in unlike]
+    found = wide_refits(bench, first.noise, wanted, WIDELY)
+    return first, [f for f in found if f.deviance < singles[f.names].deviance - NESTED]
 
 
 def _every_setting(bench: Bench, fit: Refit, unit: np.ndarray) -> list[Start]:

@@ -1,9 +1,7 @@
 """Members of families: the kind of a textbook effect at another place, or its place with another law.
 
-They are tried only where the best single textbook effect leaves something, and only around what it points to: the
-families of the nearest effects, of the faults of the measurement that stand out, and of the kinds that the loudest test
-of what is left speaks for. A member must explain more than the textbook effect beyond what its further parameters cost,
-and leave nothing.
+They are tried only where the best single textbook effect leaves something. A member must explain more than that beyond
+what its further parameters cost, and leave nothing.
 """
 
 import itertools
@@ -16,12 +14,11 @@ from tractexp.discrepancy.base_fit import BaseFit
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.catalogue import Candidate
 from tractexp.discrepancy.disagreement import Disagreement, examined
-from tractexp.discrepancy.fitting import Refit, Start, best_of, off_walls, wide_refit
+from tractexp.discrepancy.fitting import Refit, Start, off_walls, wide_refits
 
-NEAREST = 5  # textbook effects whose families are tried
+NEAREST = 4  # members that are searched to the end
 EXAMINED = 3  # members whose remainder is tested
 BEGUN = 0.5  # smallest relevant sizes at which a size without a textbook value starts
-POINTS = {"a step or a pulse": ("trip", "drift"), "an oscillation": ("oscillation",)}  # kinds that a test speaks for
 
 Names = tuple[str, ...]
 
@@ -34,12 +31,12 @@ def member_that_suffices(
     With the fits of the members that were compared; None where no member suffices.
     """
     bench, noise = base.bench, tests.noise
-    wanted = pointed_to(bench, tests, refits)
+    wanted = bench.catalogue.members
     if not wanted:
         return None
-    bench.effort.say(f"trying {len(wanted)} other places and laws of what comes near")
+    bench.effort.say(f"trying {len(wanted)} other places and laws")
     bench.kernels.family.compile_members([m.name for m in wanted], bench.effort.say)
-    fits = best_of(f for member in wanted for f in wide_refit(bench, noise, starts(bench, member, refits)))
+    fits = wide_refits(bench, noise, [starts(bench, member, refits) for member in wanted], NEAREST)
     for k, fit in enumerate(fits[:EXAMINED]):
         if not worth(fit, tests.fit, bench.criteria.family_p) or not bench.kernels.family.joins(fit.names[0]):
             continue
@@ -55,14 +52,6 @@ def worth(member: Refit, textbook: Refit, p: float) -> bool:
     further = max(member.parameters - textbook.parameters, 1)
     gained = textbook.deviance - member.deviance
     return gained > 0 and float(chdtrc(further, gained)) < p
-
-
-def pointed_to(bench: Bench, tests: Disagreement, refits: Mapping[Names, Refit]) -> list[Candidate]:
-    """The members of the families around what the search selected and what its remainder speaks for."""
-    singles = sorted((f for f in refits.values() if len(f.names) == 1), key=lambda f: f.cost)
-    heads = {f.names[0] for f in singles[:NEAREST]} | {*tests.fit.names, *tests.faults}
-    kinds = POINTS.get(tests.loudest, ())
-    return [m for m in bench.catalogue.members if m.effect.family in heads or m.effect.kind in kinds]
 
 
 def starts(bench: Bench, member: Candidate, refits: Mapping[Names, Refit]) -> list[Start]:

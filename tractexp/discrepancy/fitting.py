@@ -84,6 +84,15 @@ def wide_refit(
     return refit(bench, noise, [(f.names, f.unit) for f in fits if f.cost < fits[0].cost + CLOSE], faults)
 
 
+def wide_refits(bench: Bench, noise: Noise, wanted: Iterable[Sequence[Start]], most: int) -> list[Refit]:
+    """`wide_refit` of those `most` sets, each with starts of its own, that come nearest in a few iterations."""
+    begun = [
+        sorted(_descended(bench, noise, starts, None, (FIRST, ROUGH[1])), key=lambda f: f.cost) for starts in wanted
+    ]
+    begun = sorted((fits[:KEPT] for fits in begun), key=lambda fits: fits[0].cost)[:most]
+    return best_of(f for fits in begun for f in wide_refit(bench, noise, [(g.names, g.unit) for g in fits]))
+
+
 def moved_across(bench: Bench, noise: Noise, fit: Refit, faults: Sequence[str] | None = None) -> np.ndarray:
     """Coordinates (D,) with what an effect has beside its sizes moved, one parameter at a time and by any reach."""
     at = bench.coordinates
