@@ -45,7 +45,8 @@ def _factor(weights: bytes, n: int, free: bytes, error: float) -> np.ndarray:
 
     w, bends = np.frombuffer(weights), np.where(np.frombuffer(free, bool), BENT, CALM) ** -2.0
     wide, most = n + len(w) - 1, max(len(w) - 1, 2)
-    across, second = list[Any](range(len(w))), list[Any](range(3))  # SciPy's type of offsets is inferred from one
+    across: Any = list(range(len(w)))  # SciPy's type of it is inferred from its default, one diagonal
+    second: Any = [0, 1, 2]
     box = diags_array(list(w), offsets=across, shape=(n, wide))
     bend = diags_array([1.0, -2.0, 1.0], offsets=second, shape=(wide - 2, wide))
     normal = box.T @ box / error**2 + bend.T @ diags_array(bends) @ bend
