@@ -1,7 +1,8 @@
 """Undervoltage trip of the load in two stages, and its reconnection."""
 
 from tractexp.extend import Effect, Parameter, plugin, sites
-from tractexp_plugins.effects._relay import opened
+
+from ._relay import opened
 
 SOURCE = "WECC composite load model (Ftr1, Vtr1, Ttr1, Ftr2, Vtr2, Ttr2); NERC 2016, Dynamic Load Modeling, app. A"
 
