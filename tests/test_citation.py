@@ -1,4 +1,4 @@
-"""CITATION.cff is what the Citation File Format 1.2.0 asks for, and says of the project what the project says itself."""
+"""CITATION.cff is what the Citation File Format 1.2.0 asks for, and says what the project says of itself."""
 
 import re
 import tomllib
