@@ -8,8 +8,8 @@ from tractexp import PUBLIC, extend, files
 
 TITLE = """# Public calls
 
-What `import tractexp` offers; [From Python](../python.md) shows them at work. Where a call takes a `model`, an `optimizer`
-or records, it takes what the command line takes.
+What `import tractexp` offers; [From Python](../python.md) shows them at work. Where a call takes a `model`, an
+`optimizer` or records, it takes what the command line takes.
 """
 EXTEND = """
 # What a plugin imports
