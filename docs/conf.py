@@ -22,6 +22,7 @@ myst_heading_anchors = 4  # links to headings, as other viewers of Markdown make
 html_math_renderer = "mathml"
 smartquotes = False  # X' is a reactance
 
+highlight_language = "none"  # what has no language is a terminal's answer
 default_role = "code"  # single backticks of docstrings
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
