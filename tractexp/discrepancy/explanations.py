@@ -129,7 +129,7 @@ def searched(steps: Sequence[Disagreement], refits: Refits, size: int, say: Call
 def searched_widely(base: BaseFit, first: Disagreement, refits: Refits) -> tuple[Disagreement, list[Refit]]:
     """Single effects that have thresholds or times, searched from all their settings, and `first`."""
     bench, bare = base.bench, refits[()].unit
-    singles = {f.names: f for f in best_of(refits.values()) if len(f.names) == 1}
+    singles: Refits = {f.names: f for f in best_of(refits.values()) if len(f.names) == 1}
     unlike = [f for f in singles.values() if len(bench.catalogue[f.names[0]].settings) > 1]
     grounds = bare, off_walls(bench, bare)
     wanted = [[(f.names, f.unit), *(s for unit in grounds for s in _every_setting(bench, f, unit))] for f in unlike]
