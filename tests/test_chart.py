@@ -138,6 +138,9 @@ def test_a_sampled_line_of_one_value_or_none_is_drawn():
     for y in (np.full(9, 3.0), np.full(9, np.nan)):
         (trace,) = Chart("t", ["y"]).samples("y", 0.0, 1.0, y, BLUE).plain()["data"]
         json.dumps(trace, allow_nan=False)
+        held = np.frombuffer(base64.b64decode(trace["samples"]["bdata"]), "<i2").astype(float)
+        held[held == -32768] = np.nan
+        np.testing.assert_allclose(trace["samples"]["offset"] + trace["samples"]["scale"] * held, y)
 
 
 def test_a_shade_may_have_a_word_at_its_top():

@@ -96,6 +96,14 @@ def test_a_filter_takes_a_part_of_the_runs(filled):
     assert find(uri, "tags.seed = '99'") == []
 
 
+def test_more_runs_than_a_page_holds_come_all_and_oldest_first(filled, monkeypatch):
+    _, uri, _, runs = filled
+    whole = [run.run_id for run in find(uri, "tags.data = 'tibet_50pct'", curves=())]
+    monkeypatch.setattr("tractexp.tracking.find.PAGE", 3)
+    assert [run.run_id for run in find(uri, "tags.data = 'tibet_50pct'", curves=())] == whole
+    assert len(set(whole)) == len(runs) > 2 * 3
+
+
 def test_the_command_compares_what_a_filter_finds_and_logs_the_page(filled):
     folder, uri, _, _ = filled
     done = tractexp("task.filter=\"tags.data = 'tibet_50pct'\"", "hydra.run.dir=out", cwd=folder)

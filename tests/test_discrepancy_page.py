@@ -205,10 +205,11 @@ def test_an_unexplained_verdict_does_not_contradict_itself(unexplained, tmp_path
     assert "catalogue" not in reason
     assert "less than one in a million" in reason
     assert not re.search(r"e-\d\d", reason)
-    if (near := unexplained.verdict.nearest) is not None:
-        assert re.search(rf"the nearest, explains? {near.fitted:.0%} of what exceeds the noise", reason)
-        told = content(unexplained)["nearest"]["parameters"]
-        assert {"value", "standard_error", "interval"} == next(iter(told.values())).keys()
+    near = unexplained.verdict.nearest
+    assert near is not None
+    assert re.search(rf"the nearest, explains? {near.fitted:.0%} of what exceeds the noise", reason)
+    told = content(unexplained)["nearest"]["parameters"]
+    assert {"value", "standard_error", "interval"} == next(iter(told.values())).keys()
     words, _ = page(unexplained, tmp_path)
     assert not re.search(r"\d\.\d+e-\d\d\d", words)
 

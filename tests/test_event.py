@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tractexp.errors import UserError
 from tractexp.record import Record, describe, detect, find_dips
-from tractexp.record.event import noise
+from tractexp.record.event import find_dips, noise, sample_noise
 
 
 def dip(step=1e-3, length=1.0, start=0.3, duration=0.15, depth=0.5, sigma=0.002, slow=0.0, seed=0):
@@ -49,6 +49,20 @@ def test_noise_ignores_a_linear_trend_and_gaps():
     x = np.column_stack([np.ones(990), t[np.isfinite(values)]])
     rest = np.linalg.lstsq(x, values[np.isfinite(values)], rcond=None)[1][0]
     assert noise(t, values) == pytest.approx(np.sqrt(rest / 988), rel=1e-9)
+
+
+def test_noise_from_sample_to_sample_is_the_standard_deviation_whatever_is_slow():
+    t = np.arange(40000) / 1000
+    values = np.random.default_rng(2).normal(scale=0.003, size=len(t)) + 0.05 * np.sin(t)
+    assert sample_noise(values) == pytest.approx(0.003, rel=0.02)
+
+
+def test_a_dip_begins_where_the_voltage_leaves_a_tenth_of_the_margin():
+    """3 % make it a dip; it began where 0.3 % were missing."""
+    U = np.ones(1000)
+    U[300:400] = np.maximum(1 - 0.00055 * np.arange(1, 101), 0.9)
+    U[400:500] = 0.9
+    assert find_dips(np.arange(1000) / 1000, U) == [(305, 500)]
 
 
 def test_recorded_frequency_gives_f0():

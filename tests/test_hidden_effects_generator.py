@@ -2,7 +2,6 @@
 
 import ast
 import json
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -570,12 +569,3 @@ def test_what_makes_no_sense_is_refused(settings, message):
 def test_impossible_noise_is_refused(settings):
     with pytest.raises(ValueError, match="noise"):
         Noise(**settings)
-
-
-def test_what_a_record_costs(capsys):
-    began = time.process_time()
-    made = [scene(Case(name), 1) for name in (None, "undervoltage_trip", "feeder_impedance")]
-    for one in made:
-        one.records()
-    with capsys.disabled():
-        print(f" [{(time.process_time() - began) / 3:.3f} s of CPU a record] ", end="")

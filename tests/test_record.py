@@ -30,7 +30,8 @@ def test_a_good_record_passes_and_is_returned():
 
 
 def test_gaps_in_P_and_Q_are_allowed():
-    record(P=spoiled(np.full(N, 0.8), 5, np.nan), Q=spoiled(np.full(N, 0.4), 7, np.nan)).check()
+    gappy = record(P=spoiled(np.full(N, 0.8), 5, np.nan), Q=spoiled(np.full(N, 0.4), 7, np.nan))
+    assert gappy.check() is gappy
 
 
 @pytest.mark.parametrize(
