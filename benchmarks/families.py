@@ -28,7 +28,6 @@ from hidden_effects.laws import FAMILY  # noqa: E402
 ROWS, DOCS = Path(__file__).with_suffix(".jsonl"), Path(__file__).parents[1] / "docs" / "missing-effects.md"
 NOTHING, SHARP = "nothing", "time_skew"  # what is hidden where nothing is; skew with edges of a few samples
 EDGE = 0.008  # s
-FAMILY_P = 1e-5
 CASES = [
     ("static_part_trip", 1.0, (800011, 800101, 800102)),
     ("motor_share_trip", 1.0, (800103, 800104)),
@@ -57,7 +56,6 @@ def wanted() -> Iterator[tuple[str, float, int, bool]]:
 def run(hidden: str, size: float, seed: int, families: bool) -> dict:
     """One data set investigated."""
     from tractexp.discrepancy import explanations
-    from tractexp.discrepancy.criteria import Criteria
     from tractexp.discrepancy.discrepancy_json import content
     from tractexp.discrepancy.investigate import investigate
     from tractexp.model.model import compose
@@ -73,7 +71,7 @@ def run(hidden: str, size: float, seed: int, families: bool) -> dict:
     tried = mock.patch.object(explanations, "member_that_suffices", return_value=None)
     began = time.perf_counter()
     with contextlib.nullcontext() if families else tried:
-        found = investigate(model, events[:3], events[3:], criteria=Criteria(family_p=FAMILY_P), seed=0)
+        found = investigate(model, events[:3], events[3:], seed=0)
     told = content(found)
     forms = {name: {k: v for k, v in form.items() if k != "curve"} for name, form in told["forms"].items()}
     return {

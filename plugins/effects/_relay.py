@@ -1,6 +1,6 @@
 """An undervoltage relay and the contactors behind it, on the samples: what every effect that trips has in common."""
 
-from tractexp_plugins.effects._operators import gate
+from ._operators import gate
 
 LEVEL, TIME = 0.0025, 0.3  # how sharp a relay is: in voltage over U_0, and in samples
 

@@ -71,7 +71,7 @@ def starts(bench: Bench, member: Candidate, refits: Mapping[Names, Refit]) -> li
         known = dict(told)
         for size in member.sizes:
             low, high = size.bounds
-            known.setdefault(size.name, float(np.clip(size.null + BEGUN * member.relevant(size), low, high)))
+            known.setdefault(size.name, float(np.clip(size.absent + BEGUN * member.relevant(size), low, high)))
         for setting in open_settings(member, tuple(known)):
             point = ground.copy()
             for p in effect.parameters:

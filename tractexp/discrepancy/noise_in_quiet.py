@@ -60,7 +60,7 @@ class QuietNoise:
         bench = self.bench
         if bench.waves:
             passed, phases = answers(bench.problem, _values(bench, unit)), bench.records.phases
-            blur = np.concatenate([self.blur, jumps(bench, unit)])
+            blur = np.concatenate([shapes for shapes in (self.blur, jumps(bench, unit)) if shapes is not None])
             return of_waves(residual, bench.known, bench.quiet, passed, phases, blur)
         wander = functools.partial(self._wander, left, columns)
         return estimate(residual, bench.known, bench.quiet, wander, self.blur)

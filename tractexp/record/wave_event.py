@@ -9,6 +9,7 @@ state.
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tractexp.errors import UserError
 from tractexp.record.event import Event
@@ -18,6 +19,8 @@ from tractexp.record.record import Record
 from tractexp.record.waves import Waves
 
 COARSEST = 16  # samples per cycle
+SHORT = 5.0  # cycles: of a shorter dip phasors of one cycle show little but their own window
+UNBALANCED = 0.1  # of the voltage before
 FEWEST_CYCLES = 2  # before the event
 LEAD = 6  # cycles of the periodic voltage before the record, in which a simulation reaches its steady state
 HIGHEST = 25  # harmonic that is fitted
@@ -40,9 +43,9 @@ class WaveEvent(Event):
     """
 
     phasors: Event
-    v: np.ndarray
+    v: NDArray[np.complex128]
     v_zero: np.ndarray
-    turn: np.ndarray
+    turn: NDArray[np.complex128]
     currents: np.ndarray
     lead: int
     omega_s0: float
@@ -92,7 +95,7 @@ def phases_of(stationary: np.ndarray, phases: int) -> np.ndarray:
     return np.stack([(vector * TURN ** (-k)).real + zero for k in range(phases)])
 
 
-def stationary(phases: np.ndarray, rate: float, frequency: float) -> tuple[np.ndarray, np.ndarray]:
+def stationary(phases: np.ndarray, rate: float, frequency: float) -> tuple[NDArray[np.complex128], np.ndarray]:
     """Space vector (N,) complex and zero sequence (N,) of phases (K, N).
 
     A single phase is the real part of its vector; the imaginary part is what it was a quarter of a cycle ago, so that
@@ -188,8 +191,9 @@ def in_waves(event: Event) -> WaveEvent:
     currents[~compared] = np.nan
     levels = (noise.mean() * np.sqrt(2 / 3),) * 2 + (noise.mean() / np.sqrt(3),) if K == 3 else (noise[0], 1.0, 1.0)
     slow = replace(
-        record, t=time, U=made[0], P=made[1].real, Q=made[1].imag, f=None, U2=made[2], window=None, more={}, waves=None
-    )
+        record, t=time, U=made[0], P=np.real(made[1]), Q=np.imag(made[1]), U2=made[2],
+        f=None, window=None, more={}, waves=None,
+    )  # fmt: skip
     end = min(max(int(np.searchsorted(time, event.t_end)), start + 1), len(time) - 1)
     return WaveEvent(
         **{f.name: getattr(event, f.name) for f in fields(Event)}
@@ -203,6 +207,15 @@ def in_waves(event: Event) -> WaveEvent:
         offsets=periodic.offsets * _scale(record, K), phases=K,
         weights=quieting.weights,
     )  # fmt: skip
+
+
+def smeared(duration: float, U2: float, frequency: float) -> str:
+    """What phasors make of a dip of this duration [s] and share of U2, as the end of a sentence; "" where no harm."""
+    if duration * frequency < SHORT:
+        return f"lasts {1000 * duration:.0f} ms, less than {SHORT:g} cycles, which phasors smear"
+    if U2 > UNBALANCED:
+        return f"is unbalanced, U2 {U2:.0%} of U, which phasors leave out"
+    return ""
 
 
 def _waves(event: Event) -> Waves:

@@ -76,7 +76,8 @@ def _far(a: Scored, b: Scored) -> bool:
     """Whether two settings differ by two places of the grid in some parameter."""
 
     def places(s: Shape) -> int:
-        return abs(*np.diff([int(np.abs(np.array(s.grid) - f.setting[s.name]).argmin()) for f in (a, b)]))
+        here, there = (int(np.abs(np.array(s.grid) - f.setting[s.name]).argmin()) for f in (a, b))
+        return abs(there - here)
 
     return any(places(s) >= 2 for s in a.term.signal.shapes if s.name != "phase")
 
