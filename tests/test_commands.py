@@ -199,3 +199,22 @@ def test_every_command_is_seen_to():
     for c in ALL:
         seen = c.arguments is not None or any(kind in c.line for kind in kinds) or c.words[1].endswith(".py")
         assert seen, f"{c.page.name}: {c.line}"
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/records.md", "docs/model.md"])
+def test_the_python_of_a_page_runs_and_has_what_its_comments_name(page, desk, monkeypatch):
+    """That of docs/python.md is run by `test_docs.py`, that of docs/plugins.md by `test_plugins.py`."""
+    monkeypatch.chdir(desk)
+    names = {}
+    for example in re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(encoding="utf-8"), flags=re.DOTALL):
+        exec(compile(example, page, "exec"), names)
+    if page == "README.md":
+        assert names["found"].names == ("stator_transients",)
+        assert all(hasattr(names["found"], told) for told in ("verdict", "gap", "extended"))
+        assert names["fit"].parameters["X_prime"].interval
+    if page == "docs/records.md":
+        told = ("start", "end", "depth", "U0", "P0", "Q0", "f0", "noise_U", "noise_P", "noise_Q")
+        assert all(hasattr(names["event"], name) for name in told)
+        told = ("t", "U", "P", "Q", "f", "U2", "base", "window", "more", "notes")
+        assert all(hasattr(names["event"].record, name) for name in told)
+        assert all(hasattr(names["seen"], name) for name in ("feeders", "events", "commands", "report"))

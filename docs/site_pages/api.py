@@ -1,9 +1,9 @@
 """The page of public calls, and of what a plugin imports."""
 
-import importlib
 import inspect
 from pathlib import Path
 
+import tractexp
 from tractexp import PUBLIC, extend, files
 
 TITLE = """# Public calls
@@ -20,12 +20,9 @@ EXTEND = """
 
 def write(folder: Path) -> Path:
     """Write the page into a folder and return its path."""
-    calls = [_entry(getattr(importlib.import_module(module), name), name, module) for name, module in PUBLIC.items()]
-    bases = [
-        _entry(getattr(extend, name), name, "")
-        for name in extend.__all__
-        if _told(getattr(extend, name)) and name not in PUBLIC
-    ]
+    calls = [_entry(getattr(tractexp, name), f"tractexp.{name}") for name in PUBLIC]
+    others = {name: getattr(extend, name) for name in extend.__all__ if name not in PUBLIC}
+    bases = [_entry(what, f"tractexp.extend.{name}") for name, what in others.items() if _told(what)]
     return files.write(folder / "api.md", "\n".join([TITLE, *calls, EXTEND, *bases]))
 
 
@@ -33,10 +30,9 @@ def _told(what: object) -> bool:
     return inspect.isclass(what) or inspect.isfunction(what)
 
 
-def _entry(what: object, name: str, module: str) -> str:
+def _entry(what: object, name: str) -> str:
     kind = "autoexception" if _is_error(what) else "autoclass" if inspect.isclass(what) else "autofunction"
-    where = module or what.__module__  # type: ignore[attr-defined]
-    return f"## {name}\n\n```{{eval-rst}}\n.. {kind}:: {where}.{name}\n```\n"
+    return f"## {name.rpartition('.')[2]}\n\n```{{eval-rst}}\n.. {kind}:: {name}\n```\n"
 
 
 def _is_error(what: object) -> bool:

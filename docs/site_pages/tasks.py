@@ -12,6 +12,7 @@ from tractexp.plugin import discover
 
 DOCS = Path(__file__).parents[1]
 MOST = 8  # examples on a page
+SUBCOMMANDS = ("look", "list", "ui", "sync", "doctor")  # which are no tasks
 
 
 def write(folder: Path) -> list[Path]:
@@ -33,15 +34,16 @@ def _page(cls: type, shown: Iterable[Command]) -> str:
     if rows := markdown.settings(cls):
         rows = [[f"`task.{name[1:]}", *rest] for name, *rest in rows]
         parts += ["## Settings", table(["setting", "default", "meaning"], rows)]
-    if used := [c for c in shown if _task(c) == cls.name][:MOST]:
-        parts += ["## Shown in", "\n\n".join(map(_example, used))]
+    used = {(c.page, c.heading): c for c in shown if _task(c) == cls.name}  # the last of a section
+    if used:
+        parts += ["## Shown in", "\n\n".join(map(_example, [*used.values()][:MOST]))]
     return "\n\n".join(parts) + "\n"
 
 
 def _task(command: Command) -> str:
     """The task of a command; "" where it is none."""
     arguments = command.arguments or []
-    if not any("=" in word for word in arguments):
+    if arguments[:1] in ([word] for word in SUBCOMMANDS) or not any("=" in word for word in arguments):
         return ""
     named = [word.partition("=")[2] for word in arguments if word.startswith("task=")]
     return named[0] if named else defaults()["task"] * ("experiment=" not in " ".join(arguments))
@@ -49,5 +51,7 @@ def _task(command: Command) -> str:
 
 def _example(command: Command) -> str:
     anchor = "-".join("".join(c for c in command.heading.lower() if c.isalnum() or c in " -_").split())
-    where = f"[{plain(command.heading)}](../../{command.page.name}#{anchor})"
+    title = command.page.read_text(encoding="utf-8").partition("\n")[0].lstrip("# ")
+    told = title if title == command.heading else f"{title}: {command.heading}"
+    where = f"[{plain(told)}](../../{command.page.name}#{anchor})"
     return f"{where}:\n\n```sh\n{command.line}\n```"
