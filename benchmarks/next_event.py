@@ -1,12 +1,12 @@
 """Whether the event that is recommended for a tie ends it as often as it says: a row each tie in next_event.json.
 
-    cd benchmarks && python next_event.py [--first 930000] [--count 120] [--most 30] [--minutes 30]
+    cd benchmarks && python next_event.py [--first 931000] [--count 120] [--most 30] [--minutes 30]
 
 Small effects of `hidden_effects` in two mild dips, of which an investigation leaves several. The event it recommends is
 simulated by the same generator, which shares nothing with the product, and added to the others; the investigation is
 made again. Where no event is likely to decide by the product's own rule, the event recommended with formulas taken as
 exact is simulated instead, and the investigation is made again with `alike` = 0, as its sentence says. Seeds begin at
-930000 and are used nowhere else.
+931000 and are used nowhere else.
 """
 
 import argparse
@@ -16,6 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import tractexp  # noqa: F401 before NumPy: it keeps BLAS to one thread
+
 import numpy as np  # isort: skip
 
 from hidden_effects import Case, Noise
@@ -30,13 +31,10 @@ from tractexp.plugin import get
 from tractexp.record import Event, Record, detect
 
 TABLE = Path(__file__).with_suffix(".json")
-FIRST, COUNT, MOST, MINUTES = 930_000, 120, 30, 30.0
+FIRST, COUNT, MOST, MINUTES = 931_000, 120, 30, 30.0
 NOISE = Noise(0.004)
-AMONG = (
-    "stator_resistance", "feeder_impedance", "speed_dependent_torque", "exponential_recovery", "second_motor_group",
-    "magnetic_saturation",
-)  # fmt: skip
-SIZES = (0.4, 0.8, 1.6)  # of what an engineer would call noticeable
+AMONG = ("stator_resistance", "feeder_impedance", "speed_dependent_torque", "exponential_recovery")
+SIZES = (0.3, 0.5, 0.8)  # of what an engineer would call noticeable
 
 
 def hidden(seed: int) -> tuple[str, float, Scene]:

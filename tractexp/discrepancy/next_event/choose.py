@@ -92,7 +92,12 @@ class NextEvent:
                 {"pair": [self.rivals[a], self.rivals[b]], "probability": p} for a, b, p in self.hopeless
             ],
             "tried": [
-                {**asdict(t.event), "probability": t.chances.least, "by_noise_alone": t.exact.least}
+                {
+                    **asdict(t.event),
+                    "words": t.event.words,
+                    "probability": t.chances.least,
+                    "by_noise_alone": t.exact.least,
+                }
                 for t in self.tried
             ],
         }
@@ -114,7 +119,8 @@ class NextEvent:
         if p >= self.criteria.decided:
             return f"record {what}: it tells {them} with a probability of {p:.0%}"
         if self.by_noise is None or p >= HOPELESS:
-            return f"no event that was tried is sure to tell {them}; the surest, {what}, does so with a probability of {p:.0%}"
+            sure = f"no event that was tried is sure to tell {them}"
+            return f"{sure}; the surest, {what}, does so with a probability of {p:.0%}"
         what, p = self.by_noise.event.words, self.by_noise.exact.least
         return (
             f"no event that was tried is likely to tell {them} as long as no formula is trusted to"
@@ -208,4 +214,3 @@ def _fitted_to(bench: Bench, noise: Noise, sides: Sequence[Side], truth: Side, e
     made = {f.names: f for f in refit(whole, both, [(s.fit.names, u) for s, u in zip(sides, wide, strict=True)])}
     fits = [made[s.fit.names] for s in sides]
     return [replace(f, unit=np.r_[f.unit[:d], f.unit[whole.coordinates.before][:before]]) for f in fits]
-

@@ -1,4 +1,4 @@
-"""Events that might be recorded next: dips, a bank or tap that is switched off and on again, other channels and rates."""
+"""Events that might be recorded next: dips, a tap or bank that is switched and back, other channels and rates."""
 
 import itertools
 from collections.abc import Sequence

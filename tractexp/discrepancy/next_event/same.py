@@ -66,7 +66,6 @@ def _followed(
     bench: Bench, drive: Drive, point: np.ndarray, names: Sequence[str], rival: Refit
 ) -> tuple[int, float] | None:  # fmt: skip
     """Rank and distance where the rival follows the truth at coordinates (D,); None where it does not."""
-    at = bench.coordinates
     known = drive.weights > 0
     truth = bench.kernels.simulate(names, point[None], drive)[0][known]
     alive = np.isfinite(truth)
