@@ -22,6 +22,7 @@ from tractexp.wording import joined
 CHECKED = 4  # events whose chances are reckoned again at refits, until one holds what it promised
 HOPELESS = 0.5  # chance below which no event is said to tell a pair apart
 WORTH = 0.1  # chance below which no refit is worth its time
+REPEATED = (2, 3, 5, 10, 20)  # events of one kind together
 NEARLY = 0.02  # of the chance: of events as sure as this the mildest is the surest
 
 Rule = Callable[["Tried"], Chances]
@@ -38,6 +39,7 @@ class Tried:
     chances: Chances
     exact: Chances
     refitted: bool = False  # whether rivals were refitted to it, not only linearised about their fits
+    repeated: int | None = None  # how many such events are sure to, where one is not and so many are
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +112,7 @@ class NextEvent:
             "probability": chances.least,
             "by_truth": dict(zip(self.rivals, chances.alone.tolist(), strict=True)),
             "refitted": tried.refitted,
+            "repeated": tried.repeated,
         }
 
     def _recommended(self) -> str:
@@ -120,13 +123,18 @@ class NextEvent:
             return f"record {what}: it tells {them} with a probability of {p:.0%}"
         if self.by_noise is None or p >= HOPELESS:
             sure = f"no event that was tried is sure to tell {them}"
-            return f"{sure}; the surest, {what}, does so with a probability of {p:.0%}"
+            return f"{sure}; the surest, {what}, does so with a probability of {p:.0%}{_together(self.best)}"
         what, p = self.by_noise.event.words, self.by_noise.exact.least
         return (
             f"no event that was tried is likely to tell {them} as long as no formula is trusted to"
             f" {self.criteria.alike:.0%} of what it explains; record {what}: where formulas are exact"
-            f" (task.criteria.alike=0) it does so with a probability of {p:.0%}"
+            f" (task.criteria.alike=0) it does so with a probability of {p:.0%}{_together(self.by_noise)}"
         )
+
+
+def _together(tried: Tried) -> str:
+    """How many such events are sure to."""
+    return f", {tried.repeated} of them are sure to" if tried.repeated else ""
 
 
 def next_event(
@@ -138,23 +146,36 @@ def next_event(
     """
     bench.effort.say(f"choosing what to record next, to tell {len(rivals)} explanations apart")
     sides = [sided(bench, noise, fit) for fit in (bare, *rivals)]
-    separation = Separation(sides, bench.criteria, FEW, seed)
+    separation, truths = Separation(sides, bench.criteria, FEW, seed), range(1, len(sides))
     reads = {channel for fit in rivals for name in fit.names for channel in bench.catalogue[name].effect.reads}
-    tried = [
-        Tried(event, *separation.chances(views))
-        for group in _alike(imagined(bench, sorted(reads)))
-        for event, views in zip(group, zip(*(seen(bench, noise, s, group) for s in sides), strict=True), strict=True)
-    ]
-    best = _held(bench, noise, sides, tried, seed, lambda t: t.chances)
-    sure = best.chances.least >= bench.criteria.decided
-    by_noise = None if sure else _held(bench, noise, sides, tried, seed, lambda t: t.exact)
-    most = np.max([t.exact.pairs for t in tried], axis=0)
+    events, denied = [], []
+    for group in _alike(imagined(bench, sorted(reads))):
+        for event, views in zip(group, zip(*(seen(bench, noise, s, group) for s in sides), strict=True), strict=True):
+            events.append(event)
+            denied.append(np.stack([separation.denied(views, truth) for truth in truths], axis=1))
+    most = np.max([d[1].mean(axis=2) for d in denied], axis=0)  # (a, a), by the noise alone
     apart = [(a, b, float(min(most[a, b], most[b, a]))) for a, b in itertools.combinations(range(len(rivals)), 2)]
     open_pairs = [pair for pair in apart if pair[2] < HOPELESS]
+    ignored = np.zeros(most.shape, bool)
+    if len(open_pairs) < len(apart):  # what can be told apart shall be
+        for a, b, _ in open_pairs:
+            ignored[a, b] = ignored[b, a] = True
+    tried = [Tried(e, *(Chances.of(rule, ignored) for rule in d)) for e, d in zip(events, denied, strict=True)]
+    best = _held(bench, noise, sides, tried, ignored, seed, _by_rule)
+    sure = best.chances.least >= bench.criteria.decided
+    by_noise = None if sure else _held(bench, noise, sides, tried, ignored, seed, _by_noise)
     found = [(a, b, same(bench, rivals[a], rivals[b])) for a, b, _ in open_pairs]
     proved = tuple((a, b, s) for a, b, s in found if s is not None)
     hopeless = tuple(pair for pair, (*_, s) in zip(open_pairs, found, strict=True) if s is None)
     return NextEvent(tuple(labels), best, by_noise, tuple(tried), bench.criteria, proved, hopeless)
+
+
+def _by_rule(tried: Tried) -> Chances:
+    return tried.chances
+
+
+def _by_noise(tried: Tried) -> Chances:
+    return tried.exact
 
 
 def mildest(tried: Sequence[Tried], decided: float, by: Rule) -> Tried:
@@ -169,7 +190,10 @@ def _alike(events: Sequence[Imagined]) -> list[list[Imagined]]:
     return [list(group) for _, group in itertools.groupby(by_rate, key=lambda e: e.rate)]
 
 
-def _held(bench: Bench, noise: Noise, sides: Sequence[Side], tried: Sequence[Tried], seed: int, by: Rule) -> Tried:
+def _held(
+    bench: Bench, noise: Noise, sides: Sequence[Side], tried: Sequence[Tried], ignored: np.ndarray, seed: int,
+    by: Rule,
+) -> Tried:  # fmt: skip
     """The mildest event that is sure enough after refits, too."""
     left, checked = list(tried), []
     while left and len(checked) < CHECKED:
@@ -177,27 +201,37 @@ def _held(bench: Bench, noise: Noise, sides: Sequence[Side], tried: Sequence[Tri
         if checked and by(best).least < min(HOPELESS, max(by(t).least for t in checked)):
             break
         left.remove(best)
-        checked.append(_refitted(bench, noise, sides, best, seed) if by(best).least >= WORTH else best)
+        checked.append(_refitted(bench, noise, sides, best, ignored, seed, by) if by(best).least >= WORTH else best)
         if by(checked[-1]).least >= bench.criteria.decided:
             return checked[-1]
     return max(checked, key=lambda t: by(t).least)
 
 
-def _refitted(bench: Bench, noise: Noise, sides: Sequence[Side], best: Tried, seed: int) -> Tried:
+def _refitted(
+    bench: Bench, noise: Noise, sides: Sequence[Side], best: Tried, ignored: np.ndarray, seed: int, by: Rule
+) -> Tried:  # fmt: skip
     """The chances of one event with rivals linearised where they fit it best, each in turn the truth.
 
     Only of phasors without further channels or rates, which the bench has no records of: others stay linearised about
     their fits.
     """
     event, plain = best.event, not (bench.waves or bench.records.window is not None or best.event.burden[0])
-    told = []
+    places = []
     for a in range(1, len(sides)):
         moved = _fitted_to(bench, noise, sides, sides[a], event) if plain else []
         there = [side if k == a or not moved else sided(bench, noise, moved[k]) for k, side in enumerate(sides)]
         views = [seen(bench, noise, side, [event])[0] for side in there]
-        told.append(Separation(there, bench.criteria, seed=seed).chances(views, only=a))
-    both = [Chances(sum(c.alone for c in rule), sum(c.pairs for c in rule)) for rule in zip(*told, strict=True)]
-    return Tried(event, *both, refitted=plain)
+        places.append((Separation(there, bench.criteria, seed=seed), views))
+
+    def again(times: int) -> Tried:
+        denied = np.stack([s.denied(views, a, times) for a, (s, views) in enumerate(places, 1)], axis=1)
+        return Tried(event, *(Chances.of(rule, ignored) for rule in denied), refitted=plain)
+
+    once = again(1)
+    if by(once).least >= bench.criteria.decided:
+        return once
+    enough = (n for n in REPEATED if by(again(n)).least >= bench.criteria.decided)
+    return replace(once, repeated=next(enough, None))
 
 
 def _fitted_to(bench: Bench, noise: Noise, sides: Sequence[Side], truth: Side, event: Imagined) -> list[Refit]:

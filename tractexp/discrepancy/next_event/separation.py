@@ -70,6 +70,11 @@ class Chances:
     alone: np.ndarray
     pairs: np.ndarray
 
+    @classmethod
+    def of(cls, denied: np.ndarray, ignored: np.ndarray) -> "Chances":
+        """Of draws (a, a, b) that deny rivals, by the truth; pairs that are `ignored` (a, a) need not be told apart."""
+        return cls((denied | ignored[:, :, None]).all(axis=1).mean(axis=1), denied.mean(axis=2))
+
     @property
     def least(self) -> float:
         """Over all rivals in turn."""
@@ -143,21 +148,15 @@ class Separation:
         self.r, self.J = [x[0] for x in rows], [x[1:] for x in rows]
         self.known = [x.known for x in sides]
 
-    def chances(self, seen: Sequence[Seen], only: int | None = None) -> tuple[Chances, Chances]:
-        """By one new event, as each of the sides sees it: by the product's rule, and where formulas are exact.
+    def denied(self, seen: Sequence[Seen], truth: int, times: int = 1) -> np.ndarray:
+        """Which rivals (2, a, b) each of b draws denies by one new event, or `times` its like, with `truth` the truth.
 
-        `only` is the one side that is the truth in turn, all others are left at 0.
+        First by the product's rule, then where formulas are exact. None is denied where a side does not survive.
         """
-        count = len(self.sides) - 1
-        pairs, alone = np.zeros((2, count, count)), np.zeros((2, count))
-        if all(x.survives for x in seen):
-            rows = _reduced([np.vstack([x.f - seen[0].f, x.K]) for x in seen])
-            f, K = [x[0] for x in rows], [x[1:] for x in rows]
-            for a in range(count) if only is None else (only - 1,):
-                denied = self._denied(a + 1, f, K)  # (2, a, b)
-                alone[:, a] = denied.all(axis=1).mean(axis=1)
-                pairs[:, a] = denied.mean(axis=2)
-        return Chances(alone[0], pairs[0]), Chances(alone[1], pairs[1])
+        if not all(x.survives for x in seen):
+            return np.zeros((2, len(self.sides) - 1, self.draws), bool)
+        rows = _reduced([np.sqrt(times) * np.vstack([x.f - seen[0].f, x.K]) for x in seen])
+        return self._denied(truth, [x[0] for x in rows], [x[1:] for x in rows])
 
     def _denied(self, truth: int, f: Sequence[np.ndarray], K: Sequence[np.ndarray]) -> np.ndarray:
         """Which rivals (2, a, b) each of b draws denies where one of them is the truth; itself it always does."""
