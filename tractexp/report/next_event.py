@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from tractexp.discrepancy.next_event.choose import NextEvent, Tried
+from tractexp.discrepancy.next_event.separation import Chances
 from tractexp.report.chart import Chart
 from tractexp.report.page import Page
 from tractexp.report.style import PALETTE
@@ -27,19 +28,17 @@ def section(made: Page, found: NextEvent) -> None:
     """The chances by dip as charts, the best events of each kind, and which pair each tells apart."""
     rule = f"the rule of this investigation, which trusts no formula to {found.criteria.alike:.0%} of what it explains"
     if not found.same or len(found.rivals) > 2:
-        shown = [("By that rule", lambda t: t.chances.least)] if found.by_noise is None else []
-        shown += [("Where formulas are exact", lambda t: t.exact.least)]
-        made.charts([_chart(found, name, value) for name, value in shown], _caption(found))
+        made.chart(_chart(found), _caption(found))
     made.heading("What each kind of event would do", 3)
     made.table(
-        ["kind", "event", "by the rule [%]", "where formulas are exact [%]"],
+        ["event", "by the rule [%]", "by noise [%]"],
         [_row(t) for kind in KINDS for t in _best(found, kind)],
         f"Probability that all rivals but the true one are rejected, the least over all of them as the truth: by"
-        f" {rule}; and by the noise alone. The best events of each kind.",
-        words=(0, 1),
+        f" {rule}; and by noise, with formulas taken as exact. The best events of each kind.",
+        words=(0,),
     )
     best = found.by_noise or found.best
-    chances = best.chances if best is found.best else best.exact
+    chances = _chances(found, best)
     made.heading("Rival by rival", 3)
     made.table(
         ["if the truth is", *(f"{name} is rejected [%]" for name in found.rivals)],
@@ -59,19 +58,25 @@ def section(made: Page, found: NextEvent) -> None:
 
 
 def _caption(found: NextEvent) -> str:
+    exact = ", where formulas are exact" * (found.by_noise is not None)
     decided = f"Dashed: the {found.criteria.decided:.0%} from which an event is recommended as sure."
-    return f"Probability that one dip more tells all rivals apart, by its depth and duration. {decided}"
+    return f"Probability that one dip more tells all rivals apart{exact}, by its depth and duration. {decided}"
 
 
-def _chart(found: NextEvent, name: str, value) -> Chart:
-    """Probability by depth, a line for each duration of a plain dip."""
-    chart = Chart("depth of the dip [%]", [f"{name.lower()} [%]"], pixels=340)
+def _chart(found: NextEvent) -> Chart:
+    """Probability by depth, a line for each duration of a plain dip: by the rule, or by noise where that is hopeless."""
+    chart = Chart("depth of the dip [%]", ["probability [%]"], pixels=360)
     plain = [t for t in found.tried if _kind(t) == KINDS[0]]
     for color, duration in zip(PALETTE, sorted({t.event.duration for t in plain}), strict=False):
-        line = sorted((t.event.depth, value(t)) for t in plain if t.event.duration == duration)
+        line = sorted((t.event.depth, _chances(found, t).least) for t in plain if t.event.duration == duration)
         x, y = 100 * np.array(line).T
         chart.line(f"{1000 * duration:.0f} ms", x, y, color, width=2.0)
     return chart.level(100 * found.criteria.decided).limits(0, -3, 103)
+
+
+def _chances(found: NextEvent, tried: Tried) -> Chances:
+    """By the rule, or where that is not sure to decide, by the noise alone."""
+    return tried.chances if found.by_noise is None else tried.exact
 
 
 def _kind(tried: Tried) -> str:
@@ -93,5 +98,4 @@ def _best(found: NextEvent, kind: str) -> list[Tried]:
 
 
 def _row(tried: Tried) -> list[str]:
-    told = tried.event.words
-    return [_kind(tried), told, f"{100 * tried.chances.least:.0f}", f"{100 * tried.exact.least:.0f}"]
+    return [tried.event.words, f"{100 * tried.chances.least:.0f}", f"{100 * tried.exact.least:.0f}"]
