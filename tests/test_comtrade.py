@@ -390,6 +390,7 @@ def test_what_cannot_be_written_is_refused(pair, tmp_path):
         ("b.txt", "BINARY", 2013, "the ending of a COMTRADE file=.txt is not one of .cfg, .cff"),
         ("b.cfg", "FLOAT32", 1999, "kind=FLOAT32 is not one of BINARY, ASCII"),
         ("b.cff", "BINARY", 1999, "a .cff is of the standard of 2013"),
+        ("b.cfg", "BINARY", 1991, "revision=1991 is not one of 1999, 2013"),
     ]:
         with pytest.raises(UserError, match=says):
             comtrade.write(made, tmp_path / path, kind, revision)

@@ -6,7 +6,7 @@ from field_waves import KA, dip, load, noise, phases, recording, wave
 
 from tractexp.filetypes import comtrade
 from tractexp.recording import propose
-from tractexp.recording.label import order
+from tractexp.recording.label import groups, order
 from tractexp.recording.measure import phasors_of
 from tractexp.recording.recording import Channel
 
@@ -54,6 +54,13 @@ def test_channels_in_any_order_are_put_in_that_of_their_phases():
     waves = [I[2], V[1], I[0], V[2], V[0], I[1]]
     [feeder] = propose(recording(waves, names=["Ic", "Ub", "Ia", "Uc", "Ua", "Ib"]))
     assert (feeder.voltages, feeder.currents) == ((4, 1, 3), (2, 5, 0))
+
+
+def test_phases_belong_together_though_one_lacks_a_number():
+    names = ["12-Ia", "13-Ib", "Ic"]
+    (found,) = groups({k: Channel(name, np.zeros(1), "A") for k, name in enumerate(names)})
+    assert found.numbers == (0, 1, 2)
+    assert found.name == ""
 
 
 def test_channels_without_names_are_put_in_the_order_of_their_angles():

@@ -37,7 +37,7 @@ PUBLIC = {
     "sites": "tractexp.model.site_table",
     "survey": "tractexp.api.survey",
 }
-__all__ = ["__version__", *PUBLIC]
+__all__ = ["__version__", *PUBLIC]  # pyright: ignore[reportUnsupportedDunderAll] # made by __getattr__ when asked for
 
 
 def __getattr__(name: str) -> Any:

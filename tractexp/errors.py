@@ -43,12 +43,13 @@ def among(name: object, allowed: Iterable[str], label: str = "Available") -> str
     return f"{nearest(str(name), allowed) or '.'} {label}: {', '.join(allowed) or 'none'}"
 
 
-def check_choice(where: str, value: object, allowed: Iterable[str]) -> None:
+def check_choice(where: str, value: object, allowed: Iterable[object]) -> None:
     """Raise `UserError` unless `value` is one of `allowed`; `where` is the setting's full key."""
     allowed = tuple(allowed)
     if value not in allowed:
+        names = tuple(map(str, allowed))
         raise UserError(
-            f"{where}={' '.join(str(value).split())} is not one of {', '.join(allowed)}{nearest(str(value), allowed)}"
+            f"{where}={' '.join(str(value).split())} is not one of {', '.join(names)}{nearest(str(value), names)}"
         )
 
 

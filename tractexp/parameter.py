@@ -24,6 +24,12 @@ class Parameter:
     null: float | None = None
     name: str = field(default="", compare=False)
 
+    @property
+    def absent(self) -> float:
+        """The `null` of a parameter that has one: the size of an effect."""
+        assert self.null is not None
+        return self.null
+
     def __set_name__(self, owner: type, name: str) -> None:
         if not self.name:  # one of several classes' has its name already
             object.__setattr__(self, "name", name)

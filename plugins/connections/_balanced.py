@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.errors import check_choice
-from tractexp_plugins.connections._arms import _Arms
-from tractexp_plugins.connections._phases import PAIRS, PHASES, line
+
+from ._arms import _Arms
+from ._phases import PAIRS, PHASES, line
 
 
 @dataclass(frozen=True, kw_only=True)

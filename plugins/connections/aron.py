@@ -4,7 +4,8 @@ import numpy as np
 
 from tractexp.plugin import plugin
 from tractexp.recording import Connection
-from tractexp_plugins.connections._phases import check_two, from_two
+
+from ._phases import check_two, from_two
 
 
 @plugin

@@ -3,7 +3,8 @@
 import numpy as np
 
 from tractexp.plugin import plugin
-from tractexp_plugins.connections._balanced import _Balanced
+
+from ._balanced import _Balanced
 
 
 @plugin

@@ -7,7 +7,8 @@ import numpy as np
 from tractexp.errors import UserError
 from tractexp.plugin import plugin
 from tractexp.recording import Connection
-from tractexp_plugins.connections._phases import check_pairs, check_two, from_lines, from_two
+
+from ._phases import check_pairs, check_two, from_lines, from_two
 
 
 @plugin

@@ -6,8 +6,9 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.plugin import plugin
-from tractexp_plugins.connections._arms import _Arms
-from tractexp_plugins.connections._phases import check_pairs, line
+
+from ._arms import _Arms
+from ._phases import check_pairs, line
 
 
 @plugin

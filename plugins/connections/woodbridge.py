@@ -1,7 +1,8 @@
 """Woodbridge traction transformer."""
 
 from tractexp.plugin import plugin
-from tractexp_plugins.connections._balanced import _Balanced
+
+from ._balanced import _Balanced
 
 
 @plugin

@@ -1,7 +1,8 @@
 """What begins with a dip or after it, told from the voltage, sample by sample."""
 
 from tractexp.extend import sites
-from tractexp_plugins.effects._operators import gate, larger, smaller
+
+from ._operators import gate, larger, smaller
 
 LEVEL, BEGUN = 0.0015, 0.96  # how sharp a level is, and the voltage over U_0 below which a dip has begun
 WIDTH = 0.02  # of a change: how rounded its corners are

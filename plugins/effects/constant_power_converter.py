@@ -1,7 +1,8 @@
 """Converters that hold their power."""
 
 from tractexp.extend import Effect, Parameter, plugin, sites
-from tractexp_plugins.effects._operators import seen_late, smaller
+
+from ._operators import seen_late, smaller
 
 SOURCE = "WECC composite load model (power electronic load); RAMSES vfd_load"
 WIDTH = 0.02  # of the power: how rounded the corner at the limit is

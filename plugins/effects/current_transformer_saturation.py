@@ -1,7 +1,8 @@
 """Saturation of the current transformers."""
 
 from tractexp.extend import Effect, Parameter, plugin, sites
-from tractexp_plugins.effects._phases import beyond, phases_of, vector_of
+
+from ._phases import beyond, phases_of, vector_of
 
 SOURCE = "IEEE C37.110-2007, guide for the application of current transformers; IEC 61869-2, annex 2B"
 

@@ -1,7 +1,8 @@
 """Resistance of an arc or a fault inside the load."""
 
 from tractexp.extend import Effect, Parameter, plugin
-from tractexp_plugins.effects._phases import left
+
+from ._phases import left
 
 SOURCE = "Kundur 1994, section 13.4 (faults by shunts); IEC 60909-0"
 LEVEL, HOLD = 0.1, 0.005  # of the voltage: how far off it is in a fault; s: how long it may be nearer in between

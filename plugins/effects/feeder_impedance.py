@@ -201,11 +201,11 @@ def _motor_current_at(eq, V):
 
 def _affine(eq):
     """Whether the motor's current really is a + b V: tried at V = 2j with every other symbol at some number."""
-    from sympy import I
+    from sympy import Add, I
 
     a, b = _motor_current(eq)
-    off = sum(part**2 for part in eq.parts(_motor_current_at(eq, 2 * I) - a - 2 * I * b))
-    known = {s: 0.3 + 0.01 * k for k, s in enumerate(sorted(off.free_symbols, key=str))}
+    off = Add(*(part**2 for part in eq.parts(_motor_current_at(eq, 2 * I) - a - 2 * I * b)))
+    known = [(s, 0.3 + 0.01 * k) for k, s in enumerate(sorted(off.free_symbols, key=str))]
     return abs(off.subs(known)) < 1e-18
 
 

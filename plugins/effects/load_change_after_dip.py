@@ -1,7 +1,8 @@
 """Load that changes by itself, after the dip."""
 
 from tractexp.extend import Effect, Parameter, plugin
-from tractexp_plugins.effects._dip import changes
+
+from ._dip import changes
 
 SOURCE = "ordinary change of load; customers and trains that react to a dip"
 

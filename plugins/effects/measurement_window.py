@@ -26,7 +26,7 @@ class MeasurementWindow(Measurement):
     confused_with = ("time_skew", "stator_resistance")
 
     def observe(self, power, drive, values):
-        from tractexp_plugins.effects._recorder import averaged
+        from ._recorder import averaged
 
         out = np.empty_like(power)
         for e in range(drive.events):

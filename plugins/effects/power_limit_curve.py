@@ -3,7 +3,8 @@
 import numpy as np
 
 from tractexp.extend import Curve, Effect, Parameter, plugin, sites
-from tractexp_plugins.effects._operators import bent, drawn, larger, seen_late, smaller
+
+from ._operators import bent, drawn, larger, seen_late, smaller
 
 SOURCE = "EN 50388-1, limitation of current or power at low line voltage"
 KNOTS, BEND = (1 / 3, 2 / 3), 0.1  # of the way from full power to none

@@ -1,7 +1,8 @@
 """The swing of the rotor, of a motor whose speed stays."""
 
 from tractexp.extend import Effect, Parameter, plugin, sites
-from tractexp_plugins.effects import _orders
+
+from . import _orders
 
 SOURCE = "Wu, Fan, Zou 2022, Energies 15(14) 5034, Table 1 and Eq. (1)"
 

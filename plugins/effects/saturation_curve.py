@@ -3,7 +3,8 @@
 import numpy as np
 
 from tractexp.extend import Curve, Effect, Parameter, plugin, sites
-from tractexp_plugins.effects._operators import bent, drawn
+
+from ._operators import bent, drawn
 
 SOURCE = "Milano 2010, ch. 15; tables of saturation in Kundur 1994, ch. 3"
 KNOTS, WIDTH = (0.15, 0.4), 0.08  # pu² of flux fallen

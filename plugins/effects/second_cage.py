@@ -1,7 +1,8 @@
 """A second cage on the motor's rotor."""
 
 from tractexp.extend import Effect, Parameter, plugin, sites
-from tractexp_plugins.effects import _orders
+
+from . import _orders
 
 SOURCE = "Milano 2010, Power System Modelling and Scripting, ch. 15"
 

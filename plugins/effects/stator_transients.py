@@ -1,7 +1,8 @@
 """Transients of the motor's stator flux."""
 
 from tractexp.extend import Effect, Parameter, plugin, sites
-from tractexp_plugins.effects import _orders
+
+from . import _orders
 
 SOURCE = "Krause, Wasynczuk, Sudhoff 2002, Analysis of Electric Machinery, ch. 4 and 8"
 

@@ -1,8 +1,9 @@
 """A pole of the load's breaker that opens, or does not close."""
 
 from tractexp.extend import Effect, Parameter, plugin, sites
-from tractexp_plugins.effects._operators import gate
-from tractexp_plugins.effects._phases import left, phases_of, vector_of
+
+from ._operators import gate
+from ._phases import left, phases_of, vector_of
 
 SOURCE = "IEEE C37.04, pole discrepancy; Blackburn, Domin 2014, Protective Relaying, section 4.9 (open phases)"
 LEVEL = 0.1  # of the voltage: how far off it is when the event begins

@@ -30,7 +30,7 @@ class TimeSkew(Measurement):
     confused_with = ("stator_resistance", "dc_link_lag", "measurement_window")
 
     def observe(self, power, drive, values):
-        from tractexp_plugins.effects._recorder import earlier, moved
+        from ._recorder import earlier, moved
 
         out = np.empty_like(power)
         for e in range(drive.events):

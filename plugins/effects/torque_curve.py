@@ -3,7 +3,8 @@
 import numpy as np
 
 from tractexp.extend import Curve, Effect, Parameter, plugin, sites
-from tractexp_plugins.effects._operators import bent, drawn
+
+from ._operators import bent, drawn
 
 SOURCE = "Milano 2010, ch. 15; WECC composite load model (Etrq)"
 KNOTS, WIDTH = (0.08, 0.2), 0.04  # of 1 - (omega/omega_0)^2: at 96 and 89 % of the speed before

@@ -1,7 +1,8 @@
 """Saturation of the load's transformers: inrush when the voltage returns."""
 
 from tractexp.extend import Effect, Parameter, plugin
-from tractexp_plugins.effects._phases import beyond, phases_of, vector_of
+
+from ._phases import beyond, phases_of, vector_of
 
 SOURCE = "Blume et al. 1951, Transformer Engineering; Chiesa, Mork, Hoidalen 2010, IEEE Trans. Power Delivery 25(4)"
 

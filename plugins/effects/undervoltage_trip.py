@@ -1,7 +1,8 @@
 """Undervoltage trip of part of the load, and its reconnection."""
 
 from tractexp.extend import Effect, Parameter, plugin, sites
-from tractexp_plugins.effects._relay import opened
+
+from ._relay import opened
 
 SOURCE = "NERC 2016, Dynamic Load Modeling, app. A; WECC composite load model (Ftr1, Vtr1, Ttr1, Vrc1, Trc1)"
 

@@ -1,7 +1,8 @@
 """Traction power limited at low line voltage."""
 
 from tractexp.extend import Effect, Parameter, plugin, sites
-from tractexp_plugins.effects._operators import larger, seen_late, smaller
+
+from ._operators import larger, seen_late, smaller
 
 SOURCE = "EN 50388-1, limitation of current or power at low line voltage"
 WIDTH = 0.02  # of the power: how rounded the corners are

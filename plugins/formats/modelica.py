@@ -92,14 +92,14 @@ def _modelica(expression):
     from sympy.printing.str import StrPrinter
 
     class Printer(StrPrinter):
-        def _print_Pow(self, e, rational=False):
-            if e.exp == Rational(1, 2):
-                return f"sqrt({self._print(e.base)})"
-            base, power = (self.parenthesize(x, 80) for x in (e.base, e.exp))
-            return f"{base}^{power}" if not e.exp.is_negative else f"{base}^({self._print(e.exp)})"
+        def _print_Pow(self, expr, rational=False):
+            if expr.exp == Rational(1, 2):
+                return f"sqrt({self._print(expr.base)})"
+            base, power = (self.parenthesize(x, 80) for x in (expr.base, expr.exp))
+            return f"{base}^{power}" if not expr.exp.is_negative else f"{base}^({self._print(expr.exp)})"
 
-        def _print_Float(self, e):
-            return repr(float(e))
+        def _print_Float(self, expr):
+            return repr(float(expr))
 
     names = {"Max(": "max(", "Min(": "min(", "Abs(": "abs("}
     text = Printer({"full_prec": False}).doprint(expression.evalf() if isinstance(expression, Float) else expression)

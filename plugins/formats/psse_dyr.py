@@ -58,7 +58,7 @@ class PsseDyr(Format):
             shares = [(value(f"{x}_Z"), value(f"{x}_I")) for x in "ab"]
             return [((Z, 2.0), (current, 1.0), (1 - Z - current, 0.0)) for Z, current in shares]
         fixed = {"constant_impedance": (2.0, 2.0), "branch": (2.0, 2.0), "constant_power": (0.0, 0.0)}.get(static)
-        return [((1.0, n), (0.0, 0.0), (0.0, 0.0)) for n in fixed or (value("p_v"), value("q_v"))]
+        return [((1.0, n), (0.0, 0.0), (0.0, 0.0)) for n in fixed or (load.values["p_v"], load.values["q_v"])]
 
 
 def _record(bus, model, load, *constants):

@@ -1,7 +1,8 @@
 """Third-order induction motor."""
 
 from tractexp.extend import Motor, plugin
-from tractexp_plugins.motors import _machine
+
+from . import _machine
 
 
 @plugin

@@ -1,7 +1,8 @@
 """First-order induction motor."""
 
 from tractexp.extend import Motor, plugin, sites
-from tractexp_plugins.motors import _machine
+
+from . import _machine
 
 
 @plugin

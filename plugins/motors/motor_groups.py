@@ -36,7 +36,9 @@ class MotorGroups(Motor):
         for member in map(_name, self.of):
             if member in ("none", self.name):
                 raise UserError(f"model/motor={self.of} has '{member}' in it, which is no motor by itself")
-        members = tuple(build("model/motor", m if isinstance(m, Mapping) else {"name": m}) for m in self.of)
+        members: tuple[Motor, ...] = tuple(
+            build("model/motor", m if isinstance(m, Mapping) else {"name": m}) for m in self.of
+        )
         told = {
             "members": members,
             "parameters": tuple(p for k, one in enumerate(members, 1) for p in _own(one, k, len(members))),
@@ -55,6 +57,7 @@ class MotorGroups(Motor):
     def declare(self, eq, **parameters):
         total = 0
         for k, one in enumerate(self.members, 1):
+            assert isinstance(one, Motor)
             own = {p.name: parameters[p.name + _suffix(k)] for p in one.parameters}
             current = one.declare(eq if k == 1 else eq.apart(_suffix(k)), **own)
             if k == 1 and sites.stator_current not in eq:

@@ -1,7 +1,8 @@
 """Fifth-order induction motor: single cage with stator transients."""
 
 from tractexp.extend import Motor, Parameter, plugin, sites
-from tractexp_plugins.motors import _machine
+
+from . import _machine
 
 SOURCE = "Krause, Wasynczuk, Sudhoff 2002, ch. 4"
 

@@ -1,7 +1,8 @@
 """Second-order induction motor: flux without speed."""
 
 from tractexp.extend import Motor, plugin
-from tractexp_plugins.motors import _machine
+
+from . import _machine
 
 
 @plugin

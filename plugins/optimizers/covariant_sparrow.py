@@ -7,7 +7,8 @@ import numpy as np
 from tractexp.errors import check_range
 from tractexp.identification.optimizer import Box, Evaluate, Iterative
 from tractexp.plugin import plugin
-from tractexp_plugins.optimizers._sparrow import Flock
+
+from ._sparrow import Flock
 
 FLAT = 1e-12  # relative spread of the objectives of a flock that has nothing left to compare
 

@@ -9,7 +9,8 @@ import numpy as np
 from tractexp.errors import check_choice, check_range
 from tractexp.identification.optimizer import Box
 from tractexp.plugin import plugin
-from tractexp_plugins.optimizers._sparrow import Flock, Sparrow
+
+from ._sparrow import Flock, Sparrow
 
 LEVY_BETA = 1.5  # beta of Eq. (15)
 BETTER = 2 / 3  # share of a flock that is better than its mean, about
@@ -119,5 +120,5 @@ class ISSA(Sparrow):
         elif 2 * t <= iterations:
             varied, disturbed = np.arange(0), np.arange(len(f))
         else:
-            varied, disturbed = f.argmin(keepdims=True), np.arange(0)
+            varied, disturbed = np.array([f.argmin()]), np.arange(0)
         return varied[: None if self.gaussian else 0], disturbed[: None if self.tent_perturbation else 0]

@@ -54,6 +54,7 @@ class MultistartLeastSquares(Optimizer):
 
     def search(self, evaluate: Evaluate, box: Box, rng: np.random.Generator) -> Iterator[None]:
         center, width = np.full(box.dimension, 0.5), 1.0
+        x, f = np.empty((0, box.dimension)), np.empty(0)
         for _ in range(CLOSER):
             unit = latin_hypercube(self.scatter, box.dimension, rng)
             x, f = evaluate(box.from_unit(center + width * (toward_walls(unit) - 0.5)))

@@ -1,7 +1,8 @@
 """The traditional sparrow search algorithm."""
 
 from tractexp.plugin import plugin
-from tractexp_plugins.optimizers._sparrow import Sparrow
+
+from ._sparrow import Sparrow
 
 
 @plugin

@@ -1,7 +1,8 @@
 """COMTRADE in one file."""
 
 from tractexp.plugin import plugin
-from tractexp_plugins.writers._comtrade import _COMTRADE
+
+from ._comtrade import _COMTRADE
 
 
 @plugin

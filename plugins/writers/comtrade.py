@@ -1,7 +1,8 @@
 """COMTRADE in two files."""
 
 from tractexp.plugin import plugin
-from tractexp_plugins.writers._comtrade import _COMTRADE
+
+from ._comtrade import _COMTRADE
 
 
 @plugin

@@ -1,7 +1,8 @@
 """CSV with a sidecar."""
 
 from tractexp.plugin import plugin
-from tractexp_plugins.writers._table import _Table
+
+from ._table import _Table
 
 
 @plugin

@@ -79,7 +79,7 @@ def _on_bbob(
 
     variants = [v for v in comparison.gathered.variants if not v.settings.get("polish")]
     optimizers = {v.name: nested(v.runs[0].config)["optimizer"] for v in variants}
-    budgets = {run.config.get("budget") for v in variants for run in v.runs} - {None}
+    budgets = {budget for v in variants for run in v.runs if (budget := run.config.get("budget")) is not None}
     multiplier = -(-int(budgets.pop() if len(budgets) == 1 else EVALUATIONS) // DIMENSION)
     told = {"optimizers": optimizers, "instances": instances, "multiplier": multiplier, "code": provenance.code()}
     made = _kept(folder, told) if folder else None

@@ -46,8 +46,8 @@ class Several:
 def terms_of(runs: Sequence[Run]) -> str:
     """What ended the searches: "15,000 simulations", "300 iterations", or "" where they had no end in common."""
     budgets = {run.config.get("budget") for run in runs}
-    if len(budgets) == 1 and None not in budgets:
-        return f"{int(*budgets):,} simulations"
+    if len(budgets) == 1 and (budget := budgets.pop()) is not None:
+        return f"{int(budget):,} simulations"
     counts = {len(run.history) - 1 for run in runs if run.finished}
     return f"{int(*counts)} iterations" if len(counts) == 1 else ""
 

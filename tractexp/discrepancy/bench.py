@@ -99,7 +99,7 @@ class Bench:
     def describe(self, noise: Noise) -> str:
         """Level and color of the noise of what is compared, as a run prints them."""
         told = noise.describe(self.drive.spoken).split(", ")
-        return ", ".join(part for part, there in zip(told, [*self.known.any(axis=1), True], strict=True) if there)
+        return ", ".join(part for part, there in zip(told, [*np.any(self.known, axis=1), True], strict=True) if there)
 
     @functools.cached_property
     def profile(self) -> np.ndarray:

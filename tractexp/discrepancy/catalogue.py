@@ -124,7 +124,7 @@ def missing_channel(effect: Effect, events: Sequence[Event], swing: float) -> st
         enough = any if channel in COMPARED else all
         if not enough(channel in e.channels for e in events):
             return f"it is seen through {channel}, which is not recorded"
-        if channel == "f" and all(np.ptp(e.record.f) < swing for e in events):
+        if channel == "f" and all(np.ptp(e.record.channels["f"]) < swing for e in events):
             return f"it is seen through the frequency, which moves by less than {swing:g} Hz"
     return ""
 

@@ -168,7 +168,7 @@ def _singles(investigation: Investigation) -> list[dict[str, Any]]:
     for j in judgements(investigation):
         values = {}
         if j.score is not None:
-            null = {p.name: p.null for p in investigation.catalogue[j.name].sizes}
+            null = {p.name: p.absent for p in investigation.catalogue[j.name].sizes}
             values = {
                 n: {"value": null[n] + size, "standard_error": _number(j.score.deviation[n])}
                 for n, size in j.score.size.items()

@@ -13,7 +13,7 @@ class Effort:
 
     def __init__(self, tell: Callable[[str], None] = lambda line: None):
         self.simulations, self._lock = 0, Lock()
-        self._tell, self._all = tell, [self]
+        self._tell, self._all = tell, list[Effort]((self,))
         self._step, self._begun, self._said = "", time.perf_counter(), time.perf_counter()
 
     def anew(self) -> "Effort":

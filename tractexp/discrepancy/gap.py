@@ -93,7 +93,8 @@ def _errors(bench: Bench, calculated: np.ndarray) -> tuple[float, float, float |
 
 
 def gap(
-    bench: Bench, base: np.ndarray, extended: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int]
+    bench: Bench, base: np.ndarray, extended: np.ndarray, names: Sequence[str], noise: Noise,
+    fitted: Sequence[int] | np.ndarray,
 ) -> Gap:  # fmt: skip
     """Compare the base model's fit and that with the named effects on the events of `bench`.
 
@@ -108,7 +109,9 @@ def gap(
     return Gap(before, after, float(closed), float(gained), float(rows @ rows), bench.criteria.shown, noise)
 
 
-def left_over(bench: Bench, unit: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int]) -> float:
+def left_over(
+    bench: Bench, unit: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int] | np.ndarray
+) -> float:
     """How much more than chance pushes into all balances would still lower the deviance at coordinates (D,).
 
     Unbiased: the energy in the space of the pushes less its dimension, what is `fitted` projected out.

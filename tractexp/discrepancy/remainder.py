@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tractexp.identification.problem import excited
 from tractexp.model.drive import Drive
@@ -126,7 +127,7 @@ class _Stretch:
         """
         drive = Drive.of([excited(event)])
         known, before = drive.weights > 0, slice(0, event.start)
-        if not isinstance(event, WaveEvent) and np.count_nonzero(known.all(axis=0)[before]) >= FEWEST:
+        if not isinstance(event, WaveEvent) and np.count_nonzero(np.all(known, axis=0)[before]) >= FEWEST:
             noise = estimate(_level(residual[:, before]), known[:, before], [before])
         return cls(event, residual, replace(noise, wander=None, blur=blur), drive)
 
@@ -175,9 +176,8 @@ def remainders(
     excess = sum(float(np.sum(s.white(s.residual[None]) ** 2)) - s.size for s in stretches)
     loudest = [_loudest(s, false_alarms / len(stretches)) for s in stretches]
     told: list[Remainder] = []
-    while len(told) < MOST and any(loudest):
-        e = max(range(len(stretches)), key=lambda e: loudest[e][0] if loudest[e] else 0.0)
-        gain, shape, channel = loudest[e]
+    while len(told) < MOST and (found := [(one, e) for e, one in enumerate(loudest) if one]):
+        (gain, shape, channel), e = max(found, key=lambda f: f[0][0])
         _, sizes, curve = stretches[e].fitted(shape, channel)
         told.append(_told(stretches[e], shape, channel, sizes, gain / max(excess, gain)))
         stretches[e] = replace(stretches[e], residual=stretches[e].residual - curve)
@@ -224,10 +224,10 @@ def _gains(white: np.ndarray, decay: float, frequency: float) -> np.ndarray:
     from scipy.signal import lfilter
 
     z = np.exp(-1 / decay + 2j * np.pi * frequency)
-    sums = lfilter([1.0], [1.0, -z], white[:, ::-1].astype(complex), axis=1)[:, ::-1]
+    sums = np.asarray(lfilter([1.0], [1.0, -z], white[:, ::-1].astype(complex), axis=1), dtype=np.complex128)[:, ::-1]
     left = np.arange(white.shape[1], 0, -1)  # samples from each on
 
-    def series(q: complex) -> np.ndarray:
+    def series(q: complex) -> NDArray[np.complex128]:
         """1 + q + ... over the samples left."""
         return left.astype(complex) if abs(1 - q) < 1e-12 else (1 - q**left) / (1 - q)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.bench import Bench
-from tractexp.discrepancy.fitting import Refit
+from tractexp.discrepancy.fitting import WALL, Refit
 from tractexp.discrepancy.projection import Column, Projection
 from tractexp.discrepancy.pushes import push_points
 from tractexp.noise import Noise
@@ -15,7 +15,7 @@ from tractexp.noise.span import spanned
 
 REACH = 0.5  # smallest relevant sizes: the step of a candidate's difference quotient
 NUISANCE_STEP = 1e-4  # of a coordinate's range
-WALL, HELD = 1e-3, 1e-6  # of it: how near a wall a parameter rests on it, and how far it may move then
+HELD = 1e-6  # of it: how far a parameter that rests on a wall may move
 LEAST_KEPT = 0.2  # of a residual's variance: where columns explain more, it tells nothing of the noise
 
 
@@ -112,7 +112,7 @@ def tangent(bench: Bench, fit: Refit, noise: Noise) -> Tangent:
     )
 
 
-def resting(bench: Bench, unit: np.ndarray, columns: Sequence[int], gradient: np.ndarray) -> np.ndarray:
+def resting(bench: Bench, unit: np.ndarray, columns: Sequence[int] | np.ndarray, gradient: np.ndarray) -> np.ndarray:
     """Which of the columns are parameters of the base model on a wall beyond which the deviance falls.
 
     `gradient` of the deviance is needed for its sign only.
@@ -125,13 +125,13 @@ def resting(bench: Bench, unit: np.ndarray, columns: Sequence[int], gradient: np
 def _by_event(bench: Bench, columns: np.ndarray) -> np.ndarray:
     """Columns (k, C, N) cut into one for each event, (k E, C, N)."""
     split = np.zeros((len(bench.events), *columns.shape))
-    for e, rows in enumerate(split):
+    for e in range(len(split)):
         part = bench.drive.part(e)
-        rows[..., part] = columns[..., part]
+        split[e, ..., part] = columns[..., part]
     return split.reshape(-1, *columns.shape[1:])
 
 
-def two_sided(unit: np.ndarray, columns: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+def two_sided(unit: np.ndarray, columns: Sequence[int] | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Points (k, D) a small step above and below in each of the columns."""
     up, down = (np.tile(unit, (len(columns), 1)) for _ in "ud")
     for row, k in enumerate(columns):
@@ -154,7 +154,7 @@ def _candidate_points(bench: Bench, fit: Refit) -> tuple[np.ndarray, np.ndarray,
                 point = fit.unit.copy()
                 for name, value in setting.items():
                     point[at.column[name]] = at.to_unit(name, value)
-                point[at.column[p.name]] = at.to_unit(p.name, p.null + step)
+                point[at.column[p.name]] = at.to_unit(p.name, p.absent + step)
                 points.append(point)
                 spans.append(step)
             labels.append((candidate, setting, first, len(points)))

@@ -102,21 +102,22 @@ def times(cells: Sequence[Any]) -> tuple[np.ndarray, dt.datetime | None]:
     Times of day run on past midnight, those without hours past the full hour. Raises `BadCell` for what is no time.
     """
     made, start = np.empty(len(cells)), None
+    if not len(cells):
+        return made, start
+    first, begin = _moment(cells[0], 0)
     for row, cell in enumerate(cells):
         day, seconds = _moment(cell, row)
         made[row] = seconds
-        if row == 0:
-            first, begin = day, seconds
         if (day is None) != (first is None):
             raise BadCell(row, f"'{cell}' {'lacks' if day is None else 'has'} a date, unlike the first row")
         if day is not None and first is not None:
             made[row] += (day - first).days * DAY
-    if len(cells) and first is not None:
+    if first is not None:
         start = dt.datetime.combine(first, dt.time()) + dt.timedelta(seconds=begin)
-    elif len(cells):
+    else:
         turn = HOUR if isinstance(cells[0], str) and cells[0].count(":") == 1 else DAY
         made += turn * np.cumsum(np.diff(made, prepend=made[0]) < -turn / 2)
-    return made - (made[0] if len(made) else 0.0), start
+    return made - made[0], start
 
 
 def _moment(cell: Any, row: int) -> tuple[dt.date | None, float]:

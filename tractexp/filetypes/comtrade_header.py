@@ -250,7 +250,8 @@ def _digital(left: _Lines, k: int, count: int) -> Digital:
             "3 by the standard of 1991; correct the line, or the numbers of channels in line 2",
         )  # fmt: skip
     if len(fields) == 5:
-        return Digital(*fields[1:4], int(fields[4] == "1"))
+        name, phase, circuit = fields[1:4]
+        return Digital(name, phase, circuit, int(fields[4] == "1"))
     return Digital(fields[1], "", "", int("1" in fields[2:]))
 
 

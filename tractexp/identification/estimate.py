@@ -230,7 +230,7 @@ def cleaned(likelihood: Likelihood, unit: np.ndarray) -> Likelihood:
     return replace(likelihood, known=known)
 
 
-def with_rivals(known: Uncertainty, units: np.ndarray, deviance: Sequence[float]) -> Uncertainty:
+def with_rivals(known: Uncertainty, units: np.ndarray, deviance: np.ndarray) -> Uncertainty:
     """The judgement with the intervals reaching over other valleys (n, D) that the records do not rule out."""
     limit, own = threshold(), dict(zip(known.names, known.intervals.tolist(), strict=True))
     hull, said = dict(own), dict(known.verdicts)

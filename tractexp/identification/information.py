@@ -1,7 +1,7 @@
 """What the records say about each parameter: the information matrix, its directions, and the intervals it gives."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -30,12 +30,17 @@ class Information:
         basis, _ = np.linalg.qr(seen)
         return cls(tuple(names), values, width, jacobian - basis @ (basis.T @ jacobian))
 
+    _directions: np.ndarray = field(init=False, repr=False)  # rows, in ranges
+    _singular: np.ndarray = field(init=False, repr=False)
+    _seen: np.ndarray = field(init=False, repr=False)
+    _blind: np.ndarray = field(init=False, repr=False)
+
     def __post_init__(self) -> None:
         size = np.linalg.norm(self.J, axis=0)
         scale = np.where(size > 0, size, 1.0)
         _, singular, directions = np.linalg.svd(self.J / scale, full_matrices=False)
         seen = singular > STRUCTURAL * singular.max(initial=0.0)
-        object.__setattr__(self, "_directions", directions / scale)  # rows, in ranges
+        object.__setattr__(self, "_directions", directions / scale)
         object.__setattr__(self, "_singular", singular)
         object.__setattr__(self, "_seen", seen & (singular > 0))
         object.__setattr__(self, "_blind", size == 0)
@@ -61,7 +66,7 @@ class Information:
     @property
     def identifiable(self) -> np.ndarray:
         """(d,) False for parameters that take part in a direction that changes nothing."""
-        return ~(np.abs(self.unseen) > SHARE).any(axis=0)
+        return ~np.any(np.abs(self.unseen) > SHARE, axis=0)
 
     @property
     def standard_errors(self) -> np.ndarray:
@@ -94,7 +99,7 @@ def _echelon(rows: np.ndarray) -> np.ndarray:
     while done < len(rows):
         open_ = np.abs(rows[done:])
         open_[:, used] = 0.0
-        i, j = np.unravel_index(open_.argmax(), open_.shape)
+        i, j = map(int, np.unravel_index(open_.argmax(), open_.shape))
         if open_[i, j] < 1e-9:
             break
         rows[[done, done + i]] = rows[[done + i, done]]

@@ -84,10 +84,11 @@ class Observed:
         """
         apart = np.linalg.qr(columns.reshape(len(columns), -1)[np.any(columns != 0, axis=(1, 2))].T)[0]
         kept = np.maximum(1 - (apart**2).sum(axis=1), LEAST_KEPT).reshape(residuals.shape)  # the fit took the rest
+        first = self.events[0]
         where = [self.drive.part(e) for e in range(self.drive.events)] if whole else self.quiet
         try:
-            if answers is not None:
-                return of_waves(residuals / np.sqrt(kept), known, where, answers, self.events[0].phases, blur)
+            if answers is not None and isinstance(first, WaveEvent):
+                return of_waves(residuals / np.sqrt(kept), known, where, answers, first.phases, blur)
             wander = functools.partial(self._wander, residuals, columns, known)
             return estimate(residuals / np.sqrt(kept), known, where, wander, blur)
         except UserError:
@@ -143,9 +144,10 @@ def answers(problem: Problem, values: np.ndarray) -> tuple[np.ndarray, np.ndarra
     that sample to the dip: what is smooth between samples is changed a little earlier. Of the first event.
     """
     event = problem.events[0]
+    assert isinstance(event, WaveEvent)
     noise = max(event.noise_U, SMALLEST)
     shocks = [(noise, 0.0), (1j * noise, 0.0), (0.0, noise / np.sqrt(2))][: event.phases]  # the zero's is a third
-    events = [event, *(_struck(event, *shock) for shock in shocks)]
+    events: list[Event] = [event, *(_struck(event, *shock) for shock in shocks)]
     drive = Drive.of([excited(e, problem.model) for e in events])
     own = np.tile(problem.by_event(values)[:1], (len(events), 1, 1))
     response = problem.model.simulate(drive, own, np.tile(problem.step.substeps[:1], len(events)))
@@ -169,6 +171,7 @@ def _of_voltage(problem: Problem, values: np.ndarray, event: int) -> np.ndarray:
     """What offsets of the voltage do in one event, and what it may be between samples at its edges, (k, 3, N)."""
     drive, part = problem.drive, problem.drive.part(event)
     plain = problem.events[event]
+    assert isinstance(plain, WaveEvent)
     one = Drive.of([excited(e, problem.model) for e in (plain, *_shifted(plain), *_between(plain))])
     own = np.tile(problem.by_event(values)[[event]], (one.events, 1, 1))
     made = problem.model.simulate(one, own, np.tile(problem.step.substeps[[event]], one.events)).outputs[:, 0]
@@ -195,7 +198,7 @@ def _between(event: WaveEvent) -> list[WaveEvent]:
 
     How far each sample lies off a cubic through its neighbors tells how far the cubic may be off between samples.
     """
-    off = np.abs(_off_neighbors(event.v * event.turn))
+    off = np.abs(off_neighbors(event.v * event.turn))
     off[: event.lead + 3] = 0.0
     seen = np.argsort(-off)[:MOST_BETWEEN]
     seen = np.sort(seen[off[seen] > max(ROUGH * event.noise_U, SMALLEST)])
@@ -207,7 +210,7 @@ def _between(event: WaveEvent) -> list[WaveEvent]:
     return made
 
 
-def _off_neighbors(v: np.ndarray) -> np.ndarray:
+def off_neighbors(v: np.ndarray) -> np.ndarray:
     """How far each sample of v (N,) lies off the cubic through two on either side; 0 at the ends."""
     off = np.zeros_like(v)
     off[3:-3] = v[3:-3] - (9 * (v[2:-4] + v[4:-2]) - (v[:-6] + v[6:])) / 16
@@ -232,4 +235,4 @@ def _struck(event: WaveEvent, vector: complex, zero: float) -> WaveEvent:
     v = vector * struck
     if event.phases == 1:  # whose imaginary part is what the sample was a quarter of a cycle ago
         v = v + 1j * np.roll(v, round(event.rate / event.f0 / 4))
-    return replace(event, v=event.v + v * event.turn.conj(), v_zero=event.v_zero + zero * struck.real)
+    return replace(event, v=event.v + v * event.turn.conj(), v_zero=event.v_zero + zero * np.real(struck))

@@ -23,7 +23,8 @@ class Evaluate(Protocol):
     `budget` is the number of evaluations the search may make, by which a schedule can be laid out; None: any.
     """
 
-    budget: int | None
+    @property
+    def budget(self) -> int | None: ...
 
     def __call__(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points (n, d) -> (evaluated points (n, d), objectives (n,)). Lower is better; never nan."""

@@ -30,6 +30,7 @@ def excited(event: Event, model: Model | None = None, loss: Loss | None = None) 
     loss = loss or Loss()
     if not isinstance(event, WaveEvent):
         return replace(excitation(event, model), weight_P=loss.weight_P, weight_Q=loss.weight_Q)
+    assert event.record.U2 is not None
     return Waveforms(
         step=event.record.step, v=event.v, v_zero=event.v_zero, turn=event.turn, currents=event.currents,
         U=event.record.U, U2=event.record.U2, U0=event.U0, P0=event.P0, Q0=event.Q0,
@@ -45,8 +46,9 @@ def excitation(event: Event, model: Model | None = None) -> Excitation:
     the record's window where that is known, and looked at through it.
     """
     window = event.record.window if model is not None and model.motor.within_a_cycle else None
-    weights = None if window is None else window.on(event.record.step)
+    weights = None
     if window is not None:
+        weights = window.on(event.record.step)
         event = sharpened(event, weights, window.length)
     record, nominal = event.record, 2 * np.pi * event.record.base.frequency
     return Excitation(

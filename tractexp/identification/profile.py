@@ -126,8 +126,8 @@ def profiles(known: Uncertainty, points: int = 24, names: Sequence[str] | None =
 
     Where a point fits better than the optimum did, everything starts again from there.
     """
-    simulations, limit = 0, threshold()
-    for restarts in range(RESTARTS + 1):
+    simulations, restarts, limit = 0, 0, threshold()
+    while True:
         lanes = _Lanes(known, limit, names or known.names)
         for _ in range(points):
             if not lanes.advance():
@@ -140,6 +140,7 @@ def profiles(known: Uncertainty, points: int = 24, names: Sequence[str] | None =
         found = descend(known.likelihood.rows, lanes.better[None])
         simulations += found.simulations
         known = conclude(known.likelihood, found.unit[0], known.notes)
+        restarts += 1
     made = tuple(lanes.profile(k) for k in range(len(names or known.names)))
     return Profiles(known, made, limit, simulations, restarts)
 

@@ -33,7 +33,7 @@ def _phasors(event: WaveEvent, currents: np.ndarray) -> Phasors:
     voltage = event.of_phases(np.stack([v.real, v.imag, event.v_zero]))
     size = np.sqrt(2 / event.phases)  # so that K V I* of the peaks' phasors is v i*
     waves = np.concatenate([voltage, event.of_phases(currents)])[:, part] * size
-    estimator, base = event.phasors.record.waves.estimator, event.phasors.record.base
-    return measure(
-        waves, event.rate, base.frequency, float(event.record.t[event.lead]), window=estimator_of(estimator).averager
-    )
+    recorded, base = event.phasors.record.waves, event.phasors.record.base
+    assert recorded is not None
+    window = estimator_of(recorded.estimator).averager
+    return measure(waves, event.rate, base.frequency, float(event.record.t[event.lead]), window=window)

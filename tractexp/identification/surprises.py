@@ -5,6 +5,7 @@ tail, the largest of many (b, k) that of a Gumbel distribution, both with the mo
 the tails reach further than their number.
 """
 
+import functools
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -32,7 +33,7 @@ class Layout(Protocol):
     def events(self) -> Sequence[Event]: ...
     @property
     def drive(self) -> Drive: ...
-    @property
+    @functools.cached_property
     def quiet(self) -> Sequence[slice]: ...
 
 

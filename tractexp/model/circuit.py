@@ -33,6 +33,16 @@ class Circuit:
     _fluxes: dict[sympy.Expr, Symbol]
     _lost: tuple[sympy.Expr, sympy.Expr]
 
+    if TYPE_CHECKING:  # of these words `Equations` has the sentences
+
+        def __contains__(self, what: Site | str) -> bool: ...
+        def __getitem__(self, what: Site | str) -> Symbol: ...
+        def _define(self, symbol: Symbol, expression: sympy.Expr, latex: str) -> Symbol: ...
+        def lag_vector(self, name: str, latex: str) -> Symbol: ...
+        def moves(
+            self, state: Symbol, derivative: sympy.Expr, initial: sympy.Expr, balance: sympy.Expr | None = None
+        ) -> None: ...
+
     def consume(self, P: sympy.Expr, Q: sympy.Expr, damping: sympy.Expr = DAMPING) -> None:
         """Add power drawn at the bus (positive when consumed); before the event the static load gives way.
 

@@ -52,6 +52,11 @@ class _Printer(PythonCodePrinter):
 _printer = _Printer({"fully_qualified_modules": True, "precision": 17})
 
 
+def _printed(expression: sympy.Expr) -> str:
+    """An expression as Python source."""
+    return str(_printer.doprint(expression))
+
+
 def source(lowered: Lowered, title: str, integration: str = "classical") -> str:
     """The kernel module's source text. Deterministic: the same equations give the same text."""
     at = _Rows(lowered)
@@ -228,13 +233,13 @@ def _stage(lowered: Lowered, at: _Rows, slope: str, point: str, ahead: tuple[str
 def _start(lowered: Lowered, rows: list[sympy.Symbol]) -> str:
     """States before the event and by how much the requirements are missed (0: a steady state exists)."""
     states, slacks = lowered.start.expressions[: len(lowered.starts)], lowered.start.expressions[len(lowered.starts) :]
-    short = [f"max(0.0, -({_printer.doprint(s)}))" for s in slacks]
-    lines = [f"{s} = {_printer.doprint(e)}" for s, e in lowered.start.temporaries]
+    short = [f"max(0.0, -({_printed(s)}))" for s in slacks]
+    lines = [f"{s} = {_printed(e)}" for s, e in lowered.start.temporaries]
     lines.append(f"miss = min({' + '.join(short) or '0.0'}, 1e6)")
     missed = "miss if miss >= 0.0 else 1e6"
     if len(states) >= LONG_TUPLE:
         lines, missed = [*lines, f"miss = {missed}"], "miss"
-    lines.append(f"return {', '.join([*map(_printer.doprint, states), missed])}")
+    lines.append(f"return {', '.join([*map(_printed, states), missed])}")
     return _text("_start", [*rows, *lowered.event], lines)
 
 
@@ -258,10 +263,10 @@ def _phase(name: str, arguments: list, phase: Phase) -> str:
 
 
 def _function(name: str, arguments: list, temporaries: Iterable, expressions: Iterable[sympy.Expr]) -> str:
-    results = [_printer.doprint(e) for e in expressions]
+    results = [_printed(e) for e in expressions]
     if not results:
         return ""
-    lines = [f"{s} = {_printer.doprint(e)}" for s, e in temporaries]
+    lines = [f"{s} = {_printed(e)}" for s, e in temporaries]
     lines.append(f"return {', '.join(results)}{',' * (len(results) == 1)}")
     return _text(name, arguments, lines)
 

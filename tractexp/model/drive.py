@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 PHASORS, WAVES = DOMAINS = ("phasors", "waves")
 # Rows of `Drive.inputs`: U_rate is the slope of U there [pu/s]. Those of waves follow: the voltage's space vector v in
@@ -80,9 +81,9 @@ class Waveforms:
     """
 
     step: float
-    v: np.ndarray
+    v: NDArray[np.complex128]
     v_zero: np.ndarray
-    turn: np.ndarray
+    turn: NDArray[np.complex128]
     currents: np.ndarray
     U: np.ndarray
     U2: np.ndarray
@@ -153,7 +154,7 @@ class Drive:
     windows: tuple[np.ndarray | None, ...] = ()  # of each event, where any has one
 
     @classmethod
-    def of(cls, events: Sequence[Excitation] | Sequence[Waveforms]) -> "Drive":
+    def of(cls, events: Sequence[Excitation | Waveforms]) -> "Drive":
         """Lay events end to end, all phasors or all waves."""
         measured = np.concatenate([e.measured for e in events], axis=1)
         lengths = [e.measured.shape[1] for e in events]

@@ -21,7 +21,7 @@ from tractexp.model.graph import halves as real_and_imaginary
 from tractexp.model.graph import replaced, symbols_of
 from tractexp.model.names import check_name
 from tractexp.model.sites import Site
-from tractexp.model.states import Memory, Requirement, State
+from tractexp.model.states import UNSAID, Memory, Requirement, State
 from tractexp.model.symbols import is_real as _is_real
 from tractexp.model.symbols import phasor_parts, start_symbol
 from tractexp.model.symbols import real_symbol as _real
@@ -211,8 +211,8 @@ class Equations(Circuit):
     def _check_kind(self, site: Site, expression: sympy.Expr) -> None:
         """Raise `UserError` where a real site would get what is not made of real symbols and real parts."""
         whole = self.expand(expression, lambda s: s.name not in sites.SITES)
-        real = {s for s in whole.free_symbols if s.name in sites.SITES and sites.SITES[s.name].kind == "real"}
-        left = whole.xreplace(dict.fromkeys({*whole.atoms(re, im, sympy.Abs), *real}, _real("part")))
+        real = {s for s in symbols_of(whole) if s.name in sites.SITES and sites.SITES[s.name].kind == "real"}
+        left: Any = whole.xreplace(dict.fromkeys({*whole.atoms(re, im, sympy.Abs), *real}, _real("part")))
         if site.kind == "real" and not _is_real(left):
             raise UserError(
                 f"the site {site.name} is real, and what the {self._writer} puts there is not: {expression}; take its"
@@ -341,10 +341,10 @@ class Equations(Circuit):
     def close(self) -> None:
         """Give the static load what the other parts leave before the event. Called once all parts have declared."""
         for symbol, state in self.states.items():
-            if state.derivative is None:
+            if state.derivative is UNSAID:
                 raise UserError(f"nothing says how the state '{symbol}' moves; call eq.moves once for each state")
         for symbol, memory in self.memories.items():
-            if memory.renewal is None:
+            if memory.renewal is UNSAID:
                 raise UserError(f"nothing renews the memory '{symbol}'; call eq.renews once for each memory")
         self._derive_starts()
         without_static = {self.P_s0: sympy.Integer(0), self.Q_s0: sympy.Integer(0)}
@@ -352,7 +352,7 @@ class Equations(Circuit):
             whole = self.parts(self.v * conjugate(self._drawn[sites.current]))
             others = [replaced(power, without_static | self._starts()) for power in whole]
         else:
-            powers = (self.expand(power).xreplace(without_static) for power in (self.P, self.Q))
+            powers = (replaced(self.expand(power), without_static) for power in (self.P, self.Q))
             others = [self.real(self.before(power)) for power in powers]
         lost = [self.real(self.before(power)) for power in self._lost]
         share = self._share()
@@ -381,7 +381,7 @@ class Equations(Circuit):
                     )
         for state in self.states.values():
             if state.derived:
-                state.initial = self.before(state.initial).xreplace(known)
+                state.initial = replaced(self.before(state.initial), known)
 
     def _check_still(self, what: str, expression: sympy.Expr) -> None:
         """Raise `UserError` where a value before the event is written in what moves after it."""
@@ -473,7 +473,9 @@ class Equations(Circuit):
 
     def real(self, expression: sympy.Expr) -> sympy.Expr:
         """The real part of an expression that is meant to be real."""
-        return (self._parts_of(expression) if expression in self.definitions else self.parts(expression))[0]
+        if isinstance(expression, Symbol) and expression in self.definitions:
+            return self._parts_of(expression)[0]
+        return self.parts(expression)[0]
 
     def _parts_of(self, name: Symbol) -> tuple[sympy.Expr, sympy.Expr]:
         """Real and imaginary part of a named quantity, reckoned once."""

@@ -4,7 +4,8 @@ SymPy walks an expression as a tree. The steady state of a double cage, Newton's
 graph and a tree of millions.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import sympy
 from sympy import Basic, Symbol
@@ -26,9 +27,14 @@ def symbols_of(expression: Basic) -> set[Symbol]:
     return {part for part in nodes(expression) if isinstance(part, Symbol)}
 
 
+def arguments(expression: sympy.Expr) -> tuple[sympy.Expr, ...]:
+    """The arguments of an expression, which are expressions."""
+    return expression.args  # pyright: ignore[reportReturnType] # SymPy calls them `Basic`, as those of a set are
+
+
 def replaced(expression: sympy.Expr, known: Mapping[Symbol, sympy.Expr], plain: bool = False) -> sympy.Expr:
     """The expression with symbols replaced, as `xreplace` does it; `plain`: maxima and minima are not looked into."""
-    made: dict[Basic, Basic] = dict(known)
+    made: dict[Basic, Basic] = {**known}
 
     def visit(part: Basic) -> Basic:
         if part not in made:
@@ -37,10 +43,10 @@ def replaced(expression: sympy.Expr, known: Mapping[Symbol, sympy.Expr], plain: 
             made[part] = part if same else _rebuilt(part, args, plain)
         return made[part]
 
-    return visit(expression)  # type: ignore[return-value]
+    return visit(expression)  # pyright: ignore[reportReturnType] # an expression's parts give one again
 
 
-def _rebuilt(part: Basic, args: list[Basic], plain: bool) -> Basic:
+def _rebuilt(part: Basic, args: Sequence[Basic], plain: bool) -> Any:
     """The same function of other arguments. SymPy compares those of a maximum with each other, which takes seconds."""
     if plain and isinstance(part, sympy.Max | sympy.Min) and not all(a.is_number for a in args):
         return part.func(*args, evaluate=False)
@@ -89,4 +95,5 @@ def _halves(part: Basic, args: list[tuple[sympy.Expr, sympy.Expr]]) -> tuple[sym
         return a / (a**2 + b**2), -b / (a**2 + b**2)
     if isinstance(part, sympy.Pow) and part.exp.is_Integer and part.exp > 1:
         return _product([args[0]] * int(part.exp))
-    return part.as_real_imag()
+    assert isinstance(part, sympy.Expr)
+    return part.as_real_imag()  # pyright: ignore[reportReturnType] # SymPy's own types allow for None

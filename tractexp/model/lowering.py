@@ -7,6 +7,7 @@ becomes exp(exponent * log(base)), whose logarithm is then a signal.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import sympy
 from sympy import Symbol
@@ -14,7 +15,7 @@ from sympy import Symbol
 from tractexp.errors import UserError
 from tractexp.model.drive import EVENT, INPUTS
 from tractexp.model.equations import Equations, phasor_parts, start_symbol
-from tractexp.model.graph import replaced, symbols_of
+from tractexp.model.graph import arguments, replaced, symbols_of
 from tractexp.model.rest import settled
 
 
@@ -60,8 +61,8 @@ class _Hoister:
     def symbols(self, e: sympy.Expr) -> frozenset[Symbol]:
         """The symbols of an expression, those of each of its parts found once."""
         if e not in self._symbols:
-            own = frozenset((e,)) if e.is_Symbol else frozenset()
-            self._symbols[e] = own.union(*map(self.symbols, e.args))
+            own = frozenset[Symbol]((e,) if isinstance(e, Symbol) else ())
+            self._symbols[e] = own.union(*map(self.symbols, arguments(e)))
         return self._symbols[e]
 
     def is_constant(self, e: sympy.Expr) -> bool:
@@ -96,12 +97,12 @@ class _Hoister:
             return self(sympy.exp(e.exp * sympy.log(e.base)))
         if isinstance(e, sympy.Add | sympy.Mul):
             return self._grouped(e)
-        return e.func(*map(self, e.args))
+        return e.func(*map(self, arguments(e)))
 
     def _grouped(self, e: sympy.Expr) -> sympy.Expr:
-        constant = [a for a in e.args if self.is_constant(a)]
-        signal = [a for a in e.args if a not in constant and self.is_signal(a)]
-        rest = [self(a) for a in e.args if a not in constant and a not in signal]
+        constant = [a for a in arguments(e) if self.is_constant(a)]
+        signal = [a for a in arguments(e) if a not in constant and self.is_signal(a)]
+        rest = [self(a) for a in arguments(e) if a not in constant and a not in signal]
         if constant:
             rest.append(self.constant(e.func(*constant)))
         if signal:
@@ -127,7 +128,7 @@ def lower(eq: Equations) -> Lowered:
     output = _phase(hoist, [eq.real(e) for e in outputs.values()], steps)
     first = [i for _, _, i in rows] + [eq.real(m.initial) for m in eq.memories.values()]
     begin = dict(zip(starts, first, strict=True))
-    slack = [eq.expand(r.slack).xreplace(begin) for r in eq.requirements]
+    slack = [replaced(eq.expand(r.slack), begin) for r in eq.requirements]
     start = _phase(None, first + slack)
     at_rest = eq.at_rest() | dict(zip((*states, *memories), starts, strict=True))
     balances = _phase(None, [replaced(b, at_rest, eq.waves) for b in eq.real_balances()])
@@ -144,7 +145,7 @@ def lower(eq: Equations) -> Lowered:
 def symbols(phase: Phase) -> set[Symbol]:
     """All symbols a phase reads or makes."""
     parts = (*phase.expressions, *(e for _, e in (*phase.temporaries, *phase.signals)))
-    return set().union(*(e.free_symbols for e in parts))
+    return set[Symbol]().union(*map(symbols_of, parts))
 
 
 def _phase(
@@ -157,7 +158,8 @@ def _phase(
         expressions = [hoist(e) for e in expressions]
         used = set().union(*map(symbols_of, expressions))
         signals = tuple((s, e) for e, s in hoist.signals.items() if s in used)
-    temporaries, reduced = sympy.cse(expressions, symbols=sympy.numbered_symbols("x", real=True), order="none")
+    found: Any = sympy.cse(expressions, symbols=sympy.numbered_symbols("x", real=True), order="none")
+    temporaries, reduced = found
     computed = [*temporaries, *zip(targets, reduced, strict=False)]
     return Phase(signals, _in_order(computed), tuple(reduced[len(targets) :]))
 

@@ -159,7 +159,11 @@ class Model:
         return load(self.source)
 
     def simulate(
-        self, drive: Drive, values: np.ndarray, substeps: Sequence[int] | int = 1, before: np.ndarray | None = None
+        self,
+        drive: Drive,
+        values: np.ndarray,
+        substeps: Sequence[int] | np.ndarray | int = 1,
+        before: np.ndarray | None = None,
     ) -> Response:
         """P and Q of every candidate over every event, (n, N).
 
@@ -179,7 +183,7 @@ class Model:
             outputs = effect.observe(outputs, drive, columns)
         return Response(outputs, miss)
 
-    def errors(self, drive: Drive, values: np.ndarray, substeps: Sequence[int] | int = 1) -> Errors:
+    def errors(self, drive: Drive, values: np.ndarray, substeps: Sequence[int] | np.ndarray | int = 1) -> Errors:
         """Weighted squared errors of every candidate over every event, in one pass and without storing responses."""
         if self.measurements or drive.windows:
             return self._errors_of(self.simulate(drive, values, substeps), drive)

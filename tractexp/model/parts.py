@@ -1,7 +1,8 @@
 """The bases a load is composed of. A part returns what it is asked for; the framework does the rest.
 
 A method gets the part's own parameters by name, as SymPy symbols; which names it asks for is checked when the plugin
-is registered. What `eq` offers is told in docs/plugins.md.
+is registered, and the bases' `*_, **parameters` leave them open to a type checker. What `eq` offers is told in
+docs/plugins.md.
 """
 
 from abc import abstractmethod
@@ -53,7 +54,7 @@ class Motor(Part):
     within_a_cycle: ClassVar[bool] = False
 
     @abstractmethod
-    def declare(self, eq: "Equations", **parameters: Any) -> Any:
+    def declare(self, eq: "Equations", *_: Any, **parameters: Any) -> Any:
         """Declare states and sites in `eq` and return the phasor of the stator current [pu]; None: no motor.
 
         The motor draws V conj(I), V = `eq.V`; the framework declares that.
@@ -74,19 +75,19 @@ class Static(Part):
     group: ClassVar[str] = "model/static"
 
     @abstractmethod
-    def law(self, u: Any, **parameters: Any) -> tuple[Any, Any] | None:
+    def law(self, u: Any, *_: Any, **parameters: Any) -> tuple[Any, Any] | None:
         """P/P_s0 and Q/Q_s0 at the voltage u = U/U_0, both 1 at u = 1; None: no static load.
 
         A law that names an argument `f` gets the frequency over that before the event.
         """
 
-    def damping(self, **parameters: Any) -> Any:
+    def damping(self, *_: Any, **parameters: Any) -> Any:
         """Resistance over reactance of the branch that draws Q_s in waveforms; in phasors there is none."""
         from tractexp.model.circuit import DAMPING
 
         return DAMPING
 
-    def require(self, **parameters: Any) -> Iterable[tuple]:
+    def require(self, *_: Any, **parameters: Any) -> Iterable[tuple]:
         """What must hold for a steady state: (slack, sentence) or (slack, sentence, shown), slack >= 0 where it does.
 
         `{value}` in the sentence prints `shown`, by default the slack. May ask for `P0`, `Q0` and `U0` by name.
@@ -141,12 +142,12 @@ class Effect(Part):
     nests_textbook: ClassVar[bool] = False
     likely: ClassVar[Mapping[str, float]] = {}
 
-    def curve(self, **parameters: float) -> "Curve | None":
+    def curve(self, *_: Any, **parameters: Any) -> "Curve | None":
         """The law found, where it is one that can be drawn, at these values of the parameters."""
         return None
 
     @abstractmethod
-    def edit(self, eq: "Equations", **parameters: Any) -> None:
+    def edit(self, eq: "Equations", *_: Any, **parameters: Any) -> None:
         """Edit the declared equations: call `eq.edit` on a site, add what is new.
 
         Asking `eq` for what a model lacks refuses the effect for that model.
@@ -191,7 +192,7 @@ class Effect(Part):
 class Measurement(Effect):
     """Base of the effects of the measurement: they act on the calculated power, not on the equations."""
 
-    def edit(self, eq: "Equations", **parameters: Any) -> None:
+    def edit(self, eq: "Equations", *_: Any, **parameters: Any) -> None:
         """A recorder leaves the equations as they are."""
 
     @abstractmethod

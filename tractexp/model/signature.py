@@ -31,7 +31,7 @@ def check_signature(
                 f"{where}: {method}() asks for '{argument.name}', which is neither a parameter of it nor offered"
                 f"{among(argument.name, (*own, *offered), 'It may ask for')}"
             )
-        if argument.kind is argument.VAR_POSITIONAL:
+        if argument.kind is argument.VAR_POSITIONAL and argument.name != "_":  # the bases' own, which gets nothing
             raise UserError(f"{where}: {method}() gets its parameters by name, so it cannot take *{argument.name}")
     rest = any(a.kind is a.VAR_KEYWORD for a in arguments)
     taken = {a.name for a in arguments}

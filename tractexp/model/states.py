@@ -6,6 +6,8 @@ from typing import Literal
 import sympy
 from sympy import Symbol
 
+UNSAID = Symbol("unsaid")  # where nothing has told yet how a state moves or what a memory becomes
+
 
 @dataclass
 class State:
@@ -19,8 +21,8 @@ class State:
     latex: str
     role: Literal["flux", "speed", "lag"]
     writer: str
-    derivative: sympy.Expr | None = None
-    initial: sympy.Expr | None = None
+    derivative: sympy.Expr = UNSAID
+    initial: sympy.Expr = UNSAID
     balance: sympy.Expr | None = None
     derived: bool = False  # `initial` is written in what moves, and taken before the event once all parts have declared
 
@@ -40,5 +42,5 @@ class Memory:
 
     symbol: Symbol
     latex: str
-    renewal: sympy.Expr | None = None
-    initial: sympy.Expr | None = None
+    renewal: sympy.Expr = UNSAID
+    initial: sympy.Expr = UNSAID

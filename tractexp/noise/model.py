@@ -163,7 +163,7 @@ class Noise:
         pair, rows = self.pair(event), []
         if self.vector:
             white = pair[0].whiten(mixed[:, 0] + 1j * mixed[:, 1], known[0])
-            rows = [white.real, white.imag]
+            rows = [np.real(white), np.imag(white)]
         rows += [channel.whiten(mixed[:, c], known[c]) for c, channel in enumerate(pair) if c >= len(rows)]
         return np.stack(rows, axis=1)
 
@@ -212,7 +212,7 @@ class Noise:
         if self.vector:
             shocks = rng.standard_normal((2, *size)) * pair[0].deviation[-1]
             turning = pair[0].recurring(shocks[0] + 1j * shocks[1])[:, BURN_IN:]
-            colored = [turning.real, turning.imag]
+            colored = [np.real(turning), np.imag(turning)]
         for c, channel in list(enumerate(pair))[len(colored) :]:
             shocks = rng.standard_normal(size) if self.shocks is None else rng.choice(self.shocks[c], size)
             shocks *= channel.deviation[-1]
@@ -223,8 +223,8 @@ class Noise:
 
 def _all_measured(known: np.ndarray) -> np.ndarray:
     """Samples (C, n) at which every channel counts that counts at all."""
-    measured = known.any(axis=1)
-    return known[measured].all(axis=0) & measured[:, None]
+    measured = np.any(known, axis=1)
+    return np.all(known[measured], axis=0) & measured[:, None]
 
 
 def _shrunk(channels: tuple[int, ...], shapes: np.ndarray) -> Shrunk:

@@ -39,8 +39,8 @@ def estimate(
 
     Raises `UserError` where too few samples are quiet.
     """
-    measured = known.any(axis=1)
-    both = known[measured].all(axis=0)
+    measured = np.any(known, axis=1)
+    both = np.all(known[measured], axis=0)
     pieces = [residuals[measured, part][:, both[part]] for part in quiet]
     count = sum(p.shape[1] for p in pieces)
     if count < FEWEST:

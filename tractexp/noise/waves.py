@@ -35,7 +35,7 @@ def of_waves(
     `answers` has, for the space vector and for the zero sequence, the currents (L,) [pu] that one standard deviation of
     a voltage's sample causes at the samples from then on. Raises `UserError` where too few samples are quiet.
     """
-    measured = known.any(axis=1)
+    measured = np.any(known, axis=1)
     count = sum(part.stop - part.start for part in quiet)
     if count < FEWEST:
         raise UserError(
@@ -56,7 +56,7 @@ def _fitted(pieces: Sequence[np.ndarray], answer: np.ndarray) -> Autoregression:
     level = max(np.sqrt(np.mean(np.abs(np.concatenate(pieces)) ** 2) / per), SMALLEST)
     passed = covariances(answer, HIGHEST)
     if per == 1:
-        passed = passed.real
+        passed = np.real(passed)
     shares = SHARES if passed[0].real > (1e-3 * level) ** 2 else (0.0,)
 
     def of(share: float, floor: float) -> tuple[float, float, float, Autoregression]:

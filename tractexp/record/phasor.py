@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tractexp.errors import UserError
 
@@ -103,7 +104,7 @@ def fundamental(
     return np.array(found) if harmonics else found[0]
 
 
-def sequences(phases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def sequences(phases: np.ndarray) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
     """Positive and negative sequence (N,) of three phase phasors (3, N), ordered a, b, c (Fortescue 1918)."""
     a, b, c = phases
     return (a + TURN * b + TURN**2 * c) / 3, (a + TURN**2 * b + TURN * c) / 3
@@ -160,33 +161,33 @@ class Phasors:
     """RMS phasors of one load at uniform times: of its three phases (K = 3) or of the only one (K = 1)."""
 
     t: np.ndarray  # (M,) s
-    V: np.ndarray  # (K, M) kV, phase to ground; of a single-phase load the voltage it is fed with
-    I: np.ndarray  # (K, M) kA, into the load
+    V: NDArray[np.complex128]  # (K, M) kV, phase to ground; of a single-phase load the voltage it is fed with
+    I: NDArray[np.complex128]  # (K, M) kA, into the load
     f: np.ndarray  # (M,) Hz, at which the (positive-sequence) voltage turns
     more: Mapping[str, np.ndarray] = field(default_factory=dict)  # (M,) each: P_3, ..., P_H [MW], THD_u, THD_i
 
     @property
-    def V1(self) -> np.ndarray:
+    def V1(self) -> NDArray[np.complex128]:
         """Positive-sequence voltage (M,) [kV]; of a single-phase load its voltage."""
         return symmetrical(self.V)[0]
 
     @property
-    def V2(self) -> np.ndarray:
+    def V2(self) -> NDArray[np.complex128]:
         """Negative-sequence voltage (M,) [kV]; zero for a single-phase load."""
         return symmetrical(self.V)[1]
 
     @property
-    def I1(self) -> np.ndarray:
+    def I1(self) -> NDArray[np.complex128]:
         """Positive-sequence current (M,) [kA]; of a single-phase load its current."""
         return symmetrical(self.I)[0]
 
     @property
-    def I2(self) -> np.ndarray:
+    def I2(self) -> NDArray[np.complex128]:
         """Negative-sequence current (M,) [kA]; zero for a single-phase load."""
         return symmetrical(self.I)[1]
 
     @property
-    def S(self) -> np.ndarray:
+    def S(self) -> NDArray[np.complex128]:
         """Power P + jQ [MVA], (M,) complex: of the positive sequence, 3 V1 I1*; of a single-phase load V I*."""
         return len(self.V) * self.V1 * self.I1.conj()
 
@@ -257,8 +258,10 @@ def _distortion(
     fundamental; of three phases together as in its effective values, 3.2.2.
     """
     K = X.shape[1] // 2
-    made = {"P_H": power.sum(axis=0) - (X[0, :K] * X[0, K:].conj()).real.sum(axis=0)}
-    made |= {f"P_{h}": (V * I.conj()).real.sum(axis=0) for h, V, I in zip(harmonics, X[1:, :K], X[1:, K:], strict=True)}
+    made = {"P_H": power.sum(axis=0) - np.real(X[0, :K] * X[0, K:].conj()).sum(axis=0)}
+    made |= {
+        f"P_{h}": np.real(V * I.conj()).sum(axis=0) for h, V, I in zip(harmonics, X[1:, :K], X[1:, K:], strict=True)
+    }
     for name, side in (("THD_u", slice(K)), ("THD_i", slice(K, None))):
         one = (np.abs(X[0, side]) ** 2).sum(axis=0)
         rest = np.maximum(squares[side].sum(axis=0) - one, 0.0)

@@ -5,6 +5,7 @@ periodic course slowly, and what is faster is noise. It stays where it is louder
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +33,8 @@ class Quieting:
             return cls(np.ones(1), near)
         taps, beta = kaiserord(RIPPLE, 2 * width / rate)
         half = taps // 2 + 1
-        weights = firwin(2 * half + 1, edge, window=("kaiser", beta), fs=rate)
+        window: Any = ("kaiser", beta)  # SciPy's type of it is inferred from its default, a name
+        weights = firwin(2 * half + 1, edge, window=window, fs=rate)
         kept = weights @ np.cos(2 * np.pi * frequency / rate * np.arange(-half, half + 1))
         return cls(weights / kept, near)
 

@@ -55,7 +55,8 @@ def reader_of(path: str) -> type[Any]:
     Raises `UserError` for a folder, and for an ending that no reader takes.
     """
     ending = Path(path).suffix.lower()
-    readers: list[Any] = [cls for cls in discover()[Reader.group].values() if ending and ending in cls.endings]
+    known: list[Any] = list(discover()[Reader.group].values())
+    readers = [cls for cls in known if ending and ending in cls.endings]
     if Path(path).is_dir():
         raise UserError(
             f"{path} is a folder; give a file of it, or 'tractexp task=survey data.path={path}' for a table"

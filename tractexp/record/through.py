@@ -10,6 +10,7 @@ Source: IEC/IEEE 60255-118-1. Departures: the angle of the voltage is taken as s
 
 import functools
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -44,7 +45,9 @@ def _factor(weights: bytes, n: int, free: bytes, error: float) -> np.ndarray:
 
     w, bends = np.frombuffer(weights), np.where(np.frombuffer(free, bool), BENT, CALM) ** -2.0
     wide, most = n + len(w) - 1, max(len(w) - 1, 2)
-    box = diags_array(list(w), offsets=list(range(len(w))), shape=(n, wide))
-    bend = diags_array([1.0, -2.0, 1.0], offsets=[0, 1, 2], shape=(wide - 2, wide))
+    across: Any = list(range(len(w)))  # SciPy's type of it is inferred from its default, one diagonal
+    second: Any = [0, 1, 2]
+    box = diags_array(list(w), offsets=across, shape=(n, wide))
+    bend = diags_array([1.0, -2.0, 1.0], offsets=second, shape=(wide - 2, wide))
     normal = box.T @ box / error**2 + bend.T @ diags_array(bends) @ bend
     return cholesky_banded(np.array([np.pad(normal.diagonal(k), (k, 0)) for k in range(most, -1, -1)]))

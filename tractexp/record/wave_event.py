@@ -9,6 +9,7 @@ state.
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tractexp.errors import UserError
 from tractexp.record.event import Event
@@ -40,9 +41,9 @@ class WaveEvent(Event):
     """
 
     phasors: Event
-    v: np.ndarray
+    v: NDArray[np.complex128]
     v_zero: np.ndarray
-    turn: np.ndarray
+    turn: NDArray[np.complex128]
     currents: np.ndarray
     lead: int
     omega_s0: float
@@ -92,7 +93,7 @@ def phases_of(stationary: np.ndarray, phases: int) -> np.ndarray:
     return np.stack([(vector * TURN ** (-k)).real + zero for k in range(phases)])
 
 
-def stationary(phases: np.ndarray, rate: float, frequency: float) -> tuple[np.ndarray, np.ndarray]:
+def stationary(phases: np.ndarray, rate: float, frequency: float) -> tuple[NDArray[np.complex128], np.ndarray]:
     """Space vector (N,) complex and zero sequence (N,) of phases (K, N).
 
     A single phase is the real part of its vector; the imaginary part is what it was a quarter of a cycle ago, so that
@@ -188,8 +189,9 @@ def in_waves(event: Event) -> WaveEvent:
     currents[~compared] = np.nan
     levels = (noise.mean() * np.sqrt(2 / 3),) * 2 + (noise.mean() / np.sqrt(3),) if K == 3 else (noise[0], 1.0, 1.0)
     slow = replace(
-        record, t=time, U=made[0], P=made[1].real, Q=made[1].imag, f=None, U2=made[2], window=None, more={}, waves=None
-    )
+        record, t=time, U=made[0], P=np.real(made[1]), Q=np.imag(made[1]), U2=made[2],
+        f=None, window=None, more={}, waves=None,
+    )  # fmt: skip
     end = min(max(int(np.searchsorted(time, event.t_end)), start + 1), len(time) - 1)
     return WaveEvent(
         **{f.name: getattr(event, f.name) for f in fields(Event)}

@@ -272,7 +272,7 @@ def _power(seen: _Seen, permutation: tuple[int, ...]) -> complex:
     return complex(np.median(S.real), np.median(S.imag))
 
 
-def _angle(S: complex) -> float:
+def _angle(S: complex | np.complexfloating) -> float:
     return float(np.degrees(np.angle(S)))
 
 

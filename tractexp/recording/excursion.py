@@ -90,7 +90,7 @@ def _one(
     worst = np.maximum.accumulate(np.abs(off).max(axis=0))
     allowed = np.maximum(np.maximum(limits - HYSTERESIS, limits / 3)[:, None], RECOVERED * worst)
     allowed = np.where(worst > DIP, np.maximum(allowed, DIP - HYSTERESIS), allowed)
-    inside = (np.abs(off) <= allowed).all(axis=0)
+    inside = np.all(np.abs(off) <= allowed, axis=0)
     crossed = (side * off[row] < -limits[row]) & (side * off < 0).any(axis=0)
     back = np.flatnonzero(inside | crossed)
     back = back[back * trace.step <= LONGEST]

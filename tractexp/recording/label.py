@@ -199,7 +199,8 @@ def _shared(channels: list[Channel]) -> str:
     while stop < min(map(len, names)) - start and len({n[-1 - stop] for n in names}) == 1:
         stop += 1
     head, tail = names[0][:start], names[0][len(names[0]) - stop :]
-    head = "" if COUNTER.match(plain(names[0])) and len({COUNTER.match(plain(n))[0] for n in names}) > 1 else head
+    counters = [COUNTER.match(plain(n)) for n in names]
+    head = "" if counters[0] and len({counter and counter[0] for counter in counters}) > 1 else head
     head = re.sub(r"(?i)(?:^|(?<=[^a-z]))[uvi]l?$", "", head)
     name = f"{head} {tail}".strip(" _-.:")
     circuit = channels[0].circuit.strip()
@@ -211,7 +212,7 @@ def _shared(channels: list[Channel]) -> str:
 def words(text: str) -> set[str]:
     """What a name is made of, to be compared with another: words, numbers, single Chinese characters."""
     text = plain(text)
-    found = set(re.findall(r"[a-z]+|\d+|[^\W\d_a-z\u2e80-\u9fff]+|[\u2e80-\u9fff]", text))
+    found: set[str] = set(re.findall(r"[a-z]+|\d+|[^\W\d_a-z\u2e80-\u9fff]+|[\u2e80-\u9fff]", text))
     found |= set(re.findall(r"\d+[^\W\d_\u2e80-\u9fff]+|[^\W\d_\u2e80-\u9fff]+\d+", text))  # "2СШ", "T1"
     single = {"1", "5"} if re.search(r"[\u2e80-\u9fff][iv](?![a-z])", text) else set()  # "母线I"
     made = {ROMAN.get(word, word) for word in found if len(word) > 1 or word not in ROMAN}

@@ -46,8 +46,8 @@ class Compare(Task):
         paths = made.write_results(job.folder)
         report(made)
         paths += made.write_drawings(job.folder)
-        beside = made.folder not in (None, job.folder)
-        listed([files.copy(path, made.folder / path.name) for path in paths if beside] + paths)
+        beside = made.folder if made.folder != job.folder else None
+        listed([files.copy(path, beside / path.name) for path in paths if beside] + paths)
         track(job, made, paths)
 
 

@@ -15,7 +15,8 @@ class Export(Task):
     reads = ()
     instead = {"model": "the model is that of task.parameters"}
 
-    parameters: str | None = None  # path of a result.json
+    # path of a result.json; of parameters that a model has, a task has none
+    parameters: str | None = None  # pyright: ignore[reportIncompatibleVariableOverride]
     format: str = ""  # andes, psse_dyr, modelica, or a format of an installed package
     bus: int = 1  # number of the bus the load is on
     power: float = 100.0  # MVA, what 1 pu of the record stands for

@@ -24,7 +24,8 @@ class Simulate(Task):
         "data": "with task.depth no record is played",
     }
 
-    parameters: str | None = None  # path of a result.json
+    # path of a result.json; of parameters that a model has, a task has none
+    parameters: str | None = None  # pyright: ignore[reportIncompatibleVariableOverride]
     values: dict[str, float] = field(default_factory=dict)  # {name: value}
     depth: float | None = None  # pu of the voltage before; null: play the recorded data
     duration: float = 0.15  # s, from the start of the fall to the start of the recovery

@@ -257,6 +257,7 @@ def belongs_to_its_family(cls: type[Effect]) -> None:
         return
     assert cls.family in known, f"'{cls.name}' belongs to '{cls.family}', no effect{among(cls.family, known)}"
     textbook = known[cls.family]
+    assert issubclass(textbook, Effect)
     assert not textbook.family, f"'{cls.name}' belongs to '{cls.family}', which is itself a member of a family"
     assert textbook.kind == cls.kind, f"'{cls.name}' is a {cls.kind}, and '{cls.family}' a {textbook.kind}"
     assert cls.differs, f"'{cls.name}' does not say in 'differs' what differs from '{cls.family}'"

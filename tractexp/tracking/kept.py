@@ -7,14 +7,14 @@ sends what a store lacks, and sends nothing twice.
 import json
 import time
 import uuid
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 from tractexp import files
 from tractexp.errors import UserError
-from tractexp.tracking.run import CURVE_POINTS, Run, flatten
+from tractexp.tracking.run import CURVE_POINTS, Line, Run, flatten
 
 FILE = "mlflow.json"
 
@@ -81,7 +81,7 @@ def _plain(run: Run, folder: Path) -> dict[str, Any]:
     return told
 
 
-def _thin(steps: Sequence[Any], values: Sequence[Any]) -> list[list[float]]:
+def _thin(steps: Line, values: Line) -> list[list[float]]:
     """A curve with as many points as are logged."""
     import numpy as np
 

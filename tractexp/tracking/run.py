@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import zip_longest
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from tractexp import provenance
 from tractexp.errors import UserError, check_choice
@@ -29,6 +29,7 @@ PER_DECADE = 40  # steps that curves share
 CURVE_POINTS = 1000  # a longer curve is thinned evenly; the files of the run keep every point
 BATCH_METRICS, BATCH_PARAMETERS = 900, 100  # MLflow takes at most 1000 entries a batch, 100 of them parameters
 VALUE_LENGTH = 6000  # characters MLflow stores of a parameter
+Line: TypeAlias = "Sequence[float] | np.ndarray"  # (n,), steps or values of a curve
 
 
 @dataclass(frozen=True)
@@ -46,9 +47,7 @@ class Run:
     name: str
     parameters: Mapping[str, Any] = field(default_factory=dict)
     metrics: Mapping[str, float] = field(default_factory=dict)
-    curves: "Mapping[str, tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray]]" = field(
-        default_factory=dict
-    )
+    curves: Mapping[str, tuple[Line, Line]] = field(default_factory=dict)
     tags: Mapping[str, str] = field(default_factory=dict)
     artifacts: Sequence[Path] = ()
     description: str = ""

@@ -3,7 +3,7 @@
 A term is a candidate like any other. All of a kind share one kernel, in which parameters choose what acts.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -32,9 +32,9 @@ class Terms(Family):
     def key(self, names: Iterable[str], pushed: bool = False) -> Key:
         return frozenset(kind_of(n) for n in set(names) - set(self.catalogue.of_measurement)), pushed
 
-    def compile_kinds(self, say: object) -> None:
+    def compile_kinds(self, say: Callable[[], None]) -> None:
         """Compile both kernels, side by side, where the cache lacks them."""
-        compile_missing((self.with_effects((kind,)).source for kind in KINDS), say)  # type: ignore[arg-type]
+        compile_missing((self.with_effects((kind,)).source for kind in KINDS), say)
 
 
 def kind_of(name: str) -> str:
@@ -70,7 +70,9 @@ def bench_of_terms(found: Bench) -> Bench:
         found.load, Catalogue((*faults, *whole), {}), found.records, kernels.bounds, kernels.fixed, found.criteria,
         found.effort, kernels.substeps, Terms,
     )  # fmt: skip
-    bench.kernels.family.compile_kinds(lambda: found.effort.say("compiling the library of terms, once for this model"))
+    terms = bench.kernels.family
+    assert isinstance(terms, Terms)
+    terms.compile_kinds(lambda: found.effort.say("compiling the library of terms, once for this model"))
     return bench
 
 

@@ -204,7 +204,7 @@ def _named(term: Term) -> dict[str, object]:
     """A term as machines and people call it."""
     clock = term.clock and term.clock.name
     names = {"balance": term.balance.name, "signal": term.signal.name, "clock": clock}
-    return names | {"words": term.words, "latex": term.latex}
+    return {**names, "words": term.words, "latex": term.latex}
 
 
 def _number(known: Known) -> dict[str, object]:
