@@ -10,7 +10,9 @@ and switching are recommended here: the generator has no phase jump. Seeds begin
 """
 
 import argparse
+import itertools
 import json
+import textwrap
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -34,6 +36,7 @@ from tractexp.plugin import get
 from tractexp.record import Event, Record, detect
 
 TABLE = Path(__file__).with_suffix(".json")
+BINS = (0.0, 0.05, 0.35, 0.65, 0.95, 1.01)
 FIRST, COUNT, MOST, MINUTES = 931_000, 120, 30, 30.0
 NOISE = Noise(0.004)
 AMONG = ("stator_resistance", "feeder_impedance", "speed_dependent_torque", "exponential_recovery")
@@ -100,6 +103,27 @@ def row(seed: int) -> dict | None:
         return told | {"after": None, "why": str(error)}
     after = investigated(again, **({"alike": 0.0} if by_noise else {}))
     return told | {"after": after.verdict.word, "sets_after": [list(names) for names in after.verdict.sets]}
+
+
+def table(rows: Sequence[dict]) -> str:
+    """Predicted and seen, as docs/missing-effects.md has it."""
+    ties = [r for r in rows if r["verdict"] == "tied"]
+    gone = [r for r in ties if r["after"] == "named"]
+    right = [r for r in gone if r["sets_after"] == [[r["effect"]]]]
+    lines = ["| predicted for the truth | ties | predicted, mean | truth alone left |", "| --- | --- | --- | --- |"]
+    for low, high in itertools.pairwise(BINS):
+        own = [r for r in ties if r["predicted"] is not None and low <= r["predicted"] < high]
+        if own:
+            mean = sum(r["predicted"] for r in own) / len(own)
+            seen = sum(r in right for r in own)
+            lines.append(f"| {low:.0%} to {min(high, 1.0):.0%} | {len(own)} | {mean:.0%} | {seen} |")
+    by_rule = [r for r in ties if r["rule"] == "default"]
+    ended = sum(r in gone for r in by_rule)
+    told = (
+        f"{len(rows)} data sets, {len(ties)} ties; {len(gone)} ended with one event, {len(right)} of them with the"
+        f" truth. By the product's own rule an event was recommended for {len(by_rule)}, and ended {ended} of them."
+    )
+    return "\n".join(lines) + "\n\n" + textwrap.fill(told, 120)
 
 
 def main() -> None:

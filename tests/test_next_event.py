@@ -6,7 +6,9 @@ how often the predicted chances come true, is `benchmarks/next_event.py`.
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
+import next_event as study
 import numpy as np
 import pytest
 
@@ -232,3 +234,11 @@ def test_a_plan_for_rivals_says_what_an_investigation_says(tied, tmp_path):
     told = json.loads((tmp_path / "plan.json").read_text())
     assert told["sentence"] == made.sentence
     assert isinstance(tied.next_event.best.chances, Chances)
+
+
+def test_the_docs_report_what_the_stored_study_holds():
+    root = Path(__file__).parents[1]
+    rows = json.loads((root / "benchmarks" / "next_event.json").read_text())["rows"]
+    docs = (root / "docs" / "missing-effects.md").read_text()
+    part = docs.partition("<!-- next event -->")[2].partition("<!-- end of next event -->")[0]
+    assert part.strip() == study.table(rows)

@@ -11,7 +11,7 @@ from tractexp.report.page import Page
 from tractexp.report.style import PALETTE
 from tractexp.wording import as_sentence
 
-LISTED = 3  # events of each kind that a table has
+LISTED = 2  # events of each kind that a table has
 KINDS = ("dip", "tap or capacitor bank", "dip with a phase jump and f", "unbalanced dip with U2", "dip sampled faster")
 
 
@@ -64,7 +64,7 @@ def _caption(found: NextEvent) -> str:
 
 
 def _chart(found: NextEvent) -> Chart:
-    """Probability by depth, a line for each duration of a plain dip: by the rule, or by noise where that is hopeless."""
+    """Probability by depth, a line for each duration: by the rule, or by noise where that is not sure to decide."""
     chart = Chart("depth of the dip [%]", ["probability [%]"], pixels=360)
     plain = [t for t in found.tried if _kind(t) == KINDS[0]]
     for color, duration in zip(PALETTE, sorted({t.event.duration for t in plain}), strict=False):
