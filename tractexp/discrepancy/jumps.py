@@ -14,8 +14,8 @@ from tractexp.discrepancy.bench import Bench
 from tractexp.identification.observed import off_neighbors
 
 MOST = 4  # samples of one channel and event that are the least smooth
-AROUND = 2  # samples on either side that a filter may spread a jump over
-SPREAD = 0.5  # of how far a sample lies off its neighbors: what may be wrong with it and with those around it
+AROUND = 3  # samples on either side that a filter may spread a jump over
+SPREAD = 1.0  # of how far a sample lies off its neighbors: what may be wrong with it and with those around it
 ABRUPT = 0.02  # of the most that the effects change: from there a sample off its neighbors is a jump
 
 
