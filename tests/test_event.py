@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tractexp.errors import UserError
 from tractexp.record import Record, describe, detect, find_dips
-from tractexp.record.event import find_dips, noise, sample_noise
+from tractexp.record.event import noise, sample_noise
 
 
 def dip(step=1e-3, length=1.0, start=0.3, duration=0.15, depth=0.5, sigma=0.002, slow=0.0, seed=0):
@@ -63,6 +63,13 @@ def test_a_dip_begins_where_the_voltage_leaves_a_tenth_of_the_margin():
     U[300:400] = np.maximum(1 - 0.00055 * np.arange(1, 101), 0.9)
     U[400:500] = 0.9
     assert find_dips(np.arange(1000) / 1000, U) == [(305, 500)]
+
+
+def test_the_steady_state_ends_where_a_swell_before_the_dip_begins():
+    U = np.ones(1200)
+    U[500:560], U[600:700] = 1.1, 0.6
+    made = Record("made", np.arange(1200) / 1000, U, np.ones(1200), np.ones(1200), source="made")
+    assert detect(made).steady == slice(0, 500)
 
 
 def test_recorded_frequency_gives_f0():
