@@ -62,7 +62,7 @@ class Mutant:
 
     @property
     def key(self) -> str:
-        return f"{self.module}:{self.before} -> {self.after}"
+        return key_of(asdict(self))
 
 
 def places(tree: ast.AST) -> Iterator[tuple[ast.AST, str, Any]]:
@@ -274,7 +274,8 @@ def _end(found: dict[str, Any], told: dict[str, str]) -> tuple[str, str]:
 
 
 def key_of(found: dict[str, Any]) -> str:
-    return f"{found['module']}:{found['before']} -> {found['after']}"
+    """What a change is called, here and in mutants_explained.json."""
+    return f"{found['module']} {found['nth']}: {found['before']} -> {found['after']}"
 
 
 def _cell(text: str) -> str:
