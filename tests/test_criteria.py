@@ -81,7 +81,7 @@ def prior_of_skew(c):
 
 def swinging(c, swing=0.045):
     """Why an effect of the frequency cannot be tested where it swings by so much."""
-    record = SimpleNamespace(f=np.linspace(50.0, 50.0 + swing, 10))
+    record = SimpleNamespace(channels={"f": np.linspace(50.0, 50.0 + swing, 10)})
     return missing_channel(
         get("effect", "frequency_dependence")(), [SimpleNamespace(record=record, channels=("f",))], c.frequency_swing
     )

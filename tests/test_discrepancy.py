@@ -19,10 +19,11 @@ from tractexp.discrepancy.base_fit import base_fit
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.catalogue import catalogue
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.disagreement import disagreement
+from tractexp.discrepancy.disagreement import disagreement, examined
 from tractexp.discrepancy.discrepancy_json import content, write_left, write_model
 from tractexp.discrepancy.effort import Effort
-from tractexp.discrepancy.explanations import from_other_valleys
+from tractexp.discrepancy.explanations import from_other_valleys, without_needless
+from tractexp.discrepancy.fitting import refit
 from tractexp.discrepancy.held_out import together, weighed
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.judgement import judgements
@@ -429,6 +430,21 @@ def test_an_effect_is_looked_for_from_the_other_valleys_of_the_base_model():
     assert single.deviance < first.fit.deviance - 1000
     assert min(better, key=lambda f: f.deviance).names == ("shunt_capacitor",)
     assert found.names == ("shunt_capacitor",)
+
+
+def test_an_effect_that_a_larger_set_does_not_need_is_left_out_again(planted):
+    """A pair may lead to the better place of one of its members: then that one alone is the explanation."""
+    (name,), first = planted.names, planted.first
+    other = next(n for n in FEW if n != name)
+    pair = refit(planted.bench, first.noise, [((name, other), planted.verdict.chosen.fit.unit)])[0]
+    tests = examined(planted.base.quiet, pair, first.noise, 0)
+    astray = replace(planted.explanations.refits[name,], deviance=first.fit.deviance)
+    refits = {**planted.explanations.refits, (name,): astray}
+    fewer = without_needless(planted.base, tests, refits, 0)
+    assert fewer.fit.names == (name,)
+    assert refits[name,].deviance < first.fit.deviance - 100
+    needed = replace(tests, fit=replace(tests.fit, deviance=tests.fit.deviance - 30.0))  # p = 4e-8 of one parameter
+    assert without_needless(planted.base, needed, refits, 0) is needed
 
 
 def test_the_deciding_dip_looks_at_the_load_and_not_at_what_the_recorder_did(planted):

@@ -98,6 +98,21 @@ def test_dips_are_numbered_as_the_reader_numbers_them(tmp_path):
     np.testing.assert_allclose([e["start"] for e in made.events if e["dip"]], starts, atol=0.02)
 
 
+def test_a_short_dip_is_to_be_fitted_in_waves_and_that_command_runs_too(tmp_path):
+    """A dip of three cycles is smeared by phasors; one of ten is not, nor one that begins with the record."""
+    short = saved(tmp_path / "short.cfg", constant(start=0.5, end=0.56))
+    (command,) = tractexp.look(short).commands
+    assert command.endswith(" domain=waves")
+    done = command_line(
+        *shlex.split(command)[1:], "model/motor=none", "model/static=branch", "optimizer=random_search", "budget=50",
+        "tracking.enabled=false", cwd=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "domain=waves" not in tractexp.look(saved(tmp_path / "long.cfg")).commands[0]
+    early = saved(tmp_path / "early.cfg", constant(start=0.05, end=0.11))
+    assert not any("domain=waves" in c for c in tractexp.look(early).commands)
+
+
 def test_a_file_without_events_or_loads_is_told_and_is_no_error(tmp_path):
     quiet = tractexp.look(saved(tmp_path / "quiet.cfg", constant(depth=0.0)))
     assert (len(quiet.feeders), len(quiet.events), quiet.commands) == (1, 0, [])

@@ -68,6 +68,13 @@ def test_every_record_is_a_row_and_nothing_else_is(surveyed, field):
     assert "broken" in why["broken.cfg"]
 
 
+def test_the_folder_of_a_run_is_looked_at_where_it_is_the_one_asked_for(tmp_path):
+    (fill(tmp_path / "converted", 2) / ".hydra").mkdir()
+    assert len(tractexp.survey(tmp_path / "converted", cores=1).rows) == 2
+    with pytest.raises(UserError, match="holds no file that can be read"):
+        tractexp.survey(tmp_path, cores=1)
+
+
 def test_a_row_tells_what_a_look_tells(surveyed, field):
     row = next(row for row in surveyed.rows if row["file"] == "day 0/e2.cfg")
     look = tractexp.look(field / "day 0" / "e2.cfg")

@@ -13,12 +13,15 @@ def opened(eq, level, delay, wait, margin, ramp, stage=""):
     import sympy
 
     u = eq.U / eq.U0
-    below, above = eq.memory(f"time_below{stage}", f"t_b{stage}"), eq.memory(f"time_above{stage}", f"t_a{stage}")
-    tripped = eq.memory(f"tripped{stage}", f"g{stage}")
-    low = eq.define(f"voltage_low{stage}", gate(level - u, LEVEL), rf"\ell{stage}")
-    high = eq.define(f"voltage_back{stage}", gate(u - level - margin, LEVEL), f"h{stage}")
-    goes = eq.define(f"relay_goes{stage}", low * gate(below - delay, TIME * eq.step), f"g{stage}_+")
-    returns = eq.define(f"relay_returns{stage}", high * gate(above - wait, TIME * eq.step), f"g{stage}_-")
+    of = rf"\mathrm{{{stage.strip('_')}}}"
+    first, then = (f"_{{{of}}}", f",{of}") if stage else ("", "")  # a symbol's only index, and one after another
+    below = eq.memory(f"time_below{stage}", f"t_{{b{then}}}")
+    above = eq.memory(f"time_above{stage}", f"t_{{a{then}}}")
+    tripped = eq.memory(f"tripped{stage}", f"g{first}")
+    low = eq.define(f"voltage_low{stage}", gate(level - u, LEVEL), rf"\ell{first}")
+    high = eq.define(f"voltage_back{stage}", gate(u - level - margin, LEVEL), f"b{first}")
+    goes = eq.define(f"relay_goes{stage}", low * gate(below - delay, TIME * eq.step), f"g_{{+{then}}}")
+    returns = eq.define(f"relay_returns{stage}", high * gate(above - wait, TIME * eq.step), f"g_{{-{then}}}")
     eq.renews(below, low * (below + eq.step), 0)
     eq.renews(above, high * (above + eq.step), 0)
     left = sympy.Max(0, tripped - returns * eq.step / (ramp + eq.step))

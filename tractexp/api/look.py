@@ -17,8 +17,11 @@ from tractexp.outcome import Table, Tabulated
 from tractexp.overrides import typed
 from tractexp.progress import Progress, staged
 from tractexp.record import Event, Record
+from tractexp.record.wave_event import COARSEST, smeared
 from tractexp.recording.overview import Seen, Sight, View, sight_of, view_of
 from tractexp.wording import change, degrees, share
+
+EARLIER = 3.0  # cycles that a fit of samples needs before the dip, and one that the estimator of phasors leaves out
 
 
 class Listed(Tabulated):
@@ -295,7 +298,19 @@ def command(view: View, shown: Sight) -> str:
         return ""
     usual = {f.name: f for f in fields(plugin.get("data", view.node["name"]))}
     settings = {**view.node, **choice}
-    return typed({key: value for key, value in settings.items() if key == "name" or not _is_usual(usual[key], value)})
+    told = typed({key: value for key, value in settings.items() if key == "name" or not _is_usual(usual[key], value)})
+    return f"{told} domain=waves" if waves_serve(view, shown) else told
+
+
+def waves_serve(view: View, shown: Sight) -> bool:
+    """Whether the samples of the dip that is fitted first tell more than its phasors, and can be fitted."""
+    first = next((seen.what for seen in shown.seen if seen.worth and seen.dip is not None), None)
+    if view.recording is None or first is None:
+        return False
+    f = view.recording.frequency
+    there = next((s for s in view.recording.waveforms() if s.start <= first.start), None)
+    fine = there is not None and there.rate >= COARSEST * f and first.start - there.start > EARLIER / f
+    return fine and bool(smeared(first.end - first.start, first.U2 or 0.0, f))
 
 
 def _is_usual(setting: Any, value: Any) -> bool:

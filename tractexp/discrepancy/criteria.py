@@ -47,8 +47,9 @@ class Criteria:
         1e-9, (0.0, 1.0), "p that a third name must undercut", CHOSEN, "as for the second, with hundreds of sets to try"
     )
     family_p: float = _criterion(
-        0.0, (0.0, 1.0), "p by which another law or place must explain more than the catalogue's, its further"
-        " parameters paid for; at 0 none is tried", CHOSEN, "off: what it names and misnames has not been counted yet",
+        1e-5, (0.0, 1.0), "p by which another law or place must explain more than the catalogue's, its further"
+        " parameters paid for; at 0 none is tried", CHOSEN,
+        "as for a second name; what decides is that it leaves nothing",
     )  # fmt: skip
     beside_measurement: float = _criterion(
         0.1, (0.0, 1.0), "factor on the p of an effect of the load beside one of the measurement", CHOSEN,

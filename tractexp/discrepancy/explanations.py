@@ -9,20 +9,35 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import chdtrc
 
 from tractexp.discrepancy.base_fit import BaseFit
+from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.disagreement import Disagreement, examined
 from tractexp.discrepancy.families import member_that_suffices
-from tractexp.discrepancy.fitting import CLOSE, Refit, Start, best_of, no_worse_than_subsets, refit, rough_refit
+from tractexp.discrepancy.fitting import (
+    CLOSE,
+    NESTED,
+    Refit,
+    Start,
+    best_of,
+    no_worse_than_subsets,
+    off_walls,
+    refit,
+    rough_refit,
+    wide_refits,
+)  # fmt: skip
 from tractexp.discrepancy.projection import Score
 from tractexp.discrepancy.tangent import Column, tangent
 from tractexp.identification.valleys import DISTINCT
 from tractexp.noise import Noise
 
 MOST_EFFECTS = 3
+MOST_STEPS = 6  # of adding and leaving out
 SHORTLIST = {1: 10, 2: 8, 3: 6}  # sets of each size that are refitted
 COMBINED = 14  # effects whose sets are ranked exhaustively
 PATCHED = 4  # sets of one size that are tried before a further effect is added
+WIDELY = 3  # single effects with thresholds or times that are searched to the end
 RANKS = 2  # settings of a candidate to start from
 FAMILIES = 50  # added to the seed of the draws at members of families
 LEAST_START = 0.1  # smallest relevant sizes that a start moves at least
@@ -63,24 +78,50 @@ def explanations(base: BaseFit, first: Disagreement, seed: int) -> Explanations:
     """Add effects one by one as long as the best one helps more than chance, searching all sets of each size."""
     steps, ground = [first], first
     refits: dict[Names, Refit] = {(): first.fit}
-    while steps[-1].asks_for_more and len(steps[-1].fit.names) < MOST_EFFECTS:
+    while steps[-1].asks_for_more and len(steps[-1].fit.names) < MOST_EFFECTS and len(steps) < MOST_STEPS:
         size = len(steps[-1].fit.names) + 1
         fits = searched([ground, *steps[1:]], refits, size, base.bench.effort.say)
         refits |= {f.names: f for f in fits}
         tests = sufficient(base, fits, steps[-1].noise, seed + size)
-        if size == 1 and (tests.asks_for_more or not tests.adequate):
-            ground, better = from_other_valleys(base, first, refits)
+        for further in (searched_widely, from_other_valleys) if size == 1 else ():
+            if tests.adequate and not tests.asks_for_more:
+                break
+            ground, better = further(base, ground, refits)
             if better:
                 refits |= {f.names: f for f in better}
                 fits = best_of(f for f in refits.values() if f.names)
                 tests = sufficient(base, fits, first.noise, seed + size)
         if size == 1:
             tests = with_families(base, tests, refits, seed)
+        else:
+            tests = without_needless(base, tests, refits, seed + size)
         steps.append(tests)
     if len(steps) == 1:
         tests = with_families(base, first, refits, seed)
         steps += [tests] * (tests is not first)
     return Explanations(base, tuple(steps), refits)
+
+
+def without_needless(base: BaseFit, tests: Disagreement, refits: dict[Names, Refit], seed: int) -> Disagreement:
+    """The tests with an effect less, where its size at the null costs no more than a further name must gain.
+
+    A larger set may have led to a better place of its own subset than any start of that. Adds to `refits`.
+    """
+    fit, bench = tests.fit, base.bench
+    at = bench.coordinates
+    if len(fit.names) < 2:
+        return tests
+    wanted: list[Start] = []
+    for left in fit.names:
+        unit = fit.unit.copy()
+        unit[at.parameters([left])] = at.null[at.parameters([left])]
+        wanted.append((tuple(n for n in fit.names if n != left), unit))
+    fewer = refit(bench, tests.noise, wanted)[0]
+    gained, parameters = max(fewer.deviance - fit.deviance, 0.0), max(fit.parameters - fewer.parameters, 1)
+    if chdtrc(parameters, gained) < bench.criteria.further_name(len(fewer.names)):
+        return tests
+    refits[fewer.names] = fewer
+    return without_needless(base, examined(base.quiet, fewer, tests.noise, seed), refits, seed)
 
 
 def with_families(base: BaseFit, tests: Disagreement, refits: dict[Names, Refit], seed: int) -> Disagreement:
@@ -109,6 +150,29 @@ def searched(steps: Sequence[Disagreement], refits: Refits, size: int, say: Call
     exact = {f.names: f for f in refit(bench, noise, [(f.names, f.unit) for f in near])}
     fits = [exact.get(f.names, f) for f in fits]
     return best_of(no_worse_than_subsets(bench, noise, {**refits, **{f.names: f for f in fits}}, fits))
+
+
+def searched_widely(base: BaseFit, first: Disagreement, refits: Refits) -> tuple[Disagreement, list[Refit]]:
+    """Single effects that have thresholds or times, searched from all their settings, and `first`."""
+    bench, bare = base.bench, refits[()].unit
+    singles: Refits = {f.names: f for f in best_of(refits.values()) if len(f.names) == 1}
+    unlike = [f for f in singles.values() if len(bench.catalogue[f.names[0]].settings) > 1]
+    grounds = bare, off_walls(bench, bare)
+    wanted = [[(f.names, f.unit), *(s for unit in grounds for s in _every_setting(bench, f, unit))] for f in unlike]
+    found = wide_refits(bench, first.noise, wanted, WIDELY)
+    return first, [f for f in found if f.deviance < singles[f.names].deviance - NESTED]
+
+
+def _every_setting(bench: Bench, fit: Refit, unit: np.ndarray) -> list[Start]:
+    """Starts for a single effect at coordinates (D,): of the size that it was fitted with, at all its settings."""
+    at, made = bench.coordinates, []
+    for setting in bench.catalogue[fit.names[0]].settings:
+        point = unit.copy()
+        point[at.sizes(fit.names)] = fit.unit[at.sizes(fit.names)]
+        for name, value in setting.items():
+            point[at.column[name]] = at.to_unit(name, value)
+        made.append((fit.names, point))
+    return made
 
 
 def from_other_valleys(base: BaseFit, first: Disagreement, refits: Refits) -> tuple[Disagreement, list[Refit]]:

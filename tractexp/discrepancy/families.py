@@ -1,9 +1,7 @@
 """Members of families: the kind of a textbook effect at another place, or its place with another law.
 
-They are tried only where the best single textbook effect leaves something, and only around what it points to: the
-families of the nearest effects, of the faults of the measurement that stand out, and of the kinds that the loudest test
-of what is left speaks for. A member must explain more than the textbook effect beyond what its further parameters cost,
-and leave nothing.
+They are tried only where the best single textbook effect leaves something. A member must explain more than that beyond
+what its further parameters cost, and leave nothing.
 """
 
 import itertools
@@ -16,12 +14,11 @@ from tractexp.discrepancy.base_fit import BaseFit
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.catalogue import Candidate
 from tractexp.discrepancy.disagreement import Disagreement, examined
-from tractexp.discrepancy.fitting import CLOSE, Refit, Start, refit, rough_refit
+from tractexp.discrepancy.fitting import Refit, Start, off_walls, wide_refits
 
-NEAREST = 5  # textbook effects whose families are tried
+NEAREST = 4  # members that are searched to the end
 EXAMINED = 3  # members whose remainder is tested
 BEGUN = 0.5  # smallest relevant sizes at which a size without a textbook value starts
-POINTS = {"a step or a pulse": ("trip", "drift"), "an oscillation": ("oscillation",)}  # kinds that a test speaks for
 
 Names = tuple[str, ...]
 
@@ -34,14 +31,12 @@ def member_that_suffices(
     With the fits of the members that were compared; None where no member suffices.
     """
     bench, noise = base.bench, tests.noise
-    wanted = pointed_to(bench, tests, refits)
+    wanted = bench.catalogue.members
     if not wanted:
         return None
-    bench.effort.say(f"trying {len(wanted)} other places and laws of what comes near")
+    bench.effort.say(f"trying {len(wanted)} other places and laws")
     bench.kernels.family.compile_members([m.name for m in wanted], bench.effort.say)
-    begun = [rough_refit(bench, noise, starts(bench, member, refits))[0] for member in wanted]
-    least = min(f.cost for f in begun)
-    fits = refit(bench, noise, [(f.names, f.unit) for f in begun if f.cost < least + CLOSE])
+    fits = wide_refits(bench, noise, [starts(bench, member, refits) for member in wanted], NEAREST)
     for k, fit in enumerate(fits[:EXAMINED]):
         if not worth(fit, tests.fit, bench.criteria.family_p) or not bench.kernels.family.joins(fit.names[0]):
             continue
@@ -59,14 +54,6 @@ def worth(member: Refit, textbook: Refit, p: float) -> bool:
     return gained > 0 and float(chdtrc(further, gained)) < p
 
 
-def pointed_to(bench: Bench, tests: Disagreement, refits: Mapping[Names, Refit]) -> list[Candidate]:
-    """The members of the families around what the search selected and what its remainder speaks for."""
-    singles = sorted((f for f in refits.values() if len(f.names) == 1), key=lambda f: f.cost)
-    heads = {f.names[0] for f in singles[:NEAREST]} | {*tests.fit.names, *tests.faults}
-    kinds = POINTS.get(tests.loudest, ())
-    return [m for m in bench.catalogue.members if m.effect.family in heads or m.effect.kind in kinds]
-
-
 def starts(bench: Bench, member: Candidate, refits: Mapping[Names, Refit]) -> list[Start]:
     """Starts of a member: from the textbook's fit, with every setting that it leaves open, and where the member does
     not nest that, from the base model's with every setting, since the textbook's fit may have gone astray."""
@@ -78,7 +65,7 @@ def starts(bench: Bench, member: Candidate, refits: Mapping[Names, Refit]) -> li
         ground[at.parameters([effect.family])] = at.null[at.parameters([effect.family])]
         begun.append((ground, {own: at.value(theirs, textbook.unit) for own, theirs in effect.as_textbook.items()}))
     if textbook is None or not effect.nests_textbook:
-        begun.append((bare, {}))
+        begun += [(bare, {}), (off_walls(bench, bare), {})]
     made = []
     for ground, told in begun:
         known = dict(told)

@@ -14,6 +14,10 @@ ROUGH, EXACT = (12, 0.3), (40, 0.02)  # iterations and tolerance of the deviance
 FIRST = 4  # iterations after which the worse half of a set's starts is given up
 CLOSE = 12.0  # of the deviance: a rough refit this near the best is made exact
 HOPELESS, SLOW = 60.0, 0.3  # of the deviance, and of what it spans: a set this far behind then is not refined
+REACHES = 2.0 ** -np.arange(1, 10)  # of a parameter's range: how far one without a slope is moved
+MOVES, WORTH = 8, 1.0  # of such parameters in a row, and the deviance that one must gain
+TURNS, KEPT = 3, 6  # of moving and descending in turn, and the starts that take part
+WALL = 1e-3  # of a coordinate's range: how near a bound a parameter rests on it
 NESTED = 0.1  # of the deviance: a set that is worse than its own subset by more has not converged
 
 Start = tuple[Sequence[str], np.ndarray]  # names of effects, and coordinates (D,) to start from
@@ -63,6 +67,53 @@ def rough_refit(bench: Bench, noise: Noise, wanted: Sequence[Start]) -> list[Ref
     return best_of([*best, *_descended(bench, noise, again, None, (ROUGH[0] - FIRST, ROUGH[1]))])
 
 
+def wide_refit(
+    bench: Bench, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None = None
+) -> list[Refit]:  # fmt: skip
+    """As `refit`, for one set whose thresholds and times have hardly a slope: moved far and descended in turn.
+
+    A descent walks a relay's time by a sample a step, and a wrong time bends what else is fitted.
+    """
+    fits = sorted(_descended(bench, noise, wanted, faults, (FIRST, ROUGH[1])), key=lambda f: f.cost)[:KEPT]
+    for _ in range(TURNS):
+        moved = [(f.names, moved_across(bench, noise, f, faults)) for f in fits]
+        better = sorted(_descended(bench, noise, moved, faults, ROUGH), key=lambda f: f.cost)
+        if better[0].deviance > fits[0].deviance - WORTH:
+            break
+        fits = better
+    return refit(bench, noise, [(f.names, f.unit) for f in fits if f.cost < fits[0].cost + CLOSE], faults)
+
+
+def wide_refits(bench: Bench, noise: Noise, wanted: Iterable[Sequence[Start]], most: int) -> list[Refit]:
+    """`wide_refit` of those `most` sets, each with starts of its own, that come nearest in a few iterations."""
+    begun = [
+        sorted(_descended(bench, noise, starts, None, (FIRST, ROUGH[1])), key=lambda f: f.cost) for starts in wanted
+    ]
+    begun = sorted((fits[:KEPT] for fits in begun), key=lambda fits: fits[0].cost)[:most]
+    return best_of(f for fits in begun for f in wide_refit(bench, noise, [(g.names, g.unit) for g in fits]))
+
+
+def moved_across(bench: Bench, noise: Noise, fit: Refit, faults: Sequence[str] | None = None) -> np.ndarray:
+    """Coordinates (D,) with what an effect has beside its sizes moved, one parameter at a time and by any reach."""
+    at = bench.coordinates
+    sizes = at.sizes(fit.names)
+    columns = [k for k in at.parameters(fit.names) if k not in sizes]
+    if not columns:
+        return fit.unit
+    prior = _with_prior(bench, [fit.names], faults)[1]
+    unit, deviance = fit.unit, fit.deviance
+    for _ in range(MOVES):
+        trials = np.repeat(unit[None], 2 * len(columns) * len(REACHES), axis=0)
+        for k, mine in zip(columns, np.split(trials, len(columns)), strict=True):
+            mine[:, k] = np.clip(mine[:, k] + np.r_[REACHES, -REACHES], 0.0, 1.0)
+        rows = bench.rows(trials, noise, prior, [fit.names] * len(trials))
+        found = np.nan_to_num(np.einsum("nr,nr->n", rows, rows), nan=np.inf)
+        if not found.min() < deviance - WORTH:
+            break
+        unit, deviance = trials[found.argmin()], float(found.min())
+    return unit
+
+
 def no_worse_than_subsets(
     bench: Bench, noise: Noise, refits: Mapping[tuple[str, ...], Refit], fits: Sequence[Refit]
 ) -> list[Refit]:  # fmt: skip
@@ -85,8 +136,7 @@ def _descended(
     """The end of a descent from each start; of one that was made before, as by a run that was stopped, as it was."""
     spent = 0
     at = bench.coordinates
-    measured = at.parameters(at.catalogue.of_measurement if faults is None else tuple(faults))
-    prior = [*measured, *at.shapes(sorted({name for names, _ in wanted for name in names}))]
+    measured, prior = _with_prior(bench, [names for names, _ in wanted], faults)
     always = [*at.base, *at.before, *measured]
     columns = [[*always, *(k for k in at.parameters(names) if k not in always)] for names, _ in wanted]
     table = np.full((len(wanted), max(map(len, columns))), at.dimension)
@@ -114,6 +164,23 @@ def _descended(
         Refit(tuple(sorted(names)), starts[lane, :-1].copy(), float(deviance[lane]), len(at.parameters(names)))
         for lane, (names, _) in enumerate(wanted)
     ]
+
+
+def _with_prior(
+    bench: Bench, sets: Iterable[Sequence[str]], faults: Sequence[str] | None
+) -> tuple[list[int], list[int]]:
+    """The columns of the faults of the measurement that are free, and all that have a prior beside these sets."""
+    at = bench.coordinates
+    measured = at.parameters(at.catalogue.of_measurement if faults is None else tuple(faults))
+    return measured, [*measured, *at.shapes(sorted({name for names in sets for name in names}))]
+
+
+def off_walls(bench: Bench, unit: np.ndarray) -> np.ndarray:
+    """Coordinates (D,) with what rests on a bound of the base model back at its default: there it has no slope."""
+    moved, base = unit.copy(), bench.coordinates.base
+    resting = base[(unit[base] <= WALL) | (unit[base] >= 1 - WALL)]
+    moved[resting] = bench.coordinates.null[resting]
+    return moved
 
 
 def settled(bench: Bench, unit: np.ndarray, noise: Noise, names: Sequence[str]) -> np.ndarray:

@@ -11,7 +11,7 @@ from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.disagreement import examined
 from tractexp.discrepancy.explanations import Explanations
-from tractexp.discrepancy.fitting import Refit, refit, settled
+from tractexp.discrepancy.fitting import Refit, best_of, refit, settled, wide_refit
 from tractexp.discrepancy.gap import Gap, gap
 from tractexp.discrepancy.noise_in_quiet import QuietNoise, white
 from tractexp.discrepancy.records import Records
@@ -202,12 +202,11 @@ def together(
     quiet = QuietNoise.at(whole, plain)
     noise = as_fitted.noise.on(whole.profile, quiet.blur)
     first = refit(whole, noise, [((), plain)], faults=())[0]
-    wanted = [
-        (fit.names, _placed(whole, start, setting))
-        for fit in extended
-        for start in [_widened(whole, fit.unit)]
-        for setting in (_settings(whole, fit.names) if anew else [{}])
-    ]
+
+    def refitted(fit: Refit) -> list[Refit]:
+        start, settings = _widened(whole, fit.unit), _settings(whole, fit.names) if anew else [{}]
+        wanted = [(fit.names, _placed(whole, start, setting)) for setting in settings]
+        return wide_refit(whole, noise, wanted, as_fitted.faults)
 
     def told(fit: Refit) -> Together:
         alone = next(e for e in extended if e.names == fit.names)
@@ -216,7 +215,7 @@ def together(
         unit = np.r_[fit.unit[:d], fit.unit[whole.coordinates.before][:before]]
         return Together(replace(fit, unit=unit), louder, p_left)
 
-    return each_apart(told, refit(whole, noise, wanted, faults=as_fitted.faults))
+    return each_apart(told, best_of(better for fit in extended for better in refitted(fit)))
 
 
 def _widened(bench: Bench, unit: np.ndarray) -> np.ndarray:

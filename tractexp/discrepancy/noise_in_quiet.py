@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.jumps import jumps
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.observed import answers, unsure
 from tractexp.identification.problem import Problem
@@ -59,7 +60,8 @@ class QuietNoise:
         bench = self.bench
         if bench.waves:
             passed, phases = answers(bench.problem, _values(bench, unit)), bench.records.phases
-            return of_waves(residual, bench.known, bench.quiet, passed, phases, self.blur)
+            blur = np.concatenate([shapes for shapes in (self.blur, jumps(bench, unit)) if shapes is not None])
+            return of_waves(residual, bench.known, bench.quiet, passed, phases, blur)
         wander = functools.partial(self._wander, left, columns)
         return estimate(residual, bench.known, bench.quiet, wander, self.blur)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.bench import Bench
-from tractexp.discrepancy.fitting import Refit
+from tractexp.discrepancy.fitting import WALL, Refit
 from tractexp.discrepancy.projection import Column, Projection
 from tractexp.discrepancy.pushes import push_points
 from tractexp.noise import Noise
@@ -15,7 +15,7 @@ from tractexp.noise.span import spanned
 
 REACH = 0.5  # smallest relevant sizes: the step of a candidate's difference quotient
 NUISANCE_STEP = 1e-4  # of a coordinate's range
-WALL, HELD = 1e-3, 1e-6  # of it: how near a wall a parameter rests on it, and how far it may move then
+HELD = 1e-6  # of it: how far a parameter that rests on a wall may move
 LEAST_KEPT = 0.2  # of a residual's variance: where columns explain more, it tells nothing of the noise
 
 

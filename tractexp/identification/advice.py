@@ -12,10 +12,7 @@ from tractexp.identification.problem import Problem
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import BOUND, EDGE, UNIDENTIFIED, WEAK, WITHIN, shown, size
 from tractexp.noise.color import runs
-from tractexp.record.wave_event import COARSEST
-
-SHORT = 5.0  # cycles: of a shorter dip phasors of one cycle show little but their own window
-UNBALANCED = 0.1  # of the voltage before
+from tractexp.record.wave_event import COARSEST, smeared
 
 
 def advise(known: Uncertainty, adequacy: Adequacy, odd: Sequence[str] = (), data: str = "") -> list[str]:
@@ -56,12 +53,9 @@ def waves_better(problem: Problem) -> list[str]:
         waves, record = event.record.waves, event.record
         if waves is None or waves.rate < COARSEST * record.base.frequency:
             continue
-        if event.duration * record.base.frequency < SHORT:
-            why = f"lasts {1000 * event.duration:.0f} ms, less than {SHORT:g} cycles, which phasors smear"
-        elif record.U2 is not None and record.U2[event.start : event.end].max() > UNBALANCED * event.U0:
-            share = record.U2[event.start : event.end].max() / event.U0
-            why = f"is unbalanced, U2 {share:.0%} of U, which phasors leave out"
-        else:
+        U2 = 0.0 if record.U2 is None else float(record.U2[event.start : event.end].max() / event.U0)
+        why = smeared(event.duration, U2, record.base.frequency)
+        if not why:
             continue
         return [f"fit the sampled waveforms, by domain=waves: the dip of {record.name} {why}"]
     return []

@@ -198,7 +198,7 @@ def _between(event: WaveEvent) -> list[WaveEvent]:
 
     How far each sample lies off a cubic through its neighbors tells how far the cubic may be off between samples.
     """
-    off = np.abs(_off_neighbors(event.v * event.turn))
+    off = np.abs(off_neighbors(event.v * event.turn))
     off[: event.lead + 3] = 0.0
     seen = np.argsort(-off)[:MOST_BETWEEN]
     seen = np.sort(seen[off[seen] > max(ROUGH * event.noise_U, SMALLEST)])
@@ -210,7 +210,7 @@ def _between(event: WaveEvent) -> list[WaveEvent]:
     return made
 
 
-def _off_neighbors(v: np.ndarray) -> np.ndarray:
+def off_neighbors(v: np.ndarray) -> np.ndarray:
     """How far each sample of v (N,) lies off the cubic through two on either side; 0 at the ends."""
     off = np.zeros_like(v)
     off[3:-3] = v[3:-3] - (9 * (v[2:-4] + v[4:-2]) - (v[:-6] + v[6:])) / 16

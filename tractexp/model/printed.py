@@ -1,5 +1,6 @@
 """Equations in LaTeX."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import sympy
@@ -25,3 +26,12 @@ def lines(eq: "Equations") -> list[str]:
     made += [f"{tex(s)} = {tex(eq.shown.get(s, expression))}" for s, expression in eq.definitions.items()]
     made += [f"{site.latex} = {tex(drawn)}" for site, drawn in eq._drawn.items()]
     return made + [f"{starts[start_symbol(s.symbol)]} = {tex(s.initial)}" for s in eq.states.values()]
+
+
+def changed(before: Sequence[str], after: Sequence[str]) -> list[tuple[str | None, str]]:
+    """(line before, line after) of equations that are not as they were; None before one that came in.
+
+    What holds before the event is left out: it follows from the others.
+    """
+    old = {line.split("=")[0]: line for line in before}
+    return [(old.get(line.split("=")[0]), line) for line in after if line not in before and "|_0" not in line]

@@ -19,6 +19,8 @@ from tractexp.record.record import Record
 from tractexp.record.waves import Waves
 
 COARSEST = 16  # samples per cycle
+SHORT = 5.0  # cycles: of a shorter dip phasors of one cycle show little but their own window
+UNBALANCED = 0.1  # of the voltage before
 FEWEST_CYCLES = 2  # before the event
 LEAD = 6  # cycles of the periodic voltage before the record, in which a simulation reaches its steady state
 HIGHEST = 25  # harmonic that is fitted
@@ -205,6 +207,15 @@ def in_waves(event: Event) -> WaveEvent:
         offsets=periodic.offsets * _scale(record, K), phases=K,
         weights=quieting.weights,
     )  # fmt: skip
+
+
+def smeared(duration: float, U2: float, frequency: float) -> str:
+    """What phasors make of a dip of this duration [s] and share of U2, as the end of a sentence; "" where no harm."""
+    if duration * frequency < SHORT:
+        return f"lasts {1000 * duration:.0f} ms, less than {SHORT:g} cycles, which phasors smear"
+    if U2 > UNBALANCED:
+        return f"is unbalanced, U2 {U2:.0%} of U, which phasors leave out"
+    return ""
 
 
 def _waves(event: Event) -> Waves:

@@ -20,7 +20,7 @@ RUN = ".hydra"  # a folder that holds it is that of a run: what lies there was w
 
 
 def files(folder: Path) -> Iterator[Path]:
-    """The records below a folder, in order of name; hidden files and those of runs are left out.
+    """The records below a folder, in order of name; hidden files and those of runs below it are left out.
 
     Raises `UserError` where there is no such folder.
     """
@@ -29,7 +29,7 @@ def files(folder: Path) -> Iterator[Path]:
         raise UserError(f"data.path={folder} is {kind}")
     known = endings()
     for place, below, names in os.walk(folder):
-        if RUN in below:
+        if RUN in below and Path(place) != folder:  # what a run converted may be asked for by name
             below.clear()
             continue
         below[:] = sorted(name for name in below if not name.startswith("."))

@@ -338,6 +338,7 @@ def _brief(verdict: str) -> str:
 def _equations(made: Page, found: Investigation) -> None:
     """The equations that changed or came in, and how the extended model is used."""
     from tractexp.model.model import compose
+    from tractexp.model.printed import changed
 
     made.heading("The extended model")
     if others := [joined(names) for names in found.verdict.sets[1:]]:
@@ -349,16 +350,12 @@ def _equations(made: Page, found: Investigation) -> None:
     base = found.bench.load
     effects = [found.catalogue[n].effect for n in found.names]
     extended = compose(base.motor, base.static, [*base.effects, *effects], domain=base.domain)
-    before, after = base.latex(), extended.latex()
-    old = {line.split("=")[0]: line for line in before}
-    for line in after:
-        if line not in before and "|_0" not in line:
-            was = old.get(line.split("=")[0])
-            if was is not None:
-                made.text("before").equation(was).text("after")
-            made.equation(line)
+    for was, line in changed(base.latex(), extended.latex()):
+        if was is not None:
+            made.text("before").equation(was).text("after")
+        made.equation(line)
     with made.folded("All equations of the extended model"):
-        for line in after:
+        for line in extended.latex():
             made.equation(line)
 
 

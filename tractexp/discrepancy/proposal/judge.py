@@ -26,8 +26,9 @@ class Before:
 
     @property
     def closed(self) -> float:
-        """The share of the deviance in excess of the noise that the term takes away."""
-        return (self.without.deviance - self.with_it.deviance) / max(self.without.deviance - self.bench.samples, 1e-300)
+        """The share of the deviance in excess of the noise that the term takes away; 0 where there is no excess."""
+        excess = self.without.deviance - self.bench.samples
+        return (self.without.deviance - self.with_it.deviance) / excess if excess > 0 else 0.0
 
     @property
     def left(self) -> float:

@@ -10,11 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.bench import Bench
-from tractexp.discrepancy.fitting import Refit, Start, best_of, refit, rough_refit
+from tractexp.discrepancy.fitting import WALL, Refit, Start, best_of, refit, rough_refit, wide_refit
 from tractexp.discrepancy.proposal.bed import place, values_of, with_terms
-from tractexp.discrepancy.proposal.library import ANSWER, Shape, Term, term
+from tractexp.discrepancy.proposal.library import ANSWER, Shape, Term, term, terms
 from tractexp.discrepancy.proposal.screen import Ground, Scored, Screened, linearised, scores
-from tractexp.discrepancy.tangent import WALL
 from tractexp.noise import Noise
 
 MOST, ANSWERS = 30, 15  # terms refitted, and how many at least are functions of voltage and states
@@ -24,6 +23,7 @@ CLOSE = 0.05  # of what the best explains: the terms that are fitted exactly
 EXACT = 6  # of them at most
 PEAKS, PROMISING = 3, 0.7  # settings of one term, and how good the further ones are of the best
 REGRIDDED = 3  # terms whose grid is searched anew where the base model is that of their refit
+MOVED = 2  # terms whose signal is tried in the other balances, too
 AGAIN = 10  # terms that start from the other fits of the base model, too
 
 
@@ -113,19 +113,45 @@ def fitted(screened: Screened, valleys: Sequence[np.ndarray]) -> Fitted:
     ground = screened.ground
     listed = shortlist(screened)
     chosen = zoomed(ground, [*listed, *further(screened, listed[:AGAIN])])
-    bench, noise = with_terms(ground.bench, [f.term for f in chosen]), ground.noise
+    likely = [f.term for f in chosen]
+    bench, noise = with_terms(ground.bench, [*likely, *(s for t in likely for s in siblings(t))]), ground.noise
     bare = refit(bench, noise, [((), ground.unit)])[0]
     fits = rough_refit(bench, noise, _starts(bench, chosen, [ground.unit]))
     best = {f.names[0] for f in fits[:AGAIN]}
     others = [*off_bounds(bench, ground.unit), *valleys]
     again = _starts(bench, [f for f in chosen if f.term.name in best], others)
     fits = best_of([*fits, *(rough_refit(bench, noise, again) if again else [])])
-    better = [regridded(bench, noise, f) for f in fits[:REGRIDDED] if term(f.names[0]).signal.shapes]
-    fits = best_of([*fits, *(rough_refit(bench, noise, better) if better else [])])
+    fits = _searched_anew(bench, noise, fits)
+    moved = [start for f in fits[:MOVED] for start in elsewhere(bench, noise, f)]
+    fits = _searched_anew(bench, noise, best_of([*fits, *(rough_refit(bench, noise, moved) if moved else [])]))
     near = fits[0].cost + max(CLOSE * (bare.deviance - fits[0].deviance), 20.0)
     exact = {f.names: f for f in refit(bench, noise, [(f.names, f.unit) for f in fits[:EXACT] if f.cost <= near])}
     ranked = sorted((exact.get(f.names, f) for f in fits), key=lambda f: f.cost)
     return Fitted(bench, noise, bare, tuple(ranked))
+
+
+def _searched_anew(bench: Bench, noise: Noise, fits: Sequence[Refit]) -> list[Refit]:
+    """The fits, with the shapes of the best terms searched over their grids and moved across their ranges."""
+    shaped = [f for f in fits[:REGRIDDED] if term(f.names[0]).signal.shapes]
+    begun = [[regridded(bench, noise, f), (f.names, f.unit)] for f in shaped]
+    return best_of([*fits, *(better for starts in begun for better in wide_refit(bench, noise, starts))])
+
+
+def siblings(of: Term) -> list[Term]:
+    """The terms with the same signal in other balances."""
+    return [t for t in terms() if (t.signal, t.clock) == (of.signal, of.clock) and t != of]
+
+
+def elsewhere(bench: Bench, noise: Noise, fit: Refit) -> list[Start]:
+    """Starts of a term's siblings at its setting, where the base model is that of its own refit.
+
+    At the first fit of the base model they may have ranked far behind, or at another setting.
+    """
+    chosen, at = term(fit.names[0]), bench.coordinates
+    values = values_of(at, fit.unit, chosen)
+    setting = {s.name: values[s.name] for s in chosen.signal.shapes}
+    there = Ground.at(bench, place(at, fit.unit, chosen, values, [0.0] * len(chosen.balance.sizes)), noise)
+    return _starts(bench, scores(there, [(t, setting) for t in siblings(chosen)]), [there.unit])
 
 
 def regridded(bench: Bench, noise: Noise, fit: Refit) -> Start:

@@ -1,0 +1,74 @@
+"""Markdown from what plugins say of themselves."""
+
+import ast
+import dataclasses
+import inspect
+import re
+import textwrap
+from collections.abc import Iterator, Sequence
+
+SPECIAL = re.compile(r"([\\*\[\]<>|$])")
+
+
+def plain(text: str) -> str:
+    """Text as Markdown shows it: nothing of it is markup but `code`."""
+    parts = re.split(r"(`[^`]*`)", " ".join(text.split()))
+    return "".join(part if part.startswith("`") else SPECIAL.sub(r"\\\1", part) for part in parts)
+
+
+def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table of cells that are Markdown already; "" where it has no rows."""
+    if not rows:
+        return ""
+    lines = [columns, ["---"] * len(columns), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+
+
+def folded(summary: str, inside: str) -> str:
+    """What a reader opens."""
+    return f"<details><summary>{summary}</summary>\n\n{inside}\n\n</details>\n"
+
+
+def docstring(cls: type) -> str:
+    """A docstring: paragraphs, indented lines as they stand, `Source:` and `Departures:` with their words marked."""
+    blocks = re.split(r"\n\s*\n", inspect.cleandoc(cls.__doc__ or ""))
+    return "\n\n".join(filter(None, map(_block, blocks)))
+
+
+def _block(block: str) -> str:
+    if block.startswith("    "):
+        return f"```text\n{textwrap.dedent(block).rstrip()}\n```"
+    marked = re.split(r"(?m)^(Source|Departures): ", block)
+    told = [plain(marked[0])] if marked[0].strip() else []
+    told += [f"**{word}:** {plain(text)}" for word, text in zip(marked[1::2], marked[2::2], strict=True)]
+    return "\n\n".join(told)
+
+
+def settings(cls: type) -> list[list[str]]:
+    """A row for each setting: its name, its default, and what the comment beside it says."""
+    said = dict(_comments(cls))
+    return [
+        [f"`{item.name}`", f"`{_default(item)}`", plain(said.get(item.name, ""))]
+        for item in dataclasses.fields(cls)
+        if item.init
+    ]
+
+
+def _default(item: dataclasses.Field) -> str:
+    if item.default_factory is not dataclasses.MISSING:
+        return repr(item.default_factory())
+    if item.default is None or isinstance(item.default, bool):
+        return "null" if item.default is None else str(item.default).lower()
+    return str(item.default) or "''"
+
+
+def _comments(cls: type) -> Iterator[tuple[str, str]]:
+    """(setting, comment) of a class, those of its bases first."""
+    for base in reversed(cls.__mro__):
+        if dataclasses.is_dataclass(base):
+            source = inspect.getsource(base)
+            lines = source.splitlines()
+            (node,) = ast.parse(textwrap.dedent(source)).body
+            for item in node.body:
+                if isinstance(item, ast.AnnAssign) and (found := re.search(r"#\s*(.+)$", lines[item.end_lineno - 1])):
+                    yield item.target.id, found[1]

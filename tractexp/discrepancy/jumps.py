@@ -1,0 +1,55 @@
+"""What a recorder's filter makes of a jump that an effect puts into the currents, of waveforms.
+
+Voltage and currents pass the same anti-alias filter, which a linear load does not notice: what it makes of the filtered
+voltage is the filtered current. A contactor that opens is not linear. Its jump is recorded over two or three samples,
+with an overshoot of a few per cent, by a filter that nobody told us, while it is calculated between two samples. So the
+samples at a jump tell of its size and time, but nothing by how steep it is.
+"""
+
+import functools
+
+import numpy as np
+
+from tractexp.discrepancy.bench import Bench
+from tractexp.identification.observed import off_neighbors
+
+MOST = 4  # samples of one channel and event that are the least smooth
+AROUND = 3  # samples on either side that a filter may spread a jump over
+SPREAD = 1.0  # of how far a sample lies off its neighbors: what may be wrong with it and with those around it
+ABRUPT = 0.02  # of the most that the effects change: from there a sample off its neighbors is a jump
+
+
+def jumps(bench: Bench, unit: np.ndarray) -> np.ndarray:
+    """What may be wrong at the jumps that effects make at coordinates (D,), one standard deviation: (k, C, N) [pu]."""
+    return _jumps(bench, unit.tobytes())
+
+
+@functools.lru_cache(maxsize=8)
+def _jumps(bench: Bench, told: bytes) -> np.ndarray:
+    at, unit = bench.coordinates, np.frombuffer(told)
+    there = tuple(n for n in bench.catalogue.of_load if (unit != at.null)[at.sizes([n])].any())
+    if not there:
+        return np.empty((0, *bench.drive.measured.shape))
+    without = unit.copy()
+    columns = at.sizes(there)
+    without[columns] = at.null[columns]
+    added = bench.residuals(unit[None], there)[0] - bench.residuals(without[None], there)[0]
+    shapes = []
+    for e in range(len(bench.events)):
+        part = bench.drive.part(e)
+        for c, change in enumerate(np.nan_to_num(added[:, part])):
+            for k, size in _at_jumps(change):
+                shapes.append(np.zeros(bench.drive.measured.shape))
+                shapes[-1][c, part.start + k] = size
+    return np.array(shapes).reshape(-1, *bench.drive.measured.shape)
+
+
+def _at_jumps(added: np.ndarray) -> list[tuple[int, float]]:
+    """The samples around the jumps of one channel (N,), each with what may be wrong with it [pu]."""
+    off, least = np.abs(off_neighbors(added)), ABRUPT * np.abs(added).max(initial=0.0)
+    doubt: dict[int, float] = {}
+    for k in np.argsort(-off)[:MOST].tolist():
+        if off[k] > least:
+            for near in range(max(k - AROUND, 0), min(k + AROUND + 1, len(off))):
+                doubt[near] = max(doubt.get(near, 0.0), SPREAD * float(off[k]))
+    return sorted(doubt.items())
