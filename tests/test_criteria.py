@@ -18,7 +18,9 @@ from tractexp.discrepancy.gap import Gap
 from tractexp.discrepancy.held_out import Judged, Together
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.judgement import judged
-from tractexp.discrepancy.next_dip import NextDip, mildest
+from tractexp.discrepancy.next_event.choose import Tried, mildest
+from tractexp.discrepancy.next_event.imagined import Imagined
+from tractexp.discrepancy.next_event.separation import Chances
 from tractexp.discrepancy.projection import Score
 from tractexp.discrepancy.proposal.judge import Before, Weighed
 from tractexp.errors import UserError
@@ -95,7 +97,11 @@ def status(c):
 
 
 def chosen_dip(c):
-    return mildest([NextDip(0.2, 0.1, 0.93), NextDip(0.6, 0.1, 0.99)], c.decided).depth
+    tried = [
+        Tried(Imagined(depth, 0.1), Chances(np.array([p]), np.ones((1, 1))), Chances(np.array([p]), np.ones((1, 1))))
+        for depth, p in ((0.2, 0.93), (0.6, 0.99))
+    ]
+    return mildest(tried, c.decided, lambda t: t.chances).event.depth
 
 
 def proposed(closed=0.9, left=1.0, p=1e-6):

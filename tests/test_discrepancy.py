@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.special import chdtrc, ndtr
+from scipy.special import chdtrc
 from test_cli import tractexp
 
 from hidden_effects import Case, Noise, make, write
@@ -27,7 +27,6 @@ from tractexp.discrepancy.fitting import refit
 from tractexp.discrepancy.held_out import together, weighed
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.judgement import judgements
-from tractexp.discrepancy.next_dip import ONE_SIDED, next_dip
 from tractexp.discrepancy.noise_in_quiet import QuietNoise
 from tractexp.discrepancy.projection import signed_drop
 from tractexp.discrepancy.records import Records, check_events
@@ -445,20 +444,6 @@ def test_an_effect_that_a_larger_set_does_not_need_is_left_out_again(planted):
     assert refits[name,].deviance < first.fit.deviance - 100
     needed = replace(tests, fit=replace(tests.fit, deviance=tests.fit.deviance - 30.0))  # p = 4e-8 of one parameter
     assert without_needless(planted.base, needed, refits, 0) is needed
-
-
-def test_the_deciding_dip_looks_at_the_load_and_not_at_what_the_recorder_did(planted):
-    """A set is never told from itself, whatever skew and drift its two fits found in the events."""
-    rival, at = planted.survivors.rivals[0], planted.bench.coordinates
-    unit = rival.fit.unit.copy()
-    unit[at.parameters(["time_skew", "load_drift"])] += 0.1
-    assert next_dip(planted.bench, [rival, rival]).probability == pytest.approx(ndtr(-ONE_SIDED))
-    skewed = next_dip(planted.bench, [rival, replace(rival, fit=replace(rival.fit, unit=unit))])
-    assert skewed.probability == pytest.approx(ndtr(-ONE_SIDED))
-    other = rival.fit.unit.copy()
-    other[at.parameters(["stator_resistance"])] += 0.2
-    decided = next_dip(planted.bench, [rival, replace(rival, fit=replace(rival.fit, unit=other))])
-    assert 0.1 < decided.probability <= 1
 
 
 def test_candidates_at_their_null_leave_the_base_model(silent):

@@ -14,7 +14,6 @@ from test_report_page import read
 from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.evidence import CHOSEN, beside, chance_level, evidence, why_not_the_most_helpful
 from tractexp.discrepancy.investigate import investigate
-from tractexp.discrepancy.next_dip import NextDip
 from tractexp.discrepancy.recommended import adequacy
 from tractexp.report import discrepancy, overlay
 from tractexp.report.events import WITHIN
@@ -212,10 +211,3 @@ def test_an_unexplained_verdict_does_not_contradict_itself(unexplained, tmp_path
     assert {"value", "standard_error", "interval"} == next(iter(told.values())).keys()
     words, _ = page(unexplained, tmp_path)
     assert not re.search(r"\d\.\d+e-\d\d\d", words)
-
-
-def test_a_dip_that_does_not_decide_is_not_promised_to():
-    sure, unsure = NextDip(0.4, 0.1, 0.97), NextDip(0.7, 0.8, 0.6)
-    assert sure.sentence("a", "b", 0.95).startswith("record a dip of 40% or more lasting 100 ms: it tells a from b")
-    assert unsure.sentence("a", "b", 0.95).startswith("no dip of up to 70% and 800 ms is sure to tell a from b")
-    assert "60%" in unsure.sentence("a", "b", 0.95)

@@ -14,7 +14,7 @@ from wave_records import case, events
 import tractexp
 from tractexp.discrepancy.catalogue import catalogue
 from tractexp.discrepancy.injection import Injection
-from tractexp.discrepancy.next_dip import next_dip
+from tractexp.discrepancy.next_event.choose import next_event
 from tractexp.discrepancy.remainder import remainders
 from tractexp.errors import UserError
 from tractexp.identification.problem import Problem
@@ -105,15 +105,16 @@ def test_the_page_shows_the_currents_of_the_phases_before_and_after(planted):
     assert after < before
 
 
-def test_a_dip_that_would_decide_is_found_in_waveforms(planted):
+def test_an_event_that_would_decide_is_found_in_waveforms(planted):
     steps = planted.steps
-    mild = next_dip(steps.bench, [steps.survivors.rivals[0], steps.survivors.kept[0]])
-    assert mild.probability < 0.5  # a set is not told from itself
-    rivals = [r for r in steps.survivors.rivals if r.tests is not None]
-    other = replace(steps.survivors.rivals[1], tests=rivals[0].tests)
-    sure = next_dip(steps.bench, [rivals[0], other])
-    assert 0.04 <= sure.duration <= 0.32
-    assert sure.sentence("a", "b", 0.95)
+    bench, noise, kept = steps.bench, steps.held_out.noise, steps.survivors.kept[0].fit
+    other = next(r.fit for r in steps.survivors.rivals if r.fit.names != kept.names)
+    chosen = next_event(bench, noise, steps.bare, [kept, other], ["a", "b"])
+    assert 0.04 <= chosen.best.event.duration <= 0.32
+    assert {np.sign(t.event.jump) for t in chosen.tried} == {-1.0, 0.0, 1.0}
+    assert chosen.best.chances.least > 0.5
+    assert not chosen.same
+    assert chosen.sentence()
 
 
 def test_a_push_of_waveforms_is_the_terminal_current(given):

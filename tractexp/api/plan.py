@@ -11,6 +11,7 @@ import numpy as np
 from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.identify import Identification
+from tractexp.api.next_event import Recommended, recommended
 from tractexp.api.pages import Drawing, Written
 from tractexp.api.setup import Setup
 from tractexp.errors import UserError, check_range
@@ -98,8 +99,10 @@ def plan(
     bounds: Mapping[str, Sequence[float]] | None = None,
     fixed: Mapping[str, float] | None = None,
     substeps: int | None = None,
-) -> Forecasts:
-    """Forecast the intervals that a recording would give, without fitting it.
+    rivals: Any = (),
+    progress: Any = None,
+) -> Forecasts | Recommended:
+    """Forecast the intervals that a recording would give, without fitting it; or what tells `rivals` apart.
 
     How deep must a dip be for `parameter` (H stands for M) to be known with half of its 95 % interval `within` a share
     of the value? The dip is that of the deepest of `records`, unless `depth` (of the voltage before), `duration` [s],
@@ -110,8 +113,15 @@ def plan(
     that tell most together are chosen, until another one narrows the intervals by less than the share `least`, at most
     `events` of them. The model is as in `tractexp.identify`.
 
+    With `rivals` nothing of this is asked: they are effects that the model may lack (`["a", "b"]`, `"b+c"` two at
+    once, or the path of a `discrepancy.json` that ended tied), and the event is chosen that most surely leaves one of
+    them. `progress` is as in `tractexp.investigate`.
+
     Raises `UserError` for wrong names or values, and for a model with `per_event`.
     """
+    if rivals:
+        known = {"bounds": bounds, "fixed": fixed, "substeps": substeps, "domain": domain}
+        return recommended(Setup.of(records, model, (), None, known), rivals, progress)
     check_range("task.within", within, 1e-6, 10.0)
     check_range("task.least", least, 0.0, 1.0)
     if events is not None:

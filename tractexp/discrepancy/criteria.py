@@ -13,6 +13,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from tractexp.errors import UserError, among, check_range
 from tractexp.noise import wander
 
@@ -175,11 +177,12 @@ class Criteria:
         clear = max(self.window_clear, self.window_share * best)
         return max(self.window_least, min(best - self.window_behind, clear))
 
-    def rejects(self, behind: float, distance: float, parameters: int, explained: float) -> bool:
-        """Whether a rival this far behind the best set is rejected.
+    def rejects(self, behind: Any, distance: Any, parameters: int, explained: Any) -> Any:
+        """Whether a rival this far behind the best set is rejected; numbers, or arrays of one shape (n,).
 
         `distance` of the two curves [squared standard deviations]; `parameters` of both, whose noise moves the curves
         apart too; `explained` by the best set, of the deviance.
         """
-        far = max(distance - parameters, self.rejected**2)
-        return behind > max(2 * self.rejected * far**0.5 - far, self.alike * max(explained, 0.0))
+        far = np.maximum(distance - parameters, self.rejected**2)
+        least = np.maximum(2 * self.rejected * far**0.5 - far, self.alike * np.maximum(explained, 0.0))
+        return behind > least

@@ -15,7 +15,7 @@ from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import Estimate, estimates, own_parameters
 from tractexp.discrepancy.proposal import generate
 from tractexp.discrepancy.proposal.propose import told as told_of_proposal
-from tractexp.discrepancy.verdict import NAMED, UNEXPLAINED
+from tractexp.discrepancy.verdict import NAMED, TIED, UNEXPLAINED
 from tractexp.identification.adequacy import Grade
 from tractexp.model.drive import PHASORS
 from tractexp.wording import joined
@@ -45,6 +45,7 @@ def content(investigation: Investigation) -> dict[str, Any]:
         "proposal": told_of_proposal(investigation.proposed, PLUGIN),
         "no_proposal": investigation.proposed.why or None,
         "recommendation": recommendation(investigation),
+        "next_event": None if investigation.next_event is None else investigation.next_event.told(),
         "adequacy": recommended.adequacy(investigation).told(),
         "held": recommended.held(investigation),
         "extended": "conf/model/extended.yaml" if investigation.names else None,
@@ -58,12 +59,12 @@ def content(investigation: Investigation) -> dict[str, Any]:
 
 def recommendation(investigation: Investigation) -> str:
     """What to do next, one sentence."""
-    if (dip := investigation.verdict.next_dip) is not None:
-        spoken = investigation.catalogue.spoken
-        first, second = (joined([spoken(n) for n in names]) for names in investigation.verdict.sets[:2])
-        return dip.sentence(first, second, investigation.bench.criteria.decided)
+    chosen = investigation.next_event
+    if chosen is not None and investigation.verdict.word == TIED:
+        return chosen.sentence()
     if (made := investigation.proposed.proposal) is not None:
-        return f"ask what on site acts like {made.term.words}; {PLUGIN} adds it to a model (docs/missing-effects.md)"
+        told = f"ask what on site acts like {made.term.words}; {PLUGIN} adds it to a model (docs/missing-effects.md)"
+        return told if chosen is None else f"{told}; {chosen.sentence()}"
     if investigation.verdict.word == UNEXPLAINED:
         return "look at what is left (unexplained.csv) and at what switched at that time"
     if investigation.verdict.word == NAMED:

@@ -15,6 +15,7 @@ from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.gap import Gap, gap
 from tractexp.discrepancy.held_out import HeldOut, Judged, held_out
 from tractexp.discrepancy.kernels import Family
+from tractexp.discrepancy.next_event.choose import NextEvent
 from tractexp.discrepancy.overlay import Overlay, left, on_fitted, on_held_out
 from tractexp.discrepancy.places import Place, places
 from tractexp.discrepancy.precision import Estimate, estimates
@@ -70,6 +71,12 @@ class Investigation:
     def extended(self) -> Refit:
         """The model with the names of the verdict added; the base model where there are none."""
         return self.held_out.extended[self.verdict.chosen.fit.names] if self.names else self.bare
+
+    @property
+    def next_event(self) -> NextEvent | None:
+        """What to record next, where explanations are tied or the proposed term has near-synonyms."""
+        made = self.proposed.proposal
+        return self.verdict.next_event or (made and made.next_event)
 
     @property
     def judged(self) -> Judged | None:

@@ -7,9 +7,10 @@ from scipy.special import ndtr, ndtri
 
 from tractexp.discrepancy.catalogue import Candidate
 from tractexp.discrepancy.investigate import Investigation
-from tractexp.discrepancy.next_dip import ONE_SIDED
 from tractexp.discrepancy.projection import Score
 from tractexp.wording import in_words
+
+ONE_SIDED = 1.6449  # standard deviations: 5 %
 
 
 @dataclass(frozen=True)

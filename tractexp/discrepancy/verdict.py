@@ -10,7 +10,7 @@ from tractexp.discrepancy.explanations import Explanations
 from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.gap import Curves, curves
 from tractexp.discrepancy.held_out import HeldOut, carried
-from tractexp.discrepancy.next_dip import NextDip, next_dip
+from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.discrepancy.survivors import Rival, Survivors
 from tractexp.noise import Noise
 from tractexp.record import Event
@@ -51,7 +51,7 @@ class Verdict:
     names: tuple[str, ...]
     sets: tuple[tuple[str, ...], ...]
     chosen: Rival
-    next_dip: NextDip | None  # that would tell tied sets apart
+    next_event: NextEvent | None  # that would tell tied sets apart
     nearest: Nearest | None  # where nothing explains
 
 
@@ -79,9 +79,17 @@ def verdict(weighed: HeldOut, validate: Sequence[Event]) -> Verdict:
         names=names,
         sets=sets,
         chosen=chosen,
-        next_dip=next_dip(bench, weighed.kept) if word == TIED else None,
+        next_event=_next_event(weighed, sets) if word == TIED else None,
         nearest=nearest,
     )
+
+
+def _next_event(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> NextEvent:
+    """What to record to tell all explanations apart that are kept."""
+    bench = weighed.survivors.explanations.base.bench
+    fits = [weighed.extended.get(rival.fit.names, rival.fit) for rival in weighed.kept]
+    labels = [joined(_spoken(names, weighed)) for names in sets]
+    return next_event(bench, weighed.noise, weighed.bare, fits, labels)
 
 
 def _word(explained: Explanations, left: Survivors, weighed: HeldOut) -> str:

@@ -27,6 +27,7 @@ from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.verdict import UNEXPLAINED, Nearest
 from tractexp.model.sites import KINDS
 from tractexp.report.chart import Chart
+from tractexp.report.next_event import section
 from tractexp.report.overlay import overlaid
 from tractexp.report.page import Page
 from tractexp.report.proposal import headlines, proposed
@@ -71,6 +72,9 @@ def page(path: Path, found: Investigation, title: str) -> Path:
     if found.verdict.word == UNEXPLAINED:
         proposed(made, found)
         _left(made, found)
+    if (chosen := found.next_event) is not None:
+        made.heading("What to record next").text(as_sentence(chosen.sentence()))
+        section(made, chosen)
     _forms(made, found)
     _candidates(made, found)
     _parameters(made, found)

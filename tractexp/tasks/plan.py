@@ -1,6 +1,7 @@
 """Before the recording: which dips tell what, how deep one must be, and which events of an archive to fit."""
 
-from typing import TYPE_CHECKING
+from dataclasses import field
+from typing import TYPE_CHECKING, Any
 
 from tractexp.errors import check_range
 from tractexp.plugin import plugin
@@ -33,16 +34,21 @@ class Plan(Task):
     values: str = "fit"  # fit, default, or the path of a result.json
     least: float = 0.05  # another event of the archive must narrow the intervals by this share
     events: int | None = None  # at most so many
+    rivals: Any = field(default_factory=list)  # [a, b+c], or a discrepancy.json: what to record to tell these apart
 
     def check(self) -> None:
         check_range("task.within", self.within, 1e-6, 10.0)
         check_range("task.least", self.least, 0.0, 1.0)
 
     def run(self, job: Job) -> None:
-        from tractexp.api.plan import plan
+        from tractexp.api.plan import Forecasts, plan
 
+        if self.rivals:
+            self._for_rivals(job)
+            return
         asked = {key: getattr(self, key) for key in ASKED}
         made = call(plan, job.events.train, job.config["model"], **asked)
+        assert isinstance(made, Forecasts)
         paths = made.write_results(job.folder)
         tell(made.planned)
         paths += made.write_drawings(job.folder)
@@ -51,6 +57,27 @@ class Plan(Task):
             name=f"plan for {self.parameter}",
             values=dict(made.content["parameters"]),
             metrics={} if made.depth_needed is None else {"depth_needed": made.depth_needed},
+            artifacts=[*paths, job.folder / ".hydra"],
+        )
+
+    def _for_rivals(self, job: Job) -> None:
+        """What to record next to tell effects apart."""
+        from tractexp.api.plan import Recommended, plan
+
+        rivals = self.rivals if isinstance(self.rivals, str) else [*self.rivals]
+        say_so = lambda line: say(f"  {line}")  # noqa: E731
+        made = call(plan, job.events.train, job.config["model"], rivals=rivals, progress=say_so)
+        assert isinstance(made, Recommended)
+        paths = made.write_results(job.folder)
+        shown = made.table()
+        table(shown.columns, shown.rows, shown.title)
+        say(f"next: {made.sentence}")
+        paths += made.write_drawings(job.folder)
+        listed(paths)
+        job.log(
+            name=f"plan to tell {len(made.rivals)} explanations apart",
+            values={},
+            metrics={"probability": made.probability},
             artifacts=[*paths, job.folder / ".hydra"],
         )
 

@@ -8,6 +8,7 @@ import numpy as np
 from tractexp.discrepancy.base_fit import BaseFit
 from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.discrepancy.fitting import Refit
+from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.discrepancy.precision import WIDE
 from tractexp.discrepancy.proposal import generate
 from tractexp.discrepancy.proposal.bed import bench_of_terms, carried_over, sizes_of
@@ -65,6 +66,7 @@ class Proposal:
     ties: tuple[tuple[Term, float, float], ...]  # with the shares they close on fitted and on held-out events
     alike: tuple[tuple[str, float], ...]  # textbook effects, and the share of its change that each could have made
     source: str  # of a plugin file
+    next_event: NextEvent | None  # that would tell the terms apart
 
     @property
     def values(self) -> dict[str, float]:
@@ -118,13 +120,22 @@ def _proposal(made: Fitted, first: Disagreement, standing: Sequence[Weighed], gr
     declared |= {s.name: (s.unit, s.about, s.latex) for s in term.signal.shapes}
     known = tuple(Known(n, v, errors[n], *declared[n]) for n, v in values.items())
     records = joined([e.record.name for e in made.bench.events])
+    alternatives = tied(made, chosen, others)
     return Proposal(
         term=term, known=known, train=chosen.train, validate=chosen.validate, p=chosen.p,
         acting=tuple(_acting(made, chosen.fit)),
-        ties=tuple((made.term(o.fit), o.train.closed, o.validate.closed) for o in tied(made, chosen, others)),
+        ties=tuple((made.term(o.fit), o.train.closed, o.validate.closed) for o in alternatives),
         alike=tuple(alike(made, chosen.fit, first)),
         source=generate.source(term, values, records),
+        next_event=_next_event(made, [chosen.fit, *(o.fit for o in alternatives)]),
     )  # fmt: skip
+
+
+def _next_event(made: Fitted, fits: Sequence[Refit]) -> NextEvent | None:
+    """What to record to tell a term from its near-synonyms."""
+    if len(fits) == 1:
+        return None
+    return next_event(made.bench, made.noise, made.bare, fits, [made.term(fit).words for fit in fits])
 
 
 def change(made: Fitted, fit: Refit) -> np.ndarray:

@@ -1,0 +1,109 @@
+"""What to record next, so that explanations which fit equally well are told apart."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+from tractexp import files
+from tractexp.api.pages import Drawing, Written
+from tractexp.api.setup import Setup
+from tractexp.errors import UserError
+from tractexp.outcome import Table
+from tractexp.progress import Progress, telling
+
+if TYPE_CHECKING:
+    from tractexp.discrepancy.next_event.choose import NextEvent
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Recommended(Written):
+    """The event that tells rivals apart. `content` is that of `plan.json`."""
+
+    kind = "next_event"
+
+    setup: Setup
+    rivals: Sequence[Sequence[str]]
+    content: Mapping[str, Any]
+
+    @property
+    def sentence(self) -> str:
+        """What to record, or why no event would help."""
+        return self.content["sentence"]
+
+    @property
+    def probability(self) -> float:
+        """That the recommended event leaves one rival, the least over all as the truth."""
+        return self.content["recommended"]["probability"]
+
+    @property
+    def found(self) -> "NextEvent":
+        """What stands behind the page; of a loaded result it is reckoned again."""
+        return self.__dict__.get("_found") or _found(self.setup, self.rivals, False)
+
+    def table(self) -> Table:
+        """Every event tried, the surest first."""
+        ranked = sorted(self.content["tried"], key=lambda t: (-t["probability"], -t["by_noise_alone"]))
+        rows = [[t["words"], f"{t['probability']:.0%}", f"{t['by_noise_alone']:.0%}"] for t in ranked[:10]]
+        columns = ["event", "probability", "where formulas are exact"]
+        return Table(columns, rows, "the ten surest events", [self.sentence])
+
+    def to_dict(self) -> dict[str, Any]:
+        rivals = [list(names) for names in self.rivals]
+        return {"setup": self.setup.to_dict(), "rivals": rivals, "content": dict(self.content)}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        return cls(Setup.from_dict(content["setup"]), content["rivals"], content["content"])
+
+    def _results(self, folder: Path) -> list[Path]:
+        return [files.write_json(folder / "plan.json", self.content)]
+
+    def _drawings(self) -> Mapping[str, Drawing]:
+        from tractexp.report import next_event
+
+        records = ", ".join(e.record.name for e in self.setup.train)
+        return {"plan.html": lambda path: next_event.page(path, self.found, records)}
+
+
+def recommended(setup: Setup, rivals: Any, progress: Progress = None) -> Recommended:
+    """Choose the event that tells `rivals` apart. Raises `UserError` for rivals that cannot be planned for."""
+    sets = sets_of(rivals)
+    found = _found(setup, sets, progress)
+    made = Recommended(setup, sets, files.plain(found.told()))
+    made.__dict__["_found"] = found
+    return made
+
+
+def sets_of(rivals: Any) -> list[list[str]]:
+    """Sets of effects: from names, `a+b` for two at once, or from the `discrepancy.json` of a tie.
+
+    Raises `UserError` for a file that holds no tie.
+    """
+    if not isinstance(rivals, str):
+        return [name.split("+") if isinstance(name, str) else list(name) for name in rivals]
+    path = Path(rivals)
+    if not path.is_file():
+        raise UserError(
+            f"task.rivals={rivals}: there is no such file; give names of effects, [a,b] or [a,b+c], or the"
+            " discrepancy.json of an investigation that ended tied"
+        )
+    told = json.loads(path.read_text(encoding="utf-8"))
+    if told.get("verdict") != "tied":
+        raise UserError(
+            f"task.rivals={rivals}: that investigation ended {told.get('verdict')}, not tied, so that there is nothing"
+            " to tell apart; of a proposal the terms that are like it, and what to record for them, are in that file"
+            " itself, as next_event"
+        )
+    return told["name_sets"]
+
+
+def _found(setup: Setup, rivals: Sequence[Sequence[str]], progress: Progress) -> "NextEvent":
+    from tractexp.discrepancy.next_event.rivals import event_for
+
+    m = setup.model
+    if m.per_event:
+        raise UserError("task=plan plans for shared parameters; leave model.per_event empty")
+    with telling(progress) as tell:
+        return event_for(m.model, setup.train, rivals, m.bounds, m.fixed, substeps=m.substeps, tell=tell)

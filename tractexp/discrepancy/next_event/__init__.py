@@ -1,0 +1,1 @@
+"""What to record next, so that explanations which fit equally well are told apart."""

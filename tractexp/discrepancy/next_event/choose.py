@@ -1,0 +1,252 @@
+"""The event to record next, chosen among those imagined: the mildest that is sure to leave one rival, or the surest."""
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.criteria import Criteria
+from tractexp.discrepancy.fitting import Refit, refit
+from tractexp.discrepancy.next_event.imagined import Imagined, as_recorded, driven, imagined
+from tractexp.discrepancy.next_event.same import Same, same
+from tractexp.discrepancy.next_event.separation import FEW, Chances, Separation, Side, seen, sided
+from tractexp.discrepancy.noise_in_quiet import QuietNoise
+from tractexp.discrepancy.records import Records
+from tractexp.model.drive import Drive
+from tractexp.noise import Noise
+from tractexp.wording import joined
+
+CHECKED = 4  # events whose chances are reckoned again at refits, until one holds what it promised
+HOPELESS = 0.5  # chance below which no event is said to tell a pair apart
+WORTH = 0.1  # chance below which no refit is worth its time
+REPEATED = (2, 3, 5, 10, 20)  # events of one kind together
+NEARLY = 0.02  # of the chance: of events as sure as this the mildest is the surest
+
+Rule = Callable[["Tried"], Chances]
+
+
+@dataclass(frozen=True)
+class Tried:
+    """An event and how surely it leaves one rival: by the product's own rule, and where formulas are `exact`.
+
+    The rule rejects no rival whose curves differ by less than `Criteria.alike` of what the best explains.
+    """
+
+    event: Imagined
+    chances: Chances
+    exact: Chances
+    refitted: bool = False  # whether rivals were refitted to it, not only linearised about their fits
+    repeated: int | None = None  # how many such events are sure to, where one is not and so many are
+
+
+@dataclass(frozen=True, eq=False)
+class NextEvent:
+    """What to record next for `rivals`, and how surely it leaves one of them; `tried` are all events, as imagined.
+
+    `best` is chosen by the product's own rule, and where that is not sure to decide, `by_noise` with formulas taken as
+    exact. `same` are pairs that no voltage at all tells apart, by their places among the rivals, and `hopeless` others
+    that none of the events does.
+    """
+
+    rivals: tuple[str, ...]
+    best: Tried
+    by_noise: Tried | None
+    tried: tuple[Tried, ...]
+    criteria: Criteria
+    same: tuple[tuple[int, int, Same], ...] = field(default=())
+    hopeless: tuple[tuple[int, int, float], ...] = field(default=())
+
+    @property
+    def probability(self) -> float:
+        """By the product's own rule, the least over all rivals as the truth."""
+        return self.best.chances.least
+
+    def sentence(self) -> str:
+        """What to record, or why nothing need be."""
+        told = [
+            f"{self.rivals[a]} and {self.rivals[b]} cannot be told apart by any dip at this bus: {found.reason}"
+            for a, b, found in self.same
+        ]
+        told += [
+            f"none of the {len(self.tried)} events tried tells {self.rivals[a]} from {self.rivals[b]}, the surest with"
+            f" a probability of {p:.0%}"
+            for a, b, p in self.hopeless
+        ]
+        if told and len(self.rivals) == 2:
+            return told[0]
+        return "; ".join([self._recommended(), *told])
+
+    def told(self) -> dict[str, Any]:
+        """As `discrepancy.json` and `plan.json` have it."""
+        return {
+            "sentence": self.sentence(),
+            "rivals": list(self.rivals),
+            "recommended": self._told(self.best),
+            "by_noise_alone": self.by_noise and self._told(self.by_noise),
+            "indistinguishable": [
+                {"pair": [self.rivals[a], self.rivals[b]], "rank": s.rank, "off": s.off, "reason": s.reason}
+                for a, b, s in self.same
+            ],
+            "no_event_separates": [
+                {"pair": [self.rivals[a], self.rivals[b]], "probability": p} for a, b, p in self.hopeless
+            ],
+            "tried": [
+                {
+                    **asdict(t.event),
+                    "words": t.event.words,
+                    "probability": t.chances.least,
+                    "by_noise_alone": t.exact.least,
+                }
+                for t in self.tried
+            ],
+        }
+
+    def _told(self, tried: Tried) -> dict[str, Any]:
+        chances = tried.exact if tried is self.by_noise else tried.chances
+        return {
+            **asdict(tried.event),
+            "words": tried.event.words,
+            "probability": chances.least,
+            "by_truth": dict(zip(self.rivals, chances.alone.tolist(), strict=True)),
+            "refitted": tried.refitted,
+            "repeated": tried.repeated,
+        }
+
+    def _recommended(self) -> str:
+        first, *others = self.rivals
+        them = f"{first} from {others[0]}" if len(others) == 1 else f"{joined(self.rivals)} apart"
+        what, p = self.best.event.words, self.probability
+        if p >= self.criteria.decided:
+            return f"record {what}: it tells {them} with a probability of {p:.0%}"
+        if self.by_noise is None or p >= HOPELESS:
+            sure = f"no event that was tried is sure to tell {them}"
+            return f"{sure}; the surest, {what}, does so with a probability of {p:.0%}{_together(self.best)}"
+        what, p = self.by_noise.event.words, self.by_noise.exact.least
+        return (
+            f"no event that was tried is likely to tell {them} as long as no formula is trusted to"
+            f" {self.criteria.alike:.0%} of what it explains; record {what}: where formulas are exact"
+            f" (task.criteria.alike=0) it does so with a probability of {p:.0%}{_together(self.by_noise)}"
+        )
+
+
+def _together(tried: Tried) -> str:
+    """How many such events are sure to."""
+    return f", {tried.repeated} of them are sure to" if tried.repeated else ""
+
+
+def next_event(
+    bench: Bench, noise: Noise, bare: Refit, rivals: Sequence[Refit], labels: Sequence[str], seed: int = 0
+) -> NextEvent:
+    """Choose what to record to tell two rivals or more apart.
+
+    `bare` is the base model's fit, `noise` that under which all were fitted.
+    """
+    bench.effort.say(f"choosing what to record next, to tell {len(rivals)} explanations apart")
+    sides = [sided(bench, noise, fit) for fit in (bare, *rivals)]
+    separation, truths = Separation(sides, bench.criteria, FEW, seed), range(1, len(sides))
+    reads = {channel for fit in rivals for name in fit.names for channel in bench.catalogue[name].effect.reads}
+    events, denied = [], []
+    for group in _alike(imagined(bench, sorted(reads))):
+        for event, views in zip(group, zip(*(seen(bench, noise, s, group) for s in sides), strict=True), strict=True):
+            events.append(event)
+            denied.append(np.stack([separation.denied(views, truth) for truth in truths], axis=1))
+    most = np.max([d[1].mean(axis=2) for d in denied], axis=0)  # (a, a), by the noise alone
+    apart = [(a, b, float(min(most[a, b], most[b, a]))) for a, b in itertools.combinations(range(len(rivals)), 2)]
+    open_pairs = [pair for pair in apart if pair[2] < HOPELESS]
+    ignored = np.zeros(most.shape, bool)
+    if len(open_pairs) < len(apart):  # what can be told apart shall be
+        for a, b, _ in open_pairs:
+            ignored[a, b] = ignored[b, a] = True
+    tried = [
+        Tried(e, Chances.of(d[0], ignored), Chances.of(d[1], ignored)) for e, d in zip(events, denied, strict=True)
+    ]
+    best = _held(bench, noise, sides, tried, ignored, seed, _by_rule)
+    sure = best.chances.least >= bench.criteria.decided
+    by_noise = None if sure else _held(bench, noise, sides, tried, ignored, seed, _by_noise)
+    found = [(a, b, same(bench, rivals[a], rivals[b])) for a, b, _ in open_pairs]
+    proved = tuple((a, b, s) for a, b, s in found if s is not None)
+    hopeless = tuple(pair for pair, (*_, s) in zip(open_pairs, found, strict=True) if s is None)
+    return NextEvent(tuple(labels), best, by_noise, tuple(tried), bench.criteria, proved, hopeless)
+
+
+def _by_rule(tried: Tried) -> Chances:
+    return tried.chances
+
+
+def _by_noise(tried: Tried) -> Chances:
+    return tried.exact
+
+
+def mildest(tried: Sequence[Tried], decided: float, by: Rule) -> Tried:
+    """Of the events that are sure enough the one that asks for least, or else of the surest."""
+    enough = [t for t in tried if by(t).least >= min(decided, max(by(t).least for t in tried) - NEARLY)]
+    return min(enough, key=lambda t: t.event.burden)
+
+
+def _alike(events: Sequence[Imagined]) -> list[list[Imagined]]:
+    """Events that are sampled alike together."""
+    by_rate = sorted(events, key=lambda e: e.rate)
+    return [list(group) for _, group in itertools.groupby(by_rate, key=lambda e: e.rate)]
+
+
+def _held(
+    bench: Bench, noise: Noise, sides: Sequence[Side], tried: Sequence[Tried], ignored: np.ndarray, seed: int,
+    by: Rule,
+) -> Tried:  # fmt: skip
+    """The mildest event that is sure enough after refits, too."""
+    left, checked = list(tried), []
+    while left and len(checked) < CHECKED:
+        best = mildest(left, bench.criteria.decided, by)
+        if checked and by(best).least < min(HOPELESS, max(by(t).least for t in checked)):
+            break
+        left.remove(best)
+        checked.append(_refitted(bench, noise, sides, best, ignored, seed, by) if by(best).least >= WORTH else best)
+        if by(checked[-1]).least >= bench.criteria.decided:
+            return checked[-1]
+    return max(checked, key=lambda t: by(t).least)
+
+
+def _refitted(
+    bench: Bench, noise: Noise, sides: Sequence[Side], best: Tried, ignored: np.ndarray, seed: int, by: Rule
+) -> Tried:  # fmt: skip
+    """The chances of one event with rivals linearised where they fit it best, each in turn the truth.
+
+    Only of phasors without further channels or rates, which the bench has no records of: others stay linearised about
+    their fits.
+    """
+    event, plain = best.event, not (bench.waves or bench.records.window is not None or best.event.burden[0])
+    places = []
+    for a in range(1, len(sides)):
+        moved = _fitted_to(bench, noise, sides, sides[a], event) if plain else []
+        there = [side if k == a or not moved else sided(bench, noise, moved[k]) for k, side in enumerate(sides)]
+        views = [seen(bench, noise, side, [event])[0] for side in there]
+        places.append((Separation(there, bench.criteria, seed=seed), views))
+
+    def again(times: int) -> Tried:
+        denied = np.stack([s.denied(views, a, times) for a, (s, views) in enumerate(places, 1)], axis=1)
+        return Tried(event, *(Chances.of(rule, ignored) for rule in denied), refitted=plain)
+
+    once = again(1)
+    if by(once).least >= bench.criteria.decided:
+        return once
+    enough = (n for n in REPEATED if by(again(n)).least >= bench.criteria.decided)
+    return replace(once, repeated=next(enough, None))
+
+
+def _fitted_to(bench: Bench, noise: Noise, sides: Sequence[Side], truth: Side, event: Imagined) -> list[Refit]:
+    """Every side fitted to the records and one event more, in which `truth` holds exactly; coordinates of the bench."""
+    middle, at = truth.fit.unit.copy(), bench.coordinates
+    faults = at.parameters(bench.catalogue.of_measurement)
+    middle[faults] = at.null[faults]
+    power = bench.kernels.simulate(truth.fit.names, middle[None], Drive.of([driven(bench, event)]))[0]
+    whole = bench.on(Records.of((*bench.records.recorded, as_recorded(bench, event, power))))
+    d, before = len(at.names), len(at.before)
+    wide = [np.r_[side.fit.unit, 0.5, 0.5] for side in sides]
+    blur = None if noise.blur is None else QuietNoise.at(whole, wide[0]).blur
+    both = noise.on(whole.profile, blur)
+    made = {f.names: f for f in refit(whole, both, [(s.fit.names, u) for s, u in zip(sides, wide, strict=True)])}
+    fits = [made[s.fit.names] for s in sides]
+    return [replace(f, unit=np.r_[f.unit[:d], f.unit[whole.coordinates.before][:before]]) for f in fits]

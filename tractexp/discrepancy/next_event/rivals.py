@@ -1,0 +1,89 @@
+"""Rivals that somebody names, fitted to records: what to record next for them, without a whole investigation."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from tractexp.discrepancy.base_fit import base_fit
+from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.catalogue import Catalogue, catalogue
+from tractexp.discrepancy.criteria import Criteria
+from tractexp.discrepancy.effort import Effort
+from tractexp.discrepancy.fitting import Start, refit
+from tractexp.discrepancy.kernels import Family
+from tractexp.discrepancy.next_event.choose import NextEvent, next_event
+from tractexp.discrepancy.records import Records, check_events, in_waves_of
+from tractexp.errors import UserError
+from tractexp.model.model import Model
+from tractexp.record import Event
+from tractexp.wording import joined
+
+Names = tuple[str, ...]
+
+
+def event_for(
+    model: Model, events: Sequence[Event], rivals: Sequence[Sequence[str]], bounds: Mapping[str, Sequence[float]],
+    fixed: Mapping[str, float], *, substeps: int | None = None, criteria: Criteria | None = None, seed: int = 0,
+    tell: Callable[[str], None] = lambda line: None,
+) -> NextEvent:  # fmt: skip
+    """Fit sets of effects to all events and choose the event that tells them apart.
+
+    Raises `UserError` for fewer than two sets, and for effects that cannot be told on these events or are no load's.
+    """
+    criteria = criteria or Criteria()
+    sets = list(dict.fromkeys(tuple(sorted(names)) for names in rivals))
+    if len(sets) < 2:
+        raise UserError(
+            f"task.rivals={[list(s) for s in sets]}: an event is planned to tell two explanations or more apart; name"
+            " another one, such as 'task.rivals=[stator_resistance,feeder_impedance]'"
+        )
+    events = in_waves_of(model, events)
+    check_events(events, ())
+    named = sorted({name for names in sets for name in names})
+    missing = catalogue(
+        model.motor, model.static, model.effects, events, named, criteria.frequency_swing, model.domain
+    )  # fmt: skip
+    _check(missing, named)
+    with Effort(tell).audible() as effort:
+        Family(model, missing).compile(effort.say)
+        bench = Bench.of(model, missing, Records.of(events), bounds, fixed, criteria, effort, substeps)
+        base = base_fit(bench)
+        effort.say(f"fitting {len(sets)} explanations")
+        noise, begin = base.noise, [start for names in sets for start in _starts(bench, base.fit.unit, names)]
+        for _ in range(2):  # the second time under the noise that the best of them leaves
+            fits = refit(bench, noise, begin)
+            noise = base.quiet.of_fit(fits[0].unit, fits[0].names)
+            begin = [(fit.names, fit.unit) for fit in fits]
+        bare, *fits = sorted(refit(bench, noise, [((), base.fit.unit), *begin]), key=lambda fit: bool(fit.names))
+        return next_event(bench, noise, bare, fits, [joined(list(fit.names)) for fit in fits], seed)
+
+
+def _check(missing: Catalogue, named: Sequence[str]) -> None:
+    """Raise `UserError` for a name that is no effect of the load, or one that the events do not show."""
+    for name in named:
+        if name in missing.untestable:
+            raise UserError(f"task.rivals names '{name}', which cannot be tested here: {missing.untestable[name]}")
+        if name not in missing.of_load:
+            raise UserError(
+                f"task.rivals names '{name}', which is in the model already, a fault of the measurement, or of another"
+                " law or place; give effects that the model lacks, by the catalogue's names"
+            )
+
+
+def _starts(bench: Bench, unit: np.ndarray, names: Names) -> list[Start]:
+    """The base fit with every setting of each effect and its sizes at what matters least, either way."""
+    at, found = bench.coordinates, []
+    for name in names:
+        candidate = bench.catalogue[name]
+        for setting in candidate.settings:
+            for sign in (1, -1):
+                point = unit.copy()
+                for label, value in setting.items():
+                    point[at.column[label]] = at.to_unit(label, value)
+                for p in (p for other in names for p in bench.catalogue[other].sizes):
+                    step = candidate.relevant(p) * (candidate.sign(p) or sign)
+                    point[at.column[p.name]] = np.clip(at.to_unit(p.name, (p.null or 0.0) + step), 0.0, 1.0)
+                found.append((names, point))
+                if all(candidate.sign(p) for p in candidate.sizes):
+                    break
+    return found

@@ -1,0 +1,133 @@
+"""Whether two explanations are one function of the voltage: then no event at this bus tells them apart.
+
+Two conditions, both numerical, over voltages richer than any record's: at the point where one follows the other, the
+changes that the parameters of either make span the same space (the joint Jacobian has the rank of each); and refitted
+without noise each follows the other, at its fit and at half its size, to what the integration leaves.
+"""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.fitting import Refit
+from tractexp.discrepancy.next_event.imagined import BRIEF, DURATIONS, Imagined, driven
+from tractexp.discrepancy.tangent import two_sided
+from tractexp.model.drive import Drive
+
+FOLLOWS = 1e-6  # pu: how near one comes to the other
+SETTLED = 0.1  # of the power before: an event that a load has survived by its end
+DIRECTION = 1e-4  # of the largest singular value of normalized columns: a direction of its own
+RICH = (0.1, 0.3, 0.5, 0.7)  # depths
+TURNED = (0.0, 20.0, -30.0)  # degrees
+
+
+@dataclass(frozen=True)
+class Same:
+    """Two explanations that are one: the rank of their joint Jacobian and how near each follows the other [pu]."""
+
+    rank: int
+    events: int
+    off: float
+
+    @property
+    def reason(self) -> str:
+        return (
+            f"over {self.events} voltages, dips and phase jumps of many sizes, the changes that the parameters of"
+            f" either make span the same {self.rank} directions, and each follows the other within {FOLLOWS:.0e} pu"
+        )
+
+
+def same(bench: Bench, one: Refit, other: Refit) -> Same | None:
+    """The proof that two explanations are the same function of the voltage, None where they are not."""
+    events = [Imagined(*made) for made in itertools.product(RICH, (BRIEF if bench.waves else DURATIONS)[::2], TURNED)]
+    drive = Drive.of([driven(bench, event) for event in events])
+    told = []
+    for truth, rival in ((one, other), (other, one)):
+        for size in (1.0, 0.5):
+            pair = _followed(bench, drive, _shrunk(bench, truth, size), truth.names, rival)
+            if pair is None:
+                return None
+            told.append(pair)
+    return Same(max(rank for rank, _ in told), len(events), max(off for _, off in told))
+
+
+def _shrunk(bench: Bench, fit: Refit, size: float) -> np.ndarray:
+    """Coordinates (D,) of a fit with the sizes of its effects at this share, without faults of the measurement."""
+    at, unit = bench.coordinates, fit.unit.copy()
+    faults, sizes = at.parameters(bench.catalogue.of_measurement), at.sizes(fit.names)
+    unit[faults] = at.null[faults]
+    unit[sizes] = at.null[sizes] + size * (unit[sizes] - at.null[sizes])
+    return unit
+
+
+def _followed(
+    bench: Bench, drive: Drive, point: np.ndarray, names: Sequence[str], rival: Refit
+) -> tuple[int, float] | None:  # fmt: skip
+    """Rank and distance where the rival follows the truth at coordinates (D,); None where it does not."""
+    answer = bench.kernels.simulate(names, point[None], drive)[0]
+    known = (drive.weights > 0) & _recovering(answer, drive)
+    truth = answer[known]
+    columns = _of_load(bench, rival.names)
+    start = _shrunk(bench, rival, 1.0)
+
+    def drawn(points: np.ndarray, whose: Sequence[str]) -> np.ndarray:
+        made = bench.kernels.simulate(whose, points, drive)
+        bench.effort.spend(len(points))
+        return np.nan_to_num(made[:, known])
+
+    def whole(x: np.ndarray) -> np.ndarray:
+        unit = start.copy()
+        unit[columns] = x
+        return unit
+
+    def slopes(unit: np.ndarray, whose: Sequence[str], inside: Sequence[int]) -> np.ndarray:
+        up, down = two_sided(unit, inside)
+        width = np.array([u[c] - d[c] for u, d, c in zip(up, down, inside, strict=True)])
+        rows = drawn(np.concatenate([up, down]), whose)
+        return (rows[: len(inside)] - rows[len(inside) :]) / width[:, None]
+
+    def nearest(x: np.ndarray, rows: np.ndarray):
+        from scipy.optimize import least_squares
+
+        return least_squares(
+            lambda x: (drawn(whole(x)[None], rival.names)[0] - truth)[rows], np.clip(x, 1e-3, 1 - 1e-3),
+            lambda x: slopes(whole(x), rival.names, columns)[:, rows].T,  # pyright: ignore[reportArgumentType]
+            bounds=(0.0, 1.0), xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=60,
+        )  # fmt: skip
+
+    mild = np.zeros(known.shape, bool)  # first: near a stall a descent from afar goes astray
+    mild[:, : drive.first[drive.events // 2]] = True
+    found = nearest(nearest(start[columns], mild[known]).x, np.ones(len(truth), bool))
+    off = float(np.abs(found.fun).max())
+    if off > FOLLOWS:
+        return None
+    own = slopes(point, names, _of_load(bench, names)), slopes(whole(found.x), rival.names, columns)
+    ranks = [_rank(rows) for rows in (*own, np.concatenate(own))]
+    return (ranks[2], off) if len(set(ranks)) == 1 else None
+
+
+def _recovering(answer: np.ndarray, drive: Drive) -> np.ndarray:
+    """Which samples (C, N) are of events that the load survives: a motor that stalls amplifies what rounding does."""
+    alive = np.zeros(answer.shape, bool)
+    for e in range(drive.events):
+        own = answer[:, drive.part(e)]
+        first, last = own[:, :20].mean(axis=1), own[:, -20:].mean(axis=1)
+        alive[:, drive.part(e)] = np.isfinite(own).all() and np.abs(last - first).max() < SETTLED * np.abs(first).max()
+    return alive
+
+
+def _of_load(bench: Bench, names: Sequence[str]) -> list[int]:
+    """Columns of the base model's and the effects' parameters."""
+    at = bench.coordinates
+    return [*at.base, *at.parameters(names)]
+
+
+def _rank(rows: np.ndarray) -> int:
+    """How many directions rows (k, R) span, each of size one."""
+    size = np.linalg.norm(rows, axis=1)
+    kept = rows[size > DIRECTION * size.max()]
+    values = np.linalg.svd(kept / np.linalg.norm(kept, axis=1)[:, None], compute_uv=False)
+    return int((values > DIRECTION * values[0]).sum())

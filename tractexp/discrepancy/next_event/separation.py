@@ -1,0 +1,201 @@
+"""How surely one more event tells rivals apart: each in turn the truth, all others refitted, by the product's own rule.
+
+Every rival is linearised about its fit: r + J d on the events recorded, f + K d on the new one, whitened. With A the
+truth the new event shows y = f_A + K_A h + e, with h as uncertain as the records leave A's parameters and e noise.
+All rivals are fitted to both, in closed form, and judged as the product judges them (`Criteria.rejects`). Only the
+space that all r, J, f and K span matters, so that thousands of draws cost little.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.criteria import Criteria
+from tractexp.discrepancy.fitting import Refit
+from tractexp.discrepancy.next_event.imagined import Imagined, driven, noise_of
+from tractexp.discrepancy.proposal.screen import linearised
+from tractexp.discrepancy.tangent import resting, two_sided
+from tractexp.model.drive import Drive
+from tractexp.noise import Noise
+
+DRAWS, FEW = 2000, 200  # of the event chosen, and of each that is tried
+BOX = 12.0  # precision of a parameter of which nothing is known but its range
+MOVED = 1e-3  # of P0 and Q0, for their differences [pu]
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """One explanation on the recorded events: k parameters of the model and its effects, and P0 and Q0 of each event.
+
+    `r` (R,) and `J` (k, R) are whitened, faults of the measurement with their priors; `own` (k, m) and `s` (m,) are
+    priors of the explanation's own. Rows of parameters on a wall are 0.
+    """
+
+    fit: Refit
+    columns: tuple[int, ...]
+    free: np.ndarray  # (k,) which are not on a wall
+    r: np.ndarray
+    J: np.ndarray
+    own: np.ndarray
+    s: np.ndarray
+    box: np.ndarray  # (k,) precision of each by its range alone
+
+    @property
+    def known(self) -> np.ndarray:
+        """Precision (k, k) of the parameters by the recorded events."""
+        return self.J @ self.J.T + self.own @ self.own.T + np.diag(self.box)
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """An explanation on one new event: whitened prediction f (n,) and its differences K (k + 2, n), P0, Q0 at last.
+
+    nan where the model does not survive it.
+    """
+
+    f: np.ndarray
+    K: np.ndarray
+
+    @property
+    def survives(self) -> bool:
+        return bool(np.isfinite(self.f).all() and np.isfinite(self.K).all())
+
+
+@dataclass(frozen=True, eq=False)
+class Chances:
+    """By which probability an event leaves each rival alone where it is the truth (a,), and denies others (a, a)."""
+
+    alone: np.ndarray
+    pairs: np.ndarray
+
+    @classmethod
+    def of(cls, denied: np.ndarray, ignored: np.ndarray) -> "Chances":
+        """Of draws (a, a, b) that deny rivals, by the truth; pairs that are `ignored` (a, a) need not be told apart."""
+        return cls((denied | ignored[:, :, None]).all(axis=1).mean(axis=1), denied.mean(axis=2))
+
+    @property
+    def least(self) -> float:
+        """Over all rivals in turn."""
+        return float(self.alone.min())
+
+
+def sided(bench: Bench, noise: Noise, fit: Refit) -> Side:
+    """Linearise an explanation at its fit."""
+    at = bench.coordinates
+    faults = at.sizes(bench.catalogue.of_measurement)
+    own = [k for k in at.parameters(fit.names) if k not in faults]
+    columns = [*at.base, *faults, *own, *at.before]
+    _, rows = linearised(bench, fit.unit, noise, columns, fit.names)
+    shared = bench.drive.measured.size + len(faults)
+    free = ~resting(bench, fit.unit, columns, rows[1:] @ rows[0])
+    J = rows[1:, :shared] * free[:, None]
+    box = np.where(np.isin(columns, faults), 0.0, BOX)
+    return Side(fit, tuple(columns), free, rows[0, :shared], J, rows[1:, shared:], rows[0, shared:], box)
+
+
+def seen(bench: Bench, noise: Noise, side: Side, events: Sequence[Imagined]) -> list[Seen]:
+    """What an explanation predicts of events that are sampled alike, with the faults of the measurement at their null.
+
+    What the recorder did to earlier events says nothing of the load, but it may go on.
+    """
+    at, names = bench.coordinates, side.fit.names
+    drives = [driven(bench, event) for event in events]
+    inside = list(side.columns[: -len(at.before)])
+    middle = side.fit.unit.copy()
+    faults = at.parameters(bench.catalogue.of_measurement)
+    middle[faults] = at.null[faults]
+    up, down = two_sided(middle, inside)
+    width = np.array([u[k] - d[k] for u, d, k in zip(up, down, inside, strict=True)])
+    moved = _simulated(bench, names, np.concatenate([middle[None], up, down]), drives)  # (E, n, C, N)
+    before = [
+        _simulated(bench, names, middle[None], [_drawing(d, channel, sign * MOVED) for d in drives])
+        for channel in ("P0", "Q0")
+        for sign in (1, -1)
+    ]
+    one, k = Drive.of(drives[:1]), len(inside)
+    white = noise_of(noise, one, events[0].rate, bench.events[0].record.step)
+    told = []
+    for e in range(len(events)):
+        rows = np.concatenate([moved[e], *(b[e] for b in before)])
+        rows = white.whiten(np.where(one.weights > 0, rows, 0.0), one, one.weights > 0)
+        K = np.zeros((len(side.columns) + 2, rows.shape[1]))
+        K[:k] = (rows[1 : 1 + k] - rows[1 + k : 1 + 2 * k]) / width[:, None] * side.free[:k, None]
+        K[-2:] = (rows[[-4, -2]] - rows[[-3, -1]]) / (2 * MOVED)
+        told.append(Seen(rows[0], K))
+    return told
+
+
+def _simulated(bench: Bench, names: Sequence[str], points: np.ndarray, drives: Sequence) -> np.ndarray:
+    """What is compared (E, n, C, N) of drives of equal length."""
+    power = bench.kernels.simulate(names, points, Drive.of(drives))
+    bench.effort.spend(len(points))
+    return np.moveaxis(power.reshape(len(points), power.shape[1], len(drives), -1), 2, 0)
+
+
+def _drawing(drive, channel: str, more: float):
+    """The same voltage, with a little more P0 or Q0."""
+    return replace(drive, **{channel: getattr(drive, channel) + more})
+
+
+class Separation:
+    """Rivals on the recorded events, reduced to what they span; the first of `sides` is the base model."""
+
+    def __init__(self, sides: Sequence[Side], criteria: Criteria, draws: int = DRAWS, seed: int = 0):
+        self.sides, self.criteria, self.draws, self.seed = sides, criteria, draws, seed
+        rows = _reduced([np.vstack([x.r, x.J]) for x in sides])
+        self.r, self.J = [x[0] for x in rows], [x[1:] for x in rows]
+        self.known = [x.known for x in sides]
+
+    def denied(self, seen: Sequence[Seen], truth: int, times: int = 1) -> np.ndarray:
+        """Which rivals (2, a, b) each of b draws denies by one new event, or `times` its like, with `truth` the truth.
+
+        First by the product's rule, then where formulas are exact. None is denied where a side does not survive.
+        """
+        if not all(x.survives for x in seen):
+            return np.zeros((2, len(self.sides) - 1, self.draws), bool)
+        rows = _reduced([np.sqrt(times) * np.vstack([x.f - seen[0].f, x.K]) for x in seen])
+        return self._denied(truth, [x[0] for x in rows], [x[1:] for x in rows])
+
+    def _denied(self, truth: int, f: Sequence[np.ndarray], K: Sequence[np.ndarray]) -> np.ndarray:
+        """Which rivals (2, a, b) each of b draws denies where one of them is the truth; itself it always does."""
+        rng = np.random.default_rng([self.seed, truth])
+        side = self.sides[truth]
+        k, here = len(side.columns), side.fit.unit[list(side.columns)]
+        h = rng.standard_normal((self.draws, k)) @ np.linalg.cholesky(np.linalg.inv(self.known[truth])).T
+        h = np.clip(h, -here, 1 - here)
+        y = f[truth] + h @ K[truth][:k] + rng.standard_normal((self.draws, len(f[truth])))
+        fits = [self._fitted(x, f[x] - y, K[x]) for x in range(len(self.sides))]
+        deviance, old, new = fits[truth]
+        explained = fits[0][0] - deviance
+        rules = self.criteria, replace(self.criteria, alike=0.0)
+        denied = np.ones((2, len(self.sides) - 1, self.draws), bool)
+        for x in (x for x in range(1, len(self.sides)) if x != truth):
+            other, parameters = self.sides[x].fit.parameters, side.fit.parameters
+            behind = fits[x][0] - deviance + 2 * (other - parameters)
+            distance = ((fits[x][1] - old) ** 2).sum(axis=1) + ((fits[x][2] - new) ** 2).sum(axis=1)
+            for row, rule in zip(denied, rules, strict=True):
+                row[x - 1] = rule.rejects(behind, distance, other + parameters, explained) & (behind > 0)
+        return denied
+
+    def _fitted(self, x: int, off: np.ndarray, K: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Deviance (b,) and rows (b, .) of recorded and new events, of one side fitted to both."""
+        side, r, J = self.sides[x], self.r[x], self.J[x]
+        k = len(J)
+        whole = np.zeros((k + 2, k + 2))
+        whole[:k, :k] = self.known[x]
+        whole[k:, k:] += 1e-9 * np.eye(2)
+        whole += K @ K.T
+        slope = off @ K.T
+        slope[:, :k] += J @ r + side.own @ side.s
+        d = -np.linalg.solve(whole, slope.T).T
+        old, new, prior = r + d[:, :k] @ J, off + d @ K, side.s + d[:, :k] @ side.own
+        return (old**2).sum(axis=1) + (new**2).sum(axis=1) + (prior**2).sum(axis=1), old, new
+
+
+def _reduced(blocks: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Blocks of rows (m_i, n) as rows (m_i, m) of the same inner products, m their number in all."""
+    rows = np.concatenate(blocks)
+    squares, vectors = np.linalg.eigh(rows @ rows.T)
+    return np.split(vectors * np.sqrt(np.maximum(squares, 0.0)), np.cumsum([len(b) for b in blocks])[:-1])

@@ -1,0 +1,101 @@
+"""What to record next, as a section of an investigation's page and as a page of its own."""
+
+from pathlib import Path
+
+import numpy as np
+
+from tractexp.discrepancy.next_event.choose import NextEvent, Tried
+from tractexp.discrepancy.next_event.separation import Chances
+from tractexp.report.chart import Chart
+from tractexp.report.page import Page
+from tractexp.report.style import PALETTE
+from tractexp.wording import as_sentence
+
+LISTED = 2  # events of each kind that a table has
+KINDS = ("dip", "tap or capacitor bank", "dip with a phase jump and f", "unbalanced dip with U2", "dip sampled faster")
+
+
+def page(path: Path, found: NextEvent, title: str) -> Path:
+    """Write the page of a plan for rivals; returns its path."""
+    made = Page("What to record next", f"For {title}, to tell {' from '.join(found.rivals)}.")
+    sure = found.probability >= found.criteria.decided
+    made.verdict(as_sentence(found.sentence()), kind="good" if sure else "bad" if found.same else "plain")
+    section(made, found)
+    return made.write(path)
+
+
+def section(made: Page, found: NextEvent) -> None:
+    """The chances by dip as charts, the best events of each kind, and which pair each tells apart."""
+    rule = f"the rule of this investigation, which trusts no formula to {found.criteria.alike:.0%} of what it explains"
+    if not found.same or len(found.rivals) > 2:
+        made.chart(_chart(found), _caption(found))
+    made.heading("What each kind of event would do", 3)
+    made.table(
+        ["event", "by the rule [%]", "by noise [%]"],
+        [_row(t) for kind in KINDS for t in _best(found, kind)],
+        f"Probability that all rivals but the true one are rejected, the least over all of them as the truth: by"
+        f" {rule}; and by noise, with formulas taken as exact. The best events of each kind.",
+        words=(0,),
+    )
+    best = found.by_noise or found.best
+    chances = _chances(found, best)
+    made.heading("Rival by rival", 3)
+    made.table(
+        ["if the truth is", *(f"{name} is rejected [%]" for name in found.rivals)],
+        [
+            [name, *("" if a == b else f"{100 * p:.0f}" for b, p in enumerate(chances.pairs[a]))]
+            for a, name in enumerate(found.rivals)
+        ],
+        f"By {best.event.words}.",
+        words=(0,),
+    )
+    made.text(
+        "Each rival in turn is taken as the truth with its fitted parameters, as uncertain as the records leave them;"
+        " all others are fitted to the records and the new event together, under the records' own noise"
+        + (", by a refit of every parameter." if best.refitted else ", linearised about their fits.")
+        + " Noise of the voltage, and laws that no rival has, are not in it."
+    )
+
+
+def _caption(found: NextEvent) -> str:
+    exact = ", where formulas are exact" * (found.by_noise is not None)
+    decided = f"Dashed: the {found.criteria.decided:.0%} from which an event is recommended as sure."
+    return f"Probability that one dip more tells all rivals apart{exact}, by its depth and duration. {decided}"
+
+
+def _chart(found: NextEvent) -> Chart:
+    """Probability by depth, a line for each duration: by the rule, or by noise where that is not sure to decide."""
+    chart = Chart("depth of the dip [%]", ["probability [%]"], pixels=360)
+    plain = [t for t in found.tried if _kind(t) == KINDS[0]]
+    for color, duration in zip(PALETTE, sorted({t.event.duration for t in plain}), strict=False):
+        line = sorted((t.event.depth, _chances(found, t).least) for t in plain if t.event.duration == duration)
+        x, y = 100 * np.array(line).T
+        chart.line(f"{1000 * duration:.0f} ms", x, y, color, width=2.0)
+    return chart.level(100 * found.criteria.decided).limits(0, -3, 103)
+
+
+def _chances(found: NextEvent, tried: Tried) -> Chances:
+    """By the rule, or where that is not sure to decide, by the noise alone."""
+    return tried.chances if found.by_noise is None else tried.exact
+
+
+def _kind(tried: Tried) -> str:
+    event = tried.event
+    if event.unbalance:
+        return KINDS[3]
+    if event.rate > 1:
+        return KINDS[4]
+    if event.switched:
+        return KINDS[1]
+    return KINDS[2] if event.jump else KINDS[0]
+
+
+def _best(found: NextEvent, kind: str) -> list[Tried]:
+    ranked = sorted(
+        (t for t in found.tried if _kind(t) == kind), key=lambda t: (-t.chances.least, -t.exact.least, t.event.burden)
+    )
+    return ranked[:LISTED]
+
+
+def _row(tried: Tried) -> list[str]:
+    return [tried.event.words, f"{100 * tried.chances.least:.0f}", f"{100 * tried.exact.least:.0f}"]
