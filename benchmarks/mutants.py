@@ -240,7 +240,7 @@ Written by `python benchmarks/mutants.py` from `benchmarks/mutants.json`. Single
 seed from every module in turn, are changed, and the test files that use most of the module are run, each for a minute.
 A change is killed by the first test that fails, if that test passes with nothing changed. What survives has a reason:
 nobody can tell it from the original, or it says what is not tested. Undecided is what no file was done with in its
-minute.
+minute. A package without changes has not been run yet.
 
 | package | changes | killed | explained | survive | undecided |
 |---|---:|---:|---:|---:|---:|
