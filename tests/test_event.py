@@ -65,6 +65,13 @@ def test_a_dip_begins_where_the_voltage_leaves_a_tenth_of_the_margin():
     assert find_dips(np.arange(1000) / 1000, U) == [(305, 500)]
 
 
+def test_the_steady_state_ends_where_a_swell_before_the_dip_begins():
+    U = np.ones(1200)
+    U[500:560], U[600:700] = 1.1, 0.6
+    made = Record("made", np.arange(1200) / 1000, U, np.ones(1200), np.ones(1200), source="made")
+    assert detect(made).steady == slice(0, 500)
+
+
 def test_recorded_frequency_gives_f0():
     made = dip()
     f = np.where(made.t < 0.3, 49.9, 50.3)

@@ -2,6 +2,8 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +13,11 @@ from tractexp.api import judging
 from tractexp.comparison import overall_claims
 from tractexp.comparison.ablation import Family
 from tractexp.comparison.bbob import Benchmark, Plan, Run
+from tractexp.comparison.comparison import _median
+from tractexp.comparison.load import _readable
 from tractexp.comparison.overall import on_functions
 from tractexp.comparison.runs import parted
+from tractexp.errors import UserError
 from tractexp.sweep import sweeper
 
 JUDGING = {"targets": TARGETS, "ties": 1e-3, "floor": 1e-9, "reference": None}
@@ -88,6 +93,28 @@ def test_what_a_switch_costs_is_counted():
     (overall,) = several(runs).overall
     assert overall.cost == pytest.approx({s: 50.0 * (s == "gaussian") for s in SWITCHES})
     assert "gaussian +50.0" in overall_claims.of_cost(overall)
+
+
+def test_a_search_that_ended_with_its_first_population_tells_no_cost_of_an_iteration():
+    runs = ablation_runs(subsets(range(5)))
+    first = runs[0]
+    runs[0] = replace(first, history=first.history[:1], simulations=first.simulations[:1], seconds=first.seconds[:1])
+    (overall,) = several(runs).overall
+    assert overall.cost == pytest.approx(dict.fromkeys(SWITCHES, 0.0))
+
+
+@pytest.mark.parametrize(("values", "median"), [([5, 1, 2], 2), ([4, 1, 3, 2], 2.5), ([1, np.inf, np.inf], np.inf)])
+def test_the_median_of_an_odd_and_an_even_number_of_runs(values, median):
+    variant = SimpleNamespace(objectives=dict(enumerate(map(float, values))))
+    assert _median(variant, range(len(values))) == median
+
+
+def test_a_job_that_cannot_be_read_says_why_in_the_first_line_of_the_reason():
+    with (
+        pytest.raises(UserError, match=r"a/b\.csv cannot be read: a column is missing; run this job again"),
+        _readable(Path("a/b.csv")),
+    ):
+        raise ValueError("a column is missing\nand more")
 
 
 def test_on_bbob_a_function_is_a_block():

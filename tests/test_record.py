@@ -7,6 +7,8 @@ import pytest
 
 from tractexp.errors import UserError
 from tractexp.record import Record
+from tractexp.record.dips import numbered
+from tractexp.record.direction import direction
 
 N = 100
 
@@ -27,6 +29,22 @@ def test_a_good_record_passes_and_is_returned():
     good = record(f=np.full(N, 50.0), U2=np.zeros(N))
     assert good.check() is good
     assert good.rate == pytest.approx(1000)
+
+
+def test_the_dips_of_one_record_are_numbered_from_one():
+    t = np.arange(3000) / 1000
+    U = np.where(((t > 0.5) & (t < 0.6)) | ((t > 2.0) & (t < 2.2)), 0.7, 1.0)
+    whole = Record("whole", t, U, np.ones(3000), np.full(3000, 0.5), source="made")
+    first, second = numbered([whole], "made", 0.3, 0.8)
+    assert [(d.number, d.made.name, d.made.source) for d in (first, second)] == [
+        (1, "whole_dip1", "made dip 1"), (2, "whole_dip2", "made dip 2"),
+    ]  # fmt: skip
+    assert (first.made.t[0], second.made.t[0]) == pytest.approx((0.2, 1.7), abs=2e-3)
+
+
+def test_one_sample_tells_no_direction():
+    one = np.ones(1)
+    assert direction(one, one, one) == ""
 
 
 def test_gaps_in_P_and_Q_are_allowed():

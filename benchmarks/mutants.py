@@ -1,0 +1,327 @@
+"""Do the tests notice a mistake? `python benchmarks/mutants.py [--count 30] [--seed 1] [--only PACKAGE] [--jobs 2]`.
+
+In each of six packages single places are changed: a comparison, an operator, a number, a condition, a sign. The places
+are drawn with a seed, in turn from every module. Each change is made in a copy of the repository and run against the
+test files that use the module, those that use most of its names first, until one fails: then it is killed. What
+survives them all needs a test, or a reason in `EXPLAINED` why nobody can tell it from the original.
+
+Results go to mutants.json, which also says what need not be run again: a module is run anew once it or a change in it
+is another. docs/mutation.md is written from it (`--write` writes that alone).
+
+mutmut and cosmic-ray were looked at. mutmut 3 replaces each function by a trampoline, and here functions are looked
+into: arguments of plugins by name, sources by their hash. cosmic-ray runs one command for all that it changes, which
+here would be the whole suite, minutes each.
+"""
+
+import argparse
+import ast
+import copy
+import json
+import os
+import random
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from queue import Queue
+from typing import Any
+
+from tractexp import files
+
+ROOT = Path(__file__).parents[1]
+RESULTS, PAGE = ROOT / "benchmarks" / "mutants.json", ROOT / "docs" / "mutation.md"
+REASONS = ROOT / "benchmarks" / "mutants_explained.json"
+PACKAGES = ("model", "identification", "record", "discrepancy", "comparison", "sweep")
+FILES = 3  # test files that a change is run against, of those that use its module most
+LIMIT = 60.0  # s for each of them
+PASSED, FAILED, LATE = "passed", "failed", "late"
+SWAPS: dict[type[ast.AST], type[ast.AST]] = {
+    ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
+    ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn, ast.NotIn: ast.In,
+    ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Pow: ast.Mult, ast.FloorDiv: ast.Mult,
+    ast.And: ast.Or, ast.Or: ast.And, ast.USub: ast.UAdd,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One change: the module, where, and the text of the changed expression before and after."""
+
+    module: str
+    line: int
+    before: str
+    after: str
+    nth: int  # of all places of the module
+
+    @property
+    def key(self) -> str:
+        return key_of(asdict(self))
+
+
+def places(tree: ast.AST) -> Iterator[tuple[ast.AST, str, Any]]:
+    """(node, field, what it becomes) of each place that can be changed; messages and annotations cannot."""
+    for node in _code(tree):
+        if isinstance(node, ast.Compare) and len(node.ops) == 1 and type(node.ops[0]) in SWAPS:
+            yield node, "ops", [SWAPS[type(node.ops[0])]()]
+        elif isinstance(node, ast.BinOp | ast.BoolOp | ast.UnaryOp | ast.AugAssign) and type(node.op) in SWAPS:
+            if not _text(node):
+                yield node, "op", SWAPS[type(node.op)]()
+        elif isinstance(node, ast.If | ast.IfExp | ast.While) and not isinstance(node.test, ast.Compare):
+            yield node, "test", ast.UnaryOp(ast.Not(), node.test)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, bool | int | float):
+            yield node, "value", _other(node.value)
+
+
+def _other(value: bool | int | float) -> bool | int | float:
+    if isinstance(value, bool):
+        return not value
+    return value + 1 if isinstance(value, int) else 2 * value if value else 1.0
+
+
+def _text(node: ast.AST) -> bool:
+    """Whether an operation is one of strings or of types: `"a" + "b"`, `int | None`."""
+    words = (n for n in ast.walk(node) if isinstance(n, ast.Constant | ast.JoinedStr))
+    return any(isinstance(n, ast.JoinedStr) or n.value is None or isinstance(n.value, str) for n in words)
+
+
+def _code(node: ast.AST) -> Iterator[ast.AST]:
+    """All nodes below one that are neither a message, an annotation nor a type."""
+    if isinstance(node, ast.Raise | ast.JoinedStr | ast.Assert | ast.Import | ast.ImportFrom):
+        return
+    yield node
+    skipped = {"annotation", "returns", "decorator_list", "bases", "keywords" if isinstance(node, ast.ClassDef) else ""}
+    for field, value in ast.iter_fields(node):
+        if field in skipped:
+            continue
+        for child in value if isinstance(value, list) else [value]:
+            if isinstance(child, ast.AST):
+                yield from _code(child)
+
+
+def mutants_of(module: str, text: str) -> list[Mutant]:
+    """All changes of a module."""
+    tree = ast.parse(text)
+    made = []
+    for k, (node, field, other) in enumerate(places(tree)):
+        shown = node.test if field == "test" and isinstance(node, ast.If | ast.IfExp | ast.While) else node
+        before = ast.unparse(shown)
+        changed = copy.copy(node)
+        setattr(changed, field, other)
+        after = ast.unparse(changed.test if shown is not node else changed)  # type: ignore[attr-defined]
+        made.append(Mutant(module, node.lineno, before, after, k))
+    return made
+
+
+def mutated(text: str, mutant: Mutant) -> str:
+    """The module's text with the change; comments go, which no test reads."""
+    tree = ast.parse(text)
+    for k, (node, field, other) in enumerate(places(tree)):
+        if k == mutant.nth:
+            setattr(node, field, other)
+            break
+    return ast.unparse(ast.fix_missing_locations(tree))
+
+
+def drawn(package: str, count: int, seed: int) -> list[Mutant]:
+    """So many changes of a package, from its modules in turn."""
+    rng = random.Random(f"{seed} {package}")
+    files = sorted((ROOT / "tractexp" / package).rglob("*.py"))
+    each = {f: mutants_of(f.relative_to(ROOT).as_posix(), f.read_text(encoding="utf-8")) for f in files}
+    stacks = [rng.sample(found, len(found)) for found in each.values() if found]
+    rng.shuffle(stacks)
+    chosen: list[Mutant] = []
+    while len(chosen) < count and any(stacks):
+        chosen += [stack.pop() for stack in stacks if stack][: count - len(chosen)]
+    return sorted(chosen, key=lambda m: (m.module, m.line, m.nth))
+
+
+def tests_for(module: str) -> list[str]:
+    """The test files that use a module, the one that uses most of its names first."""
+    tree = ast.parse((ROOT / module).read_text(encoding="utf-8"))
+    names = {n.name for n in tree.body if isinstance(n, ast.FunctionDef | ast.ClassDef)}
+    names |= {
+        m.name for n in tree.body if isinstance(n, ast.ClassDef) for m in n.body if isinstance(m, ast.FunctionDef)
+    }
+    dotted = module.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+    package, _, stem = dotted.rpartition(".")
+    imports = re.compile(
+        rf"from {re.escape(dotted)} import|import {re.escape(dotted)}\b|"
+        rf"from {re.escape(package)} import [^\n]*\b{stem}\b"
+    )
+    scores = {}
+    for path in sorted((ROOT / "tests").glob("test_*.py")):
+        text = path.read_text(encoding="utf-8")
+        used = sum(
+            bool(re.search(rf"\b{re.escape(n)}\b", text)) for n in names if len(n) > 3 and not n.startswith("__")
+        )
+        near = sum(word in path.stem.split("_") for word in {*stem.split("_"), package.rpartition(".")[2]})
+        scores[path.name] = 20 * bool(imports.search(text)) + used + 3 * near
+    ranked = sorted((name for name in scores if scores[name]), key=lambda name: (-scores[name], name))
+    return ranked[:FILES]
+
+
+def copied(to: Path) -> None:
+    """The repository as a wheel lays it out, with its tests."""
+    for part in ("tractexp", "plugins", "conf", "tests", "benchmarks", "docs"):
+        shutil.copytree(ROOT / part, to / part, ignore=shutil.ignore_patterns("__pycache__", "*.ipynb_checkpoints"))
+    for name in ("pyproject.toml", "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE"):
+        shutil.copy(ROOT / name, to / name)
+    (to / "tractexp_plugins").symlink_to("plugins")
+    (to / "tractexp" / "conf").symlink_to("../conf")
+
+
+def run(folder: Path, test: str, limit: float) -> tuple[str, str]:
+    """Whether a test file (or a test in it) passes in a copy, fails, or is late; and the first test that failed."""
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-n0", "-p", "no:cacheprovider", "--no-header", "--tb=no"]
+    environment = {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1", "COLUMNS": "400"}
+    with tempfile.TemporaryDirectory() as scratch:
+        process = subprocess.Popen(
+            [*command, f"--basetemp={scratch}/t", f"tests/{test}"], cwd=folder, env=environment, text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True,
+        )  # fmt: skip
+        try:
+            told = process.communicate(timeout=limit)[0]
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
+            return LATE, ""
+    failed = re.search(r"^(?:FAILED|ERROR) tests/(.+?)(?: - .*)?$", told, re.MULTILINE)
+    return (PASSED, "") if process.returncode in (0, 5) else (FAILED, failed[1] if failed else test)
+
+
+class Clean:
+    """A copy with nothing changed: a test that fails there as well is no evidence."""
+
+    def __init__(self, folder: Path):
+        self.folder, self.lock = folder, threading.Lock()
+        self.known: dict[str, bool] = {}
+
+    def passes(self, test: str) -> bool:
+        with self.lock:
+            if test not in self.known:
+                self.known[test] = run(self.folder, test, 10 * LIMIT)[0] == PASSED
+                if not self.known[test]:
+                    print(f"  {test} fails with nothing changed", flush=True)
+            return self.known[test]
+
+
+def judged(mutant: Mutant, folder: Path, clean: Clean) -> dict[str, Any]:
+    """What becomes of one change."""
+    path = folder / mutant.module
+    original = path.read_text(encoding="utf-8")
+    told: dict[str, Any] = {**asdict(mutant), "killed_by": None, "passed": [], "unfinished": []}
+    try:
+        path.write_text(mutated(original, mutant), encoding="utf-8")
+        for test in tests_for(mutant.module):
+            outcome, what = run(folder, test, LIMIT)
+            if outcome == FAILED and clean.passes(what):
+                return told | {"killed_by": what}
+            if outcome != FAILED:
+                told["passed" if outcome == PASSED else "unfinished"].append(test)
+    finally:
+        path.write_text(original, encoding="utf-8")
+    return told
+
+
+def keep(found: list[dict[str, Any]]) -> None:
+    files.write(RESULTS, json.dumps(found, indent=1, ensure_ascii=False) + "\n")
+
+
+HEAD = """# Do the tests notice a mistake?
+
+Written by `python benchmarks/mutants.py` from `benchmarks/mutants.json`. Single places of six packages, drawn with a
+seed from every module in turn, are changed, and the test files that use most of the module are run, each for a minute.
+A change is killed by the first test that fails, if that test passes with nothing changed. What survives has a reason:
+nobody can tell it from the original, or it says what is not tested. Undecided is what no file was done with in its
+minute. A package without changes has not been run yet.
+
+| package | changes | killed | explained | survive | undecided |
+|---|---:|---:|---:|---:|---:|
+"""
+
+
+def page(found: list[dict[str, Any]], told: dict[str, str]) -> str:
+    """docs/mutation.md."""
+    lines = []
+    ends = [_end(f, told) for f in found]
+    for package in PACKAGES:
+        own = [end for f, (end, _) in zip(found, ends, strict=True) if f["module"].split("/")[1] == package]
+        counts = [own.count(word) for word in ("killed", "explained", "survives", "undecided")]
+        lines.append(f"| {package} | {len(own)} | {' | '.join(map(str, counts))} |")
+    lines += ["", "| module | line | change | what became of it |", "|---|---:|---|---|"]
+    for f, (end, why) in zip(found, ends, strict=True):
+        change = f"`{_cell(f['before'])}` to `{_cell(f['after'])}`"
+        lines.append(f"| {f['module'].removeprefix('tractexp/')} | {f['line']} | {change} | {end}: {_cell(why)} |")
+    return HEAD + "\n".join(lines) + "\n"
+
+
+def _end(found: dict[str, Any], told: dict[str, str]) -> tuple[str, str]:
+    """What became of a change, in a word, and by what or why."""
+    if found["killed_by"]:
+        return "killed", found["killed_by"]
+    if reason := told.get(key_of(found)):
+        return "explained", reason
+    if found["passed"]:
+        return "survives", ", ".join(found["passed"])
+    return "undecided", ", ".join(found["unfinished"])
+
+
+def key_of(found: dict[str, Any]) -> str:
+    """What a change is called, here and in mutants_explained.json."""
+    return f"{found['module']} {found['nth']}: {found['before']} -> {found['after']}"
+
+
+def _cell(text: str) -> str:
+    text = " ".join(text.split()).replace("|", "\\|")
+    return text if len(text) < 140 else text[:137] + "..."
+
+
+def main() -> None:
+    ask = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    ask.add_argument("--count", type=int, default=30, help="changes in each package")
+    ask.add_argument("--seed", type=int, default=1)
+    ask.add_argument("--jobs", type=int, default=2)
+    ask.add_argument("--only", nargs="*", default=list(PACKAGES), choices=PACKAGES)
+    ask.add_argument("--survivors", action="store_true", help="run those again that survived")
+    ask.add_argument("--write", action="store_true", help="write docs/mutation.md alone")
+    chosen = ask.parse_args()
+    known = {key_of(f): f for f in json.loads(RESULTS.read_text())} if RESULTS.exists() else {}
+    told = json.loads(REASONS.read_text()) if REASONS.exists() else {}
+    if not chosen.write:
+        wanted = [m for package in chosen.only for m in drawn(package, chosen.count, chosen.seed)]
+        again = [m for m in wanted if m.key not in known or (chosen.survivors and not known[m.key]["killed_by"])]
+        with tempfile.TemporaryDirectory() as scratch:
+            folders: Queue[Path] = Queue()
+            for k in range(chosen.jobs + 1):
+                copied(Path(scratch) / str(k))
+                folders.put(Path(scratch) / str(k))
+            clean = Clean(folders.get())
+
+            def one(mutant: Mutant) -> None:
+                folder = folders.get()
+                try:
+                    known[mutant.key] = judged(mutant, folder, clean)
+                finally:
+                    folders.put(folder)
+                end = known[mutant.key]["killed_by"] or f"survives {known[mutant.key]['passed']}"
+                print(f"{mutant.line} {mutant.key}: {end}", flush=True)
+                keep(list(known.values()))
+
+            with ThreadPoolExecutor(chosen.jobs) as pool:
+                list(pool.map(one, again))
+    found = sorted(
+        known.values(), key=lambda f: (PACKAGES.index(f["module"].split("/")[1]), f["module"], f["line"], f["nth"])
+    )
+    keep(found)
+    files.write(PAGE, page(found, told))
+
+
+if __name__ == "__main__":
+    main()
