@@ -8,9 +8,9 @@ survives them all needs a test, or a reason in `EXPLAINED` why nobody can tell i
 Results go to mutants.json, which also says what need not be run again: a module is run anew once it or a change in it
 is another. docs/mutation.md is written from it (`--write` writes that alone).
 
-mutmut and cosmic-ray were judged by what their documentation says, not tried. mutmut 3 replaces each function by a trampoline, and here functions are looked
-into: arguments of plugins by name, sources by their hash. cosmic-ray runs one command for all that it changes, which
-here would be the whole suite, minutes each.
+mutmut and cosmic-ray were judged by what their documentation says, not tried. mutmut 3 replaces each function by a
+trampoline, and here functions are looked into: arguments of plugins by name, sources by their hash. cosmic-ray runs one
+command for all that it changes, which here would be the whole suite, minutes each.
 """
 
 import argparse

@@ -1,10 +1,11 @@
 """What a proposal finds of effects that no catalogue holds: blind cases and nulls, a row each in proposals.json.
 
-    cd benchmarks && python proposals.py [--first 900000] [--count 2] [case ...]
+    cd benchmarks && python proposals.py [--first 900000] [--count 2] [--docs] [case ...]
 
 Three events are fitted, one is held out, noise is 0.3 %. The term is searched whatever the verdict of the catalogue
-would be, so that nulls are searched, too. The hidden effects are other formulas than the library's terms: admittances,
-circuits and relays of `hidden_effects`, some of them declared here. Seeds begin at 900000 and are used nowhere else.
+would be, so that nulls are searched, too. `--docs` writes the table of docs/missing-effects.md and ends. The hidden
+effects are other formulas than the library's terms: admittances, circuits and relays of `hidden_effects`, some of them
+declared here. Reported seeds begin at 900000 and are used nowhere else; from 950000 on the search was looked at.
 """
 
 import argparse
@@ -23,7 +24,7 @@ from hidden_effects.outside import after
 from hidden_effects.site import Site
 from hidden_effects.supply import Profile
 
-TABLE = Path(__file__).with_suffix(".json")
+TABLE, DOCS = Path(__file__).with_suffix(".json"), Path(__file__).parents[1] / "docs" / "missing-effects.md"
 FIRST, COUNT, NOISE = 900_000, 2, Noise(0.003)
 
 
@@ -145,12 +146,36 @@ def row(case: str, seed: int) -> dict:
     }  # fmt: skip
 
 
+def told_in_docs(rows: list[dict]) -> list[str]:
+    """The rows as a table for people; in brackets the best term where none is proposed."""
+    columns = "hidden, seed, chi2 per sample before, found, excess closed (fitted / held out), left (same), right"
+    lines = [f"| {' | '.join(columns.split(', '))} |", "| " + " | ".join(["---"] * 7) + " |"]
+    for r in rows:
+        if "failed" in r:
+            lines.append(f"| {r['case']} | {r['seed']} | failed: {r['failed']} |  |  |  | no |")
+            continue
+        name = f"{r['balance']}: {r['signal']}" + (f" {r['clock']}" if r["clock"] else "")
+        closed = f"{r['closed_train']:.0%} / {r['closed_validate']:.0%}"
+        left = f"{r['left_train']:.2f} / {r['left_validate']:.2f}"
+        cells = [r["case"], r["seed"], f"{r['before']:.1f}", name if r["proposed"] else f"none ({name})", closed, left]
+        right = ("yes" if r["right"] else "no") if r["proposed"] or r["case"] == "null" else "not proposed"
+        lines.append("| " + " | ".join(map(str, [*cells, right])) + " |")
+    return lines
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--first", type=int, default=FIRST, help="the first seed, at least 900000")
     parser.add_argument("--count", type=int, default=COUNT, help="data sets of each case")
     parser.add_argument("cases", nargs="*", metavar="case", help=f"of {', '.join(CASES)}; by default all")
+    parser.add_argument("--docs", action="store_true", help="write the table of the docs, and nothing else")
     chosen = parser.parse_args()
+    if chosen.docs:
+        text = DOCS.read_text(encoding="utf-8")
+        begin, end = "<!-- proposals -->", "<!-- end of proposals -->"
+        before, after = text[: text.index(begin) + len(begin)], text[text.index(end) :]
+        DOCS.write_text("\n\n".join([before, "\n".join(told_in_docs(kept())), after]), encoding="utf-8")
+        return
     if chosen.first < FIRST or chosen.count < 1 or set(chosen.cases) - set(CASES):
         parser.error(f"seeds begin at {FIRST}, there is at least one of each case, and cases are {', '.join(CASES)}")
     for seed in range(chosen.first, chosen.first + chosen.count):

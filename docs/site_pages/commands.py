@@ -47,7 +47,7 @@ def _lines(page: Path) -> Iterator[tuple[str, str]]:
     """(heading, line) of all code, lines that end in a backslash joined with the next."""
     heading, fence, held = "", None, ""
     for line in page.read_text(encoding="utf-8").splitlines():
-        if marked := re.match(r"^```(\w*)", line):
+        if marked := re.match(r"^```(\S*)", line):
             fence = None if fence is not None else marked[1]
         elif fence is None and (title := re.match(r"^#+ (.+)$", line)):
             heading = title[1]
