@@ -206,7 +206,7 @@ def together(
     def refitted(fit: Refit) -> list[Refit]:
         start, settings = _widened(whole, fit.unit), _settings(whole, fit.names) if anew else [{}]
         wanted = [(fit.names, _placed(whole, start, setting)) for setting in settings]
-        return wide_refit(whole, noise, wanted, as_fitted.faults)
+        return (wide_refit if anew else refit)(whole, noise, wanted, as_fitted.faults)
 
     def told(fit: Refit) -> Together:
         alone = next(e for e in extended if e.names == fit.names)
