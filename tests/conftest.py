@@ -10,6 +10,18 @@ import tractexp  # before NumPy: it keeps BLAS to one thread, as every command d
 MOTOR = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p_v": 1.4, "q_v": 3.0}
 
 
+@pytest.fixture(autouse=True)
+def registry_as_it_was():
+    """What a test registers is gone after it: the next one of this process finds what is installed."""
+    from tractexp.plugin import discover
+
+    registry = discover()
+    kept = {group: dict(classes) for group, classes in registry.items()}
+    yield
+    registry.clear()
+    registry.update(kept)
+
+
 @pytest.fixture(scope="session")
 def resistive_dips(tmp_path_factory) -> list[Path]:
     """Three dips of a motor with a stator resistance of 0.02 pu and noise of 0.3 %, as CSV files."""

@@ -17,7 +17,6 @@ from tractexp.extend import (
     plugin,
     sites,
 )
-from tractexp.plugin import _registry as registry
 from tractexp.plugin import get
 from tractexp.record.phasor import Averager
 from tractexp.testing import channels, loads, readers, searches
@@ -31,17 +30,13 @@ TestBuiltIn = tractexp.testing.contract("tractexp_plugins", SAMPLES)
 @pytest.fixture
 def stranger():
     """Registers a class with these methods as the plugin `stranger`, until the test ends."""
-    made = []
 
     def register(base, **attributes):
         size = {"a": Parameter(0.0, (0.0, 1.0), "1", "size", "here", null=0.0)} if issubclass(base, Effect) else {}
         body = {"__doc__": "a = b. Source: here.", "__module__": "elsewhere.stranger", "__annotations__": {}}
-        made.append(plugin(type("Stranger", (base,), body | size | attributes)))
-        return made[-1]
+        return plugin(type("Stranger", (base,), body | size | attributes))
 
     yield register
-    for cls in made:
-        registry[cls.group].pop("stranger")
     for remembered in (loads.model, loads.partners, loads._base):
         remembered.cache_clear()
 

@@ -216,11 +216,8 @@ def test_what_plugins_are_made_from_is_not_taken_for_a_plugin_without_its_decora
     (made / "shared_base_child.py").write_text(text)
     (made / "importer.py").write_text("from tractexp.extend import Static\n")
     monkeypatch.syspath_prepend(tmp_path)
-    try:
-        framework.import_all([importlib.import_module("shared_bases")])
-        assert get("model/static", "shared_base_child").__name__ == "Child"
-    finally:
-        framework._registry["model/static"].pop("shared_base_child", None)
+    framework.import_all([importlib.import_module("shared_bases")])
+    assert get("model/static", "shared_base_child").__name__ == "Child"
 
 
 @pytest.mark.parametrize(
