@@ -5,7 +5,7 @@ construction.
 """
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -99,10 +99,19 @@ class Coordinates:
         """Columns of the effects' parameters that are held to their defaults by what is likely."""
         return [self.column[name] for n in effects for name in self.catalogue[n].effect.likely]
 
+    def placed(self, unit: np.ndarray, values: Mapping[str, float]) -> np.ndarray:
+        """Coordinates (D,) with these parameters at these values."""
+        moved = unit.copy()
+        for name, value in values.items():
+            moved[self.column[name]] = self.to_unit(name, value)
+        return moved
+
+    def without(self, unit: np.ndarray, names: Sequence[str]) -> np.ndarray:
+        """Coordinates (D,) with all parameters of these effects back at their nulls."""
+        moved, columns = unit.copy(), self.parameters(names)
+        moved[columns] = self.null[columns]
+        return moved
+
     def without_faults(self, unit: np.ndarray, kept: Sequence[str]) -> np.ndarray:
         """Coordinates (D,) with the faults of the measurement that are not `kept` back at their nulls."""
-        moved = unit.copy()
-        for name in self.catalogue.of_measurement:
-            if name not in kept:
-                moved[self.parameters([name])] = self.null[self.parameters([name])]
-        return moved
+        return self.without(unit, [name for name in self.catalogue.of_measurement if name not in kept])

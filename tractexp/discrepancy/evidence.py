@@ -153,7 +153,7 @@ def _singles(found: Investigation) -> list[Evidence]:
             if fit:
                 sizes.append(Size(p.name, at.value(p.name, fit.unit), np.nan, p.unit))
             elif score and score.deviation[p.name] < np.ptp(p.bounds):  # else these events say nothing of it
-                sizes.append(Size(p.name, (p.null or 0.0) + score.size[p.name], score.deviation[p.name], p.unit))
+                sizes.append(Size(p.name, p.absent + score.size[p.name], score.deviation[p.name], p.unit))
         how = FITTED if fit else ONE_STEP if score else ""
         status = CHOSEN if j.name in found.names else j.status
         rows.append(Evidence((j.name,), max(drop, 0.0), how, status, tuple(sizes), j.why))

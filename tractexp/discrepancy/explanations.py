@@ -111,11 +111,7 @@ def without_needless(base: BaseFit, tests: Disagreement, refits: dict[Names, Ref
     at = bench.coordinates
     if len(fit.names) < 2:
         return tests
-    wanted: list[Start] = []
-    for left in fit.names:
-        unit = fit.unit.copy()
-        unit[at.parameters([left])] = at.null[at.parameters([left])]
-        wanted.append((tuple(n for n in fit.names if n != left), unit))
+    wanted = [(tuple(n for n in fit.names if n != left), at.without(fit.unit, [left])) for left in fit.names]
     fewer = refit(bench, tests.noise, wanted)[0]
     gained, parameters = max(fewer.deviance - fit.deviance, 0.0), max(fit.parameters - fewer.parameters, 1)
     if chdtrc(parameters, gained) < bench.criteria.further_name(len(fewer.names)):
@@ -157,7 +153,7 @@ def searched_widely(base: BaseFit, first: Disagreement, refits: Refits) -> tuple
     bench, bare = base.bench, refits[()].unit
     singles: Refits = {f.names: f for f in best_of(refits.values()) if len(f.names) == 1}
     unlike = [f for f in singles.values() if len(bench.catalogue[f.names[0]].settings) > 1]
-    grounds = bare, off_walls(bench, bare)
+    grounds = bare, *off_walls(bench, bare)
     wanted = [[(f.names, f.unit), *(s for unit in grounds for s in _every_setting(bench, f, unit))] for f in unlike]
     found = wide_refits(bench, first.noise, wanted, WIDELY)
     return first, [f for f in found if f.deviance < singles[f.names].deviance - NESTED]
@@ -165,14 +161,9 @@ def searched_widely(base: BaseFit, first: Disagreement, refits: Refits) -> tuple
 
 def _every_setting(bench: Bench, fit: Refit, unit: np.ndarray) -> list[Start]:
     """Starts for a single effect at coordinates (D,): of the size that it was fitted with, at all its settings."""
-    at, made = bench.coordinates, []
-    for setting in bench.catalogue[fit.names[0]].settings:
-        point = unit.copy()
-        point[at.sizes(fit.names)] = fit.unit[at.sizes(fit.names)]
-        for name, value in setting.items():
-            point[at.column[name]] = at.to_unit(name, value)
-        made.append((fit.names, point))
-    return made
+    at, sized = bench.coordinates, unit.copy()
+    sized[at.sizes(fit.names)] = fit.unit[at.sizes(fit.names)]
+    return [(fit.names, at.placed(sized, setting)) for setting in bench.catalogue[fit.names[0]].settings]
 
 
 def from_other_valleys(base: BaseFit, first: Disagreement, refits: Refits) -> tuple[Disagreement, list[Refit]]:

@@ -61,11 +61,10 @@ def starts(bench: Bench, member: Candidate, refits: Mapping[Names, Refit]) -> li
     textbook = refits.get((effect.family,)) if effect.as_textbook else None
     begun: list[tuple[np.ndarray, dict[str, float]]] = []
     if textbook is not None:
-        ground = textbook.unit.copy()
-        ground[at.parameters([effect.family])] = at.null[at.parameters([effect.family])]
+        ground = at.without(textbook.unit, [effect.family])
         begun.append((ground, {own: at.value(theirs, textbook.unit) for own, theirs in effect.as_textbook.items()}))
     if textbook is None or not effect.nests_textbook:
-        begun += [(bare, {}), (off_walls(bench, bare), {})]
+        begun += [(unit, {}) for unit in (bare, *off_walls(bench, bare))]
     made = []
     for ground, told in begun:
         known = dict(told)
@@ -73,10 +72,8 @@ def starts(bench: Bench, member: Candidate, refits: Mapping[Names, Refit]) -> li
             low, high = size.bounds
             known.setdefault(size.name, float(np.clip(size.absent + BEGUN * member.relevant(size), low, high)))
         for setting in open_settings(member, tuple(known)):
-            point = ground.copy()
-            for p in effect.parameters:
-                point[at.column[p.name]] = at.to_unit(p.name, (setting | known).get(p.name, p.default))
-            made.append(((member.name,), point))
+            values = {p.name: (setting | known).get(p.name, p.default) for p in effect.parameters}
+            made.append(((member.name,), at.placed(ground, values)))
     return made
 
 

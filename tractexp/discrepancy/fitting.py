@@ -175,12 +175,13 @@ def _with_prior(
     return measured, [*measured, *at.shapes(sorted({name for names in sets for name in names}))]
 
 
-def off_walls(bench: Bench, unit: np.ndarray) -> np.ndarray:
-    """Coordinates (D,) with what rests on a bound of the base model back at its default: there it has no slope."""
+def off_walls(bench: Bench, unit: np.ndarray, to: float | None = None) -> list[np.ndarray]:
+    """Coordinates (D,) with what rests on a bound of the base model back at its default or at `to`: there it has no
+    slope. None where nothing rests."""
     moved, base = unit.copy(), bench.coordinates.base
     resting = base[(unit[base] <= WALL) | (unit[base] >= 1 - WALL)]
-    moved[resting] = bench.coordinates.null[resting]
-    return moved
+    moved[resting] = bench.coordinates.null[resting] if to is None else to
+    return [moved] if len(resting) else []
 
 
 def settled(bench: Bench, unit: np.ndarray, noise: Noise, names: Sequence[str]) -> np.ndarray:

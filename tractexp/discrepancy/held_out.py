@@ -205,7 +205,7 @@ def together(
 
     def refitted(fit: Refit) -> list[Refit]:
         start, settings = _widened(whole, fit.unit), _settings(whole, fit.names) if anew else [{}]
-        wanted = [(fit.names, _placed(whole, start, setting)) for setting in settings]
+        wanted = [(fit.names, whole.coordinates.placed(start, setting)) for setting in settings]
         return (wide_refit if anew else refit)(whole, noise, wanted, as_fitted.faults)
 
     def told(fit: Refit) -> Together:
@@ -228,10 +228,3 @@ def _widened(bench: Bench, unit: np.ndarray) -> np.ndarray:
 def _settings(bench: Bench, names: Sequence[str]) -> list[dict[str, float]]:
     """No change, and every setting of the scanned parameters of one of the effects."""
     return [{}, *itertools.chain.from_iterable(bench.catalogue[name].settings for name in names)]
-
-
-def _placed(bench: Bench, unit: np.ndarray, setting: Mapping[str, float]) -> np.ndarray:
-    moved, at = unit.copy(), bench.coordinates
-    for name, value in setting.items():
-        moved[at.column[name]] = at.to_unit(name, value)
-    return moved

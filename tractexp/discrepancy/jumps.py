@@ -24,7 +24,7 @@ def jumps(bench: Bench, unit: np.ndarray) -> np.ndarray:
     return _jumps(bench, unit.tobytes())
 
 
-@functools.lru_cache(maxsize=8)
+@functools.lru_cache(maxsize=2)  # of the two fits that are examined side by side; it holds their bench
 def _jumps(bench: Bench, told: bytes) -> np.ndarray:
     at, unit = bench.coordinates, np.frombuffer(told)
     there = tuple(n for n in bench.catalogue.of_load if (unit != at.null)[at.sizes([n])].any())

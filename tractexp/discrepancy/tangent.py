@@ -151,11 +151,7 @@ def _candidate_points(bench: Bench, fit: Refit) -> tuple[np.ndarray, np.ndarray,
             first = len(points)
             for p in candidate.sizes:
                 step = REACH * candidate.relevant(p) * (candidate.sign(p) or 1)
-                point = fit.unit.copy()
-                for name, value in setting.items():
-                    point[at.column[name]] = at.to_unit(name, value)
-                point[at.column[p.name]] = at.to_unit(p.name, p.absent + step)
-                points.append(point)
+                points.append(at.placed(fit.unit, setting | {p.name: p.absent + step}))
                 spans.append(step)
             labels.append((candidate, setting, first, len(points)))
     return np.array(points).reshape(-1, at.dimension), np.array(spans), labels

@@ -238,9 +238,8 @@ def _refitted(
 
 def _fitted_to(bench: Bench, noise: Noise, sides: Sequence[Side], truth: Side, event: Imagined) -> list[Refit]:
     """Every side fitted to the records and one event more, in which `truth` holds exactly; coordinates of the bench."""
-    middle, at = truth.fit.unit.copy(), bench.coordinates
-    faults = at.parameters(bench.catalogue.of_measurement)
-    middle[faults] = at.null[faults]
+    at = bench.coordinates
+    middle = at.without_faults(truth.fit.unit, ())
     power = bench.kernels.simulate(truth.fit.names, middle[None], Drive.of([driven(bench, event)]))[0]
     whole = bench.on(Records.of((*bench.records.recorded, as_recorded(bench, event, power))))
     d, before = len(at.names), len(at.before)

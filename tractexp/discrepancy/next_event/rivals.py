@@ -77,12 +77,10 @@ def _starts(bench: Bench, unit: np.ndarray, names: Names) -> list[Start]:
         candidate = bench.catalogue[name]
         for setting in candidate.settings:
             for sign in (1, -1):
-                point = unit.copy()
-                for label, value in setting.items():
-                    point[at.column[label]] = at.to_unit(label, value)
+                point = at.placed(unit, setting)
                 for p in (p for other in names for p in bench.catalogue[other].sizes):
                     step = candidate.relevant(p) * (candidate.sign(p) or sign)
-                    point[at.column[p.name]] = np.clip(at.to_unit(p.name, (p.null or 0.0) + step), 0.0, 1.0)
+                    point[at.column[p.name]] = np.clip(at.to_unit(p.name, p.absent + step), 0.0, 1.0)
                 found.append((names, point))
                 if all(candidate.sign(p) for p in candidate.sizes):
                     break

@@ -56,9 +56,8 @@ def same(bench: Bench, one: Refit, other: Refit) -> Same | None:
 
 def _shrunk(bench: Bench, fit: Refit, size: float) -> np.ndarray:
     """Coordinates (D,) of a fit with the sizes of its effects at this share, without faults of the measurement."""
-    at, unit = bench.coordinates, fit.unit.copy()
-    faults, sizes = at.parameters(bench.catalogue.of_measurement), at.sizes(fit.names)
-    unit[faults] = at.null[faults]
+    at = bench.coordinates
+    unit, sizes = at.without_faults(fit.unit, ()), at.sizes(fit.names)
     unit[sizes] = at.null[sizes] + size * (unit[sizes] - at.null[sizes])
     return unit
 

@@ -103,9 +103,7 @@ def seen(bench: Bench, noise: Noise, side: Side, events: Sequence[Imagined]) -> 
     at, names = bench.coordinates, side.fit.names
     drives = [driven(bench, event) for event in events]
     inside = list(side.columns[: -len(at.before)])
-    middle = side.fit.unit.copy()
-    faults = at.parameters(bench.catalogue.of_measurement)
-    middle[faults] = at.null[faults]
+    middle = at.without_faults(side.fit.unit, ())
     up, down = two_sided(middle, inside)
     width = np.array([u[k] - d[k] for u, d, k in zip(up, down, inside, strict=True)])
     moved = _simulated(bench, names, np.concatenate([middle[None], up, down]), drives)  # (E, n, C, N)

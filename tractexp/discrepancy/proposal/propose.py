@@ -140,9 +140,7 @@ def _next_event(made: Fitted, fits: Sequence[Refit]) -> NextEvent | None:
 
 def change(made: Fitted, fit: Refit) -> np.ndarray:
     """What a term adds to the calculated power (C, N) [pu], all else as it was fitted with it."""
-    at, without = made.bench.coordinates, fit.unit.copy()
-    for _, label in sizes_of(made.term(fit)):
-        without[at.column[label]] = at.to_unit(label, 0.0)
+    without = made.bench.coordinates.placed(fit.unit, {label: 0.0 for _, label in sizes_of(made.term(fit))})
     with_it, alone = made.bench.residuals(np.array([fit.unit, without]), fit.names)
     return with_it - alone
 

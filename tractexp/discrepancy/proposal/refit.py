@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.bench import Bench
-from tractexp.discrepancy.fitting import WALL, Refit, Start, best_of, refit, rough_refit, wide_refit
+from tractexp.discrepancy.fitting import Refit, Start, best_of, off_walls, refit, rough_refit, wide_refit
 from tractexp.discrepancy.proposal.bed import place, values_of, with_terms
 from tractexp.discrepancy.proposal.library import ANSWER, Shape, Term, term, terms
 from tractexp.discrepancy.proposal.screen import Ground, Scored, Screened, linearised, scores
@@ -24,6 +24,7 @@ EXACT = 6  # of them at most
 PEAKS, PROMISING = 3, 0.7  # settings of one term, and how good the further ones are of the best
 REGRIDDED = 3  # terms whose grid is searched anew where the base model is that of their refit
 MOVED = 2  # terms whose signal is tried in the other balances, too
+MIDDLE = 0.5  # of its range: where what rests on a bound starts again
 AGAIN = 10  # terms that start from the other fits of the base model, too
 
 
@@ -118,7 +119,7 @@ def fitted(screened: Screened, valleys: Sequence[np.ndarray]) -> Fitted:
     bare = refit(bench, noise, [((), ground.unit)])[0]
     fits = rough_refit(bench, noise, _starts(bench, chosen, [ground.unit]))
     best = {f.names[0] for f in fits[:AGAIN]}
-    others = [*off_bounds(bench, ground.unit), *valleys]
+    others = [*off_walls(bench, ground.unit, MIDDLE), *valleys]
     again = _starts(bench, [f for f in chosen if f.term.name in best], others)
     fits = best_of([*fits, *(rough_refit(bench, noise, again) if again else [])])
     fits = _searched_anew(bench, noise, fits)
@@ -173,17 +174,6 @@ def _starts(bench: Bench, chosen: Sequence[Scored], units: Sequence[np.ndarray])
     """Each term at its one-step size on each of the base model's fits (D,)."""
     at = bench.coordinates
     return [((f.term.name,), place(at, unit, f.term, f.setting, f.sizes)) for f in chosen for unit in units]
-
-
-def off_bounds(bench: Bench, unit: np.ndarray) -> list[np.ndarray]:
-    """The same coordinates with what rests on its bounds in the middle; none where nothing does."""
-    base = bench.coordinates.base
-    resting = base[(unit[base] <= WALL) | (unit[base] >= 1 - WALL)]
-    if not len(resting):
-        return []
-    moved = unit.copy()
-    moved[resting] = 0.5
-    return [moved]
 
 
 def standard_errors(made: Fitted, fit: Refit) -> dict[str, float]:
