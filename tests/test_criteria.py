@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from test_discrepancy import FEW, base, events
 
+from tractexp.discrepancy.all_events import Together
 from tractexp.discrepancy.catalogue import candidate, missing_channel
 from tractexp.discrepancy.chance import Chance
 from tractexp.discrepancy.coordinates import Coordinates
@@ -15,7 +16,7 @@ from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.discrepancy.families import worth
 from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.gap import Gap
-from tractexp.discrepancy.held_out import Judged, Together
+from tractexp.discrepancy.held_out import Judged
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.judgement import judged
 from tractexp.discrepancy.next_event.choose import Tried, mildest

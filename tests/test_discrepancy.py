@@ -15,6 +15,7 @@ from scipy.special import chdtrc
 from test_cli import tractexp
 
 from hidden_effects import Case, Noise, make, write
+from tractexp.discrepancy.all_events import AllEvents
 from tractexp.discrepancy.base_fit import base_fit
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.catalogue import catalogue
@@ -24,7 +25,7 @@ from tractexp.discrepancy.discrepancy_json import content, write_left, write_mod
 from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.explanations import from_other_valleys, without_needless
 from tractexp.discrepancy.fitting import refit
-from tractexp.discrepancy.held_out import together, weighed
+from tractexp.discrepancy.held_out import weighed
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.noise_in_quiet import QuietNoise
@@ -387,7 +388,9 @@ def test_a_held_out_event_speaks_only_where_it_can_show_the_effect(planted):
 def test_all_events_together_confirm_only_what_the_held_out_ones_show(planted):
     """An event with the effect adds to the evidence of the fitted ones, one without it takes from it."""
     trained, alone, criteria = planted.bench, planted.extended, Criteria()
-    fit = lambda made: together(trained, made, planted.held_out, [alone], seed=0)  # noqa: E731
+    held = planted.held_out
+    both = lambda made: AllEvents(trained, made, held.noise, held.faults, held.bare)  # noqa: E731
+    fit = lambda made: both(made).together([alone], seed=0)  # noqa: E731
     (confirmed,) = fit(events("stator_resistance", size=2.0, count=3)[2:])
     assert confirmed.confirmed(criteria, doubted=False)
     assert confirmed.fit.names == ("stator_resistance",)
@@ -404,7 +407,9 @@ def test_an_effect_that_closes_little_of_the_held_out_gap_must_leave_nothing_in_
     """A step of the load after the held-out dip is seen beside the effect; without it nobody asks for that fit."""
 
     def judged_on(made):
-        found, again = weighed(planted.bench, made, planted.held_out, seed=0, doubted=True)
+        held = planted.held_out
+        both = AllEvents(planted.bench, made, held.noise, held.faults, held.bare)
+        found, again = weighed(both, held.extended, seed=0, doubted=True)
         assert again == []
         return found["stator_resistance",]
 

@@ -6,12 +6,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from tractexp.discrepancy.all_events import AllEvents
 from tractexp.discrepancy.bench import Bench
-from tractexp.discrepancy.cores import each_apart
-from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.disagreement import examined
 from tractexp.discrepancy.explanations import Explanations
-from tractexp.discrepancy.fitting import Refit, best_of, refit, settled, wide_refit
+from tractexp.discrepancy.fitting import Refit, refit, settled
 from tractexp.discrepancy.gap import Gap, gap
 from tractexp.discrepancy.noise_in_quiet import QuietNoise, white
 from tractexp.discrepancy.records import Records
@@ -48,20 +47,6 @@ class Judged:
 
 
 @dataclass(frozen=True, eq=False)
-class Together:
-    """An explanation fitted to fitted and held-out events together, in coordinates of the fitted ones."""
-
-    fit: Refit
-    louder: float  # by how much all events speak louder for it than the fitted ones alone, of the deviance
-    p_left: float  # how often chance leaves as much as it does
-
-    def confirmed(self, criteria: Criteria, doubted: bool) -> bool:
-        """Whether all events bear it out. Where the base model is `doubted` they need only bear with it."""
-        least = -criteria.quieter if doubted else criteria.shown
-        return self.louder > least and self.p_left >= criteria.adequate_p
-
-
-@dataclass(frozen=True, eq=False)
 class HeldOut:
     """The explanations that remain, as fitted without the faults of the measurement that do not help.
 
@@ -88,6 +73,10 @@ class HeldOut:
             of_family.setdefault(self.survivors.explanations.base.bench.catalogue.textbook(rival.fit.names), rival)
         return tuple(of_family.values())
 
+    def fitted_to_all(self, fits: Sequence[Refit]) -> "HeldOut":
+        """With explanations that were fitted to all events."""
+        return replace(self, together=tuple(fits), extended={**self.extended, **{f.names: f for f in fits}})
+
 
 def held_out(surviving: Survivors, events: Sequence[Event], seed: int) -> HeldOut:
     """Refit the survivors without needless faults of the measurement, and judge them on held-out events, if any."""
@@ -101,11 +90,12 @@ def held_out(surviving: Survivors, events: Sequence[Event], seed: int) -> HeldOu
     as_fitted = HeldOut(surviving, noise, faults, bare, {names: exact[names] for names, _ in wanted})
     if not events or not any(s.fit.names or faults for s in surviving.adequate):
         return as_fitted
-    count = len(surviving.adequate)
+    count, doubted = len(surviving.adequate), not explained.steps[0].adequate
     bench.effort.say(f"judging {count} explanation{'s' * (count > 1)} on the held-out events")
-    judged, again = weighed(bench, events, as_fitted, seed, doubted=not explained.steps[0].adequate)
-    extended = {**as_fitted.extended, **{f.names: f for f in again}}
-    return replace(as_fitted, judged=judged, together=tuple(again), extended=extended)
+    both = AllEvents(bench, events, noise, faults, bare)
+    judged, again = weighed(both, as_fitted.extended, seed, doubted=doubted)
+    made = replace(as_fitted, judged=judged).fitted_to_all(again)
+    return with_members(made, both, seed) if doubted and not made.kept else made
 
 
 def telling(explained: Explanations, bare: Refit) -> Names:
@@ -132,30 +122,62 @@ def telling(explained: Explanations, bare: Refit) -> Names:
 
 
 def weighed(
-    bench: Bench, events: Sequence[Event], as_fitted: HeldOut, seed: int, *, doubted: bool
+    both: AllEvents, extended: Mapping[Names, Refit], seed: int, *, doubted: bool
 ) -> tuple[dict[Names, Judged], list[Refit]]:
     """Judge explanations on held-out events; where none helps as it was fitted, also those that all events confirm.
 
     Where the base model is `doubted` all events need only bear with them: the held-out ones may not show them at all.
     Several effects at once, chosen among hundreds of sets, must also leave nothing in a fit to all events, and so must
-    a single one that closes less of the gap there than a true one does, and one of another place or law.
+    a single one that closes less of the gap there than a true one does, and one of another place or law. What leaves
+    something where that fit began is fitted anew from every setting.
     """
-    extended = list(as_fitted.extended.values())
-    judged = judged_on(bench, events, as_fitted.bare, extended)
-    helping = [fit for fit in extended if judged[fit.names].gap.helps]
+    bench, events, fits = both.fitted, both.events, list(extended.values())
+    judged = judged_on(bench, events, both.bare, fits)
+    helping = [fit for fit in fits if judged[fit.names].gap.helps]
     if not helping:
-        fits = together(bench, events, as_fitted, extended, seed, anew=True)
-        again = [fitted.fit for fitted in fits if fitted.confirmed(bench.criteria, doubted)]
-        return judged | (judged_on(bench, events, as_fitted.bare, again) if again else {}), again
-    found = bench.catalogue
+        again = [t.fit for t in both.together(fits, seed, anew=True) if t.confirmed(bench.criteria, doubted)]
+        return judged | (judged_on(bench, events, both.bare, again) if again else {}), again
+    textbook = bench.catalogue.textbook
     doubtful = [
         f for f in helping
-        if len(f.names) + len(as_fitted.faults) > 1 or f.names != found.textbook(f.names)
-        or not judged[f.names].convincing
+        if len(f.names) + len(both.faults) > 1 or f.names != textbook(f.names) or not judged[f.names].convincing
     ]  # fmt: skip
-    for fitted in together(bench, events, as_fitted, doubtful, seed) if doubtful else ():
-        judged[fitted.fit.names] = replace(judged[fitted.fit.names], p_left=fitted.p_left)
+    for anew in (False, True):
+        for fitted in both.together(doubtful, seed, anew=anew) if doubtful else ():
+            names = fitted.fit.names
+            judged[names] = replace(judged[names], p_left=max(fitted.p_left, anew * judged[names].p_left))
+        doubtful = [fit for fit in doubtful if not judged[fit.names].helps]
     return judged, []
+
+
+def with_members(made: HeldOut, both: AllEvents, seed: int) -> HeldOut:
+    """With other places and laws of what the held-out events deny, where all events confirm them.
+
+    The fitted events may show only what the textbook effect does, such as the first of two stages of a relay.
+    """
+    bench, surviving = both.fitted, made.survivors
+    if bench.waves or not bench.criteria.family_p:
+        return made
+    denied = [f for f in made.extended.values() if len(f.names) == 1 and f.names == bench.catalogue.textbook(f.names)]
+    found = [
+        (alone, fitted.fit)
+        for textbook in denied
+        for alone, fitted in both.members(textbook, seed)
+        if fitted.confirmed(bench.criteria, doubted=True)
+    ]
+    if not found:
+        return made
+    quiet = surviving.explanations.base.quiet
+    rivals = [
+        Rival(
+            alone, made.bare.deviance - alone.deviance, 0.0, 0.0, False, examined(quiet, alone, made.noise, seed, True)
+        )
+        for alone, _ in found
+    ]
+    fits = [fit for _, fit in found]
+    surviving = replace(surviving, kept=(*rivals, *surviving.kept), rivals=(*rivals, *surviving.rivals))
+    judged = {**made.judged, **judged_on(bench, both.events, both.bare, fits)}
+    return replace(made, survivors=surviving, judged=judged).fitted_to_all(fits)
 
 
 def judged_on(bench: Bench, events: Sequence[Event], bare: Refit, extended: Sequence[Refit]) -> dict[Names, Judged]:
@@ -180,51 +202,3 @@ def carried(bench: Bench, events: Sequence[Event], fits: Sequence[Refit]) -> tup
         units.append(settled(other, unit, white(other), fit.names))
     noise = QuietNoise.at(other, units[-1]).of_fit(units[-1], fits[-1].names)
     return other, [settled(other, u, noise, fit.names) for u, fit in zip(units, fits, strict=True)], noise
-
-
-def together(
-    bench: Bench,
-    events: Sequence[Event],
-    as_fitted: HeldOut,
-    extended: Sequence[Refit],
-    seed: int,
-    *,
-    anew: bool = False,
-) -> list[Together]:
-    """Explanations fitted to fitted and held-out events together, from every setting if `anew`.
-
-    What the fitted events leave open, such as the level of a relay between the depths of two dips, may be wrong on
-    the held-out ones though the effect is there.
-    """
-    whole = bench.on(Records.of((*bench.records.recorded, *events), bench.records.window))
-    bare, d, before = as_fitted.bare, len(bench.coordinates.names), len(bench.coordinates.before)
-    plain = _widened(whole, bare.unit)
-    quiet = QuietNoise.at(whole, plain)
-    noise = as_fitted.noise.on(whole.profile, quiet.blur)
-    first = refit(whole, noise, [((), plain)], faults=())[0]
-
-    def refitted(fit: Refit) -> list[Refit]:
-        start, settings = _widened(whole, fit.unit), _settings(whole, fit.names) if anew else [{}]
-        wanted = [(fit.names, whole.coordinates.placed(start, setting)) for setting in settings]
-        return (wide_refit if anew else refit)(whole, noise, wanted, as_fitted.faults)
-
-    def told(fit: Refit) -> Together:
-        alone = next(e for e in extended if e.names == fit.names)
-        louder = (first.deviance - fit.deviance) - (bare.deviance - alone.deviance)
-        p_left = examined(quiet, fit, noise, seed, plain=True).p_left
-        unit = np.r_[fit.unit[:d], fit.unit[whole.coordinates.before][:before]]
-        return Together(replace(fit, unit=unit), louder, p_left)
-
-    return each_apart(told, best_of(better for fit in extended for better in refitted(fit)))
-
-
-def _widened(bench: Bench, unit: np.ndarray) -> np.ndarray:
-    """Coordinates of the fitted events as those of a bench with more events after them."""
-    wide = bench.coordinates.null.copy()
-    wide[: len(unit)] = unit
-    return wide
-
-
-def _settings(bench: Bench, names: Sequence[str]) -> list[dict[str, float]]:
-    """No change, and every setting of the scanned parameters of one of the effects."""
-    return [{}, *itertools.chain.from_iterable(bench.catalogue[name].settings for name in names)]

@@ -191,7 +191,7 @@ def investigate(
             first=first,
             places=() if said.word == NONE else tuple(standing_out),
             explanations=explained,
-            survivors=surviving,
+            survivors=weighed.survivors,
             held_out=weighed,
             verdict=said,
             train=_gap(base.bench, weighed, said),

@@ -1,0 +1,128 @@
+"""Fitted and held-out events together, and explanations fitted to all of them.
+
+What the fitted events leave open, such as the level of a relay between the depths of two dips, or a second stage that
+none of them reached, may be wrong on the held-out ones though the effect is there.
+"""
+
+import functools
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.cores import each_apart
+from tractexp.discrepancy.criteria import Criteria
+from tractexp.discrepancy.disagreement import examined
+from tractexp.discrepancy.families import NEAREST, starts, worth
+from tractexp.discrepancy.fitting import Refit, Start, best_of, refit, wide_refit, wide_refits
+from tractexp.discrepancy.noise_in_quiet import QuietNoise
+from tractexp.discrepancy.records import Records
+from tractexp.noise import Noise
+from tractexp.record import Event
+
+Names = tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Together:
+    """An explanation fitted to fitted and held-out events together, in coordinates of the fitted ones."""
+
+    fit: Refit
+    louder: float  # by how much all events speak louder for it than the fitted ones alone, of the deviance
+    p_left: float  # how often chance leaves as much as it does
+
+    def confirmed(self, criteria: Criteria, doubted: bool) -> bool:
+        """Whether all events bear it out. Where the base model is `doubted` they need only bear with it."""
+        least = -criteria.quieter if doubted else criteria.shown
+        return self.louder > least and self.p_left >= criteria.adequate_p
+
+
+@dataclass(frozen=True, eq=False)
+class AllEvents:
+    """The bench of fitted and held-out events beside that of the fitted ones, `noise` and the base model `bare` there.
+
+    `faults` are those of the measurement in every explanation.
+    """
+
+    fitted: Bench
+    events: Sequence[Event]  # held out
+    noise: Noise
+    faults: Names
+    bare: Refit
+
+    @functools.cached_property
+    def bench(self) -> Bench:
+        records = self.fitted.records
+        return self.fitted.on(Records.of((*records.recorded, *self.events), records.window))
+
+    @functools.cached_property
+    def quiet(self) -> QuietNoise:
+        return QuietNoise.at(self.bench, _widened(self.bench, self.bare.unit))
+
+    @functools.cached_property
+    def level(self) -> Noise:
+        """The noise of all events."""
+        return self.noise.on(self.bench.profile, self.quiet.blur)
+
+    @functools.cached_property
+    def plain(self) -> Refit:
+        """The base model, fitted to all events."""
+        return refit(self.bench, self.level, [((), _widened(self.bench, self.bare.unit))], faults=())[0]
+
+    def together(self, alone: Sequence[Refit], seed: int, *, anew: bool = False) -> list[Together]:
+        """Explanations as fitted to the fitted events `alone`, fitted to all: from there, or from every setting."""
+
+        def refitted(fit: Refit) -> list[Refit]:
+            start, settings = _widened(self.bench, fit.unit), _settings(self.bench, fit.names) if anew else [{}]
+            wanted = [(fit.names, self.bench.coordinates.placed(start, setting)) for setting in settings]
+            return (wide_refit if anew else refit)(self.bench, self.level, wanted, self.faults)
+
+        by_name = {fit.names: fit for fit in alone}
+        fits = best_of(better for fit in alone for better in refitted(fit))
+        return each_apart(lambda fit: self._told(fit, by_name[fit.names], seed), fits)
+
+    def members(self, textbook: Refit, seed: int) -> list[tuple[Refit, Together]]:
+        """Other places and laws of a textbook effect, as fitted to the fitted events alone and to all.
+
+        Only what explains more of all events than the textbook effect does, beyond what its further parameters cost.
+        """
+        bench, family = self.bench, self.bench.kernels.family
+        wanted = [m for m in bench.catalogue.members if (m.effect.family,) == textbook.names and family.joins(m.name)]
+        if not wanted:
+            return []
+        bench.effort.say(f"trying {len(wanted)} other places and laws on all events")
+        family.compile_members([m.name for m in wanted], bench.effort.say)
+        ground = {(): self.plain, textbook.names: replace(textbook, unit=_widened(bench, textbook.unit))}
+        begun: list[Sequence[Start]] = [starts(bench, member, ground) for member in wanted]
+        best = self.together([textbook], seed)[0]
+        made = []
+        for fit in wide_refits(bench, self.level, begun, NEAREST, self.faults):
+            if worth(fit, best.fit, bench.criteria.family_p):
+                family.compile_members(fit.names, bench.effort.say, whole=True)
+                alone = refit(self.fitted, self.noise, [(fit.names, self._narrowed(fit.unit))], self.faults)[0]
+                made.append((alone, self._told(fit, alone, seed)))
+        return made
+
+    def _told(self, fit: Refit, alone: Refit, seed: int) -> Together:
+        louder = (self.plain.deviance - fit.deviance) - (self.bare.deviance - alone.deviance)
+        p_left = examined(self.quiet, fit, self.level, seed, plain=True).p_left
+        return Together(replace(fit, unit=self._narrowed(fit.unit)), louder, p_left)
+
+    def _narrowed(self, unit: np.ndarray) -> np.ndarray:
+        """Coordinates of all events as those of the fitted ones, which come first."""
+        d, before = len(self.fitted.coordinates.names), len(self.fitted.coordinates.before)
+        return np.r_[unit[:d], unit[self.bench.coordinates.before][:before]]
+
+
+def _widened(bench: Bench, unit: np.ndarray) -> np.ndarray:
+    """Coordinates of the fitted events as those of a bench with more events after them."""
+    wide = bench.coordinates.null.copy()
+    wide[: len(unit)] = unit
+    return wide
+
+
+def _settings(bench: Bench, names: Sequence[str]) -> list[Mapping[str, float]]:
+    """No change, and every setting of the scanned parameters of one of the effects."""
+    return [{}, *itertools.chain.from_iterable(bench.catalogue[name].settings for name in names)]
