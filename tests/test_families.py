@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_discrepancy import base, bench, events
+from test_discrepancy import LOUD, base, bench, events
 
 from tractexp.discrepancy import families
 from tractexp.discrepancy.catalogue import catalogue
@@ -60,6 +60,18 @@ def test_a_trip_of_the_static_load_alone_is_told_by_its_family_and_its_place():
     at = made.bench.coordinates
     assert at.value("static_tripped", made.extended.unit) == pytest.approx(0.2, abs=0.01)
     assert made.validate.closed > 0.9
+
+
+def test_a_second_stage_that_the_fitted_dips_do_not_show_is_found_in_all_events():
+    made = events("trip_in_two_stages", 1.5, 820023, count=4, noise=LOUD)
+    told = investigate(base(), made[:3], made[3:], {}, {}, only=TRIPS[:1])
+    assert told.explanations.chosen.names == ("undervoltage_trip",)  # which leaves nothing of the fitted ones
+    assert not told.held_out.judged["undervoltage_trip",].helps
+    assert told.names == ("two_stage_trip",)
+    assert told.fitted_to_both
+    at = told.bench.coordinates
+    shares = [at.value(f"stage_{k}_tripped", told.extended.unit) for k in (1, 2)]
+    assert shares == pytest.approx([0.075, 0.075], rel=0.05)
 
 
 def test_members_belong_to_the_effects_that_are_asked_for():
