@@ -239,8 +239,9 @@ HEAD = """# Do the tests notice a mistake?
 Written by `python benchmarks/mutants.py` from `benchmarks/mutants.json`. Single places of six packages, drawn with a
 seed from every module in turn, are changed, and the test files that use most of the module are run, each for a minute.
 A change is killed by the first test that fails, if that test passes with nothing changed. What survives has a reason:
-nobody can tell it from the original, or it says what is not tested. Undecided is what no file was done with in its
-minute. A package without changes has not been run yet.
+nobody can tell it from the original, or it says what is not tested. Undecided is what passed where it was run to the
+end, while another file was not done in its minute (`sweep` is hit most: its tests take longer). A package without
+changes has not been run yet.
 
 | package | changes | killed | explained | survive | undecided |
 |---|---:|---:|---:|---:|---:|
@@ -268,9 +269,9 @@ def _end(found: dict[str, Any], told: dict[str, str]) -> tuple[str, str]:
         return "killed", found["killed_by"]
     if reason := told.get(key_of(found)):
         return "explained", reason
-    if found["passed"]:
-        return "survives", ", ".join(found["passed"])
-    return "undecided", ", ".join(found["unfinished"])
+    if found["unfinished"] or not found["passed"]:
+        return "undecided", ", ".join(found["unfinished"]) or "no file uses it by name"
+    return "survives", ", ".join(found["passed"])
 
 
 def key_of(found: dict[str, Any]) -> str:
