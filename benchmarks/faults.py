@@ -518,7 +518,7 @@ def longer(work: Path, chance: random.Random) -> Iterator[Fault]:
     folder, kept = made(work / "stopped"), made(work / "kept")
     for share in (0.35, 0.6, 0.8):
         code, _ = forked(investigates(folder, kept), share * took)
-        there = len(list((kept / "descents").glob("*.npz")))
+        there = len(list((kept / "descents").glob("*.kept")))
         yield told(
             f"kill -9 of an investigation after {share:.0%} of its time",
             f"{there} of its {descents} fits and draws are kept", "" if there else "NOTHING IS KEPT", halves(folder),
