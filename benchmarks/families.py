@@ -10,20 +10,20 @@ program with no member of any family tried. Rows are appended to families.jsonl,
 
 import argparse
 import json
-import os
 import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-for library in ("OPENBLAS", "OMP", "MKL"):
-    os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+import marked
 
-from hidden_effects import Case, Noise, make  # noqa: E402
-from hidden_effects.generator import scene  # noqa: E402
-from hidden_effects.laws import FAMILY  # noqa: E402
+import tractexp  # noqa: F401 before NumPy: it keeps BLAS to one thread
+from hidden_effects import Case, Noise, make
+from hidden_effects.generator import scene
+from hidden_effects.laws import FAMILY
 
 ROWS, DOCS = Path(__file__).with_suffix(".jsonl"), Path(__file__).parents[1] / "docs" / "missing-effects.md"
+MARK = "benchmarks/families.py --docs"  # what makes the table there
 NOTHING, SHARP = "nothing", "time_skew"  # what is hidden where nothing is; skew with edges of a few samples
 EDGE = 0.008  # s
 CASES = [
@@ -105,10 +105,7 @@ def main() -> None:
     chosen = asked.parse_args()
     rows = [json.loads(line) for line in ROWS.read_text().splitlines()] if ROWS.exists() else []
     if chosen.docs:
-        begin, end = "<!-- families: written by benchmarks/families.py --docs -->", "<!-- end of families -->"
-        text = DOCS.read_text(encoding="utf-8")
-        before, after = text[: text.index(begin) + len(begin)], text[text.index(end) :]
-        DOCS.write_text("\n\n".join([before, "\n".join(table(rows)), after]), encoding="utf-8")
+        marked.replace(DOCS, MARK, "\n".join(table(rows)))
         return
     done = {(r["hidden"], r["size"], r["seed"], r["families"]) for r in rows}
     for trial in wanted():

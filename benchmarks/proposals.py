@@ -14,6 +14,8 @@ import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import marked
+
 import tractexp  # noqa: F401 before NumPy: it keeps BLAS to one thread
 from hidden_effects import EFFECTS, Case, Noise, make
 from hidden_effects.devices import Ring, Switched
@@ -25,6 +27,7 @@ from hidden_effects.site import Site
 from hidden_effects.supply import Profile
 
 TABLE, DOCS = Path(__file__).with_suffix(".json"), Path(__file__).parents[1] / "docs" / "missing-effects.md"
+MARK = "benchmarks/proposals.py --docs"  # what makes the table there
 FIRST, COUNT, NOISE = 900_000, 2, Noise(0.003)
 
 
@@ -171,10 +174,7 @@ def main() -> None:
     parser.add_argument("--docs", action="store_true", help="write the table of the docs, and nothing else")
     chosen = parser.parse_args()
     if chosen.docs:
-        text = DOCS.read_text(encoding="utf-8")
-        begin, end = "<!-- proposals -->", "<!-- end of proposals -->"
-        before, after = text[: text.index(begin) + len(begin)], text[text.index(end) :]
-        DOCS.write_text("\n\n".join([before, "\n".join(told_in_docs(kept())), after]), encoding="utf-8")
+        marked.replace(DOCS, MARK, "\n".join(told_in_docs(kept())))
         return
     if chosen.first < FIRST or chosen.count < 1 or set(chosen.cases) - set(CASES):
         parser.error(f"seeds begin at {FIRST}, there is at least one of each case, and cases are {', '.join(CASES)}")

@@ -59,7 +59,7 @@ class AllEvents:
 
     @functools.cached_property
     def quiet(self) -> QuietNoise:
-        return QuietNoise.at(self.bench, _widened(self.bench, self.bare.unit))
+        return QuietNoise.at(self.bench, self.bench.coordinates.widened(self.bare.unit))
 
     @functools.cached_property
     def level(self) -> Noise:
@@ -69,18 +69,12 @@ class AllEvents:
     @functools.cached_property
     def plain(self) -> Refit:
         """The base model, fitted to all events."""
-        return refit(self.bench, self.level, [((), _widened(self.bench, self.bare.unit))], faults=())[0]
+        return refit(self.bench, self.level, [((), self.bench.coordinates.widened(self.bare.unit))], faults=())[0]
 
     def together(self, alone: Sequence[Refit], seed: int, *, anew: bool = False) -> list[Together]:
         """Explanations as fitted to the fitted events `alone`, fitted to all: from there, or from every setting."""
-
-        def refitted(fit: Refit) -> list[Refit]:
-            start, settings = _widened(self.bench, fit.unit), _settings(self.bench, fit.names) if anew else [{}]
-            wanted = [(fit.names, self.bench.coordinates.placed(start, setting)) for setting in settings]
-            return (wide_refit if anew else refit)(self.bench, self.level, wanted, self.faults)
-
         by_name = {fit.names: fit for fit in alone}
-        fits = best_of(better for fit in alone for better in refitted(fit))
+        fits = best_of(better for fit in alone for better in self._refitted(fit, anew=anew))
         return each_apart(lambda fit: self._told(fit, by_name[fit.names], seed), fits)
 
     def members(self, textbook: Refit, seed: int) -> list[tuple[Refit, Together]]:
@@ -94,33 +88,29 @@ class AllEvents:
             return []
         bench.effort.say(f"trying {len(wanted)} other places and laws on all events")
         family.compile_members([m.name for m in wanted], bench.effort.say)
-        ground = {(): self.plain, textbook.names: replace(textbook, unit=_widened(bench, textbook.unit))}
+        ground = {(): self.plain, textbook.names: replace(textbook, unit=bench.coordinates.widened(textbook.unit))}
         begun: list[Sequence[Start]] = [starts(bench, member, ground) for member in wanted]
-        best = self.together([textbook], seed)[0]
+        best = self._refitted(textbook)[0]
         made = []
         for fit in wide_refits(bench, self.level, begun, NEAREST, self.faults):
-            if worth(fit, best.fit, bench.criteria.family_p):
+            if worth(fit, best, bench.criteria.family_p):
                 family.compile_members(fit.names, bench.effort.say, whole=True)
-                alone = refit(self.fitted, self.noise, [(fit.names, self._narrowed(fit.unit))], self.faults)[0]
+                alone = refit(self.fitted, self.noise, [(fit.names, self._narrowed(fit))], self.faults)[0]
                 made.append((alone, self._told(fit, alone, seed)))
         return made
+
+    def _refitted(self, alone: Refit, *, anew: bool = False) -> list[Refit]:
+        at, settings = self.bench.coordinates, _settings(self.bench, alone.names) if anew else [{}]
+        wanted = [(alone.names, at.placed(at.widened(alone.unit), setting)) for setting in settings]
+        return (wide_refit if anew else refit)(self.bench, self.level, wanted, self.faults)
+
+    def _narrowed(self, fit: Refit) -> np.ndarray:
+        return fit.unit[: self.fitted.coordinates.dimension]
 
     def _told(self, fit: Refit, alone: Refit, seed: int) -> Together:
         louder = (self.plain.deviance - fit.deviance) - (self.bare.deviance - alone.deviance)
         p_left = examined(self.quiet, fit, self.level, seed, plain=True).p_left
-        return Together(replace(fit, unit=self._narrowed(fit.unit)), louder, p_left)
-
-    def _narrowed(self, unit: np.ndarray) -> np.ndarray:
-        """Coordinates of all events as those of the fitted ones, which come first."""
-        d, before = len(self.fitted.coordinates.names), len(self.fitted.coordinates.before)
-        return np.r_[unit[:d], unit[self.bench.coordinates.before][:before]]
-
-
-def _widened(bench: Bench, unit: np.ndarray) -> np.ndarray:
-    """Coordinates of the fitted events as those of a bench with more events after them."""
-    wide = bench.coordinates.null.copy()
-    wide[: len(unit)] = unit
-    return wide
+        return Together(replace(fit, unit=self._narrowed(fit)), louder, p_left)
 
 
 def _settings(bench: Bench, names: Sequence[str]) -> list[Mapping[str, float]]:

@@ -112,6 +112,13 @@ class Coordinates:
         moved[columns] = self.null[columns]
         return moved
 
+    def widened(self, unit: np.ndarray) -> np.ndarray:
+        """Coordinates (D,) from those of the first of these events, the others as before any fit.
+
+        Their first numbers, as many as those had, are the first events' again.
+        """
+        return np.r_[unit, self.null[len(unit) :]]
+
     def without_faults(self, unit: np.ndarray, kept: Sequence[str]) -> np.ndarray:
         """Coordinates (D,) with the faults of the measurement that are not `kept` back at their nulls."""
         return self.without(unit, [name for name in self.catalogue.of_measurement if name not in kept])

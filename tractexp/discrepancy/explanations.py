@@ -235,24 +235,24 @@ def starts(steps: Sequence[Disagreement], refits: Refits, names: Names) -> list[
         at = next((s for s in reversed(steps) if s.fit.names == rest), steps[0])
         missing = [n for n in names if n not in from_fit.names]
         for rank in range(RANKS):
-            point = from_fit.unit.copy()
+            point = from_fit.unit
             for name in missing:
-                _place(at if name in {s.name for s in at.scores} else steps[0], name, rank, point)
+                point = _placed(at if name in {s.name for s in at.scores} else steps[0], name, rank, point)
             begin.append((names, point))
     return begin
 
 
-def _place(at: Disagreement, name: str, rank: int, point: np.ndarray) -> None:
-    """Put a candidate at its one-step size, with its `rank`-th best setting, into coordinates (D,)."""
+def _placed(at: Disagreement, name: str, rank: int, unit: np.ndarray) -> np.ndarray:
+    """Coordinates (D,) with a candidate at its one-step size and its `rank`-th best setting."""
     ranked, to = ranked_settings(at, name), at.bench.coordinates
     column, sizes = ranked[min(rank, len(ranked) - 1)]
-    for label, value in column.setting.items():
-        point[to.column[label]] = to.to_unit(label, value)
+    values = dict(column.setting)
     for p, size in zip(column.candidate.sizes, sizes, strict=True):
         sign = column.candidate.sign(p)
         moved = max(size * sign, column.candidate.relevant(p) * LEAST_START) * sign if sign else size
         low, high = p.bounds
-        point[to.column[p.name]] = to.to_unit(p.name, float(np.clip(p.null + moved, low, high)))
+        values[p.name] = float(np.clip(p.null + moved, low, high))
+    return to.placed(unit, values)
 
 
 def ranked_settings(at: Disagreement, name: str) -> list[tuple[Column, np.ndarray]]:

@@ -142,10 +142,12 @@ def weighed(
         f for f in helping
         if len(f.names) + len(both.faults) > 1 or f.names != textbook(f.names) or not judged[f.names].convincing
     ]  # fmt: skip
+    p_left: dict[Names, float] = {}
     for anew in (False, True):
-        for fitted in both.together(doubtful, seed, anew=anew) if doubtful else ():
+        for fitted in both.together(doubtful, seed, anew=anew):
             names = fitted.fit.names
-            judged[names] = replace(judged[names], p_left=max(fitted.p_left, anew * judged[names].p_left))
+            p_left[names] = max(fitted.p_left, p_left.get(names, 0.0))
+            judged[names] = replace(judged[names], p_left=p_left[names])
         doubtful = [fit for fit in doubtful if not judged[fit.names].helps]
     return judged, []
 
@@ -170,10 +172,11 @@ def with_members(made: HeldOut, both: AllEvents, seed: int) -> HeldOut:
     quiet = surviving.explanations.base.quiet
     rivals = [
         Rival(
-            alone, made.bare.deviance - alone.deviance, 0.0, 0.0, False, examined(quiet, alone, made.noise, seed, True)
+            alone, made.bare.deviance - alone.deviance, behind=0.0, distance=0.0, rejected=False,
+            tests=examined(quiet, alone, made.noise, seed, plain=True),
         )
         for alone, _ in found
-    ]
+    ]  # fmt: skip
     fits = [fit for _, fit in found]
     surviving = replace(surviving, kept=(*rivals, *surviving.kept), rivals=(*rivals, *surviving.rivals))
     judged = {**made.judged, **judged_on(bench, both.events, both.bare, fits)}

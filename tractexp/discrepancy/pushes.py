@@ -16,10 +16,8 @@ def push_points(bench: Bench, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     points, groups = [], []
     for g, push in enumerate(PUSHES):
         for a, b in spans:
-            point = unit.copy()
+            point = at.placed(unit, {"window_on": a, "window_off": b})
             point[at.column[push]] += PUSH / at.width(push)
-            point[at.column["window_on"]] = at.to_unit("window_on", a)
-            point[at.column["window_off"]] = at.to_unit("window_off", b)
             points.append(point)
             groups.append(g)
     return np.array(points), np.array(groups)

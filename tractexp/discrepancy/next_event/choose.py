@@ -242,10 +242,9 @@ def _fitted_to(bench: Bench, noise: Noise, sides: Sequence[Side], truth: Side, e
     middle = at.without_faults(truth.fit.unit, ())
     power = bench.kernels.simulate(truth.fit.names, middle[None], Drive.of([driven(bench, event)]))[0]
     whole = bench.on(Records.of((*bench.records.recorded, as_recorded(bench, event, power))))
-    d, before = len(at.names), len(at.before)
-    wide = [np.r_[side.fit.unit, 0.5, 0.5] for side in sides]
+    wide = [whole.coordinates.widened(side.fit.unit) for side in sides]
     blur = None if noise.blur is None else QuietNoise.at(whole, wide[0]).blur
     both = noise.on(whole.profile, blur)
     made = {f.names: f for f in refit(whole, both, [(s.fit.names, u) for s, u in zip(sides, wide, strict=True)])}
     fits = [made[s.fit.names] for s in sides]
-    return [replace(f, unit=np.r_[f.unit[:d], f.unit[whole.coordinates.before][:before]]) for f in fits]
+    return [replace(f, unit=f.unit[: at.dimension]) for f in fits]
