@@ -31,7 +31,7 @@ class Tangent:
     estimate: np.ndarray  # (k,) the nuisances' departure from their prior mean, in its standard deviations (or 0)
     faults: dict[str, list[int]]  # which nuisances belong to which fault of the measurement
     columns: tuple[Column, ...]
-    split: np.ndarray  # (e, C, N) differences of the fitted parameters, each in one event only
+    split: np.ndarray  # (e, C, N) differences of the fitted parameters but thresholds and times, each in one event only
     cells: np.ndarray  # (c, C, N) responses to injections
     groups: np.ndarray  # (c,) which balance an injection pushes
     held: tuple[int, ...]  # columns of the base model's parameters that rest on a wall
@@ -104,7 +104,7 @@ def tangent(bench: Bench, fit: Refit, noise: Noise) -> Tangent:
     for row, i in enumerate(rows):
         prior[row, i] = 1 / (HELD if i in held else at.prior_deviation[nuisances[i]])
         departure[i] = 0.0 if i in held else fit.unit[nuisances[i]] - at.null[nuisances[i]]
-    fitted = {*at.base, *at.parameters(fit.names)}
+    fitted = {*at.base, *at.sizes(fit.names)}  # a relay's instants hang on the voltage's noise, which no draw has
     split = _by_event(bench, nuisance[[i for i, c in enumerate(nuisances) if c in fitted and i not in held]])
     walls = tuple(nuisances[i] for i in sorted(held))
     return Tangent(

@@ -77,7 +77,9 @@ def surprise(observed: Observed, likelihood: Likelihood, unit: np.ndarray, seed:
     if likelihood.noise.mix is None or not observed.quiet:
         return Surprise(None, "", None, "")
     rows, J = likelihood.jacobian(unit)
-    J = J[:, (unit > WALL) & (unit < 1 - WALL)]
+    inside = (unit > WALL) & (unit < 1 - WALL)
+    steady = _linear(likelihood)[inside[: likelihood.free]]
+    J = J[:, inside]
     rng = np.random.default_rng(seed)
     drawn = likelihood.noise.draw(rng, DRAWS, np.diff(observed.drive.first).tolist()) * likelihood.known
     white = likelihood.whiten(drawn) / _level(likelihood, observed, rng)[:, None]
@@ -87,7 +89,7 @@ def surprise(observed: Observed, likelihood: Likelihood, unit: np.ndarray, seed:
     channels = rest.reshape(len(rest), observed.drive.channels, -1)
     by_test = surprises.statistics(channels, observed)
     if observed.drive.events > 1:
-        by_test[PER_EVENT] = ((rest @ _of_each_event(likelihood, J, Q).T) ** 2).sum(axis=1)
+        by_test[PER_EVENT] = ((rest @ _of_each_event(likelihood, J[:, : len(steady)][:, steady], Q).T) ** 2).sum(axis=1)
     left = {name: tail(values[1:], values[:1]) for name, values in by_test.items()}
     loudest = min(left, key=left.__getitem__)
     ratio, where = loudest_stretch(channels[0], observed)
@@ -100,10 +102,20 @@ def _level(likelihood: Likelihood, observed: Observed, rng: np.random.Generator)
     return np.sqrt(rng.chisquare(2 * worth, DRAWS) / (2 * worth))
 
 
+def _linear(likelihood: Likelihood) -> np.ndarray:
+    """Which of the free parameters are no threshold or time of an effect, (free,).
+
+    A relay's instants in an event hang on the noise of the voltage where it crosses the level, which no draw has.
+    """
+    problem = likelihood.problem
+    beside = {p.name for effect in problem.model.effects for p in effect.parameters if p.null is None}
+    return np.array([name.partition("[")[0] not in beside for name in problem.space.names])
+
+
 def _of_each_event(likelihood: Likelihood, J: np.ndarray, Q: np.ndarray) -> np.ndarray:
-    """Orthonormal directions (m, R) along which parameters of their own for each event would move the rows."""
+    """Orthonormal directions (m, R) along which columns (R, k) of their own for each event would move the rows."""
     events = likelihood.problem.drive.events
-    split = np.concatenate([(J[:, : likelihood.free] * likelihood.part_of(e)[:, None]).T for e in range(events)])
+    split = np.concatenate([(J * likelihood.part_of(e)[:, None]).T for e in range(events)])
     split -= (split @ Q) @ Q.T
     return spanned(split, DISTINCT, least=1e-9)
 
