@@ -1,5 +1,9 @@
 """Families of effects: another place or another law is named where the catalogue's leaves something, and only there."""
 
+import json
+
+import families as benchmark
+import marked
 import numpy as np
 import pytest
 from test_discrepancy import LOUD, base, bench, events
@@ -7,9 +11,10 @@ from test_discrepancy import LOUD, base, bench, events
 from tractexp.discrepancy import families
 from tractexp.discrepancy.catalogue import catalogue
 from tractexp.discrepancy.families import open_settings, starts, worth
-from tractexp.discrepancy.fitting import Refit
+from tractexp.discrepancy.fitting import Refit, scattered
 from tractexp.discrepancy.forms import forms
 from tractexp.discrepancy.investigate import investigate
+from tractexp.discrepancy.tangent import tangent
 from tractexp.errors import UserError
 from tractexp.extend import Effect, Parameter, plugin
 from tractexp.plugin import discover, get
@@ -60,6 +65,8 @@ def test_a_trip_of_the_static_load_alone_is_told_by_its_family_and_its_place():
     at = made.bench.coordinates
     assert at.value("static_tripped", made.extended.unit) == pytest.approx(0.2, abs=0.01)
     assert made.validate.closed > 0.9
+    there = tangent(made.bench, made.extended, made.held_out.noise)  # its instants are no parameters of each event:
+    assert len(there.split) == 2 * (len(at.base) - len(there.held) + 1)  # of the relay the share alone
 
 
 def test_a_second_stage_that_the_fitted_dips_do_not_show_is_found_in_all_events():
@@ -103,6 +110,37 @@ def test_a_member_that_nests_the_textbook_starts_from_its_fit():
     assert max(apart) > 1e-4
 
 
+def two_stages(share):
+    """A bench with the trip in two stages, and the textbook's fit of such a share."""
+    at = bench(base(), events(), TRIPS[:1])
+    unit = at.coordinates.placed(at.coordinates.null, {"tripped_share": share, "trip_level": 0.8})
+    return at, {(): Refit((), at.coordinates.null, 0.0, 0), TRIPS[:1]: Refit(TRIPS[:1], unit, 0.0, 6)}
+
+
+def test_two_stages_begin_with_the_whole_of_one_or_with_halves():
+    at, refits = two_stages(0.2)
+    begun = [unit for _, unit in starts(at, at.catalogue["two_stage_trip"], refits)]
+    shares = {tuple(round(at.coordinates.value(f"stage_{k}_tripped", u), 6) for k in (1, 2)) for u in begun}
+    assert shares == {(0.2, 0.02), (0.1, 0.1)}
+
+
+def test_what_is_scattered_moves_all_times_and_no_size():
+    at, refits = two_stages(0.2)
+    ((names, unit), *_) = starts(at, at.catalogue["two_stage_trip"], refits)
+    points = np.array([point for _, point in scattered(at, Refit(names, unit, 0.0, 11))])
+    moved = np.abs(points - unit)
+    sizes = at.coordinates.sizes(names)
+    settings = [k for k in at.coordinates.parameters(names) if k not in sizes]
+    still = np.setdiff1d(np.arange(len(unit)), settings)
+    assert (moved[:, still] == 0).all()
+    assert (points >= 0).all()
+    assert (points <= 1).all()
+    assert np.median((moved[:, settings] > 0).mean(axis=1)) == 1.0
+    assert ((moved[:, settings] > 0.001) & (moved[:, settings] < 0.02)).any(axis=0).all()
+    assert (moved[:, settings] > 0.1).any(axis=0).all()
+    assert len(np.unique(points.round(9), axis=0)) == len(points)
+
+
 def test_a_place_or_a_kind_that_there_is_not_is_refused_with_the_nearest():
     about = {"__doc__": "a = b. Source: here.", "__module__": "elsewhere.stranger", "__annotations__": {}}
     for told, sentence in (({"places": ("statc P",)}, "did you mean 'static P'"), ({"kind": "lags"}, "mean 'lag'")):
@@ -120,3 +158,10 @@ def test_every_curve_is_monotone_whatever_its_bends(name):
         law = effect.curve(**{p.name: rng.uniform(*p.bounds) for p in effect.parameters})
         slopes = np.diff(law.y)
         assert (slopes <= 1e-9).all() or (slopes >= -1e-9).all()
+
+
+def test_the_page_is_what_the_stored_rows_give():
+    rows = [json.loads(line) for line in benchmark.ROWS.read_text(encoding="utf-8").splitlines()]
+    _, made, _ = marked.parted(benchmark.DOCS.read_text(encoding="utf-8"), benchmark.MARK)
+    assert made.strip() == "\n".join(benchmark.table(rows))
+    assert "\n".join(benchmark.table(rows[1:])) != made.strip()

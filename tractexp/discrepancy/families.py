@@ -55,14 +55,16 @@ def worth(member: Refit, textbook: Refit, p: float) -> bool:
 
 
 def starts(bench: Bench, member: Candidate, refits: Mapping[Names, Refit]) -> list[Start]:
-    """Starts of a member: from the textbook's fit, with every setting that it leaves open, and where the member does
-    not nest that, from the base model's with every setting, since the textbook's fit may have gone astray."""
+    """Starts of a member: from the textbook's fit, with every setting that it leaves open and its size told whole or
+    shared, and where the member does not nest that, from the base model's with every setting, since the textbook's fit
+    may have gone astray."""
     at, effect, bare = bench.coordinates, member.effect, refits[()].unit
     textbook = refits.get((effect.family,)) if effect.as_textbook else None
     begun: list[tuple[np.ndarray, dict[str, float]]] = []
     if textbook is not None:
         ground = at.without(textbook.unit, [effect.family])
-        begun.append((ground, {own: at.value(theirs, textbook.unit) for own, theirs in effect.as_textbook.items()}))
+        told = {own: at.value(theirs, textbook.unit) for own, theirs in effect.as_textbook.items()}
+        begun += [(ground, told), *((ground, told | shared) for shared in _shared(member, told))]
     if textbook is None or not effect.nests_textbook:
         begun += [(unit, {}) for unit in (bare, *off_walls(bench, bare))]
     made = []
@@ -75,6 +77,14 @@ def starts(bench: Bench, member: Candidate, refits: Mapping[Names, Refit]) -> li
             values = {p.name: (setting | known).get(p.name, p.default) for p in effect.parameters}
             made.append(((member.name,), at.placed(ground, values)))
     return made
+
+
+def _shared(member: Candidate, told: Mapping[str, float]) -> list[dict[str, float]]:
+    """The textbook's size in equal parts, where a member has further sizes: a small second one beside the whole first
+    may end as a patch of it. None where it has no further one."""
+    mine = [told[p.name] for p in member.sizes if p.name in told]
+    part = sum(mine) / len(member.sizes)
+    return [{p.name: part for p in member.sizes}] if 0 < len(mine) < len(member.sizes) else []
 
 
 def open_settings(member: Candidate, known: Sequence[str]) -> list[dict[str, float]]:

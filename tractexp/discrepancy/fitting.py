@@ -17,6 +17,7 @@ HOPELESS, SLOW = 60.0, 0.3  # of the deviance, and of what it spans: a set this 
 REACHES = 2.0 ** -np.arange(1, 10)  # of a parameter's range: how far one without a slope is moved
 MOVES, WORTH = 8, 1.0  # of such parameters in a row, and the deviance that one must gain
 TURNS, KEPT = 3, 6  # of moving and descending in turn, and the starts that take part
+SCATTERED, SPREAD, AGAIN = 24, 0.5, 3  # starts around a fit, of the range to either side, and how often
 WALL = 1e-3  # of a coordinate's range: how near a bound a parameter rests on it
 NESTED = 0.1  # of the deviance: a set that is worse than its own subset by more has not converged
 
@@ -74,6 +75,17 @@ def wide_refit(
 
     A descent walks a relay's time by a sample a step, and a wrong time bends what else is fitted.
     """
+    fits = _in_turns(bench, noise, wanted, faults)
+    for _ in range(AGAIN if _settings(bench, fits[0].names) else 0):
+        again = _in_turns(bench, noise, scattered(bench, fits[0]), faults)
+        if again[0].deviance > fits[0].deviance - WORTH:
+            break
+        fits = again
+    return refit(bench, noise, [(f.names, f.unit) for f in fits if f.cost < fits[0].cost + CLOSE], faults)
+
+
+def _in_turns(bench: Bench, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None) -> list[Refit]:
+    """The best of these starts, moved and descended in turn until that gains nothing; the best first."""
     fits = sorted(_descended(bench, noise, wanted, faults, (FIRST, ROUGH[1])), key=lambda f: f.cost)[:KEPT]
     for _ in range(TURNS):
         moved = [(f.names, moved_across(bench, noise, f, faults)) for f in fits]
@@ -81,7 +93,23 @@ def wide_refit(
         if better[0].deviance > fits[0].deviance - WORTH:
             break
         fits = better
-    return refit(bench, noise, [(f.names, f.unit) for f in fits if f.cost < fits[0].cost + CLOSE], faults)
+    return fits
+
+
+def scattered(bench: Bench, fit: Refit) -> list[Start]:
+    """Starts around a fit, with all that an effect has beside its sizes moved at once, by little and by much.
+
+    Two relays may each be at its best beside the other and still have each other's times: one parameter at a time
+    leads nowhere then. The points are Roberts' (2018) sequence R_d, the fractional parts of k / phi, k / phi^2, ...
+    """
+    columns = _settings(bench, fit.names)
+    phi = 2.0
+    for _ in range(50):
+        phi = (1 + phi) ** (1 / (len(columns) + 1))
+    parts = np.outer(np.arange(1, SCATTERED + 1), phi ** -np.arange(1.0, len(columns) + 1)) % 1.0
+    units = np.repeat(fit.unit[None], SCATTERED, axis=0)
+    units[:, columns] = np.clip(units[:, columns] + SPREAD * (2 * parts - 1) ** 3, 0.0, 1.0)
+    return [(fit.names, unit) for unit in units]
 
 
 def wide_refits(
@@ -97,9 +125,7 @@ def wide_refits(
 
 def moved_across(bench: Bench, noise: Noise, fit: Refit, faults: Sequence[str] | None = None) -> np.ndarray:
     """Coordinates (D,) with what an effect has beside its sizes moved, one parameter at a time and by any reach."""
-    at = bench.coordinates
-    sizes = at.sizes(fit.names)
-    columns = [k for k in at.parameters(fit.names) if k not in sizes]
+    columns = _settings(bench, fit.names)
     if not columns:
         return fit.unit
     prior = _with_prior(bench, [fit.names], faults)[1]
@@ -114,6 +140,13 @@ def moved_across(bench: Bench, noise: Noise, fit: Refit, faults: Sequence[str] |
             break
         unit, deviance = trials[found.argmin()], float(found.min())
     return unit
+
+
+def _settings(bench: Bench, names: Sequence[str]) -> list[int]:
+    """Columns of what effects have beside their sizes."""
+    at = bench.coordinates
+    sizes = at.sizes(names)
+    return [k for k in at.parameters(names) if k not in sizes]
 
 
 def no_worse_than_subsets(
