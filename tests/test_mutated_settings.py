@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import mutated_settings
 import pytest
@@ -22,6 +23,13 @@ def test_a_damaged_setting_works_or_is_refused_with_a_sentence(monkeypatch):
     assert found["bad"] == []
     for counts in found["counts"].values():
         assert set(counts) == {"works", "refused"}
+
+
+def test_the_stored_run_is_long_and_found_nothing():
+    stored = json.loads(Path(mutated_settings.__file__).with_suffix(".json").read_text(encoding="utf-8"))
+    assert stored["bad"] == []
+    assert sum(sum(counts.values()) for counts in stored["counts"].values()) == stored["mutants"] >= 10_000
+    assert {kind for counts in stored["counts"].values() for kind in counts} == {"works", "refused"}
 
 
 def test_the_same_seed_makes_the_same_mutants(tmp_path, monkeypatch):
