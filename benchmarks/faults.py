@@ -67,6 +67,7 @@ def forked(
             os.dup2(said.fileno(), 2)
             sys.stdout, sys.stderr = (io.TextIOWrapper(os.fdopen(k, "wb", 0), write_through=True) for k in (1, 2))
             warnings.simplefilter("default")  # as users have it, whatever the tests set
+            signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell's background jobs ignore
             code = 1
             try:
                 code = act() or 0

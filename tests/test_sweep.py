@@ -454,3 +454,18 @@ def test_the_objective_of_a_job_is_told_from_that_of_its_search(tmp_path):
         (tmp_path / "result.json").write_text(json.dumps(told))
         assert (objective(tmp_path), search_objective(tmp_path)) == (1.0, ended)
     assert search_objective(tmp_path / "nowhere") is None
+
+
+def test_a_folder_that_a_full_disk_left_empty_is_the_jobs_again_and_nobody_elses_is_touched(tmp_path):
+    from tractexp.sweep.job import SweepJob
+    from tractexp.sweep.sweeper import place
+
+    jobs = [SweepJob({"seed": k}, {}, (), f"job {k}", "", Path()) for k in range(4)]
+    (tmp_path / "0" / ".hydra").mkdir(parents=True)  # a kill before it said what it is
+    (tmp_path / "1").mkdir()
+    jobs[2].status.write(tmp_path / "1")  # another job of an earlier sweep
+    (tmp_path / "2").mkdir()
+    (tmp_path / "2" / "mine.txt").write_text("not a job")
+    (tmp_path / "4").write_text("nor is this")
+    assert [job.folder.name for job in place(jobs, tmp_path)] == ["0", "3", "1", "5"]
+    assert [job.folder.name for job in place(jobs, tmp_path / "new")] == ["0", "1", "2", "3"]

@@ -1,6 +1,7 @@
 """What a run leaves in MLflow, read back through MLflow's own public client."""
 
 import json
+import logging
 import os
 import re
 import signal
@@ -20,6 +21,7 @@ from tractexp.errors import UserError
 from tractexp.tracking import Run, process
 from tractexp.tracking.process import Logger
 from tractexp.tracking.run import CURVE_POINTS
+from tractexp.tracking.store import sentences
 from tractexp.tracking.ui import serve
 
 STEPS = np.arange(300)
@@ -278,6 +280,28 @@ def test_a_store_that_cannot_be_used_is_named_with_the_reason(tmp_path, empty_st
         tracking.prepare(" ")
     with pytest.raises(UserError, match="foo://x cannot be used"):
         tracking.prepare("foo://x")
+
+
+def test_what_mlflow_logs_of_an_error_is_not_shown_but_told_in_the_sentence():
+    """It logs a traceback of each error of the database, and raises it as well."""
+    logger, said = logging.getLogger("mlflow.store.db.utils"), []
+    handler = logging.Handler()
+    handler.emit = lambda record: said.append(record.getMessage())
+    logger.addHandler(handler)
+
+    def fails():
+        with sentences("here"):
+            logger.error("a traceback")
+            raise OSError("disk is full")
+
+    try:
+        with pytest.raises(UserError, match="the MLflow store here cannot be used: disk is full"):
+            fails()
+        assert said == []
+        logger.error("heard")
+        assert said == ["heard"]
+    finally:
+        logger.removeHandler(handler)
 
 
 def test_a_relative_address_counts_from_the_folder_where_the_command_runs(tmp_path, empty_store):

@@ -154,14 +154,16 @@ def swept(override: Override) -> list[str]:
 
 
 def place(jobs: Sequence[SweepJob], folder: Path) -> list[SweepJob]:
-    """Give each job its folder: that of the same configuration in an earlier sweep here, or the next free number."""
+    """Give each job its folder: that of the same configuration in an earlier sweep here, or the next free number.
+
+    Free is also a folder that holds nothing yet but what Hydra hides in it, as a full disk or a kill leaves it.
+    """
     known = {s.configuration: p for p in _numbered(folder) if (s := status.read(p)) is not None}
-    number = max((int(p.name) for p in _numbered(folder)), default=-1)
+    free = (k for k in itertools.count() if not _holds_something(folder / str(k)))
     placed = []
     for job in jobs:
         if job.configuration not in known:
-            number += 1
-            known[job.configuration] = folder / str(number)
+            known[job.configuration] = folder / str(next(free))
         placed.append(replace(job, folder=known[job.configuration]))
     return placed
 
@@ -174,6 +176,10 @@ def placement(job: SweepJob) -> list[str]:
 
 def _numbered(folder: Path) -> list[Path]:
     return [p for p in folder.iterdir() if p.name.isdecimal()] if folder.is_dir() else []
+
+
+def _holds_something(folder: Path) -> bool:
+    return folder.exists() and not (folder.is_dir() and all(p.name.startswith(".") for p in folder.iterdir()))
 
 
 def finished(job: SweepJob) -> bool:

@@ -7,6 +7,7 @@ killed. Here the first to arrive makes the database in memory, under a lock, and
 import contextlib
 import functools
 import gc
+import logging
 import os
 import sqlite3
 import tempfile
@@ -141,12 +142,13 @@ def light_import() -> Iterator[None]:
 def sentences(uri: str) -> Iterator[None]:
     """Turn what MLflow, the database and the file system raise into one sentence that names the store.
 
-    What they warn of is for those who develop with them, and stays off the user's terminal.
+    What they warn of, and what MLflow logs of an error before it raises it, is for those who develop with them, and
+    stays off the user's terminal.
     """
     from mlflow.exceptions import MlflowException
 
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), _silent("mlflow"):
             warnings.simplefilter("ignore")
             yield
     except Exception as error:
@@ -160,6 +162,18 @@ def sentences(uri: str) -> Iterator[None]:
                 "older one up to date (keep a copy), a newer one needs the newer MLflow"
             ) from error
         raise UserError(f"the MLflow store {uri} cannot be used: {reason}") from error
+
+
+@contextlib.contextmanager
+def _silent(name: str) -> Iterator[None]:
+    """Let a logger and those below it say nothing."""
+    logger = logging.getLogger(name)
+    level = logger.level
+    logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
 
 
 def _reach(uri: str) -> None:
