@@ -1,12 +1,13 @@
 """Do the tests notice a mistake? `python benchmarks/mutants.py [--count 30] [--seed 1] [--only PACKAGE] [--jobs 2]`.
 
 In each of six packages single places are changed: a comparison, an operator, a number, a condition, a sign. The places
-are drawn with a seed, in turn from every module. Each change is made in a copy of the repository and run against the
-test files that use the module, those that use most of its names first, until one fails: then it is killed. What
-survives them all needs a test, or a reason in `EXPLAINED` why nobody can tell it from the original.
+are drawn with a seed, in turn from every module. Each change is made in a copy of the repository and put before the
+tests that run its line, the quickest of each file first, until one fails: then it is killed. What survives them all
+needs a test, or a reason in mutants_explained.json why nobody can tell it from the original.
 
-Results go to mutants.json, which also says what need not be run again: a module is run anew once it or a change in it
-is another. docs/mutation.md is written from it (`--write` writes that alone).
+Which test runs which line is measured once, by `--cover` (needs pytest-cov), and kept in outputs/. Results go to
+mutants.json, which also says what need not be run again: a change whose place is still there. docs/mutation.md is
+written from it (`--write` writes that alone).
 
 mutmut and cosmic-ray were judged by what their documentation says, not tried. mutmut 3 replaces each function by a
 trampoline, and here functions are looked into: arguments of plugins by name, sources by their hash. cosmic-ray runs one
@@ -26,12 +27,14 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from queue import Queue
 from typing import Any
+from xml.etree import ElementTree
 
 from tractexp import files
 
@@ -39,8 +42,9 @@ ROOT = Path(__file__).parents[1]
 RESULTS, PAGE = ROOT / "benchmarks" / "mutants.json", ROOT / "docs" / "mutation.md"
 REASONS = ROOT / "benchmarks" / "mutants_explained.json"
 PACKAGES = ("model", "identification", "record", "discrepancy", "comparison", "sweep")
-FILES = 3  # test files that a change is run against, of those that use its module most
-LIMIT = 60.0  # s for each of them
+COVERED, TIMES = ROOT / "outputs" / "covered", ROOT / "outputs" / "covered.xml"  # which test runs which line; how long
+LIMIT = 120.0  # s for the tests of one change
+MOST = 400  # of them
 PASSED, FAILED, LATE = "passed", "failed", "late"
 SWAPS: dict[type[ast.AST], type[ast.AST]] = {
     ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
@@ -56,6 +60,7 @@ class Mutant:
 
     module: str
     line: int
+    last: int  # line of the same expression
     before: str
     after: str
     nth: int  # of all places of the module
@@ -115,7 +120,7 @@ def mutants_of(module: str, text: str) -> list[Mutant]:
         changed = copy.copy(node)
         setattr(changed, field, other)
         after = ast.unparse(changed.test if shown is not node else changed)  # type: ignore[attr-defined]
-        made.append(Mutant(module, node.lineno, before, after, k))
+        made.append(Mutant(module, node.lineno, node.end_lineno or node.lineno, before, after, k))
     return made
 
 
@@ -142,29 +147,56 @@ def drawn(package: str, count: int, seed: int) -> list[Mutant]:
     return sorted(chosen, key=lambda m: (m.module, m.line, m.nth))
 
 
-def tests_for(module: str) -> list[str]:
-    """The test files that use a module, the one that uses most of its names first."""
-    tree = ast.parse((ROOT / module).read_text(encoding="utf-8"))
-    names = {n.name for n in tree.body if isinstance(n, ast.FunctionDef | ast.ClassDef)}
-    names |= {
-        m.name for n in tree.body if isinstance(n, ast.ClassDef) for m in n.body if isinstance(m, ast.FunctionDef)
-    }
-    dotted = module.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
-    package, _, stem = dotted.rpartition(".")
-    imports = re.compile(
-        rf"from {re.escape(dotted)} import|import {re.escape(dotted)}\b|"
-        rf"from {re.escape(package)} import [^\n]*\b{stem}\b"
-    )
-    scores = {}
-    for path in sorted((ROOT / "tests").glob("test_*.py")):
-        text = path.read_text(encoding="utf-8")
-        used = sum(
-            bool(re.search(rf"\b{re.escape(n)}\b", text)) for n in names if len(n) > 3 and not n.startswith("__")
-        )
-        near = sum(word in path.stem.split("_") for word in {*stem.split("_"), package.rpartition(".")[2]})
-        scores[path.name] = 20 * bool(imports.search(text)) + used + 3 * near
-    ranked = sorted((name for name in scores if scores[name]), key=lambda name: (-scores[name], name))
-    return ranked[:FILES]
+class Covered:
+    """Which tests run a line, and how long each takes."""
+
+    def __init__(self) -> None:
+        from coverage import CoverageData
+
+        self.data = CoverageData(COVERED.as_posix())
+        self.data.read()
+        self.seconds: dict[str, float] = {}
+        for case in ElementTree.parse(TIMES).iter("testcase"):
+            where, name = case.get("classname", ""), case.get("name", "")
+            file = "/".join(where.split(".")[:2]) + ".py"
+            inner = where.split(".")[2:]
+            self.seconds["::".join([file, *inner, name])] = float(case.get("time", "0"))
+
+    def tests(self, mutant: Mutant) -> list[str]:
+        """Those that run the changed expression; of what runs at import all that run its module, or else its package.
+
+        What a fixture runs is run for every test of its file. The quickest of each file come first, then its next.
+        """
+        lines = self.data.contexts_by_lineno((ROOT / mutant.module).as_posix())
+        there = {context for k in range(mutant.line, mutant.last + 1) for context in lines.get(k, ()) if context}
+        there = there or _all(lines)
+        if not there:
+            beside = (ROOT / mutant.module).parent.glob("*.py")
+            there = {c for file in beside for c in _all(self.data.contexts_by_lineno(file.as_posix()))}
+        found: set[str] = set()
+        for test, _, part in (context.rpartition("|") for context in there):
+            file = test.partition("::")[0]
+            found |= {test} if part == "run" else {t for t in self.seconds if t.partition("::")[0] == file}
+        ranked = sorted(found & self.seconds.keys(), key=lambda test: (self.seconds[test], test))
+        turn: Counter[str] = Counter()
+        turns = {}
+        for test in ranked:
+            turns[test] = turn[file := test.partition("::")[0]]
+            turn[file] += 1
+        return sorted(ranked, key=lambda test: turns[test])[:MOST]
+
+
+def _all(lines: dict[int, list[str]]) -> set[str]:
+    return {context for contexts in lines.values() for context in contexts if context}
+
+
+def cover() -> None:
+    """Run the whole suite once and note which test runs which line."""
+    COVERED.parent.mkdir(exist_ok=True)
+    subprocess.run(
+        [sys.executable, "-m", "pytest", "-n", "2", "--cov=tractexp", "--cov-context=test", "--cov-report=",
+         f"--junitxml={TIMES}"], cwd=ROOT, env={**os.environ, "COVERAGE_FILE": str(COVERED)}, check=False,
+    )  # fmt: skip
 
 
 def copied(to: Path) -> None:
@@ -177,13 +209,13 @@ def copied(to: Path) -> None:
     (to / "tractexp" / "conf").symlink_to("../conf")
 
 
-def run(folder: Path, test: str, limit: float) -> tuple[str, str]:
-    """Whether a test file (or a test in it) passes in a copy, fails, or is late; and the first test that failed."""
+def run(folder: Path, tests: Sequence[str], limit: float) -> tuple[str, str]:
+    """Whether tests pass in a copy, one fails, or they are late; and the one that failed first."""
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-n0", "-p", "no:cacheprovider", "--no-header", "--tb=no"]
     environment = {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1", "COLUMNS": "400"}
     with tempfile.TemporaryDirectory() as scratch:
         process = subprocess.Popen(
-            [*command, f"--basetemp={scratch}/t", f"tests/{test}"], cwd=folder, env=environment, text=True,
+            [*command, f"--basetemp={scratch}/t", *tests], cwd=folder, env=environment, text=True,
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True,
         )  # fmt: skip
         try:
@@ -192,8 +224,8 @@ def run(folder: Path, test: str, limit: float) -> tuple[str, str]:
             os.killpg(process.pid, signal.SIGKILL)
             process.communicate()
             return LATE, ""
-    failed = re.search(r"^(?:FAILED|ERROR) tests/(.+?)(?: - .*)?$", told, re.MULTILINE)
-    return (PASSED, "") if process.returncode in (0, 5) else (FAILED, failed[1] if failed else test)
+    failed = re.search(r"^(?:FAILED|ERROR) (tests/.+?)(?: - .*)?$", told, re.MULTILINE)
+    return (PASSED, "") if process.returncode in (0, 5) else (FAILED, failed[1] if failed else "")
 
 
 class Clean:
@@ -206,28 +238,31 @@ class Clean:
     def passes(self, test: str) -> bool:
         with self.lock:
             if test not in self.known:
-                self.known[test] = run(self.folder, test, 10 * LIMIT)[0] == PASSED
+                self.known[test] = run(self.folder, [test], 10 * LIMIT)[0] == PASSED
                 if not self.known[test]:
                     print(f"  {test} fails with nothing changed", flush=True)
             return self.known[test]
 
 
-def judged(mutant: Mutant, folder: Path, clean: Clean) -> dict[str, Any]:
-    """What becomes of one change."""
+def judged(mutant: Mutant, tests: list[str], folder: Path, clean: Clean) -> dict[str, Any]:
+    """What becomes of one change; tests that fail with nothing changed are left out."""
     path = folder / mutant.module
     original = path.read_text(encoding="utf-8")
-    told: dict[str, Any] = {**asdict(mutant), "killed_by": None, "passed": [], "unfinished": []}
+    told: dict[str, Any] = {**asdict(mutant), "killed_by": None, "tests": len(tests), "late": False}
+    if not tests:
+        return told
     try:
         path.write_text(mutated(original, mutant), encoding="utf-8")
-        for test in tests_for(mutant.module):
-            outcome, what = run(folder, test, LIMIT)
-            if outcome == FAILED and clean.passes(what):
-                return told | {"killed_by": what}
+        while tests:
+            outcome, what = run(folder, tests, LIMIT)
+            if outcome == FAILED and (not what or clean.passes(what)):
+                return told | {"killed_by": (what or "no test can be collected").removeprefix("tests/")}
             if outcome != FAILED:
-                told["passed" if outcome == PASSED else "unfinished"].append(test)
+                return told | {"tests": len(tests), "late": outcome == LATE}
+            tests = [test for test in tests if test != what]
     finally:
         path.write_text(original, encoding="utf-8")
-    return told
+    return told | {"tests": 0}
 
 
 def keep(found: list[dict[str, Any]]) -> None:
@@ -237,11 +272,10 @@ def keep(found: list[dict[str, Any]]) -> None:
 HEAD = """# Do the tests notice a mistake?
 
 Written by `python benchmarks/mutants.py` from `benchmarks/mutants.json`. Single places of six packages, drawn with a
-seed from every module in turn, are changed, and the test files that use most of the module are run, each for a minute.
-A change is killed by the first test that fails, if that test passes with nothing changed. What survives has a reason:
-nobody can tell it from the original, or it says what is not tested. Undecided is what passed where it was run to the
-end, while another file was not done in its minute (`sweep` is hit most: its tests take longer). A package without
-changes has not been run yet.
+seed from every module in turn, are changed and put before the tests that run the changed line, the quickest of each
+file first, for two minutes. A change is killed by the first test that fails, if that test passes with nothing changed.
+What survives has a reason: nobody can tell it from the original, or it says what is not tested. Undecided is what two
+minutes were not enough for, and what no test runs within its own process.
 
 | package | changes | killed | explained | survive | undecided |
 |---|---:|---:|---:|---:|---:|
@@ -269,9 +303,9 @@ def _end(found: dict[str, Any], told: dict[str, str]) -> tuple[str, str]:
         return "killed", found["killed_by"]
     if reason := told.get(key_of(found)):
         return "explained", reason
-    if found["unfinished"] or not found["passed"]:
-        return "undecided", ", ".join(found["unfinished"]) or "no file uses it by name"
-    return "survives", ", ".join(found["passed"])
+    if found["late"] or not found["tests"]:
+        return "undecided", f"{found['tests']} tests run it"
+    return "survives", f"passed by {found['tests']} tests"
 
 
 def key_of(found: dict[str, Any]) -> str:
@@ -290,38 +324,53 @@ def main() -> None:
     ask.add_argument("--seed", type=int, default=1)
     ask.add_argument("--jobs", type=int, default=2)
     ask.add_argument("--only", nargs="*", default=list(PACKAGES), choices=PACKAGES)
-    ask.add_argument("--survivors", action="store_true", help="run those again that survived")
+    ask.add_argument("--survivors", action="store_true", help="run those again that were not killed")
     ask.add_argument("--write", action="store_true", help="write docs/mutation.md alone")
+    ask.add_argument("--cover", action="store_true", help="measure first which test runs which line")
     chosen = ask.parse_args()
+    if chosen.cover:
+        cover()
     known = {key_of(f): f for f in json.loads(RESULTS.read_text())} if RESULTS.exists() else {}
-    told = json.loads(REASONS.read_text()) if REASONS.exists() else {}
     if not chosen.write:
         wanted = [m for package in chosen.only for m in drawn(package, chosen.count, chosen.seed)]
         again = [m for m in wanted if m.key not in known or (chosen.survivors and not known[m.key]["killed_by"])]
-        with tempfile.TemporaryDirectory() as scratch:
-            folders: Queue[Path] = Queue()
-            for k in range(chosen.jobs + 1):
-                copied(Path(scratch) / str(k))
-                folders.put(Path(scratch) / str(k))
-            clean = Clean(folders.get())
-
-            def one(mutant: Mutant) -> None:
-                folder = folders.get()
-                try:
-                    known[mutant.key] = judged(mutant, folder, clean)
-                finally:
-                    folders.put(folder)
-                end = known[mutant.key]["killed_by"] or f"survives {known[mutant.key]['passed']}"
-                print(f"{mutant.line} {mutant.key}: {end}", flush=True)
-                keep(list(known.values()))
-
-            with ThreadPoolExecutor(chosen.jobs) as pool:
-                list(pool.map(one, again))
+        investigate(again, known, chosen.jobs)
+    there = {m.key for module in {f["module"] for f in known.values()} for m in mutants_of(module, text_of(module))}
     found = sorted(
-        known.values(), key=lambda f: (PACKAGES.index(f["module"].split("/")[1]), f["module"], f["line"], f["nth"])
+        (f for key, f in known.items() if key in there),
+        key=lambda f: (PACKAGES.index(f["module"].split("/")[1]), f["module"], f["line"], f["nth"]),
     )
     keep(found)
-    files.write(PAGE, page(found, told))
+    files.write(PAGE, page(found, json.loads(REASONS.read_text(encoding="utf-8")) if REASONS.exists() else {}))
+
+
+def investigate(mutants: Sequence[Mutant], known: dict[str, dict[str, Any]], jobs: int) -> None:
+    """Put changes before their tests, so many side by side, and keep what becomes of each as it is known."""
+    covered = Covered()
+    tests = [covered.tests(m) for m in mutants]
+    with tempfile.TemporaryDirectory() as scratch:
+        folders: Queue[Path] = Queue()
+        for k in range(jobs + 1):
+            copied(Path(scratch) / str(k))
+            folders.put(Path(scratch) / str(k))
+        clean = Clean(folders.get())
+
+        def one(mutant: Mutant, tests: list[str]) -> None:
+            folder = folders.get()
+            try:
+                known[mutant.key] = judged(mutant, tests, folder, clean)
+            finally:
+                folders.put(folder)
+            print(f"{mutant.line} {mutant.key}: {' '.join(_end(known[mutant.key], {}))}", flush=True)
+            keep(list(known.values()))
+
+        with ThreadPoolExecutor(jobs) as pool:
+            list(pool.map(one, mutants, tests))
+
+
+def text_of(module: str) -> str:
+    path = ROOT / module
+    return path.read_text(encoding="utf-8") if path.exists() else ""
 
 
 if __name__ == "__main__":
