@@ -71,6 +71,17 @@ def test_one_current_of_three_is_refused(tmp_path):
         tractexp.read(path, voltages=["ua", "ub", "uc"], currents=["ia"])
 
 
+@pytest.mark.parametrize("channels", [{}, {"voltages": ["ua", "ub", "uc"], "currents": ["ia", "ib", "ic"]}])
+def test_voltage_and_current_of_different_rates_are_refused(tmp_path, channels):
+    path = table(tmp_path / "rates.csv", columns(constant()))
+    head, *rows = path.read_text().splitlines()
+    slower = [row if k % 2 == 0 else ",".join([*row.split(",")[:4], "", "", ""]) for k, row in enumerate(rows)]
+    path.write_text("\n".join([head, *slower]))
+    told = r"column ia has a number in 10 of its first 20 rows only; voltage and current .* at the same times: keep the"
+    with pytest.raises(UserError, match=told):
+        tractexp.read(path, **channels)
+
+
 def test_channels_on_other_clocks_are_moved_by_their_skew():
     """What a file says of late channels reaches the waveforms."""
     made = recording(constant())

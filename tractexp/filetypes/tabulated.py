@@ -1,7 +1,7 @@
 """What a table holds, made of its columns: a load's powers against time, or a recording of waveforms."""
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any
@@ -234,6 +234,7 @@ def recording(table: Table, found: Mapped, nominal: float) -> Recording:
     t = found.columns["t"]
     named = [k for k, name in enumerate(table.heading.names) if name and k != t.number]
     numbers = {k: "number" for k in named if _numeric(table, k)}
+    _refuse_other_rates(table, [one.number for one in found.columns.values() if one.number not in (*numbers, t.number)])
     cells = table.read({t.number: "time", **numbers})
     for k in numbers:
         wild = ~(np.abs(cells[k].values) <= HUGE)
@@ -256,8 +257,25 @@ def recording(table: Table, found: Mapped, nominal: float) -> Recording:
 
 def _numeric(table: Table, number: int) -> bool:
     """Whether a column begins with numbers, and not with words."""
+    return all(_numbers_of(table, number))
+
+
+def _numbers_of(table: Table, number: int) -> list[bool]:
+    """Which of a column's first cells are numbers."""
     cells = [row[number] if number < len(row) else "" for row in table.sample[:20]]
-    return all(is_number(cell) or is_number(cell, ",") for cell in cells)
+    return [is_number(cell) or is_number(cell, ",") for cell in cells]
+
+
+def _refuse_other_rates(table: Table, numbers: Sequence[int]) -> None:
+    """Raise `UserError` for a column of samples that has a number in some rows only."""
+    for number in numbers:
+        there = _numbers_of(table, number)
+        if any(there):
+            raise UserError(
+                f"{table.source}: column {table.label(number)} has a number in {sum(there)} of its first {len(there)}"
+                " rows only; voltage and current of one record are sampled at the same times: keep the rows that have"
+                " all of them, or interpolate what was sampled more slowly"
+            )
 
 
 def _channel(table: Table, found: Mapped, number: int, values: np.ndarray, key: str) -> Channel:
