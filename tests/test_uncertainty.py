@@ -124,6 +124,22 @@ def test_information_of_a_straight_line_is_the_textbooks():
     assert slope.standard_errors[0] == pytest.approx(whole.standard_errors[1], rel=1e-9)
 
 
+def test_a_difference_is_one_sided_where_the_other_side_is_lost():
+    """Rows A x that cannot be simulated above 0.5 in the second, below 0.5 in the third; the fourth is on a wall."""
+    A = np.random.default_rng(1).normal(size=(6, 4))
+
+    class Straight(Likelihood):
+        def rows(self, unit, lanes=None):
+            made = unit @ A.T
+            made[(unit[:, 1] > 0.5) | (unit[:, 2] < 0.5)] = np.nan
+            return made
+
+    at = np.array([0.3, 0.5, 0.5, 1.0])
+    rows, J = Straight(None, None, None).jacobian(at)
+    np.testing.assert_allclose(rows, A @ at)
+    np.testing.assert_allclose(J, A, rtol=1e-6, atol=1e-9)
+
+
 def test_jacobian_agrees_with_the_printed_equations(model):
     """Central differences of an independent solution of Eqs. (1)-(7), not of the model's own kernel."""
     events = [replace(records((0.5,), 0.005)[0], U0=1.0)]  # the mean before a smooth fall is a little lower
