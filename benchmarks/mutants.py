@@ -17,6 +17,7 @@ command for all that it changes, which here would be the whole suite, minutes ea
 import argparse
 import ast
 import copy
+import itertools
 import json
 import os
 import random
@@ -27,7 +28,6 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
@@ -179,14 +179,13 @@ class Covered:
             file = test.partition("::")[0]
             found |= {test} if part == "run" else {t for t in self.seconds if t.partition("::")[0] == file}
         ranked = sorted(found & self.seconds.keys(), key=lambda test: (self.seconds[test], test))
-        turn: Counter[str] = Counter()
-        turns = {}
+        by_file: dict[str, list[str]] = {}
         for test in ranked:
-            turns[test] = turn[file := test.partition("::")[0]]
-            turn[file] += 1
+            by_file.setdefault(test.partition("::")[0], []).append(test)
+        in_turn = [test for turn in itertools.zip_longest(*by_file.values()) for test in turn if test]
         named = f"tests/test_{Path(mutant.module).parts[1]}.py"
         further = sorted((t for t in self.seconds if t.partition("::")[0] == named), key=self.seconds.__getitem__)
-        return list(dict.fromkeys([*sorted(ranked, key=turns.__getitem__), *further]))[:MOST]
+        return list(dict.fromkeys([*in_turn, *further]))[:MOST]
 
 
 def _all(lines: dict[int, list[str]]) -> set[str]:
@@ -276,9 +275,9 @@ HEAD = """# Do the tests notice a mistake?
 
 Written by `python benchmarks/mutants.py` from `benchmarks/mutants.json`. Single places of six packages, drawn with a
 seed from every module in turn, are changed and put before the tests that run the changed line, the quickest of each
-file first, for four minutes. A change is killed by the first test that fails, if that test passes with nothing changed.
-What survives has a reason: nobody can tell it from the original, or it says what is not tested. Undecided is what four
-minutes were not enough for, and what no test runs.
+file first, for four minutes at most. A change is killed by the first test that fails, if that test passes with nothing
+changed. What survives has a reason: nobody can tell it from the original, or it says what is not tested. Undecided is
+what that time was not enough for, and what no test runs.
 
 | package | changes | killed | explained | survive | undecided |
 |---|---:|---:|---:|---:|---:|

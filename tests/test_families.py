@@ -129,12 +129,12 @@ def test_what_is_scattered_moves_all_times_and_no_size():
     ((names, unit), *_) = starts(at, at.catalogue["two_stage_trip"], refits)
     points = np.array([point for _, point in scattered(at, Refit(names, unit, 0.0, 11))])
     moved = np.abs(points - unit)
-    sizes = at.coordinates.sizes(names)
-    settings = [k for k in at.coordinates.parameters(names) if k not in sizes]
+    settings = at.coordinates.settings(names)
     still = np.setdiff1d(np.arange(len(unit)), settings)
     assert (moved[:, still] == 0).all()
     assert (points >= 0).all()
     assert (points <= 1).all()
+    assert len(settings) == 9
     assert np.median((moved[:, settings] > 0).mean(axis=1)) == 1.0
     assert ((moved[:, settings] > 0.001) & (moved[:, settings] < 0.02)).any(axis=0).all()
     assert (moved[:, settings] > 0.1).any(axis=0).all()

@@ -84,6 +84,11 @@ class Coordinates:
         """Columns of all the effects' parameters."""
         return [self.column[p.name] for n in effects for p in self.catalogue[n].effect.parameters]
 
+    def settings(self, effects: Sequence[str]) -> list[int]:
+        """Columns of what the effects have beside their sizes, such as thresholds and times."""
+        sizes = self.sizes(effects)
+        return [k for k in self.parameters(effects) if k not in sizes]
+
     @functools.cached_property
     def prior_deviation(self) -> dict[int, float]:
         """Prior standard deviation of each size of a fault of the measurement and of each shape, in the unit cube."""

@@ -76,7 +76,7 @@ def wide_refit(
     A descent walks a relay's time by a sample a step, and a wrong time bends what else is fitted.
     """
     fits = _in_turns(bench, noise, wanted, faults)
-    for _ in range(AGAIN if _settings(bench, fits[0].names) else 0):
+    for _ in range(AGAIN if bench.coordinates.settings(fits[0].names) else 0):
         again = _in_turns(bench, noise, scattered(bench, fits[0]), faults)
         if again[0].deviance > fits[0].deviance - WORTH:
             break
@@ -102,7 +102,7 @@ def scattered(bench: Bench, fit: Refit) -> list[Start]:
     Two relays may each be at its best beside the other and still have each other's times: one parameter at a time
     leads nowhere then. The points are Roberts' (2018) sequence R_d, the fractional parts of k / phi, k / phi^2, ...
     """
-    columns = _settings(bench, fit.names)
+    columns = bench.coordinates.settings(fit.names)
     phi = 2.0
     for _ in range(50):
         phi = (1 + phi) ** (1 / (len(columns) + 1))
@@ -125,7 +125,7 @@ def wide_refits(
 
 def moved_across(bench: Bench, noise: Noise, fit: Refit, faults: Sequence[str] | None = None) -> np.ndarray:
     """Coordinates (D,) with what an effect has beside its sizes moved, one parameter at a time and by any reach."""
-    columns = _settings(bench, fit.names)
+    columns = bench.coordinates.settings(fit.names)
     if not columns:
         return fit.unit
     prior = _with_prior(bench, [fit.names], faults)[1]
@@ -140,13 +140,6 @@ def moved_across(bench: Bench, noise: Noise, fit: Refit, faults: Sequence[str] |
             break
         unit, deviance = trials[found.argmin()], float(found.min())
     return unit
-
-
-def _settings(bench: Bench, names: Sequence[str]) -> list[int]:
-    """Columns of what effects have beside their sizes."""
-    at = bench.coordinates
-    sizes = at.sizes(names)
-    return [k for k in at.parameters(names) if k not in sizes]
 
 
 def no_worse_than_subsets(
