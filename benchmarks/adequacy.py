@@ -55,7 +55,7 @@ def run(task: tuple[str, str, float, int, int]) -> dict:
         if kind == "null":
             case = Case(noise=cases.NOISES[name], events=events)
         else:
-            trial = cases.at_limit((name,), (multiple,), seed, events=events)
+            trial = cases.at_limit((name,), multiple, seed, events=events)
             case, row["multiple"] = trial.case, trial.multiples[0]
         dips = [detect(Record(f"event{k + 1}", **r, source=f"{k}").check()) for k, r in enumerate(make(case, seed))]
         row["made"] = time.perf_counter() - started

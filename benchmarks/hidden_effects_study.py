@@ -1,40 +1,52 @@
-"""Run the suites through the product and count: false alarms, names found, abstentions, gaps closed.
+"""Run the suites through the product and count: false alarms, names found, abstentions, proposals, gaps closed.
 
-    python hidden_effects_study.py --docs        (from the folder benchmarks)
+    python hidden_effects_study.py                              the development set: seeds that were looked at
+    python hidden_effects_study.py --frozen COMMIT [--docs]     the judgement set    (from the folder benchmarks)
 
 Each trial is made by the independent generator, its last event held out, and investigated by `tractexp.discrepancy`.
-AIC, BIC and RMSE rank the same candidates on the same data. Rows are appended to a JSON-lines file, so that a study
-can be stopped and taken up; `--docs` writes tables and figures into docs/missing-effects.md.
+AIC, BIC, RMSE and sparse regression (PySINDy) choose among the same candidates on the same data. Rows are appended to a
+JSON-lines file, so that a study can be stopped and taken up.
+
+The judgement set's seeds follow from the hash of the commit that froze product and generator, so that nobody could look
+at them before; it is refused where either is not what that commit holds. `--docs` writes its tables and figures into
+docs/missing-effects.md.
 """
 
 import argparse
 import itertools
 import json
 import os
+import subprocess
 import time
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 for library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
+import baselines  # noqa: E402
 import hidden_effects_evidence as evidence  # noqa: E402
 import numpy as np  # noqa: E402
 
 from hidden_effects import cases  # noqa: E402
 from hidden_effects.effects import CATALOG, PHYSICAL  # noqa: E402
 from hidden_effects.generator import make, scene, truth  # noqa: E402
+from hidden_effects.laws import FAMILY  # noqa: E402
 from hidden_effects.outside import OUTSIDE  # noqa: E402
 
 LEFT_OUT = "left out "  # the group of trials whose effect is taken from the catalogue
 PAIRED, LARGE = (2.0, 4.0), (2.0, 4.0, 8.0)  # multiples of the detection limit
+FROZEN = ("tractexp", "plugins", "benchmarks/hidden_effects", "benchmarks/independent")  # what judges and is judged
+ROOT, JUDGEMENT = Path(__file__).parents[1], Path(__file__).with_name("judgement.jsonl")
 KNOWN = {"rotor_skin_effect": "second_cage", "stator_transients": "stator_transients"}  # the catalogue has them, too
 HIDDEN = {  # one effect is hidden: group of trials, multiples, effects
     "single": ("", cases.MULTIPLES, (*CATALOG, *KNOWN)),
+    "laws": ("law ", (4.0,), FAMILY),
     "outside": ("outside ", LARGE, [name for name in OUTSIDE if name not in KNOWN]),
     "left_out": (LEFT_OUT, LARGE, PHYSICAL),
 }
+Trials = Iterator[cases.Planned]
 SUITES = ("nulls", "nuisances", *HIDDEN, "pairs")
 BEST = 3  # single effects of which the least that any leaves is taken
 SAME = {  # effects whose amount is a parameter of the model, in its units
@@ -47,25 +59,28 @@ SAME = {  # effects whose amount is a parameter of the model, in its units
 }
 
 
-def suite(
-    name: str, count: int, events: int, multiples: Container[float] = cases.MULTIPLES
-) -> Iterator[tuple[str, cases.Trial]]:
-    """(group, trial) of one suite; `count` data sets of each row, hidden effects of these multiples of their limits."""
+def rows_of(name: str, salt: int | None, multiples: Container[float], **settings: int) -> Iterator[tuple[str, Trials]]:
+    """(group, its endless trials) of each row of a suite; hidden effects of these multiples of their limits."""
     if name == "nulls":
-        for noise in cases.NOISES:
-            yield from ((f"null, {noise}", t) for t in cases.nulls(noise, count, events=events))
+        yield from ((f"null, {noise}", cases.nulls(noise, salt, **settings)) for noise in cases.NOISES)
     elif name == "nuisances":
-        yield from (("null with nuisances", t) for t in cases.nuisances(count, events=events))
+        yield "null with nuisances", cases.nuisances(salt, **settings)
     elif name == "pairs":
-        for multiple in (m for m in PAIRED if m in multiples):
-            yield from ((f"pairs {multiple:g} x", t) for t in cases.pairs(multiple, count, events=events))
+        yield from ((f"pairs {m:g} x", cases.pairs(m, salt, **settings)) for m in PAIRED if m in multiples)
     else:
         group, sizes, effects = HIDDEN[name]
         for multiple, effect in itertools.product((m for m in sizes if m in multiples), effects):
-            yield from ((f"{group}{multiple:g} x", t) for t in cases.single(effect, multiple, count, events=events))
+            yield f"{group}{multiple:g} x", cases.single(effect, multiple, salt, **settings)
 
 
-def run(group: str, trial: cases.Trial, held: int) -> dict:
+def planned(suites: Iterable[str], count: int, salt: int | None, multiples: Container[float], events: int) -> Iterator:
+    """(group, trial) of `count` data sets of each row, one of every row before the second of any."""
+    rows = [row for name in suites for row in rows_of(name, salt, multiples, events=events)]
+    for _ in range(count):
+        yield from ((group, next(trials)) for group, trials in rows)
+
+
+def run(group: str, planned: cases.Planned, events: int, held: int) -> dict:
     """One data set investigated, its last `held` events kept for validation. What fails is a row with its message."""
     from tractexp.discrepancy.investigate import investigate
     from tractexp.errors import UserError
@@ -73,26 +88,23 @@ def run(group: str, trial: cases.Trial, held: int) -> dict:
     from tractexp.plugin import discover, get
     from tractexp.record import Record, detect
 
+    row = {"group": group, "label": planned.label, "seed": planned.seed, "events": events, "held": held}
+    started = time.perf_counter()
+    try:
+        trial = planned.make()
+    except (ValueError, ArithmeticError) as error:
+        return row | {"failed": f"{type(error).__name__}: {error}", "seconds": time.perf_counter() - started}
     hidden = [name for name, _ in trial.case.hidden]
-    row = {
-        "group": group,
-        "label": trial.label,
-        "truth": sorted(KNOWN.get(n, n) for n in hidden),
-        "seed": trial.seed,
-        "held": held,
-    }
-    row |= {"multiples": list(trial.multiples), "events": trial.case.events}
+    row |= {"truth": sorted((KNOWN | FAMILY).get(n, n) for n in hidden), "multiples": list(trial.multiples)}
     only = []
     if group.startswith(LEFT_OUT):
         row["truth"], only = [], [n for n in discover()["effect"] if n not in hidden]
-    started = time.perf_counter()
     try:
         records = make(trial.case, trial.seed)
-        events = [detect(Record(f"event{k + 1}", **r, source=f"{k}").check()) for k, r in enumerate(records)]
+        seen = [detect(Record(f"event{k + 1}", **r, source=f"{k}").check()) for k, r in enumerate(records)]
         model = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
         row["generated"] = time.perf_counter() - started
-        train, validate = events[: len(events) - held], events[len(events) - held :]
-        found = investigate(model, train, validate, only=only, seed=0)
+        found = investigate(model, seen[: events - held], seen[events - held :], only=only, seed=0)
         row |= _counted(found) | _compared(found, trial)
     except (UserError, ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
         row["failed"] = f"{type(error).__name__}: {error}"
@@ -101,28 +113,39 @@ def run(group: str, trial: cases.Trial, held: int) -> dict:
 
 def _counted(found) -> dict:
     """What the product said, and what it said it with."""
-    first = found.first
+    first, at = found.first, found.catalogue
     return {
         "verdict": found.verdict.word,
-        "names": list(found.names),
-        "sets": [list(s) for s in found.verdict.sets],
+        "names": sorted(set(at.textbook(found.names))),
+        "members": list(found.names),
+        "sets": [sorted(set(at.textbook(names))) for names in found.verdict.sets],
+        "sparse": baselines.sparse(found),
+        "proposal": _proposed(found.proposed),
+        "no_proposal": found.proposed.why,
         "chi2": found.train.after.chi2_per_sample,
         "closed": found.train.closed,
         "refitted": found.fitted_to_both,
         "closed_held": None if found.validate is None else found.validate.closed,
         "gain_held": None if found.validate is None else [found.validate.gain, found.validate.expected],
         "left_of_all": None if found.judged is None else found.judged.p_left,
-        "p_first": first.scores[0].p if first.scores else 1.0,
-        "first": first.scores[0].name if first.scores else "",
-        "stages": [[list(s.fit.names), s.scores[0].name, s.scores[0].p] for s in found.explanations.steps],
         "left": [s.p_left for s in found.explanations.steps],
         "left_by": found.last.left,
         "samples": found.bench.samples,
         "drops": {s.name: s.drop for s in first.scores},
-        "parameters": {s.name: len(found.catalogue[s.name].effect.parameters) for s in first.scores},
-        "untestable": sorted(found.catalogue.untestable),
+        "parameters": {s.name: len(at[s.name].effect.parameters) for s in first.scores},
+        "untestable": sorted(at.untestable),
         "simulations": found.bench.effort.simulations,
     }
+
+
+def _proposed(proposed) -> dict | None:
+    """The term of a proposal: where, by which signal, and what it closes."""
+    from tractexp.discrepancy.proposal.propose import told
+
+    content = told(proposed, "")
+    if content is None:
+        return None
+    return {k: content["terms"][0][k] for k in ("balance", "signal", "clock")} | {"closed": content["closed"]}
 
 
 def _compared(found, trial: cases.Trial) -> dict:
@@ -184,47 +207,57 @@ def _overlaps(place, where: list[dict]) -> bool:
     )
 
 
+def salt_of(commit: str) -> int:
+    """What the seeds of the judgement set are drawn from: the hash of the commit that froze it.
+
+    Refused where what judges or is judged has changed since.
+    """
+    git = ("git", "-C", str(ROOT))
+    told = subprocess.run([*git, "rev-parse", "--verify", f"{commit}^{{commit}}"], capture_output=True, text=True)
+    if told.returncode:
+        raise SystemExit(f"there is no commit '{commit}' in {ROOT}; give that which froze product and generator")
+    changed = subprocess.run([*git, "diff", "--quiet", commit, "--", *FROZEN], check=False)
+    if changed.returncode:
+        raise SystemExit(f"{', '.join(FROZEN)} have changed since {commit}: check that commit out, or freeze anew")
+    return int(told.stdout.strip()[:12], 16)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--frozen", metavar="COMMIT", help="the judgement set of this commit; else the development set")
     parser.add_argument("--suite", action="append", choices=SUITES, help="default: all")
     parser.add_argument("--count", type=int, default=5, help="data sets of each row")
     parser.add_argument("--multiple", action="append", type=float, choices=cases.MULTIPLES, help="default: all")
     parser.add_argument("--events", type=int, default=3, help="events fitted")
     parser.add_argument("--held", type=int, default=1, help="events held out beside them")
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--out", type=Path, default=Path("outputs/hidden_effects.jsonl"))
+    parser.add_argument("--out", type=Path, help="default: judgement.jsonl, or outputs/hidden_effects.jsonl")
     parser.add_argument("--minutes", type=float, default=1e9, help="begin no further trial after so long")
-    parser.add_argument("--docs", action="store_true", help="write tables and figures into docs/missing-effects.md")
+    parser.add_argument("--docs", action="store_true", help="write the judgement set's tables and figures, and stop")
     chosen = parser.parse_args()
+    out = chosen.out or (JUDGEMENT if chosen.frozen or chosen.docs else Path("outputs/hidden_effects.jsonl"))
+    if chosen.docs:
+        evidence.write(evidence.read(out), ROOT / "docs")
+        return
     from joblib import Parallel, delayed
 
-    chosen.out.parent.mkdir(parents=True, exist_ok=True)
-    rows = [json.loads(line) for line in chosen.out.read_text().splitlines()] if chosen.out.exists() else []
+    salt = salt_of(chosen.frozen) if chosen.frozen else None
+    out.parent.mkdir(parents=True, exist_ok=True)
+    rows = evidence.read(out) if out.exists() else []
     done = {(r["group"], r["label"], r["seed"], r["events"], r["held"]) for r in rows}
     started, total = time.perf_counter(), chosen.events + chosen.held
-    trials = (
-        found
-        for count in range(1, chosen.count + 1)  # one data set of every row before the second of any
-        for name in chosen.suite or SUITES
-        for found in suite(name, count, total, chosen.multiple or cases.MULTIPLES)
-    )
-    wanted = (
-        (group, trial)
-        for group, trial in itertools.takewhile(lambda _: time.perf_counter() - started < 60 * chosen.minutes, trials)
-        if (group, trial.label, trial.seed, total, chosen.held) not in done
-        and not done.add((group, trial.label, trial.seed, total, chosen.held))
-    )
-    jobs = (delayed(run)(group, trial, chosen.held) for group, trial in wanted)
-    with chosen.out.open("a") as file:
+    trials = planned(chosen.suite or SUITES, chosen.count, salt, chosen.multiple or cases.MULTIPLES, total)
+    wanted = (t for t in trials if (t[0], t[1].label, t[1].seed, total, chosen.held) not in done)
+    in_time = itertools.takewhile(lambda _: time.perf_counter() - started < 60 * chosen.minutes, wanted)
+    jobs = (delayed(run)(group, trial, total, chosen.held) for group, trial in in_time)
+    with out.open("a") as file:
         for row in Parallel(n_jobs=chosen.jobs, return_as="generator_unordered", pre_dispatch=4)(jobs):
-            rows.append(row)
-            file.write(json.dumps(row) + "\n")
+            rows.append(row | {"frozen": chosen.frozen})
+            file.write(json.dumps(rows[-1]) + "\n")
             file.flush()
             told = row.get("failed") or f"{row['verdict']} {' '.join(row['names'])}"
             print(f"{row['group']}, {row['label']}, {row['seed']}: {told} ({row['seconds']:.1f} s)", flush=True)
     print(evidence.tables(rows))
-    if chosen.docs:
-        evidence.write(rows, Path(__file__).parent.parent / "docs")
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 import ast
 import json
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -26,8 +27,20 @@ from hidden_effects import (
     truth,
     write,
 )
+from hidden_effects.controls import (
+    CurrentControlled,
+    InputFilter,
+    Ramped,
+    Rectifier,
+    ResistiveInrush,
+    SusceptanceControl,
+    SynchronousMotor,
+    Thermostat,
+    VoltageLink,
+)
 from hidden_effects.devices import Converter, Inrush, Link, Statcom
-from hidden_effects.limits import detection_limit
+from hidden_effects.laws import FAMILY, LAWS
+from hidden_effects.limits import detection_limit, joint_limit
 from hidden_effects.motor import Motor
 from hidden_effects.noise import autoregressive
 from hidden_effects.site import Response
@@ -376,6 +389,131 @@ def test_the_outer_cage_carries_its_share_of_the_torque_at_rest():
     assert current == pytest.approx(1 / (1j * m.Xs + 1 / (1 / (1j * m.Xm) + cages)), rel=1e-8)
 
 
+def rates_of(device, x: list[float], u: float = 1.0) -> np.ndarray:
+    """Rates of a device's states at a voltage u over that before."""
+    return np.array(device.flow(steady(u), u + 0j, [complex(v) for v in x])[1]).real
+
+
+def modes(device, x: list[float]) -> np.ndarray:
+    """Eigenvalues of a device about states at rest."""
+    h = 1e-6 * np.eye(len(x))
+    return np.linalg.eigvals(np.stack([(rates_of(device, x + d) - rates_of(device, x - d)) / 2e-6 for d in h], axis=1))
+
+
+def at_rest(device, u: float, x: list[float]) -> tuple[complex, np.ndarray]:
+    """Power over that before, and states, in the steady state at u, found from x."""
+    found = solve_ivp(lambda t, x: rates_of(device, x, u), (0, 60), x, "LSODA", rtol=1e-10, atol=1e-12).y[:, -1]
+    return u * device.flow(steady(u), u + 0j, found.astype(complex).tolist())[0].conjugate() / device.power, found
+
+
+@pytest.mark.parametrize(
+    "device", [InputFilter(1.0, frequency=3.0, damping=0.08), SynchronousMotor(1.0, frequency=3.0)]
+)
+def test_what_rings_does_so_at_its_frequency_and_with_its_damping(device):
+    rest = [v.real for v in device.rest()]
+    np.testing.assert_allclose(rates_of(device, rest), 0.0, atol=1e-12)
+    # Behind the filter's resistance the drive's negative one takes from w^2.
+    stiff = 1 - device.resistance if isinstance(device, InputFilter) else 1.0
+    natural = 6 * np.pi
+    assert np.prod(modes(device, rest)).real == pytest.approx(natural**2 * stiff, rel=1e-5)
+    assert -np.sum(modes(device, rest)).real / 2 == pytest.approx(0.08 * natural, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("device", "u", "power"),
+    [
+        (CurrentControlled(0.3, limit=1.3), 0.9, 1.0),
+        (CurrentControlled(0.3, limit=1.3), 0.5, 0.65),
+        (VoltageLink(0.3, gain=1.2), 0.9, 1.0),
+        (Ramped(0.3), 0.95, 0.95),
+        (Ramped(0.3), 0.65, 0.325),
+        (Thermostat(0.3), 0.9, 1.0),
+        (Thermostat(0.3), 0.5, 1.5 * 0.25),
+    ],
+)
+def test_controls_end_where_they_aim(device, u, power):
+    assert at_rest(device, u, [v.real for v in device.rest()])[0] == pytest.approx(power, rel=1e-6)
+
+
+def test_a_link_s_voltage_gives_what_the_current_needs():
+    _, (v,) = at_rest(VoltageLink(0.3, gain=1.2), 0.9, [1.0])
+    assert 1 + 1.2 * (1 - v) == pytest.approx(1 / 0.9, rel=1e-6)
+
+
+@pytest.mark.parametrize(("u", "current"), [(1.0, 1.0), (0.9, None), (0.5, 1.4)])
+def test_a_rectifier_holds_dc_power_and_pays_for_commutation(u, current):
+    device, k = Rectifier(0.88, overlap=0.12), 0.12
+    S = u * device.flow(steady(u), u + 0j, [])[0].conjugate()
+    i = abs(S) / u
+    assert S.real / abs(S) == pytest.approx(1 - k * i / u, rel=1e-9)
+    if current is None:
+        assert S.real == pytest.approx(0.88, rel=1e-9)
+    else:
+        assert i == pytest.approx(current, rel=1e-9)
+
+
+@pytest.mark.parametrize(("u", "b"), [(0.98, 0.4), (0.8, 1.0), (1.2, -1.0)])
+def test_an_integrating_compensator_ends_on_its_droop_or_at_its_rating(u, b):
+    device = SusceptanceControl(0.2, droop=0.05)
+    solved = solve_ivp(lambda t, x: rates_of(device, x, u), (0, 5), [1.0, 0.0], max_step=1e-3).y[:, -1]
+    current = device.flow(steady(u), u + 0j, solved.astype(complex).tolist())[0]
+    assert current == pytest.approx(1j * 0.2 * b * u, rel=1e-4)
+
+
+def test_froelich_s_curve_is_bounded_flux():
+    motor, states = Motor(LOAD.machine, 1.0, 0.7, saturation=0.6, ceiling=True).settled(1 + 0j)
+    m, before = LOAD.machine, motor.flux**0.5
+    a = before / 0.6
+    b = before / m.Xm * (a - before) / before  # so that the flux before needs psi/Xm
+    for V in (1.0, 0.6):
+        gap, current = motor.circuit(V + 0j, states)
+        magnetizing = current + (states[0] - gap) / m.Xr
+        assert a * abs(magnetizing) / (b + abs(magnetizing)) == pytest.approx(abs(gap), rel=1e-9)
+
+
+@pytest.mark.parametrize(("power", "head", "w", "driven"), [
+    (1.0, 0.0, 0.9, 0.9), (2.0, 0.8, 1.0, 1.0), (2.0, 0.8, 0.7, 0.0), (2.0, 0.6, 0.8, 0.28 / 0.64),
+])  # fmt: skip
+def test_what_is_driven_follows_its_own_curve(power, head, w, driven):
+    assert Motor(LOAD.machine, 1.0, 0.7, fan_power=power, head=head).driven(w) == pytest.approx(driven)
+
+
+def test_a_tap_changer_restores_its_voltage_to_a_step():
+    made = scene(case("tap_recovery", 1.0, LONG), 1)
+    device = made.site(0).devices[-1]
+    lowest = (1 - LONG.depth) * (1 + max(device.profile.values))
+    assert lowest <= 1 - LONG.depth + 0.15
+    assert max(device.profile.values) >= 0.1, "six steps of 0.02 and more fit into 0.9 s"
+    assert abs(device.profile(LONG.start)) == 0.0
+
+
+@pytest.mark.parametrize("name", ["staged_power_limit", "switched_capacitors"])
+def test_stages_act_one_by_one_and_return(name):
+    dip = replace(LONG, depth=0.25, duration=0.6)
+    profile = scene(case(name, 1.0, dip), 1).site(0).devices[-1].profile
+    assert profile(dip.start + 0.3) == pytest.approx(2 / 3), "levels 0.9 and 0.8 are passed, 0.7 is not"
+    assert profile(1.9) == pytest.approx(0.0)
+
+
+def test_a_resistance_ends_an_inrush_sooner():
+    both = Inrush(0.4, 0.3), ResistiveInrush(0.4, 0.3)
+    plain, braked = (device.flow(steady(), 1 + 0j, [0.7 + 0j]) for device in both)
+    assert plain[0] == braked[0]
+    excess = lambda x: max(np.cos(x) + 0.7 - 1.15, 0.0)  # noqa: E731
+    mean = quad(excess, -np.pi, np.pi, limit=200)[0] / (2 * np.pi)
+    assert plain[1][0] - braked[1][0] == pytest.approx(20 * mean, rel=1e-6)
+
+
+def test_every_effect_but_circuits_and_definitions_has_two_laws_of_others():
+    one = {
+        "stator_resistance", "feeder_impedance", "shunt_capacitor", "negative_sequence_braking", "second_motor_group",
+        "time_skew", "measurement_window", "frequency_dependence",
+    }  # fmt: skip
+    assert FAMILY.keys() == LAWS.keys()
+    counts = {name: list(FAMILY.values()).count(name) for name in CATALOG}
+    assert {name for name, count in counts.items() if count < 2} == one
+
+
 def test_loads_that_step_do_so_once_and_stay():
     made = scene(case("load_step"), 1).effects[0][1]
     base, record = clean(), clean("load_step")
@@ -515,6 +653,22 @@ def test_the_detection_limit_is_proportional_to_the_noise_and_rises_with_its_col
     assert colored != pytest.approx(double, rel=0.05)
 
 
+def test_a_pair_s_joint_limit_is_where_no_single_effect_of_the_catalogue_could_take_it():
+    """Two effects that nothing else resembles need what each needs alone; two that resemble each other need more."""
+    apart, alike = (
+        replace(case(), effect=names, size=(1.0, 1.0), noise=Noise(0.005))
+        for names in (("undervoltage_trip", "static_var_compensator"), ("stator_resistance", "feeder_impedance"))
+    )
+    over = {}
+    for pair in (apart, alike):
+        alone = [detection_limit(replace(pair, effect=name, size=1.0), 1) for name in pair.effect]
+        ratios = np.array(joint_limit(pair, 1)) / alone
+        assert ratios[0] == pytest.approx(ratios[1], rel=1e-9)
+        over[pair.effect] = ratios[0]
+    assert 1 < over[apart.effect] < 1.05, "the best single effect is one of the two and leaves the other whole"
+    assert over[alike.effect] > 1.3
+
+
 def test_an_effect_is_measured_against_what_the_base_model_cannot_imitate():
     """Load drift alone, nothing else to imitate it: its limit is that of a straight line in white noise."""
     flat = Dip(depth=1e-6, start=0.5, duration=0.1)
@@ -525,18 +679,31 @@ def test_an_effect_is_measured_against_what_the_base_model_cannot_imitate():
     assert detection_limit(made, 1) == pytest.approx(z / line, rel=0.01)
 
 
+def made_of(planned, count: int) -> list[cases.Trial]:
+    return [one.make() for one in islice(planned, count)]
+
+
+def test_salted_seeds_are_others_and_reproducible():
+    plain, salted, again = (list(islice(cases.seeds("a label", salt), 5)) for salt in (None, 7, 7))
+    assert salted == again
+    assert not set(plain) & set(salted)
+    assert not set(salted) & set(islice(cases.seeds("another label", 7), 5))
+
+
 def test_the_suites_hide_what_they_say():
-    (trial,) = cases.single("undervoltage_trip", 2.0, 1)
+    planned = next(cases.single("undervoltage_trip", 2.0))
+    trial = planned.make()
+    assert (trial.label, trial.seed) == (planned.label, planned.seed)
     made = scene(trial.case, trial.seed)
     assert trial.case.effect == ("undervoltage_trip",)
     assert trial.case.size[0] == pytest.approx(2 * detection_limit(replace(trial.case, size=1.0), trial.seed))
     assert made.effects[0][1].level > min(1 - d.depth / d.before for d in made.dips)
     assert trial.multiples == (pytest.approx(2.0),)
-    capped = cases.at_limit(("constant_power_converter",), (1e6,), 1, events=(DIP,), load=LOAD)
+    capped = cases.at_limit(("constant_power_converter",), 1e6, 1, events=(DIP,), load=LOAD)
     assert capped.multiples[0] < 1e6
     assert capped.case.size[0] * 0.2 < LOAD.static.P / (LOAD.static.P + LOAD.torque * LOAD.rating)
-    assert [t.case.noise.phi for t in cases.nulls("AR(1) 0.95", 2)] == [0.95, 0.95]
-    for trial in cases.nuisances(3):
+    assert [t.case.noise.phi for t in made_of(cases.nulls("AR(1) 0.95"), 2)] == [0.95, 0.95]
+    for trial in made_of(cases.nuisances(), 3):
         faults = dict((name, size * NUISANCES[name].reference) for name, size in trial.case.nuisances)
         assert 0 <= faults["time_skew"] <= 0.003
         assert trial.case.effect is None

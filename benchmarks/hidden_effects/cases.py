@@ -1,18 +1,18 @@
 """The suites of the study: what is hidden where, under which noise. Each trial is a case and a seed."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from itertools import combinations, cycle, islice
+from functools import partial
+from itertools import combinations, cycle
 from typing import Any
 from zlib import crc32
 
 import numpy as np
 
-from hidden_effects.effects import CATALOG, NUISANCES, PHYSICAL
+from hidden_effects.effects import NUISANCES, PHYSICAL
 from hidden_effects.generator import EFFECTS, Case, scene
-from hidden_effects.limits import detection_limit
+from hidden_effects.limits import detection_limit, joint_limit
 from hidden_effects.noise import Noise
-from hidden_effects.outside import OUTSIDE
 from hidden_effects.recorder import Recorder
 
 MULTIPLES = (0.5, 1.0, 2.0, 4.0, 8.0)  # of the detection limit
@@ -44,23 +44,32 @@ class Trial:
     multiples: tuple[float, ...] = ()
 
 
-def seeds(label: str) -> Iterator[int]:
-    """An endless series of seeds of its own for each label."""
-    rng = np.random.default_rng(crc32(label.encode()))
+@dataclass(frozen=True)
+class Planned:
+    """A trial that is not made yet: limits and sizes take longer than the rest of a study's book-keeping."""
+
+    label: str
+    seed: int
+    make: Callable[[], Trial]
+
+
+def seeds(label: str, salt: int | None = None) -> Iterator[int]:
+    """An endless series of seeds of its own for each label, and for each salt where one is given."""
+    own = crc32(label.encode())
+    rng = np.random.default_rng(own if salt is None else [salt, own])
     while True:
         yield int(rng.integers(2**31))
 
 
-def nulls(noise: str, count: int, **settings: Any) -> list[Trial]:
+def nulls(noise: str, salt: int | None = None, **settings: Any) -> Iterator[Planned]:
     """Nothing hidden, under one of `NOISES`; `settings` are fields of `Case`."""
     case = Case(noise=NOISES[noise], **settings)
-    return [Trial(noise, case, seed) for seed in islice(seeds(f"null {noise}"), count)]
+    return (Planned(noise, seed, partial(Trial, noise, case, seed)) for seed in seeds(f"null {noise}", salt))
 
 
-def nuisances(count: int, **settings: Any) -> list[Trial]:
+def nuisances(salt: int | None = None, **settings: Any) -> Iterator[Planned]:
     """Nothing hidden but faults of measurement: skew up to 3 ms, windows of one to four cycles, drift."""
-    trials = []
-    for seed in islice(seeds("nuisances"), count):
+    for seed in seeds("nuisances", salt):
         rng = np.random.default_rng([seed, 4])
         chosen = {
             "time_skew": rng.uniform(0.0, 0.003),
@@ -68,33 +77,30 @@ def nuisances(count: int, **settings: Any) -> list[Trial]:
             "load_drift": rng.uniform(-0.005, 0.005),
         }
         faults = tuple((name, float(amount / NUISANCES[name].reference)) for name, amount in chosen.items())
-        trials.append(Trial("nuisances", Case(nuisances=faults, **settings), seed))
-    return trials
+        yield Planned("nuisances", seed, partial(Trial, "nuisances", Case(nuisances=faults, **settings), seed))
 
 
-def single(name: str, multiple: float, count: int, **settings: Any) -> list[Trial]:
-    """One effect, of the catalogue or outside it, at a multiple of its detection limit on each data set."""
-    return [at_limit((name,), (multiple,), seed, **settings) for seed in islice(seeds(name), count)]
+def single(name: str, multiple: float, salt: int | None = None, **settings: Any) -> Iterator[Planned]:
+    """One effect, of the catalogue or not, at a multiple of its detection limit on each data set."""
+    return (Planned(name, seed, partial(at_limit, (name,), multiple, seed, **settings)) for seed in seeds(name, salt))
 
 
-def pairs(multiple: float, count: int, **settings: Any) -> list[Trial]:
-    """Two physical effects at once, both at a multiple of their limits; every pair comes before one comes again."""
+def pairs(multiple: float, salt: int | None = None, **settings: Any) -> Iterator[Planned]:
+    """Two physical effects at once, at a multiple of their joint limit; every pair comes before one comes again."""
     every = list(combinations(PHYSICAL, 2))
-    order = np.random.default_rng(0).permutation(len(every))
-    chosen = (every[k] for k in cycle(order))
-    return [
-        at_limit(names, (multiple, multiple), seed, **settings)
-        for names, seed in zip(chosen, islice(seeds("pairs"), count), strict=False)
-    ]
+    order = np.random.default_rng(0 if salt is None else salt).permutation(len(every))
+    for k, seed in zip(cycle(order), seeds("pairs", salt), strict=False):
+        yield Planned(" + ".join(every[k]), seed, partial(at_limit, every[k], multiple, seed, **settings))
 
 
-def at_limit(names: tuple[str, ...], multiples: tuple[float, ...], seed: int, **settings: Any) -> Trial:
-    """A data set with effects at multiples of their own detection limits, less where that makes no physical sense."""
+def at_limit(names: tuple[str, ...], multiple: float, seed: int, **settings: Any) -> Trial:
+    """A data set with effects at a multiple of their (joint) detection limit, less where that makes no sense."""
     needed = {what: any(EFFECTS[name].needs == what for name in names) for what in ("swing", "negative")}
     case = Case(**needed | settings)
-    limits = np.array([detection_limit(replace(case, effect=name), seed) for name in names])
+    hidden = replace(case, effect=names if len(names) > 1 else names[0])
+    limits = np.array(joint_limit(hidden, seed) if len(names) > 1 else [detection_limit(hidden, seed)])
     most = np.array([EFFECTS[name].largest / EFFECTS[name].reference for name in names])
-    sizes = np.minimum(np.array(multiples) * limits, most)
+    sizes = np.minimum(multiple * limits, most)
     while True:
         made = replace(case, effect=names, size=tuple(sizes.tolist()))
         try:
@@ -103,15 +109,3 @@ def at_limit(names: tuple[str, ...], multiples: tuple[float, ...], seed: int, **
             sizes = 0.8 * sizes
             continue
         return Trial(" + ".join(names), made, seed, tuple((sizes / limits).tolist()))
-
-
-def catalog(multiple: float, count: int, **settings: Any) -> Iterator[Trial]:
-    """`single` for every effect of the catalogue."""
-    for name in CATALOG:
-        yield from single(name, multiple, count, **settings)
-
-
-def outside(multiple: float, count: int, **settings: Any) -> Iterator[Trial]:
-    """`single` for every effect outside the catalogue."""
-    for name in OUTSIDE:
-        yield from single(name, multiple, count, **settings)

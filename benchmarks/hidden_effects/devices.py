@@ -166,10 +166,14 @@ class Inrush(Device):
     def settled(self, V: complex) -> tuple["Inrush", list[complex]]:
         return self, [0j]
 
+    def saturated(self, offset: float, U: float) -> float:
+        """Half the angle [rad] over which the core is saturated in a cycle."""
+        reach = (self.knee - offset) / U
+        return acos(max(-1.0, reach)) if reach < 1 else 0.0
+
     def flow(self, now: Moment, V: complex, x: list[complex]) -> tuple[complex, list[complex]]:
         offset, U = x[0].real, abs(V)
-        reach = (self.knee - offset) / U
-        angle = acos(max(-1.0, reach)) if reach < 1 else 0.0
+        angle = self.saturated(offset, U)
         Q = self.b * U**2 * (angle - sin(angle) * cos(angle)) / pi
         return drawn(complex(0.0, Q), V), [-offset / self.decay + self.offset * max(now.rate, 0.0) / self.depth]
 

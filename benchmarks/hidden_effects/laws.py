@@ -1,7 +1,8 @@
 """Effects of the catalogue's kinds by other laws and at other places: what nature does that uses no formula of ours.
 
 Each belongs to the family of a catalogue's effect, `FAMILY` says which; its formula is not that of any plugin, textbook
-or not.
+or not. Circuits of constant elements (resistance, feeder, capacitor, negative sequence, a second group) and definitions
+(skew, window, powers of the frequency) have one law; all other effects have two and more.
 """
 
 from collections.abc import Sequence
@@ -9,16 +10,40 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hidden_effects.controls import (
+    CurrentControlled,
+    InputFilter,
+    Ramped,
+    Rectifier,
+    ResistiveInrush,
+    Staged,
+    SusceptanceControl,
+    SwitchedBanks,
+    SynchronousMotor,
+    Tapped,
+    Thermostat,
+    VoltageLink,
+)
+from hidden_effects.devices import Converter, Inrush
 from hidden_effects.effects import UndervoltageTrip
-from hidden_effects.hidden import Hidden, motors
+from hidden_effects.hidden import Hidden, beside, motors
 from hidden_effects.site import Site
 from hidden_effects.supply import Profile, Relay
-from independent.source import Dip
+from independent.source import OMEGA, Dip
+
+STAGES = (0.9, 0.8, 0.7)  # levels over the voltage before
 
 
 def times(share: float, opened: Profile) -> Profile:
     """A share of what a relay opens."""
     return replace(opened, values=tuple(share * v for v in opened.values))
+
+
+def together(site: Site, relays: Sequence[Relay]) -> Profile:
+    """How many of some relays have acted."""
+    opened = [r.opened(site.dip, site.recorder.duration) for r in relays]
+    knots = sorted({t for profile in opened for t in profile.times})
+    return Profile(tuple(knots), tuple(sum(profile(t) for profile in opened) for t in knots))
 
 
 @dataclass(frozen=True)
@@ -58,10 +83,7 @@ class TwoStageTrip(UndervoltageTrip):
     def apply(self, site: Site) -> Site:
         first = Relay(self.level, self.reset, self.delay, self.wait, self.ramp)
         second = replace(first, level=self.further * self.level, delay=self.delay + self.later, wait=self.wait + 0.15)
-        opened = [r.opened(site.dip, site.recorder.duration) for r in (first, second)]
-        knots = sorted({t for profile in opened for t in profile.times})
-        values = tuple(self.amount * sum(profile(t) for profile in opened) for t in knots)
-        return replace(site, opened=Profile(tuple(knots), values))
+        return replace(site, opened=times(self.amount, together(site, (first, second))))
 
 
 @dataclass(frozen=True)
@@ -93,17 +115,331 @@ class KneeSaturation(Hidden):
         return motors(site, saturation=self.amount, knee=self.knee)
 
 
+@dataclass(frozen=True)
+class ActivePowerDrift(Hidden):
+    """Heating is switched on, customer by customer: active power alone grows."""
+
+    reference, largest, unit = 0.01, 0.3, "1/s"
+
+    def apply(self, site: Site) -> Site:
+        return replace(site, static=replace(site.static, growth=complex(self.amount * site.S.real)))
+
+
+@dataclass(frozen=True)
+class FroelichSaturation(Hidden):
+    """A magnetizing curve of bounded flux, psi = a i/(b + i); `amount` is the flux before the event over a.
+
+    Source: Froelich 1881, as in Kundur 1994, section 3.8.2 among representations of saturation.
+    """
+
+    reference, largest, unit = 0.4, 0.85, "1"
+
+    def apply(self, site: Site) -> Site:
+        return motors(site, saturation=self.amount, ceiling=True)
+
+
+@dataclass(frozen=True)
+class ViscousTorque(Hidden):
+    """A share of the driven machines are conveyors and extruders, whose torque grows with the speed."""
+
+    reference, largest, unit = 0.7, 1.0, "1"
+
+    def apply(self, site: Site) -> Site:
+        return motors(site, fan=self.amount, fan_power=1.0)
+
+
+@dataclass(frozen=True)
+class StaticHeadTorque(Hidden):
+    """A share of the driven machines pump against a height: below a speed they move nothing."""
+
+    reference, largest, unit = 0.3, 1.0, "1"
+    head: float = 0.8
+
+    @classmethod
+    def details(cls, rng: np.random.Generator, dips: Sequence[Dip]) -> dict[str, float]:
+        return {"head": float(rng.uniform(0.6, 0.85))}
+
+    def apply(self, site: Site) -> Site:
+        return motors(site, fan=self.amount, head=self.head)
+
+
+@dataclass(frozen=True)
+class RectifiedPower(Hidden):
+    """Diode bridges that feed constant dc power: commutation costs voltage and power factor."""
+
+    reference, largest, unit = 0.15, 0.9, "1"
+    overlap: float = 0.12
+
+    @classmethod
+    def details(cls, rng: np.random.Generator, dips: Sequence[Dip]) -> dict[str, float]:
+        return {"overlap": float(rng.uniform(0.06, 0.18))}
+
+    def apply(self, site: Site) -> Site:
+        return beside(site, Rectifier(self.amount * site.S.real, overlap=self.overlap))
+
+
+@dataclass(frozen=True)
+class CurrentLoopConverter(Hidden):
+    """Converters with a current loop and an integrator of their power."""
+
+    reference, largest, unit = 0.2, 0.9, "1"
+    rate: float = 80.0
+    limit: float = 1.3
+
+    @classmethod
+    def details(cls, rng: np.random.Generator, dips: Sequence[Dip]) -> dict[str, float]:
+        return {"rate": float(rng.uniform(60.0, 120.0)), "limit": float(rng.uniform(1.1, 1.5))}
+
+    def apply(self, site: Site) -> Site:
+        return beside(site, CurrentControlled(self.amount * site.S.real, rate=self.rate, limit=self.limit))
+
+
+@dataclass(frozen=True)
+class DelayedPowerLimit(Hidden):
+    """Trains that must take less where the line voltage is low, which they measure over some cycles."""
+
+    reference, largest, unit = 0.15, 0.9, "1"
+    measured: float = 0.05
+
+    @classmethod
+    def details(cls, rng: np.random.Generator, dips: Sequence[Dip]) -> dict[str, float]:
+        return {"measured": float(rng.uniform(0.03, 0.08))}
+
+    def apply(self, site: Site) -> Site:
+        power = self.amount * site.S.real
+        return beside(site, Converter(power, full=0.9, empty=0.7, rest=0.1, limit=1.5, filter=self.measured))
+
+
+@dataclass(frozen=True)
+class StagedPowerLimit(Hidden):
+    """Trains that give up their power in three stages, each with a level and a time of its own."""
+
+    reference, largest, unit = 0.15, 0.9, "1"
+    delay: float = 0.02
+    wait: float = 0.2
+
+    @classmethod
+    def details(cls, rng: np.random.Generator, dips: Sequence[Dip]) -> dict[str, float]:
+        return {"delay": float(rng.uniform(0.01, 0.04)), "wait": float(rng.uniform(0.1, 0.4))}
+
+    def apply(self, site: Site) -> Site:
+        stages = [Relay(level, level + 0.03, self.delay, self.wait * k, 0.1) for k, level in enumerate(STAGES, 1)]
+        profile = together(site, stages)
+        device = Staged(self.amount * site.S.real, profile=times(1 / len(stages), profile))
+        return replace(beside(site, device), breaks=(*site.breaks, *profile.times))
+
+
+@dataclass(frozen=True)
+class LinkVoltageControl(Hidden):
+    """Converters that control the voltage of their dc link, with a limit of current."""
+
+    reference, largest, unit = 0.15, 0.9, "1"
+    lag: float = 0.05
+
+    @classmethod
+    def details(cls, rng: np.random.Generator, dips: Sequence[Dip]) -> dict[str, float]:
+        return {"lag": float(rng.uniform(0.02, 0.08))}
+
+    def apply(self, site: Site) -> Site:
+        storage = 0.06
+        return beside(site, VoltageLink(self.amount * site.S.real, storage=storage, gain=storage / self.lag))
+
+
+@dataclass(frozen=True)
+class RampedReturn(Hidden):
+    """Converters that drop their current with the voltage and take it back along a ramp."""
+
+    reference, largest, unit = 0.1, 0.9, "1"
+    rate: float = 5.0
+
+    @classmethod
+    def details(cls, rng: np.random.Generator, dips: Sequence[Dip]) -> dict[str, float]:
+        return {"rate": float(rng.uniform(2.0, 8.0))}
+
+    def apply(self, site: Site) -> Site:
+        return beside(site, Ramped(self.amount * site.S.real, rate=self.rate))
+
+
+@dataclass(frozen=True)
+class FilterOscillation(Hidden):
+    """Drives of constant power that ring with their input filters."""
+
+    reference, largest, unit = 0.1, 0.9, "1"
+    frequency: float = 4.0
+    damping: float = 0.08
+
+    @classmethod
+    def details(cls, rng: np.random.Generator, dips: Sequence[Dip]) -> dict[str, float]:
+        return {"frequency": float(rng.uniform(2.0, 8.0)), "damping": float(rng.uniform(0.05, 0.15))}
+
+    def apply(self, site: Site) -> Site:
+        return beside(site, InputFilter(self.amount * site.S.real, frequency=self.frequency, damping=self.damping))
+
+
+@dataclass(frozen=True)
+class SynchronousSwing(Hidden):
+    """A rotary frequency converter swings against the grid after each dip."""
+
+    reference, largest, unit = 0.1, 0.9, "1"
+    frequency: float = 2.5
+    damping: float = 0.08
+
+    @classmethod
+    def details(cls, rng: np.random.Generator, dips: Sequence[Dip]) -> dict[str, float]:
+        return {"frequency": float(rng.uniform(1.5, 3.5)), "damping": float(rng.uniform(0.05, 0.15))}
+
+    def apply(self, site: Site) -> Site:
+        return beside(site, SynchronousMotor(self.amount * site.S.real, frequency=self.frequency, damping=self.damping))
+
+
+@dataclass(frozen=True)
+class IntegralCompensator(Hidden):
+    """A thyristor-controlled compensator that integrates what the voltage lacks."""
+
+    reference, largest, unit = 0.05, 1.0, "pu"
+    integral: float = 120.0
+
+    @classmethod
+    def details(cls, rng: np.random.Generator, dips: Sequence[Dip]) -> dict[str, float]:
+        return {"integral": float(rng.uniform(60.0, 240.0))}
+
+    def apply(self, site: Site) -> Site:
+        return beside(site, SusceptanceControl(self.amount, integral=self.integral))
+
+
+@dataclass(frozen=True)
+class SwitchedCapacitors(Hidden):
+    """Capacitor banks that thyristors switch in one after the other while the voltage is low."""
+
+    reference, largest, unit = 0.05, 1.0, "pu"
+    delay: float = 0.02
+
+    @classmethod
+    def details(cls, rng: np.random.Generator, dips: Sequence[Dip]) -> dict[str, float]:
+        return {"delay": float(rng.uniform(0.01, 0.03))}
+
+    def apply(self, site: Site) -> Site:
+        banks = [Relay(level, level + 0.02, self.delay, self.delay, 1e-3) for level in STAGES]
+        profile = together(site, banks)
+        device = SwitchedBanks(self.amount, profile=times(1 / len(banks), profile))
+        return replace(beside(site, device), breaks=(*site.breaks, *profile.times))
+
+
+@dataclass(frozen=True)
+class ThermostatRecovery(Hidden):
+    """Heating under thermostats comes back to its heat, and overshoots when the voltage returns."""
+
+    reference, largest, unit = 0.15, 0.9, "1"
+    pace: float = 0.5
+
+    @classmethod
+    def details(cls, rng: np.random.Generator, dips: Sequence[Dip]) -> dict[str, float]:
+        return {"pace": float(rng.uniform(0.3, 1.2))}
+
+    def apply(self, site: Site) -> Site:
+        return beside(site, Thermostat(self.amount * site.S.real, pace=self.pace))
+
+
+@dataclass(frozen=True)
+class TapRecovery(Hidden):
+    """A share of the load stands behind a transformer whose quick tap changer restores its voltage step by step."""
+
+    reference, largest, unit = 0.3, 0.9, "1"
+    pause: float = 0.1
+    step: float = 0.02
+
+    @classmethod
+    def details(cls, rng: np.random.Generator, dips: Sequence[Dip]) -> dict[str, float]:
+        return {"pause": float(rng.uniform(0.05, 0.15))}
+
+    def apply(self, site: Site) -> Site:
+        t = np.arange(0.0, site.recorder.duration, self.pause / 50)
+        ratio, since, changes = 0.0, 0.0, []
+        for now, u in zip(t.tolist(), (site.dip.magnitude(t) / site.dip.before).tolist(), strict=True):
+            off = 1 - u * (1 + ratio)
+            since = now if abs(off) < self.step else since
+            if now - since >= self.pause and abs(ratio + np.sign(off) * self.step) < 0.15:
+                ratio, since = float(ratio + np.sign(off) * self.step), now
+                changes.append((now, ratio))
+        profile = Profile.steps(0.0, *changes) if changes else Profile()
+        device = Tapped(self.amount * site.S.real, profile=profile)
+        return replace(beside(site, device), breaks=(*site.breaks, *profile.times))
+
+
+@dataclass(frozen=True)
+class InrushWithResistance(Hidden):
+    """Cores driven into saturation, whose offset the current's own resistance drives back, fast at first."""
+
+    reference, largest, unit = 0.3, 10.0, "pu"
+
+    def apply(self, site: Site) -> Site:
+        return beside(site, ResistiveInrush(self.amount, site.dip.depth, decay=1.0))
+
+
+@dataclass(frozen=True)
+class InrushByInstant(Hidden):
+    """Inrush whose offset is set by the instant at which the voltage returns, another in each event."""
+
+    reference, largest, unit = 0.3, 10.0, "pu"
+    decay: float = 0.3
+
+    @classmethod
+    def details(cls, rng: np.random.Generator, dips: Sequence[Dip]) -> dict[str, float]:
+        return {"decay": float(rng.uniform(0.15, 0.6))}
+
+    def apply(self, site: Site) -> Site:
+        turned = abs(np.cos(OMEGA * (site.dip.start + site.dip.duration)))
+        offset = 0.4 + 0.6 * float(turned)
+        return beside(site, Inrush(self.amount, site.dip.depth, self.decay, offset=offset))
+
+
 LAWS = {
     "static_part_trip": StaticTrip,
     "motor_share_trip": MotorTrip,
     "trip_in_two_stages": TwoStageTrip,
     "drift_that_begins_at_the_dip": DriftFromDip,
+    "drift_of_active_power": ActivePowerDrift,
     "knee_saturation": KneeSaturation,
+    "froelich_saturation": FroelichSaturation,
+    "viscous_torque": ViscousTorque,
+    "static_head_torque": StaticHeadTorque,
+    "rectified_power": RectifiedPower,
+    "current_loop_converter": CurrentLoopConverter,
+    "delayed_power_limit": DelayedPowerLimit,
+    "staged_power_limit": StagedPowerLimit,
+    "link_voltage_control": LinkVoltageControl,
+    "ramped_return": RampedReturn,
+    "filter_oscillation": FilterOscillation,
+    "synchronous_swing": SynchronousSwing,
+    "integral_compensator": IntegralCompensator,
+    "switched_capacitors": SwitchedCapacitors,
+    "thermostat_recovery": ThermostatRecovery,
+    "tap_recovery": TapRecovery,
+    "inrush_with_resistance": InrushWithResistance,
+    "inrush_by_instant": InrushByInstant,
 }
 FAMILY = {
     "static_part_trip": "undervoltage_trip",
     "motor_share_trip": "undervoltage_trip",
     "trip_in_two_stages": "undervoltage_trip",
     "drift_that_begins_at_the_dip": "load_drift",
+    "drift_of_active_power": "load_drift",
     "knee_saturation": "magnetic_saturation",
+    "froelich_saturation": "magnetic_saturation",
+    "viscous_torque": "speed_dependent_torque",
+    "static_head_torque": "speed_dependent_torque",
+    "rectified_power": "constant_power_converter",
+    "current_loop_converter": "constant_power_converter",
+    "delayed_power_limit": "voltage_dependent_power_limit",
+    "staged_power_limit": "voltage_dependent_power_limit",
+    "link_voltage_control": "dc_link_lag",
+    "ramped_return": "dc_link_lag",
+    "filter_oscillation": "low_frequency_oscillation",
+    "synchronous_swing": "low_frequency_oscillation",
+    "integral_compensator": "static_var_compensator",
+    "switched_capacitors": "static_var_compensator",
+    "thermostat_recovery": "exponential_recovery",
+    "tap_recovery": "exponential_recovery",
+    "inrush_with_resistance": "transformer_inrush",
+    "inrush_by_instant": "transformer_inrush",
 }

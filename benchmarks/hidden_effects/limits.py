@@ -9,7 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from hidden_effects.effects import CATALOG, MEASUREMENT
+from hidden_effects.effects import CATALOG, MEASUREMENT, PHYSICAL
 from hidden_effects.generator import Case, Scene, scene
 from hidden_effects.noise import Noise
 from independent import Load
@@ -27,10 +27,33 @@ def detection_limit(case: Case, seed: int, power: float = 0.9, level: float = 0.
     load of each event, and skew, window and drift are projected out. Only the level and the color of the noise count,
     and only P and Q: for effects on the voltage channel this is a rough guide.
     """
+    return float(needed(power, level) ** 0.5 / np.linalg.norm(projected(case, seed)))
+
+
+def joint_limit(case: Case, seed: int, power: float = 0.9, level: float = 0.05) -> tuple[float, ...]:
+    """Sizes of the case's effects at which together they are seen beside the best single effect of the catalogue.
+
+    Each is the same multiple of its own `detection_limit`; what the one effect of the catalogue that could take most of
+    the sum takes is projected out, with its details as they are drawn here. Otherwise as there.
+    """
+    case = replace(case, swing=case.needs("swing"), negative=case.needs("negative"))
+    own = [replace(case, effect=name, size=1.0) for name, _ in case.hidden]
+    limits = [detection_limit(one, seed, power, level) for one in own]
+    together = sum(limit * projected(one, seed) for one, limit in zip(own, limits, strict=True))
+    left = [float(np.linalg.norm(together))]
+    for rival in PHYSICAL:  # faults of the measurement are projected out already
+        other = projected(replace(case, effect=rival, size=1.0), seed)
+        if (size := other @ other) > 0:
+            left.append(float(np.linalg.norm(together - other * (other @ together) / size)))
+    multiple = needed(power, level) ** 0.5 / min(left)
+    return tuple(float(multiple * limit) for limit in limits)
+
+
+def needed(power: float, level: float) -> float:
+    """Non-centrality that a test of the whole catalogue (Bonferroni, two-sided) finds with this probability."""
     from scipy.stats import norm
 
-    needed = (norm.isf(level / (2 * len(CATALOG))) + norm.isf(1 - power)) ** 2
-    return float(np.sqrt(needed) / np.linalg.norm(projected(case, seed)))
+    return float((norm.isf(level / (2 * len(CATALOG))) + norm.isf(1 - power)) ** 2)
 
 
 def projected(case: Case, seed: int) -> np.ndarray:

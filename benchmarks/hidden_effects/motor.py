@@ -24,8 +24,11 @@ class Motor:
     machine: Machine
     rating: float
     torque: float  # pu of the rating, at the speed before the event
-    fan: float = 0.0  # share of the torque that grows with the square of the speed
+    fan: float = 0.0  # share of the torque that grows with the square of the speed, or with another power of it
+    fan_power: float = 2.0
+    head: float = 0.0  # speed below which that share is nothing: a pump's, against a static head
     saturation: float = 0.0  # relative growth of the magnetizing current per pu² of air-gap flux
+    ceiling: bool = False  # the magnetizing curve is Froelich's, flux bounded, instead
     knee: float = 0.0  # of the air-gap flux before the event: below it the core is straight, above it a table's line
     cage: float = 0.0  # a second, outer cage: its admittance over the standard one's
     cage_resistance: float = 6.0  # of the outer cage, over the inner one's, at cage = 1
@@ -89,7 +92,11 @@ class Motor:
         raise ArithmeticError(f"the saturated air gap does not settle at a flux of {abs(gap):.3g} pu")
 
     def _magnetizing(self, psi: float, k: float) -> float:
-        """Magnetizing admittance over that before: cubic, or by the table (knee, 1 - k), (flux before, 1)."""
+        """Magnetizing admittance over that before: cubic, by Froelich's curve of the ceiling 1/k of the flux before
+        (psi = a i/(b + i)), or by the table (knee, 1 - k), (flux before, 1).
+        """
+        if self.ceiling:
+            return (1 - k) / (1 - k * min(psi / self.flux**0.5, 1.1))
         if not self.knee:
             return 1 + k * (psi**2 - self.flux)
         knee, before = self.knee * self.flux**0.5, self.flux**0.5
@@ -104,6 +111,11 @@ class Motor:
         power = self.braking * now.U2 * current.conjugate()
         return power, self.braking * abs(current * gap / rotor) ** 2 * m.Rr / slip
 
+    def driven(self, w: float) -> float:
+        """What fans and pumps ask for at the speed w over that before, over what they asked for then."""
+        lost = self.head**self.fan_power
+        return max(max(w, 0.0) ** self.fan_power - lost, 0.0) / (1 - lost)
+
     def flow(self, now: Moment, V: complex, x: list[complex]) -> tuple[complex, list[complex]]:
         """Current on the record's base [pu] and the time derivative of the states [1/s]."""
         m, speed = self.machine, x[1].real
@@ -111,7 +123,7 @@ class Motor:
         slip = now.f - speed
         load = self.torque
         if self.fan:
-            load *= 1 - self.fan + self.fan * (speed / self.speed) ** 2
+            load *= 1 - self.fan + self.fan * self.driven(speed / self.speed)
         torque = (gap.conjugate() * current).imag - load
         drawn = current
         if self.braking and now.U2:

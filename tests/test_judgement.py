@@ -1,0 +1,100 @@
+"""The judgement set: seeds that nobody chose, tables that hold what is stored, and what others would pick."""
+
+import json
+from types import SimpleNamespace
+
+import hidden_effects_evidence as evidence
+import hidden_effects_study as study
+import numpy as np
+import pytest
+from baselines import sparse
+
+from hidden_effects import OUTSIDE
+
+
+def test_a_commit_that_is_not_there_is_refused_in_a_sentence():
+    with pytest.raises(SystemExit, match="there is no commit 'nowhere'"):
+        study.salt_of("nowhere")
+
+
+def test_what_is_called_a_right_proposal_is_of_the_library_and_of_strangers():
+    from tractexp.discrepancy.proposal import library
+
+    assert evidence.RIGHT.keys() == OUTSIDE.keys() - study.KNOWN.keys()
+    known = {"balances": {b.name for b in library.BALANCES}, "signals": {s.name for s in library.SIGNALS}}
+    for balances, signals in evidence.RIGHT.values():
+        assert balances <= known["balances"]
+        assert signals <= known["signals"]
+
+
+def investigated(seed: int, sizes: dict[str, float]) -> SimpleNamespace:
+    """What `sparse` reads of an investigation: 12 candidates in white noise, those of `sizes` hidden."""
+    rng = np.random.default_rng(seed)
+    names = [f"effect{k}" for k in range(12)]
+    blocks = [rng.standard_normal((1, 400)) for _ in names]
+    r = rng.standard_normal(400) + sum(
+        sizes.get(n, 0.0) * b[0] / np.linalg.norm(b) for n, b in zip(names, blocks, strict=True)
+    )
+    columns = [SimpleNamespace(candidate=SimpleNamespace(name=n), setting={}) for n in names]
+    scores = [SimpleNamespace(name=n, setting={}) for n in names]
+    return SimpleNamespace(
+        first=SimpleNamespace(projection=SimpleNamespace(columns=columns, blocks=blocks, r=r[None]), scores=scores)
+    )
+
+
+def test_sparse_regression_keeps_what_is_there_and_little_else():
+    pytest.importorskip("pysindy", reason="PySINDy is not installed: pip install 'tractexp[crosscheck]'")
+    assert sparse(investigated(0, {"effect3": 12.0, "effect7": -9.0})) == ["effect3", "effect7"]
+    alarms = sum(bool(sparse(investigated(seed, {}))) for seed in range(200))
+    assert 2 <= alarms <= 22, "one in twenty of 200, and three standard deviations to either side"
+
+
+def row(**changes) -> dict:
+    return {
+        "group": "4 x", "label": "load_drift", "truth": ["load_drift"], "seed": 1, "held": 1, "events": 4,
+        "multiples": [4.0], "verdict": "named", "names": ["load_drift"], "sets": [["load_drift"]], "untestable": [],
+        "sparse": ["load_drift"], "drops": {"load_drift": 20.0, "time_skew": 3.0}, "places": 0, "places_true": 0,
+        "parameters": {"load_drift": 1, "time_skew": 1}, "samples": 6000, "proposal": None, "seconds": 1.0,
+    } | changes  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("changes", "named", "right"),
+    [
+        ({}, "100.0% (3%-100%)", "100.0% (3%-100%)"),
+        ({"names": ["time_skew"]}, "100.0% (3%-100%)", "0.0% (0%-98%)"),
+        ({"verdict": "tied", "names": []}, "0.0% (0%-98%)", "-"),
+    ],
+)
+def test_names_are_counted_by_law(changes, named, right):
+    table = evidence.tables([row(**changes), row(group="law 4 x", label="drift_of_active_power", **changes)])
+    lines = [line for line in table.splitlines() if line.startswith(("| the catalogue's |", "| another |"))]
+    for line in lines:
+        assert line.split(" | ")[2:4] == [named, right]
+    assert len(lines) == 2
+
+
+@pytest.mark.parametrize(
+    ("balance", "signal", "closed", "right", "closing"),
+    [
+        ("power", "step", 0.9, 1, 1),
+        ("power", "step", 0.7, 1, 0),
+        ("static", "step", 0.9, 0, 0),
+        ("power", "ramp", 0.9, 0, 0),
+    ],
+)
+def test_proposals_are_right_by_balance_and_signal(balance, signal, closed, right, closing):
+    made = {"balance": balance, "signal": signal, "clock": "of_return", "closed": {"train": 1.0, "validate": closed}}
+    stranger = row(
+        group="outside 4 x", label="load_step", truth=["load_step"], verdict="unexplained", names=[], sets=[]
+    )
+    table = evidence.tables([stranger | {"proposal": made, "lambda_left": 100.0}])
+    (line,) = [line for line in table.splitlines() if line.startswith("| outside the catalogue, above 80 |")]
+    told = {0: "0.0% (0%-98%)", 1: "100.0% (3%-100%)"}
+    assert line.strip("| ").split(" | ")[2:] == ["100.0% (3%-100%)", told[right], told[closing]]
+
+
+def test_rows_are_json_lines(tmp_path):
+    path = tmp_path / "rows.jsonl"
+    path.write_text("".join(json.dumps(row(seed=k)) + "\n" for k in range(3)), encoding="utf-8")
+    assert [r["seed"] for r in evidence.read(path)] == [0, 1, 2]
