@@ -5,18 +5,21 @@ import html
 import json
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from test_discrepancy import FEW, base, events
 from test_report_page import read
 
+from tractexp.discrepancy import verdict
 from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.evidence import CHOSEN, beside, chance_level, evidence, why_not_the_most_helpful
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.recommended import adequacy
 from tractexp.report import discrepancy, overlay
 from tractexp.report.events import WITHIN
+from tractexp.wording import joined
 
 
 @pytest.fixture(scope="module")
@@ -195,6 +198,29 @@ def test_what_is_left_is_told_with_channel_start_and_size(unexplained, tmp_path)
     assert made["remainder"]["sentence"] == unexplained.headline
 
 
+@pytest.mark.parametrize(
+    ("names", "faults", "told"),
+    [
+        (
+            ("dc_link_lag", "inrush"),
+            ("load_drift",),
+            "dc_link_lag and inrush beside load_drift, the nearest, explain 66%",
+        ),
+        (("dc_link_lag",), ("load_drift",), "dc_link_lag beside load_drift, the nearest, explains 66%"),
+        ((), ("load_drift", "time_skew"), "load_drift and time_skew, the nearest, explain 66%"),
+        (("dc_link_lag",), (), "dc_link_lag, the nearest, explains 66%"),
+    ],
+)
+def test_faults_of_the_measurement_are_not_counted_among_the_effects_together(names, faults, told):
+    catalogue = SimpleNamespace(spoken=lambda name: name, candidates=range(19))
+    bench = SimpleNamespace(catalogue=catalogue)
+    tests = SimpleNamespace(bench=bench, p_left=0.001, loudest="pushes into the balances")
+    best = SimpleNamespace(fit=SimpleNamespace(names=names), tests=tests)
+    explained = SimpleNamespace(faults=faults, base=SimpleNamespace(bench=bench))
+    weighed = SimpleNamespace(survivors=SimpleNamespace(kept=[best], explanations=explained), faults=faults)
+    assert told in verdict._unexplained(weighed, SimpleNamespace(fitted=0.66))
+
+
 def test_an_unexplained_verdict_does_not_contradict_itself(unexplained, tmp_path):
     """It says what was tested, not what the catalogue holds, and a probability that can be pictured."""
     reason = unexplained.verdict.reason
@@ -207,6 +233,7 @@ def test_an_unexplained_verdict_does_not_contradict_itself(unexplained, tmp_path
     near = unexplained.verdict.nearest
     assert near is not None
     assert re.search(rf"the nearest, explains? {near.fitted:.0%} of what exceeds the noise", reason)
+    assert joined(near.names) in reason, "the sentence and what is told of the nearest name the same effects"
     told = content(unexplained)["nearest"]["parameters"]
     assert {"value", "standard_error", "interval"} == next(iter(told.values())).keys()
     words, _ = page(unexplained, tmp_path)

@@ -168,13 +168,14 @@ def _unexplained(weighed: HeldOut, nearest: Nearest | None) -> str:
         )
     most = len(best.fit.names)
     together = f", alone or up to {most} together," if most > 1 else ""
-    names = _spoken(_with_faults(best, weighed), weighed)
+    names, faults = _spoken(best.fit.names, weighed), _spoken(weighed.faults, weighed)
+    told = f"{joined(names)} beside {joined(faults)}" if names and faults else joined(names or faults)
     share = (
-        f"explain{'s' * (len(names) == 1)} {percent(nearest.fitted)} of what exceeds the noise, and what"
+        f"explain{'s' * (len(names or faults) == 1)} {percent(nearest.fitted)} of what exceeds the noise, and what"
         if nearest
         else ""
     )
-    comes = f"{joined(names)}, the nearest, {share or 'helps, but what'}"
+    comes = f"{told}, the nearest, {share or 'helps, but what'}"
     return (
         f"the model and the records disagree, and {tested}{together} explains it all: {comes} is left {chance};"
         f" {loudest}"
