@@ -166,7 +166,8 @@ def _compared(found, trial: cases.Trial) -> dict:
         got = other.residuals(np.array(found.judged.units)) + other.drive.measured - clean[:, -N:]
         before, after = np.sum(got**2, axis=(1, 2))
         row["closed_true"] = 1 - after / before
-    if made.effects and not found.catalogue.untestable.keys() & {name for name, _ in made.effects}:
+    textbook = {name for name, _ in made.effects} & CATALOG.keys()  # a stranger may have the name of an effect of waves
+    if made.effects and not found.catalogue.untestable.keys() & textbook:
         without = _powers(replace(made, effects=()).records())
         N = found.bench.drive.samples
         change = (clean - without)[:, :N]

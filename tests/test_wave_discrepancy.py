@@ -112,6 +112,8 @@ def test_an_event_that_would_decide_is_found_in_waveforms(planted):
     chosen = next_event(bench, noise, steps.bare, [kept, other], ["a", "b"])
     assert 0.04 <= chosen.best.event.duration <= 0.32
     assert {np.sign(t.event.jump) for t in chosen.tried} == {-1.0, 0.0, 1.0}
+    assert {t.event.unbalance for t in chosen.tried} == {0.0, 0.5}
+    assert not any(", with " in t.event.words for t in chosen.tried), "waveforms need no channel of their own"
     assert chosen.best.chances.least > 0.5
     assert not chosen.same
     assert chosen.sentence()

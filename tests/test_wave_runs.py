@@ -172,9 +172,38 @@ def test_a_forecast_in_waveforms_narrows_with_depth_and_with_a_jump_of_the_phase
         replace(shape, rate=600.0).check()
 
 
-def test_a_phase_jump_is_of_waveforms():
-    with pytest.raises(UserError, match="jump=20 is of waveforms: add domain=waves"):
-        tractexp.plan("tibet_50pct", jump=20.0)
+def test_a_planned_dip_has_the_sequences_that_were_asked_for():
+    """Long after the edge the last half cycle shows 1 - depth of the positive and unbalance x depth of the negative."""
+    shape = Shape(0.4, 0.2, 6400.0, 0.005, 0.005, waves=True, jump=20.0, unbalance=0.6)
+    event = shape.event()
+    low = slice(event.start + 128, event.end - 32)
+    np.testing.assert_allclose(event.record.U[low], 0.6, atol=1e-9)
+    np.testing.assert_allclose(event.record.U2[low], 0.24, atol=1e-9)
+    np.testing.assert_allclose(np.abs(event.v[low]).max(), 0.84, atol=1e-3)
+    assert event.depth == pytest.approx(0.4)
+    again = Shape.of(event)
+    assert (again.depth, again.unbalance) == pytest.approx((0.4, 0.6), abs=1e-6)
+    assert again.jump == pytest.approx(20.0, abs=1e-6)
+    with pytest.raises(UserError, match=r"task\.unbalance=1\.5 is out of range"):
+        replace(shape, unbalance=1.5).check()
+
+
+def test_an_unbalanced_dip_tells_more_of_the_locked_rotor(fit):
+    """The negative sequence sees the machine at a slip of nearly two: its leakages, whatever its flux does."""
+    problem, values = fit.asked.problem, fit.judged.known.values
+    shape = replace(
+        Shape.of(problem.events[0]), depth=0.2, duration=0.2, jump=0.0, unbalance=0.0, noise_P=0.005, noise_Q=0.005
+    )
+    plain, unbalanced = (forecast(problem, values, replace(shape, unbalance=u)) for u in (0.0, 1.0))
+    X_prime = plain.names.index("X_prime")
+    assert unbalanced.half[X_prime] < 0.8 * plain.half[X_prime]
+
+
+@pytest.mark.parametrize("asked", [{"jump": 20.0}, {"unbalance": 0.5}])
+def test_phase_jumps_and_negative_sequences_are_of_waveforms(asked):
+    (name,) = asked
+    with pytest.raises(UserError, match=f"{name}={asked[name]:g} is of waveforms: add domain=waves"):
+        tractexp.plan("tibet_50pct", **asked)
 
 
 @pytest.mark.parametrize("format", ["psse_dyr", "andes", "modelica"])

@@ -17,7 +17,7 @@ from tractexp.api.setup import Setup
 from tractexp.errors import UserError, check_range
 from tractexp.outcome import Table
 from tractexp.record import Event
-from tractexp.report.plan import CURRENT_NOISE, DEPTH, DURATION, JUMP, NOISE, RATE
+from tractexp.report.plan import CURRENT_NOISE, DEPTH, DURATION, JUMP, NOISE, RATE, UNBALANCE
 
 if TYPE_CHECKING:
     from tractexp.identification.plan import Choice, Shape
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 DURATIONS = (0.06, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8)  # s
 JUMPS = (0.0, 5.0, 10.0, 20.0, 30.0, 45.0, 60.0)  # degrees
+UNBALANCES = (0.0, 0.25, 0.5, 0.75, 1.0)  # negative sequence over the depth
 PER_CYCLE = (16, 32, 64, 128, 200)  # samples of waveforms
 RATES = (25.0, 50.0, 100.0, 200.0, 500.0, 1000.0)  # Hz
 NOISES = (0.001, 0.002, 0.005, 0.01, 0.02)  # of P before the event
@@ -39,7 +40,7 @@ class Forecasts(Written):
     kind = "plan"
 
     setup: Setup
-    asked: Mapping[str, Any]  # parameter, within, depth, duration, rate, noise, values, least, events
+    asked: Mapping[str, Any]  # parameter, within, what was given of the dip, values, least, events
     content: Mapping[str, Any]
 
     @functools.cached_property
@@ -92,6 +93,7 @@ def plan(
     rate: float | None = None,
     noise: float | None = None,
     jump: float | None = None,
+    unbalance: float | None = None,
     domain: str | None = None,
     values: Any = FIT,
     least: float = 0.05,
@@ -107,8 +109,9 @@ def plan(
     How deep must a dip be for `parameter` (H stands for M) to be known with half of its 95 % interval `within` a share
     of the value? The dip is that of the deepest of `records`, unless `depth` (of the voltage before), `duration` [s],
     `rate` [1/s] or `noise` (standard deviation, as a share of P before the event; white) are given. With `domain`
-    "waves" it is a balanced dip in which the voltage's phase jumps by `jump` [degrees], and the noise is that of the
-    sampled currents, as a share of P before the event, too. `values` are what is planned at: "fit", the estimate of
+    "waves" the voltage's phase jumps by `jump` [degrees] in it, its negative sequence is `unbalance` times its depth
+    (0: balanced, 1: a fault between two phases), and the noise is that of the sampled currents, as a share of P before
+    the event, too. `values` are what is planned at: "fit", the estimate of
     that record; "default", the model's; an identification; or the path of a `result.json`. Of several records those
     that tell most together are chosen, until another one narrows the intervals by less than the share `least`, at most
     `events` of them. The model is as in `tractexp.identify`.
@@ -134,8 +137,7 @@ def plan(
         values = values.result.parameters
     asked = {
         "parameter": parameter, "within": within, "depth": depth, "duration": duration, "rate": rate, "noise": noise,
-        "jump": jump,
-        "values": values, "least": least, "events": events,
+        "jump": jump, "unbalance": unbalance, "values": values, "least": least, "events": events,
     }  # fmt: skip
     planned = _planned(setup, **asked)
     made = Forecasts(setup, asked, files.plain(_content(planned)))
@@ -153,8 +155,9 @@ def _planned(setup: Setup, parameter: str, within: float, values: Any, least: fl
     column(problem.space.names, parameter)
     if problem.per_event:
         raise UserError("task=plan plans for shared parameters; leave model.per_event empty")
-    if given["jump"] is not None and not problem.model.waves:
-        raise UserError(f"task.jump={given['jump']:g} is of waveforms: add domain=waves, or leave it out")
+    for name in ("jump", "unbalance"):
+        if given[name] is not None and not problem.model.waves:
+            raise UserError(f"task.{name}={given[name]:g} is of waveforms: add domain=waves, or leave it out")
     deepest = max(problem.events, key=lambda e: e.depth)
     at, origin, noise = _guess(setup, deepest, values)
     shape = _shape(deepest, seen=noise, **given)
@@ -233,7 +236,7 @@ def _scans(problem: Any, values: np.ndarray, shape: "Shape") -> dict[str, Any]:
     loud = [replace(shape, noise_P=x * P, noise_Q=x * P) for x in NOISES]
     made = {DEPTH: (tuple(f.shape.depth for f in by_depth), by_depth), DURATION: over("duration", DURATIONS)}
     if shape.waves:
-        made[JUMP] = over("jump", JUMPS)
+        made |= {JUMP: over("jump", JUMPS), UNBALANCE: over("unbalance", UNBALANCES)}
     rates = tuple(n * shape.frequency for n in PER_CYCLE) if shape.waves else RATES
     made[RATE] = over("rate", rates)
     return made | {CURRENT_NOISE if shape.waves else NOISE: (NOISES, [forecast(problem, values, s) for s in loud])}
@@ -244,7 +247,8 @@ def _described(shape: "Shape") -> str:
     first, second = (f"{100 * level / abs(shape.P0):.2g} %" for level in (shape.noise_P, shape.noise_Q))
     names = ("i_alpha", "i_beta") if shape.waves else ("P", "Q")
     dip = f"a dip of {100 * shape.depth:.0f} % for {1000 * shape.duration:.0f} ms at {shape.rate:.0f} Hz"
-    dip += f", the phase jumping by {shape.jump:.0f} degrees" if shape.waves else ""
+    if shape.waves:
+        dip += f", the phase jumping by {shape.jump:.0f} degrees, negative sequence {shape.unbalance:.0%} of the depth"
     return f"planned: {dip}, noise {first} in {names[0]} and {second} in {names[1]}, of P, {memory}"
 
 

@@ -16,7 +16,7 @@ from tractexp.identification.problem import Problem
 from tractexp.identification.uncertainty import LEVEL
 from tractexp.noise import Autoregression, Noise
 from tractexp.record import Base, Event, Record, WaveEvent
-from tractexp.record.balanced import balanced
+from tractexp.record.unrecorded import unrecorded
 from tractexp.record.wave_event import COARSEST
 
 BEFORE, AFTER = 0.3, 1.5  # s recorded before and after a planned dip
@@ -30,8 +30,9 @@ INERTIA = "H"  # H = M omega_s / 2 has the relative precision of M
 class Shape:
     """A dip that might be recorded, from 1 pu, with trapezoidal edges. Noise [pu] forgets within `memory` [s].
 
-    In `waves` it is a balanced dip in which the voltage's phase jumps by `jump` [degrees], and the noise is that of the
-    currents alpha (noise_P) and beta (noise_Q).
+    In `waves` it is a dip of the positive sequence in which the voltage's phase jumps by `jump` [degrees], with a
+    negative sequence of `unbalance` times its depth (0: balanced; 1: a fault between two phases, Bollen 2000, types C
+    and D), and the noise is that of the currents alpha (noise_P) and beta (noise_Q).
     """
 
     depth: float
@@ -45,6 +46,7 @@ class Shape:
     memory: float = 0.0
     waves: bool = False
     jump: float = 0.0
+    unbalance: float = 0.0
 
     @classmethod
     def of(cls, event: Event, noise: Noise | None = None) -> "Shape":
@@ -70,6 +72,7 @@ class Shape:
         check_range(f"{where}.duration", self.duration, 2 / self.rate, 10.0)
         check_range(f"{where}.rate", self.rate, COARSEST * self.frequency if self.waves else 5.0, 20_000.0)
         check_range(f"{where}.jump", self.jump, -90.0, 90.0)
+        check_range(f"{where}.unbalance", self.unbalance, 0.0, 1.0)
         if not min(self.noise_P, self.noise_Q) > 0:
             raise UserError(
                 f"the records show no noise before the dip, and without noise every interval is zero; give it as"
@@ -87,7 +90,8 @@ class Shape:
         name = f"{100 * self.depth:.0f} % for {1000 * self.duration:.0f} ms"
         if self.waves:
             v = U * np.exp(1j * np.radians(self.jump) * (fall - back))
-            return balanced(name, t, v, (1.0, self.P0, self.Q0), self.frequency, start, end)
+            v = v + self.unbalance * self.depth * (fall - back) * np.exp(-4j * np.pi * self.frequency * t)
+            return unrecorded(name, t, v, (1.0, self.P0, self.Q0), self.frequency, start, end)
         record = Record(
             name, t, U,
             np.full(len(t), self.P0), np.full(len(t), self.Q0), base=Base(frequency=self.frequency),
@@ -98,13 +102,16 @@ class Shape:
         )  # fmt: skip
 
 
-def _in_waves(event: Event) -> tuple[bool, float]:
-    """Whether an event is in waveforms, and by how much its voltage's phase jumps [degrees]."""
+def _in_waves(event: Event) -> tuple[bool, float, float]:
+    """Whether an event is in waveforms, how far its voltage's phase jumps [degrees], and its `Shape.unbalance`."""
     if not isinstance(event, WaveEvent):
-        return False, 0.0
+        return False, 0.0, 0.0
     cycle = max(1, round(event.rate / event.f0 / 2))
     middle = max((event.start + event.end) // 2, event.start + cycle)
-    return True, float(np.degrees(np.angle(event.v[middle - cycle : middle + cycle].mean())))
+    around = slice(middle - cycle, middle + cycle)
+    v, turn = event.v[around], event.turn[around]
+    negative = abs(np.mean(np.conj(v * turn) / turn)) / max(event.U0 * event.depth, 1e-9)
+    return True, float(np.degrees(np.angle(v.mean()))), float(min(negative, 1.0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,13 +15,15 @@ from tractexp.report.style import PALETTE
 from tractexp.wording import as_sentence
 
 DEPTH, DURATION, RATE, NOISE = "depth", "duration [s]", "samples per second", "noise, of P before the dip"
-JUMP, CURRENT_NOISE = "phase jump [degrees]", "noise of the currents, of P before the dip"
+JUMP, UNBALANCE = "phase jump [degrees]", "negative sequence, of the depth"
+CURRENT_NOISE = "noise of the currents, of P before the dip"
 AXES = {  # of a scan: what its axis says, and what a value is multiplied by
     DEPTH: ("depth of the dip [%]", 100.0),
     DURATION: ("duration of the dip [ms]", 1000.0),
     RATE: ("samples per second", 1.0),
     NOISE: ("noise [% of P before the dip]", 100.0),
     JUMP: ("phase jump [degrees]", 1.0),
+    UNBALANCE: ("U2, % of the depth", 100.0),
     CURRENT_NOISE: ("noise of the currents [% of P]", 100.0),
 }
 LINES = [(color, dash) for dash in ("solid", "dash", "dot") for color in PALETTE]
@@ -85,7 +87,7 @@ def page(path: Path, planned: Planned) -> Path:
             f"Intervals follow from the sensitivity of {'the currents' if waves else 'P and Q'} to each parameter at"
             " the values above. Where the interval is wide, or the values are far off, so is the forecast.",
             "The planned dip falls from 1 pu and comes back along straight edges of"
-            f" {1000 * (SUDDEN if waves else EDGE):g} ms{', in all three phases alike' * waves}.",
+            f" {1000 * (SUDDEN if waves else EDGE):g} ms{', without zero sequence' * waves}.",
             "Noise of the recorded voltage, and effects that the model lacks, are not in it.",
         ]
     )

@@ -11,7 +11,7 @@ from tractexp.tasks.task import Job, Task, call
 if TYPE_CHECKING:
     from tractexp.report.plan import Planned
 
-ASKED = ("parameter", "within", "depth", "duration", "rate", "noise", "jump", "values", "least", "events")
+ASKED = ("parameter", "within", "depth", "duration", "rate", "noise", "jump", "unbalance", "values", "least", "events")
 
 
 @plugin
@@ -31,6 +31,7 @@ class Plan(Task):
     rate: float | None = None  # Hz
     noise: float | None = None  # standard deviation, as a share of P before the event; white
     jump: float | None = None  # degrees, of the voltage's phase; in waveforms
+    unbalance: float | None = None  # negative sequence over the depth, 1 of a fault between two phases; in waveforms
     values: str = "fit"  # fit, default, or the path of a result.json
     least: float = 0.05  # another event of the archive must narrow the intervals by this share
     events: int | None = None  # at most so many

@@ -30,7 +30,8 @@ AFTER, AFTER_OF_WAVES = 1.5, 0.3  # s after the longest
 class Imagined:
     """An event from the voltage before it back to that voltage: the phase turns by `jump` [degrees] while it is low.
 
-    `rate` is how many times as fast as the records it is sampled, `unbalance` its negative sequence over its depth.
+    `rate` is how many times as fast as the records it is sampled, `unbalance` its negative sequence over its depth. In
+    `waves` neither asks for a channel of its own.
     """
 
     depth: float
@@ -39,6 +40,7 @@ class Imagined:
     rate: int = 1
     unbalance: float = 0.0
     switched: bool = False
+    waves: bool = False
 
     @property
     def words(self) -> str:
@@ -52,9 +54,11 @@ class Imagined:
             told = f"a dip of {self.depth:.0%} or more lasting {1000 * self.duration:.0f} ms"
         more = []
         if self.jump:
-            more.append(f"in which the voltage's phase jumps by {self.jump:+.0f} degrees, with the frequency f")
+            channel = "" if self.waves else ", with the frequency f"
+            more.append(f"in which the voltage's phase jumps by {self.jump:+.0f} degrees{channel}")
         if self.unbalance:
-            more.append(f"unbalanced (negative sequence {self.unbalance:.0%} of the depth), with U2")
+            channel = "" if self.waves else ", with U2"
+            more.append(f"unbalanced (negative sequence {self.unbalance:.0%} of the depth){channel}")
         if self.rate > 1:
             more.append(f"sampled {self.rate} times as fast")
         return ", ".join([told, *more])
@@ -66,9 +70,12 @@ class Imagined:
 
 
 def imagined(bench: Bench, reads: Sequence[str] = ()) -> list[Imagined]:
-    """What is tried on this bench; unbalanced dips where one of the rivals `reads` U2."""
+    """What is tried on this bench; of phasors unbalanced dips where one of the rivals `reads` U2."""
     if bench.waves:
-        return [Imagined(*pair, jump=j) for *pair, j in itertools.product(DEPTHS, BRIEF, (0.0, *JUMPS))]
+        turned = itertools.product(DEPTHS, BRIEF, (0.0, *JUMPS))
+        unbalanced = itertools.product(DEPTHS[::2], BRIEF[::2])
+        made = [Imagined(*pair, jump=j, waves=True) for *pair, j in turned]
+        return made + [Imagined(*pair, unbalance=UNBALANCED, waves=True) for pair in unbalanced]
     made = [Imagined(*pair) for pair in itertools.product(DEPTHS, DURATIONS)]
     made += [Imagined(depth, LASTING, switched=True) for depth in SWITCHED]
     made += [Imagined(*p, jump=j) for *p, j in itertools.product(DEPTHS[::2], DURATIONS[::2], JUMPS)]
@@ -81,7 +88,7 @@ def imagined(bench: Bench, reads: Sequence[str] = ()) -> list[Imagined]:
 
 
 def driven(bench: Bench, event: Imagined) -> Excitation | Waveforms:
-    """The voltage of an imagined event, at the power before the first recorded one. Of waveforms in all phases alike,
+    """The voltage of an imagined event, at the power before the first recorded one; of waveforms without zero sequence,
     with edges as sudden as faults are."""
     like = bench.events[0]
     if isinstance(like, WaveEvent):
@@ -103,11 +110,13 @@ def _waves(like: WaveEvent, event: Imagined) -> Waveforms:
     n = round((LEAD_OF_WAVES + max(BRIEF) + AFTER_OF_WAVES) / step)
     t = np.arange(n) * step
     course = _course(t - LEAD_OF_WAVES, event.duration, SUDDEN)
-    v = like.U0 * (1 - event.depth * course) * np.exp(1j * np.radians(event.jump) * course)
     omega_n = 2 * np.pi * like.record.base.frequency
+    turn = np.exp(1j * (omega_n + like.omega_s0) * t)
+    U, U2 = like.U0 * (1 - event.depth * course), like.U0 * event.unbalance * event.depth * course
+    v = U * np.exp(1j * np.radians(event.jump) * course) + U2 * np.conj(turn) ** 2
     compared = np.where(np.array(like.known)[:, None], 0.0, np.nan) * np.ones(n)
     return Waveforms(
-        step, v, np.zeros(n), np.exp(1j * (omega_n + like.omega_s0) * t), compared, np.abs(v), np.zeros(n),
+        step, v, np.zeros(n), turn, compared, U, U2,
         like.U0, like.P0, like.Q0, omega_s0=like.omega_s0, omega_n=omega_n, weights=WEIGHTS[like.phases],
     )  # fmt: skip
 
