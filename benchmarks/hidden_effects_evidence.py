@@ -161,7 +161,7 @@ def _singles(rows: Rows) -> tuple[str, list[str], list]:
         found = [r for r in members if r["verdict"] in ("named", "tied")]
         said = [r for r in members if r["verdict"] != "none"]
         unique = [r for r in members if r["verdict"] == "named"]
-        held = np.array([r["closed_true"] for r in members if right(r) and "closed_true" in r])
+        held = np.array([r["closed_true"] for r in members if right(r) and r.get("closed_true") is not None])
         placed = [r for r in said if r["places"]]
         lines.append([
             f"{multiple:g}", n, share(len(said), n), share(len(unique), n), share(sum(map(right, unique)), len(unique)),

@@ -163,7 +163,8 @@ def _compared(found, trial: cases.Trial) -> dict:
     if found.judged is not None:
         other = found.judged.bench
         N = other.drive.samples
-        got = other.residuals(np.array(found.judged.units)) + other.drive.measured - clean[:, -N:]
+        sets = [((), False), (found.names, False)]  # members of families have kernels of their own
+        got = other.residuals_of(np.array(found.judged.units), sets) + other.drive.measured - clean[:, -N:]
         before, after = np.sum(got**2, axis=(1, 2))
         row["closed_true"] = 1 - after / before
     textbook = {name for name, _ in made.effects} & CATALOG.keys()  # a stranger may have the name of an effect of waves
@@ -242,6 +243,8 @@ def main() -> None:
         return
     from joblib import Parallel, delayed
 
+    from tractexp import files
+
     salt = salt_of(chosen.frozen) if chosen.frozen else None
     out.parent.mkdir(parents=True, exist_ok=True)
     rows = evidence.read(out) if out.exists() else []
@@ -253,7 +256,7 @@ def main() -> None:
     jobs = (delayed(run)(group, trial, total, chosen.held) for group, trial in in_time)
     with out.open("a") as file:
         for row in Parallel(n_jobs=chosen.jobs, return_as="generator_unordered", pre_dispatch=4)(jobs):
-            rows.append(row | {"frozen": chosen.frozen})
+            rows.append(files.plain(row | {"frozen": chosen.frozen}))
             file.write(json.dumps(rows[-1]) + "\n")
             file.flush()
             told = row.get("failed") or f"{row['verdict']} {' '.join(row['names'])}"

@@ -1,15 +1,42 @@
 """The judgement set: seeds that nobody chose, tables that hold what is stored, and what others would pick."""
 
+import itertools
 import json
 from types import SimpleNamespace
 
 import hidden_effects_evidence as evidence
 import hidden_effects_study as study
+import marked
 import numpy as np
 import pytest
 from baselines import sparse
 
 from hidden_effects import OUTSIDE
+
+
+@pytest.fixture(scope="module")
+def rows() -> list[dict]:
+    return evidence.read(study.JUDGEMENT)
+
+
+def test_the_docs_hold_what_the_stored_rows_hold(rows):
+    page = (study.ROOT / "docs" / "missing-effects.md").read_text(encoding="utf-8")
+    _, made, _ = marked.parted(page, evidence.MARK)
+    assert made.strip() == evidence.tables(rows)
+    (frozen,) = {row["frozen"] for row in rows}
+    assert page.count(frozen) == 2
+
+
+def test_seeds_follow_from_the_commit_that_froze_product_and_generator(rows):
+    """Nobody chose them: of each row they are the first ones of the series that the hash starts, none left out."""
+    (frozen,) = {row["frozen"] for row in rows}
+    seen: dict[tuple[str, str], list[int]] = {}
+    for row in rows:
+        label = "pairs" if row["group"].startswith("pairs") else row["label"]  # one series for all pairs
+        seen.setdefault((row["group"], label), []).append(row["seed"])
+    for (group, label), seeds in seen.items():
+        series = study.cases.seeds(f"null {label}" if group.startswith("null, ") else label, int(frozen[:12], 16))
+        assert sorted(seeds) == sorted(itertools.islice(series, len(seeds))), (group, label)
 
 
 def test_a_commit_that_is_not_there_is_refused_in_a_sentence():

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 from numba import njit
 
 from tractexp.extend import kept
@@ -38,6 +39,28 @@ def earlier(y, lag, out):
                 out[c, k, i] = far * a + near * b + here * d + ahead * e
 
 
+@njit(nogil=True, error_model="numpy")
+def _between(y, U, r, u, quiet):
+    """Power by the fraction r from the second to the third of four samples, y = P/U and U of each, at the voltage u."""
+    rise = U[2] - U[1]
+    answer = (y[2] - y[1]) * rise / (rise * rise + quiet * quiet)
+    p, s = y[1] - answer * U[1], y[2] - answer * U[2]
+    before = y[0] - answer * U[0] - 2 * p + s
+    after = y[3] - answer * U[3] - 2 * s + p
+    weaker = before if abs(before) < abs(after) else after
+    if before * after <= 0.0:
+        weaker = 0.0
+    return u * (p + r * (s - p) - r * (1 - r) / 2 * weaker + answer * u)
+
+
+@njit(nogil=True, error_model="numpy")
+def _inside(y, U, u, r, quiet, out):
+    """`_between` the samples i + 1 and i + 2 for each i; counting from 0 lets the compiler take several at once."""
+    for i in range(len(out)):
+        near = y[i], y[i + 1], y[i + 2], y[i + 3]
+        out[i] = _between(near, (U[i], U[i + 1], U[i + 2], U[i + 3]), r, u[i], quiet)
+
+
 @kept
 @njit(nogil=True, error_model="numpy")
 def moved(y, U, slope, lag, quiet, out):
@@ -49,30 +72,48 @@ def moved(y, U, slope, lag, quiet, out):
     lies beyond the first and last sample is as there.
     """
     last = y.shape[2] - 1
+    u, drawn = np.empty(last + 1), np.empty(last + 1)
     for k in range(y.shape[1]):
         whole = math.floor(lag[k])
         r = 1 - (lag[k] - whole)  # how far into the interval from a to b
+        first, end = min(max(whole + 2, 0), last + 1), max(min(last + whole, last + 1), 0)  # o and e are samples there
         for i in range(last + 1):
             b = min(max(i - whole, 0), last)
-            if r == 1.0:
-                for c in range(y.shape[0]):
-                    out[c, k, i] = y[c, k, b]
-                continue
             a = max(b - 1, 0) if i - whole <= last else last
-            o, e = max(a - 1, 0), min(b + 1, last)
             rise = U[b] - U[a]
             bend = r * (1 - r) * ((1 - r) * (slope[a] - rise) - r * (slope[b] - rise)) if b > a else 0.0
-            u = U[a] + r * rise + bend
-            for c in range(y.shape[0]):
-                at_a, at_b = y[c, k, a] / U[a], y[c, k, b] / U[b]
-                answer = (at_b - at_a) * rise / (rise * rise + quiet * quiet)
-                p, s = at_a - answer * U[a], at_b - answer * U[b]
-                before = y[c, k, o] / U[o] - answer * U[o] - 2 * p + s
-                after = y[c, k, e] / U[e] - answer * U[e] - 2 * s + p
-                weaker = before if abs(before) < abs(after) else after
-                if before * after <= 0.0:
-                    weaker = 0.0
-                out[c, k, i] = u * (p + r * (s - p) - r * (1 - r) / 2 * weaker + answer * u)
+            u[i] = U[a] + r * rise + bend
+        for c in range(y.shape[0]):
+            if r == 1.0:
+                for i in range(last + 1):
+                    out[c, k, i] = y[c, k, min(max(i - whole, 0), last)]
+                continue
+            for i in range(last + 1):
+                drawn[i] = y[c, k, i] / U[i]
+            for i in range(last + 1):
+                if i < first or i >= end:
+                    b = min(max(i - whole, 0), last)
+                    a = max(b - 1, 0) if i - whole <= last else last
+                    o, e = max(a - 1, 0), min(b + 1, last)
+                    near = drawn[o], drawn[a], drawn[b], drawn[e]
+                    out[c, k, i] = _between(near, (U[o], U[a], U[b], U[e]), r, u[i], quiet)
+            if first < end:
+                at = first - whole - 2
+                _inside(drawn[at:], U[at:], u[first:end], r, quiet, out[c, k, first:end])
+
+
+@njit(nogil=True, error_model="numpy")
+def _mean(y, sums, whole, r, window, out):
+    """`averaged` where no part of the window lies beyond the record, from the sample `whole` + 1 on."""
+    before, left = y, y[1:]
+    right, after = y[2 * whole + 1 :], y[2 * whole + 2 :]
+    sums_left, sums_here, sums_right = sums[1:], sums[whole + 1 :], sums[2 * whole + 1 :]
+    for i in range(len(out)):
+        area = sums_right[i] - sums_here[i]
+        area += r * right[i] + r * r / 2 * (after[i] - right[i])
+        area += sums_here[i] - sums_left[i]
+        area += r * left[i] + r * r / 2 * (before[i] - left[i])
+        out[i] = area / window
 
 
 @kept
@@ -83,17 +124,20 @@ def averaged(y, window, out):
     y is linear between samples and keeps its first and last value beyond them. A window of 0 leaves it as it is.
     """
     last = y.shape[2] - 1
-    sums = [0.0] * (last + 1)  # integral from the first sample to each
+    sums = np.zeros(last + 1)  # integral from the first sample to each
     for k in range(y.shape[1]):
         half = window[k] / 2
         whole = math.floor(half)
         r = half - whole
+        first, end = min(whole + 1, last + 1), max(last - whole, 0)  # the window lies within the record there
         for c in range(2):
+            if half == 0.0:
+                out[c, k] = y[c, k]
+                continue
             for i in range(last):
                 sums[i + 1] = sums[i] + (y[c, k, i] + y[c, k, i + 1]) / 2
             for i in range(last + 1):
-                if half == 0.0:
-                    out[c, k, i] = y[c, k, i]
+                if first <= i < end:
                     continue
                 at = min(i + whole, last)
                 here, there = y[c, k, at], y[c, k, min(at + 1, last)]
@@ -104,3 +148,15 @@ def averaged(y, window, out):
                 area += sums[i] - sums[at] + max(whole - i, 0) * y[c, k, 0]
                 area += r * here + r * r / 2 * (there - here)
                 out[c, k, i] = area / window[k]
+            if first < end:
+                _mean(y[c, k], sums, whole, r, window[k], out[c, k, first:end])
+
+
+@kept
+@njit(nogil=True, error_model="numpy")
+def drifted(y, t, rate, out):
+    """Write y (C, n, N) times 1 + rate t to `out`, of rates (C, n) and times t (N,)."""
+    for c in range(y.shape[0]):
+        for k in range(y.shape[1]):
+            for i in range(y.shape[2]):
+                out[c, k, i] = y[c, k, i] * (1 + rate[c, k] * t[i])

@@ -29,18 +29,19 @@ class LoadDrift(Measurement):
     confused_with = ("exponential_recovery", "undervoltage_trip", "frequency_dependence")
 
     def observe(self, power, drive, values):
-        out = power.copy()
+        from ._recorder import drifted
+
+        out = np.empty_like(power)
         for e in range(drive.events):
             part = drive.part(e)
             rows = dict(zip(INPUTS, drive.inputs[:, part], strict=False))
-            drift = (values[name][e][:, None] * rows["t"] for name in ("drift_P", "drift_Q"))
+            rate = np.stack([values[name][e] for name in ("drift_P", "drift_Q")])
             if "turn_re" not in rows:
-                for channel, more in zip(out, drift, strict=True):
-                    channel[:, part] *= 1 + more
+                drifted(power[:, :, part], rows["t"], rate, out[:, :, part])
                 continue
-            turn = rows["turn_re"] + 1j * rows["turn_im"]
-            seen = (out[0, :, part] + 1j * out[1, :, part]) * np.conj(turn)
-            along, across = drift
-            seen = turn * (seen + along * seen.real + 1j * across * seen.imag)
-            out[0, :, part], out[1, :, part] = seen.real, seen.imag
+            turn, drawn = rows["turn_re"] + 1j * rows["turn_im"], power[:, :, part]
+            seen = (drawn[0] + 1j * drawn[1]) * np.conj(turn)
+            P, Q = rate[:, :, None] * rows["t"]
+            seen = turn * (seen + P * seen.real + 1j * Q * seen.imag)
+            out[0, :, part], out[1, :, part], out[2, :, part] = seen.real, seen.imag, drawn[2]
         return out

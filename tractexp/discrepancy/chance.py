@@ -39,19 +39,20 @@ class Chance:
 def chance_at(t: Tangent, noise: Noise, quiet: QuietNoise, seed: int, plain: bool, draws: int = DRAWS) -> Chance:
     """Draw every statistic at a fit as chance makes it; where the case is `plain`, with the noise taken as known.
 
-    What was drawn for the same fit before, as by a run that was stopped, is read back.
+    Draws that estimate their noise anew are kept, as for a run that was stopped; others cost less than keeping them.
     """
     bench = t.bench
+    plain = plain or noise_known(bench, noise)
 
     def made() -> tuple[np.ndarray, ...]:
         chance = _drawn(t, noise, quiet, seed, plain, draws)
         return chance.least_p, np.array([*chance.left]), *chance.left.values()
 
-    if not bench.told:
+    if plain or not bench.told:
         return _drawn(t, noise, quiet, seed, plain, draws)
     fit = {field.name: getattr(t, field.name) for field in fields(t) if field.name != "bench"}
-    what = shelf.told("chance", bench.told, fit, noise, quiet.blur, seed, plain, draws)
-    least, names, *left = shelf.arrays("descents", what, made)
+    what = shelf.told("chance", bench.told, fit, noise, quiet.blur, seed, draws)
+    least, names, *left = shelf.arrays("draws", what, made)
     return Chance(least, dict(zip(names.tolist(), left, strict=True)))
 
 
@@ -60,7 +61,7 @@ def _drawn(t: Tangent, noise: Noise, quiet: QuietNoise, seed: int, plain: bool, 
     rng = np.random.default_rng(seed)
     drawn = noise.draw(rng, draws, np.diff(bench.drive.first).tolist())
     drawn *= bench.known
-    if plain or noise_known(bench, noise):
+    if plain:
         return _collected(t, [t.whitened(noise, drawn)], noise)
     rest = rich_residuals(t, drawn)
     return _collected(t, [t.whitened(quiet.of(t.unit, rest[b]), drawn[b : b + 1]) for b in range(draws)], noise)

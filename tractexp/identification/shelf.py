@@ -23,7 +23,7 @@ from tractexp.model.cache import cache_folder
 
 BEHIND = ("numpy", "numba", "scipy", "llvmlite")  # whose versions may change the last digits
 DAMAGED = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile)
-SHELVES = {"searches": 3000, "descents": 4000}  # kept on each, of some 20 kB: beyond, the oldest go
+SHELVES = {"searches": 3000, "descents": 4000, "draws": 100}  # kept on each, draws of 10 MB, others of some kB
 
 
 def behind() -> str:
