@@ -1,5 +1,6 @@
 """Rows of the study as the tables and figures of docs/missing-effects.md. Shares come with exact 95 % intervals."""
 
+import itertools
 import json
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -45,15 +46,30 @@ def tables(rows: Rows) -> str:
             _proposals(usual), _pairs(usual), _sizes(usual), _seconds(usual),
         ) if lines),
     ]  # fmt: skip
-    return "\n\n".join(parts)
+    return "\n\n".join([*parts, *(f"![{told}]({_path(name)})" for name, told in _figures(usual).items())])
+
+
+def _path(name: str) -> str:
+    return f"images/missing-effects-{name}.svg"
+
+
+def _figures(rows: Rows) -> dict[str, str]:
+    """The figures that these rows give, with what they show."""
+    shown = {"detection": "Share of data sets in which something was found"} if len(_multiples(rows)) > 1 else {}
+    return shown | {"confusion": "What was said of what was hidden"}
+
+
+def _multiples(rows: Rows) -> list[float]:
+    """Detection limits at which single effects of the catalogue are hidden."""
+    return [m for m in (0.5, 1.0, 2.0, 4.0, 8.0) if any(r["group"] == f"{m:g} x" and reached(r, m) for r in rows)]
 
 
 def write(rows: Rows, docs: Path) -> None:
     """Put the tables between the marks in missing-effects.md, and the figures into images/."""
     good = [r for r in rows if "failed" not in r and fitted(r) == FITTED]
     marked.replace(docs / "missing-effects.md", MARK, tables(rows))
-    for name, draw in (("detection", _draw_detection), ("confusion", _draw_confusion)):
-        draw(good, docs / "images" / f"missing-effects-{name}.svg")
+    for name in _figures(good):
+        {"detection": _draw_detection, "confusion": _draw_confusion}[name](good, docs / _path(name))
 
 
 def share(right: int, of: int) -> str:
@@ -319,22 +335,20 @@ def _draw_detection(rows: Rows, path: Path) -> None:
 
     from tractexp.report import style
 
-    multiples = [0.5, 1.0, 2.0, 4.0, 8.0]
+    x = _multiples(rows)
     with rc_context(style.SETTINGS):
         figure = Figure(figsize=(6.4, 3.4), layout="constrained")
         axes = figure.subplots()
-        members = [[r for r in rows if r["group"] == f"{m:g} x" and reached(r, m)] for m in multiples]
-        kept = [k for k, rs in enumerate(members) if rs]
-        x = [multiples[k] for k in kept]
+        members = [[r for r in rows if r["group"] == f"{m:g} x" and reached(r, m)] for m in x]
         for label, color, count in (
             ("a disagreement is found", style.REACTIVE, lambda r: r["verdict"] != "none"),
             ("the truth is among the names", style.ACTIVE, in_set),
             ("the truth is the one name", style.VOLTAGE, right),
         ):
-            axes.plot(x, [100 * np.mean([count(r) for r in members[k]]) for k in kept], "o-", color=color, label=label)
+            axes.plot(x, [100 * np.mean([*map(count, rs)]) for rs in members], "o-", color=color, label=label)
         fine = np.geomspace(0.5, 8, 60)
         axes.plot(fine, 100 * _power(fine), "--", color=style.FAINT, label="best possible: likelihood-ratio test")
-        axes.set(xscale="log", xticks=multiples, xticklabels=[f"{m:g}" for m in multiples], ylim=(0, 103))
+        axes.set(xscale="log", xticks=x, xticklabels=[f"{m:g}" for m in x], ylim=(0, 103))
         axes.set(xlabel="times the detection limit", ylabel="share of data sets [%]")
         axes.minorticks_off()
         axes.legend(loc="lower right")
@@ -356,18 +370,17 @@ def _draw_confusion(rows: Rows, path: Path, multiple: float = 4.0) -> None:
 
     from tractexp.report import style
 
-    members = [r for r in rows if r["group"] in (f"{multiple:g} x", f"outside {multiple:g} x")]
-    if not members:
-        return
-    labels = list(dict.fromkeys(r["label"] for r in members))
-    names = [n for n in labels if any(r["group"].startswith(f"{multiple:g}") and r["label"] == n for r in members)]
+    groups = [f"{sort}{multiple:g} x" for sort in ("", "law ", "outside ")]
+    blocks = [list(dict.fromkeys(_hidden(r) for r in rows if r["group"] == group)) for group in groups]
+    names, labels = blocks[0], list(itertools.chain(*blocks))
+    members = [r for r in rows if r["group"] in groups]
     said = [*names, "several at once", "tied, truth among", "tied, truth not", "unexplained", "none"]
     table = np.zeros((len(labels), len(said)))
     for r in members:
-        table[labels.index(r["label"]), said.index(_column(r, names))] += 1
+        table[labels.index(_hidden(r)), said.index(_column(r, names))] += 1
     table *= 100 / np.maximum(table.sum(axis=1, keepdims=True), 1)
     with rc_context({**style.SETTINGS, "axes.grid": False}):
-        figure = Figure(figsize=(8.6, 8.2), layout="constrained")
+        figure = Figure(figsize=(8.6, 11.0), layout="constrained")
         axes = figure.subplots()
         axes.imshow(table, cmap="Blues", vmin=0, vmax=130, aspect="auto")
         for (i, j), value in np.ndenumerate(table):
@@ -375,11 +388,17 @@ def _draw_confusion(rows: Rows, path: Path, multiple: float = 4.0) -> None:
                 axes.text(j, i, f"{value:.0f}", ha="center", va="center", fontsize=7)
         axes.set_xticks(range(len(said)), [s.replace("_", " ") for s in said], rotation=90)
         axes.set_yticks(range(len(labels)), [s.replace("_", " ") for s in labels])
-        axes.axhline(len(names) - 0.5, color=style.FAINT, linewidth=0.8)
+        for end in itertools.accumulate(map(len, blocks[:-1])):
+            axes.axhline(end - 0.5, color=style.FAINT, linewidth=0.8)
         axes.axvline(len(names) - 0.5, color=style.FAINT, linewidth=0.8)
-        axes.set(xlabel="said", ylabel="hidden (below the line: not in the catalogue)")
+        axes.set(xlabel="said", ylabel="hidden: the catalogue's law, another law, not in the catalogue")
         axes.set_title(f"percent of the data sets of each row, {multiple:g} times the detection limit")
         style.save(figure, path)
+
+
+def _hidden(row: dict) -> str:
+    """What a row of the figure is called: an effect of the catalogue by its name there."""
+    return row["truth"][0] if row["group"][0].isdigit() else row["label"]
 
 
 def _column(row: dict, names: Iterable[str]) -> str:
