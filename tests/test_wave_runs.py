@@ -206,6 +206,17 @@ def test_phase_jumps_and_negative_sequences_are_of_waveforms(asked):
         tractexp.plan("tibet_50pct", **asked)
 
 
+def test_a_step_is_chosen_by_the_circuits_that_last(dip, monkeypatch):
+    """Most reactances below zero grow without end at any step; the others say how many steps it takes."""
+    for module in ("model.model", "identification.problem"):  # fewer, since the search up to them takes its time
+        monkeypatch.setattr(f"tractexp.{module}.MOST_SUBSTEPS", 16)
+    bounds = {"X_f": (-0.05, 0.0)}
+    model = tractexp.compose(motor="stator_flux", static="branch", effects=["feeder_impedance"], domain="waves")
+    problem = Problem(model.model, [dip], bounds=bounds)
+    assert problem.step.substeps.tolist() == [4]
+    assert problem.step.error < 5e-5
+
+
 @pytest.mark.parametrize("format", ["psse_dyr", "andes", "modelica"])
 def test_what_was_found_in_waveforms_is_exported_for_phasors(fit, format):
     made = tractexp.export(fit, format)

@@ -85,7 +85,8 @@ class Likelihood:
             drive, problem.candidates(self.values(unit)), problem.step.substeps, np.swapaxes(before, 0, 1)
         )
         rows = response.by_candidate - drive.measured
-        rows *= self.known
+        with np.errstate(invalid="ignore"):  # what diverged is no number in gaps either
+            rows *= self.known
         rows[response.miss.max(axis=0) > 0] = np.nan
         return rows
 

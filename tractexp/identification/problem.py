@@ -246,16 +246,24 @@ class Problem:
         errors, miss = self._errors(values)
         return self.drive.weights * self._scale**2 * self.loss.rho((errors / self._scale) ** 2), miss
 
+    def _lasting(self, candidates: np.ndarray) -> np.ndarray:
+        """Which candidates (n, d) do not grow beyond bounds at any step, as circuits with a negative reactance may."""
+        finest = np.full(len(self.events), MOST_SUBSTEPS)
+        outputs = self.model.simulate(self.drive, candidates, finest).outputs
+        return np.all(np.isfinite(outputs), axis=(0, 2))
+
     def _step(self, substeps: int | None) -> Step:
         if substeps is not None:
             if not 1 <= substeps <= MOST_SUBSTEPS:
                 raise UserError(f"model.substeps={substeps} is out of range: it must be 1 to {MOST_SUBSTEPS}")
             given = np.full(len(self.events), substeps)
             return Step(given, np.full(len(self.events), np.nan))
-        probes = self.space.from_unit(even(PROBES, self.space.dimension))
+        probes = self.candidates(self.space.from_unit(even(PROBES, self.space.dimension)))
         # Of waveforms some stiff circuits of the box diverge, and are refused; the step of a fit is checked by itself.
         fine, share = (FINE_OF_WAVES, MOST_PROBES) if self.model.waves else (FINE, 1.0)
-        chosen, error = self.model.substeps(self.drive, self.candidates(probes), fine, share)
+        chosen, error = self.model.substeps(self.drive, probes, fine, share)
+        if self.model.waves and np.isinf(error).any() and (lasting := self._lasting(probes)).any():
+            chosen, error = self.model.substeps(self.drive, probes[lasting], fine, share)
         if self.model.integration == CLASSICAL and not (error <= fine).all():
             worst = int(np.argmax(error))
             raise UserError(
