@@ -259,6 +259,25 @@ def test_noise_of_the_voltage_is_taken_out_where_it_is_smooth():
     assert made.event.record.U[clean.start] == noisy.record.U[clean.start]  # at the edge as it was recorded
 
 
+def test_smoothing_stops_beside_an_edge(monkeypatch):
+    """A sample that is taken for an edge by chance does not take those beside it along, and they theirs."""
+    rng, time = np.random.default_rng(12), np.arange(1000) * 0.002
+    U = np.where(abs(time - 0.6) < 0.1, 0.6, 1.0)
+
+    def as_recorded():
+        """How many samples are left as recorded in all but one event of twenty."""
+        made = [smoothed(_event(time, U + rng.normal(0, 0.005, 1000))).errors for _ in range(60)]
+        return np.quantile([(np.count_nonzero(errors, axis=1) == 1).sum() for errors in made], 0.95)
+
+    assert as_recorded() < 200
+    monkeypatch.setattr("tractexp.noise.voltage.BESIDE", 2.0)
+    assert as_recorded() > 300
+
+
+def _event(t, U):
+    return detect(Record("event", t, U, U, U, source="made").check())
+
+
 def test_what_smoothing_leaves_of_the_voltages_noise_is_as_large_as_said():
     """In the directions of its errors what is left has unit variance; outside of them there is hardly anything."""
     clean = events(noise=Noise(0.002), count=1)[0]

@@ -18,7 +18,7 @@ from tractexp.record import Event
 HALF_WIDTHS = (1, 2, 3, 5, 8)  # samples of the averages that must agree where the voltage is smooth
 AGREE = 2.5  # standard deviations within which they do
 MARGIN = 3  # samples beside an edge that are not smooth
-BOUND, BESIDE = 4.0, 2.0  # standard deviations of an average that smoothing may leave, and beside an edge
+BOUND, BESIDE = 4.0, 3.0  # standard deviations of an average that smoothing may leave, and beside an edge
 SHORTEST = 24  # samples of a stretch worth smoothing
 DEGREE, COSINES = 3, 32  # of the curve through a smooth stretch
 MOST = 400  # samples as recorded whose errors are followed up, the nearest to the dip: each costs a simulation
