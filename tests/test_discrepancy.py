@@ -24,8 +24,8 @@ from tractexp.discrepancy.disagreement import disagreement, examined
 from tractexp.discrepancy.discrepancy_json import content, write_left, write_model
 from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.explanations import from_other_valleys, without_needless
-from tractexp.discrepancy.fitting import refit
-from tractexp.discrepancy.held_out import weighed
+from tractexp.discrepancy.fitting import Refit, refit
+from tractexp.discrepancy.held_out import carried, judged_on, weighed
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.noise_in_quiet import QuietNoise
@@ -420,6 +420,23 @@ def test_all_events_together_confirm_only_what_the_held_out_ones_show(planted):
     assert denied.louder < 0
     assert denied.p_left < criteria.adequate_p
     assert not denied.confirmed(criteria, doubted=True)
+
+
+def test_what_has_no_steady_state_on_a_held_out_event_is_denied_there():
+    """A motor that would not run before it: nothing of it can be compared, and the noise is another fit's."""
+    made = bench(base(), events(count=3)[:2])
+    at = made.coordinates
+    runs = Refit((), at.null.copy(), 0.0, 0)
+    stalls = Refit(("stator_resistance",), at.null.copy(), 0.0, 1)
+    stalls.unit[at.column["T_m"]] = stalls.unit[at.column["C"]] = 1.0
+    stalls.unit[at.parameters(stalls.names)] = 1.0
+    held = events(count=3)[2:]
+    other, units, noise = carried(made, held, [runs, stalls])
+    assert not np.isfinite(other.residuals(units[1][None], stalls.names)).any()
+    assert np.isfinite(noise.levels).all()
+    judged = judged_on(made, held, runs, [runs, stalls])
+    assert not judged[stalls.names].gap.helps
+    assert judged[stalls.names].gap.gain == -np.inf
 
 
 def test_an_effect_that_closes_little_of_the_held_out_gap_must_leave_nothing_in_a_fit_to_all_events(planted):

@@ -64,12 +64,12 @@ class Gap:
 
 
 def curves(bench: Bench, unit: np.ndarray, noise: Noise, names: Sequence[str] | None = None) -> Curves:
-    """What a fit with the named effects (by default any) leaves."""
+    """What a fit with the named effects (by default any) leaves; beyond all measure where it has no steady state."""
     residual = bench.residuals(unit[None], names)
     white = bench.whiten(noise, residual)[0]
     measured = bench.drive.measured
     calculated = residual[0] + measured
-    deviance = float(white @ white)
+    deviance = float(np.nan_to_num(white @ white, nan=np.inf))
     P, Q, i = _errors(bench, calculated)
     return Curves(calculated, P, Q, deviance, deviance / max(bench.samples, 1), i)
 
@@ -106,7 +106,8 @@ def gap(
     closed = gained / explainable if explainable > 0 else float("nan")
     apart = (after.calculated - before.calculated)[None] * bench.known
     rows = bench.whiten(noise, apart)[0]
-    return Gap(before, after, float(closed), float(gained), float(rows @ rows), bench.criteria.shown, noise)
+    expected = float(np.nan_to_num(rows @ rows, nan=np.inf))
+    return Gap(before, after, float(closed), float(gained), expected, bench.criteria.shown, noise)
 
 
 def left_over(

@@ -195,7 +195,8 @@ def judged_on(bench: Bench, events: Sequence[Event], bare: Refit, extended: Sequ
 def carried(bench: Bench, events: Sequence[Event], fits: Sequence[Refit]) -> tuple[Bench, list[np.ndarray], Noise]:
     """Carry fits over to held-out events: everything keeps its trained value but P0 and Q0 of each event.
 
-    Returns the bench of those events, the coordinates of each fit there, and the noise of the last one.
+    Returns the bench of those events, the coordinates of each fit there, and the noise of the last one that has a
+    steady state there.
     """
     other, d = bench.on(Records.of(events, bench.records.window)), len(bench.coordinates.names)
     units = []
@@ -203,5 +204,9 @@ def carried(bench: Bench, events: Sequence[Event], fits: Sequence[Refit]) -> tup
         unit = other.coordinates.null.copy()
         unit[:d] = fit.unit[:d]
         units.append(settled(other, unit, white(other), fit.names))
-    noise = QuietNoise.at(other, units[-1]).of_fit(units[-1], fits[-1].names)
+    noise = white(other)
+    for unit, fit in zip(reversed(units), reversed(fits), strict=True):
+        if np.isfinite(left := other.residuals(unit[None], fit.names)[0]).all():
+            noise = QuietNoise.at(other, unit).of(unit, left)
+            break
     return other, [settled(other, u, noise, fit.names) for u, fit in zip(units, fits, strict=True)], noise

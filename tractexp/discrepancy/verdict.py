@@ -206,6 +206,8 @@ def _nearest(
         other, (plain, near), level = carried(bench, validate, [bare, best])
         there = curves(other, plain, level), curves(other, near, level, best.names)
         held = (there[0].deviance - there[1].deviance) / max(there[0].deviance - other.samples, 1e-300)
+        if not np.isfinite(held):  # no steady state there
+            held, there = float("nan"), None
     others = [(r.fit.names, (before.deviance - r.fit.deviance) / excess) for r in rivals[1:4]]
     share = (before.deviance - after.deviance) / excess
     return Nearest(rivals[0], float(share), float(held), after.calculated, others, (before, after), there)
