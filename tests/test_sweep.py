@@ -443,7 +443,7 @@ def test_jobs_that_were_interrupted_are_counted_apart_from_those_that_failed(tmp
 
     jobs = [Placed(tmp_path / str(k)) for k in range(4)]
     for job, status in zip(jobs, ("finished", "failed", "interrupted", "interrupted"), strict=True):
-        Status(status, "", "", "").write(job.folder)
+        Status(status, "", "", "", 1.0, {}, 0).write(job.folder)
     assert metrics(jobs) == {"jobs": 4, "jobs_finished": 1, "jobs_failed": 1, "jobs_interrupted": 2}
 
 

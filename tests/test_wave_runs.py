@@ -15,6 +15,7 @@ from tractexp.identification.periodic import unsettled
 from tractexp.identification.plan import Shape, forecast
 from tractexp.identification.play import play
 from tractexp.identification.problem import Problem
+from tractexp.plugin import get
 from tractexp.record import in_waves
 from tractexp.report.waves import Drawn, spectra, wave_chart
 
@@ -215,6 +216,16 @@ def test_a_step_is_chosen_by_the_circuits_that_last(dip, monkeypatch):
     problem = Problem(model.model, [dip], bounds=bounds)
     assert problem.step.substeps.tolist() == [4]
     assert problem.step.error < 5e-5
+
+
+@pytest.mark.parametrize("objective", ["squares", "huber"])
+def test_what_diverges_where_nothing_is_compared_warns_nobody(dip, objective, monkeypatch):
+    """In the zero sequence of a balanced dip, and in the cycles before the record."""
+    model = tractexp.compose(motor="stator_flux", static="branch", domain="waves").model
+    problem = Problem(model, [dip], substeps=4, loss=get("objective", objective)())
+    endless = np.full((1, *problem.drive.measured.shape), np.inf)
+    monkeypatch.setattr(problem, "_errors", lambda values: (endless, np.zeros((1, 1))))
+    assert not np.isfinite(problem.residuals(np.ones((1, 1)))).all()
 
 
 @pytest.mark.parametrize("format", ["psse_dyr", "andes", "modelica"])

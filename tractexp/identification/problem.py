@@ -229,7 +229,8 @@ class Problem:
         drive = self.drive
         if self.loss.quadratic:
             errors, miss = self._errors(values)
-            rows = errors * np.sqrt(drive.weights / drive.samples)
+            with np.errstate(invalid="ignore"):  # what diverged, in a gap
+                rows = errors * np.sqrt(drive.weights / drive.samples)
         else:
             losses, miss = self._losses(values)
             rows = np.sqrt(losses / drive.samples)
@@ -244,7 +245,8 @@ class Problem:
     def _losses(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Weighted losses (n, C, N) [pu²], and the misses as above."""
         errors, miss = self._errors(values)
-        return self.drive.weights * self._scale**2 * self.loss.rho((errors / self._scale) ** 2), miss
+        with np.errstate(invalid="ignore"):  # what diverged, in a gap
+            return self.drive.weights * self._scale**2 * self.loss.rho((errors / self._scale) ** 2), miss
 
     def _lasting(self, candidates: np.ndarray) -> np.ndarray:
         """Which candidates (n, d) do not grow beyond bounds at any step, as circuits with a negative reactance may."""

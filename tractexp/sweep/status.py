@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +20,9 @@ class Status:
     message: str  # a sentence where it failed, "" otherwise
     configuration: str  # SHA-256 of what the job was told to do
     inputs: str  # SHA-256 of the code and the data files it did it with
-    seconds: float = 0.0
-    choices: Mapping[str, str] = field(default_factory=dict)
-    seed: int | None = None
+    seconds: float
+    choices: Mapping[str, str]
+    seed: int
 
     def write(self, folder: Path) -> None:
         write_json(folder / FILE, asdict(self))

@@ -1,0 +1,112 @@
+"""The parts of a sweep one by one: what a job is, how its end is kept, and what is told while others run."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from tractexp.sweep import launcher, progress
+from tractexp.sweep.job import SweepJob, shared
+from tractexp.sweep.status import FAILED, FILE, FINISHED, RUNNING, Status, read
+
+
+def job(folder: Path, *overrides: str, seed: int = 0) -> SweepJob:
+    choices = {"optimizer": "pso", "data": "tibet_50pct", "task": "identify"}
+    return SweepJob({"seed": seed}, choices, overrides, f"job {seed}", "code", folder)
+
+
+def ended(job: SweepJob, status: str = FINISHED, value: float | None = None) -> Status:
+    """The end of a job, as its worker leaves it."""
+    job.folder.mkdir(parents=True, exist_ok=True)
+    if value is not None:
+        (job.folder / "result.json").write_text(json.dumps({"objective": value}))
+    end = replace(job.status, status=status, seconds=2.0)
+    end.write(job.folder)
+    return end
+
+
+@pytest.fixture
+def jobs(tmp_path):
+    return [job(tmp_path / str(k), "budget=500", f"optimizer.c1={k // 2}", f"seed={k}", seed=k) for k in range(4)]
+
+
+def test_a_status_comes_back_from_its_folder_and_a_damaged_one_does_not(jobs):
+    for one in jobs[:2]:
+        end = ended(one)
+        assert read(one.folder) == end
+        assert json.loads((one.folder / FILE).read_text())["seed"] == one.config["seed"]
+    (jobs[0].folder / FILE).write_text("{")
+    (jobs[1].folder / FILE).write_text('{"status": "finished"}')  # of another version: parts are missing
+    assert [read(one.folder) for one in jobs[:3]] == [None, None, None]
+
+
+def test_a_job_starts_as_running_with_nothing_spent(jobs):
+    assert jobs[3].status == Status(RUNNING, "", "job 3", "code", 0.0, jobs[3].choices, 3)
+
+
+def test_a_variant_leaves_out_what_all_jobs_share(jobs):
+    assert shared(jobs) == {"budget=500"}
+    assert shared(jobs[:1]) == set()
+    assert [one.variant(shared(jobs)) for one in jobs] == ["pso c1=0", "pso c1=0", "pso c1=1", "pso c1=1"]
+    assert jobs[0].variant(()) == "pso budget=500 c1=0"
+
+
+def test_the_best_of_each_variant_is_kept_and_failures_are_counted(jobs):
+    tally = progress.Tally(jobs)
+    for one, status, value in zip(jobs, (FINISHED, FINISHED, FAILED, FINISHED), (3.0, 2.0, None, 1.0), strict=True):
+        tally.add(one, ended(one, status, value))
+    assert (tally.total, tally.done, tally.failed) == (4, 4, 1)
+    assert tally.ranked() == [("pso c1=1", 1.0), ("pso c1=0", 2.0)]
+    assert tally.jobs == {"pso c1=0": 2, "pso c1=1": 2}
+    assert tally.line().startswith("  4 of 4 jobs, 1 failed, best objectives pso c1=1 1, pso c1=0 2; about 0 s left")
+
+
+def test_the_time_left_is_that_of_the_pace_since_the_first_end(jobs, monkeypatch):
+    at = iter((10.0, 14.0, 17.0))  # begun, the first end, now
+    monkeypatch.setattr(progress.time, "perf_counter", lambda: next(at))
+    tally = progress.Tally(jobs)
+    assert tally.line() == "  0 of 4 jobs; time left not known yet"
+    tally.add(jobs[0], ended(jobs[0]))
+    assert tally.left == "time left not known yet"
+    tally.add(jobs[1], ended(jobs[1]))
+    assert tally.left == "about 6 s left"  # one job in 3 s, two more
+
+
+def test_a_log_file_gets_a_line_now_and_then(jobs, monkeypatch, capsys):
+    clock = [0.0]
+    monkeypatch.setattr(progress.time, "perf_counter", lambda: clock[0])
+    with progress.progress(jobs) as note:
+        for one, at in zip(jobs, (progress.FIRST_LINE, progress.FIRST_LINE + 0.1, 1e3, 2e3), strict=True):
+            clock[0] = at
+            note(one, ended(one, value=1.0))
+    told = capsys.readouterr().out.splitlines()
+    assert [re.match(r"  (\d) of 4 jobs, best objectives", line)[1] for line in told] == ["1", "3"]
+
+
+def test_a_terminal_shows_each_variant_under_a_bar(jobs, monkeypatch):
+    from io import StringIO
+
+    from rich.console import Console
+
+    shown = Console(file=StringIO(), force_terminal=True, width=100)
+    monkeypatch.setattr(progress, "console", lambda: shown)
+    with progress.progress(jobs) as note:
+        for one, status in zip(jobs[:3], (FINISHED, FINISHED, FAILED), strict=True):
+            note(one, ended(one, status, 2.0 - one.config["seed"]))
+    text = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", shown.file.getvalue())
+    assert "3/4" in text
+    assert re.search(r"pso c1=1 +best 0\.0000e\+00 +1 jobs\s+pso c1=0 +best 1\.0000e\+00 +2 jobs", text)
+    assert "1 failed, about" in text
+    assert "0 failed" not in text
+
+
+def test_the_end_of_a_job_whose_worker_did_not_answer_is_what_it_had_written(jobs):
+    noted = []
+    note = lambda end, one: noted.append((end.status, one.config["seed"]))  # noqa: E731
+    jobs[0].status.write(jobs[0].folder)  # begun, not ended
+    ended(jobs[1], FAILED)
+    ended(jobs[2])
+    assert [launcher._end(one, note) for one in jobs] == [RUNNING, FAILED, FINISHED, None]
+    assert noted == [(FAILED, 1), (FINISHED, 2)]
