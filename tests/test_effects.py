@@ -10,6 +10,7 @@ from scipy.interpolate import Akima1DInterpolator, CubicHermiteSpline
 from scipy.optimize import fsolve
 
 from tractexp.errors import UserError
+from tractexp.extend import Effect, Parameter, sites
 from tractexp.identification.problem import Problem
 from tractexp.model.drive import Drive, Excitation, slopes
 from tractexp.model.model import compose
@@ -159,6 +160,32 @@ def test_a_channel_that_is_not_recorded_is_named():
     recorded = detect(Record("plain", t, U, U**1.5, 0.5 * U**2))
     with pytest.raises(UserError, match=r"'negative_sequence_braking' reads U2, which plain does not have"):
         Problem(model("negative_sequence_braking"), [recorded])
+
+
+class Bent(Effect):
+    """The motor draws more by a power of its voltage."""
+
+    name = "bent"
+    bend = Parameter(0.0, (0.0, 1.0), "1", "how much more", "a test", null=0.0)
+    parameters = (bend,)
+    order = 1
+
+    def __init__(self, power):
+        self.power = power
+
+    def edit(self, eq, bend):
+        size = abs(eq.V) ** self.power
+        for site in (sites.P_motor, sites.Q_motor):
+            eq.edit(site, lambda drawn: drawn + bend * size)
+
+
+@pytest.mark.parametrize(("power", "refused"), [(2, False), (3, True)])
+def test_a_feeder_is_refused_before_a_motor_whose_current_bends_with_the_voltage(power, refused):
+    """|V|^2 more is an admittance, |V|^3 is none that one equation of |V| could be solved for."""
+    motor, static = get("model/motor", "electromechanical")(), get("model/static", "exponential")()
+    why = compose(motor, static, [Bent(power)]).acceptance(effect("feeder_impedance")).refusal
+    assert bool(why) == refused
+    assert not why or why == "its motor's current is not a + b V in the voltage V"
 
 
 @pytest.mark.parametrize("motor", ["none", "mechanical"])

@@ -201,12 +201,12 @@ def _motor_current_at(eq, V):
 
 def _affine(eq):
     """Whether the motor's current really is a + b V: tried at V = 2j with every other symbol at some number."""
-    from sympy import Add, I
+    from sympy import Float, I
 
     a, b = _motor_current(eq)
-    off = Add(*(part**2 for part in eq.parts(_motor_current_at(eq, 2 * I) - a - 2 * I * b)))
-    known = [(s, 0.3 + 0.01 * k) for k, s in enumerate(sorted(off.free_symbols, key=str))]
-    return abs(off.subs(known)) < 1e-18
+    off = _motor_current_at(eq, 2 * I) - a - 2 * I * b
+    numbers = {s: Float(0.3 + 0.01 * k) for k, s in enumerate(sorted(off.free_symbols, key=str))}
+    return abs(complex(off.xreplace({s: n if s.is_real else n * (1 + I) for s, n in numbers.items()}))) < 1e-9
 
 
 def _computed(eq, name, value, before):
