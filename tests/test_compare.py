@@ -18,7 +18,7 @@ from tractexp.comparison.comparison import compare
 from tractexp.comparison.floor import Floor, floor_of, polish
 from tractexp.comparison.runs import PROBLEM, REST, SETTINGS, Run, gather
 from tractexp.comparison.runs import on as on_data
-from tractexp.comparison.summary import ECDF_TARGETS, band, running_time, runtimes, summarize
+from tractexp.comparison.summary import ECDF_TARGETS, Band, band, running_time, runtimes, summarize
 from tractexp.errors import UserError
 
 FLOOR = 8.1e-6
@@ -143,6 +143,12 @@ def test_a_summary_is_that_of_the_numbers():
     assert told.epsilon_p.median == pytest.approx(3e-5**0.5)
 
 
+def test_at_the_floor_is_what_ends_within_a_hundredth_of_it():
+    runs = [a_run("a", s, FLOOR * times) for s, times in enumerate((1.0, 1.009, 1.011, 1.5))]
+    (variant,) = gather(runs, "x").variants
+    assert summarize(variant, floor_of(variant.runs, None, None), TARGETS).at_floor == 0.5
+
+
 def test_running_times_are_counted_by_hand():
     """Reached after 3, 5 and never; the one that never did, and one that burst, spend all 101 x 50 simulations."""
     history = {0: 3, 1: 5}
@@ -176,6 +182,11 @@ def test_a_band_holds_what_a_short_run_had_reached():
         assert (np.diff(told.median) <= 0).all()
         assert (told.lower <= told.median).all()
         assert (told.median <= told.upper).all()
+
+
+def test_the_axis_of_a_band_ends_with_what_a_fiftieth_of_the_search_left():
+    x, upper = np.arange(100.0, 201.0), np.arange(1000.0, 899.0, -1)
+    assert Band(x, upper - 2, upper - 1, upper).top == 998.0
 
 
 # The ablation: objectives with known effects of each switch, in powers of ten.
