@@ -64,7 +64,10 @@ def check(rate: float = 10_000.0, substeps: int = 4) -> dict[str, float]:
     found = theirs(rate)
     turn = np.exp(2j * np.pi * FREQUENCY * found["t"])
     v, i, n = found["u"] / PEAK / turn, found["i"] / RATED, len(turn)
-    made = Waveforms(1 / rate, v, np.zeros(n), turn, np.zeros((3, n)), np.abs(v), np.zeros(n), 1.0, 1.0, 0.5)
+    made = Waveforms(
+        1 / rate, v, np.zeros(n), turn, np.zeros((3, n)), np.abs(v), np.zeros(n), 1.0, 1.0, 0.5, omega_s0=0.0,
+        omega_n=2 * np.pi * FREQUENCY,
+    )  # fmt: skip
     of = compose(get("model/motor", "stator_flux")(), get("model/static", "none")(), domain="waves")
     known = parameters()
     response = of.simulate(Drive.of([made]), np.array([known[name] for name in of.names]), substeps)

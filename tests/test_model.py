@@ -17,6 +17,8 @@ from tractexp.model import operations
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
 from tractexp.model.sites import SITES
+from tractexp.model.states import State
+from tractexp.model.symbols import phasor_parts, real_symbol, start_symbol, vector_symbol
 from tractexp.model.template import LANES
 from tractexp.plugin import get
 
@@ -344,6 +346,18 @@ def test_a_name_the_kernel_uses_itself_is_refused(name):
 
     with pytest.raises(UserError, match=f"called '{name}'"):
         Equations().declare([Parameter(1.0, (0.0, 2.0), "1", "about", "source", name=name)])
+
+
+def test_symbols_say_what_they_are():
+    assert real_symbol("U").is_real
+    assert not vector_symbol("v").is_real
+    assert all(s.is_real for s in phasor_parts(vector_symbol("v")))
+    assert start_symbol(real_symbol("omega")) == real_symbol("omega_before")
+    assert start_symbol(vector_symbol("E")) == vector_symbol("E_before")
+
+
+def test_a_state_starts_from_constants_unless_told_otherwise():
+    assert not State(real_symbol("omega"), "\\omega", "speed", "motor").derived
 
 
 def test_a_pair_that_draws_nothing_is_refused():

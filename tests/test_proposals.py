@@ -24,6 +24,7 @@ from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.fitting import refit
 from tractexp.discrepancy.proposal import generate
 from tractexp.discrepancy.proposal.bed import bench_of_terms, carried_over, place, sizes_of, with_terms
+from tractexp.discrepancy.proposal.effect import Library
 from tractexp.discrepancy.proposal.library import ANSWER, BALANCES, CLOCKS, SIGNALS, Term, term, terms
 from tractexp.discrepancy.proposal.propose import propose, told
 from tractexp.discrepancy.proposal.refit import fitted
@@ -199,6 +200,34 @@ def test_without_a_held_out_event_or_on_waveforms_nothing_is_proposed():
     assert "of phasors" in propose(anything, None, None, None, ("an event",), 0).why
     assert proposed_in_words(None, "why not") == ["no term is proposed: why not"]
     assert proposed_in_words(None, None) == []
+
+
+def test_what_a_proposal_ties_with_and_looks_like_is_said():
+    term = {
+        "words": "a step of P",
+        "function_of_voltage": False,
+        "parameters": {"k": {"value": 0.2, "standard_error": 0.01}},
+    }
+    told = {"terms": [term], "closed": {"train": 0.9, "validate": 0.8}, "ties": [], "alike": {}}
+    alone = proposed_in_words(told, None)
+    assert alone[0].startswith("proposed: a step of P, which closes 90%")
+    assert alone[1:] == ["it is not a function of the voltage: something happened by itself"]
+    further = proposed_in_words(
+        {**told, "ties": [{"words": "a ramp of P"}], "alike": {"undervoltage_trip": 0.93}}, None
+    )
+    assert further[2:] == ["these events cannot tell it from a ramp of P", "looks like it: undervoltage_trip (93%)"]
+
+
+def test_the_library_adds_each_signal_that_is_picked():
+    """Of the steady state only: what it adds to an equation is the picked signal times the size, with its sign."""
+    library = Library(ANSWER)
+    eq = base(library).equations
+    (defined,) = [e for s, e in eq.definitions.items() if s.name == f"{ANSWER}_signal"]
+    picked = {s: 1 for s in defined.free_symbols if s.name == library.pick("constant")}
+    others = {s: 0 for s in defined.free_symbols if "pick_" in s.name and s not in picked}
+    assert picked
+    assert others
+    assert defined.subs(others | picked) == 1
 
 
 def _loaded(path, monkeypatch):

@@ -278,6 +278,21 @@ def test_input_power_is_losses_and_shaft_power_and_what_is_stored(names):
     assert (v * np.conj(alpha + 1j * beta - current)).real == pytest.approx(lost + stored, rel=1e-9)
 
 
+def test_a_capacitor_draws_its_susceptance_times_the_slope_of_the_voltage():
+    """In the stationary frame b (dv/dt)/omega_n; the frame turns at 52 Hz, and where U is 0 the load draws nothing."""
+    eq, turning = model("none", "constant_impedance", "shunt").equations, 2 * np.pi * 2.0
+    v, slope, turn = 0.7 + 0.3j, 40.0 - 90.0j, np.exp(0.6j)
+    known = {
+        "capacitor": 0.2, "U": 0.0, "U0": 1.0, "P0": 1.0, "Q0": 0.6, "omega_s": turning, "omega_s0": 0.0,
+        "omega_n": OMEGA, "v_d": v.real, "v_q": v.imag, "v_d_rate": slope.real, "v_q_rate": slope.imag,
+        "branch_flux_re": 0.4, "branch_flux_im": 0.1, "turn_re": turn.real, "turn_im": turn.imag,
+    }  # fmt: skip
+    outputs = [eq.real(e) for e in eq.outputs().values()]
+    alpha, beta = (float(e.subs({s: known[s.name] for s in e.free_symbols})) for e in outputs[:2])
+    stationary = (slope + 1j * (OMEGA + turning) * v) * turn  # d(v turn)/dt
+    assert alpha + 1j * beta == pytest.approx(0.2 * stationary / OMEGA, rel=1e-12)
+
+
 def test_a_slow_symmetric_dip_draws_the_power_that_phasors_say():
     """The error of P and Q against the third order with its resistance falls with the slope of the voltage."""
     waves = model("stator_flux", "exponential")

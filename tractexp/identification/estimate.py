@@ -125,7 +125,7 @@ def estimate(problem: Problem, values: np.ndarray) -> Estimated:
     own = descend(ends.likelihood.rows, ends.likelihood.to_unit(values), apart=ends.likelihood.apart)
     whole = ends.joined(own, "search")
     if best is None or own.deviance[0] < ends.lowest - BETTER:
-        return _finished(whole.looked_beside())
+        return _finished(whole.looked_beside(), robust=False)
     return replace(best, starts=whole.starts)
 
 
@@ -142,13 +142,13 @@ def _of_box(problem: Problem) -> tuple[Ends, Estimated | None]:
         if not np.isfinite(ends.lowest):
             return ends, None
         ends = ends.looked_beside()
-        _remembered[key] = ends, _finished(ends)
+        _remembered[key] = ends, _finished(ends, robust=False)
         if len(_remembered) > REMEMBERED:
             _remembered.popitem(last=False)
     return _remembered[key]
 
 
-def _finished(ends: Ends, robust: bool = False) -> Estimated:
+def _finished(ends: Ends, *, robust: bool) -> Estimated:
     """Noise and fit in turn from the best valleys, and the judgement of the best of them."""
     observed, likelihood = ends.observed, ends.likelihood
     near = ends.descent.deviance <= HOPELESS * ends.lowest

@@ -90,9 +90,9 @@ class Waveforms:
     U0: float
     P0: float
     Q0: float
+    omega_s0: float
+    omega_n: float
     U20: float = 0.0
-    omega_s0: float = 0.0
-    omega_n: float = 2 * np.pi * 50.0
     weights: tuple[float, ...] = (0.5, 0.5, 1.0)
     window: np.ndarray | None = None
 

@@ -46,7 +46,7 @@ def _waves(v: np.ndarray, v_zero: np.ndarray, theta: np.ndarray, rate: float) ->
     turn, n = np.exp(1j * theta), round(rate / 100)
     slow = np.convolve(np.concatenate([np.full(n - 1, v[0]), v]), np.full(n, 1 / n), "valid")
     U0, still = abs(v[0]), np.zeros((3, len(v)))
-    return Waveforms(1 / rate, v, v_zero, turn, still, abs(slow), abs(v) - U0, U0, P0, Q0, omega_s0=-1.5)
+    return Waveforms(1 / rate, v, v_zero, turn, still, abs(slow), abs(v) - U0, U0, P0, Q0, -1.5, 100 * np.pi)
 
 
 def _event(U: np.ndarray, step: float, speed: np.ndarray, U2: np.ndarray) -> Excitation:
