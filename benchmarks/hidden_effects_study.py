@@ -9,7 +9,8 @@ JSON-lines file, so that a study can be stopped and taken up.
 
 The judgement set's seeds follow from the hash of the commit that froze product and generator, so that nobody could look
 at them before; it is refused where either is not what that commit holds. `--docs` writes its tables and figures into
-docs/missing-effects.md.
+docs/missing-effects.md. What was drawn before a mend stays; `--frozen LATER --suite nulls --out judgement_anew.jsonl`
+draws nulls anew after it.
 """
 
 import argparse
@@ -39,6 +40,7 @@ LEFT_OUT = "left out "  # the group of trials whose effect is taken from the cat
 PAIRED, LARGE = (2.0, 4.0), (2.0, 4.0, 8.0)  # multiples of the detection limit
 FROZEN = ("tractexp", "plugins", "benchmarks/hidden_effects", "benchmarks/independent")  # what judges and is judged
 ROOT, JUDGEMENT = Path(__file__).parents[1], Path(__file__).with_name("judgement.jsonl")
+ANEW = JUDGEMENT.with_name("judgement_anew.jsonl")  # nulls of a commit with mends that the first set led to
 KNOWN = {"rotor_skin_effect": "second_cage", "stator_transients": "stator_transients"}  # the catalogue has them, too
 HIDDEN = {  # one effect is hidden: group of trials, multiples, effects
     "single": ("", cases.MULTIPLES, (*CATALOG, *KNOWN)),
@@ -237,9 +239,9 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=1e9, help="begin no further trial after so long")
     parser.add_argument("--docs", action="store_true", help="write the judgement set's tables and figures, and stop")
     chosen = parser.parse_args()
-    out = chosen.out or (JUDGEMENT if chosen.frozen or chosen.docs else Path("outputs/hidden_effects.jsonl"))
+    out = chosen.out or (JUDGEMENT if chosen.frozen else Path("outputs/hidden_effects.jsonl"))
     if chosen.docs:
-        evidence.write(evidence.read(out), ROOT / "docs")
+        evidence.write(evidence.read(JUDGEMENT), evidence.read(ANEW), ROOT / "docs")
         return
     from joblib import Parallel, delayed
 

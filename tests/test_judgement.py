@@ -23,12 +23,17 @@ def test_the_docs_hold_what_the_stored_rows_hold(rows):
     page = (study.ROOT / "docs" / "missing-effects.md").read_text(encoding="utf-8")
     _, made, _ = marked.parted(page, evidence.MARK)
     assert made.strip() == evidence.tables(rows)
-    (frozen,) = {row["frozen"] for row in rows}
-    assert page.count(frozen) == 2
+    _, made, _ = marked.parted(page, evidence.MARK_ANEW)
+    assert made.strip() == evidence.tables_anew(evidence.read(study.ANEW))
+    for path in (study.JUDGEMENT, study.ANEW):
+        (frozen,) = {row["frozen"] for row in evidence.read(path)}
+        assert page.count(frozen) == 2
 
 
-def test_seeds_follow_from_the_commit_that_froze_product_and_generator(rows):
+@pytest.mark.parametrize("path", [study.JUDGEMENT, study.ANEW], ids=lambda path: path.stem)
+def test_seeds_follow_from_the_commit_that_froze_product_and_generator(path):
     """Nobody chose them: of each row they are the first ones of the series that the hash starts, none left out."""
+    rows = evidence.read(path)
     (frozen,) = {row["frozen"] for row in rows}
     seen: dict[tuple[str, str], list[int]] = {}
     for row in rows:
