@@ -326,16 +326,18 @@ def main() -> None:
     ask.add_argument("--seed", type=int, default=1)
     ask.add_argument("--jobs", type=int, default=2)
     ask.add_argument("--only", nargs="*", default=list(PACKAGES), choices=PACKAGES)
-    ask.add_argument("--survivors", action="store_true", help="run those again that were not killed")
+    ask.add_argument("--survivors", action="store_true", help="run those again that were neither killed nor explained")
     ask.add_argument("--write", action="store_true", help="write docs/mutation.md alone")
     ask.add_argument("--cover", action="store_true", help="measure first which test runs which line")
     chosen = ask.parse_args()
     if chosen.cover:
         cover()
     known = {key_of(f): f for f in json.loads(RESULTS.read_text())} if RESULTS.exists() else {}
+    told = json.loads(REASONS.read_text(encoding="utf-8")) if REASONS.exists() else {}
     if not chosen.write:
         wanted = [m for package in chosen.only for m in drawn(package, chosen.count, chosen.seed)]
-        again = [m for m in wanted if m.key not in known or (chosen.survivors and not known[m.key]["killed_by"])]
+        survived = {m.key for m in wanted if m.key in known and not (known[m.key]["killed_by"] or m.key in told)}
+        again = [m for m in wanted if m.key not in known or (chosen.survivors and m.key in survived)]
         investigate(again, known, chosen.jobs)
     there = {m.key for module in {f["module"] for f in known.values()} for m in mutants_of(module, text_of(module))}
     found = sorted(
@@ -343,7 +345,7 @@ def main() -> None:
         key=lambda f: (PACKAGES.index(f["module"].split("/")[1]), f["module"], f["line"], f["nth"]),
     )
     keep(found)
-    files.write(PAGE, page(found, json.loads(REASONS.read_text(encoding="utf-8")) if REASONS.exists() else {}))
+    files.write(PAGE, page(found, told))
 
 
 def investigate(mutants: Sequence[Mutant], known: dict[str, dict[str, Any]], jobs: int) -> None:
