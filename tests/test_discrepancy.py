@@ -15,6 +15,7 @@ from scipy.special import chdtrc
 from test_cli import tractexp
 
 from hidden_effects import Case, Noise, make, write
+from tractexp.discrepancy import adequacy
 from tractexp.discrepancy.all_events import AllEvents
 from tractexp.discrepancy.base_fit import base_fit
 from tractexp.discrepancy.bench import Bench
@@ -353,6 +354,16 @@ def test_the_largest_of_many_comes_about_by_chance_as_often_as_it_says():
     assert 0.4 < np.mean(np.array(p) < 0.5) < 0.6
 
 
+@pytest.mark.parametrize(("events", "asked"), [(1, False), (2, True)])
+def test_parameters_of_each_event_are_asked_for_where_there_are_two(events, asked, monkeypatch):
+    monkeypatch.setattr(adequacy, "channels_of", lambda projection, bench: None)
+    monkeypatch.setattr(adequacy.surprises, "statistics", lambda channels, bench: {})
+    monkeypatch.setattr(adequacy, "least_p", lambda projection: np.ones(1))
+    projection = SimpleNamespace(unrest=lambda: np.zeros(1), unsteadiness=lambda: np.zeros(1))
+    made = adequacy.statistics(projection, SimpleNamespace(events=("a dip",) * events))
+    assert ("parameters of each event" in made) == asked
+
+
 def test_an_effect_outside_the_catalogue_is_unexplained_and_what_is_left_is_written(tmp_path):
     found = investigate(base(), events("load_step", size=3.0, count=3)[:2], (), {}, {}, only=FEW)
     assert found.verdict.word == "unexplained"
@@ -361,6 +372,7 @@ def test_an_effect_outside_the_catalogue_is_unexplained_and_what_is_left_is_writ
     near = content(found)["nearest"]
     assert near["effects"]
     assert 0 < near["explained"] < 1
+    assert "gap" not in near  # that of waveforms
     rows = np.genfromtxt(write_left(found, tmp_path / "left.csv"), delimiter=",", names=True, dtype=None, encoding=None)
     assert len(rows) == sum(e.record.samples for e in found.bench.events)
     assert np.abs(rows["P"]).max() > 5 * 0.002  # the step stands out of the noise

@@ -119,6 +119,22 @@ def test_a_model_that_is_off_by_more_than_eq_20_allows_is_the_wrong_one():
     assert not any("further dip" in sentence or "T_m" in sentence for sentence in wrong.advice)
 
 
+def test_two_dips_whose_loads_differ_are_told_by_parameters_of_each_event():
+    """Two dips of one load whose shaft torque was 15 % higher the second time, and twice of the same load."""
+    t, U = study.Shape(0.5).voltage()
+    changed = TRUTH * np.where(np.array(study.model().names) == "T_m", 1.15, 1.0)
+    pushed = []
+    for second in (changed, TRUTH):
+        rng = np.random.default_rng(4)
+        events = [
+            study.event(t, U, study.printed(truth, t, U, 0.35) + study.noise(rng, len(t), 0.002, 0.0), name)
+            for truth, name in ((TRUTH, "first"), (second, "second"))
+        ]
+        pushed.append(polished(Problem(study.model(), events)).surprise)
+    assert (pushed[0].loudest, pushed[0].p < 1e-6) == (adequacy.PER_EVENT, True)
+    assert pushed[1].p > adequacy.ADEQUATE_P
+
+
 def test_p_of_noise_alone_is_no_smaller_than_it_says():
     """60 judgements of noise drawn anew: one in ten below 0.1, give or take."""
     observed = Observed.of(Problem(study.model(), [recorded()]))

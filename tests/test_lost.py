@@ -1,6 +1,7 @@
 """Nothing is lost: by a kill, by a signal, by a store that is away, locked, cut short or of another version."""
 
 import contextlib
+import io
 import json
 import os
 import shutil
@@ -366,6 +367,20 @@ def test_a_fit_of_an_investigation_is_read_back_to_the_bit_and_never_for_another
     shelf.arrays("descents", key, make)
     assert len(made) == 2
     assert shelf.damaged(tmp_path) == []
+
+
+def test_what_a_shelf_holds_is_never_unpickled(tmp_path, monkeypatch):
+    from tractexp.identification import shelf
+    from tractexp.model import cache
+
+    monkeypatch.setattr(shelf, "cache_folder", lambda: tmp_path)
+    written = io.BytesIO()
+    np.savez(written, planted=np.array([{"an": "object"}], dtype=object))
+    file = shelf.place("descents", "planted")
+    file.parent.mkdir()
+    cache.write(file, written.getvalue())
+    assert cache.read(file) == written.getvalue()
+    assert shelf.read(file) is None
 
 
 # A server on PostgreSQL

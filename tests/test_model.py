@@ -350,6 +350,7 @@ def test_a_name_the_kernel_uses_itself_is_refused(name):
 
 def test_symbols_say_what_they_are():
     assert real_symbol("U").is_real
+    assert vector_symbol("v").is_complex
     assert not vector_symbol("v").is_real
     assert all(s.is_real for s in phasor_parts(vector_symbol("v")))
     assert start_symbol(real_symbol("omega")) == real_symbol("omega_before")

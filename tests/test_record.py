@@ -42,6 +42,14 @@ def test_the_dips_of_one_record_are_numbered_from_one():
     assert (first.made.t[0], second.made.t[0]) == pytest.approx((0.2, 1.7), abs=2e-3)
 
 
+def test_too_few_samples_of_low_voltage_tell_no_direction():
+    """What two samples do is no answer: said is that the voltage is never disturbed, and no exponent."""
+    U = spoiled(np.ones(N), slice(40, 42), 0.6)
+    assert "the voltage is never disturbed" in direction(U, -0.8 * U**2, np.full(N, -0.3))
+    long = spoiled(np.ones(N), slice(40, 60), 0.6)
+    assert "|P| goes as U^2" in direction(long, -0.8 * long**2, -0.4 * long**2)
+
+
 def test_one_sample_tells_no_direction():
     one = np.ones(1)
     assert direction(one, one, one) == ""

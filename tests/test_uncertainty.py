@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from tractexp.identification.problem import Problem
 from tractexp.identification.profile import checked
 from tractexp.identification.residual_tests import jarque_bera, ljung_box, louder
 from tractexp.identification.together import compare_events
-from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK
+from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, judge
 from tractexp.noise import Noise
 from tractexp.noise.color import Autoregression, fit_autoregression, stretches
 
@@ -263,6 +264,16 @@ def SHORT(seed, kept={}):  # noqa: B006 - a cache
     if seed not in kept:
         kept[seed] = study.coverage_record(seed)
     return kept[seed]
+
+
+def test_an_interval_that_reaches_past_the_bounds_says_so():
+    information = SimpleNamespace(
+        names=("T_m",), values=np.array([0.5]), unseen=np.zeros((0, 1)), identifiable=np.array([True])
+    )
+    half = np.array([0.02])
+    inside, past = (judge(information, np.array([0.0]), np.array([upper]), half, 1.96)["T_m"] for upper in (1.0, 0.51))
+    assert (inside.word, inside.detail) == (IDENTIFIED, "± 4 %")
+    assert (past.word, past.detail) == (IDENTIFIED, "± 4 %; the interval reaches past its bounds")
 
 
 def test_stator_transients_the_model_lacks_are_noticed():

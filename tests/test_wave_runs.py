@@ -15,6 +15,7 @@ from tractexp.identification.periodic import unsettled
 from tractexp.identification.plan import Shape, forecast
 from tractexp.identification.play import play
 from tractexp.identification.problem import Problem
+from tractexp.identification.seen import seen_by_estimator
 from tractexp.plugin import get
 from tractexp.record import in_waves
 from tractexp.report.waves import Drawn, spectra, wave_chart
@@ -86,6 +87,16 @@ def test_currents_are_drawn_whole_and_the_dip_is_in_view(fit):
     assert len(measured) == 3
     kept = np.frombuffer(base64.b64decode(measured[0]["samples"]["bdata"]), dtype="<i2")
     assert len(kept) == len(one.waves.record.t) - one.waves.lead
+
+
+def test_the_estimator_sees_in_recorded_currents_the_power_before_the_dip(dip):
+    event = in_waves(dip)
+    seen, P, Q = seen_by_estimator(event, 2 * np.nan_to_num(event.currents))
+    before = seen.steady
+    assert seen.record.P[before].mean() == pytest.approx(event.P0, rel=2e-3)
+    assert seen.record.Q[before].mean() == pytest.approx(event.Q0, rel=5e-3)
+    np.testing.assert_allclose(P, 2 * seen.record.P, rtol=1e-9)
+    np.testing.assert_allclose(Q, 2 * seen.record.Q, rtol=1e-9)
 
 
 def test_a_spectrum_tells_frequency_and_size_of_what_is_left(dip):
