@@ -8,12 +8,13 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from test_report_page import read
 
-from tractexp.comparison import claims, load
+from tractexp.comparison import claims, floor, load
 from tractexp.comparison.comparison import compare
 from tractexp.comparison.floor import Floor, floor_of, polish
 from tractexp.comparison.runs import PROBLEM, REST, SETTINGS, Run, gather
@@ -87,6 +88,13 @@ def test_optimizers_that_do_not_differ_are_not_told_apart():
         )
     )
     assert found <= 11  # 99 % of binomial(100, 0.05)
+
+
+@pytest.mark.parametrize(("off", "same"), [(1.009, True), (0.991, True), (1.015, False)])
+def test_runs_are_of_the_problem_whose_objectives_they_have_within_a_hundredth(off, same):
+    runs = [a_run("a", s, FLOOR * (1 + s)) for s in SEEDS]
+    problem = SimpleNamespace(objective=lambda ends: np.array([FLOOR, *(off * run.objective for run in runs[1:])]))
+    assert floor._same(problem, np.zeros((len(runs), 2)), runs) == same
 
 
 def test_runs_that_all_reach_the_floor_are_equal_whatever_is_left_of_rounding():

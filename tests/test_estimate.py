@@ -135,6 +135,13 @@ def test_two_dips_whose_loads_differ_are_told_by_parameters_of_each_event():
     assert pushed[1].p > adequacy.ADEQUATE_P
 
 
+def test_what_is_judged_is_the_estimate_against_all_draws(fit, monkeypatch):
+    known, judged = fit.judged.known, []
+    monkeypatch.setattr(adequacy, "tail", lambda draws, value: judged.append((len(draws), len(value))) or 1.0)
+    adequacy.surprise(Observed.of(known.likelihood.problem), known.likelihood, known.unit)
+    assert {*judged} == {(adequacy.DRAWS, 1)}
+
+
 def test_p_of_noise_alone_is_no_smaller_than_it_says():
     """60 judgements of noise drawn anew: one in ten below 0.1, give or take."""
     observed = Observed.of(Problem(study.model(), [recorded()]))

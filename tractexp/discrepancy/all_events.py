@@ -90,7 +90,7 @@ class AllEvents:
         family.compile_members([m.name for m in wanted], bench.effort.say)
         ground = {(): self.plain, textbook.names: replace(textbook, unit=bench.coordinates.widened(textbook.unit))}
         begun: list[Sequence[Start]] = [starts(bench, member, ground) for member in wanted]
-        best = self._refitted(textbook)[0]
+        best = self._refitted(textbook, anew=False)[0]
         made = []
         for fit in wide_refits(bench, self.level, begun, NEAREST, self.faults):
             if worth(fit, best, bench.criteria.family_p):
@@ -99,7 +99,7 @@ class AllEvents:
                 made.append((alone, self._told(fit, alone, seed)))
         return made
 
-    def _refitted(self, alone: Refit, *, anew: bool = False) -> list[Refit]:
+    def _refitted(self, alone: Refit, *, anew: bool) -> list[Refit]:
         at, settings = self.bench.coordinates, _settings(self.bench, alone.names) if anew else [{}]
         wanted = [(alone.names, at.placed(at.widened(alone.unit), setting)) for setting in settings]
         return (wide_refit if anew else refit)(self.bench, self.level, wanted, self.faults)
