@@ -116,13 +116,13 @@ def proposed(closed=0.9, left=1.0, p=1e-6):
 
 
 CASES = {  # criterion: a looser value, the decision, what it is by default
-    "false_alarms": (0.06, lambda c: at_fit(c, 0.044).asks_for_more, False),
-    "naming_share": (0.9, lambda c: at_fit(c, 0.042).asks_for_more, False),
+    "false_alarms": (0.06, lambda c: at_fit(c, 0.022).asks_for_more, False),
+    "naming_share": (0.45, lambda c: at_fit(c, 0.021).asks_for_more, False),
     "adequate_p": (0.002, lambda c: at_fit(c, 1.0, left=0.0025).adequate, False),
     "second_name_p": (3e-5, lambda c: at_fit(c, 2e-5, names=("one",)).asks_for_more, False),
     "third_name_p": (3e-9, lambda c: at_fit(c, 2e-9, names=("one", "two")).asks_for_more, False),
     "family_p": (3e-5, lambda c: worth(refitted(181.8, 2), refitted(200.0, 1), c.family_p), False),
-    "beside_measurement": (0.2, lambda c: at_fit(c, 0.006, fault_p=1e-9).asks_for_more, False),
+    "beside_measurement": (0.2, lambda c: at_fit(c, 0.003, fault_p=1e-9).asks_for_more, False),
     "rejected": (3.0, lambda c: c.rejects(10.0, 1.0, 2, 100.0), False),
     "alike": (0.04, lambda c: c.rejects(45.0, 1e4, 2, 1000.0), False),
     "shown": (12.0, lambda c: judged_by(c, gain=-1.0, expected=11.0).helps, False),

@@ -4,6 +4,7 @@ import itertools
 import json
 from types import SimpleNamespace
 
+import false_alarms
 import hidden_effects_evidence as evidence
 import hidden_effects_study as study
 import marked
@@ -12,6 +13,7 @@ import pytest
 from baselines import sparse
 
 from hidden_effects import OUTSIDE
+from tractexp.discrepancy.criteria import Criteria
 
 
 @pytest.fixture(scope="module")
@@ -42,6 +44,18 @@ def test_seeds_follow_from_the_commit_that_froze_product_and_generator(path):
     for (group, label), seeds in seen.items():
         series = study.cases.seeds(f"null {label}" if group.startswith("null, ") else label, int(frozen[:12], 16))
         assert sorted(seeds) == sorted(itertools.islice(series, len(seeds))), (group, label)
+
+
+def test_what_naming_may_spend_is_calibrated_on_development_seeds():
+    """The share of data sets below the level of chance's draws, and that nothing of them is left out."""
+    rows = json.loads(false_alarms.RESULTS.read_text())
+    for noise in study.cases.NOISES:
+        own = [row["seed"] for row in rows if row["noise"] == noise]
+        assert own == [p.seed for p in itertools.islice(study.cases.nulls(noise, events=4), len(own))]
+    assert len(rows) >= 300
+    found, level = false_alarms.shares(rows), Criteria().naming
+    assert 0.036 < found[round(level, 6)] < 0.05
+    assert found[0.5] == pytest.approx(0.5, abs=0.06)  # it is the tail that is heavy
 
 
 def test_a_commit_that_is_not_there_is_refused_in_a_sentence():
