@@ -7,6 +7,7 @@ how often the predicted chances come true, is `benchmarks/next_event.py`.
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import next_event as study
 import numpy as np
@@ -24,6 +25,7 @@ from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.fitting import refit
 from tractexp.discrepancy.investigate import investigate
+from tractexp.discrepancy.next_event import rivals
 from tractexp.discrepancy.next_event.choose import next_event
 from tractexp.discrepancy.next_event.imagined import EDGE, Imagined, as_recorded, imagined
 from tractexp.discrepancy.next_event.same import same
@@ -221,6 +223,14 @@ def test_the_smallest_switching_is_an_event_that_can_be_read(alike):
 def test_rivals_that_cannot_be_planned_for_are_refused_in_a_sentence(rivals, sentence):
     with pytest.raises(UserError, match=sentence):
         tractexp.plan(recorded(hidden(*MILD)), rivals=rivals)
+
+
+def test_a_rival_is_an_effect_of_the_load_that_the_events_can_show():
+    missing = SimpleNamespace(untestable={"negative_sequence_braking": "no U2"}, of_load=("stator_resistance",))
+    assert rivals._check(missing, ["stator_resistance"]) is None
+    for name, why in (("negative_sequence_braking", "cannot be tested here: no U2"), ("time_skew", "by the catalogue")):
+        with pytest.raises(UserError, match=why):
+            rivals._check(missing, ["stator_resistance", name])
 
 
 def test_a_plan_for_rivals_says_what_an_investigation_says(tied, tmp_path):
