@@ -31,7 +31,7 @@ from tractexp.record import in_waves
 
 STORED = Path(__file__).with_suffix(".json")
 CANDIDATES, STARTS, RATE = 200, 20, 1600.0  # Hz: some 1,300 samples
-EFFECTS = ("second_motor_group", "speed_dependent_torque", "shunt_capacitor")  # for a fit with more parameters
+EFFECTS = ("second_motor_group", "speed_dependent_torque", "shunt_capacitor", "magnetic_saturation")  # twelve in all
 
 
 def model(*effects: str) -> Model:
