@@ -77,7 +77,7 @@ def forked(
                 traceback.print_exc()
             os._exit(code)
         if kill_after is not None:
-            while once and once.encode() not in os.pread(said.fileno(), 100_000, 0):
+            while runs(child) and once and once.encode() not in os.pread(said.fileno(), 100_000, 0):
                 time.sleep(0.05)
             time.sleep(kill_after)
             os.kill(child, way)
@@ -85,6 +85,10 @@ def forked(
         said.seek(0)
         code = -os.WTERMSIG(status) if os.WIFSIGNALED(status) else os.WEXITSTATUS(status)
         return code, said.read().decode(errors="replace")
+
+
+def runs(child: int) -> bool:
+    return os.waitid(os.P_PID, child, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None
 
 
 def command(folder: Path, *arguments: str) -> int:

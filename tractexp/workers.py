@@ -11,6 +11,7 @@ import multiprocessing
 import os
 import signal
 import threading
+import warnings
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from typing import Any
@@ -40,6 +41,18 @@ def _begin() -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=lambda: (parent.join(), os._exit(1)), daemon=True).start()
+
+
+@contextlib.contextmanager
+def replaced() -> Iterator[None]:
+    """Around `joblib.Parallel`: a worker that has grown by 300 MB ends between two jobs, and another takes its place.
+
+    joblib warns of it in the thread that minds the workers. Where warnings are errors it is the thread that ends, and
+    the jobs never do.
+    """
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "A worker stopped while some jobs were given", UserWarning)
+        yield
 
 
 @contextlib.contextmanager

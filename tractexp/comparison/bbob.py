@@ -14,6 +14,7 @@ from tractexp.comparison.statistics import expected_running_time
 from tractexp.errors import UserError
 from tractexp.identification.optimizer import Optimizer
 from tractexp.identification.search import Limits, search
+from tractexp.workers import replaced
 
 GROUPS = {
     "separable": range(1, 6),
@@ -144,9 +145,10 @@ def perform(
     jobs = [delayed(run)(name, it, case, plan) for case in plan.cases for name, it in optimizers.items()]
     ending: Any = Parallel(n_jobs=cores or -1, return_as="generator_unordered")(jobs)
     runs = {}
-    for r in ending:
-        count()
-        runs[r.optimizer, r.dimension, r.function, r.instance] = r
+    with replaced():
+        for r in ending:
+            count()
+            runs[r.optimizer, r.dimension, r.function, r.instance] = r
     ordered = [
         runs[name, d, f, i] for name in optimizers for d in plan.dimensions for f in plan.functions
         for i in plan.instances

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from tractexp import files
+from tractexp import files, workers
 from tractexp.errors import UserError
 from tractexp.model import cache
 from tractexp.model.cache import cache_folder
@@ -105,7 +105,8 @@ def compile_missing(sources: Iterable[str], tell: Callable[[], None] = lambda: N
         from joblib import Parallel, delayed
 
         tell()
-        Parallel(n_jobs=os.cpu_count() or 1)(delayed(_compile)(s) for s in itertools.chain((first,), missing))
+        with workers.replaced():
+            Parallel(n_jobs=os.cpu_count() or 1)(delayed(_compile)(s) for s in itertools.chain((first,), missing))
 
 
 def _compiled(source: str) -> Iterable[Path]:

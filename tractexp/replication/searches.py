@@ -10,6 +10,7 @@ from tractexp.identification.search import Found, Limits, search
 from tractexp.plugin import build
 from tractexp.record import Event
 from tractexp.replication.remembered import Remembered
+from tractexp.workers import replaced
 
 CHUNK = 5  # searches that share the composition of a model
 Recipe = Callable[[], Problem]  # what a worker builds its problem from: a `Problem` holds compiled code
@@ -47,12 +48,13 @@ def run(
     problem.objective(problem.space.from_unit(np.full((1, problem.space.dimension), 0.5)))  # compiled once, for all
     parallel: Any = Parallel(n_jobs=min(workers or cpu_count(), len(chunks)), return_as="generator")
     jobs = (delayed(_chunk)(recipe, dict(variants[label]), part, limits) for label, part in chunks)
-    for (label, part), outcome in zip(chunks, parallel(jobs), strict=True):
-        for seed, one in zip(part, outcome, strict=True):
-            found[label][seed] = one
-            known.put(variants[label], seed, one)
-        done += len(part)
-        tell(done, total)
+    with replaced():
+        for (label, part), outcome in zip(chunks, parallel(jobs), strict=True):
+            for seed, one in zip(part, outcome, strict=True):
+                found[label][seed] = one
+                known.put(variants[label], seed, one)
+            done += len(part)
+            tell(done, total)
     return found  # type: ignore[return-value]
 
 
