@@ -10,6 +10,7 @@ import numpy as np
 
 from tractexp.discrepancy.adequacy import least_p, statistics
 from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.noise_in_quiet import QuietNoise
 from tractexp.discrepancy.projection import Projection
 from tractexp.discrepancy.tangent import Tangent, rich_residuals
@@ -62,9 +63,15 @@ def _drawn(t: Tangent, noise: Noise, quiet: QuietNoise, seed: int, plain: bool, 
     drawn = noise.draw(rng, draws, np.diff(bench.drive.first).tolist())
     drawn *= bench.known
     if plain:
-        return _collected(t, [t.whitened(noise, drawn)], noise)
+        return _told(t, t.whitened(noise, drawn), noise)
     rest = rich_residuals(t, drawn)
-    return _collected(t, [t.whitened(quiet.of(t.unit, rest[b]), drawn[b : b + 1]) for b in range(draws)], noise)
+
+    def anew(b: int) -> Chance:
+        return _told(t, t.whitened(quiet.of(t.unit, rest[b]), drawn[b : b + 1]), noise)
+
+    each = each_apart(anew, range(draws))
+    left = {name: np.concatenate([one.left[name] for one in each]) for name in each[0].left}
+    return Chance(np.concatenate([one.least_p for one in each]), left)
 
 
 def noise_known(bench: Bench, noise: Noise) -> bool:
@@ -72,13 +79,9 @@ def noise_known(bench: Bench, noise: Noise) -> bool:
     return bench.waves or bench.criteria.knows_noise(noise.worth(sum(p.stop - p.start for p in bench.quiet)))
 
 
-def _collected(t: Tangent, projections: list[Projection], noise: Noise) -> Chance:
-    least, by_test = [], []
-    for projection in projections:
-        p = least_p(projection)
-        if noise.loudest_blur <= t.bench.criteria.blurred:
-            faults = np.array(list(projection.fault_p().values())).reshape(-1, len(p))
-            p = np.maximum(np.minimum(p, faults.min(axis=0, initial=1.0)), SMALLEST_P)
-        least.append(p)
-        by_test.append(statistics(projection, t.bench))
-    return Chance(np.concatenate(least), {name: np.concatenate([f[name] for f in by_test]) for name in by_test[0]})
+def _told(t: Tangent, projection: Projection, noise: Noise) -> Chance:
+    p = least_p(projection)
+    if noise.loudest_blur <= t.bench.criteria.blurred:
+        faults = np.array(list(projection.fault_p().values())).reshape(-1, len(p))
+        p = np.maximum(np.minimum(p, faults.min(axis=0, initial=1.0)), SMALLEST_P)
+    return Chance(p, statistics(projection, t.bench))
