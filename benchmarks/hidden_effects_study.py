@@ -14,6 +14,7 @@ draws nulls anew after it.
 """
 
 import argparse
+import importlib
 import itertools
 import json
 import os
@@ -30,6 +31,7 @@ import baselines  # noqa: E402
 import hidden_effects_evidence as evidence  # noqa: E402
 import numpy as np  # noqa: E402
 
+import tractexp  # noqa: E402
 from hidden_effects import cases  # noqa: E402
 from hidden_effects.effects import CATALOG, PHYSICAL  # noqa: E402
 from hidden_effects.generator import make, scene, truth  # noqa: E402
@@ -214,12 +216,15 @@ def _overlaps(place, where: list[dict]) -> bool:
 def salt_of(commit: str) -> int:
     """What the seeds of the judgement set are drawn from: the hash of the commit that froze it.
 
-    Refused where what judges or is judged has changed since.
+    Refused where what judges or is judged has changed since, or is imported from another copy of the project.
     """
     git = ("git", "-C", str(ROOT))
     told = subprocess.run([*git, "rev-parse", "--verify", f"{commit}^{{commit}}"], capture_output=True, text=True)
     if told.returncode:
         raise SystemExit(f"there is no commit '{commit}' in {ROOT}; give that which froze product and generator")
+    for package in (tractexp, importlib.import_module("tractexp_plugins")):
+        if (there := Path(str(package.__file__)).resolve().parents[1]) != ROOT.resolve():
+            raise SystemExit(f"{package.__name__} is that of {there}, not of {ROOT}: pip install -e {ROOT}")
     changed = subprocess.run([*git, "diff", "--quiet", commit, "--", *FROZEN], check=False)
     if changed.returncode:
         raise SystemExit(f"{', '.join(FROZEN)} have changed since {commit}: check that commit out, or freeze anew")
