@@ -39,7 +39,7 @@ from hidden_effects.controls import (
     VoltageLink,
 )
 from hidden_effects.devices import Converter, Inrush, Link, Statcom
-from hidden_effects.laws import FAMILY, LAWS
+from hidden_effects.laws import FAMILY, LAWS, MEMBERS_LAW
 from hidden_effects.limits import detection_limit, joint_limit
 from hidden_effects.motor import Motor
 from hidden_effects.noise import autoregressive
@@ -47,6 +47,7 @@ from hidden_effects.site import Response
 from hidden_effects.supply import Moment, Relay, Supply
 from independent import Dip, Load, Machine, Static, simulate
 from independent.source import OMEGA
+from tractexp.plugin import discover
 
 PACKAGE = Path(__file__).parents[1] / "benchmarks" / "hidden_effects"
 LOAD = Load(
@@ -510,8 +511,17 @@ def test_every_effect_but_circuits_and_definitions_has_two_laws_of_others():
         "time_skew", "measurement_window", "frequency_dependence",
     }  # fmt: skip
     assert FAMILY.keys() == LAWS.keys()
-    counts = {name: list(FAMILY.values()).count(name) for name in CATALOG}
+    assert MEMBERS_LAW.keys() < FAMILY.keys()
+    others = [family for hidden, family in FAMILY.items() if hidden not in MEMBERS_LAW]
+    counts = {name: others.count(name) for name in CATALOG}
     assert {name for name, count in counts.items() if count < 2} == one
+
+
+def test_what_is_said_to_be_a_members_law_is_of_its_family():
+    known = discover()["effect"]
+    assert {hidden: known[member].family for hidden, member in MEMBERS_LAW.items()} == {
+        hidden: FAMILY[hidden] for hidden in MEMBERS_LAW
+    }
 
 
 def test_loads_that_step_do_so_once_and_stay():

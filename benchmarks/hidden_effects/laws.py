@@ -24,7 +24,7 @@ from hidden_effects.controls import (
     Thermostat,
     VoltageLink,
 )
-from hidden_effects.devices import Converter, Inrush
+from hidden_effects.devices import Converter, Inrush, Link
 from hidden_effects.effects import UndervoltageTrip
 from hidden_effects.hidden import Hidden, beside, motors
 from hidden_effects.site import Site
@@ -87,6 +87,33 @@ class TwoStageTrip(UndervoltageTrip):
 
 
 @dataclass(frozen=True)
+class InverseTimeTrip(UndervoltageTrip):
+    """A relay that waits less the deeper the dip: its delay falls with what the voltage lacks to its level.
+
+    Source: inverse-time undervoltage characteristics, t = k/(1 - U/U_s), as IEC 60255-127 has them.
+    """
+
+    def apply(self, site: Site) -> Site:
+        lowest = float(site.dip.magnitude(np.arange(0.0, site.recorder.duration, 1e-3)).min()) / site.dip.before
+        delay = 0.3 * self.delay / max(1 - lowest / self.level, 0.05)
+        relay = Relay(self.level, self.reset, delay, self.wait, self.ramp)
+        return replace(site, opened=times(self.amount, relay.opened(site.dip, site.recorder.duration)))
+
+
+@dataclass(frozen=True)
+class ContactorsOneByOne(UndervoltageTrip):
+    """Five contactors of as much load each, with levels about the relay's and waits of their own."""
+
+    def apply(self, site: Site) -> Site:
+        contactors = [
+            Relay(self.level + 0.02 * k, self.reset + 0.01 * k, self.delay * (1 + 0.1 * k), self.wait + 0.06 * k, 0.01)
+            for k in range(-2, 3)
+        ]
+        opened = together(site, contactors)
+        return replace(site, opened=times(self.amount / len(contactors), opened))
+
+
+@dataclass(frozen=True)
 class DriftFromDip(Hidden):
     """Customers switch on after they noticed the dip: the static load grows steadily from its beginning."""
 
@@ -123,6 +150,18 @@ class ActivePowerDrift(Hidden):
 
     def apply(self, site: Site) -> Site:
         return replace(site, static=replace(site.static, growth=complex(self.amount * site.S.real)))
+
+
+@dataclass(frozen=True)
+class AcceleratingDrift(Hidden):
+    """Customers who come faster and faster: the static load grows with the square of time."""
+
+    reference, largest, unit = 0.01, 0.3, "1/s²"
+
+    def apply(self, site: Site) -> Site:
+        t = np.linspace(0.0, site.recorder.duration, 101)
+        grown = Profile(tuple(t.tolist()), tuple((-self.amount * t**2).tolist()))
+        return replace(site, static_opened=grown)
 
 
 @dataclass(frozen=True)
@@ -195,6 +234,24 @@ class CurrentLoopConverter(Hidden):
 
 
 @dataclass(frozen=True)
+class FleetOfConverters(Hidden):
+    """Converters of five sizes, more or less loaded, so that they reach their limits of current one after the other."""
+
+    reference, largest, unit = 0.15, 0.9, "1"
+    spread: float = 0.15
+
+    @classmethod
+    def details(cls, rng: np.random.Generator, dips: Sequence[Dip]) -> dict[str, float]:
+        return {"spread": float(rng.uniform(0.1, 0.25))}
+
+    def apply(self, site: Site) -> Site:
+        power, limits = self.amount * site.S.real / 5, 1.3 + self.spread * np.linspace(-1, 1, 5)
+        for limit in limits.tolist():
+            site = beside(site, Converter(power, limit=limit, filter=0.004))
+        return site
+
+
+@dataclass(frozen=True)
 class DelayedPowerLimit(Hidden):
     """Trains that must take less where the line voltage is low, which they measure over some cycles."""
 
@@ -230,6 +287,24 @@ class StagedPowerLimit(Hidden):
 
 
 @dataclass(frozen=True)
+class FleetPowerLimit(Hidden):
+    """A fleet of five sorts of trains, each of which begins to take less at a level of its own and ends at another."""
+
+    reference, largest, unit = 0.15, 0.9, "1"
+    spread: float = 0.1
+
+    @classmethod
+    def details(cls, rng: np.random.Generator, dips: Sequence[Dip]) -> dict[str, float]:
+        return {"spread": float(rng.uniform(0.06, 0.14))}
+
+    def apply(self, site: Site) -> Site:
+        power, levels = self.amount * site.S.real / 5, 0.88 + self.spread * np.linspace(-1, 1, 5)
+        for full in levels.tolist():
+            site = beside(site, Converter(power, full=full, empty=full - 0.15, rest=0.2, limit=1.5, filter=0.006))
+        return site
+
+
+@dataclass(frozen=True)
 class LinkVoltageControl(Hidden):
     """Converters that control the voltage of their dc link, with a limit of current."""
 
@@ -258,6 +333,23 @@ class RampedReturn(Hidden):
 
     def apply(self, site: Site) -> Site:
         return beside(site, Ramped(self.amount * site.S.real, rate=self.rate))
+
+
+@dataclass(frozen=True)
+class FleetOfLinks(Hidden):
+    """Converters of two generations, whose dc links store little and much."""
+
+    reference, largest, unit = 0.1, 0.9, "1"
+    quick: float = 0.02
+    slow: float = 0.2
+
+    @classmethod
+    def details(cls, rng: np.random.Generator, dips: Sequence[Dip]) -> dict[str, float]:
+        return {"quick": float(rng.uniform(0.01, 0.03)), "slow": float(rng.uniform(0.12, 0.3))}
+
+    def apply(self, site: Site) -> Site:
+        power = self.amount * site.S.real / 2
+        return beside(beside(site, Link.lagging(power, self.quick)), Link.lagging(power, self.slow))
 
 
 @dataclass(frozen=True)
@@ -397,18 +489,24 @@ LAWS = {
     "static_part_trip": StaticTrip,
     "motor_share_trip": MotorTrip,
     "trip_in_two_stages": TwoStageTrip,
+    "inverse_time_trip": InverseTimeTrip,
+    "contactors_one_by_one": ContactorsOneByOne,
     "drift_that_begins_at_the_dip": DriftFromDip,
     "drift_of_active_power": ActivePowerDrift,
+    "accelerating_drift": AcceleratingDrift,
     "knee_saturation": KneeSaturation,
     "froelich_saturation": FroelichSaturation,
     "viscous_torque": ViscousTorque,
     "static_head_torque": StaticHeadTorque,
     "rectified_power": RectifiedPower,
     "current_loop_converter": CurrentLoopConverter,
+    "fleet_of_converters": FleetOfConverters,
     "delayed_power_limit": DelayedPowerLimit,
     "staged_power_limit": StagedPowerLimit,
+    "fleet_power_limit": FleetPowerLimit,
     "link_voltage_control": LinkVoltageControl,
     "ramped_return": RampedReturn,
+    "fleet_of_links": FleetOfLinks,
     "filter_oscillation": FilterOscillation,
     "synchronous_swing": SynchronousSwing,
     "integral_compensator": IntegralCompensator,
@@ -422,18 +520,24 @@ FAMILY = {
     "static_part_trip": "undervoltage_trip",
     "motor_share_trip": "undervoltage_trip",
     "trip_in_two_stages": "undervoltage_trip",
+    "inverse_time_trip": "undervoltage_trip",
+    "contactors_one_by_one": "undervoltage_trip",
     "drift_that_begins_at_the_dip": "load_drift",
     "drift_of_active_power": "load_drift",
+    "accelerating_drift": "load_drift",
     "knee_saturation": "magnetic_saturation",
     "froelich_saturation": "magnetic_saturation",
     "viscous_torque": "speed_dependent_torque",
     "static_head_torque": "speed_dependent_torque",
     "rectified_power": "constant_power_converter",
     "current_loop_converter": "constant_power_converter",
+    "fleet_of_converters": "constant_power_converter",
     "delayed_power_limit": "voltage_dependent_power_limit",
     "staged_power_limit": "voltage_dependent_power_limit",
+    "fleet_power_limit": "voltage_dependent_power_limit",
     "link_voltage_control": "dc_link_lag",
     "ramped_return": "dc_link_lag",
+    "fleet_of_links": "dc_link_lag",
     "filter_oscillation": "low_frequency_oscillation",
     "synchronous_swing": "low_frequency_oscillation",
     "integral_compensator": "static_var_compensator",
@@ -442,4 +546,13 @@ FAMILY = {
     "tap_recovery": "exponential_recovery",
     "inrush_with_resistance": "transformer_inrush",
     "inrush_by_instant": "transformer_inrush",
+}
+MEMBERS_LAW = {  # hidden laws that members of families were built to tell: by other code, no longer by another law
+    "static_part_trip": "static_trip",
+    "motor_share_trip": "motor_trip",
+    "trip_in_two_stages": "two_stage_trip",
+    "drift_that_begins_at_the_dip": "load_change_from_dip",
+    "rectified_power": "rectifier",
+    "delayed_power_limit": "power_limit_curve",
+    "ramped_return": "ramped_current",
 }

@@ -77,20 +77,20 @@ class AllEvents:
         fits = best_of(better for fit in alone for better in self._refitted(fit, anew=anew))
         return each_apart(lambda fit: self._told(fit, by_name[fit.names], seed), fits)
 
-    def members(self, textbook: Refit, seed: int) -> list[tuple[Refit, Together]]:
-        """Other places and laws of a textbook effect, as fitted to the fitted events alone and to all.
+    def members(self, denied: Sequence[Refit], seed: int) -> list[tuple[Refit, Together]]:
+        """Other places and laws, as fitted to the fitted events alone and to all, where textbook effects are denied.
 
-        Only what explains more of all events than the textbook effect does, beyond what its further parameters cost.
+        Only what explains more of all events than the best of these does, beyond what its further parameters cost.
         """
         bench, family = self.bench, self.bench.kernels.family
-        wanted = [m for m in bench.catalogue.members if (m.effect.family,) == textbook.names and family.joins(m.name)]
+        wanted = [m for m in bench.catalogue.members if family.joins(m.name)]
         if not wanted:
             return []
         bench.effort.say(f"trying {len(wanted)} other places and laws on all events")
         family.compile_members([m.name for m in wanted], bench.effort.say)
-        ground = {(): self.plain, textbook.names: replace(textbook, unit=bench.coordinates.widened(textbook.unit))}
+        ground = {f.names: replace(f, unit=bench.coordinates.widened(f.unit)) for f in denied} | {(): self.plain}
         begun: list[Sequence[Start]] = [starts(bench, member, ground) for member in wanted]
-        best = self._refitted(textbook, anew=False)[0]
+        best = min((self._refitted(f, anew=False)[0] for f in denied), key=lambda f: f.deviance)
         made = []
         for fit in wide_refits(bench, self.level, begun, NEAREST, self.faults):
             if worth(fit, best, bench.criteria.family_p):
