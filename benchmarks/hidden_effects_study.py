@@ -9,8 +9,7 @@ JSON-lines file, so that a study can be stopped and taken up.
 
 The judgement set's seeds follow from the hash of the commit that froze product and generator, so that nobody could look
 at them before; it is refused where either is not what that commit holds. `--docs` writes its tables and figures into
-docs/missing-effects.md. What was drawn before a mend stays; `--frozen LATER --suite nulls --out judgement_anew.jsonl`
-draws nulls anew after it.
+docs/missing-effects.md. What was drawn before a mend stays; `--frozen LATER --out judgement_LATER.jsonl` draws anew.
 """
 
 import argparse
@@ -43,6 +42,7 @@ PAIRED, LARGE = (2.0, 4.0), (2.0, 4.0, 8.0)  # multiples of the detection limit
 FROZEN = ("tractexp", "plugins", "benchmarks/hidden_effects", "benchmarks/independent")  # what judges and is judged
 ROOT, JUDGEMENT = Path(__file__).parents[1], Path(__file__).with_name("judgement.jsonl")
 ANEW = JUDGEMENT.with_name("judgement_anew.jsonl")  # nulls of a commit with mends that the first set led to
+MEMBERS = JUDGEMENT.with_name("judgement_members.jsonl")  # of a commit with more members of families, and all sizes
 KNOWN = {"rotor_skin_effect": "second_cage", "stator_transients": "stator_transients"}  # the catalogue has them, too
 HIDDEN = {  # one effect is hidden: group of trials, multiples, effects
     "single": ("", cases.MULTIPLES, (*CATALOG, *KNOWN)),
@@ -246,7 +246,7 @@ def main() -> None:
     chosen = parser.parse_args()
     out = chosen.out or (JUDGEMENT if chosen.frozen else Path("outputs/hidden_effects.jsonl"))
     if chosen.docs:
-        evidence.write(evidence.read(JUDGEMENT), evidence.read(ANEW), ROOT / "docs")
+        evidence.write(*map(evidence.read, (JUDGEMENT, ANEW, MEMBERS)), ROOT / "docs")
         return
     from joblib import Parallel, delayed
 

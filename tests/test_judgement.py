@@ -15,6 +15,8 @@ from baselines import sparse
 from hidden_effects import OUTSIDE
 from tractexp.discrepancy.criteria import Criteria
 
+SETS = (study.JUDGEMENT, study.ANEW, study.MEMBERS)
+
 
 @pytest.fixture(scope="module")
 def rows() -> list[dict]:
@@ -27,12 +29,14 @@ def test_the_docs_hold_what_the_stored_rows_hold(rows):
     assert made.strip() == evidence.tables(rows)
     _, made, _ = marked.parted(page, evidence.MARK_ANEW)
     assert made.strip() == evidence.tables_anew(evidence.read(study.ANEW))
-    for path in (study.JUDGEMENT, study.ANEW):
+    _, made, _ = marked.parted(page, evidence.MARK_MEMBERS)
+    assert made.strip() == evidence.tables_members(evidence.read(study.MEMBERS))
+    for path in SETS:
         (frozen,) = {row["frozen"] for row in evidence.read(path)}
         assert page.count(frozen) == 2
 
 
-@pytest.mark.parametrize("path", [study.JUDGEMENT, study.ANEW], ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", SETS, ids=lambda path: path.stem)
 def test_seeds_follow_from_the_commit_that_froze_product_and_generator(path):
     """Nobody chose them: of each row they are the first ones of the series that the hash starts, none left out."""
     rows = evidence.read(path)

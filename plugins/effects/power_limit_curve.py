@@ -54,7 +54,7 @@ class PowerLimitCurve(Effect):
         u = eq[sites.static_voltage]
         seen = eq.lag("measured_voltage", "x_u")
         eq.moves(seen, (u - seen) / curve_time, 1)
-        power = eq.P_s0 * allowed(seen) / allowed(1) * u / seen
+        power = eq.P_s0 * eq.define("power_allowed", allowed(seen) / allowed(1), "m") * u / seen
         eq.edit(sites.P_static, lambda P: (1 - curve_limited) * P + curve_limited * power)
 
     def curve(self, curve_limited, curve_full, curve_off, curve_time, limit_bend, limit_rest):

@@ -40,6 +40,7 @@ class RampedCurrent(Effect):
         u = eq[sites.static_voltage]
         allowed = lambda u: smaller(1, larger(0, (u - ramp_none) / (ramp_full - ramp_none), WIDTH), WIDTH)  # noqa: E731
         current = eq.lag("ramped_current", "i_r")
-        eq.moves(current, sympy.Min((allowed(u) / allowed(1) - current) / ramp_fall, ramp_rate), 1)
+        aim = eq.define("current_allowed", allowed(u) / allowed(1), "m")
+        eq.moves(current, sympy.Min((aim - current) / ramp_fall, ramp_rate), 1)
         drawn = eq.P_s0 * u * current
         eq.edit(sites.P_static, lambda P: (1 - ramped_share) * P + ramped_share * drawn)

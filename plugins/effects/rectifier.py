@@ -17,11 +17,10 @@ def _current(u, k, limit):
     return smaller((u - most) / (2 * k), limit, WIDTH)
 
 
-def _powers(u, k, limit):
-    """Active and reactive power that the bridge takes, over the apparent power before."""
+def _powers(u, k, i):
+    """Active and reactive power that the bridge takes at the current i, over the apparent power before."""
     import sympy
 
-    i = _current(u, k, limit)
     return i * (u - k * i), i * sympy.sqrt(k * i * (2 * u - k * i))
 
 
@@ -52,8 +51,10 @@ class Rectifier(Effect):
     confused_with = ("constant_power_converter", "voltage_dependent_power_limit", "static_var_compensator")
 
     def edit(self, eq, rectified_share, commutation, rectified_limit):
-        P, Q = _powers(eq[sites.static_voltage], commutation, rectified_limit)
-        P_0, Q_0 = _powers(1, commutation, rectified_limit)
+        u = eq[sites.static_voltage]
+        i = _current(u, commutation, rectified_limit) / _current(1, commutation, rectified_limit)
+        P, Q = _powers(u, commutation, eq.define("bridge_current", i, "i_b"))
+        P_0, Q_0 = _powers(1, commutation, 1)
         eq.edit(sites.P_static, lambda P_s: (1 - rectified_share) * P_s + rectified_share * eq.P_s0 * P / P_0)
         scale = rectified_share * eq.P_s0 / P_0
         eq.edit(sites.Q_static, lambda Q_s: Q_s + scale * (Q - Q_0 * Q_s / (eq.Q_s0 + TINY)))
