@@ -40,8 +40,7 @@ def read(path: Path) -> Rows:
 
 def tables(rows: Rows) -> str:
     """All tables and figures, Markdown."""
-    usual = [r for r in rows if "failed" not in r and fitted(r) == FITTED]
-    return "\n\n".join([_all(rows), *(f"![{told}]({_path(name)})" for name, told in _figures(usual).items())])
+    return "\n\n".join([_all(rows), *(f"![{told}]({_path(name)})" for name, told in _figures(_usual(rows)).items())])
 
 
 def tables_members(rows: Rows) -> str:
@@ -49,18 +48,17 @@ def tables_members(rows: Rows) -> str:
 
     Without their times: other work ran on the machine.
     """
-    timeless = [{**r, "seconds": np.nan} for r in rows]
-    return _all(timeless, ", with more members", MEMBERS_LAW)
+    return _all(rows, ", with more members", MEMBERS_LAW, timed=False)
 
 
-def _all(rows: Rows, when: str = "", known: Container[str] = ()) -> str:
-    good = [r for r in rows if "failed" not in r]
-    failed, usual = len(rows) - len(good), [r for r in good if fitted(r) == FITTED]
+def _all(rows: Rows, when: str = "", known: Container[str] = (), *, timed: bool = True) -> str:
+    good, usual = [r for r in rows if "failed" not in r], _usual(rows)
+    failed = len(rows) - len(good)
     parts = [
         f"{len(rows)} data sets" + (f", of which {failed} could not be made or investigated." if failed else "."),
         *(_table(title + when, head, lines) for title, head, lines in (
             _false_alarms(usual), _singles(usual), _laws(usual, known), _each_law(usual), _events(good),
-            _abstention(usual), _proposals(usual), _pairs(usual), _sizes(usual), _seconds(usual),
+            _abstention(usual), _proposals(usual), _pairs(usual), _sizes(usual), _seconds(usual if timed else []),
         ) if lines),
     ]  # fmt: skip
     return "\n\n".join(parts)
@@ -72,6 +70,11 @@ def tables_anew(rows: Rows) -> str:
     _, head, lines = _false_alarms(good)
     told = f"{len(rows)} data sets, of which {len(rows) - len(good)} could not be investigated."
     return f"{told}\n\n{_table('Nothing is missing, frozen anew', head, lines)}"
+
+
+def _usual(rows: Rows) -> Rows:
+    """What was investigated with the usual number of events."""
+    return [r for r in rows if "failed" not in r and fitted(r) == FITTED]
 
 
 def _path(name: str) -> str:
@@ -91,12 +94,12 @@ def _multiples(rows: Rows) -> list[float]:
 
 def write(rows: Rows, anew: Rows, members: Rows, docs: Path) -> None:
     """Put the tables between the marks in missing-effects.md, and the figures into images/."""
-    good = [r for r in rows if "failed" not in r and fitted(r) == FITTED]
+    usual = _usual(rows)
     marked.replace(docs / "missing-effects.md", MARK, tables(rows))
     marked.replace(docs / "missing-effects.md", MARK_ANEW, tables_anew(anew))
     marked.replace(docs / "missing-effects.md", MARK_MEMBERS, tables_members(members))
-    for name in _figures(good):
-        {"detection": _draw_detection, "confusion": _draw_confusion}[name](good, docs / _path(name))
+    for name in _figures(usual):
+        {"detection": _draw_detection, "confusion": _draw_confusion}[name](usual, docs / _path(name))
 
 
 def share(right: int, of: int) -> str:
@@ -355,7 +358,7 @@ def _seconds(rows: Rows) -> tuple[str, list[str], list]:
     lines = []
     for verdict in VERDICTS:
         spent = np.array([r["seconds"] - r.get("generated", 0.0) for r in rows if r["verdict"] == verdict])
-        if np.isfinite(spent).any():
+        if len(spent):
             lines.append([verdict, len(spent), f"{np.median(spent):.1f}", f"{np.quantile(spent, 0.9):.1f}"])
     return "Seconds of an investigation, one core each", ["verdict", "data sets", "median", "90 %"], lines
 

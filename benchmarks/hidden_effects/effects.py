@@ -111,10 +111,12 @@ class UndervoltageTrip(Hidden):
             "ramp": float(rng.uniform(0.02, 0.4)),
         }
 
+    @property
+    def relay(self) -> Relay:
+        return Relay(self.level, self.reset, self.delay, self.wait, self.ramp)
+
     def apply(self, site: Site) -> Site:
-        relay = Relay(self.level, self.reset, self.delay, self.wait, self.ramp)
-        opened = relay.opened(site.dip, site.recorder.duration)
-        return replace(site, opened=replace(opened, values=tuple(self.amount * v for v in opened.values)))
+        return replace(site, opened=self.amount * self.relay.opened(site.dip, site.recorder.duration))
 
 
 @dataclass(frozen=True)

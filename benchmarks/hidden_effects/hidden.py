@@ -50,9 +50,9 @@ def motors(site: Site, **changes: Any) -> Site:
     return replace(site, motors=tuple(replace(m, **changes) for m in site.motors))
 
 
-def beside(site: Site, device: Device) -> Site:
-    """The site with one device more."""
-    return replace(site, devices=(*site.devices, device))
+def beside(site: Site, *devices: Device) -> Site:
+    """The site with further devices."""
+    return replace(site, devices=(*site.devices, *devices))
 
 
 def split(site: Site, share: float, second: Motor) -> Site:

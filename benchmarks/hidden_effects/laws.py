@@ -1,8 +1,9 @@
 """Effects of the catalogue's kinds by other laws and at other places: what nature does that uses no formula of ours.
 
-Each belongs to the family of a catalogue's effect, `FAMILY` says which; its formula is not that of any plugin, textbook
-or not. Circuits of constant elements (resistance, feeder, capacitor, negative sequence, a second group) and definitions
-(skew, window, powers of the frequency) have one law; all other effects have two and more.
+Each belongs to the family of a catalogue's effect, `FAMILY` says which; its formula is not that effect's, and that of
+another plugin only where `MEMBERS_LAW` says so. Circuits of constant elements (resistance, feeder, capacitor, negative
+sequence, a second group) and definitions (skew, window, powers of the frequency) have one law; all other effects have
+two and more that no plugin has.
 """
 
 from collections.abc import Sequence
@@ -26,17 +27,12 @@ from hidden_effects.controls import (
 )
 from hidden_effects.devices import Converter, Inrush, Link
 from hidden_effects.effects import UndervoltageTrip
-from hidden_effects.hidden import Hidden, beside, motors
+from hidden_effects.hidden import Hidden, beside, lowest, motors
 from hidden_effects.site import Site
 from hidden_effects.supply import Profile, Relay
 from independent.source import OMEGA, Dip
 
 STAGES = (0.9, 0.8, 0.7)  # levels over the voltage before
-
-
-def times(share: float, opened: Profile) -> Profile:
-    """A share of what a relay opens."""
-    return replace(opened, values=tuple(share * v for v in opened.values))
 
 
 def together(site: Site, relays: Sequence[Relay]) -> Profile:
@@ -53,8 +49,7 @@ class StaticTrip(UndervoltageTrip):
     reference, largest, unit = 0.1, 0.9, "1"
 
     def apply(self, site: Site) -> Site:
-        relay = Relay(self.level, self.reset, self.delay, self.wait, self.ramp)
-        return replace(site, static_opened=times(self.amount, relay.opened(site.dip, site.recorder.duration)))
+        return replace(site, static_opened=self.amount * self.relay.opened(site.dip, site.recorder.duration))
 
 
 @dataclass(frozen=True)
@@ -64,8 +59,7 @@ class MotorTrip(UndervoltageTrip):
     reference, largest, unit = 0.1, 0.9, "1"
 
     def apply(self, site: Site) -> Site:
-        relay = Relay(self.level, self.reset, self.delay, self.wait, self.ramp)
-        return replace(site, motors_opened=times(self.amount, relay.opened(site.dip, site.recorder.duration)))
+        return replace(site, motors_opened=self.amount * self.relay.opened(site.dip, site.recorder.duration))
 
 
 @dataclass(frozen=True)
@@ -81,9 +75,9 @@ class TwoStageTrip(UndervoltageTrip):
         return {**super().details(rng, dips), "later": float(rng.uniform(0.03, 0.08))}
 
     def apply(self, site: Site) -> Site:
-        first = Relay(self.level, self.reset, self.delay, self.wait, self.ramp)
+        first = self.relay
         second = replace(first, level=self.further * self.level, delay=self.delay + self.later, wait=self.wait + 0.15)
-        return replace(site, opened=times(self.amount, together(site, (first, second))))
+        return replace(site, opened=self.amount * together(site, (first, second)))
 
 
 @dataclass(frozen=True)
@@ -94,10 +88,9 @@ class InverseTimeTrip(UndervoltageTrip):
     """
 
     def apply(self, site: Site) -> Site:
-        lowest = float(site.dip.magnitude(np.arange(0.0, site.recorder.duration, 1e-3)).min()) / site.dip.before
-        delay = 0.3 * self.delay / max(1 - lowest / self.level, 0.05)
-        relay = Relay(self.level, self.reset, delay, self.wait, self.ramp)
-        return replace(site, opened=times(self.amount, relay.opened(site.dip, site.recorder.duration)))
+        delay = 0.3 * self.delay / max(1 - lowest([site.dip]) / self.level, 0.05)
+        relay = replace(self.relay, delay=delay)
+        return replace(site, opened=self.amount * relay.opened(site.dip, site.recorder.duration))
 
 
 @dataclass(frozen=True)
@@ -109,8 +102,7 @@ class ContactorsOneByOne(UndervoltageTrip):
             Relay(self.level + 0.02 * k, self.reset + 0.01 * k, self.delay * (1 + 0.1 * k), self.wait + 0.06 * k, 0.01)
             for k in range(-2, 3)
         ]
-        opened = together(site, contactors)
-        return replace(site, opened=times(self.amount / len(contactors), opened))
+        return replace(site, opened=self.amount / len(contactors) * together(site, contactors))
 
 
 @dataclass(frozen=True)
@@ -246,9 +238,7 @@ class FleetOfConverters(Hidden):
 
     def apply(self, site: Site) -> Site:
         power, limits = self.amount * site.S.real / 5, 1.3 + self.spread * np.linspace(-1, 1, 5)
-        for limit in limits.tolist():
-            site = beside(site, Converter(power, limit=limit, filter=0.004))
-        return site
+        return beside(site, *(Converter(power, limit=limit, filter=0.004) for limit in limits.tolist()))
 
 
 @dataclass(frozen=True)
@@ -282,7 +272,7 @@ class StagedPowerLimit(Hidden):
     def apply(self, site: Site) -> Site:
         stages = [Relay(level, level + 0.03, self.delay, self.wait * k, 0.1) for k, level in enumerate(STAGES, 1)]
         profile = together(site, stages)
-        device = Staged(self.amount * site.S.real, profile=times(1 / len(stages), profile))
+        device = Staged(self.amount * site.S.real, profile=1 / len(stages) * profile)
         return replace(beside(site, device), breaks=(*site.breaks, *profile.times))
 
 
@@ -299,9 +289,8 @@ class FleetPowerLimit(Hidden):
 
     def apply(self, site: Site) -> Site:
         power, levels = self.amount * site.S.real / 5, 0.88 + self.spread * np.linspace(-1, 1, 5)
-        for full in levels.tolist():
-            site = beside(site, Converter(power, full=full, empty=full - 0.15, rest=0.2, limit=1.5, filter=0.006))
-        return site
+        alike = Converter(power, rest=0.2, limit=1.5, filter=0.006)
+        return beside(site, *(replace(alike, full=full, empty=full - 0.15) for full in levels.tolist()))
 
 
 @dataclass(frozen=True)
@@ -349,7 +338,7 @@ class FleetOfLinks(Hidden):
 
     def apply(self, site: Site) -> Site:
         power = self.amount * site.S.real / 2
-        return beside(beside(site, Link.lagging(power, self.quick)), Link.lagging(power, self.slow))
+        return beside(site, *(Link.lagging(power, lag) for lag in (self.quick, self.slow)))
 
 
 @dataclass(frozen=True)
@@ -413,7 +402,7 @@ class SwitchedCapacitors(Hidden):
     def apply(self, site: Site) -> Site:
         banks = [Relay(level, level + 0.02, self.delay, self.delay, 1e-3) for level in STAGES]
         profile = together(site, banks)
-        device = SwitchedBanks(self.amount, profile=times(1 / len(banks), profile))
+        device = SwitchedBanks(self.amount, profile=1 / len(banks) * profile)
         return replace(beside(site, device), breaks=(*site.breaks, *profile.times))
 
 

@@ -1,7 +1,7 @@
 """What the network imposes on the load, at one instant: the scalar, fast twin of `independent.Dip`."""
 
 from bisect import bisect_right
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, exp, pi, sin
 from typing import NamedTuple
 
@@ -71,6 +71,10 @@ class Profile:
             return self.values[0 if k == 0 else -1]
         share = (t - self.times[k - 1]) / (self.times[k] - self.times[k - 1])
         return self.values[k - 1] + share * (self.values[k] - self.values[k - 1])
+
+    def __rmul__(self, share: float) -> "Profile":
+        """A share of it."""
+        return replace(self, values=tuple(share * v for v in self.values))
 
     @classmethod
     def steps(cls, before: float, *changes: tuple[float, float]) -> "Profile":

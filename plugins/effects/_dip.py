@@ -2,7 +2,7 @@
 
 from tractexp.extend import sites
 
-from ._operators import gate, larger, smaller
+from ._operators import gate, ramp
 
 LEVEL, BEGUN = 0.0015, 0.96  # how sharp a level is, and the voltage over U_0 below which a dip has begun
 WIDTH = 0.02  # of a change: how rounded its corners are
@@ -27,8 +27,8 @@ def changes(eq, returned, name, sizes, wait, duration, static):
     Where `static` is 1 all but the motors change.
     """
     time = since(eq, returned, name)
-    ramp = lambda t: smaller(1, larger(0, (t - wait) / duration, WIDTH), WIDTH)  # noqa: E731
-    way = eq.define(f"changed_{name}", ramp(time) - ramp(0), "r")
+    begun, before = (ramp((t - wait) / duration, WIDTH) for t in (time, 0))
+    way = eq.define(f"changed_{name}", begun - before, "r")
     if eq.waves:
         places = ((sites.current, sites.motor_current, sizes[0]),)
     else:

@@ -13,6 +13,11 @@ def larger(a, b, width):
     return -smaller(-a, -b, width)
 
 
+def ramp(x, width, least=0):
+    """`least` up to there, x beyond, and 1 from 1 on: its corners rounded over `width`."""
+    return smaller(1, larger(least, x, width), width)
+
+
 def gate(x, width):
     """0 well below x = 0, 1 well above: a logistic step."""
     import sympy

@@ -4,7 +4,7 @@ import numpy as np
 
 from tractexp.extend import Curve, Effect, Parameter, plugin, sites
 
-from ._operators import bent, drawn, larger, smaller
+from ._operators import bent, drawn, ramp
 
 SOURCE = "EN 50388-1, limitation of current or power at low line voltage"
 KNOT, BEND = 0.5, 0.1  # of the way from full power to none
@@ -12,7 +12,7 @@ WIDTH = 0.02  # of the power: how rounded the corners are
 
 
 def _allowed(u, full, off, bend, rest):
-    return smaller(1, larger(rest, 1 - bent((full - u) / (full - off), (KNOT,), (bend,), BEND), WIDTH), WIDTH)
+    return ramp(1 - bent((full - u) / (full - off), (KNOT,), (bend,), BEND), WIDTH, rest)
 
 
 @plugin

@@ -18,7 +18,7 @@ class SaturationCurve(Effect):
 
     psi is the flux of the core, between the bus and E: 1 - a is the rotor's part of X', by which what the core
     takes changes the voltage behind X' at once, in current and torque. h has slope 1 up to a fall of c and exp(b)
-    beyond, its corner rounded over 0.08 pu²: a knee, where it flattens, or a curve that steepens. At
+    beyond, its corner rounded over 0.03 pu²: a knee, where it flattens, or a curve that steepens. At
     a = 1 and b = 0 it is `magnetic_saturation` of phasors, at k = 0 the base model.
 
     Source: saturation factors by table, Kundur 1994, ch. 3; Milano 2010, ch. 15.

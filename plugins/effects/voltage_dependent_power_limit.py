@@ -2,7 +2,7 @@
 
 from tractexp.extend import Effect, Parameter, plugin, sites
 
-from ._operators import larger, seen_late, smaller
+from ._operators import ramp, seen_late
 
 SOURCE = "EN 50388-1, limitation of current or power at low line voltage"
 WIDTH = 0.02  # of the power: how rounded the corners are
@@ -34,7 +34,7 @@ class VoltageDependentPowerLimit(Effect):
     confused_with = ("constant_power_converter", "undervoltage_trip")
 
     def edit(self, eq, limited_share, full_level, off_level, limit_delay):
-        allowed = lambda u: smaller(1, larger(0, (u - off_level) / (full_level - off_level), WIDTH), WIDTH)  # noqa: E731
+        allowed = lambda u: ramp((u - off_level) / (full_level - off_level), WIDTH)  # noqa: E731
         u = eq[sites.static_voltage]
         seen = seen_late(eq, u, limit_delay)
         power = eq.P_s0 * allowed(seen) / allowed(1) * u / seen

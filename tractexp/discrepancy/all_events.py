@@ -84,7 +84,7 @@ class AllEvents:
         """
         bench, family = self.bench, self.bench.kernels.family
         wanted = [m for m in bench.catalogue.members if family.joins(m.name)]
-        if not wanted:
+        if not (wanted and denied):
             return []
         bench.effort.say(f"trying {len(wanted)} other places and laws on all events")
         family.compile_members([m.name for m in wanted], bench.effort.say)

@@ -161,7 +161,7 @@ def with_members(made: HeldOut, both: AllEvents, seed: int) -> HeldOut:
     if bench.waves or not bench.criteria.family_p:
         return made
     denied = [f for f in made.extended.values() if len(f.names) == 1 and f.names == bench.catalogue.textbook(f.names)]
-    tried = both.members(denied, seed) if denied else []
+    tried = both.members(denied, seed)
     found = [(alone, fitted.fit) for alone, fitted in tried if fitted.confirmed(bench.criteria, doubted=True)]
     if not found:
         return made
