@@ -20,6 +20,7 @@ from tractexp.discrepancy.all_events import AllEvents
 from tractexp.discrepancy.base_fit import base_fit
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.catalogue import catalogue
+from tractexp.discrepancy.chance import scales
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.disagreement import disagreement, examined
 from tractexp.discrepancy.discrepancy_json import content, write_left, write_model
@@ -36,7 +37,7 @@ from tractexp.discrepancy.tangent import tangent
 from tractexp.errors import UserError
 from tractexp.identification import observed
 from tractexp.identification.descent import Apart, normal
-from tractexp.identification.surprises import tail
+from tractexp.identification.surprises import Scale, tail
 from tractexp.model.model import compose
 from tractexp.noise import Autoregression, white_noise
 from tractexp.noise import Noise as PowerNoise
@@ -352,6 +353,39 @@ def test_the_largest_of_many_comes_about_by_chance_as_often_as_it_says():
     assert 0.05 < np.mean(np.array(p) < 0.1) < 0.15
     assert np.mean(np.array(p) < 0.01) < 0.03
     assert 0.4 < np.mean(np.array(p) < 0.5) < 0.6
+
+
+def test_a_rare_value_of_many_is_judged_alike_by_any_draws_once_the_scales_are_exact():
+    """Exponential columns: the largest of 3000 exceeds x with 1 - (1 - exp(-x))^3000 exactly."""
+    rng = np.random.default_rng(13)
+    x = -np.log(1 - (1 - 1e-3) ** (1 / 3000))
+    value, exact = np.zeros((1, 3000)), Scale(np.ones(3000), np.ones(3000))
+    value[0, 1234] = x
+    draws = [rng.exponential(size=(199, 3000)) for _ in range(40)]
+    alike = np.array([tail(few, value, exact) for few in draws]) / 1e-3
+    own = np.array([tail(few, value) for few in draws]) / 1e-3
+    assert 0.8 < np.exp(np.log(alike).mean()) < 1.25
+    assert np.log(alike).std() < 0.7 * np.log(own).std()
+    assert np.all((alike > 0.25) & (alike < 4))
+    assert not np.all((own > 0.25) & (own < 4))
+
+
+def test_only_a_decision_that_is_open_asks_for_exact_scales(silent):
+    """p of the six tests together is moved to either side of what draws leave open."""
+    first, level = silent.first, silent.bench.criteria.adequate_p
+    bare = replace(first, chance=replace(first.chance, scales={}))
+    for p, open_ in [(level / 30, False), (level / 10, True), (level * 10, True), (level * 30, False)]:
+        moved = replace(bare)
+        moved.__dict__["left"] = {"one of six": p}
+        assert moved.undecided == open_
+    exact = replace(bare, chance=replace(bare.chance, scales=scales(first.tangent, first.noise, 3)))
+    exact.__dict__["left"] = {"one of six": level}
+    assert not exact.undecided
+    drawn = bare.chance.left
+    for name, scale in exact.chance.scales.items():
+        assert np.median(np.abs(scale.mean / drawn[name].mean(axis=0) - 1)) < 0.1
+        assert np.median(np.abs(scale.spread / drawn[name].std(axis=0) - 1)) < 0.15
+    assert set(exact.chance.scales) == {name for name, values in drawn.items() if values[0].size > 1}
 
 
 @pytest.mark.parametrize(("events", "asked"), [(1, False), (2, True)])

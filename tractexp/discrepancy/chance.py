@@ -4,21 +4,23 @@ Thresholds hold for the largest of all candidates at once, for the noise as it w
 samples are few, for the error of that estimate too: each draw then estimates its noise anew.
 """
 
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from tractexp.discrepancy.adequacy import least_p, statistics
+from tractexp.discrepancy.adequacy import channels_of, least_p, statistics
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.noise_in_quiet import QuietNoise
 from tractexp.discrepancy.projection import Projection
 from tractexp.discrepancy.tangent import Tangent, rich_residuals
-from tractexp.identification import shelf
-from tractexp.identification.surprises import SMALLEST_P, tail
+from tractexp.identification import shelf, surprises
+from tractexp.identification.surprises import SMALLEST_P, Scale, tail
 from tractexp.noise import Noise
 
 DRAWS = 199
+MORE = 10  # times as many are drawn for the scales alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +29,7 @@ class Chance:
 
     least_p: np.ndarray
     left: dict[str, np.ndarray]
+    scales: Mapping[str, Scale] = field(default_factory=dict)  # of the statistics that have exact ones
 
     def critical_p(self, alpha: float) -> float:
         """The p a single candidate must undercut so that chance names any with probability `alpha`."""
@@ -34,7 +37,8 @@ class Chance:
 
     def surprises(self, projection: Projection, bench: Bench) -> dict[str, float]:
         """How often chance leaves as much as a fit does, by each test of adequacy."""
-        return {name: tail(self.left[name], value) for name, value in statistics(projection, bench).items()}
+        found = statistics(projection, bench)
+        return {name: tail(self.left[name], value, self.scales.get(name)) for name, value in found.items()}
 
 
 def chance_at(t: Tangent, noise: Noise, quiet: QuietNoise, seed: int, plain: bool, draws: int = DRAWS) -> Chance:
@@ -51,17 +55,31 @@ def chance_at(t: Tangent, noise: Noise, quiet: QuietNoise, seed: int, plain: boo
 
     if plain or not bench.told:
         return _drawn(t, noise, quiet, seed, plain, draws)
-    fit = {field.name: getattr(t, field.name) for field in fields(t) if field.name != "bench"}
+    fit = {part.name: getattr(t, part.name) for part in fields(t) if part.name != "bench"}
     what = shelf.told("chance", bench.told, fit, noise, quiet.blur, seed, draws)
     least, names, *left = shelf.arrays("draws", what, made)
     return Chance(least, dict(zip(names.tolist(), left, strict=True)))
 
 
+def scales(t: Tangent, noise: Noise, seed: int) -> dict[str, Scale]:
+    """Scales of the statistics of which the largest counts, by many draws of noise that is taken as known.
+
+    The scale of the column that turns out largest is the one most likely to be too small. By the draws of a `Chance`
+    alone it is a tenth off, and a p of 1e-3 comes out as anything from 1e-4 to 1e-2.
+    """
+
+    def part(k: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        drawn = t.whitened(noise, _noise(t, noise, np.random.default_rng((seed, k)), DRAWS))
+        found = surprises.statistics(channels_of(drawn, t.bench), t.bench)
+        return {name: (values.mean(axis=0), (values**2).mean(axis=0)) for name, values in found.items()}
+
+    parts = each_apart(part, range(1, MORE + 1))
+    moments = {name: np.mean([p[name] for p in parts], axis=0) for name in parts[0]}
+    return {name: Scale(mean, np.sqrt(square - mean**2) + 1e-12) for name, (mean, square) in moments.items()}
+
+
 def _drawn(t: Tangent, noise: Noise, quiet: QuietNoise, seed: int, plain: bool, draws: int) -> Chance:
-    bench = t.bench
-    rng = np.random.default_rng(seed)
-    drawn = noise.draw(rng, draws, np.diff(bench.drive.first).tolist())
-    drawn *= bench.known
+    drawn = _noise(t, noise, np.random.default_rng(seed), draws)
     if plain:
         return _told(t, t.whitened(noise, drawn), noise)
     rest = rich_residuals(t, drawn)
@@ -72,6 +90,11 @@ def _drawn(t: Tangent, noise: Noise, quiet: QuietNoise, seed: int, plain: bool, 
     each = each_apart(anew, range(draws))
     left = {name: np.concatenate([one.left[name] for one in each]) for name in each[0].left}
     return Chance(np.concatenate([one.least_p for one in each]), left)
+
+
+def _noise(t: Tangent, noise: Noise, rng: np.random.Generator, draws: int) -> np.ndarray:
+    """Noise (b, C, N) [pu] where the events have samples that count."""
+    return noise.draw(rng, draws, np.diff(t.bench.drive.first).tolist()) * t.bench.known
 
 
 def noise_known(bench: Bench, noise: Noise) -> bool:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from tractexp.discrepancy.base_fit import BaseFit
 from tractexp.discrepancy.bench import Bench
-from tractexp.discrepancy.chance import Chance, chance_at, noise_known
+from tractexp.discrepancy.chance import Chance, chance_at, noise_known, scales
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.fitting import Refit, refit
 from tractexp.discrepancy.noise_in_quiet import QuietNoise
@@ -14,6 +14,7 @@ from tractexp.discrepancy.tangent import Tangent, rich_residuals, tangent
 from tractexp.noise import Noise
 
 PLAIN = 1e-10  # a score of this p needs no exact threshold
+MISSED = 20.0  # factor by which scales that are not exact may miss p
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +50,12 @@ class Disagreement:
     def adequate(self) -> bool:
         """Whether chance alone may leave as much."""
         return self.p_left >= self.criteria.adequate_p
+
+    @property
+    def undecided(self) -> bool:
+        """Whether the draws leave that open: their scales are not exact."""
+        level = self.criteria.adequate_p
+        return not self.chance.scales and level / MISSED < self.p_left < level * MISSED
 
     @property
     def loudest(self) -> str:
@@ -113,4 +120,6 @@ def examined(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int, plain: bool
     plain = plain or noise_known(bench, noise) or (bool(scores) and scores[0].p < PLAIN)
     if not plain and found.doubtful:
         found = replace(found, chance=chance_at(t, noise, quiet, seed, plain=False))
+    if found.undecided:
+        found = replace(found, chance=replace(found.chance, scales=scales(t, noise, seed)))
     return found

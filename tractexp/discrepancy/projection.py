@@ -125,7 +125,7 @@ def signed_drop(block: np.ndarray, r: np.ndarray, signs: np.ndarray) -> tuple[np
     side = r @ block.T  # (b, k)
     inverse = np.linalg.pinv(gram, rcond=1e-10, hermitian=True)
     size = -side @ inverse
-    drop = np.einsum("bi,ij,bj->b", side, inverse, side)
+    drop = -np.einsum("bi,bi->b", size, side)
     if len(signs) == 1:
         if signs[0]:
             drop = np.where(size[:, 0] * signs[0] > 0, drop, 0.0)

@@ -9,7 +9,7 @@ import functools
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -46,6 +46,17 @@ def windows(layout: Layout, event: int) -> list[tuple[float, float]]:
     return [(a, b) for a, b in itertools.pairwise(edges) if b > a]
 
 
+class Scale(NamedTuple):
+    """What columns (k,) of a statistic are measured in before the largest is taken."""
+
+    mean: np.ndarray
+    spread: np.ndarray
+
+    def largest(self, draws: np.ndarray) -> np.ndarray:
+        """The largest (b,) of draws (b, k)."""
+        return ((draws - self.mean) / self.spread).max(axis=1)
+
+
 @dataclass(frozen=True, eq=False)
 class Cell:
     """A stretch of one channel of one event, as samples of the drive and as times of the record."""
@@ -67,17 +78,20 @@ def statistics(channels: np.ndarray, layout: Layout) -> dict[str, np.ndarray]:
     }
 
 
-def tail(draws: np.ndarray, value: np.ndarray) -> float:
-    """How often a statistic is at least as large as `value`, (1,) or (1, k), given draws (b,) or (b, k)."""
+def tail(draws: np.ndarray, value: np.ndarray, scale: Scale | None = None) -> float:
+    """How often a statistic is at least as large as `value`, (1,) or (1, k), given draws (b,) or (b, k).
+
+    Of many columns the largest counts, each in its own `scale`: any is right, by default the draws' own is taken.
+    """
     from scipy.special import gammaincc
 
     if draws.ndim == 1:
         mean, variance = draws.mean(), max(draws.var(), 1e-300)
         return max(float(gammaincc(mean**2 / variance, max(value[0], 0.0) * mean / variance)), SMALLEST_P)
-    mean, spread, largest = extremes(draws)
-    scale = max(largest.std() * np.sqrt(6) / np.pi, 1e-12)
+    mean, spread, largest = extremes(draws) if scale is None else (*scale, scale.largest(draws))
+    width = max(largest.std() * np.sqrt(6) / np.pi, 1e-12)
     departure = ((value - mean) / spread).max()
-    return max(float(-np.expm1(-np.exp(-(departure - largest.mean()) / scale - np.euler_gamma))), SMALLEST_P)
+    return max(float(-np.expm1(-np.exp(-(departure - largest.mean()) / width - np.euler_gamma))), SMALLEST_P)
 
 
 def extremes(draws: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
