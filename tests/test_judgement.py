@@ -9,6 +9,7 @@ import hidden_effects_evidence as evidence
 import hidden_effects_study as study
 import marked
 import numpy as np
+import open_decisions
 import pytest
 from baselines import sparse
 
@@ -34,6 +35,14 @@ def test_the_docs_hold_what_the_stored_rows_hold(rows):
     for path in SETS:
         (frozen,) = {row["frozen"] for row in evidence.read(path)}
         assert page.count(frozen) == 2
+
+
+def test_every_open_decision_was_looked_at_again_and_the_docs_tell_what_came_of_it():
+    before, after = open_decisions.stored(), evidence.read(open_decisions.OUT)
+    assert sorted(before) == sorted(map(open_decisions.key, after))
+    page = open_decisions.DOCS.read_text(encoding="utf-8")
+    _, made, _ = marked.parted(page, open_decisions.MARK)
+    assert made.strip() == open_decisions.table(before, after)
 
 
 @pytest.mark.parametrize("path", SETS, ids=lambda path: path.stem)
