@@ -2,7 +2,7 @@
 
 import itertools
 import json
-from collections.abc import Callable, Container, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from pathlib import Path
 
 import marked
@@ -16,7 +16,7 @@ FITTED = 3  # events, where nothing else is said
 OTHERS = ("rotor_skin_effect", "stator_transients")  # orders of the model, which have no law of their own
 BINS = ((0, 20), (20, 40), (40, 80), (80, np.inf))  # of the non-centrality that the best single effect leaves
 MARK = "benchmarks/hidden_effects_study.py --docs"  # what makes the tables of missing-effects.md
-MARK_ANEW, MARK_MEMBERS = f"{MARK}, frozen anew", f"{MARK}, with more members"
+MARK_ANEW = f"{MARK}, frozen anew"
 _POWER, _STATIC = {"power", "power_P", "power_Q", "whole"}, {"static", "static_P", "static_Q"}
 RIGHT = {  # of a stranger: balances and signals of a proposal that are called right, fixed before any seed was drawn
     "load_step": (_POWER, {"step"}),
@@ -43,12 +43,17 @@ def tables(rows: Rows) -> str:
     return "\n\n".join([_all(rows), *(f"![{told}]({_path(name)})" for name, told in _figures(_usual(rows)).items())])
 
 
-def tables_members(rows: Rows) -> str:
-    """The tables of the set frozen with more members of families, Markdown: laws of members apart from others.
+def tables_later(rows: Rows, what: str) -> str:
+    """The tables of a set frozen later, Markdown, `what` is new to it in words: laws of members apart from others.
 
     Without their times: other work ran on the machine.
     """
-    return _all(rows, ", with more members", MEMBERS_LAW, timed=False)
+    return _all(rows, f", {what}", MEMBERS_LAW, timed=False)
+
+
+def mark_later(what: str) -> str:
+    """Where they stand."""
+    return f"{MARK}, {what}"
 
 
 def _all(rows: Rows, when: str = "", known: Container[str] = (), *, timed: bool = True) -> str:
@@ -92,12 +97,13 @@ def _multiples(rows: Rows) -> list[float]:
     return [m for m in (0.5, 1.0, 2.0, 4.0, 8.0) if any(r["group"] == f"{m:g} x" and reached(r, m) for r in rows)]
 
 
-def write(rows: Rows, anew: Rows, members: Rows, docs: Path) -> None:
+def write(rows: Rows, anew: Rows, later: Mapping[str, Rows], docs: Path) -> None:
     """Put the tables between the marks in missing-effects.md, and the figures into images/."""
     usual = _usual(rows)
     marked.replace(docs / "missing-effects.md", MARK, tables(rows))
     marked.replace(docs / "missing-effects.md", MARK_ANEW, tables_anew(anew))
-    marked.replace(docs / "missing-effects.md", MARK_MEMBERS, tables_members(members))
+    for what, drawn in later.items():
+        marked.replace(docs / "missing-effects.md", mark_later(what), tables_later(drawn, what))
     for name in _figures(usual):
         {"detection": _draw_detection, "confusion": _draw_confusion}[name](usual, docs / _path(name))
 

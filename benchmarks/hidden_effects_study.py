@@ -42,7 +42,10 @@ PAIRED, LARGE = (2.0, 4.0), (2.0, 4.0, 8.0)  # multiples of the detection limit
 FROZEN = ("tractexp", "plugins", "benchmarks/hidden_effects", "benchmarks/independent")  # what judges and is judged
 ROOT, JUDGEMENT = Path(__file__).parents[1], Path(__file__).with_name("judgement.jsonl")
 ANEW = JUDGEMENT.with_name("judgement_anew.jsonl")  # nulls of a commit with mends that the first set led to
-MEMBERS = JUDGEMENT.with_name("judgement_members.jsonl")  # of a commit with more members of families, and all sizes
+LATER = {  # sets of later commits, by what is new to them
+    "with more members": JUDGEMENT.with_name("judgement_members.jsonl"),  # of families, and all sizes
+    "ten of each": JUDGEMENT.with_name("judgement_ten.jsonl"),  # with exact scales of open decisions
+}
 KNOWN = {"rotor_skin_effect": "second_cage", "stator_transients": "stator_transients"}  # the catalogue has them, too
 HIDDEN = {  # one effect is hidden: group of trials, multiples, effects
     "single": ("", cases.MULTIPLES, (*CATALOG, *KNOWN)),
@@ -246,7 +249,8 @@ def main() -> None:
     chosen = parser.parse_args()
     out = chosen.out or (JUDGEMENT if chosen.frozen else Path("outputs/hidden_effects.jsonl"))
     if chosen.docs:
-        evidence.write(*map(evidence.read, (JUDGEMENT, ANEW, MEMBERS)), ROOT / "docs")
+        later = {what: evidence.read(path) for what, path in LATER.items()}
+        evidence.write(evidence.read(JUDGEMENT), evidence.read(ANEW), later, ROOT / "docs")
         return
     from joblib import Parallel, delayed
 

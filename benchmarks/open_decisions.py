@@ -54,7 +54,7 @@ def judged(row: dict) -> str:
 
 def stored() -> dict[tuple, dict]:
     """The open data sets as they were decided."""
-    return {key(row): row for row in evidence.read(study.MEMBERS) if is_open(row)}
+    return {key(row): row for row in evidence.read(study.LATER["with more members"]) if is_open(row)}
 
 
 def table(before: dict[tuple, dict], after: list[dict]) -> str:

@@ -16,7 +16,7 @@ from baselines import sparse
 from hidden_effects import OUTSIDE
 from tractexp.discrepancy.criteria import Criteria
 
-SETS = (study.JUDGEMENT, study.ANEW, study.MEMBERS)
+SETS = (study.JUDGEMENT, study.ANEW, *study.LATER.values())
 
 
 @pytest.fixture(scope="module")
@@ -30,8 +30,9 @@ def test_the_docs_hold_what_the_stored_rows_hold(rows):
     assert made.strip() == evidence.tables(rows)
     _, made, _ = marked.parted(page, evidence.MARK_ANEW)
     assert made.strip() == evidence.tables_anew(evidence.read(study.ANEW))
-    _, made, _ = marked.parted(page, evidence.MARK_MEMBERS)
-    assert made.strip() == evidence.tables_members(evidence.read(study.MEMBERS))
+    for what, path in study.LATER.items():
+        _, made, _ = marked.parted(page, evidence.mark_later(what))
+        assert made.strip() == evidence.tables_later(evidence.read(path), what)
     for path in SETS:
         (frozen,) = {row["frozen"] for row in evidence.read(path)}
         assert page.count(frozen) == 2
