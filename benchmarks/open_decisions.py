@@ -9,6 +9,7 @@ they were: their draws are the same. Rows are appended to open_decisions.jsonl, 
 """
 
 import argparse
+import itertools
 import json
 from collections import Counter
 from pathlib import Path
@@ -81,17 +82,12 @@ def main() -> None:
         return
     (frozen,) = {r["frozen"] for r in before.values()}
     (total,) = {r["events"] for r in before.values()}
-    drawn = study.planned(study.SUITES, MOST, int(frozen[:12], 16), cases.MULTIPLES, total)
     missing = set(before) - {key(r) for r in rows}
-    jobs = []
-    for group, trial in drawn:
-        if (group, trial.label, trial.seed) in missing:
-            jobs.append((group, trial))
-            missing -= {(group, trial.label, trial.seed)}
-        if not missing:
-            break
-    if missing:
-        raise SystemExit(f"{len(missing)} data sets are not among the first {MOST} of their rows: {sorted(missing)[0]}")
+    drawn = study.planned(study.SUITES, MOST, int(frozen[:12], 16), cases.MULTIPLES, total)
+    wanted = ((group, trial) for group, trial in drawn if (group, trial.label, trial.seed) in missing)
+    jobs = list(itertools.islice(wanted, len(missing)))
+    if left := len(missing) - len(jobs):
+        raise SystemExit(f"{left} of {len(missing)} data sets are not among the first {MOST} of their rows")
     held = before[next(iter(before))]["held"]
     with OUT.open("a", encoding="utf-8") as file:
         calls = (delayed(study.run)(group, trial, total, held) for group, trial in jobs)
