@@ -13,7 +13,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import argparse
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -147,8 +147,11 @@ def bound(load, events, truth: np.ndarray, deviation: float, correlation: float)
     return Information.of(NAMES, truth, problem.upper - problem.lower, J[:, :d], J[:, d:])
 
 
-def coverage_record(seed: int) -> dict:
-    """One truth and one dip under each condition: estimates, errors and intervals."""
+def coverage_record(seed: int, only: Sequence[str] = tuple(CONDITIONS)) -> dict:
+    """One truth and one dip under each condition: estimates, errors and intervals; of `only` these conditions.
+
+    Noise is drawn for every condition, so that a row is the same whatever is asked for beside it.
+    """
     rng = np.random.default_rng([11, seed])
     load, truth = model(), draw(rng)
     t, U = Shape(rng.uniform(0.4, 0.65), rng.uniform(0.12, 0.25)).voltage()
@@ -156,6 +159,8 @@ def coverage_record(seed: int) -> dict:
     rows = {}
     for label, (deviation, correlation) in CONDITIONS.items():
         events = [event(t, U, clean + noise(rng, len(t), deviation, correlation))]
+        if label not in only:
+            continue
         limit = bound(load, events, truth, deviation, correlation).standard_errors
         found, known = identified(load, events, seed)
         rows[label] = {

@@ -251,19 +251,12 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
     """30 records under two kinds of noise; the full study is benchmarks/uncertainty.py."""
     inside, off = [], []
     for seed in range(15):
-        for label in ("white 0.2 %", "AR(1) 0.2 %"):
-            row = SHORT(seed)[label]
+        for row in study.coverage_record(seed, ("white 0.2 %", "AR(1) 0.2 %")).values():
             inside.append(row["inside"])
             off.append(row["likely"])
     n = np.size(inside)
     assert abs(np.mean(inside) - 0.95) < 4 * np.sqrt(0.95 * 0.05 / n)
     assert np.sqrt(np.mean(np.square(off))) < 1.1
-
-
-def SHORT(seed, kept={}):  # noqa: B006 - a cache
-    if seed not in kept:
-        kept[seed] = study.coverage_record(seed)
-    return kept[seed]
 
 
 def test_an_interval_that_reaches_past_the_bounds_says_so():
