@@ -524,3 +524,30 @@ def test_measurement_effects_see_each_event_by_itself():
         together = model(name).simulate(Drive.of([dip(0.3), dip(0.6)]), on)
         alone = model(name).simulate(Drive.of([dip(0.6)]), on)
         assert np.array_equal(together.P[:, -alone.P.shape[1] :], alone.P)
+
+
+# members of families
+
+
+def test_heating_comes_back_to_its_heat_and_is_too_much_when_the_voltage_returns():
+    """At u = 0.9 all the heat is back; before the limit is near it is the textbook's integral of what is missing."""
+    t = np.arange(3000) * 1e-3
+    excitation = event(1 - 0.1 * np.clip((t - 0.1) / 0.02, 0, 1) + 0.1 * np.clip((t - 2.5) / 0.02, 0, 1))
+    size = {"heating_share": 0.5, "heating_time": 0.2, "heating_most": 1.5}
+    P, Q = run("thermostatic_load", excitation, values("thermostatic_load", **size))
+    (on,) = solved(excitation, lambda u, g: (1 - g * u**2) / 0.2, [1.0])
+    share = 0.5 * (P0 - T_M)
+    heat = share * (on * excitation.U**2 - excitation.U**P_V)
+    assert pytest.approx(heat, abs=1e-8) == P - base(excitation)[0]
+    assert pytest.approx(base(excitation)[1], abs=1e-12) == Q
+    assert on[2400] * 0.9**2 == pytest.approx(1.0, abs=1e-4)
+    assert on[2530] > 1.2
+
+
+def test_heating_stays_short_where_all_of_it_is_on():
+    t = np.arange(3000) * 1e-3
+    excitation = event(1 - 0.4 * np.clip((t - 0.1) / 0.02, 0, 1))
+    size = {"heating_share": 0.5, "heating_time": 0.2, "heating_most": 1.5}
+    P, _ = run("thermostatic_load", excitation, values("thermostatic_load", **size))
+    drawn = 0.5 * (P0 - T_M) * (1.5 * 0.6**2 - 0.6**P_V)
+    assert (P - base(excitation)[0])[-1] == pytest.approx(drawn, rel=0.01)
