@@ -551,3 +551,24 @@ def test_heating_stays_short_where_all_of_it_is_on():
     P, _ = run("thermostatic_load", excitation, values("thermostatic_load", **size))
     drawn = 0.5 * (P0 - T_M) * (1.5 * 0.6**2 - 0.6**P_V)
     assert (P - base(excitation)[0])[-1] == pytest.approx(drawn, rel=0.01)
+
+
+def banks(low):
+    """What banks at 0.9, 0.8 and 0.7 give over b u^2 in a dip to `low`, which ends at 270 ms."""
+    excitation = dip(1 - low, length=0.6)
+    size = {"bank_rating": 0.3, "bank_first": 0.9, "bank_last": 0.7, "bank_delay": 0.03, "bank_wait": 0.05}
+    Q = run("switched_banks", excitation, values("switched_banks", **size))[1] - base(excitation)[1]
+    return -Q / (0.3 * excitation.U**2)
+
+
+@pytest.mark.parametrize(("low", "inside"), [(0.95, 0), (0.85, 1), (0.75, 2), (0.5, 3)])
+def test_as_many_banks_are_in_as_levels_are_passed(low, inside):
+    given = banks(low)
+    assert pytest.approx(0.0, abs=1e-3) == given[:130]
+    assert pytest.approx(inside / 3, abs=1e-3) == given[170:245]
+    assert pytest.approx(0.0, abs=1e-3) == given[340:]
+
+
+def test_banks_go_in_one_after_the_other():
+    given = banks(0.5)  # below 0.9, 0.8 and 0.7 at 104, 108 and 112 ms
+    assert [given[k] for k in (136, 140, 144)] == pytest.approx([1 / 3, 2 / 3, 1.0], abs=0.05)

@@ -27,3 +27,14 @@ def opened(eq, level, delay, wait, margin, ramp, stage=""):
     left = sympy.Max(0, tripped - returns * eq.step / (ramp + eq.step))
     eq.renews(tripped, left + (1 - left) * goes, 0)
     return tripped
+
+
+def stages(eq, first, last, delay, waits, margin, ramp, name):
+    """How much is open of equal stages, 0 to 1: relays with levels evenly from `first` to `last`, one for each of
+    `waits`, as `opened` has them. `name` begins the ends of the names of their states.
+    """
+    steps = len(waits) - 1
+    return sum(
+        opened(eq, first + (last - first) * k / steps, delay, wait, margin, ramp, f"_{name}{k + 1}")
+        for k, wait in enumerate(waits)
+    ) / (steps + 1)
