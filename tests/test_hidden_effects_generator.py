@@ -29,6 +29,7 @@ from hidden_effects import (
 )
 from hidden_effects.controls import (
     CurrentControlled,
+    DeadBand,
     InputFilter,
     Ramped,
     Rectifier,
@@ -36,6 +37,7 @@ from hidden_effects.controls import (
     SusceptanceControl,
     SynchronousMotor,
     Thermostat,
+    TwoPaces,
     VoltageLink,
 )
 from hidden_effects.devices import Converter, Inrush, Link, Statcom
@@ -503,6 +505,29 @@ def test_a_resistance_ends_an_inrush_sooner():
     excess = lambda x: max(np.cos(x) + 0.7 - 1.15, 0.0)  # noqa: E731
     mean = quad(excess, -np.pi, np.pi, limit=200)[0] / (2 * np.pi)
     assert plain[1][0] - braked[1][0] == pytest.approx(20 * mean, rel=1e-6)
+
+
+def test_a_load_of_two_paces_is_of_constant_current_in_the_end():
+    device = TwoPaces(0.4)
+    current, rates = device.flow(steady(), 0.5 + 0j, [0j, 0j])
+    assert current == pytest.approx(0.4 * 0.5**2 / 0.5)  # at once it is an impedance
+    assert rates[0] / rates[1] == pytest.approx(10.0)  # ten times as soon
+    ended = [(0.5 - 0.25) / 2 + 0j] * 2
+    current, rates = device.flow(steady(), 0.5 + 0j, ended)
+    assert current == pytest.approx(0.4)
+    assert rates == [0, 0]
+
+
+def test_a_compensator_with_a_dead_band_sleeps_in_it_and_moves_no_faster_than_its_rate():
+    device = DeadBand(0.2, band=0.08, gain=5.0, rate=10.0)
+    assert device.flow(steady(), 0.95 + 0j, [0j]) == (0, [0])
+    _, (fast,) = device.flow(steady(), 0.6 + 0j, [0j])
+    assert fast == 10.0
+    current, (rest,) = device.flow(steady(), 0.88 + 0j, [0.2 + 0j])
+    assert rest == pytest.approx(0.0, abs=1e-12)  # 5 x 0.04 of its rating
+    assert current == pytest.approx(0.04j)
+    _, (back,) = device.flow(steady(), 1.2 + 0j, [0j])
+    assert back < 0
 
 
 def test_every_effect_but_circuits_and_definitions_has_two_laws_of_others():

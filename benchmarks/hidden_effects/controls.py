@@ -4,7 +4,7 @@ Interfaces, units and signs are those of `devices`. u is the voltage over that b
 """
 
 from dataclasses import dataclass, field, replace
-from math import asin, cos, pi, sin, sqrt
+from math import asin, copysign, cos, pi, sin, sqrt
 
 from hidden_effects.devices import Device, Inrush, drawn
 from hidden_effects.supply import Moment, Profile
@@ -192,6 +192,31 @@ class SusceptanceControl(Device):
 
 
 @dataclass(frozen=True)
+class DeadBand(Device):
+    """A compensator of current that sleeps within a band of the voltage and moves no faster than its rate.
+
+    Of the rating: i' = (K (|1 - u| - band)_+ sign(1 - u) - i)/T, within -1..1 and no faster than `rate`. Source:
+    generic; dead bands and limited rates are usual in such regulators.
+    """
+
+    rating: float  # pu of current
+    band: float = 0.08
+    gain: float = 6.0
+    lag: float = 0.02  # s
+    rate: float = 10.0  # 1/s
+    V0: float = 1.0
+
+    def settled(self, V: complex) -> tuple["DeadBand", list[complex]]:
+        return replace(self, V0=abs(V)), [0j]
+
+    def flow(self, now: Moment, V: complex, x: list[complex]) -> tuple[complex, list[complex]]:
+        off, i = 1 - abs(V) / self.V0, x[0].real
+        aim = copysign(min(1.0, self.gain * max(0.0, abs(off) - self.band)), off)
+        moves = max(-self.rate, min(self.rate, (aim - i) / self.lag))
+        return 1j * self.rating * i * V / abs(V), [moves]
+
+
+@dataclass(frozen=True)
 class SwitchedBanks(Device):
     """Capacitor banks that relays switch in and out: `profile` of the susceptance `b` [pu] is in."""
 
@@ -218,6 +243,25 @@ class Thermostat(Rated):
         u, g = abs(V) / self.V0, x[0].real
         moves = (1 - g * u**2) / self.pace
         return drawn(complex(self.power * g * u**2), V), [0.0 if g >= 1.5 and moves > 0 else moves]
+
+
+@dataclass(frozen=True)
+class TwoPaces(Rated):
+    """Load that falls with u^2 and comes back to a constant current, half of it soon and half of it late.
+
+    P = u^2 + x + y, T x' = (u - u^2)/2 - x and likewise y. Source: two loads of Karlsson and Hill 1994 side by side.
+    """
+
+    soon: float = 0.1  # s
+    late: float = 1.0  # s
+
+    def rest(self) -> list[complex]:
+        return [0j, 0j]
+
+    def flow(self, now: Moment, V: complex, x: list[complex]) -> tuple[complex, list[complex]]:
+        u = abs(V) / self.V0
+        rates: list[complex] = [((u - u**2) / 2 - y) / T for y, T in zip(x, (self.soon, self.late), strict=True)]
+        return drawn(complex(self.power * (u**2 + sum(y.real for y in x))), V), rates
 
 
 @dataclass(frozen=True)

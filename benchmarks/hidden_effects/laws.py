@@ -13,6 +13,7 @@ import numpy as np
 
 from hidden_effects.controls import (
     CurrentControlled,
+    DeadBand,
     InputFilter,
     Ramped,
     Rectifier,
@@ -23,6 +24,7 @@ from hidden_effects.controls import (
     SynchronousMotor,
     Tapped,
     Thermostat,
+    TwoPaces,
     VoltageLink,
 )
 from hidden_effects.devices import Converter, Inrush, Link
@@ -448,6 +450,38 @@ class TapRecovery(Hidden):
 
 
 @dataclass(frozen=True)
+class RecoveryAtTwoPaces(Hidden):
+    """Load that comes back to its current, some of it soon, such as drives, and some of it late, such as processes."""
+
+    reference, largest, unit = 0.3, 0.9, "1"
+    soon: float = 0.1
+    late: float = 1.0
+
+    @classmethod
+    def details(cls, rng: np.random.Generator, dips: Sequence[Dip]) -> dict[str, float]:
+        return {"soon": float(rng.uniform(0.05, 0.15)), "late": float(rng.uniform(0.6, 1.5))}
+
+    def apply(self, site: Site) -> Site:
+        return beside(site, TwoPaces(self.amount * site.S.real, soon=self.soon, late=self.late))
+
+
+@dataclass(frozen=True)
+class DeadBandCompensator(Hidden):
+    """A compensator that does nothing within a band of the voltage and whose current changes slowly."""
+
+    reference, largest, unit = 0.05, 1.0, "pu"
+    band: float = 0.08
+    rate: float = 10.0
+
+    @classmethod
+    def details(cls, rng: np.random.Generator, dips: Sequence[Dip]) -> dict[str, float]:
+        return {"band": float(rng.uniform(0.04, 0.12)), "rate": float(rng.uniform(5.0, 20.0))}
+
+    def apply(self, site: Site) -> Site:
+        return beside(site, DeadBand(self.amount, band=self.band, rate=self.rate))
+
+
+@dataclass(frozen=True)
 class InrushWithResistance(Hidden):
     """Cores driven into saturation, whose offset the current's own resistance drives back, fast at first."""
 
@@ -500,8 +534,10 @@ LAWS = {
     "synchronous_swing": SynchronousSwing,
     "integral_compensator": IntegralCompensator,
     "switched_capacitors": SwitchedCapacitors,
+    "dead_band_compensator": DeadBandCompensator,
     "thermostat_recovery": ThermostatRecovery,
     "tap_recovery": TapRecovery,
+    "recovery_at_two_paces": RecoveryAtTwoPaces,
     "inrush_with_resistance": InrushWithResistance,
     "inrush_by_instant": InrushByInstant,
 }
@@ -531,8 +567,10 @@ FAMILY = {
     "synchronous_swing": "low_frequency_oscillation",
     "integral_compensator": "static_var_compensator",
     "switched_capacitors": "static_var_compensator",
+    "dead_band_compensator": "static_var_compensator",
     "thermostat_recovery": "exponential_recovery",
     "tap_recovery": "exponential_recovery",
+    "recovery_at_two_paces": "exponential_recovery",
     "inrush_with_resistance": "transformer_inrush",
     "inrush_by_instant": "transformer_inrush",
 }
@@ -544,4 +582,6 @@ MEMBERS_LAW = {  # hidden laws that members of families were built to tell: by o
     "rectified_power": "rectifier",
     "delayed_power_limit": "power_limit_curve",
     "ramped_return": "ramped_current",
+    "thermostat_recovery": "thermostatic_load",
+    "switched_capacitors": "switched_banks",
 }
