@@ -79,9 +79,14 @@ class Disagreement:
         return bool(self.scores) and self.scores[0].p < level
 
     @property
+    def suffices(self) -> bool:
+        """Whether this fit leaves nothing, and no further effect helps."""
+        return self.adequate and not self.asks_for_more
+
+    @property
     def doubtful(self) -> bool:
         """Whether anything says that more is missing."""
-        return self.asks_for_more or not self.adequate or bool(self.faults)
+        return not self.suffices or bool(self.faults)
 
     @functools.cached_property
     def faults(self) -> tuple[str, ...]:

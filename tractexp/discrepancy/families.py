@@ -1,7 +1,8 @@
 """Members of families: the kind of a textbook effect at another place, or its place with another law.
 
-They are tried only where the best single textbook effect leaves something. A member must explain more than that beyond
-what its further parameters cost, and leave nothing.
+All are tried where the best single textbook effect leaves something; where it does not, those of other families whose
+own textbook effect comes near it, for the wrong formula may suffice where the right one has another law. A member must
+explain more than the best textbook effect beyond what its further parameters cost, and leave nothing.
 """
 
 import itertools
@@ -18,6 +19,7 @@ from tractexp.discrepancy.fitting import Refit, Start, off_walls, wide_refits
 
 NEAREST = 4  # members that are searched to the end
 EXAMINED = 3  # members whose remainder is tested
+NEAR = 0.5  # of what the best effect explains: a family whose textbook effect explains as much may hold the truth
 BEGUN = 0.5  # smallest relevant sizes at which a size without a textbook value starts
 
 Names = tuple[str, ...]
@@ -26,12 +28,12 @@ Names = tuple[str, ...]
 def member_that_suffices(
     base: BaseFit, tests: Disagreement, refits: Mapping[Names, Refit], seed: int
 ) -> tuple[Disagreement, list[Refit]] | None:
-    """The tests at the best member that leaves nothing where `tests` of the best textbook effect leave something.
+    """The tests at the best member that leaves nothing and explains more than the best textbook effect of `tests`.
 
-    With the fits of the members that were compared; None where no member suffices.
+    With the fits of the members that were compared; None where there is no such member.
     """
     bench, noise = base.bench, tests.noise
-    wanted = bench.catalogue.members
+    wanted = near(bench, tests.fit, refits) if tests.suffices else bench.catalogue.members
     if not wanted:
         return None
     bench.effort.say(f"trying {len(wanted)} other places and laws")
@@ -42,9 +44,17 @@ def member_that_suffices(
             continue
         bench.kernels.family.compile_members(fit.names, bench.effort.say, whole=True)
         there = examined(base.quiet, fit, noise, seed + k)
-        if there.adequate and not there.asks_for_more:
+        if there.suffices:
             return there, [there.fit, *(f for f in fits if f is not fit)]
     return None
+
+
+def near(bench: Bench, best: Refit, refits: Mapping[Names, Refit]) -> list[Candidate]:
+    """Members of families whose textbook effect comes near the best single one, that one's own left out."""
+    bare = refits[()].deviance
+    least = bare - NEAR * (bare - best.deviance)
+    families = {f.names[0] for f in refits.values() if len(f.names) == 1 and f.deviance < least} - {*best.names}
+    return [m for m in bench.catalogue.members if m.effect.family in families] if len(best.names) == 1 else []
 
 
 def worth(member: Refit, textbook: Refit, p: float) -> bool:

@@ -69,18 +69,19 @@ def rough_refit(bench: Bench, noise: Noise, wanted: Sequence[Start]) -> list[Ref
 
 
 def wide_refit(
-    bench: Bench, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None = None
+    bench: Bench, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None = None, again: int = AGAIN
 ) -> list[Refit]:  # fmt: skip
     """As `refit`, for one set whose thresholds and times have hardly a slope: moved far and descended in turn.
 
-    A descent walks a relay's time by a sample a step, and a wrong time bends what else is fitted.
+    A descent walks a relay's time by a sample a step, and a wrong time bends what else is fitted. Around the best it is
+    begun `again` so often.
     """
     fits = _in_turns(bench, noise, wanted, faults)
-    for _ in range(AGAIN if bench.coordinates.settings(fits[0].names) else 0):
-        again = _in_turns(bench, noise, scattered(bench, fits[0]), faults)
-        if again[0].deviance > fits[0].deviance - WORTH:
+    for _ in range(again if bench.coordinates.settings(fits[0].names) else 0):
+        others = _in_turns(bench, noise, scattered(bench, fits[0]), faults)
+        if others[0].deviance > fits[0].deviance - WORTH:
             break
-        fits = again
+        fits = others
     return refit(bench, noise, [(f.names, f.unit) for f in fits if f.cost < fits[0].cost + CLOSE], faults)
 
 

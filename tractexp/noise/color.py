@@ -42,6 +42,8 @@ class Autoregression:
 
         A gap ends the memory: the samples after it are predicted from fewer predecessors.
         """
+        if self.white:
+            return np.where(known, rows, 0.0) / self.deviation[0]
         history = np.minimum(_run_lengths(known), self.order)
         white = np.zeros_like(rows)
         for k in range(self.order + 1):

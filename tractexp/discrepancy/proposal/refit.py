@@ -22,6 +22,7 @@ ROUNDS, FINER = 3, (-0.75, -0.5, -0.25, 0.25, 0.5, 0.75)  # of the zoom; of the 
 CLOSE = 0.05  # of what the best explains: the terms that are fitted exactly
 EXACT = 6  # of them at most
 PEAKS, PROMISING = 3, 0.7  # settings of one term, and how good the further ones are of the best
+ROUND_ABOUT = 1  # how often the best term is begun anew around its fit
 REGRIDDED = 3  # terms whose grid is searched anew where the base model is that of their refit
 MOVED = 2  # terms whose signal is tried in the other balances, too
 MIDDLE = 0.5  # of its range: where what rests on a bound starts again
@@ -122,20 +123,24 @@ def fitted(screened: Screened, valleys: Sequence[np.ndarray]) -> Fitted:
     others = [*off_walls(bench, ground.unit, MIDDLE), *valleys]
     again = _starts(bench, [f for f in chosen if f.term.name in best], others)
     fits = best_of([*fits, *(rough_refit(bench, noise, again) if again else [])])
-    fits = _searched_anew(bench, noise, fits)
+    fits = _searched_anew(bench, noise, fits, REGRIDDED)
     moved = [start for f in fits[:MOVED] for start in elsewhere(bench, noise, f)]
-    fits = _searched_anew(bench, noise, best_of([*fits, *(rough_refit(bench, noise, moved) if moved else [])]))
+    fits = best_of([*fits, *(rough_refit(bench, noise, moved) if moved else [])])
+    fits = _searched_anew(bench, noise, fits, 1, scattered=True)
     near = fits[0].cost + max(CLOSE * (bare.deviance - fits[0].deviance), 20.0)
     exact = {f.names: f for f in refit(bench, noise, [(f.names, f.unit) for f in fits[:EXACT] if f.cost <= near])}
     ranked = sorted((exact.get(f.names, f) for f in fits), key=lambda f: f.cost)
     return Fitted(bench, noise, bare, tuple(ranked))
 
 
-def _searched_anew(bench: Bench, noise: Noise, fits: Sequence[Refit]) -> list[Refit]:
+def _searched_anew(
+    bench: Bench, noise: Noise, fits: Sequence[Refit], most: int, *, scattered: bool = False
+) -> list[Refit]:  # fmt: skip
     """The fits, with the shapes of the best terms searched over their grids and moved across their ranges."""
-    shaped = [f for f in fits[:REGRIDDED] if term(f.names[0]).signal.shapes]
+    shaped = [f for f in fits[:most] if term(f.names[0]).signal.shapes]
     begun = [[regridded(bench, noise, f), (f.names, f.unit)] for f in shaped]
-    return best_of([*fits, *(better for starts in begun for better in wide_refit(bench, noise, starts))])
+    again = ROUND_ABOUT if scattered else 0
+    return best_of([*fits, *(f for starts in begun for f in wide_refit(bench, noise, starts, again=again))])
 
 
 def siblings(of: Term) -> list[Term]:
