@@ -39,6 +39,10 @@ class Refit:
         return self.deviance + 2 * self.parameters
 
 
+def _cost(fit: Refit) -> float:
+    return fit.cost
+
+
 def best_of(fits: Iterable[Refit]) -> list[Refit]:
     """The best fit of each set, in order of cost."""
     best: dict[tuple[str, ...], Refit] = {}
@@ -86,14 +90,17 @@ def wide_refit(
 
 
 def _in_turns(bench: Bench, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None) -> list[Refit]:
-    """The best of these starts, moved and descended in turn until that gains nothing; the best first."""
-    fits = sorted(_descended(bench, noise, wanted, faults, (FIRST, ROUGH[1])), key=lambda f: f.cost)[:KEPT]
+    """The best of these starts, moved and descended in turn until none gains that may end best; the best first."""
+    fits = sorted(_descended(bench, noise, wanted, faults, (FIRST, ROUGH[1])), key=_cost)[:KEPT]
     for _ in range(TURNS):
         moved = [(f.names, moved_across(bench, noise, f, faults)) for f in fits]
-        better = sorted(_descended(bench, noise, moved, faults, ROUGH), key=lambda f: f.cost)
-        if better[0].deviance > fits[0].deviance - WORTH:
+        ended = _descended(bench, noise, moved, faults, ROUGH)
+        best = min(f.deviance for f in (*fits, *ended))
+        gains = [before.deviance - after.deviance for before, after in zip(fits, ended, strict=True)]
+        promising = [gain > max(WORTH, f.deviance - best) for gain, f in zip(gains, ended, strict=True)]
+        fits = sorted((min(pair, key=lambda f: f.deviance) for pair in zip(fits, ended, strict=True)), key=_cost)
+        if not any(promising):
             break
-        fits = better
     return fits
 
 
