@@ -1,6 +1,7 @@
 """Families of effects: another place or another law is named where the catalogue's leaves something, and only there."""
 
 import json
+from types import SimpleNamespace
 
 import families as benchmark
 import marked
@@ -8,9 +9,10 @@ import numpy as np
 import pytest
 from test_discrepancy import LOUD, base, bench, events
 
-from tractexp.discrepancy import all_events, families
+from tractexp.discrepancy import all_events, families, fitting
 from tractexp.discrepancy.catalogue import catalogue
-from tractexp.discrepancy.families import open_settings, starts, worth
+from tractexp.discrepancy.explanations import worth_another
+from tractexp.discrepancy.families import member_that_suffices, near, open_settings, starts, worth
 from tractexp.discrepancy.fitting import Refit, scattered
 from tractexp.discrepancy.forms import forms
 from tractexp.discrepancy.investigate import investigate
@@ -75,6 +77,8 @@ def test_a_trip_of_the_static_load_alone_is_told_by_its_family_and_its_place():
         ("delayed_power_limit", 1.5, 820034, "power_limit_curve"),
         ("ramped_return", 2.0, 820034, "ramped_current"),
         ("rectified_power", 1.5, 820043, "rectifier"),
+        ("thermostat_recovery", 2.0, 820061, "thermostatic_load"),
+        ("switched_capacitors", 2.0, 820064, "switched_banks"),
     ],
 )
 def test_a_law_that_the_textbook_has_not_is_told_by_its_family(hidden, size, seed, member):
@@ -84,6 +88,70 @@ def test_a_law_that_the_textbook_has_not_is_told_by_its_family(hidden, size, see
     (form,) = forms(made)
     assert (form.name, form.effect.name) == (textbook, member)
     assert made.validate.closed > 0.9
+
+
+def test_members_of_other_families_that_come_near_are_tried_beside_a_name_that_suffices():
+    """A compensator may suffice where a saturation has another law: only families near it, and never its own."""
+    at = bench(base(), events(), ("magnetic_saturation", "static_var_compensator", "undervoltage_trip"))
+    refits = {
+        f.names: f
+        for f in (
+            fit(1000.0, 0),
+            fit(100.0, 4, "static_var_compensator"),
+            fit(500.0, 1, "magnetic_saturation"),
+            fit(600.0, 6, "undervoltage_trip"),
+        )
+    }
+    best = refits["static_var_compensator",]
+    assert {m.name for m in near(at, best, refits)} == {"saturation_curve"}  # 500 of 900, and 400 of 900
+    assert not near(at, fit(90.0, 5, "magnetic_saturation", "static_var_compensator"), refits)
+
+
+@pytest.mark.parametrize(("better", "named"), [(60.0, True), (99.0, False)])
+def test_a_name_that_suffices_gives_way_to_a_member_that_explains_more_and_leaves_nothing(monkeypatch, better, named):
+    at = bench(base(), events(), ("magnetic_saturation", "static_var_compensator"))
+    refits = {f.names: f for f in (fit(1000.0, 0), fit(100.0, 4, "static_var_compensator"))}
+    refits["magnetic_saturation",] = fit(400.0, 1, "magnetic_saturation")
+    told = SimpleNamespace(fit=refits["static_var_compensator",], noise=None, suffices=True)
+    member = fit(better, 4, "saturation_curve")
+    monkeypatch.setattr(families, "starts", lambda *_: [])
+    monkeypatch.setattr(families, "wide_refits", lambda *_: [member])
+    monkeypatch.setattr(families, "examined", lambda quiet, fit, *_: SimpleNamespace(fit=fit, suffices=True))
+    found = member_that_suffices(SimpleNamespace(bench=at, quiet=None), told, refits, 0)
+    assert (found is not None and found[0].fit is member) == named
+
+
+@pytest.mark.parametrize(
+    ("names", "explained", "another"),
+    [
+        ((), 0.0, True),
+        (("a",), 0.1, True),
+        (("a", "b"), 0.79, False),
+        (("a", "b"), 0.81, True),
+        (("a", "b", "c"), 1.0, False),
+    ],
+)
+def test_a_third_effect_is_tried_where_two_explain_most(names, explained, another):
+    """Of 1,000 that exceed the noise of 600 samples."""
+    first = SimpleNamespace(fit=fit(1600.0, 0), bench=SimpleNamespace(samples=600))
+    assert worth_another(first, SimpleNamespace(fit=fit(1600.0 - 1000 * explained, len(names), *names))) == another
+
+
+def test_a_start_that_may_overtake_the_best_is_searched_on(monkeypatch):
+    """The best of them gains nothing; the other falls by 30 a turn, from 50 behind."""
+    at = SimpleNamespace(coordinates=None)
+    ways = {"still": [100.0] * 9, "falls": [150.0, 120.0, 90.0, 60.0, 60.0]}
+    turns = []
+
+    def descended(bench, noise, wanted, *_):
+        turns.append(len(wanted))
+        return [Refit(names, unit, ways[names[0]][len(turns) - 1], 0) for names, unit in wanted]
+
+    monkeypatch.setattr(fitting, "_descended", descended)
+    monkeypatch.setattr(fitting, "moved_across", lambda bench, noise, fit, faults: fit.unit)
+    ended = fitting._in_turns(at, None, [(("still",), np.zeros(1)), (("falls",), np.zeros(1))], None)
+    assert (ended[0].names, ended[0].deviance) == (("falls",), 60.0)
+    assert len(turns) == 1 + fitting.TURNS
 
 
 def test_a_second_stage_that_the_fitted_dips_do_not_show_is_found_in_all_events(monkeypatch):
