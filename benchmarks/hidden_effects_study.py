@@ -179,7 +179,8 @@ def _compared(found, trial: cases.Trial) -> dict:
         without = _powers(replace(made, effects=()).records())
         N = found.bench.drive.samples
         change = (clean - without)[:, :N]
-        projection = found.first.tangent.whitened(found.first.noise, -change[None])
+        first = found.first
+        projection = first.projection.of(found.bench.whiten(first.noise, -change[None]))
         row |= {"lambda": float(projection.r[0] @ projection.r[0]), "lambda_left": _left(found, clean[:, :N])}
     return row
 
@@ -199,7 +200,7 @@ def _left(found, clean: np.ndarray) -> float:
     for fit in sorted(singles, key=lambda f: f.cost)[:BEST]:
         t = tangent(bench, fit, first.noise)
         off = (t.residual + bench.drive.measured - clean) * bench.known
-        rows = t.whitened(first.noise, off[None]).r[0]
+        rows = t.whitened(first.noise).of(bench.whiten(first.noise, off[None])).r[0]
         left.append(float(rows @ rows))
     return min(left)
 

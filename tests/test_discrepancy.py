@@ -338,7 +338,7 @@ def test_what_no_effect_explains_is_found_by_the_test_that_looks_for_it(silent, 
     planted = first.tangent.residual.copy()
     for e, event in enumerate(at.events):
         planted[0, at.drive.part(e)] += 0.002 * shape(event.record.t, event)
-    found = first.chance.surprises(first.tangent.whitened(first.noise, planted[None]), at)
+    found = first.chance.surprises(first.projection.of(at.whiten(first.noise, planted[None])), at)
     assert min(found, key=found.get) == looked_for
     assert found[looked_for] < 1e-5
 
@@ -378,7 +378,7 @@ def test_only_a_decision_that_is_open_asks_for_exact_scales(silent):
         moved = replace(bare)
         moved.__dict__["left"] = {"one of six": p}
         assert moved.undecided == open_
-    exact = replace(bare, chance=replace(bare.chance, scales=scales(first.tangent, first.noise, 3)))
+    exact = replace(bare, chance=replace(bare.chance, scales=scales(first.tangent, first.projection, first.noise, 3)))
     exact.__dict__["left"] = {"one of six": level}
     assert not exact.undecided
     drawn = bare.chance.left

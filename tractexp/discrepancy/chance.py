@@ -41,8 +41,12 @@ class Chance:
         return {name: tail(self.left[name], value, self.scales.get(name)) for name, value in found.items()}
 
 
-def chance_at(t: Tangent, noise: Noise, quiet: QuietNoise, seed: int, plain: bool, draws: int = DRAWS) -> Chance:
+def chance_at(
+    t: Tangent, own: Projection, noise: Noise, quiet: QuietNoise, seed: int, plain: bool, draws: int = DRAWS
+) -> Chance:  # fmt: skip
     """Draw every statistic at a fit as chance makes it; where the case is `plain`, with the noise taken as known.
+
+    `own` is the projection of the fit under this noise.
 
     Draws that estimate their noise anew are kept, as for a run that was stopped; others cost less than keeping them.
     """
@@ -50,18 +54,18 @@ def chance_at(t: Tangent, noise: Noise, quiet: QuietNoise, seed: int, plain: boo
     plain = plain or noise_known(bench, noise)
 
     def made() -> tuple[np.ndarray, ...]:
-        chance = _drawn(t, noise, quiet, seed, plain, draws)
+        chance = _drawn(t, own, noise, quiet, seed, plain, draws)
         return chance.least_p, np.array([*chance.left]), *chance.left.values()
 
     if plain or not bench.told:
-        return _drawn(t, noise, quiet, seed, plain, draws)
+        return _drawn(t, own, noise, quiet, seed, plain, draws)
     fit = {part.name: getattr(t, part.name) for part in fields(t) if part.name != "bench"}
     what = shelf.told("chance", bench.told, fit, noise, quiet.blur, seed, draws)
     least, names, *left = shelf.arrays("draws", what, made)
     return Chance(least, dict(zip(names.tolist(), left, strict=True)))
 
 
-def scales(t: Tangent, noise: Noise, seed: int) -> dict[str, Scale]:
+def scales(t: Tangent, own: Projection, noise: Noise, seed: int) -> dict[str, Scale]:
     """Scales of the statistics of which the largest counts, by many draws of noise that is taken as known.
 
     The scale of the column that turns out largest is the one most likely to be too small. By the draws of a `Chance`
@@ -69,7 +73,7 @@ def scales(t: Tangent, noise: Noise, seed: int) -> dict[str, Scale]:
     """
 
     def part(k: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        drawn = t.whitened(noise, _noise(t, noise, np.random.default_rng((seed, k)), DRAWS))
+        drawn = own.of(t.bench.whiten(noise, _noise(t, noise, np.random.default_rng((seed, k)), DRAWS)))
         found = surprises.statistics(channels_of(drawn, t.bench), t.bench)
         return {name: (values.mean(axis=0), (values**2).mean(axis=0)) for name, values in found.items()}
 
@@ -78,14 +82,17 @@ def scales(t: Tangent, noise: Noise, seed: int) -> dict[str, Scale]:
     return {name: Scale(mean, np.sqrt(square - mean**2) + 1e-12) for name, (mean, square) in moments.items()}
 
 
-def _drawn(t: Tangent, noise: Noise, quiet: QuietNoise, seed: int, plain: bool, draws: int) -> Chance:
+def _drawn(
+    t: Tangent, own: Projection, noise: Noise, quiet: QuietNoise, seed: int, plain: bool, draws: int
+) -> Chance:  # fmt: skip
     drawn = _noise(t, noise, np.random.default_rng(seed), draws)
     if plain:
-        return _told(t, t.whitened(noise, drawn), noise)
+        return _told(t, own.of(t.bench.whiten(noise, drawn)), noise)
     rest = rich_residuals(t, drawn)
 
     def anew(b: int) -> Chance:
-        return _told(t, t.whitened(quiet.of(t.unit, rest[b]), drawn[b : b + 1]), noise)
+        seen = quiet.of(t.unit, rest[b])
+        return _told(t, t.whitened(seen).of(t.bench.whiten(seen, drawn[b : b + 1])), noise)
 
     each = each_apart(anew, range(draws))
     left = {name: np.concatenate([one.left[name] for one in each]) for name in each[0].left}

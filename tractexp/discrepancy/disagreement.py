@@ -120,11 +120,11 @@ def examined(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int, plain: bool
     t = tangent(bench, fit, noise)
     projection = t.whitened(noise)
     scores = projection.scores()
-    chance = chance_at(t, noise, quiet, seed, plain=True)
+    chance = chance_at(t, projection, noise, quiet, seed, plain=True)
     found = Disagreement(fit, noise, t, projection, chance, scores)
     plain = plain or noise_known(bench, noise) or (bool(scores) and scores[0].p < PLAIN)
     if not plain and found.doubtful:
-        found = replace(found, chance=chance_at(t, noise, quiet, seed, plain=False))
+        found = replace(found, chance=chance_at(t, projection, noise, quiet, seed, plain=False))
     if found.undecided:
-        found = replace(found, chance=replace(found.chance, scales=scales(t, noise, seed)))
+        found = replace(found, chance=replace(found.chance, scales=scales(t, projection, noise, seed)))
     return found

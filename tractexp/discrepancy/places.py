@@ -24,7 +24,7 @@ def places(at: Disagreement) -> list[Place]:
     """Intervals that stand out at the family-wise error of `false_alarms`, adjacent ones joined, the largest first."""
     bench = at.bench
     cells = cells_of(bench)
-    mean, spread, highest = extremes(at.chance.left[LOUDEST])
+    (mean, spread), highest = extremes(at.chance.left[LOUDEST])
     excess = energies(channels_of(at.projection, bench), bench)[0] - mean
     loud = excess / spread > np.quantile(highest, 1 - at.criteria.false_alarms)
     total = np.maximum(excess, 0.0).sum()

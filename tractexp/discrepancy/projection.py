@@ -7,7 +7,7 @@ their prior, M = I - N (N'N)^-1 N', s = M W dy/deta of a candidate. Adding the c
 
 import functools
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtrc
@@ -54,6 +54,13 @@ class Projection:
     blocks: list[np.ndarray]  # per column (k, R)
     split: np.ndarray  # (e, R)
     cells: np.ndarray  # (c, R)
+
+    def of(self, white: np.ndarray) -> "Projection":
+        """The same columns with other whitened residuals (b, C N) in place of the fit's own, off no prior mean."""
+        rows = np.concatenate([white, np.zeros((len(white), len(self.Q) - white.shape[1]))], axis=1)
+        along = rows @ self.Q
+        rows -= along @ self.Q.T
+        return replace(self, r=rows, along=along, departure=np.zeros_like(self.departure))
 
     @functools.cached_property
     def drops(self) -> tuple[np.ndarray, np.ndarray]:

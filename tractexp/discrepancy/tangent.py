@@ -41,32 +41,22 @@ class Tangent:
         """All that the fit or any candidate could change, (k, C, N)."""
         return np.concatenate([self.nuisance, *(c.raw for c in self.columns)])
 
-    def whitened(self, noise: Noise, residuals: np.ndarray | None = None) -> Projection:
-        """Project under this noise; `residuals` (b, C, N) replace the fit's own (for the bootstrap)."""
-        own = residuals is None
-        raw = [
-            self.nuisance,
-            self.residual[None] if own else residuals,
-            *(c.raw for c in self.columns),
-            self.split,
-            self.cells,
-        ]
+    def whitened(self, noise: Noise) -> Projection:
+        """Project under this noise; `Projection.of` puts other residuals in place of the fit's own."""
+        raw = [self.nuisance, self.residual[None], *(c.raw for c in self.columns), self.split, self.cells]
         ends = np.cumsum([len(part) for part in raw])
         white = self.bench.whiten(noise, np.concatenate(raw))
         rows = np.concatenate([white, np.zeros((len(white), len(self.prior)))], axis=1)
         size = white.shape[1]
         rows[: ends[0], size:] = self.prior.T
-        if own:
-            rows[ends[0], size:] = self.prior @ self.estimate
+        rows[ends[0], size:] = self.prior @ self.estimate
         Q, R = np.linalg.qr(rows[: ends[0]].T)
         rest = rows[ends[0] :]
         along = rest @ Q
         rest -= along @ Q.T
-        parts = np.split(rest, ends[1:-1] - ends[0])
-        departure = self.estimate if own else np.zeros_like(self.estimate)
-        r, *blocks, split, cells = parts
+        r, *blocks, split, cells = np.split(rest, ends[1:-1] - ends[0])
         return Projection(
-            self.columns, self.faults, self.groups, Q, R, r, along[: len(r)], departure, blocks, split, cells
+            self.columns, self.faults, self.groups, Q, R, r, along[:1], self.estimate, blocks, split, cells
         )
 
 

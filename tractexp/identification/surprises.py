@@ -88,14 +88,14 @@ def tail(draws: np.ndarray, value: np.ndarray, scale: Scale | None = None) -> fl
     if draws.ndim == 1:
         mean, variance = draws.mean(), max(draws.var(), 1e-300)
         return max(float(gammaincc(mean**2 / variance, max(value[0], 0.0) * mean / variance)), SMALLEST_P)
-    mean, spread, largest = extremes(draws) if scale is None else (*scale, scale.largest(draws))
+    scale, largest = extremes(draws) if scale is None else (scale, scale.largest(draws))
     width = max(largest.std() * np.sqrt(6) / np.pi, 1e-12)
-    departure = ((value - mean) / spread).max()
+    departure = scale.largest(np.atleast_2d(value))[0]
     return max(float(-np.expm1(-np.exp(-(departure - largest.mean()) / width - np.euler_gamma))), SMALLEST_P)
 
 
-def extremes(draws: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mean and spread (k,) of draws (b, k), and the largest of each in these terms, (b,).
+def extremes(draws: np.ndarray) -> tuple[Scale, np.ndarray]:
+    """The scale of draws (b, k), and the largest of each in it, (b,).
 
     Each draw is judged by the others: among many columns its own part in their mean and spread would tell.
     """
@@ -103,7 +103,7 @@ def extremes(draws: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     mean = (whole - draws) / (b - 1)
     spread = np.sqrt(np.maximum((squares - draws**2) / (b - 1) - mean**2, 0.0)) + 1e-12
     largest = ((draws - mean) / spread).max(axis=1)
-    return draws.mean(axis=0), draws.std(axis=0) + 1e-12, largest
+    return Scale(draws.mean(axis=0), draws.std(axis=0) + 1e-12), largest
 
 
 def cells_of(layout: Layout) -> list[Cell]:
