@@ -45,6 +45,7 @@ ANEW = JUDGEMENT.with_name("judgement_anew.jsonl")  # nulls of a commit with men
 LATER = {  # sets of later commits, by what is new to them
     "with more members": JUDGEMENT.with_name("judgement_members.jsonl"),  # of families, and all sizes
     "ten of each": JUDGEMENT.with_name("judgement_ten.jsonl"),  # with exact scales of open decisions
+    "nearby families": JUDGEMENT.with_name("judgement_nearby.jsonl"),  # tried beside a name that suffices
 }
 KNOWN = {"rotor_skin_effect": "second_cage", "stator_transients": "stator_transients"}  # the catalogue has them, too
 HIDDEN = {  # one effect is hidden: group of trials, multiples, effects
