@@ -137,7 +137,7 @@ def with_families(base: BaseFit, tests: Disagreement, refits: dict[Names, Refit]
 
     None is tried unless `family_p` asks for them, and none of waveforms: no criterion was calibrated with members.
     """
-    if base.bench.waves or not base.bench.criteria.family_p or (tests.suffices and not tests.fit.names):
+    if base.bench.waves or not base.bench.criteria.family_p:
         return tests
     found = member_that_suffices(base, tests, refits, seed + FAMILIES)
     if found is None:

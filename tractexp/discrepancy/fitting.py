@@ -124,9 +124,7 @@ def wide_refits(
     bench: Bench, noise: Noise, wanted: Iterable[Sequence[Start]], most: int, faults: Sequence[str] | None = None
 ) -> list[Refit]:  # fmt: skip
     """`wide_refit` of those `most` sets, each with starts of its own, that come nearest in a few iterations."""
-    begun = [
-        sorted(_descended(bench, noise, starts, faults, (FIRST, ROUGH[1])), key=lambda f: f.cost) for starts in wanted
-    ]
+    begun = [sorted(_descended(bench, noise, starts, faults, (FIRST, ROUGH[1])), key=_cost) for starts in wanted]
     begun = sorted((fits[:KEPT] for fits in begun), key=lambda fits: fits[0].cost)[:most]
     return best_of(f for fits in begun for f in wide_refit(bench, noise, [(g.names, g.unit) for g in fits], faults))
 

@@ -198,7 +198,8 @@ def _forms(made: Page, found: Investigation) -> None:
     ]  # fmt: skip
     made.table(
         ["effect", "where", "what it does there", "law", "effect in the model"], rows,
-        "The catalogue's law is tried first; another law or place of the same kind only where that leaves something.",
+        "The catalogue's laws are tried first; other laws and places where the best of them leaves something, or where"
+        " their own comes near it.",
         words=(1, 2, 3, 4),
     )  # fmt: skip
     for form in told:
