@@ -481,6 +481,18 @@ def test_what_is_driven_follows_its_own_curve(power, head, w, driven):
     assert Motor(LOAD.machine, 1.0, 0.7, fan_power=power, head=head).driven(w) == pytest.approx(driven)
 
 
+def test_a_transformer_whose_ratio_steps_neither_gives_nor_takes_power():
+    made = response("tap_changer_step", 8.0)
+    t = max(made.site.tap.times)
+    for now in (t - 0.05, t + 0.05):
+        x = made.states(np.array([now])).T.tolist()[0]
+        bus, current, _ = made.network(now, x)
+        behind = bus * made.site.tap(now)
+        drawn = made._parts(made.supply.at(now), behind, x)[0]
+        assert bus * np.conj(current) == pytest.approx(behind * np.conj(drawn), rel=1e-12)
+    assert abs(behind) > 1.05 * abs(bus)
+
+
 def test_a_tap_changer_restores_its_voltage_to_a_step():
     made = scene(case("tap_recovery", 1.0, LONG), 1)
     device = made.site(0).devices[-1]

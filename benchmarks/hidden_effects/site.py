@@ -28,7 +28,7 @@ class Site:
     recorder: Recorder
     devices: tuple[Device, ...] = ()
     feeder: complex = 0j  # pu, series impedance
-    tap: Profile = field(default_factory=lambda: Profile(values=(1.0,)))  # load voltage over bus voltage
+    tap: Profile = field(default_factory=lambda: Profile(values=(1.0,)))  # load voltage over bus voltage, and bus current over load current
     opened: Profile = field(default_factory=Profile)  # share of the whole load that relays hold open
     static_opened: Profile = field(default_factory=Profile)  # share of the static load that is held open
     motors_opened: Profile = field(default_factory=Profile)  # share of the motors
@@ -94,14 +94,16 @@ class Response:
         bus = now.U + 0j
         if site.angle:
             bus *= complex(np.cos(site.angle * now.missing), np.sin(site.angle * now.missing))
-        V = source = bus * site.tap(t)
+        ratio = site.tap(t)
+        V = source = bus * ratio
         if self.chord is None:
-            return bus, *self._parts(now, V, x)
+            current, rates = self._parts(now, V, x)
+            return bus, current * ratio, rates
         for _ in range(200):
             current, rates = self._parts(now, V, x)
             left = source - V - site.feeder * current
             if abs(left) < 1e-12:
-                return bus, current, rates
+                return bus, current * ratio, rates  # an ideal transformer neither gives nor takes power
             V += self.chord[0] * left + self.chord[1] * left.conjugate()
         raise ArithmeticError(f"the voltage behind the feeder collapses at t = {t:.4g} s")
 
