@@ -151,7 +151,7 @@ def row(case: str, seed: int) -> dict:
 
 def told_in_docs(rows: list[dict]) -> list[str]:
     """The rows as a table for people; in brackets the best term where none is proposed."""
-    columns = "hidden, seed, chi2 per sample before, found, excess closed (fitted / held out), left (same), right"
+    columns = "hidden, seed, chi2 per sample before, found, gap closed (fitted / held out), left (same), right"
     lines = [f"| {' | '.join(columns.split(', '))} |", "| " + " | ".join(["---"] * 7) + " |"]
     for r in rows:
         if "failed" in r:

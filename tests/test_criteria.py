@@ -111,7 +111,7 @@ def proposed(closed=0.9, left=1.0, p=1e-6):
     def curve(deviance):
         return SimpleNamespace(deviance=deviance, chi2_per_sample=left)
 
-    before = Before(SimpleNamespace(samples=1000), curve(2000.0), curve(2000.0 - closed * 1000.0))
+    before = Before(SimpleNamespace(), curve(2000.0), curve(2000.0 - closed * 1000.0), (1 - closed) * 1000.0)
     return Weighed(None, before, before, p, None)
 
 

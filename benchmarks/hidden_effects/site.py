@@ -28,7 +28,7 @@ class Site:
     recorder: Recorder
     devices: tuple[Device, ...] = ()
     feeder: complex = 0j  # pu, series impedance
-    tap: Profile = field(default_factory=lambda: Profile(values=(1.0,)))  # load voltage over bus voltage, and bus current over load current
+    tap: Profile = field(default_factory=lambda: Profile(values=(1.0,)))  # V of load over bus, and I of bus over load
     opened: Profile = field(default_factory=Profile)  # share of the whole load that relays hold open
     static_opened: Profile = field(default_factory=Profile)  # share of the static load that is held open
     motors_opened: Profile = field(default_factory=Profile)  # share of the motors

@@ -130,7 +130,7 @@ class Criteria:
         "the usual power of a planned test (Saris, Satorra and van der Veld 2009)",
     )  # fmt: skip
     proposal_closed: float = _criterion(
-        0.6, (0.0, 1.0), "share of the excess on held-out events that a proposed term must close", CHOSEN,
+        0.6, (0.0, 1.0), "share of the explainable gap on held-out events that a proposed term must close", CHOSEN,
         "wrong terms on nulls made held-out events worse, right ones closed three quarters and more (prototype)",
     )  # fmt: skip
     proposal_left: float = _criterion(

@@ -115,17 +115,32 @@ def left_over(
 ) -> float:
     """How much more than chance pushes into all balances would still lower the deviance at coordinates (D,).
 
-    Unbiased: the energy in the space of the pushes less its dimension, what is `fitted` projected out.
+    What is `fitted` is projected out.
     """
+    return beyond_chance(bench, unit, names, noise, fitted, pushed(bench, unit, names, noise))
+
+
+def pushed(bench: Bench, unit: np.ndarray, names: Sequence[str], noise: Noise) -> np.ndarray:
+    """What pushes into all balances in all windows change at coordinates (D,), whitened (c, C N)."""
     pushes, _ = push_points(bench, unit)
+    raw = bench.residuals_of(np.concatenate([unit[None], pushes]), [(names, True)] * (1 + len(pushes)))
+    return bench.whiten(noise, np.nan_to_num(raw[1:] - raw[0]))
+
+
+def beyond_chance(
+    bench: Bench, unit: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int] | np.ndarray,
+    changes: np.ndarray,
+) -> float:  # fmt: skip
+    """How much more than chance `changes` (c, C N) would still lower the deviance at coordinates (D,).
+
+    Unbiased: the energy in their space less its dimension, what is `fitted` projected out.
+    """
     up, down = two_sided(unit, fitted)
-    sets = [(names, False)] * (1 + 2 * len(fitted)) + [(names, True)] * len(pushes)
-    raw = bench.residuals_of(np.concatenate([unit[None], up, down, pushes]), sets)
+    raw = bench.residuals(np.concatenate([unit[None], up, down]), names)
     rows = np.nan_to_num(bench.whiten(noise, raw))
     r, k = rows[0], len(fitted)
-    nuisance, cells = rows[1 : 1 + k] - rows[1 + k : 1 + 2 * k], rows[1 + 2 * k :] - r
+    nuisance = rows[1 : 1 + k] - rows[1 + k :]
     nuisance = nuisance[~resting(bench, unit, fitted, nuisance @ r)]
     Q = np.linalg.qr(nuisance.T)[0]
-    cells -= (cells @ Q) @ Q.T
-    basis = spanned(cells, SAME)
+    basis = spanned(changes - (changes @ Q) @ Q.T, SAME)
     return float(np.sum((basis @ r) ** 2) - len(basis))

@@ -76,8 +76,9 @@ def _closed(made: Page, proposal: Proposal) -> None:
         for role, b in (("fitted", proposal.train), ("held out", proposal.validate))
     ]
     made.table(
-        ["events", "chi2 per sample without it", "with it", "share of the excess closed"], rows,
-        f"Of the deviance in excess of the noise; {chance(proposal.p)}.",
+        ["events", "chi2 per sample without it", "with it", "share of the gap closed"], rows,
+        "Of what the term gains and what pushes into the balances or the other terms tried would gain beside it, beyond"
+        f" chance; {chance(proposal.p)}.",
     )  # fmt: skip
 
 
@@ -128,7 +129,7 @@ def _tried(made: Page, tried: Sequence[tuple[Term, Weighed]]) -> None:
             ["term", "closed, fitted", "closed, held out", "left, fitted", "left, held out", "chance"],
             [[t.words, percent(w.train.closed), percent(w.validate.closed), f"{w.train.left:.2f}",
               f"{w.validate.left:.2f}", in_words(w.p)] for t, w in tried],
-            "Shares of the excess closed, and what is left over the variance of the noise.",
+            "Shares of the explainable gap closed, and what is left over the variance of the noise.",
         )  # fmt: skip
 
 

@@ -91,3 +91,9 @@ def angle(eq, g, size):
     from sympy import I
 
     eq.edit(sites.motor_voltage, lambda V: V * (1 + I * size * g))
+
+
+def voltage(eq, g, size):
+    """V -> V (1 + k g), u -> u (1 + k g)."""
+    for site in (sites.motor_voltage, sites.static_voltage):
+        eq.edit(site, lambda V: V * (1 + size * g))

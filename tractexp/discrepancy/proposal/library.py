@@ -253,6 +253,8 @@ BALANCES = (
             (Size("size", 0.5, "pu", 0.005),), (_Z,), without=(*_OWN_CURRENT, "constant")),
     Balance("angle", "the angle of the voltage", r"V \rightarrow V (1 + \mathrm{j} k\,{g})",
             (Size("size", 2.0, "rad", 0.02),), (sites.motor_voltage,)),
+    Balance("voltage", "the voltage that the load sees", r"V \rightarrow V (1 + k\,{g})",
+            (Size("size", 0.5, "1", 0.005),), (sites.motor_voltage, sites.static_voltage), kinds=(TIMED,)),
 )  # fmt: skip
 
 

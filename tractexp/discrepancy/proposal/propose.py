@@ -103,7 +103,7 @@ def propose(
     made = fitted(screened, [carried_over(under, bench, v) for v in base.valleys_but(bare.unit)[:1]])
     bench.effort.say("judging terms on the held-out events")
     lowered = [made.bare.deviance - fit.deviance for fit in made.fits]
-    told = weighed(made, validate, [screened.p(drop) for drop in lowered])
+    told = weighed(bench, made, validate, [screened.p(drop) for drop in lowered])
     tried = tuple((made.term(w.fit), w) for w in told)
     standing = [w for w in told if w.stands(bench.criteria)]
     if not standing:
