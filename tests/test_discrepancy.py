@@ -513,11 +513,23 @@ def test_an_effect_is_looked_for_from_the_other_valleys_of_the_base_model():
         base(), events("shunt_capacitor", size=0.5 / 0.3, seed=2048740674, count=3), (), {}, {}, only=only
     )
     first, single = found.first, found.explanations.refits["shunt_capacitor",]
-    ground, better = from_other_valleys(found.base, first, {(): first.fit})
+    ground, better = from_other_valleys(found.base, first, {(): first.fit}, first)
     assert ground.fit.deviance > first.fit.deviance + 1000
     assert single.deviance < first.fit.deviance - 1000
     assert min(better, key=lambda f: f.deviance).names == ("shunt_capacitor",)
     assert found.names == ("shunt_capacitor",)
+
+
+def test_a_name_that_suffices_from_the_wrong_valley_does_not_hide_what_explains_more_from_another():
+    """There a compensator leaves nothing of a capacitor; the capacitor explains more by a single parameter."""
+    made = events("shunt_capacitor", size=0.5 / 0.3, seed=716855646, count=4, noise=LOUD)
+    found = investigate(base(), made[:3], made[3:], {}, {}, only=("shunt_capacitor", "static_var_compensator"))
+    first, refits = found.first, found.explanations.refits
+    assert found.explanations.chosen.names == ("shunt_capacitor",)
+    from_base = refit(found.bench, first.noise, [(("shunt_capacitor",), first.fit.unit)])[0]
+    assert from_base.deviance > first.fit.deviance - 1
+    assert refits["shunt_capacitor",].deviance < refits["static_var_compensator",].deviance - 10
+    assert ("shunt_capacitor",) in found.verdict.sets
 
 
 def test_an_effect_that_a_larger_set_does_not_need_is_left_out_again(planted):

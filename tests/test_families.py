@@ -9,12 +9,15 @@ import numpy as np
 import pytest
 from test_discrepancy import LOUD, base, bench, events
 
-from tractexp.discrepancy import all_events, families, fitting
+from tractexp.discrepancy import all_events, families, fitting, survivors
 from tractexp.discrepancy.catalogue import catalogue
+from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.explanations import worth_another
-from tractexp.discrepancy.families import member_that_suffices, near, open_settings, starts, worth
+from tractexp.discrepancy.families import near, open_settings, starts, with_members, worth
 from tractexp.discrepancy.fitting import Refit, scattered
 from tractexp.discrepancy.forms import forms
+from tractexp.discrepancy.gap import Gap
+from tractexp.discrepancy.held_out import HeldOut, Judged
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.tangent import tangent
 from tractexp.errors import UserError
@@ -99,16 +102,17 @@ def test_members_of_other_families_that_come_near_are_tried_beside_a_name_that_s
             fit(1000.0, 0),
             fit(100.0, 4, "static_var_compensator"),
             fit(500.0, 1, "magnetic_saturation"),
-            fit(600.0, 6, "undervoltage_trip"),
+            fit(680.0, 6, "undervoltage_trip"),
         )
     }
     best = refits["static_var_compensator",]
-    assert {m.name for m in near(at, best, refits)} == {"saturation_curve"}  # 500 of 900, and 400 of 900
+    assert {m.name for m in near(at, best, refits)} == {"saturation_curve"}  # 500 of 900, and 320 of 900
     assert not near(at, fit(90.0, 5, "magnetic_saturation", "static_var_compensator"), refits)
 
 
 @pytest.mark.parametrize(("better", "named"), [(60.0, True), (99.0, False)])
 def test_a_name_that_suffices_gives_way_to_a_member_that_explains_more_and_leaves_nothing(monkeypatch, better, named):
+    """Where it does not, the member is held against it: both may explain what is there."""
     at = bench(base(), events(), ("magnetic_saturation", "static_var_compensator"))
     refits = {f.names: f for f in (fit(1000.0, 0), fit(100.0, 4, "static_var_compensator"))}
     refits["magnetic_saturation",] = fit(400.0, 1, "magnetic_saturation")
@@ -117,8 +121,76 @@ def test_a_name_that_suffices_gives_way_to_a_member_that_explains_more_and_leave
     monkeypatch.setattr(families, "starts", lambda *_: [])
     monkeypatch.setattr(families, "wide_refits", lambda *_: [member])
     monkeypatch.setattr(families, "examined", lambda quiet, fit, *_: SimpleNamespace(fit=fit, suffices=True))
-    found = member_that_suffices(SimpleNamespace(bench=at, quiet=None), told, refits, 0)
-    assert (found is not None and found[0].fit is member) == named
+    tests, held_against = with_members(SimpleNamespace(bench=at, quiet=None), told, refits, 0)
+    assert tests.fit is (member if named else told.fit)
+    assert held_against == [member]
+
+
+def test_where_neither_leaves_nothing_no_member_is_a_rival(monkeypatch):
+    at = bench(base(), events(), ("magnetic_saturation",))
+    refits = {f.names: f for f in (fit(1000.0, 0), fit(400.0, 1, "magnetic_saturation"))}
+    told = SimpleNamespace(fit=refits["magnetic_saturation",], noise=None, suffices=False)
+    monkeypatch.setattr(families, "starts", lambda *_: [])
+    monkeypatch.setattr(families, "wide_refits", lambda *_: [fit(60.0, 4, "saturation_curve")])
+    monkeypatch.setattr(families, "examined", lambda quiet, fit, *_: SimpleNamespace(fit=fit, suffices=False))
+    assert with_members(SimpleNamespace(bench=at, quiet=None), told, refits, 0) == (told, [])
+
+
+def test_the_chosen_set_comes_first_with_its_own_tests_though_another_fits_better(monkeypatch):
+    """Of two that fit alike the one that asks for no further effect is chosen, and its tests are not the other's."""
+    chosen, better, far = fit(104.0, 1, "chosen"), fit(100.0, 1, "better"), fit(300.0, 1, "far")
+    bare = fit(1000.0, 0)
+    rows = np.array([[0.0, 0.0], [2.0, 0.0], [14.0, 0.0]])
+    at = SimpleNamespace(
+        criteria=Criteria(), catalogue=SimpleNamespace(of_measurement=(), of_load=("chosen", "better", "far")),
+        coordinates=SimpleNamespace(parameters=lambda names: []), rows=lambda *_: rows,
+    )  # fmt: skip
+    monkeypatch.setattr(
+        survivors, "refit", lambda bench, noise, wanted: [bare] if wanted[0][0] == () else [better, chosen, far]
+    )
+    monkeypatch.setattr(survivors, "examined", lambda quiet, fit, *_, **__: SimpleNamespace(fit=fit, adequate=False))
+    last = SimpleNamespace(fit=chosen, noise=None, adequate=True)
+    explained = SimpleNamespace(
+        base=SimpleNamespace(bench=at, quiet=None), last=last, chosen=chosen, steps=[SimpleNamespace(fit=bare)],
+        refits={f.names: f for f in (bare, better, chosen, far)},
+    )  # fmt: skip
+    left = survivors.survivors(explained, 0)
+    assert [(r.fit.names, r.behind, r.tests.fit.names) for r in left.kept] == [
+        (("chosen",), 0.0, ("chosen",)),
+        (("better",), -4.0, ("better",)),
+    ]
+    assert [r.fit.names for r in left.adequate] == [("chosen",)]
+    assert [r.rejected for r in left.rivals] == [False, False, True]
+
+
+def test_a_saturation_with_a_knee_that_a_compensator_explains_as_well_is_tied_with_it():
+    """The compensator leaves nothing and fits a little better; a saturation by another law leaves nothing, either."""
+    made = events("knee_saturation", 0.46, 312360453, count=4, noise=LOUD)  # four times its detection limit
+    told = investigate(base(), made[:3], made[3:], {}, {}, only=("static_var_compensator", *CORE))
+    assert told.explanations.chosen.names == ("static_var_compensator",)
+    assert set(told.verdict.sets) == {("static_var_compensator",), ("saturation_curve",)}
+
+
+@pytest.mark.parametrize(
+    ("chosen", "rival", "kept"),
+    [
+        ((1.0, 0.9), (0.03, 0.95), ["chosen", "rival"]),  # too little for a name, enough for a rival
+        ((1.0, 0.9), (0.03, 0.7), ["chosen"]),  # it closes less than a true explanation does
+        ((1.0, 0.9), (0.001, 0.95), ["chosen"]),  # it leaves something
+        ((0.03, 0.9), (0.03, 0.95), []),  # no name
+    ],
+)
+def test_held_out_events_deny_a_rival_only_by_what_it_leaves(chosen, rival, kept):
+    at = SimpleNamespace(criteria=Criteria(), catalogue=SimpleNamespace(textbook=lambda names: names))
+    told = {("chosen",): chosen, ("rival",): rival}
+    judged = {
+        names: Judged(Gap(None, None, closed, 100.0, 100.0, 10.8, None), at, (), p)
+        for names, (p, closed) in told.items()
+    }
+    adequate = [SimpleNamespace(fit=fit(0.0, 1, *names)) for names in told]
+    surviving = SimpleNamespace(adequate=adequate, explanations=SimpleNamespace(base=SimpleNamespace(bench=at)))
+    made = HeldOut(surviving, None, (), None, {}, judged)
+    assert [r.fit.names[0] for r in made.kept] == kept
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from scipy.special import chdtrc
 from tractexp.discrepancy.base_fit import BaseFit
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.disagreement import Disagreement, examined
-from tractexp.discrepancy.families import member_that_suffices
+from tractexp.discrepancy.families import with_members
 from tractexp.discrepancy.fitting import (
     CLOSE,
     NESTED,
@@ -38,6 +38,7 @@ WORTH_A_THIRD = 0.8  # of what exceeds the noise: what two effects explain befor
 SHORTLIST = {1: 10, 2: 8, 3: 6}  # sets of each size that are refitted
 COMBINED = 14  # effects whose sets are ranked exhaustively
 PATCHED = 4  # sets of one size that are tried before a further effect is added
+PROMISING = 0.8  # of what the best effect explains, by a linear step from another valley
 WIDELY = 3  # single effects with thresholds or times that are searched to the end
 RANKS = 2  # settings of a candidate to start from
 FAMILIES = 50  # added to the seed of the draws at members of families
@@ -85,9 +86,7 @@ def explanations(base: BaseFit, first: Disagreement, seed: int) -> Explanations:
         refits |= {f.names: f for f in fits}
         tests = sufficient(base, fits, steps[-1].noise, seed + size)
         for further in (searched_widely, from_other_valleys) if size == 1 else ():
-            if tests.suffices:
-                break
-            ground, better = further(base, ground, refits)
+            ground, better = further(base, ground, refits, tests)
             if better:
                 refits |= {f.names: f for f in better}
                 fits = best_of(f for f in refits.values() if f.names)
@@ -139,10 +138,7 @@ def with_families(base: BaseFit, tests: Disagreement, refits: dict[Names, Refit]
     """
     if base.bench.waves or not base.bench.criteria.family_p:
         return tests
-    found = member_that_suffices(base, tests, refits, seed + FAMILIES)
-    if found is None:
-        return tests
-    tests, fits = found
+    tests, fits = with_members(base, tests, refits, seed + FAMILIES)
     refits |= {f.names: f for f in fits}
     return tests
 
@@ -160,8 +156,15 @@ def searched(steps: Sequence[Disagreement], refits: Refits, size: int, say: Call
     return best_of(no_worse_than_subsets(bench, noise, {**refits, **{f.names: f for f in fits}}, fits))
 
 
-def searched_widely(base: BaseFit, first: Disagreement, refits: Refits) -> tuple[Disagreement, list[Refit]]:
-    """Single effects that have thresholds or times, searched from all their settings, and `first`."""
+def searched_widely(
+    base: BaseFit, first: Disagreement, refits: Refits, best: Disagreement
+) -> tuple[Disagreement, list[Refit]]:  # fmt: skip
+    """Single effects that have thresholds or times, searched from all their settings, and `first`.
+
+    None where the best so far leaves nothing.
+    """
+    if best.suffices:
+        return first, []
     bench, bare = base.bench, refits[()].unit
     singles: Refits = {f.names: f for f in best_of(refits.values()) if len(f.names) == 1}
     unlike = [f for f in singles.values() if len(bench.catalogue[f.names[0]].settings) > 1]
@@ -178,12 +181,17 @@ def _every_setting(bench: Bench, fit: Refit, unit: np.ndarray) -> list[Start]:
     return [(fit.names, at.placed(sized, setting)) for setting in bench.catalogue[fit.names[0]].settings]
 
 
-def from_other_valleys(base: BaseFit, first: Disagreement, refits: Refits) -> tuple[Disagreement, list[Refit]]:
+def from_other_valleys(
+    base: BaseFit, first: Disagreement, refits: Refits, best: Disagreement
+) -> tuple[Disagreement, list[Refit]]:  # fmt: skip
     """Single effects that explain more from another valley of the base model, and the base model there.
 
-    Where an effect is missing, a wrong valley may fit better than the right one.
+    Where an effect is missing, a wrong valley may fit better than the right one. Where the best so far leaves nothing,
+    only valleys in which a linear step promises nearly as much.
     """
-    bench = base.bench
+    bench, most = base.bench, np.inf
+    if best.suffices:
+        most = first.fit.deviance - PROMISING * (first.fit.deviance - best.fit.deviance)
     ground, singles = first, best_of(refits.values())
     for valley in base.valleys_but(first.fit.unit):
         fit = refit(bench, first.noise, [((), valley)])[0]
@@ -192,9 +200,14 @@ def from_other_valleys(base: BaseFit, first: Disagreement, refits: Refits) -> tu
         t = tangent(bench, fit, first.noise)
         projection = t.whitened(first.noise)
         there = replace(first, fit=fit, tangent=t, projection=projection, scores=projection.scores())
-        say = lambda line: bench.effort.say(f"{line} from another valley of the base model")  # noqa: E731
-        fits = searched([there], {(): fit}, 1, say)
-        if fits[0].cost < singles[0].cost:
+        if best.suffices:
+            promising = [(s.name,) for s in there.scores if fit.deviance - s.drop <= most]
+            begun = [start for names in promising for start in starts([there], {(): fit}, names)]
+            fits = refit(bench, first.noise, begun) if begun else []
+        else:
+            say = lambda line: bench.effort.say(f"{line} from another valley of the base model")  # noqa: E731
+            fits = searched([there], {(): fit}, 1, say)
+        if fits and fits[0].cost < singles[0].cost:
             ground = there
         singles = best_of([*singles, *fits])
     return ground, [f for f in singles if refits.get(f.names) is not f]

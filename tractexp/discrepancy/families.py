@@ -1,8 +1,9 @@
 """Members of families: the kind of a textbook effect at another place, or its place with another law.
 
 All are tried where the best single textbook effect leaves something; where it does not, those of other families whose
-own textbook effect comes near it, for the wrong formula may suffice where the right one has another law. A member must
-explain more than the best textbook effect beyond what its further parameters cost, and leave nothing.
+own textbook effect comes near it, for the wrong formula may suffice where the right one has another law. A member takes
+its place where it explains more beyond what its further parameters cost, and leaves nothing. Beside an effect that
+suffices those that were searched are rivals, whether or not they explain more.
 """
 
 import itertools
@@ -19,34 +20,35 @@ from tractexp.discrepancy.fitting import Refit, Start, off_walls, wide_refits
 
 NEAREST = 4  # members that are searched to the end
 EXAMINED = 3  # members whose remainder is tested
-NEAR = 0.5  # of what the best effect explains: a family whose textbook effect explains as much may hold the truth
+NEAR = 0.4  # of what the best effect explains: a family whose textbook effect explains as much may hold the truth
 BEGUN = 0.5  # smallest relevant sizes at which a size without a textbook value starts
 
 Names = tuple[str, ...]
 
 
-def member_that_suffices(
+def with_members(
     base: BaseFit, tests: Disagreement, refits: Mapping[Names, Refit], seed: int
-) -> tuple[Disagreement, list[Refit]] | None:
-    """The tests at the best member that leaves nothing and explains more than the best textbook effect of `tests`.
+) -> tuple[Disagreement, list[Refit]]:
+    """The tests at the best member that leaves nothing and explains more than the best textbook effect, or `tests`.
 
-    With the fits of the members that were compared; None where there is no such member.
+    With the fits of the members that are held against it: none where neither leaves nothing.
     """
-    bench, noise = base.bench, tests.noise
+    bench, noise, family = base.bench, tests.noise, base.bench.kernels.family
     wanted = near(bench, tests.fit, refits) if tests.suffices else bench.catalogue.members
+    wanted = [member for member in wanted if family.joins(member.name)]
     if not wanted:
-        return None
+        return tests, []
     bench.effort.say(f"trying {len(wanted)} other places and laws")
-    bench.kernels.family.compile_members([m.name for m in wanted], bench.effort.say)
+    family.compile_members([m.name for m in wanted], bench.effort.say)
     fits = wide_refits(bench, noise, [starts(bench, member, refits) for member in wanted], NEAREST)
     for k, fit in enumerate(fits[:EXAMINED]):
-        if not worth(fit, tests.fit, bench.criteria.family_p) or not bench.kernels.family.joins(fit.names[0]):
+        if not worth(fit, tests.fit, bench.criteria.family_p):
             continue
-        bench.kernels.family.compile_members(fit.names, bench.effort.say, whole=True)
+        family.compile_members(fit.names, bench.effort.say, whole=True)
         there = examined(base.quiet, fit, noise, seed + k)
         if there.suffices:
             return there, [there.fit, *(f for f in fits if f is not fit)]
-    return None
+    return tests, fits if tests.suffices else []
 
 
 def near(bench: Bench, best: Refit, refits: Mapping[Names, Refit]) -> list[Candidate]:

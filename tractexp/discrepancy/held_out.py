@@ -45,6 +45,11 @@ class Judged:
         """Whether it closes as much of the gap there as a true explanation does."""
         return self.gap.closed >= self.bench.criteria.convincing
 
+    @property
+    def tolerable(self) -> bool:
+        """Whether it is kept beside one that helps: what would not do for a name is not enough to deny a rival."""
+        return self.convincing and self.gap.helps and self.p_left >= self.bench.criteria.adequate_p
+
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
@@ -65,9 +70,10 @@ class HeldOut:
     @property
     def kept(self) -> tuple[Rival, ...]:
         """The adequate explanations that the held-out events do not deny."""
-        helping = (
-            s for s in self.survivors.adequate if s.fit.names not in self.judged or self.judged[s.fit.names].helps
-        )
+        judged, adequate = self.judged, self.survivors.adequate
+        helping = [s for s in adequate if s.fit.names not in judged or judged[s.fit.names].helps]
+        if helping:
+            helping += [s for s in adequate if s not in helping and judged[s.fit.names].tolerable]
         of_family: dict[Names, Rival] = {}
         for rival in helping:  # the best first: places and laws of one family are told by one name
             of_family.setdefault(self.survivors.explanations.base.bench.catalogue.textbook(rival.fit.names), rival)

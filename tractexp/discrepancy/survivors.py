@@ -39,7 +39,7 @@ class Rival:
 
 @dataclass(frozen=True, eq=False)
 class Survivors:
-    """The sets that are not rejected, their adequacy tested, and all rivals; the best first."""
+    """The sets that are not rejected, their adequacy tested, and all rivals; the chosen one first, then the best."""
 
     explanations: Explanations
     kept: tuple[Rival, ...]
@@ -47,29 +47,33 @@ class Survivors:
 
     @property
     def adequate(self) -> tuple[Rival, ...]:
-        """Those that leave nothing; none where the best does not."""
+        """Those that leave nothing; none where the chosen one does not."""
         return tuple(s for s in self.kept if s.adequate) if self.kept[0].adequate else ()
 
 
 def survivors(explained: Explanations, seed: int) -> Survivors:
-    """Test every refitted set of the chosen size against the best one."""
-    everyone, last, quiet = rivals(explained), explained.last, explained.base.quiet
-
-    def tested(k: int, rival: Rival) -> Rival:
-        tests = last if k == 0 else examined(quiet, rival.fit, last.noise, seed + 100 + k, plain=True)
-        return replace(rival, tests=tests)
-
+    """Test every refitted set of the chosen size against the chosen one."""
+    everyone, last, bench = rivals(explained), explained.last, explained.base.bench
     left = [r for r in everyone if not r.rejected][:MOST]
-    kept = each_apart(lambda k: tested(k, left[k]), range(len(left)))
+    members = [n for r in left[1:] for n in r.fit.names if n not in bench.catalogue.of_load]
+    for name in members:
+        bench.kernels.family.compile_members((name,), bench.effort.say, whole=True)
+
+    def tested(k: int) -> Rival:
+        fit = left[k].fit
+        tests = last if k == 0 else examined(explained.base.quiet, fit, last.noise, seed + 100 + k, plain=True)
+        return replace(left[k], tests=tests)
+
+    kept = each_apart(tested, range(len(left)))
     by_name = {r.fit.names: r for r in kept}
     return Survivors(explained, tuple(kept), tuple(by_name.get(r.fit.names, r) for r in everyone))
 
 
 def rivals(explained: Explanations) -> list[Rival]:
-    """Every refitted set of the chosen size under the noise of the last tests, the best first."""
-    bench, noise = explained.base.bench, explained.last.noise
-    wanted = [(f.names, f.unit) for f in explained.refits.values() if len(f.names) == len(explained.chosen.names)]
-    fits = refit(bench, noise, wanted)
+    """Every refitted set of the chosen size under the noise of the last tests: the chosen one, then the best first."""
+    bench, noise, chosen = explained.base.bench, explained.last.noise, explained.chosen.names
+    wanted = [(f.names, f.unit) for f in explained.refits.values() if len(f.names) == len(chosen)]
+    fits = sorted(refit(bench, noise, wanted), key=lambda fit: fit.names != chosen)
     base = refit(bench, noise, [((), explained.steps[0].fit.unit)])[0]
     best = fits[0]
     faults = bench.coordinates.parameters(bench.catalogue.of_measurement)
