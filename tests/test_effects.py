@@ -572,3 +572,54 @@ def test_as_many_banks_are_in_as_levels_are_passed(low, inside):
 def test_banks_go_in_one_after_the_other():
     given = banks(0.5)  # below 0.9, 0.8 and 0.7 at 104, 108 and 112 ms
     assert [given[k] for k in (136, 140, 144)] == pytest.approx([1 / 3, 2 / 3, 1.0], abs=0.05)
+
+
+@pytest.mark.parametrize(("low", "left"), [(0.95, 1.0), (0.85, 2 / 3), (0.75, 1 / 3), (0.5, 0.0)])
+def test_traction_gives_up_its_power_in_stages_and_takes_it_back_one_by_one(low, left):
+    excitation = dip(1 - low, length=1.2)  # back above 0.93 by 268 ms
+    size = {"staged_share": 0.5, "staged_delay": 0.03, "staged_wait": 0.2, "staged_pause": 0.2, "staged_ramp": 0.02}
+    P, Q = run("staged_power_limit", excitation, values("staged_power_limit", **size))
+    drawn = (P - base(excitation)[0]) / (0.5 * (P0 - T_M)) + excitation.U**P_V
+    assert pytest.approx(left, abs=2e-3) == drawn[170:245]
+    assert pytest.approx([min(1.0, left + k / 3) for k in (0, 1, 2, 3)], abs=2e-3) == drawn[[440, 590, 790, 990]]
+    assert pytest.approx(base(excitation)[1], abs=1e-12) == Q
+
+
+def test_traction_between_two_stages_holds_its_power_up_to_its_current():
+    excitation = dip(0.5, length=0.4)
+    size = {"staged_share": 0.5, "staged_delay": 0.3, "staged_limit": 1.2}
+    P, _ = run("staged_power_limit", excitation, values("staged_power_limit", **size))
+    drawn = (P - base(excitation)[0]) / (0.5 * (P0 - T_M)) + excitation.U**P_V
+    assert drawn[200] == pytest.approx(1.2 * 0.5, abs=2e-3)
+    assert drawn[102] == pytest.approx(1.0, abs=2e-3)
+
+
+def linked(low, **size):
+    """What converters draw in a dip to `low` from 100 to 800 ms, over what they drew before."""
+    t = np.arange(1500) * 1e-3
+    excitation = event(1 - (1 - low) * np.clip((t - 0.1) / 0.02, 0, 1) + (1 - low) * np.clip((t - 0.8) / 0.02, 0, 1))
+    P, Q = run("limited_link", excitation, values("limited_link", link_share=0.5, link_time=0.05, **size))
+    assert pytest.approx(base(excitation)[1], abs=1e-12) == Q
+    return excitation, (P - base(excitation)[0]) / (0.5 * (P0 - T_M)) + excitation.U**P_V
+
+
+def test_a_link_s_voltage_falls_until_the_current_gives_the_power_back():
+    excitation, drawn = linked(0.8, link_storage=0.1, link_most=4.0)
+    (v,) = solved(excitation, lambda u, v: (u * (1 + 2 * (1 - v)) - 1) / (0.1 * v), [1.0])
+    assert pytest.approx(excitation.U * (1 + 2 * (1 - v)), abs=1e-3) == drawn  # its corners are rounded
+    assert v[700] == pytest.approx(1 - (1 / 0.8 - 1) / 2, abs=1e-4)
+
+
+def test_a_link_that_stores_much_is_the_textbook_s():
+    """T di/dt = 1 - u i, which dc_link_lag has at a = 1."""
+    excitation, drawn = linked(0.8, link_storage=1.0, link_most=4.0)
+    (i,) = solved(excitation, lambda u, i: (1 - u * i) / 0.05, [1.0])
+    assert pytest.approx(excitation.U * i, abs=0.01) == drawn
+    assert drawn[700] == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_link_at_the_limit_of_its_current_stays_short():
+    _, drawn = linked(0.6, link_storage=0.1, link_most=1.2)
+    assert drawn[700] == pytest.approx(1.2 * 0.6, rel=0.01)
+    assert drawn[825] == pytest.approx(1.2, rel=0.02)  # the voltage is back, the link not yet
+    assert drawn[1400] == pytest.approx(1.0, abs=0.005)

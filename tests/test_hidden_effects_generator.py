@@ -30,7 +30,9 @@ from hidden_effects import (
 from hidden_effects.controls import (
     CurrentControlled,
     DeadBand,
+    Held,
     InputFilter,
+    IntegralLink,
     Ramped,
     Rectifier,
     ResistiveInrush,
@@ -428,6 +430,7 @@ def test_what_rings_does_so_at_its_frequency_and_with_its_damping(device):
         (CurrentControlled(0.3, limit=1.3), 0.9, 1.0),
         (CurrentControlled(0.3, limit=1.3), 0.5, 0.65),
         (VoltageLink(0.3, gain=1.2), 0.9, 1.0),
+        (IntegralLink(0.3), 0.9, 1.0),
         (Ramped(0.3), 0.95, 0.95),
         (Ramped(0.3), 0.65, 0.325),
         (Thermostat(0.3), 0.9, 1.0),
@@ -436,6 +439,24 @@ def test_what_rings_does_so_at_its_frequency_and_with_its_damping(device):
 )
 def test_controls_end_where_they_aim(device, u, power):
     assert at_rest(device, u, [v.real for v in device.rest()])[0] == pytest.approx(power, rel=1e-6)
+
+
+def test_an_integral_control_brings_the_link_back_to_its_voltage_at_its_frequency():
+    """Linearised in a small dip: v'' + 2 zeta w v' + w^2 v, a constant current taking from the damping."""
+    device = IntegralLink(0.3, frequency=4.0, damping=0.7)
+    _, (v, z) = at_rest(device, 0.95, [1.0, 0.0])
+    assert (v, 1 + z) == pytest.approx((1.0, 1 / 0.95), rel=1e-6)
+    assert np.prod(modes(device, [1.0, 0.0])).real == pytest.approx((8 * np.pi) ** 2, rel=1e-4)
+    assert -np.sum(modes(device, [1.0, 0.0])).real == pytest.approx(2 * 0.7 * 8 * np.pi, rel=1e-4)
+
+
+def test_power_that_was_given_up_is_held_until_the_line_is_back():
+    device = Held(0.3, rate=2.0)
+    power, (m,) = at_rest(device, 0.75, [1.0])
+    assert (power, m) == (pytest.approx(0.5, rel=1e-6), pytest.approx(0.5, rel=1e-6))
+    assert rates_of(device, [0.5], 0.91) == [0.0]  # above the curve, below what counts as back
+    assert rates_of(device, [0.5], 0.95) == [2.0]
+    assert rates_of(device, [1.0], 0.95) == [0.0]
 
 
 def test_a_link_s_voltage_gives_what_the_current_needs():

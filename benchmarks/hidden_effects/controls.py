@@ -89,6 +89,32 @@ class VoltageLink(Rated):
 
 
 @dataclass(frozen=True)
+class IntegralLink(Rated):
+    """A converter whose dc voltage v has a proportional and an integral control, and whose current has a limit.
+
+    T v v' = u i - 1, i = min(limit, 1 + z + 2 zeta w T (1 - v)), z' = w^2 T (1 - v), which stands still at the limit.
+    Source: Yazdani and Iravani 2010, Voltage-Sourced Converters in Power Systems, section 8.6 (dc-bus control).
+    """
+
+    storage: float = 0.06  # s, T
+    frequency: float = 4.0  # Hz, w / 2 pi
+    damping: float = 0.7  # zeta
+    limit: float = 1.5
+
+    def rest(self) -> list[complex]:
+        return [1 + 0j, 0j]
+
+    def flow(self, now: Moment, V: complex, x: list[complex]) -> tuple[complex, list[complex]]:
+        u, v, z = abs(V) / self.V0, max(x[0].real, 0.1), x[1].real
+        w, T = 2 * pi * self.frequency, self.storage
+        asked = 1 + z + 2 * self.damping * w * T * (1 - v)
+        i = min(self.limit, max(0.0, asked))
+        demand = min(1.0, (v / 0.5) ** 2)  # drives let go where the link is nearly empty
+        grows = 0.0 if asked != i and (asked > i) == (v < 1) else w**2 * T * (1 - v)
+        return drawn(complex(self.power * u * i), V), [(u * i - demand) / (T * v), grows]
+
+
+@dataclass(frozen=True)
 class Ramped(Rated):
     """A converter that may lower its current at once and raises it along a ramp.
 
@@ -273,6 +299,29 @@ class Tapped(Rated):
     def flow(self, now: Moment, V: complex, x: list[complex]) -> tuple[complex, list[complex]]:
         u = abs(V) / self.V0 * (1 + self.profile(now.t))
         return drawn(complex(self.power * u**2), V), []
+
+
+@dataclass(frozen=True)
+class Held(Rated):
+    """Traction that gives up power quickly on its way down a curve, and asks for it again only once the line is back.
+
+    P = m, m falls to 1 - (full - u)/(full - off) within 10 ms; it rises at `rate` while u is above `back`.
+    Source: EN 50388-1 has power given back slowly, so that trains do not swing with the line.
+    """
+
+    full: float = 0.9
+    off: float = 0.6
+    back: float = 0.93
+    rate: float = 1.0  # 1/s
+
+    def rest(self) -> list[complex]:
+        return [1 + 0j]
+
+    def flow(self, now: Moment, V: complex, x: list[complex]) -> tuple[complex, list[complex]]:
+        u, m = abs(V) / self.V0, x[0].real
+        aim = min(1.0, max(0.0, 1 - (self.full - u) / (self.full - self.off)))
+        rises = self.rate if u > self.back and m < 1 else 0.0
+        return drawn(complex(self.power * m), V), [(aim - m) / 0.01 if aim < m else rises]
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,9 @@ import numpy as np
 from hidden_effects.controls import (
     CurrentControlled,
     DeadBand,
+    Held,
     InputFilter,
+    IntegralLink,
     Ramped,
     Rectifier,
     ResistiveInrush,
@@ -279,6 +281,21 @@ class StagedPowerLimit(Hidden):
 
 
 @dataclass(frozen=True)
+class HeldPowerLimit(Hidden):
+    """Trains that give up power along a curve at once, and take it back slowly and only once the line is back."""
+
+    reference, largest, unit = 0.15, 0.9, "1"
+    rate: float = 1.0
+
+    @classmethod
+    def details(cls, rng: np.random.Generator, dips: Sequence[Dip]) -> dict[str, float]:
+        return {"rate": float(rng.uniform(0.7, 3.0))}
+
+    def apply(self, site: Site) -> Site:
+        return beside(site, Held(self.amount * site.S.real, rate=self.rate))
+
+
+@dataclass(frozen=True)
 class FleetPowerLimit(Hidden):
     """A fleet of five sorts of trains, each of which begins to take less at a level of its own and ends at another."""
 
@@ -309,6 +326,21 @@ class LinkVoltageControl(Hidden):
     def apply(self, site: Site) -> Site:
         storage = 0.06
         return beside(site, VoltageLink(self.amount * site.S.real, storage=storage, gain=storage / self.lag))
+
+
+@dataclass(frozen=True)
+class LinkWithIntegralControl(Hidden):
+    """Converters whose control of the dc voltage has an integral part, so that the link swings back to its voltage."""
+
+    reference, largest, unit = 0.15, 0.9, "1"
+    frequency: float = 4.0
+
+    @classmethod
+    def details(cls, rng: np.random.Generator, dips: Sequence[Dip]) -> dict[str, float]:
+        return {"frequency": float(rng.uniform(2.0, 6.0))}
+
+    def apply(self, site: Site) -> Site:
+        return beside(site, IntegralLink(self.amount * site.S.real, frequency=self.frequency))
 
 
 @dataclass(frozen=True)
@@ -526,8 +558,10 @@ LAWS = {
     "fleet_of_converters": FleetOfConverters,
     "delayed_power_limit": DelayedPowerLimit,
     "staged_power_limit": StagedPowerLimit,
+    "held_power_limit": HeldPowerLimit,
     "fleet_power_limit": FleetPowerLimit,
     "link_voltage_control": LinkVoltageControl,
+    "link_with_integral_control": LinkWithIntegralControl,
     "ramped_return": RampedReturn,
     "fleet_of_links": FleetOfLinks,
     "filter_oscillation": FilterOscillation,
@@ -559,10 +593,12 @@ FAMILY = {
     "fleet_of_converters": "constant_power_converter",
     "delayed_power_limit": "voltage_dependent_power_limit",
     "staged_power_limit": "voltage_dependent_power_limit",
+    "held_power_limit": "voltage_dependent_power_limit",
     "fleet_power_limit": "voltage_dependent_power_limit",
     "link_voltage_control": "dc_link_lag",
     "ramped_return": "dc_link_lag",
     "fleet_of_links": "dc_link_lag",
+    "link_with_integral_control": "dc_link_lag",
     "filter_oscillation": "low_frequency_oscillation",
     "synchronous_swing": "low_frequency_oscillation",
     "integral_compensator": "static_var_compensator",
@@ -584,4 +620,6 @@ MEMBERS_LAW = {  # hidden laws that members of families were built to tell: by o
     "ramped_return": "ramped_current",
     "thermostat_recovery": "thermostatic_load",
     "switched_capacitors": "switched_banks",
+    "staged_power_limit": "staged_power_limit",
+    "link_voltage_control": "limited_link",
 }

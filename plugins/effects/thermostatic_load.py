@@ -22,12 +22,12 @@ class ThermostaticLoad(Effect):
     """
 
     heating_share = Parameter(0.0, (0.0, 1.0), "1", "share in the static active power", SOURCE, "s_h", null=0.0)
-    heating_time = Parameter(0.6, (0.05, 20.0), "s", "time in which the heat comes back", SOURCE, "T_h")
+    heating_time = Parameter(0.6, (0.2, 20.0), "s", "time in which the heat comes back", SOURCE, "T_h")
     heating_most = Parameter(1.5, (1.05, 2.5), "1", "all that can be on, over what was before", SOURCE, "g_{max}")
 
     places, kind = ("static P",), "lag"
     family, differs = "exponential_recovery", "as of heating under thermostats"
-    grid = {"heating_time": (0.2, 0.5, 1.2, 3.0), "heating_most": (1.2, 1.5, 2.0)}
+    grid = {"heating_time": (0.3, 0.6, 1.2, 3.0), "heating_most": (1.2, 1.5, 2.0)}
     relevant = {"heating_share": 0.1}
     confused_with = ("exponential_recovery", "dc_link_lag", "undervoltage_trip")
 

@@ -166,7 +166,7 @@ def with_members(made: HeldOut, both: AllEvents, seed: int) -> HeldOut:
     bench, surviving = both.fitted, made.survivors
     if bench.waves or not bench.criteria.family_p:
         return made
-    denied = [f for f in made.extended.values() if len(f.names) == 1 and f.names == bench.catalogue.textbook(f.names)]
+    denied = [f for f in made.extended.values() if len(f.names) == 1]
     tried = both.members(denied, seed)
     found = [(alone, fitted.fit) for alone, fitted in tried if fitted.confirmed(bench.criteria, doubted=True)]
     if not found:
