@@ -46,6 +46,7 @@ LATER = {  # sets of later commits, by what is new to them
     "with more members": JUDGEMENT.with_name("judgement_members.jsonl"),  # of families, and all sizes
     "ten of each": JUDGEMENT.with_name("judgement_ten.jsonl"),  # with exact scales of open decisions
     "nearby families": JUDGEMENT.with_name("judgement_nearby.jsonl"),  # tried beside a name that suffices
+    "near rivals": JUDGEMENT.with_name("judgement_rivals.jsonl"),  # of other families, and other valleys
 }
 KNOWN = {"rotor_skin_effect": "second_cage", "stator_transients": "stator_transients"}  # the catalogue has them, too
 HIDDEN = {  # one effect is hidden: group of trials, multiples, effects
@@ -187,7 +188,7 @@ def _compared(found, trial: cases.Trial) -> dict:
 
 
 def _left(found, clean: np.ndarray) -> float:
-    """Non-centrality that the best single effect leaves of clean curves (2, N), refitted to the noisy ones.
+    """Non-centrality that the best effect of the catalogue leaves of clean curves (2, N), refitted to the noisy ones.
 
     At its fit the problem is linear enough: what its parameters and the nuisances can still take is projected out.
     """
@@ -195,7 +196,7 @@ def _left(found, clean: np.ndarray) -> float:
     from tractexp.discrepancy.tangent import tangent
 
     bench, first, refits = found.bench, found.first, found.explanations.refits
-    singles = [fit for names, fit in refits.items() if len(names) == 1]
+    singles = [f for names, f in refits.items() if len(names) == 1 and names == found.catalogue.textbook(names)]
     singles = singles or searched([first], {(): first.fit}, 1, lambda line: None)
     left = []
     for fit in sorted(singles, key=lambda f: f.cost)[:BEST]:
