@@ -222,6 +222,7 @@ def test_a_start_that_may_overtake_the_best_is_searched_on(monkeypatch):
         return [Refit(names, unit, ways[names[0]][len(turns) - 1], 0) for names, unit in wanted]
 
     monkeypatch.setattr(fitting, "_descended", descended)
+    monkeypatch.setattr(fitting, "_begun", descended)
     monkeypatch.setattr(fitting, "moved_across", lambda bench, noise, fit, faults: fit.unit)
     ended = fitting._in_turns(at, None, [(("still",), np.zeros(1)), (("falls",), np.zeros(1))], None)
     assert (ended[0].names, ended[0].deviance) == (("falls",), 60.0)

@@ -35,20 +35,19 @@ def with_members(
     """
     bench, noise, family = base.bench, tests.noise, base.bench.kernels.family
     wanted = near(bench, tests.fit, refits) if tests.suffices else bench.catalogue.members
-    wanted = [member for member in wanted if family.joins(member.name)]
     if not wanted:
         return tests, []
     bench.effort.say(f"trying {len(wanted)} other places and laws")
     family.compile_members([m.name for m in wanted], bench.effort.say)
     fits = wide_refits(bench, noise, [starts(bench, member, refits) for member in wanted], NEAREST)
     for k, fit in enumerate(fits[:EXAMINED]):
-        if not worth(fit, tests.fit, bench.criteria.family_p):
+        if not worth(fit, tests.fit, bench.criteria.family_p) or not family.joins(fit.names[0]):
             continue
         family.compile_members(fit.names, bench.effort.say, whole=True)
         there = examined(base.quiet, fit, noise, seed + k)
         if there.suffices:
-            return there, [there.fit, *(f for f in fits if f is not fit)]
-    return tests, fits if tests.suffices else []
+            return there, [there.fit, *(f for f in fits if f is not fit and family.joins(f.names[0]))]
+    return tests, [f for f in fits if family.joins(f.names[0])] if tests.suffices else []
 
 
 def near(bench: Bench, best: Refit, refits: Mapping[Names, Refit]) -> list[Candidate]:

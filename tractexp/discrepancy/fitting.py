@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.promising import promising
 from tractexp.identification import shelf
 from tractexp.identification.descent import descend
 from tractexp.noise import Noise
@@ -16,6 +17,7 @@ CLOSE = 12.0  # of the deviance: a rough refit this near the best is made exact
 HOPELESS, SLOW = 60.0, 0.3  # of the deviance, and of what it spans: a set this far behind then is not refined
 REACHES = 2.0 ** -np.arange(1, 10)  # of a parameter's range: how far one without a slope is moved
 MOVES, WORTH = 8, 1.0  # of such parameters in a row, and the deviance that one must gain
+BEGUN = 8  # starts of one set that are begun, of those that promise most
 TURNS, KEPT = 3, 6  # of moving and descending in turn, and the starts that take part
 SCATTERED, SPREAD, AGAIN = 24, 0.5, 3  # starts around a fit, of the range to either side, and how often
 WALL = 1e-3  # of a coordinate's range: how near a bound a parameter rests on it
@@ -91,7 +93,7 @@ def wide_refit(
 
 def _in_turns(bench: Bench, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None) -> list[Refit]:
     """The best of these starts, moved and descended in turn until none gains that may end best; the best first."""
-    fits = sorted(_descended(bench, noise, wanted, faults, (FIRST, ROUGH[1])), key=_cost)[:KEPT]
+    fits = _begun(bench, noise, wanted, faults)
     for _ in range(TURNS):
         moved = [(f.names, moved_across(bench, noise, f, faults)) for f in fits]
         ended = _descended(bench, noise, moved, faults, ROUGH)
@@ -124,9 +126,18 @@ def wide_refits(
     bench: Bench, noise: Noise, wanted: Iterable[Sequence[Start]], most: int, faults: Sequence[str] | None = None
 ) -> list[Refit]:  # fmt: skip
     """`wide_refit` of those `most` sets, each with starts of its own, that come nearest in a few iterations."""
-    begun = [sorted(_descended(bench, noise, starts, faults, (FIRST, ROUGH[1])), key=_cost) for starts in wanted]
-    begun = sorted((fits[:KEPT] for fits in begun), key=lambda fits: fits[0].cost)[:most]
+    begun = [_begun(bench, noise, starts, faults) for starts in wanted]
+    begun = sorted(begun, key=lambda fits: fits[0].cost)[:most]
     return best_of(f for fits in begun for f in wide_refit(bench, noise, [(g.names, g.unit) for g in fits], faults))
+
+
+def _begun(bench: Bench, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None) -> list[Refit]:
+    """The best starts of one set after a few iterations, of those that promise most by one simulation each."""
+    names = wanted[0][0]
+    measured, prior = _with_prior(bench, [names], faults)
+    nuisances = [*bench.coordinates.base, *bench.coordinates.before, *measured]
+    units = promising(bench, noise, names, np.array([unit for _, unit in wanted]), nuisances, prior, BEGUN)
+    return sorted(_descended(bench, noise, [(names, u) for u in units], faults, (FIRST, ROUGH[1])), key=_cost)[:KEPT]
 
 
 def moved_across(bench: Bench, noise: Noise, fit: Refit, faults: Sequence[str] | None = None) -> np.ndarray:

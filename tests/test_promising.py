@@ -1,0 +1,61 @@
+"""Starts ranked by one simulation each, as a descent from every one of them would."""
+
+import numpy as np
+import pytest
+from test_discrepancy import LOUD, base, bench, events
+
+from tractexp.discrepancy import fitting
+from tractexp.discrepancy.base_fit import base_fit
+from tractexp.discrepancy.disagreement import disagreement
+from tractexp.discrepancy.promising import promising
+
+TRIP = ("undervoltage_trip",)
+
+
+@pytest.fixture(scope="module")
+def planted():
+    """The bench of a trip of 5 %, its base fit, and a start at each setting of the catalogue's grid."""
+    at = bench(base(), events("undervoltage_trip", 0.5, 800012, noise=LOUD), TRIP)
+    first = disagreement(base_fit(at), 0)
+    settings = at.catalogue["undervoltage_trip"].settings
+    units = np.array([at.coordinates.placed(first.fit.unit, s | {"tripped_share": 0.05}) for s in settings])
+    coordinates = at.coordinates
+    faults = coordinates.parameters(at.catalogue.of_measurement)
+    return at, first.noise, units, [*coordinates.base, *coordinates.before, *faults], faults
+
+
+def test_the_best_of_all_descents_begins_at_a_start_that_promises(planted):
+    at, noise, units, nuisances, prior = planted
+    kept = promising(at, noise, TRIP, units, nuisances, prior, fitting.BEGUN)
+    assert len(units) == 2 * fitting.BEGUN
+    assert len(kept) == fitting.BEGUN
+    best = lambda these: min(  # noqa: E731
+        f.deviance for f in fitting._descended(at, noise, [(TRIP, u) for u in these], None, fitting.ROUGH)
+    )
+    assert best(kept) == pytest.approx(best(units), abs=1.0)
+
+
+def test_what_changes_nothing_promises_least(planted):
+    """A relay whose level no dip reaches leaves the deviance of the base model; so does one of no size."""
+    at, noise, units, nuisances, prior = planted
+    never = at.coordinates.placed(units[0], {"trip_level": 0.3, "trip_delay": 0.5})
+    still = at.coordinates.placed(units[1], {"tripped_share": 0.0})
+    kept = promising(at, noise, TRIP, np.array([never, *units, still]), nuisances, prior, len(units))
+    assert not any(np.array_equal(k, u) for k in kept for u in (never, still))
+
+
+def test_few_starts_are_taken_as_they_are_and_the_order_is_kept(planted):
+    at, noise, units, nuisances, prior = planted
+    spent = at.effort.total
+    assert promising(at, noise, TRIP, units[:5], nuisances, prior, 5) is not None
+    assert at.effort.total == spent
+    kept = promising(at, noise, TRIP, units, nuisances, prior, 7)
+    places = [int(np.flatnonzero((units == k).all(axis=1))[0]) for k in kept]
+    assert places == sorted(places)
+
+
+def test_it_costs_a_simulation_for_each_start_and_nuisance(planted):
+    at, noise, units, nuisances, prior = planted
+    spent = at.effort.total
+    promising(at, noise, TRIP, units, nuisances, prior, 7)
+    assert at.effort.total - spent == len(units) + len(nuisances) + 1
