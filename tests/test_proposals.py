@@ -184,6 +184,29 @@ def test_the_plugin_file_reproduces_the_fit(stepped, tmp_path, monkeypatch):
     assert any("proposed_size_P" in line or "k_P" in line for line in model.latex())
 
 
+def test_a_transformer_whose_ratio_steps_is_found_in_the_voltage_that_the_load_sees():
+    """The motors answer it by a decaying swing of Q, which a term in the power alone fits worse."""
+    made = events("tap_changer_step", 0.5)
+    voltage, power = "timed:voltage:step:of_return", "timed:power:decay:of_return"
+    found = searched(made[:2], made[2:], (*FEW, term(voltage), term(power)))
+    assert found.proposal.term.name == voltage
+    assert found.proposal.values["size"] == pytest.approx(0.5 * EFFECTS["tap_changer_step"].reference, rel=0.05)
+    assert [t.name for t, _ in found.tried].index(power) > 0
+
+
+@pytest.mark.parametrize(("seed", "measured"), [(800001, 0.6), (800002, 3.4)])
+def test_what_a_right_term_closes_does_not_hang_on_the_level_of_the_noise(seed, measured):
+    """Of the deviance in excess of the noise, `measured` on the held-out event, the same step closes too little once,
+    and once three times what there is."""
+    made = events("load_step", 0.2, seed=seed)
+    found = searched(made[:2], made[2:])
+    held = found.proposal.validate
+    gained = held.without.deviance - held.with_it.deviance
+    assert gained / (held.without.deviance - held.bench.samples) == pytest.approx(measured, abs=0.1)
+    assert 0.8 < held.closed <= 1.0
+    assert found.proposal.term.name == STEP
+
+
 @pytest.mark.parametrize("seed", [800003, 800004])
 def test_nothing_is_proposed_where_nothing_is_missing(seed):
     made = events(seed=seed, count=3)
