@@ -13,7 +13,7 @@ from tractexp.discrepancy import all_events, families, fitting, survivors
 from tractexp.discrepancy.catalogue import catalogue
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.explanations import worth_another
-from tractexp.discrepancy.families import near, open_settings, starts, with_members, worth
+from tractexp.discrepancy.families import against_members, near, open_settings, starts, worth
 from tractexp.discrepancy.fitting import Refit, scattered
 from tractexp.discrepancy.forms import forms
 from tractexp.discrepancy.gap import Gap
@@ -123,7 +123,7 @@ def test_a_name_that_suffices_gives_way_to_a_member_that_explains_more_and_leave
     monkeypatch.setattr(families, "starts", lambda *_: [])
     monkeypatch.setattr(families, "wide_refits", lambda *_: [member])
     monkeypatch.setattr(families, "examined", lambda quiet, fit, *_: SimpleNamespace(fit=fit, suffices=True))
-    tests, held_against = with_members(SimpleNamespace(bench=at, quiet=None), told, refits, 0)
+    tests, held_against = against_members(SimpleNamespace(bench=at, quiet=None), told, refits, 0)
     assert tests.fit is (member if named else told.fit)
     assert held_against == [member]
 
@@ -135,7 +135,7 @@ def test_where_neither_leaves_nothing_no_member_is_a_rival(monkeypatch):
     monkeypatch.setattr(families, "starts", lambda *_: [])
     monkeypatch.setattr(families, "wide_refits", lambda *_: [fit(60.0, 4, "saturation_curve")])
     monkeypatch.setattr(families, "examined", lambda quiet, fit, *_: SimpleNamespace(fit=fit, suffices=False))
-    assert with_members(SimpleNamespace(bench=at, quiet=None), told, refits, 0) == (told, [])
+    assert against_members(SimpleNamespace(bench=at, quiet=None), told, refits, 0) == (told, [])
 
 
 def test_the_chosen_set_comes_first_with_its_own_tests_though_another_fits_better(monkeypatch):

@@ -21,12 +21,12 @@ def planted():
     units = np.array([at.coordinates.placed(first.fit.unit, s | {"tripped_share": 0.05}) for s in settings])
     coordinates = at.coordinates
     faults = coordinates.parameters(at.catalogue.of_measurement)
-    return at, first.noise, units, [*coordinates.base, *coordinates.before, *faults], faults
+    return at, first.noise, units, [*coordinates.base, *coordinates.before, *faults]
 
 
 def test_the_best_of_all_descents_begins_at_a_start_that_promises(planted):
-    at, noise, units, nuisances, prior = planted
-    kept = promising(at, noise, TRIP, units, nuisances, prior, fitting.BEGUN)
+    at, noise, units, nuisances = planted
+    kept = promising(at, noise, TRIP, units, nuisances, fitting.BEGUN)
     assert len(units) == 2 * fitting.BEGUN
     assert len(kept) == fitting.BEGUN
     best = lambda these: min(  # noqa: E731
@@ -37,25 +37,25 @@ def test_the_best_of_all_descents_begins_at_a_start_that_promises(planted):
 
 def test_what_changes_nothing_promises_least(planted):
     """A relay whose level no dip reaches leaves the deviance of the base model; so does one of no size."""
-    at, noise, units, nuisances, prior = planted
+    at, noise, units, nuisances = planted
     never = at.coordinates.placed(units[0], {"trip_level": 0.3, "trip_delay": 0.5})
     still = at.coordinates.placed(units[1], {"tripped_share": 0.0})
-    kept = promising(at, noise, TRIP, np.array([never, *units, still]), nuisances, prior, len(units))
+    kept = promising(at, noise, TRIP, np.array([never, *units, still]), nuisances, len(units))
     assert not any(np.array_equal(k, u) for k in kept for u in (never, still))
 
 
 def test_few_starts_are_taken_as_they_are_and_the_order_is_kept(planted):
-    at, noise, units, nuisances, prior = planted
+    at, noise, units, nuisances = planted
     spent = at.effort.total
-    assert promising(at, noise, TRIP, units[:5], nuisances, prior, 5) is not None
+    assert promising(at, noise, TRIP, units[:5], nuisances, 5) is not None
     assert at.effort.total == spent
-    kept = promising(at, noise, TRIP, units, nuisances, prior, 7)
+    kept = promising(at, noise, TRIP, units, nuisances, 7)
     places = [int(np.flatnonzero((units == k).all(axis=1))[0]) for k in kept]
     assert places == sorted(places)
 
 
-def test_it_costs_a_simulation_for_each_start_and_nuisance(planted):
-    at, noise, units, nuisances, prior = planted
+def test_it_costs_a_simulation_for_each_start_and_two_for_each_nuisance(planted):
+    at, noise, units, nuisances = planted
     spent = at.effort.total
-    promising(at, noise, TRIP, units, nuisances, prior, 7)
-    assert at.effort.total - spent == len(units) + len(nuisances) + 1
+    promising(at, noise, TRIP, units, nuisances, 7)
+    assert at.effort.total - spent == len(units) + 2 * len(nuisances) + 1

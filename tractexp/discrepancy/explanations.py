@@ -14,7 +14,7 @@ from scipy.special import chdtrc
 from tractexp.discrepancy.base_fit import BaseFit
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.disagreement import Disagreement, examined
-from tractexp.discrepancy.families import with_members
+from tractexp.discrepancy.families import against_members
 from tractexp.discrepancy.fitting import (
     CLOSE,
     NESTED,
@@ -138,7 +138,7 @@ def with_families(base: BaseFit, tests: Disagreement, refits: dict[Names, Refit]
     """
     if base.bench.waves or not base.bench.criteria.family_p:
         return tests
-    tests, fits = with_members(base, tests, refits, seed + FAMILIES)
+    tests, fits = against_members(base, tests, refits, seed + FAMILIES)
     refits |= {f.names: f for f in fits}
     return tests
 

@@ -26,7 +26,7 @@ BEGUN = 0.5  # smallest relevant sizes at which a size without a textbook value 
 Names = tuple[str, ...]
 
 
-def with_members(
+def against_members(
     base: BaseFit, tests: Disagreement, refits: Mapping[Names, Refit], seed: int
 ) -> tuple[Disagreement, list[Refit]]:
     """The tests at the best member that leaves nothing and explains more than the best textbook effect, or `tests`.

@@ -134,9 +134,8 @@ def wide_refits(
 def _begun(bench: Bench, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None) -> list[Refit]:
     """The best starts of one set after a few iterations, of those that promise most by one simulation each."""
     names = wanted[0][0]
-    measured, prior = _with_prior(bench, [names], faults)
-    nuisances = [*bench.coordinates.base, *bench.coordinates.before, *measured]
-    units = promising(bench, noise, names, np.array([unit for _, unit in wanted]), nuisances, prior, BEGUN)
+    nuisances = [*bench.coordinates.base, *bench.coordinates.before, *_with_prior(bench, [names], faults)[0]]
+    units = promising(bench, noise, names, np.array([unit for _, unit in wanted]), nuisances, BEGUN)
     return sorted(_descended(bench, noise, [(names, u) for u in units], faults, (FIRST, ROUGH[1])), key=_cost)[:KEPT]
 
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.linear import two_sided
 from tractexp.discrepancy.pushes import push_points
-from tractexp.discrepancy.tangent import resting, two_sided
+from tractexp.discrepancy.tangent import resting
 from tractexp.identification.result import current_error, relative_error
 from tractexp.identification.seen import seen_by_estimator
 from tractexp.noise import Noise

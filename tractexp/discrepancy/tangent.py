@@ -8,13 +8,13 @@ import numpy as np
 
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.fitting import WALL, Refit
+from tractexp.discrepancy.linear import two_sided
 from tractexp.discrepancy.projection import Column, Projection
 from tractexp.discrepancy.pushes import push_points
 from tractexp.noise import Noise
 from tractexp.noise.span import spanned
 
 REACH = 0.5  # smallest relevant sizes: the step of a candidate's difference quotient
-NUISANCE_STEP = 1e-4  # of a coordinate's range
 HELD = 1e-6  # of it: how far a parameter that rests on a wall may move
 LEAST_KEPT = 0.2  # of a residual's variance: where columns explain more, it tells nothing of the noise
 
@@ -119,15 +119,6 @@ def _by_event(bench: Bench, columns: np.ndarray) -> np.ndarray:
         part = bench.drive.part(e)
         split[e, ..., part] = columns[..., part]
     return split.reshape(-1, *columns.shape[1:])
-
-
-def two_sided(unit: np.ndarray, columns: Sequence[int] | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points (k, D) a small step above and below in each of the columns."""
-    up, down = (np.tile(unit, (len(columns), 1)) for _ in "ud")
-    for row, k in enumerate(columns):
-        up[row, k] = min(unit[k] + NUISANCE_STEP, 1.0)
-        down[row, k] = max(unit[k] - NUISANCE_STEP, 0.0)
-    return up, down
 
 
 def _candidate_points(bench: Bench, fit: Refit) -> tuple[np.ndarray, np.ndarray, list]:

@@ -13,8 +13,8 @@ import numpy as np
 
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.fitting import Refit
+from tractexp.discrepancy.linear import two_sided
 from tractexp.discrepancy.next_event.imagined import BRIEF, DURATIONS, Imagined, driven
-from tractexp.discrepancy.tangent import two_sided
 from tractexp.model.drive import Drive
 
 FOLLOWS = 1e-6  # pu: how near one comes to the other

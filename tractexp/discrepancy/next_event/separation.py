@@ -14,9 +14,9 @@ import numpy as np
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.fitting import Refit
+from tractexp.discrepancy.linear import linearised, two_sided
 from tractexp.discrepancy.next_event.imagined import Imagined, driven, noise_of
-from tractexp.discrepancy.proposal.screen import linearised
-from tractexp.discrepancy.tangent import resting, two_sided
+from tractexp.discrepancy.tangent import resting
 from tractexp.model.drive import Drive
 from tractexp.noise import Noise
 

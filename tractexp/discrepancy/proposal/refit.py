@@ -11,9 +11,10 @@ import numpy as np
 
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.fitting import Refit, Start, best_of, off_walls, refit, rough_refit, wide_refit
+from tractexp.discrepancy.linear import linearised
 from tractexp.discrepancy.proposal.bed import place, values_of, with_terms
 from tractexp.discrepancy.proposal.library import ANSWER, Shape, Term, term, terms
-from tractexp.discrepancy.proposal.screen import Ground, Scored, Screened, linearised, scores
+from tractexp.discrepancy.proposal.screen import Ground, Scored, Screened, scores
 from tractexp.noise import Noise
 
 MOST, ANSWERS = 30, 15  # terms refitted, and how many at least are functions of voltage and states

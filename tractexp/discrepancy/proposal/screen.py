@@ -12,37 +12,15 @@ import numpy as np
 
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.cores import side_by_side
+from tractexp.discrepancy.linear import linearised
 from tractexp.discrepancy.proposal.bed import Setting, place, sizes_of
 from tractexp.discrepancy.proposal.library import Term
-from tractexp.discrepancy.tangent import two_sided
 from tractexp.noise import Noise
 
 STEP = 0.02  # of a size's relevant value: how large a term is whose column is taken
 TOGETHER = 384  # columns held at once
 QUARTER = float(np.pi / 2)
 LEAST = 1e-8  # of a column's square: what the nuisances leave of it at least
-
-
-def linearised(
-    bench: Bench, unit: np.ndarray, noise: Noise, columns: Sequence[int], names: Sequence[str]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Residuals (C, N) of a fit with the named terms, and rows (1 + k, R): they and their differences, whitened.
-
-    R = C N rows of the records, then those of the priors of the faults of the measurement.
-    """
-    at = bench.coordinates
-    up, down = two_sided(unit, columns)
-    raw = bench.residuals(np.concatenate([unit[None], up, down]), names)
-    k = len(columns)
-    width = np.array([u[c] - d[c] for u, d, c in zip(up, down, columns, strict=True)])
-    moved = np.nan_to_num((raw[1 : 1 + k] - raw[1 + k :]) / width[:, None, None])
-    white = bench.whiten(noise, np.concatenate([raw[:1], moved]))
-    held = [(i, c) for i, c in enumerate(columns) if c in at.prior_deviation]
-    prior = np.zeros((1 + k, len(held)))
-    for row, (i, c) in enumerate(held):
-        prior[1 + i, row] = 1 / at.prior_deviation[c]
-        prior[0, row] = (unit[c] - at.null[c]) / at.prior_deviation[c]
-    return raw[0], np.concatenate([white, prior], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
