@@ -3,6 +3,7 @@
 import numpy as np
 
 
+@np.errstate(invalid="ignore")  # what diverges stays what is not finite
 def mean(y: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Mean of y (..., N) with weights (odd,) about each sample.
 
