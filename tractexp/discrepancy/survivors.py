@@ -56,8 +56,8 @@ def survivors(explained: Explanations, seed: int) -> Survivors:
     everyone, last, bench = rivals(explained), explained.last, explained.base.bench
     left = [r for r in everyone if not r.rejected][:MOST]
     members = [n for r in left[1:] for n in r.fit.names if n not in bench.catalogue.of_load]
-    for name in members:
-        bench.kernels.family.compile_members((name,), bench.effort.say, whole=True)
+    if members:
+        bench.kernels.family.compile_members(members, bench.effort.say, whole=True)
 
     def tested(k: int) -> Rival:
         fit = left[k].fit
