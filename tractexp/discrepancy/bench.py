@@ -8,7 +8,7 @@ import numpy as np
 
 from tractexp.discrepancy.catalogue import Catalogue
 from tractexp.discrepancy.coordinates import Coordinates
-from tractexp.discrepancy.cores import side_by_side
+from tractexp.discrepancy.cores import in_same_parts, side_by_side
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.kernels import Family, Kernels
@@ -132,12 +132,12 @@ class Bench:
 
     def whiten(self, noise: Noise, residuals: np.ndarray) -> np.ndarray:
         """Residuals (n, C, N) as rows (n, C N) of independent unit variance."""
-        return noise.whiten(residuals, self.drive, self.known)
+        return in_same_parts(lambda part: noise.whiten(part, self.drive, self.known), residuals)
 
     def rows(self, unit: np.ndarray, noise: Noise, faults: Sequence[int], sets: Sequence[Sequence[str]]) -> np.ndarray:
         """Whitened residuals (n, C N) of coordinates with a set of names each, then the prior of the free faults."""
         raw = self.residuals_of(unit, [(names, False) for names in sets])
-        white = side_by_side(lambda part: self.whiten(noise, part), raw)
+        white = self.whiten(noise, raw)
         at = self.coordinates
         prior = [(unit[:, k] - at.null[k]) / at.prior_deviation[k] for k in faults]
         return np.concatenate([white, *(p[:, None] for p in prior)], axis=1)

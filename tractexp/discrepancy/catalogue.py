@@ -1,5 +1,6 @@
 """The effects that could be missing: which of them this data can show, and how each is scanned."""
 
+import functools
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -55,7 +56,11 @@ class Catalogue:
     members: tuple[Candidate, ...] = ()
 
     def __getitem__(self, name: str) -> Candidate:
-        return next(c for c in (*self.candidates, *self.members) if c.name == name)
+        return self._named[name]
+
+    @functools.cached_property
+    def _named(self) -> dict[str, Candidate]:
+        return {c.name: c for c in (*self.candidates, *self.members)}
 
     def family(self, name: str) -> str:
         """The textbook effect whose family an effect belongs to: itself, where it is one."""
@@ -70,16 +75,16 @@ class Catalogue:
         differs = self[name].effect.differs
         return f"{self.family(name)}{',' * differs.startswith('but')} {differs}" if differs else name
 
-    @property
+    @functools.cached_property
     def effects(self) -> list[Effect]:
         return [c.effect for c in self.candidates]
 
-    @property
+    @functools.cached_property
     def of_load(self) -> tuple[str, ...]:
         """Names of the effects of the load itself."""
         return tuple(c.name for c in self.candidates if not c.measurement)
 
-    @property
+    @functools.cached_property
     def of_measurement(self) -> tuple[str, ...]:
         """Names of the faults of the measurement."""
         return tuple(c.name for c in self.candidates if c.measurement)

@@ -9,6 +9,7 @@ import numpy as np
 
 from tractexp.model.template import GROUP
 
+FEWEST, MOST = 2 * GROUP, 7 * GROUP  # lanes that are worth a call, and that one call has
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
@@ -17,7 +18,18 @@ def side_by_side(function: Callable[[np.ndarray], np.ndarray], lanes: np.ndarray
     """`function` of lanes (n, ...), on all cores: they do not know of each other, so the bits are the same."""
     from numba import get_num_threads
 
-    parts = min(get_num_threads(), -(-len(lanes) // (2 * GROUP)))
+    return _in_parts(function, lanes, min(get_num_threads(), -(-len(lanes) // FEWEST)))
+
+
+def in_same_parts(function: Callable[[np.ndarray], np.ndarray], lanes: np.ndarray) -> np.ndarray:
+    """As `side_by_side`, of a function whose last bits depend on how many lanes it is given, as matrix products do.
+
+    How lanes are parted does not depend on the number of cores, so that no result does.
+    """
+    return _in_parts(function, lanes, max(-(-len(lanes) // MOST), min(2, -(-len(lanes) // FEWEST))))
+
+
+def _in_parts(function: Callable[[np.ndarray], np.ndarray], lanes: np.ndarray, parts: int) -> np.ndarray:
     if parts < 2:
         return function(lanes)
     return np.concatenate(list(_threads().map(function, np.array_split(lanes, parts))))

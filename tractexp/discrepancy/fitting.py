@@ -1,11 +1,13 @@
 """Fits of sets of effects side by side: each is a lane of the batched descent with its own free columns."""
 
+import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.promising import promising
 from tractexp.identification import shelf
 from tractexp.identification.descent import descend
@@ -126,9 +128,10 @@ def wide_refits(
     bench: Bench, noise: Noise, wanted: Iterable[Sequence[Start]], most: int, faults: Sequence[str] | None = None
 ) -> list[Refit]:  # fmt: skip
     """`wide_refit` of those `most` sets, each with starts of its own, that come nearest in a few iterations."""
-    begun = [_begun(bench, noise, starts, faults) for starts in wanted]
+    begun = each_apart(lambda starts: _begun(bench, noise, starts, faults), list(wanted))
     begun = sorted(begun, key=lambda fits: fits[0].cost)[:most]
-    return best_of(f for fits in begun for f in wide_refit(bench, noise, [(g.names, g.unit) for g in fits], faults))
+    again = [[(f.names, f.unit) for f in fits] for fits in begun]
+    return best_of(itertools.chain(*each_apart(lambda starts: wide_refit(bench, noise, starts, faults), again)))
 
 
 def _begun(bench: Bench, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None) -> list[Refit]:

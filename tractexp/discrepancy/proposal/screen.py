@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.discrepancy.bench import Bench
-from tractexp.discrepancy.cores import side_by_side
 from tractexp.discrepancy.linear import linearised
 from tractexp.discrepancy.proposal.bed import Setting, place, sizes_of
 from tractexp.discrepancy.proposal.library import Term
@@ -53,7 +52,7 @@ class Ground:
         raw = self.bench.residuals(points, (kind,))
         raw -= self.raw
         raw /= spans[:, None, None]
-        return side_by_side(lambda part: self.bench.whiten(self.noise, part), np.nan_to_num(raw, copy=False))
+        return self.bench.whiten(self.noise, np.nan_to_num(raw, copy=False))
 
     def drawn(self, seed: int, draws: int) -> np.ndarray:
         """Noise (draws, R), whitened and projected as the fit's residual is."""
