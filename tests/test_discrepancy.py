@@ -43,7 +43,7 @@ from tractexp.noise import Autoregression, white_noise
 from tractexp.noise import Noise as PowerNoise
 from tractexp.noise.quiet import estimate
 from tractexp.noise.voltage import smoothed
-from tractexp.noise.wander import Rest, Wander
+from tractexp.noise.wander import Load, Rest, Wander
 from tractexp.noise.wander import find as wandering
 from tractexp.plugin import get
 from tractexp.record import Record, detect
@@ -66,11 +66,16 @@ def bench(model, made, only=FEW, bounds=None):
     return Bench.of(model, missing, Records.of(made), bounds or {}, {}, Criteria(), Effort())
 
 
-def find(before, step, profile, rests=()):
+def steady(samples):
+    """A load that takes the same power throughout, in one event."""
+    return Load(np.tile([[1.0], [0.0]], samples), np.array([[1.0, 0.0]]))
+
+
+def find(before, step, load, rests=()):
     """Whether a load wanders, by the criteria of an investigation."""
     c = Criteria()
     limits = {"seen": c.wandering_seen, "within": c.wandering_within, "less": c.wandering_likely}
-    return wandering(before, step, profile, rests, **limits)
+    return wandering(before, step, load, rests, **limits)
 
 
 @pytest.fixture(scope="module")
@@ -203,10 +208,10 @@ def test_a_recurrence_is_undone_by_its_own_whitening():
 def test_a_load_that_wanders_is_seen_before_the_events_and_steady_noise_is_not():
     rng = np.random.default_rng(8)
     calm = lambda: [rng.normal(size=(2, 250)) for _ in range(3)]  # noqa: E731
-    spoken = sum(find(calm(), 0.002, np.ones(250)) is not None for _ in range(150))
+    spoken = sum(find(calm(), 0.002, steady(250)) is not None for _ in range(150))
     assert 0.03 < spoken / 150 < 0.1  # half a chi-square of one degree beyond 2, less what fast noise takes: 6 %
     walks = [w + np.cumsum(rng.normal(size=(2, 250)) * np.array([[0.05], [0.0]]), axis=1) for w in calm()]
-    found = find(walks, 0.002, np.ones(250))
+    found = find(walks, 0.002, steady(250))
     assert 1.0 < found.intensity[0] / (0.05**2 / 0.002) < 2.0  # the larger end of its interval
     assert found.intensity[1] < found.intensity[0] / 2
 
@@ -214,16 +219,41 @@ def test_a_load_that_wanders_is_seen_before_the_events_and_steady_noise_is_not()
 def test_an_identification_asks_for_more_before_it_says_that_a_load_wanders():
     rng = np.random.default_rng(9)
     limits = {"seen": observed.SEEN, "within": observed.WITHIN, "less": observed.LESS}
-    seen = lambda before: wandering(before, 0.002, np.ones(250), **limits) is not None  # noqa: E731
+    seen = lambda before: wandering(before, 0.002, steady(250), **limits) is not None  # noqa: E731
     calm = lambda: [rng.normal(size=(2, 250)) for _ in range(3)]  # noqa: E731
     walk = lambda: [b + np.cumsum(rng.normal(size=(2, 250)) * [[0.03], [0.0]], axis=1) for b in calm()]  # noqa: E731
     assert sum(seen(calm()) for _ in range(150)) <= 3  # 0.3 %; of an investigation 6 %
     assert 28 <= sum(seen(walk()) for _ in range(60)) <= 36  # of which an investigation sees 42
 
 
+def test_heavy_tails_are_drawn_beyond_what_the_quiet_samples_showed():
+    """Quantiles of the law stand for few samples of Student's t; normal and quantised samples stand for themselves."""
+    rng = np.random.default_rng(8)
+    whole = slice(0, 400)
+    drawn = lambda rows: estimate(rows, np.ones((2, 400), dtype=bool), [whole]).shocks  # noqa: E731
+    heavy = drawn(rng.standard_t(4, (2, 400)))
+    assert all(len(channel) > 400 and 8 < channel.max() < 30 for channel in heavy)
+    assert all(channel.std() == pytest.approx(1.0) for channel in heavy)
+    for rows in (rng.normal(size=(2, 400)), np.round(2 * rng.normal(size=(2, 400)))):
+        assert all(len(channel) <= 400 for channel in drawn(rows))
+
+
+@pytest.mark.parametrize(("shape", "p"), [(0.0, 0.01), (0.3, 0.01), (0.3, 0.001)])
+def test_the_largest_of_many_has_the_tail_of_its_own_law(shape, p):
+    """Draws from SciPy's extreme value distributions, light and heavy tails: the p of a known quantile comes out."""
+    from scipy.stats import genextreme
+
+    law = genextreme(-shape, 2.0, 3.0)
+    rng = np.random.default_rng(5)
+    unit = Scale(np.zeros(1), np.ones(1))
+    found = [tail(law.rvs((199, 1), random_state=rng), np.array([law.isf(p)]), unit) for _ in range(40)]
+    assert np.median(found) == pytest.approx(p, rel=0.3)
+
+
 def test_noise_of_a_wandering_load_is_white_once_whitened():
     """Draws that wander come out of the whitening with unit variance, also in their slow sums."""
-    wander = Wander(np.array([2.0, 0.0]), 0.002, np.where(np.arange(600) < 300, 1.0, 0.5))
+    power = np.stack([np.where(np.arange(600) < 300, 1.0, 0.5), np.zeros(600)])
+    wander = Wander(np.array([2.0, 0.0]), 0.002, Load(power, np.array([[1.0, 0.0]])))
     noise = PowerNoise(PowerNoise.white(1.0, 1.0).pairs, wander=wander)
     drive = SimpleNamespace(events=1, samples=600, part=lambda e: slice(0, 600))
     drawn = noise.draw(np.random.default_rng(9), 400, [600])
@@ -234,6 +264,23 @@ def test_noise_of_a_wandering_load_is_white_once_whitened():
     assert rows.var() == pytest.approx(1.0, abs=0.02)
 
 
+def test_what_the_reactive_power_of_customers_does_after_a_dip_follows_their_active_power():
+    """P and Q of one load wander together: where it takes thrice the reactive power, that wanders thrice as much."""
+    rng, n, count = np.random.default_rng(3), 600, 200
+    clean = np.stack([np.ones(n), np.where(np.arange(n) < 300, 0.4, 1.2)])
+    walk = np.cumsum(rng.normal(size=(count, 1, n)) * 0.01, axis=2)
+    walk -= walk.mean(axis=2, keepdims=True)  # a load that is larger throughout is P0 and Q0
+    recorded = clean * walk + 0.05 * rng.normal(size=(count, 2, n))
+    load = Load(clean / np.hypot(1.0, 0.4), np.array([[1.0, 0.4]]) / np.hypot(1.0, 0.4))
+    mix = np.array([[20.0, 0.0], [-8.0, 20.0]])  # in which what goes together in P and Q before the dip is P's alone
+    noise = PowerNoise(PowerNoise.white(1.0, 1.1).pairs, mix, wander=Wander(np.array([20.0, 0.0]), 0.002, load))
+    drive = SimpleNamespace(events=1, samples=n, part=lambda e: slice(0, n))
+    rows = noise.whiten(recorded, drive, np.ones((2, n), dtype=bool)).reshape(count, 2, n)
+    slow = (np.arange(n) >= 300) / np.sqrt(300)
+    assert np.var((mix @ recorded)[:, 1] @ slow) > 20
+    assert np.var(rows[:, 1] @ slow) < 2
+
+
 def test_a_load_that_seems_steady_before_the_events_may_wander_within_them():
     """What is left of the events adds evidence, as long as the stretches before do not speak against it."""
     rng = np.random.default_rng(11)
@@ -242,11 +289,11 @@ def test_a_load_that_seems_steady_before_the_events_may_wander_within_them():
     columns = rng.normal(size=(3, 2, 1000))
     rest = lambda left: Rest(left, columns, np.ones(1000))  # noqa: E731
     calm = [white(250) for _ in range(3)]
-    assert find(calm, 0.002, np.ones(1000)) is None
-    assert find(calm, 0.002, np.ones(1000), [rest(white(1000)) for _ in range(3)]) is None
-    assert find(calm, 0.002, np.ones(1000), [rest(white(1000) + walk(1000)) for _ in range(3)]) is not None
+    assert find(calm, 0.002, steady(1000)) is None
+    assert find(calm, 0.002, steady(1000), [rest(white(1000)) for _ in range(3)]) is None
+    assert find(calm, 0.002, steady(1000), [rest(white(1000) + walk(1000)) for _ in range(3)]) is not None
     explained = [rest(white(1000) + 5 * columns[0]) for _ in range(3)]
-    assert find(calm, 0.002, np.ones(1000), explained) is None
+    assert find(calm, 0.002, steady(1000), explained) is None
 
 
 def test_noise_of_the_voltage_is_taken_out_where_it_is_smooth():
@@ -647,3 +694,22 @@ def test_on_a_real_record_it_says_that_it_does_not_know(shared_data, tmp_path):
     assert "extended model:" not in done.stdout
     assert "measured less calculated" in (tmp_path / "run" / "discrepancy.html").read_text()
     assert (tmp_path / "run" / "unexplained.csv").read_text().startswith("event,t,P,Q")
+
+
+def test_whitened_bits_do_not_depend_on_the_number_of_cores(planted):
+    """Products of matrices round by how many rows they have: rows are parted alike on any machine."""
+    import numba
+
+    bench = planted.bench
+    wander = Wander(np.array([1.0, 0.3]), 0.002, bench.power)
+    noise = replace(planted.last.noise, mix=np.eye(2), wander=wander)
+    residuals = np.random.default_rng(1).normal(size=(150, *bench.known.shape))
+    whole = numba.get_num_threads()
+    rows = []
+    try:
+        for threads in {1, whole}:
+            numba.set_num_threads(threads)
+            rows.append(bench.whiten(noise, residuals))
+    finally:
+        numba.set_num_threads(whole)
+    np.testing.assert_array_equal(rows[0], rows[-1])

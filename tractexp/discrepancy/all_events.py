@@ -64,7 +64,7 @@ class AllEvents:
     @functools.cached_property
     def level(self) -> Noise:
         """The noise of all events."""
-        return self.noise.on(self.bench.profile, self.quiet.blur)
+        return self.noise.on(self.bench.power, self.quiet.blur)
 
     @functools.cached_property
     def plain(self) -> Refit:

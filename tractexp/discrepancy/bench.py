@@ -20,7 +20,7 @@ from tractexp.model.drive import Drive
 from tractexp.model.model import Model
 from tractexp.noise import Noise
 from tractexp.noise.quiet import quiet_stretches
-from tractexp.noise.wander import power_profile
+from tractexp.noise.wander import Load
 from tractexp.record import Event
 
 
@@ -102,9 +102,9 @@ class Bench:
         return ", ".join(part for part, there in zip(told, [*np.any(self.known, axis=1), True], strict=True) if there)
 
     @functools.cached_property
-    def profile(self) -> np.ndarray:
-        """Apparent power over that before each event, (N,)."""
-        return power_profile(self.drive.measured, self.drive.before, self.drive.first)
+    def power(self) -> Load:
+        """What the load takes, over what it took before each event."""
+        return Load.of(self.drive.measured, self.drive.before, self.drive.first)
 
     @functools.cached_property
     def quiet(self) -> list[slice]:

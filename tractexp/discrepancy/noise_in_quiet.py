@@ -71,12 +71,10 @@ class QuietNoise:
         before = [drive.measured[:, drive.part(e)][:, event.steady] for e, event in enumerate(bench.events)]
         rests = []
         if left is not None and columns is not None and bench.known.all():
-            rests = [
-                Rest(mix @ left[:, part], np.einsum("ij,kjt->kit", mix, columns[:, :, part]), bench.profile[part])
-                for part in map(drive.part, range(drive.events))
-            ]
+            mixed, parts = np.einsum("ij,kjt->kit", mix, columns), map(drive.part, range(drive.events))
+            rests = [Rest(mix @ left[:, part], mixed[:, :, part], bench.power.apparent[part]) for part in parts]
         return find(
-            [mix @ b for b in before if np.isfinite(b).all()], bench.events[0].record.step, bench.profile, rests,
+            [mix @ b for b in before if np.isfinite(b).all()], bench.events[0].record.step, bench.power, rests,
             seen=criteria.wandering_seen, within=criteria.wandering_within, less=criteria.wandering_likely,
         )  # fmt: skip
 

@@ -17,7 +17,7 @@ from tractexp.noise.color import SMALLEST
 from tractexp.noise.model import Noise
 from tractexp.noise.quiet import estimate, quiet_stretches
 from tractexp.noise.voltage import Smoothed, smoothed
-from tractexp.noise.wander import LESS, WITHIN, Rest, Wander, find, power_profile
+from tractexp.noise.wander import LESS, WITHIN, Load, Rest, Wander, find
 from tractexp.noise.waves import of_waves
 from tractexp.record import Event, WaveEvent
 
@@ -64,9 +64,9 @@ class Observed:
         return quiet_stretches(self.events, self.drive)
 
     @functools.cached_property
-    def profile(self) -> np.ndarray:
-        """Apparent power over that before each event, (N,)."""
-        return power_profile(self.drive.measured, self.drive.before, self.drive.first)
+    def power(self) -> Load:
+        """What the load takes, over what it took before each event."""
+        return Load.of(self.drive.measured, self.drive.before, self.drive.first)
 
     def noise(
         self,
@@ -101,9 +101,9 @@ class Observed:
         rests = []
         if known.all():
             mixed = np.einsum("ij,kjt->kit", mix, columns)
-            rests = [Rest(mix @ left[:, part], mixed[:, :, part], self.profile[part]) for part in parts]
+            rests = [Rest(mix @ left[:, part], mixed[:, :, part], self.power.apparent[part]) for part in parts]
         return find(
-            [mix @ b for b in before if np.isfinite(b).all()], self.events[0].record.step, self.profile, rests,
+            [mix @ b for b in before if np.isfinite(b).all()], self.events[0].record.step, self.power, rests,
             seen=SEEN, within=WITHIN, less=LESS,
         )  # fmt: skip
 

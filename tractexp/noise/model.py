@@ -6,20 +6,20 @@ the voltage's noise, which enters the model and leaves it in P and Q at once.
 
 import functools
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from tractexp.model.drive import Drive
 from tractexp.noise.color import Autoregression, white_noise
-from tractexp.noise.wander import Wander
+from tractexp.noise.wander import Load, Wander
 
 BURN_IN = 500  # samples
 UNSEEN = 0.05  # standard deviations of the fast noise: shapes that do less are left out
 
 Pair = tuple[Autoregression, ...]  # of P and of Q, or of each current
-Shrunk = tuple[tuple[int, ...], np.ndarray, np.ndarray]  # channels, orthonormal shapes (k, R) in them, what goes (k,)
+Shrunk = tuple[np.ndarray, np.ndarray]  # orthonormal shapes (k, R), and how much of each goes (k,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class Noise:
     wander: Wander | None = None  # of the mixed channels
     blur: np.ndarray | None = None  # (k, C, N) pu: what errors of the voltage do, each of one standard deviation
     vector: bool = False  # the first two channels are a space vector, whose autoregression is complex
-    _shrunk: dict[int, "list[Shrunk]"] = field(default_factory=dict, init=False)
+    _shrunk: dict[int, Shrunk] = field(default_factory=dict, init=False)
 
     @classmethod
     def white(cls, *deviations: float) -> "Noise":
@@ -68,9 +68,9 @@ class Noise:
         made._shrunk.update(self._shrunk)  # shapes and noise keep their ratio
         return made
 
-    def on(self, profile: np.ndarray, blur: np.ndarray | None = None) -> "Noise":
-        """The same noise on other events: their power over that before (N,), what errors of their voltage do."""
-        wander = None if self.wander is None else replace(self.wander, profile=profile)
+    def on(self, load: Load, blur: np.ndarray | None = None) -> "Noise":
+        """The same noise on other events: their power, and what errors of their voltage do."""
+        wander = None if self.wander is None else replace(self.wander, load=load)
         return replace(self, wander=wander, blur=blur)
 
     def whiten(self, residuals: np.ndarray, drive: Drive, known: np.ndarray) -> np.ndarray:
@@ -137,7 +137,7 @@ class Noise:
         variance = np.empty(drive.measured.shape)
         for e in range(drive.events):
             part = drive.part(e)
-            shapes = np.einsum("ij,kjt->kit", self._unmixing, self._shapes(part))
+            shapes = np.einsum("ij,kjt->kit", self._unmixing, self._shapes(part, e))
             variance[:, part] = self._fast_variance(e)[:, None] + (shapes**2).sum(axis=0)
         return np.sqrt(variance)
 
@@ -175,32 +175,16 @@ class Noise:
         if self.wander is None and self.blur is None:
             return white
         if event not in self._shrunk:
-            self._shrunk[event] = [_shrunk(*shapes) for shapes in self._whitened_shapes(known, part, event)]
-        for channels, basis, share in self._shrunk[event]:
-            flat = white[:, channels].reshape(len(white), -1)
-            flat = flat - ((flat @ basis.T) * share) @ basis
-            white[:, channels] = flat.reshape(len(white), len(channels), -1)
-        return white
+            self._shrunk[event] = _shrunk(self._fast(self._shapes(part, event), known, event))
+        basis, share = self._shrunk[event]
+        flat = white.reshape(len(white), -1)
+        return (flat - ((flat @ basis.T) * share) @ basis).reshape(white.shape)
 
-    def _whitened_shapes(
-        self, known: np.ndarray, part: slice, event: int
-    ) -> Iterator[tuple[tuple[int, ...], np.ndarray]]:
-        """Channels and the whitened shapes (k, R) in them: channels apart where nothing changes several at once."""
-        shapes = self._fast(self._shapes(part), known, event)
-        if self.blur is not None:
-            yield tuple(range(self.channels)), shapes.reshape(len(shapes), -1)
-            return
-        for c, own in enumerate(np.split(shapes, self.channels)):
-            yield (c,), own[:, c]
-
-    def _shapes(self, part: slice) -> np.ndarray:
+    def _shapes(self, part: slice, event: int) -> np.ndarray:
         """Shapes (k, C, samples) of the mixed channels in one event, of one standard deviation each, in their order."""
         shapes = [np.empty((0, self.channels, part.stop - part.start))]
         if self.wander is not None:
-            for c in range(self.channels):
-                modes = self.wander.modes(c, part)
-                shapes.append(np.zeros((len(modes), *shapes[0].shape[1:])))
-                shapes[-1][:, c] = modes
+            shapes.append(self.wander.modes(event, part, np.eye(self.channels) if self.mix is None else self.mix))
         if self.blur is not None:
             shapes.append(self._mixed(self.blur[:, :, part]))
         return np.concatenate(shapes)
@@ -217,7 +201,7 @@ class Noise:
             shocks = rng.standard_normal(size) if self.shocks is None else rng.choice(self.shocks[c], size)
             shocks *= channel.deviation[-1]
             colored.append(channel.recurring(shocks)[:, BURN_IN:])
-        shapes = self._shapes(part)
+        shapes = self._shapes(part, event)
         return np.stack(colored, axis=1) + np.einsum("bk,kct->bct", rng.standard_normal((count, len(shapes))), shapes)
 
 
@@ -227,11 +211,12 @@ def _all_measured(known: np.ndarray) -> np.ndarray:
     return np.all(known[measured], axis=0) & measured[:, None]
 
 
-def _shrunk(channels: tuple[int, ...], shapes: np.ndarray) -> Shrunk:
-    """Right singular vectors of shapes (k, R) that are seen, and 1 - (1 + s²)^(-1/2) of their singular values s.
+def _shrunk(shapes: np.ndarray) -> Shrunk:
+    """Right singular vectors of shapes (k, C, n) that are seen, and 1 - (1 + s²)^(-1/2) of their singular values s.
 
     By the eigenvectors of their products: a fifth of the time of a singular value decomposition.
     """
-    squares, vectors = np.linalg.eigh(shapes @ shapes.T)
+    flat = shapes.reshape(len(shapes), -1)
+    squares, vectors = np.linalg.eigh(flat @ flat.T)
     seen = squares > UNSEEN**2
-    return channels, (vectors[:, seen] / np.sqrt(squares[seen])).T @ shapes, 1 - 1 / np.sqrt(1 + squares[seen])
+    return (vectors[:, seen] / np.sqrt(squares[seen])).T @ flat, 1 - 1 / np.sqrt(1 + squares[seen])

@@ -4,6 +4,7 @@ A random walk over an event is a sum of cosines whose amplitudes fall with the f
 prior is divided out of the residuals like the rest of the noise, so that no slow effect is named for it.
 """
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -13,6 +14,7 @@ from tractexp.noise.color import Autoregression, fit_autoregression
 from tractexp.noise.span import spanned
 
 MODES = 48
+LEAST = 0.3  # of the level of a load in both channels: one that has less of the first does not wander by it
 SLOW = 3  # cosines of a stretch that belong to wandering before its fast noise is modelled
 DISTINCT = 0.03  # of the strongest direction: columns that differ by less from others are none of their own
 SEEN, WITHIN, LESS = 2.0, 2.0, 1.0  # of `find`, where nobody says otherwise
@@ -52,16 +54,44 @@ class Walk:
 
 @dataclass(frozen=True, eq=False)
 class Wander:
-    """Random walks of two channels: `intensity` (2,) is the variance gained in a second."""
+    """Random walks of two mixed channels: `intensity` (2,) is the variance gained in a second before an event.
+
+    What wanders are customers, whose active and reactive power go together, in a dip and after it, too: what the first
+    channel does the second follows as the load's power says. Beside that the second wanders by itself.
+    """
 
     intensity: np.ndarray
     step: float  # s
-    profile: np.ndarray  # (N,) power over that before: what wanders are customers, who draw less in a dip
+    load: "Load"
 
-    def modes(self, channel: int, part: slice) -> np.ndarray:
-        """Cosines (k, samples) of one event, scaled by the standard deviation of their amplitudes."""
+    def modes(self, event: int, part: slice, mix: np.ndarray) -> np.ndarray:
+        """Cosines (2 k, 2, samples) of one event, scaled by the standard deviation of their amplitudes."""
         n = part.stop - part.start
-        return np.sqrt(self.intensity[channel]) * _random_walk(n, self.step, min(MODES, n // 8)) * self.profile[part]
+        walk = _random_walk(n, self.step, min(MODES, n // 8))
+        level, power = mix @ self.load.before[event], mix @ self.load.power[:, part]
+        whole = max(abs(level[0]), LEAST * float(np.linalg.norm(level)))
+        together = np.sqrt(self.intensity[0]) / whole * walk[:, None] * power
+        apart = np.sqrt(self.intensity[1]) * walk * self.load.apparent[part]
+        return np.concatenate([together, np.stack([np.zeros_like(apart), apart], axis=1)])
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """Active and reactive power of events end to end, over the apparent power before each."""
+
+    power: np.ndarray  # (2, N)
+    before: np.ndarray  # (E, 2)
+
+    @classmethod
+    def of(cls, measured: np.ndarray, before: np.ndarray, first: np.ndarray) -> "Load":
+        """Of P and Q (2, N) with means `before` (E, 2); events begin at `first` (E + 1,)."""
+        level = np.maximum(np.linalg.norm(before, axis=1), 1e-9)
+        return cls(np.nan_to_num(measured) / np.repeat(level, np.diff(first)), before / level[:, None])
+
+    @functools.cached_property
+    def apparent(self) -> np.ndarray:
+        """Apparent power (N,)."""
+        return np.linalg.norm(self.power, axis=0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +104,7 @@ class Rest:
 
 
 def find(
-    before: Sequence[np.ndarray], step: float, profile: np.ndarray, rests: Sequence[Rest] = (),
+    before: Sequence[np.ndarray], step: float, load: Load, rests: Sequence[Rest] = (),
     *, seen: float, within: float, less: float,
 ) -> Wander | None:  # fmt: skip
     """The wandering of two channels in stretches (2, n_i) before the events; None where there is none to be seen.
@@ -91,19 +121,13 @@ def find(
     total = np.array([_likelihood([s[c] for s in stretches], fast[c], step) for c in (0, 1)])
     total -= total[:, :1]
     most = [_last(row, less) for row in total]
-    found = Wander(GRID[most], step, profile)
+    found = Wander(GRID[most], step, load)
     if 2 * total.max() >= seen:
         return found
     rest = np.array([sum(_within(r, c, fast[c], step) for r in rests) * np.ones(len(GRID)) for c in (0, 1)])
     both = total + rest - rest[:, :1]
     gained = max(2 * row[: last + 1].max() for row, last in zip(both, most, strict=True))
     return found if gained - within >= seen else None
-
-
-def power_profile(measured: np.ndarray, before: np.ndarray, first: np.ndarray) -> np.ndarray:
-    """Apparent power (N,) over that before each event, of P and Q (2, N) with means `before` (E, 2)."""
-    level = np.repeat(np.linalg.norm(before, axis=1), np.diff(first))
-    return np.linalg.norm(measured, axis=0) / np.maximum(level, 1e-9)
 
 
 def _last(likelihood: np.ndarray, less: float) -> int:

@@ -244,7 +244,7 @@ def _fitted_to(bench: Bench, noise: Noise, sides: Sequence[Side], truth: Side, e
     whole = bench.on(Records.of((*bench.records.recorded, as_recorded(bench, event, power))))
     wide = [whole.coordinates.widened(side.fit.unit) for side in sides]
     blur = None if noise.blur is None else QuietNoise.at(whole, wide[0]).blur
-    both = noise.on(whole.profile, blur)
+    both = noise.on(whole.power, blur)
     made = {f.names: f for f in refit(whole, both, [(s.fit.names, u) for s, u in zip(sides, wide, strict=True)])}
     fits = [made[s.fit.names] for s in sides]
     return [replace(f, unit=f.unit[: at.dimension]) for f in fits]
