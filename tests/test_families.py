@@ -77,7 +77,7 @@ def test_a_trip_of_the_static_load_alone_is_told_by_its_family_and_its_place():
 @pytest.mark.parametrize(
     ("hidden", "size", "seed", "member"),
     [
-        ("delayed_power_limit", 1.5, 820034, "power_limit_curve"),
+        ("delayed_power_limit", 1.5, 820035, "power_limit_curve"),
         ("ramped_return", 2.0, 820034, "ramped_current"),
         ("rectified_power", 1.5, 820043, "rectifier"),
         ("thermostat_recovery", 2.0, 820061, "thermostatic_load"),

@@ -53,6 +53,16 @@ class Criteria:
         " parameters paid for; at 0 none is tried", CHOSEN,
         "as for a second name; what decides is that it leaves nothing",
     )  # fmt: skip
+    near_family: float = _criterion(
+        0.4, (0.0, 1.0), "part of what a name that suffices explains that the textbook effect of another family must"
+        " explain for its members to be rivals", CHOSEN,
+        "a right effect by a wrong formula explains less than a wrong effect that suffices, but not far less",
+    )  # fmt: skip
+    other_valley: float = _criterion(
+        0.8, (0.0, 1.0), "part of what a name that suffices explains that another effect must promise where the base"
+        " model fits nearly as well", CHOSEN,
+        "one linear step promises a little less than a fit gains",
+    )  # fmt: skip
     beside_measurement: float = _criterion(
         0.1, (0.0, 1.0), "factor on the p of an effect of the load beside one of the measurement", CHOSEN,
         "what imitates a fault of the measurement badly leaves a little for an effect of the load",
@@ -176,6 +186,10 @@ class Criteria:
         """The deviance that a recorder's window must explain where the best effect explains `best`."""
         clear = max(self.window_clear, self.window_share * best)
         return max(self.window_least, min(best - self.window_behind, clear))
+
+    def promises(self, drop: float, explained: float) -> bool:
+        """Whether an effect that would lower the deviance so far is looked for beside a name that explains so much."""
+        return drop >= self.other_valley * explained
 
     def rejects(self, behind: Any, distance: Any, parameters: int, explained: Any) -> Any:
         """Whether a rival this far behind the best set is rejected; numbers, or arrays of one shape (n,).

@@ -38,7 +38,6 @@ WORTH_A_THIRD = 0.8  # of what exceeds the noise: what two effects explain befor
 SHORTLIST = {1: 10, 2: 8, 3: 6}  # sets of each size that are refitted
 COMBINED = 14  # effects whose sets are ranked exhaustively
 PATCHED = 4  # sets of one size that are tried before a further effect is added
-PROMISING = 0.8  # of what the best effect explains, by a linear step from another valley
 WIDELY = 3  # single effects with thresholds or times that are searched to the end
 RANKS = 2  # settings of a candidate to start from
 FAMILIES = 50  # added to the seed of the draws at members of families
@@ -189,9 +188,7 @@ def from_other_valleys(
     Where an effect is missing, a wrong valley may fit better than the right one. Where the best so far leaves nothing,
     only valleys in which a linear step promises nearly as much.
     """
-    bench, most = base.bench, np.inf
-    if best.suffices:
-        most = first.fit.deviance - PROMISING * (first.fit.deviance - best.fit.deviance)
+    bench, explained = base.bench, first.fit.deviance - best.fit.deviance
     ground, singles = first, best_of(refits.values())
     for valley in base.valleys_but(first.fit.unit):
         fit = refit(bench, first.noise, [((), valley)])[0]
@@ -201,7 +198,8 @@ def from_other_valleys(
         projection = t.whitened(first.noise)
         there = replace(first, fit=fit, tangent=t, projection=projection, scores=projection.scores())
         if best.suffices:
-            promising = [(s.name,) for s in there.scores if fit.deviance - s.drop <= most]
+            nearer = first.fit.deviance - fit.deviance
+            promising = [(s.name,) for s in there.scores if bench.criteria.promises(nearer + s.drop, explained)]
             begun = [start for names in promising for start in starts([there], {(): fit}, names)]
             fits = refit(bench, first.noise, begun) if begun else []
         else:

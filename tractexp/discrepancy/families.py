@@ -20,7 +20,6 @@ from tractexp.discrepancy.fitting import Refit, Start, off_walls, wide_refits
 
 NEAREST = 4  # members that are searched to the end
 EXAMINED = 3  # members whose remainder is tested
-NEAR = 0.4  # of what the best effect explains: a family whose textbook effect explains as much may hold the truth
 BEGUN = 0.5  # smallest relevant sizes at which a size without a textbook value starts
 
 Names = tuple[str, ...]
@@ -53,7 +52,7 @@ def against_members(
 def near(bench: Bench, best: Refit, refits: Mapping[Names, Refit]) -> list[Candidate]:
     """Members of families whose textbook effect comes near the best single one, that one's own left out."""
     bare = refits[()].deviance
-    least = bare - NEAR * (bare - best.deviance)
+    least = bare - bench.criteria.near_family * (bare - best.deviance)
     families = {f.names[0] for f in refits.values() if len(f.names) == 1 and f.deviance < least} - {*best.names}
     return [m for m in bench.catalogue.members if m.effect.family in families] if len(best.names) == 1 else []
 

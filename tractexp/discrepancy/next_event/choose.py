@@ -17,7 +17,6 @@ from tractexp.discrepancy.noise_in_quiet import QuietNoise
 from tractexp.discrepancy.records import Records
 from tractexp.model.drive import Drive
 from tractexp.noise import Noise
-from tractexp.wording import joined
 
 CHECKED = 4  # events whose chances are reckoned again at refits, until one holds what it promised
 HOPELESS = 0.5  # chance below which no event is said to tell a pair apart
@@ -117,7 +116,7 @@ class NextEvent:
 
     def _recommended(self) -> str:
         first, *others = self.rivals
-        them = f"{first} from {others[0]}" if len(others) == 1 else f"{joined(self.rivals)} apart"
+        them = f"{first} from {others[0]}" if len(others) == 1 else f"these {len(self.rivals)} apart"
         what, p = self.best.event.words, self.probability
         if p >= self.criteria.decided:
             return f"record {what}: it tells {them} with a probability of {p:.0%}"

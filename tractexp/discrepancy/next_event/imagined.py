@@ -10,6 +10,7 @@ from tractexp.discrepancy.bench import Bench
 from tractexp.identification.problem import WEIGHTS
 from tractexp.model.drive import Drive, Excitation, Waveforms
 from tractexp.noise import Autoregression, Noise
+from tractexp.noise.wander import Load
 from tractexp.record import Event, Record, WaveEvent
 
 DEPTHS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
@@ -129,7 +130,8 @@ def _course(since: np.ndarray, duration: float, edge: float) -> np.ndarray:
 def noise_of(noise: Noise, drive: Drive, rate: int, step: float) -> Noise:
     """The records' noise on an imagined event; at another rate as loud, and forgotten in the same time."""
     if rate == 1:
-        return noise.on(np.ones(drive.samples))
+        steady = np.repeat(drive.before.T, np.diff(drive.first), axis=1)
+        return noise.on(Load.of(steady, drive.before, drive.first))
     memory = noise.memory(step)
     a = float(np.exp(-step / rate / memory)) if memory > 0 else 0.0
     color, shock = np.array([[0.0], [a]]), float(np.sqrt(1 - a * a))
