@@ -47,6 +47,7 @@ LATER = {  # sets of later commits, by what is new to them
     "ten of each": JUDGEMENT.with_name("judgement_ten.jsonl"),  # with exact scales of open decisions
     "nearby families": JUDGEMENT.with_name("judgement_nearby.jsonl"),  # tried beside a name that suffices
     "near rivals": JUDGEMENT.with_name("judgement_rivals.jsonl"),  # of other families, and other valleys
+    "walks in common": JUDGEMENT.with_name("judgement_wander.jsonl"),  # P and Q of a load wander together; heavy tails
 }
 KNOWN = {"rotor_skin_effect": "second_cage", "stator_transients": "stator_transients"}  # the catalogue has them, too
 HIDDEN = {  # one effect is hidden: group of trials, multiples, effects
