@@ -44,7 +44,7 @@ def test_the_first_line_of_the_answer_is_what_it_is_good_for(main_job):
     """The stand-in's stator transients are missing in the model: no interval is printed, and one table."""
     _, done = main_job
     answer = done.stdout.partition("optimizer: issa, seed 0")[2].strip()
-    assert answer.startswith("It fits within 0.5%, but an effect is missing: do not use its intervals")
+    assert answer.startswith("It fits within 0.6%, but an effect is missing: do not use its intervals")
     assert answer.count("X_prime") == 1
     assert "95 % interval" not in answer
     assert "task=discrepancy" in answer
