@@ -1,5 +1,6 @@
 """Noise where little happens: estimated from what a fit leaves before the dips and at the end of the records."""
 
+import functools
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -86,7 +87,7 @@ def _shocks(channel: Autoregression, pieces: Sequence[np.ndarray]) -> np.ndarray
 def _heavy(unit: np.ndarray) -> np.ndarray | None:
     """Quantiles of unit variance of the most likely Student's t of samples (n,), where it is clearly likelier than the
     normal distribution; else None."""
-    from scipy.special import gammaln, stdtrit
+    from scipy.special import gammaln
 
     freedom = DEGREES[:, None]
     scale = 1 - 2 / freedom  # of a variance of one
@@ -95,5 +96,13 @@ def _heavy(unit: np.ndarray) -> np.ndarray | None:
     normal = -(np.log(2 * np.pi) + unit**2).sum() / 2
     if 2 * (likely.max() - normal) < CLEARLY:
         return None
-    quantiles = stdtrit(DEGREES[likely.argmax()], (np.arange(QUANTILES) + 0.5) / QUANTILES)
+    return _quantiles(float(DEGREES[likely.argmax()]))
+
+
+@functools.cache
+def _quantiles(freedom: float) -> np.ndarray:
+    """Quantiles of Student's t, of unit variance; once for each of `DEGREES`, since draws estimate their noise anew."""
+    from scipy.special import stdtrit
+
+    quantiles = stdtrit(freedom, (np.arange(QUANTILES) + 0.5) / QUANTILES)
     return quantiles / quantiles.std()
