@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_discrepancy import FEW, base, events
+from test_discrepancy import FEW, base, events, steady
 
 from tractexp.discrepancy.all_events import Together
 from tractexp.discrepancy.catalogue import candidate, missing_channel
@@ -25,7 +25,7 @@ from tractexp.discrepancy.next_event.separation import Chances
 from tractexp.discrepancy.projection import Score
 from tractexp.discrepancy.proposal.judge import Before, Weighed
 from tractexp.errors import UserError
-from tractexp.noise.wander import Load, Rest, find
+from tractexp.noise.wander import Rest, find
 from tractexp.plugin import get
 
 
@@ -62,8 +62,7 @@ def wandering(c, seed, rests=(), walk=0.0):
     rng = np.random.default_rng(seed)
     before = rng.normal(size=(2, 250)) + np.cumsum(rng.normal(size=(2, 250)) * np.array([[walk], [0.0]]), axis=1)
     limits = {"seen": c.wandering_seen, "within": c.wandering_within, "less": c.wandering_likely}
-    steady = Load(np.tile([[1.0], [0.0]], 1000), np.array([[1.0, 0.0]]))
-    return find([before], 0.002, steady, rests, **limits)
+    return find([before], 0.002, steady(1000), rests, **limits)
 
 
 def wandering_within(c):

@@ -271,7 +271,7 @@ def test_what_the_reactive_power_of_customers_does_after_a_dip_follows_their_act
     walk = np.cumsum(rng.normal(size=(count, 1, n)) * 0.01, axis=2)
     walk -= walk.mean(axis=2, keepdims=True)  # a load that is larger throughout is P0 and Q0
     recorded = clean * walk + 0.05 * rng.normal(size=(count, 2, n))
-    load = Load(clean / np.hypot(1.0, 0.4), np.array([[1.0, 0.4]]) / np.hypot(1.0, 0.4))
+    load = Load.of(clean, np.array([[1.0, 0.4]]), np.array([0, n]))
     mix = np.array([[20.0, 0.0], [-8.0, 20.0]])  # in which what goes together in P and Q before the dip is P's alone
     noise = PowerNoise(PowerNoise.white(1.0, 1.1).pairs, mix, wander=Wander(np.array([20.0, 0.0]), 0.002, load))
     drive = SimpleNamespace(events=1, samples=n, part=lambda e: slice(0, n))

@@ -132,7 +132,7 @@ class Bench:
 
     def whiten(self, noise: Noise, residuals: np.ndarray) -> np.ndarray:
         """Residuals (n, C, N) as rows (n, C N) of independent unit variance."""
-        noise.whiten(residuals[:1], self.drive, self.known)  # its shapes are made ready once, not by each part
+        noise.prepare(self.drive, self.known)
         return in_same_parts(lambda part: noise.whiten(part, self.drive, self.known), residuals)
 
     def rows(self, unit: np.ndarray, noise: Noise, faults: Sequence[int], sets: Sequence[Sequence[str]]) -> np.ndarray:

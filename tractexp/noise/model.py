@@ -75,8 +75,7 @@ class Noise:
 
     def whiten(self, residuals: np.ndarray, drive: Drive, known: np.ndarray) -> np.ndarray:
         """(n, C, N) to rows (n, C N) of independent unit variance; samples that are not `known` (C, N) are 0."""
-        if self.mix is not None:
-            known = self._together(known, drive)
+        known = self._together(known, drive)
         rows = np.empty_like(residuals)
         with np.errstate(over="ignore", invalid="ignore"):  # what diverges has a deviance that is not finite
             mixed = self._mixed(residuals)
@@ -86,11 +85,19 @@ class Noise:
                 rows[:, :, part] = self._without_shapes(white, known[:, part], part, e)
         return rows.reshape(len(rows), -1)
 
+    def prepare(self, drive: Drive, known: np.ndarray) -> None:
+        """Make ready what `whiten` keeps of the shapes, once, where many threads are about to call it."""
+        known = self._together(known, drive)
+        for e in range(drive.events):
+            self._kept(known[:, drive.part(e)], drive.part(e), e)
+
     def _together(self, known: np.ndarray, drive: Drive) -> np.ndarray:
         """Samples (C, N) that count where channels are mixed: those at which all count that are measured.
 
         The mixing of currents is triangular, so that an event without the last, of zero sequence, has the others.
         """
+        if self.mix is None:
+            return known
         if self.channels > 2 and drive.events > 1:
             parts = [known[:, drive.part(e)] for e in range(drive.events)]
             return np.concatenate([_all_measured(part) for part in parts], axis=1)
@@ -172,13 +179,19 @@ class Noise:
 
         With B the whitened shapes, (I + B'B)^(-1/2) by their singular vectors.
         """
-        if self.wander is None and self.blur is None:
+        if (kept := self._kept(known, part, event)) is None:
             return white
-        if event not in self._shrunk:
-            self._shrunk[event] = _shrunk(self._fast(self._shapes(part, event), known, event))
-        basis, share = self._shrunk[event]
+        basis, share = kept
         flat = white.reshape(len(white), -1)
         return (flat - ((flat @ basis.T) * share) @ basis).reshape(white.shape)
+
+    def _kept(self, known: np.ndarray, part: slice, event: int) -> Shrunk | None:
+        """The shapes of an event as whitening takes them out, decomposed once; None where there are none."""
+        if self.wander is None and self.blur is None:
+            return None
+        if event not in self._shrunk:
+            self._shrunk[event] = _shrunk(self._fast(self._shapes(part, event), known, event))
+        return self._shrunk[event]
 
     def _shapes(self, part: slice, event: int) -> np.ndarray:
         """Shapes (k, C, samples) of the mixed channels in one event, of one standard deviation each, in their order."""

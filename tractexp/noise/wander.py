@@ -53,29 +53,6 @@ class Walk:
 
 
 @dataclass(frozen=True, eq=False)
-class Wander:
-    """Random walks of two mixed channels: `intensity` (2,) is the variance gained in a second before an event.
-
-    What wanders are customers, whose active and reactive power go together, in a dip and after it, too: what the first
-    channel does the second follows as the load's power says. Beside that the second wanders by itself.
-    """
-
-    intensity: np.ndarray
-    step: float  # s
-    load: "Load"
-
-    def modes(self, event: int, part: slice, mix: np.ndarray) -> np.ndarray:
-        """Cosines (2 k, 2, samples) of one event, scaled by the standard deviation of their amplitudes."""
-        n = part.stop - part.start
-        walk = _random_walk(n, self.step, min(MODES, n // 8))
-        level, power = mix @ self.load.before[event], mix @ self.load.power[:, part]
-        whole = max(abs(level[0]), LEAST * float(np.linalg.norm(level)))
-        together = np.sqrt(self.intensity[0]) / whole * walk[:, None] * power
-        apart = np.sqrt(self.intensity[1]) * walk * self.load.apparent[part]
-        return np.concatenate([together, np.stack([np.zeros_like(apart), apart], axis=1)])
-
-
-@dataclass(frozen=True, eq=False)
 class Load:
     """Active and reactive power of events end to end, over the apparent power before each."""
 
@@ -92,6 +69,29 @@ class Load:
     def apparent(self) -> np.ndarray:
         """Apparent power (N,)."""
         return np.linalg.norm(self.power, axis=0)
+
+
+@dataclass(frozen=True, eq=False)
+class Wander:
+    """Random walks of two mixed channels: `intensity` (2,) is the variance gained in a second before an event.
+
+    What wanders are customers, whose active and reactive power go together, in a dip and after it, too: what the first
+    channel does the second follows as the load's power says. Beside that the second wanders by itself.
+    """
+
+    intensity: np.ndarray
+    step: float  # s
+    load: Load
+
+    def modes(self, event: int, part: slice, mix: np.ndarray) -> np.ndarray:
+        """Cosines (2 k, 2, samples) of one event, scaled by the standard deviation of their amplitudes."""
+        n = part.stop - part.start
+        walk = _random_walk(n, self.step, min(MODES, n // 8))
+        level, power = mix @ self.load.before[event], mix @ self.load.power[:, part]
+        whole = max(abs(level[0]), LEAST * float(np.linalg.norm(level)))
+        together = np.sqrt(self.intensity[0]) / whole * walk[:, None] * power
+        apart = np.sqrt(self.intensity[1]) * walk * self.load.apparent[part]
+        return np.concatenate([together, np.stack([np.zeros_like(apart), apart], axis=1)])
 
 
 @dataclass(frozen=True, eq=False)
