@@ -132,13 +132,17 @@ class Bench:
 
     def whiten(self, noise: Noise, residuals: np.ndarray) -> np.ndarray:
         """Residuals (n, C, N) as rows (n, C N) of independent unit variance."""
+        return noise.whiten(residuals, self.drive, self.known)
+
+    def whiten_many(self, noise: Noise, residuals: np.ndarray) -> np.ndarray:
+        """As `whiten`, of many residuals on all cores; not for what itself runs beside others."""
         noise.prepare(self.drive, self.known)
-        return in_same_parts(lambda part: noise.whiten(part, self.drive, self.known), residuals)
+        return in_same_parts(lambda part: self.whiten(noise, part), residuals)
 
     def rows(self, unit: np.ndarray, noise: Noise, faults: Sequence[int], sets: Sequence[Sequence[str]]) -> np.ndarray:
         """Whitened residuals (n, C N) of coordinates with a set of names each, then the prior of the free faults."""
         raw = self.residuals_of(unit, [(names, False) for names in sets])
-        white = self.whiten(noise, raw)
+        white = self.whiten_many(noise, raw)
         at = self.coordinates
         prior = [(unit[:, k] - at.null[k]) / at.prior_deviation[k] for k in faults]
         return np.concatenate([white, *(p[:, None] for p in prior)], axis=1)

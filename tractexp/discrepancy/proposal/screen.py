@@ -52,7 +52,7 @@ class Ground:
         raw = self.bench.residuals(points, (kind,))
         raw -= self.raw
         raw /= spans[:, None, None]
-        return self.bench.whiten(self.noise, np.nan_to_num(raw, copy=False))
+        return self.bench.whiten_many(self.noise, np.nan_to_num(raw, copy=False))
 
     def drawn(self, seed: int, draws: int) -> np.ndarray:
         """Noise (draws, R), whitened and projected as the fit's residual is."""
