@@ -79,7 +79,7 @@ def explanations(base: BaseFit, first: Disagreement, seed: int) -> Explanations:
     """Add effects one by one as long as the best one helps more than chance, searching all sets of each size."""
     steps, ground = [first], first
     refits: dict[Names, Refit] = {(): first.fit}
-    while steps[-1].asks_for_more and worth_another(first, steps[-1]) and len(steps) < MOST_STEPS:
+    while steps[-1].asks_for_more and worth_another(steps) and len(steps) < MOST_STEPS:
         size = len(steps[-1].fit.names) + 1
         fits = searched([ground, *steps[1:]], refits, size, base.bench.effort.say)
         refits |= {f.names: f for f in fits}
@@ -101,14 +101,17 @@ def explanations(base: BaseFit, first: Disagreement, seed: int) -> Explanations:
     return Explanations(base, tuple(steps), refits)
 
 
-def worth_another(first: Disagreement, last: Disagreement) -> bool:
-    """Whether one more effect is tried beside those of the last tests.
+def worth_another(steps: Sequence[Disagreement]) -> bool:
+    """Whether one more effect is tried beside those of the last tests; not again where that led back to the same set.
 
     A third patches up what two do not explain: it is tried where they explain most of what exceeds the noise. None of
     the 1,121 judgement data sets of docs/missing-effects.md was told by three.
     """
+    first, last = steps[0], steps[-1]
     size, samples = len(last.fit.names), first.bench.samples
     explained = first.fit.deviance - last.fit.deviance
+    if len(steps) > 1 and steps[-2].fit.names == last.fit.names:
+        return False
     return size < 2 or (size < MOST_EFFECTS and explained >= WORTH_A_THIRD * (first.fit.deviance - samples))
 
 

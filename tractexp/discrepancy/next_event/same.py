@@ -18,6 +18,7 @@ from tractexp.discrepancy.next_event.imagined import BRIEF, DURATIONS, Imagined,
 from tractexp.model.drive import Drive
 
 FOLLOWS = 1e-6  # pu: how near one comes to the other
+DONE = 1e-8  # of the sum of squares: a descent that gains less ends; where one follows, each step gains nearly all
 SETTLED = 0.1  # of the power before: an event that a load has survived by its end
 DIRECTION = 1e-4  # of the largest singular value of normalized columns: a direction of its own
 RICH = (0.1, 0.3, 0.5, 0.7)  # depths
@@ -94,16 +95,18 @@ def _followed(
         return least_squares(
             lambda x: (drawn(whole(x)[None], rival.names)[0] - truth)[rows], np.clip(x, 1e-3, 1 - 1e-3),
             lambda x: slopes(whole(x), rival.names, columns)[:, rows].T,  # pyright: ignore[reportArgumentType]
-            bounds=(0.0, 1.0), xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=60,
+            bounds=(0.0, 1.0), xtol=1e-14, ftol=DONE, gtol=1e-14, max_nfev=60,
         )  # fmt: skip
 
     mild = np.zeros(known.shape, bool)  # first: near a stall a descent from afar goes astray
     mild[:, : drive.first[drive.events // 2]] = True
-    found = nearest(nearest(start[columns], mild[known]).x, np.ones(len(truth), bool))
-    off = float(np.abs(found.fun).max())
-    if off > FOLLOWS:
-        return None
-    own = slopes(point, names, _of_load(bench, names)), slopes(whole(found.x), rival.names, columns)
+    found, off = start[columns], np.inf
+    for rows in (mild[known], np.ones(len(truth), bool)):
+        ended = nearest(found, rows)
+        found, off = ended.x, float(np.abs(ended.fun).max())
+        if off > FOLLOWS:
+            return None
+    own = slopes(point, names, _of_load(bench, names)), slopes(whole(found), rival.names, columns)
     ranks = [_rank(rows) for rows in (*own, np.concatenate(own))]
     return (ranks[2], off) if len(set(ranks)) == 1 else None
 

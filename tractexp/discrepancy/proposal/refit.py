@@ -4,12 +4,14 @@ The best terms get their instants, levels and times from ever finer grids, then 
 base fit, from the same with what rests on its bounds moved into the middle, and from the base model's other valleys.
 """
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.fitting import Refit, Start, best_of, off_walls, refit, rough_refit, wide_refit
 from tractexp.discrepancy.linear import linearised
 from tractexp.discrepancy.proposal.bed import place, values_of, with_terms
@@ -125,7 +127,7 @@ def fitted(screened: Screened, valleys: Sequence[np.ndarray]) -> Fitted:
     again = _starts(bench, [f for f in chosen if f.term.name in best], others)
     fits = best_of([*fits, *(rough_refit(bench, noise, again) if again else [])])
     fits = _searched_anew(bench, noise, fits, REGRIDDED)
-    moved = [start for f in fits[:MOVED] for start in elsewhere(bench, noise, f)]
+    moved = [*itertools.chain(*each_apart(lambda f: elsewhere(bench, noise, f), fits[:MOVED]))]
     fits = best_of([*fits, *(rough_refit(bench, noise, moved) if moved else [])])
     fits = _searched_anew(bench, noise, fits, 1, scattered=True)
     near = fits[0].cost + max(CLOSE * (bare.deviance - fits[0].deviance), 20.0)
@@ -138,10 +140,13 @@ def _searched_anew(
     bench: Bench, noise: Noise, fits: Sequence[Refit], most: int, *, scattered: bool = False
 ) -> list[Refit]:  # fmt: skip
     """The fits, with the shapes of the best terms searched over their grids and moved across their ranges."""
-    shaped = [f for f in fits[:most] if term(f.names[0]).signal.shapes]
-    begun = [[regridded(bench, noise, f), (f.names, f.unit)] for f in shaped]
     again = ROUND_ABOUT if scattered else 0
-    return best_of([*fits, *(f for starts in begun for f in wide_refit(bench, noise, starts, again=again))])
+
+    def anew(fit: Refit) -> list[Refit]:
+        return wide_refit(bench, noise, [regridded(bench, noise, fit), (fit.names, fit.unit)], again=again)
+
+    shaped = [f for f in fits[:most] if term(f.names[0]).signal.shapes]
+    return best_of([*fits, *itertools.chain(*each_apart(anew, shaped))])
 
 
 def siblings(of: Term) -> list[Term]:

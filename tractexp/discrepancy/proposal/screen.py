@@ -5,12 +5,14 @@ side in the library's kernel, which costs less than assembling them of pushes. C
 model's parameters, P0 and Q0 of each event and the faults of the measurement projected out. The rank is a shortlist.
 """
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.linear import linearised
 from tractexp.discrepancy.proposal.bed import Setting, place, sizes_of
 from tractexp.discrepancy.proposal.library import Term
@@ -20,6 +22,9 @@ STEP = 0.02  # of a size's relevant value: how large a term is whose column is t
 TOGETHER = 384  # columns held at once
 QUARTER = float(np.pi / 2)
 LEAST = 1e-8  # of a column's square: what the nuisances leave of it at least
+
+Members = list[tuple[Term, Setting]]  # at one setting of one signal, which share columns
+Batch = list[Members]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +57,7 @@ class Ground:
         raw = self.bench.residuals(points, (kind,))
         raw -= self.raw
         raw /= spans[:, None, None]
-        return self.bench.whiten_many(self.noise, np.nan_to_num(raw, copy=False))
+        return self.bench.whiten(self.noise, np.nan_to_num(raw, copy=False))
 
     def drawn(self, seed: int, draws: int) -> np.ndarray:
         """Noise (draws, R), whitened and projected as the fit's residual is."""
@@ -117,24 +122,29 @@ def _scores(
     ground: Ground, wanted: Sequence[tuple[Term, Setting]], noise: np.ndarray
 ) -> Iterator[tuple[Scored, np.ndarray]]:
     """Each term with its score, and what noise (b, R) would give it (b,). Balances of a signal share columns."""
-    groups: dict[tuple, list[tuple[Term, Setting]]] = {}
+    ground.noise.prepare(ground.bench.drive, ground.bench.known)
+    return itertools.chain(*each_apart(lambda batch: _batch(ground, batch, noise), _batches(wanted)))
+
+
+def _batches(wanted: Sequence[tuple[Term, Setting]]) -> list[Batch]:
+    """Terms at settings in batches of one kind whose columns are held at once; those of one signal together."""
+    groups: dict[tuple, Members] = {}
     for t, s in wanted:
         groups.setdefault((t.signal.kind, t.signal.name, t.clock, _key(s)), []).append((t, s))
-    batch: list[list[tuple[Term, Setting]]] = []
-    kinds = sorted(groups.values(), key=lambda members: members[0][0].signal.kind)
-    for members in kinds:
-        full = sum(map(len, batch)) * 2 >= TOGETHER
-        if batch and (full or batch[0][0][0].signal.kind != members[0][0].signal.kind):
-            yield from _batch(ground, batch, noise)
-            batch = []
-        batch.append(members)
-    if batch:
-        yield from _batch(ground, batch, noise)
+    batches: list[Batch] = []
+    for members in sorted(groups.values(), key=_kind):
+        full = batches and sum(map(len, batches[-1])) * 2 >= TOGETHER
+        if not batches or full or _kind(batches[-1][0]) != _kind(members):
+            batches.append([])
+        batches[-1].append(members)
+    return batches
 
 
-def _batch(
-    ground: Ground, batch: list[list[tuple[Term, Setting]]], noise: np.ndarray
-) -> Iterator[tuple[Scored, np.ndarray]]:
+def _kind(members: Members) -> str:
+    return members[0][0].signal.kind
+
+
+def _batch(ground: Ground, batch: Batch, noise: np.ndarray) -> list[tuple[Scored, np.ndarray]]:
     at, index = ground.bench.coordinates, {}
     points, spans = [], []
     blocks = []
@@ -156,12 +166,14 @@ def _batch(
     seen = columns.shape[1]
     side, drawn = columns @ ground.r[:seen], columns @ noise[:, :seen].T
     along = columns @ ground.Q[:seen]
+    told = []
     for t, s, rows in blocks:
         gram = columns[rows] @ columns[rows].T - along[rows] @ along[rows].T  # what the nuisances explain taken away
         inverse = _inverse(gram, np.einsum("nr,nr->n", columns[rows], columns[rows]).max())
         sizes, chance = -inverse @ side[rows], drawn[rows]
         drops = (chance * (inverse @ chance)).sum(axis=0)
-        yield _told(t, s, sizes, float(-sizes @ side[rows])), drops
+        told.append((_told(t, s, sizes, float(-sizes @ side[rows])), drops))
+    return told
 
 
 def _inverse(gram: np.ndarray, whole: float) -> np.ndarray:
