@@ -123,6 +123,8 @@ class Bench:
     def residuals_of(self, unit: np.ndarray, sets: Sequence[tuple[Sequence[str], bool]]) -> np.ndarray:
         """As `residuals`, with a set of names for each of the coordinates, and whether a push is in it."""
         keys = [self.kernels.family.key(names, pushed) for names, pushed in sets]
+        if len(set(keys)) == 1:
+            return self.residuals(unit, *sets[0])
         residuals = np.empty((len(unit), self.drive.channels, self.drive.samples))
         for key in dict.fromkeys(keys):
             mine = np.array([k == key for k in keys])

@@ -67,7 +67,8 @@ def normal(
             for k, group in enumerate(apart, len(alone)):
                 J[:, group.coordinates] = change[:, k, None] * group.rows
         J /= h[:, :, None]
-        J[~np.isfinite(J)] = 0.0
+        if (lost := ~np.isfinite(J.sum(axis=2))).any():
+            J[lost] = np.where(np.isfinite(J[lost]), J[lost], 0.0)
         gradient[part] = (J @ base[part, :, None])[:, :, 0]
         H[part] = J @ np.swapaxes(J, 1, 2)
     return gradient, H
