@@ -130,6 +130,20 @@ def test_code_for_another_machine_or_of_another_source_is_another_file(folder, m
     assert made("a", "def f(x):\n    return x") == 4
 
 
+def test_a_file_of_a_package_that_has_another_name_now_is_compiled_anew(folder, tmp_path):
+    """What is kept looks its names up in the module that it was compiled in."""
+    text = "from numba import njit\nfrom tractexp.extend import kept\n\n@kept\n@njit\ndef f(x):\n    return 2 * x\n"
+    for name in ("of_old", "renamed"):
+        package = tmp_path / name
+        package.mkdir()
+        (package / "__init__.py").touch()
+        (package / "loops.py").write_text(text)
+        ask = [sys.executable, "-c", f"from {name}.loops import f; print(f(1.5))"]
+        ran = subprocess.run(ask, cwd=tmp_path, capture_output=True, text=True)
+        assert ran.stdout.strip() == "3.0", ran.stderr
+        (package / "loops.py").unlink()
+
+
 def test_a_changed_digit_in_a_source_is_not_executed(folder):
     """The text that people may read is never what runs; the text that is remembered is looked at."""
     source = "TORQUE = 0.55\n"

@@ -60,5 +60,7 @@ class _Kept(NullCache):
         self.write(self._file(sig), dumps(cres._reduce()))
 
     def _file(self, sig: Any) -> str:
-        digest = hashlib.sha256(repr(sig).encode() + self.function.__code__.co_code).hexdigest()[:16]
+        # the module, too: what is kept looks its names up there, and cannot be loaded once a package has another name
+        told = repr((sig, self.function.__module__)).encode() + self.function.__code__.co_code
+        digest = hashlib.sha256(told).hexdigest()[:16]
         return f"{self.name}.{self.function.__name__}.{machine()}.{digest}.kept"
