@@ -127,7 +127,7 @@ def fitted(screened: Screened, valleys: Sequence[np.ndarray]) -> Fitted:
     again = _starts(bench, [f for f in chosen if f.term.name in best], others)
     fits = best_of([*fits, *(rough_refit(bench, noise, again) if again else [])])
     fits = _searched_anew(bench, noise, fits, REGRIDDED)
-    moved = [*itertools.chain(*each_apart(lambda f: elsewhere(bench, noise, f), fits[:MOVED]))]
+    moved = [start for f in fits[:MOVED] for start in elsewhere(bench, noise, f)]
     fits = best_of([*fits, *(rough_refit(bench, noise, moved) if moved else [])])
     fits = _searched_anew(bench, noise, fits, 1, scattered=True)
     near = fits[0].cost + max(CLOSE * (bare.deviance - fits[0].deviance), 20.0)
