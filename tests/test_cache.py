@@ -38,6 +38,10 @@ class Part:
         return "Part()"
 
 
+class Nameless:
+    """A part whose `repr` is Python's own: it tells where it lies, not what it is set to."""
+
+
 class Planted:
     """A pickle that leaves a mark where it is loaded."""
 
@@ -160,6 +164,16 @@ def test_a_changed_digit_in_a_source_is_not_executed(folder):
         (text,) = folder.glob("source_*.kept")
         text.write_bytes(text.read_bytes().replace(b"0.55", b"0.66"))
     assert len(made) == 2
+
+
+@pytest.mark.parametrize("parts", [(Nameless(),), (Part(), Nameless())])
+def test_nothing_is_remembered_of_a_part_known_by_its_address(folder, parts):
+    """Another part at the same address once got the equations of the first."""
+    made = []
+    for _ in range(2):
+        kernel.remembered(parts, lambda: made.append(1) or "text")
+    assert len(made) == 2
+    assert not list(folder.glob("source_*"))
 
 
 def test_a_kernel_whose_file_is_damaged_is_compiled_with_the_others(folder, monkeypatch):

@@ -6,6 +6,7 @@ import hashlib
 import importlib.metadata
 import itertools
 import os
+import re
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -20,6 +21,7 @@ from tractexp.model.template import VECTORS
 from tractexp.model.vectors import width
 
 NUMBA_KEEPS, WE_KEEP = "njit(cache=True, ", "njit("  # of a kernel's text
+ADDRESS = re.compile(r" at 0x[0-9a-f]+>", re.IGNORECASE)  # in the `repr` of what has none of its own
 
 
 def remembered(parts: Iterable[object], generate: Callable[[], str], what: str = "source") -> str:
@@ -27,14 +29,16 @@ def remembered(parts: Iterable[object], generate: Callable[[], str], what: str =
 
     Deriving a large model takes seconds, reading it back milliseconds. What a text depends on is the settings of
     its parts (their `repr`), every file beside their plugins, this package's own code, and SymPy's version. Of a part
-    that stands in no file, such as one typed into a notebook, nothing is remembered.
+    that stands in no file, such as one typed into a notebook, or whose `repr` tells an address instead of its settings,
+    nothing is remembered: another object may stand at that address later.
     """
     parts = tuple(one for part in parts for one in (part, *getattr(part, "members", ())))
     modules = [type(part).__module__ for part in parts]
     written = [getattr(sys.modules.get(module), "__file__", None) for module in modules]
-    if None in written:
+    settings = repr(parts)
+    if None in written or ADDRESS.search(settings):
         return generate()
-    digest = hashlib.sha256(f"{importlib.metadata.version('sympy')} {modules} {parts!r}".encode())
+    digest = hashlib.sha256(f"{importlib.metadata.version('sympy')} {modules} {settings}".encode())
     for folder in sorted({Path(__file__).parent, *(Path(file or "").parent for file in written)}):
         digest.update(_code(folder))
     path = cache_folder() / f"{what}_{digest.hexdigest()[:20]}.kept"
