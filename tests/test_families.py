@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from test_discrepancy import LOUD, base, bench, events
 
-from tractexp.discrepancy import all_events, families, fitting, survivors
+from tractexp.discrepancy import families, fitting, survivors
 from tractexp.discrepancy.catalogue import catalogue
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.explanations import worth_another
@@ -17,7 +17,7 @@ from tractexp.discrepancy.families import against_members, near, open_settings, 
 from tractexp.discrepancy.fitting import Refit, scattered
 from tractexp.discrepancy.forms import forms
 from tractexp.discrepancy.gap import Gap
-from tractexp.discrepancy.held_out import HeldOut, Judged
+from tractexp.discrepancy.held_out import HeldOut, Judged, searched_again
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.tangent import tangent
 from tractexp.errors import UserError
@@ -241,7 +241,12 @@ def test_a_start_that_may_overtake_the_best_is_searched_on(monkeypatch):
 def test_a_second_stage_that_the_fitted_dips_do_not_show_is_found_in_all_events(monkeypatch):
     """Among the members of every family: the fitted dips may have named another one's textbook effect."""
     tried: list[str] = []
-    monkeypatch.setattr(all_events, "starts", lambda *given: tried.append(given[1].name) or starts(*given))
+
+    def noted(at, member, refits):
+        tried.extend([member.name] * (at.drive.events == 4))
+        return starts(at, member, refits)
+
+    monkeypatch.setattr(families, "starts", noted)
     made = events("trip_in_two_stages", 1.5, 820023, count=4, noise=LOUD)
     told = investigate(base(), made[:3], made[3:], {}, {}, only=(TRIPS[0], CORE[0]))
     assert {"two_stage_trip", "saturation_curve"} <= set(tried)
@@ -252,6 +257,28 @@ def test_a_second_stage_that_the_fitted_dips_do_not_show_is_found_in_all_events(
     at = told.bench.coordinates
     shares = [at.value(f"stage_{k}_tripped", told.extended.unit) for k in (1, 2)]
     assert shares == pytest.approx([0.075, 0.075], rel=0.05)
+
+
+def test_a_second_effect_that_the_fitted_dips_do_not_show_is_found_in_all_events():
+    """One of the two leaves nothing of the fitted dips; of all events it does, and only both do not."""
+    pair = ("negative_sequence_braking", "transformer_inrush")
+    made = events(pair, (0.048, 0.043), 652317836, count=4, noise=LOUD, negative=True)
+    told = investigate(base(), made[:3], made[3:], {}, {}, only=(*pair, "load_drift"))
+    assert told.explanations.chosen.names == pair[1:]
+    assert told.explanations.last.suffices
+    assert not told.held_out.judged[pair[1:]].helps
+    assert told.names == pair
+    assert told.verdict.sets == (pair,)
+    assert told.fitted_to_both
+    assert told.validate.closed > 0.9
+
+
+@pytest.mark.parametrize("adequate", [(), (SimpleNamespace(fit=Refit((), np.zeros(1), 0.0, 0)),)])
+def test_a_search_in_all_events_that_finds_nothing_or_no_effect_changes_nothing(adequate):
+    denied = SimpleNamespace(survivors=SimpleNamespace(explanations=SimpleNamespace(base=SimpleNamespace(valleys=()))))
+    found = SimpleNamespace(adequate=adequate)
+    both = SimpleNamespace(fitted=SimpleNamespace(waves=False), searched=lambda valleys, seed: found)
+    assert searched_again(denied, both, 0) is denied
 
 
 def test_members_belong_to_the_effects_that_are_asked_for():

@@ -11,14 +11,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tractexp.discrepancy.base_fit import fitted_from
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.disagreement import examined
-from tractexp.discrepancy.families import NEAREST, starts, worth
-from tractexp.discrepancy.fitting import Refit, Start, best_of, refit, wide_refit, wide_refits
+from tractexp.discrepancy.disagreement import disagreement, examined
+from tractexp.discrepancy.explanations import explanations
+from tractexp.discrepancy.fitting import Refit, best_of, refit, wide_refit
 from tractexp.discrepancy.noise_in_quiet import QuietNoise
 from tractexp.discrepancy.records import Records
+from tractexp.discrepancy.survivors import Survivors, survivors
 from tractexp.noise import Noise
 from tractexp.record import Event
 
@@ -77,27 +79,20 @@ class AllEvents:
         fits = best_of(better for fit in alone for better in self._refitted(fit, anew=anew))
         return each_apart(lambda fit: self._told(fit, by_name[fit.names], seed), fits)
 
-    def members(self, denied: Sequence[Refit], seed: int) -> list[tuple[Refit, Together]]:
-        """Other places and laws, as fitted to the fitted events alone and to all, where textbook effects are denied.
+    def searched(self, valleys: Sequence[np.ndarray], seed: int) -> Survivors:
+        """What explains all events, searched for as in the fitted ones; `valleys` (D,) of the base model there."""
+        bench = self.bench
+        bench.effort.say("searching again, fitted to all events")
+        wide = [bench.coordinates.widened(valley) for valley in (self.bare.unit, *valleys)]
+        base = fitted_from(bench, wide, wide[1:])
+        return survivors(explanations(base, disagreement(base, seed), seed), seed)
 
-        Only what explains more of all events than the best of these does, beyond what its further parameters cost.
-        """
-        bench, family = self.bench, self.bench.kernels.family
-        wanted = [m for m in bench.catalogue.members if family.joins(m.name)]
-        if not (wanted and denied):
-            return []
-        bench.effort.say(f"trying {len(wanted)} other places and laws on all events")
-        family.compile_members([m.name for m in wanted], bench.effort.say)
-        ground = {f.names: replace(f, unit=bench.coordinates.widened(f.unit)) for f in denied} | {(): self.plain}
-        begun: list[Sequence[Start]] = [starts(bench, member, ground) for member in wanted]
-        best = min((self._refitted(f, anew=False)[0] for f in denied), key=lambda f: f.deviance)
-        made = []
-        for fit in wide_refits(bench, self.level, begun, NEAREST, self.faults):
-            if worth(fit, best, bench.criteria.family_p):
-                family.compile_members(fit.names, bench.effort.say, whole=True)
-                alone = refit(self.fitted, self.noise, [(fit.names, self._narrowed(fit))], self.faults)[0]
-                made.append((alone, self._told(fit, alone, seed)))
-        return made
+    def carried_back(self, fits: Sequence[Refit], seed: int) -> list[tuple[Refit, Together]]:
+        """Explanations (D of all events) as fitted to the fitted events alone, and to all."""
+        there = {f.names: self._narrowed(f) for f in fits}
+        alone = {names: refit(self.fitted, self.noise, [(names, u)], self.faults)[0] for names, u in there.items()}
+        again = refit(self.bench, self.level, [(f.names, f.unit) for f in fits], self.faults)
+        return each_apart(lambda f: (alone[f.names], self._told(f, alone[f.names], seed)), again)
 
     def _refitted(self, alone: Refit, *, anew: bool) -> list[Refit]:
         at, settings = self.bench.coordinates, _settings(self.bench, alone.names) if anew else [{}]

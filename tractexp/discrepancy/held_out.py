@@ -6,8 +6,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tractexp.discrepancy.all_events import AllEvents
+from tractexp.discrepancy.all_events import AllEvents, Together
 from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.disagreement import examined
 from tractexp.discrepancy.explanations import Explanations
 from tractexp.discrepancy.fitting import Refit, refit, settled
@@ -101,7 +102,7 @@ def held_out(surviving: Survivors, events: Sequence[Event], seed: int) -> HeldOu
     both = AllEvents(bench, events, noise, faults, bare)
     judged, again = weighed(both, as_fitted.extended, seed, doubted=doubted)
     made = replace(as_fitted, judged=judged).fitted_to_all(again)
-    return with_members(made, both, seed) if doubted and not made.kept else made
+    return searched_again(made, both, seed) if doubted and not made.kept else made
 
 
 def telling(explained: Explanations, bare: Refit) -> Names:
@@ -158,31 +159,41 @@ def weighed(
     return judged, []
 
 
-def with_members(made: HeldOut, both: AllEvents, seed: int) -> HeldOut:
-    """With other places and laws of what the held-out events deny, where all events confirm them.
+def searched_again(made: HeldOut, both: AllEvents, seed: int) -> HeldOut:
+    """With what a search in all events finds, where the held-out ones deny all that the fitted ones had shown.
 
-    The fitted events may show only what the textbook effect does, such as the first of two stages of a relay.
+    The fitted events may show only a part of what is there, such as the first of two stages of a relay, or one of two
+    effects. What all events confirm is taken; of waveforms nothing is, for no criterion was calibrated with it.
     """
     bench, surviving = both.fitted, made.survivors
-    if bench.waves or not bench.criteria.family_p:
+    if bench.waves:
         return made
-    denied = [f for f in made.extended.values() if len(f.names) == 1]
-    tried = both.members(denied, seed)
-    found = [(alone, fitted.fit) for alone, fitted in tried if fitted.confirmed(bench.criteria, doubted=True)]
-    if not found:
+    found = both.searched(surviving.explanations.base.valleys, seed)
+    of_all = {s.fit.names: s for s in found.adequate if s.fit.names}
+    if not of_all:
+        return made
+    plain = refit(both.bench, found.explanations.last.noise, [((), both.plain.unit)], faults=())[0]
+    both = replace(both, faults=telling(found.explanations, plain))
+    tried = both.carried_back([s.fit for s in of_all.values()], seed)
+    fits = [(alone, fitted.fit) for alone, fitted in tried if _borne_out(fitted, bench.criteria)]
+    if not fits:
         return made
     quiet = surviving.explanations.base.quiet
-    rivals = [
-        Rival(
-            alone, made.bare.deviance - alone.deviance, behind=0.0, distance=0.0, rejected=False,
-            tests=examined(quiet, alone, made.noise, seed, plain=True),
-        )
-        for alone, _ in found
-    ]  # fmt: skip
-    fits = [fit for _, fit in found]
-    surviving = replace(surviving, kept=(*rivals, *surviving.kept), rivals=(*rivals, *surviving.rivals))
-    judged = {**made.judged, **judged_on(bench, both.events, both.bare, fits)}
-    return replace(made, survivors=surviving, judged=judged).fitted_to_all(fits)
+    rivals = tuple(
+        replace(of_all[alone.names], fit=alone, tests=examined(quiet, alone, made.noise, seed, plain=True))
+        for alone, _ in fits
+    )
+    surviving = replace(surviving, kept=rivals, rivals=(*rivals, *surviving.rivals))
+    judged = {**made.judged, **judged_on(bench, both.events, both.bare, [fit for _, fit in fits])}
+    made = replace(made, survivors=surviving, judged=judged, faults=both.faults)
+    return made.fitted_to_all([fit for _, fit in fits])
+
+
+def _borne_out(fitted: Together, criteria: Criteria) -> bool:
+    """Whether all events bear out what a search in them found; several effects, chosen among hundreds of sets, must
+    leave nothing."""
+    least = criteria.stands if len(fitted.fit.names) > 1 else criteria.adequate_p
+    return fitted.confirmed(criteria, doubted=True) and fitted.p_left >= least
 
 
 def judged_on(bench: Bench, events: Sequence[Event], bare: Refit, extended: Sequence[Refit]) -> dict[Names, Judged]:
