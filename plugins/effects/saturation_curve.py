@@ -7,7 +7,6 @@ from tractexp.extend import Curve, Effect, Parameter, plugin, sites
 from ._operators import bent, drawn
 
 SOURCE = "Milano 2010, ch. 15; tables of saturation in Kundur 1994, ch. 3"
-WIDTH = 0.03  # pu² of flux fallen: how rounded the corner is
 
 
 @plugin
@@ -18,8 +17,9 @@ class SaturationCurve(Effect):
 
     psi is the flux of the core, between the bus and E: 1 - a is the rotor's part of X', by which what the core
     takes changes the voltage behind X' at once, in current and torque. h has slope 1 up to a fall of c and exp(b)
-    beyond, its corner rounded over 0.03 pu²: a knee, where it flattens, or a curve that steepens. At
-    a = 1 and b = 0 it is `magnetic_saturation` of phasors, at k = 0 the base model.
+    beyond, its corner rounded over w: a knee, where it flattens, or a curve that steepens; well rounded it follows a
+    bounded flux (Froelich's curve at 0.7 of its bound to 0.001). At a = 1 and b = 0 it is `magnetic_saturation` of
+    phasors, at k = 0 the base model.
 
     Source: saturation factors by table, Kundur 1994, ch. 3; Milano 2010, ch. 15.
     Departures: those of `magnetic_saturation`; two slopes stand for the curve; behind a feeder the core still sees
@@ -30,31 +30,38 @@ class SaturationCurve(Effect):
         0.0, (0.0, 3.0), "1/pu²", "slope at the flux before the event", SOURCE, "k_c", null=0.0
     )
     saturation_bend = Parameter(0.0, (-4.0, 1.5), "1", "logarithm of the slope beyond the corner over it", SOURCE, "b")
-    saturation_corner = Parameter(0.2, (0.05, 0.7), "pu²", "fall of the flux squared at the corner", SOURCE, "c")
+    saturation_corner = Parameter(0.2, (0.02, 0.7), "pu²", "fall of the flux squared at the corner", SOURCE, "c")
+    saturation_rounding = Parameter(0.03, (0.01, 0.6), "pu²", "how rounded the corner is", SOURCE, "w")
     flux_depth = Parameter(1.0, (0.0, 1.0), "1", "where between terminals and E the core is", SOURCE, "a_s")
 
     places, kind = ("coupling", "flux decay", "stator impedance", "load torque"), "law"
     family, differs, nests_textbook = "magnetic_saturation", "but not by the catalogue's law", True
     as_textbook = {"curve_saturation": "saturation"}
-    grid = {"saturation_bend": (-2.0, 0.0), "saturation_corner": (0.1, 0.2, 0.4), "flux_depth": (1.0, 0.6)}
+    grid = {
+        "saturation_bend": (-2.0, 0.0),
+        "saturation_corner": (0.1, 0.2, 0.4),
+        "saturation_rounding": (0.03, 0.3),
+        "flux_depth": (1.0, 0.6),
+    }
     likely = {"saturation_bend": 1.5, "flux_depth": 1.0}
     relevant = {"curve_saturation": 0.2}
     confused_with = ("magnetic_saturation", "feeder_impedance", "speed_dependent_torque")
 
-    def edit(self, eq, curve_saturation, saturation_bend, saturation_corner, flux_depth):
+    def edit(self, eq, curve_saturation, saturation_bend, saturation_corner, saturation_rounding, flux_depth):
         from sympy import conjugate, re
 
         psi = eq.define("gap_flux", (1 - flux_depth) * eq.v + flux_depth * eq["E"], r"\psi")
         square = lambda x: re(x * conjugate(x))  # noqa: E731
         fall = eq.define("flux_fall", square(eq.before(psi)) - square(psi), r"\Delta E^2")
-        less = (1 - eq["C"]) * curve_saturation * bent(fall, (saturation_corner,), (saturation_bend,), WIDTH)
+        h = bent(fall, (saturation_corner,), (saturation_bend,), saturation_rounding)
+        less = (1 - eq["C"]) * curve_saturation * h
         for site in (sites.coupling, sites.time_constant):
             eq.edit(site, lambda x: x / (1 - less))
         taken = (1 - flux_depth) * less
         eq.edit(sites.stator_current, lambda current: current - eq["E"] * taken / eq[sites.stator_impedance])
         eq.edit(sites.electrical_torque, lambda torque: torque * (1 + taken))
 
-    def curve(self, curve_saturation, saturation_bend, saturation_corner, flux_depth):
+    def curve(self, curve_saturation, saturation_bend, saturation_corner, saturation_rounding, flux_depth):
         x = np.linspace(0.0, 0.7, 71)
-        y = -curve_saturation * drawn(lambda x: bent(x, (saturation_corner,), (saturation_bend,), WIDTH), x)
-        return Curve(x, y, "fall of the flux squared, pu²", "change of the saturation factor")
+        h = drawn(lambda x: bent(x, (saturation_corner,), (saturation_bend,), saturation_rounding), x)
+        return Curve(x, -curve_saturation * h, "fall of the flux squared, pu²", "change of the saturation factor")
