@@ -284,12 +284,15 @@ def test_a_second_effect_that_the_fitted_dips_do_not_show_is_found_in_all_events
     assert told.validate.closed > 0.9
 
 
-@pytest.mark.parametrize("adequate", [(), (SimpleNamespace(fit=Refit((), np.zeros(1), 0.0, 0)),)])
-def test_a_search_in_all_events_that_finds_nothing_or_no_effect_changes_nothing(adequate):
-    denied = SimpleNamespace(survivors=SimpleNamespace(explanations=SimpleNamespace(base=SimpleNamespace(valleys=()))))
-    found = SimpleNamespace(adequate=adequate)
+@pytest.mark.parametrize("names", [None, (), ("denied",)])
+def test_a_search_in_all_events_that_finds_nothing_new_changes_nothing(names):
+    """No explanation that leaves nothing, the base model itself, and what was fitted to all events before."""
+    bases = SimpleNamespace(base=SimpleNamespace(valleys=()))
+    before = SimpleNamespace(survivors=SimpleNamespace(explanations=bases), judged={("denied",): None})
+    adequate = [] if names is None else [SimpleNamespace(fit=Refit(names, np.zeros(1), 0.0, 0))]
+    found = SimpleNamespace(adequate=adequate, explanations=SimpleNamespace(chosen=SimpleNamespace(names=names)))
     both = SimpleNamespace(fitted=SimpleNamespace(waves=False), searched=lambda valleys, seed: found)
-    assert searched_again(denied, both, 0) is denied
+    assert searched_again(before, both, 0) is before
 
 
 def test_members_belong_to_the_effects_that_are_asked_for():

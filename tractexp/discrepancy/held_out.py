@@ -163,14 +163,15 @@ def searched_again(made: HeldOut, both: AllEvents, seed: int) -> HeldOut:
     """With what a search in all events finds, where the held-out ones deny all that the fitted ones had shown.
 
     The fitted events may show only a part of what is there, such as the first of two stages of a relay, or one of two
-    effects. What all events confirm is taken; of waveforms nothing is, for no criterion was calibrated with it.
+    effects. What all events confirm is taken, unless it comes to what was denied, which was fitted to all events, too.
+    Of waveforms nothing is, for no criterion was calibrated with it.
     """
     bench, surviving = both.fitted, made.survivors
     if bench.waves:
         return made
     found = both.searched(surviving.explanations.base.valleys, seed)
     of_all = {s.fit.names: s for s in found.adequate if s.fit.names}
-    if not of_all:
+    if not of_all or found.explanations.chosen.names in made.judged:
         return made
     plain = refit(both.bench, found.explanations.last.noise, [((), both.plain.unit)], faults=())[0]
     both = replace(both, faults=telling(found.explanations, plain))
