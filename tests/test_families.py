@@ -280,6 +280,9 @@ def test_a_second_effect_that_the_fitted_dips_do_not_show_is_found_in_all_events
     assert not told.held_out.judged[pair[1:]].helps
     assert told.names == pair
     assert told.verdict.sets == (pair,)
+    both, one, *_ = told.survivors.rivals
+    assert (both.fit.names, one.fit.names) == (pair, pair[1:])
+    assert 0 < both.lowered - one.lowered < 20  # on the fitted dips the second hardly shows
     assert told.fitted_to_both
     assert told.validate.closed > 0.9
 

@@ -1,7 +1,8 @@
 """Fitted and held-out events together, and explanations fitted to all of them.
 
-What the fitted events leave open, such as the level of a relay between the depths of two dips, or a second stage that
-none of them reached, may be wrong on the held-out ones though the effect is there.
+What the fitted events leave open, such as the level of a relay between the depths of two dips, may be wrong on the
+held-out ones though the effect is there; and what none of them shows, such as a second stage or a second effect, is
+found only where all are searched.
 """
 
 import functools

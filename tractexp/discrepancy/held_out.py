@@ -180,10 +180,12 @@ def searched_again(made: HeldOut, both: AllEvents, seed: int) -> HeldOut:
     if not fits:
         return made
     quiet = surviving.explanations.base.quiet
-    rivals = tuple(
-        replace(of_all[alone.names], fit=alone, tests=examined(quiet, alone, made.noise, seed, plain=True))
-        for alone, _ in fits
-    )
+
+    def on_fitted_events(alone: Refit) -> Rival:  # as the others are told
+        tests = examined(quiet, alone, made.noise, seed, plain=True)
+        return replace(of_all[alone.names], fit=alone, lowered=made.bare.deviance - alone.deviance, tests=tests)
+
+    rivals = tuple(on_fitted_events(alone) for alone, _ in fits)
     surviving = replace(surviving, kept=rivals, rivals=(*rivals, *surviving.rivals))
     judged = {**made.judged, **judged_on(bench, both.events, both.bare, [fit for _, fit in fits])}
     made = replace(made, survivors=surviving, judged=judged, faults=both.faults)
