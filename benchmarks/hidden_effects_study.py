@@ -220,8 +220,8 @@ def _overlaps(place, where: list[dict]) -> bool:
     )
 
 
-def salt_of(commit: str) -> int:
-    """What the seeds of the judgement set are drawn from: the hash of the commit that froze it.
+def commit_of(commit: str) -> str:
+    """The whole hash of the commit that froze a judgement set, from which its seeds are drawn.
 
     Refused where what judges or is judged has changed since, or is imported from another copy of the project.
     """
@@ -235,7 +235,7 @@ def salt_of(commit: str) -> int:
     changed = subprocess.run([*git, "diff", "--quiet", commit, "--", *FROZEN], check=False)
     if changed.returncode:
         raise SystemExit(f"{', '.join(FROZEN)} have changed since {commit}: check that commit out, or freeze anew")
-    return int(told.stdout.strip()[:12], 16)
+    return told.stdout.strip()
 
 
 def main() -> None:
@@ -260,7 +260,8 @@ def main() -> None:
 
     from tractexp import files
 
-    salt = salt_of(chosen.frozen) if chosen.frozen else None
+    frozen = commit_of(chosen.frozen) if chosen.frozen else None
+    salt = int(frozen[:12], 16) if frozen else None
     out.parent.mkdir(parents=True, exist_ok=True)
     rows = evidence.read(out) if out.exists() else []
     done = {(r["group"], r["label"], r["seed"], r["events"], r["held"]) for r in rows}
@@ -271,7 +272,7 @@ def main() -> None:
     jobs = (delayed(run)(group, trial, total, chosen.held) for group, trial in in_time)
     with out.open("a") as file:
         for row in Parallel(n_jobs=chosen.jobs, return_as="generator_unordered", pre_dispatch=4)(jobs):
-            rows.append(files.plain(row | {"frozen": chosen.frozen}))
+            rows.append(files.plain(row | {"frozen": frozen}))
             file.write(json.dumps(rows[-1]) + "\n")
             file.flush()
             told = row.get("failed") or f"{row['verdict']} {' '.join(row['names'])}"

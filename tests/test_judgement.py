@@ -74,7 +74,7 @@ def test_what_naming_may_spend_is_calibrated_on_development_seeds():
 
 def test_a_commit_that_is_not_there_is_refused_in_a_sentence():
     with pytest.raises(SystemExit, match="there is no commit 'nowhere'"):
-        study.salt_of("nowhere")
+        study.commit_of("nowhere")
 
 
 def test_plugins_of_another_copy_are_refused(monkeypatch, tmp_path):
@@ -84,7 +84,7 @@ def test_plugins_of_another_copy_are_refused(monkeypatch, tmp_path):
     monkeypatch.setattr(study.subprocess, "run", lambda *_, **__: SimpleNamespace(returncode=0, stdout="0" * 40))
     monkeypatch.setattr(tractexp_plugins, "__file__", str(tmp_path / "plugins" / "__init__.py"))
     with pytest.raises(SystemExit, match=f"tractexp_plugins is that of {tmp_path}, not of"):
-        study.salt_of("HEAD")
+        study.commit_of("HEAD")
 
 
 def test_what_is_called_a_right_proposal_is_of_the_library_and_of_strangers():
