@@ -287,14 +287,16 @@ def test_a_second_effect_that_the_fitted_dips_do_not_show_is_found_in_all_events
     assert told.validate.closed > 0.9
 
 
-@pytest.mark.parametrize("names", [None, (), ("denied",)])
-def test_a_search_in_all_events_that_finds_nothing_new_changes_nothing(names):
-    """No explanation that leaves nothing, the base model itself, and what was fitted to all events before."""
+@pytest.mark.parametrize(("names", "deviance"), [(None, 0.0), ((), 0.0), (("denied",), 0.0), (("new",), np.inf)])
+def test_a_search_in_all_events_that_finds_nothing_new_changes_nothing(names, deviance):
+    """No explanation that leaves nothing, the base model itself, what was fitted to all events before; and none is
+    made where the base model cannot run before the held-out events."""
     bases = SimpleNamespace(base=SimpleNamespace(valleys=()))
     before = SimpleNamespace(survivors=SimpleNamespace(explanations=bases), judged={("denied",): None})
     adequate = [] if names is None else [SimpleNamespace(fit=Refit(names, np.zeros(1), 0.0, 0))]
     found = SimpleNamespace(adequate=adequate, explanations=SimpleNamespace(chosen=SimpleNamespace(names=names)))
-    both = SimpleNamespace(fitted=SimpleNamespace(waves=False), searched=lambda valleys, seed: found)
+    plain = SimpleNamespace(deviance=deviance)
+    both = SimpleNamespace(fitted=SimpleNamespace(waves=False), plain=plain, searched=lambda valleys, seed: found)
     assert searched_again(before, both, 0) is before
 
 
