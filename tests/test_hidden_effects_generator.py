@@ -804,3 +804,10 @@ def test_what_makes_no_sense_is_refused(settings, message):
 def test_impossible_noise_is_refused(settings):
     with pytest.raises(ValueError, match="noise"):
         Noise(**settings)
+
+
+def test_a_control_that_chatters_about_its_limit_ends_with_a_sentence(monkeypatch):
+    """Such a simulation once went on for more than ten minutes, in steps of a nanosecond."""
+    monkeypatch.setattr("hidden_effects.site.MOST", 200)
+    with pytest.raises(ArithmeticError, match=r"the simulation chatters at t = \d\.\d+ s: 200 derivatives"):
+        make(Case("constant_power_converter", 2.0, events=1), 800001)

@@ -1,5 +1,6 @@
 """The load as it stands on its feeder, and its answer to one dip: the network solved at every instant, SciPy DOP853."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -12,6 +13,7 @@ from hidden_effects.supply import Moment, Profile, Supply
 from independent.source import Dip
 
 MARGIN = 0.15  # s simulated before and after the record, for the recorder's windows
+MOST = 100_000  # derivatives between two edges, twenty-five times what any law takes
 
 
 @dataclass(frozen=True)
@@ -117,18 +119,27 @@ class Response:
         self.edges = [first, *sorted(k for k in knots if first < k < last), last]
         self.pieces, x = [], begin
         for a, b in pairwise(self.edges):
-
-            def derivative(t: float, x: np.ndarray, a: float = a, b: float = b) -> list[complex]:
-                inside = min(max(t, a + 1e-10), b - 1e-10)  # a jump at an edge belongs to the neighbor
-                return self.network(inside, x.tolist())[2]
-
-            solved = solve_ivp(derivative, (a, b), x, "DOP853", dense_output=True, rtol=1e-9, atol=1e-11)
+            solved = solve_ivp(self._between(a, b), (a, b), x, "DOP853", dense_output=True, rtol=1e-9, atol=1e-11)
             if not solved.success:
                 raise ArithmeticError(f"the simulation stopped at t = {solved.t[-1]:.4g} s: {solved.message}")
             self.pieces.append(solved.sol)
             x = solved.y[:, -1]
         speeds = [piece(piece.ts)[own.start + 1].real for piece in self.pieces for own in self._motors()]
         self.lowest_speed = float(min(map(np.min, speeds)))
+
+    def _between(self, a: float, b: float) -> Callable[[float, np.ndarray], list[complex]]:
+        """The derivatives between two edges. `ArithmeticError` where a state chatters about a limit of a control."""
+        calls = 0
+
+        def derivative(t: float, x: np.ndarray) -> list[complex]:
+            nonlocal calls
+            calls += 1
+            if calls > MOST:
+                raise ArithmeticError(f"the simulation chatters at t = {t:.4g} s: {MOST} derivatives do not suffice")
+            inside = min(max(t, a + 1e-10), b - 1e-10)  # a jump at an edge belongs to the neighbor
+            return self.network(inside, x.tolist())[2]
+
+        return derivative
 
     def _motors(self) -> list[slice]:
         return self.slices[: len(self.site.motors)]
