@@ -276,6 +276,48 @@ def test_motor_effects_agree_with_equations_written_apart(name, chosen, known):
     assert np.abs(P - base(excitation)[0]).max() > 0.01
 
 
+@pytest.mark.parametrize("depth", [0.9, 0.5, 0.2])
+def test_a_saturation_curve_is_a_magnetizing_branch_between_two_leakages(depth):
+    """The node of stator, rotor and X_m/sigma, solved at every instant, and the rotor circuit behind it."""
+    excitation, k, corner, bend = dip(0.5, step=2e-3, length=0.5, sag=0.0), 1.5, 0.15, -2.0
+    X_s = depth * X_PRIME
+    X_m = X_PRIME / (1 - C) - X_s
+    X_r = 1 / (1 / (X_PRIME - X_s) - 1 / X_m)
+    R_r = (X_m + X_r) * X_PRIME / (X_m + X_s) / T_PRIME  # times omega_n
+
+    def circuit(rotor, U, before=None):
+        """Core flux, stator current, the square of the flux with nothing saturated; at that of `before`, sigma is 1."""
+        free = (rotor / X_r + U / X_s) / (1 / X_s + 1 / X_r + 1 / X_m)
+        fall = 0.0 if before is None else before - abs(free) ** 2
+        sigma = 1 - k * (fall if fall < corner else corner + np.exp(bend) * (fall - corner))
+        core = (rotor / X_r + U / X_s) / (1 / X_s + 1 / X_r + sigma / X_m)
+        return core, (U - core) / (1j * X_s), abs(free) ** 2
+
+    def rates(y, U, before=None):
+        rotor = y[0] + 1j * y[1]
+        core, current, _ = circuit(rotor, U, before)
+        moved = -R_r * (rotor - core) / X_r + 1j * y[2] * rotor
+        return [moved.real, moved.imag, ((core * np.conj(current)).real - T_M) / M]
+
+    U0 = excitation.U0
+    y = fsolve(lambda y: np.array(rates(y, U0)) * [1, 1, M], [0.85 * U0, -0.2, -2.0], xtol=1e-13)
+    _, I_0, before = circuit(y[0] + 1j * y[1], U0)
+    S_s0 = P0 + 1j * Q0 - U0 * np.conj(I_0)
+    t, out = np.arange(len(excitation.U)) * excitation.step, []
+    recorded = Akima1DInterpolator(t, excitation.U, method="makima")
+    for i, U in enumerate(excitation.U):
+        static = S_s0.real * (U / U0) ** P_V + 1j * S_s0.imag * (U / U0) ** Q_V
+        out.append(U * np.conj(circuit(y[0] + 1j * y[1], U, before)[1]) + static)
+        if i + 1 < len(t):
+            slope = lambda s, y: rates(y, recorded(s), before)  # noqa: E731
+            y = solve_ivp(slope, t[i : i + 2], y, method="DOP853", rtol=1e-9, atol=1e-11).y[:, -1]
+    sizes = {"curve_saturation": k, "saturation_corner": corner, "saturation_bend": bend, "flux_depth": depth}
+    P, Q = run("saturation_curve", excitation, values("saturation_curve", saturation_rounding=1e-9, **sizes), 8)
+    assert np.abs(P - np.real(out)).max() < 1e-6
+    assert np.abs(Q - np.imag(out)).max() < 1e-6
+    assert np.abs(P - base(excitation)[0]).max() > 0.005
+
+
 def test_a_second_group_is_two_loads_side_by_side():
     g, r = 0.3, 5.0
     slow = TRUTH * np.where(np.arange(7) == 3, r, 1)

@@ -13,17 +13,20 @@ SOURCE = "Milano 2010, ch. 15; tables of saturation in Kundur 1994, ch. 3"
 class SaturationCurve(Effect):
     r"""The magnetizing reactance grows as the flux falls, as in `magnetic_saturation`, by a monotone curve.
 
-        sigma = 1 - k h(x),   x = |psi_0|^2 - |psi|^2,   psi = (1 - a) U + a E,   E -> E (1 - (1 - a)(1 - C)(sigma - 1))
+        sigma = 1 - k h(x),   x = |psi_u,0|^2 - |psi_u|^2,   psi_u = (1 - a) U + a E
+        g = 1 + (1 - a) (sigma - 1) X'/X_m,   kappa = C (sigma - 1)/g X'/X_m,   X'/X_m = (1 - C)/(1 - a (1 - C))
+        I = (g U - E)/(j X' (1 + a (g - 1))),   T_e = Re(E I*)/g
+        C -> (C - (1 - a) kappa)/(1 + a kappa),   T' -> T'/(1 + a kappa)
 
-    psi is the flux of the core, between the bus and E: 1 - a is the rotor's part of X', by which what the core
-    takes changes the voltage behind X' at once, in current and torque. h has slope 1 up to a fall of c and exp(b)
-    beyond, its corner rounded over w: a knee, where it flattens, or a curve that steepens; well rounded it follows a
-    bounded flux (Froelich's curve at 0.7 of its bound to 0.001). At a = 1 and b = 0 it is `magnetic_saturation` of
-    phasors, at k = 0 the base model.
+    The magnetizing branch X_m/sigma between a stator leakage a X' and the rotor's, without approximation: with the
+    flux psi = psi_u/(1 + a (g - 1)) of the core, psi_u if nothing saturated. h has slope 1 up to a fall of c and
+    exp(b) beyond, its corner rounded over w: a knee, where it flattens, or a curve that steepens; well rounded it
+    follows a bounded flux (Froelich's curve at 0.7 of its bound to 0.001). At a = 1 and b = 0 it is
+    `magnetic_saturation` of phasors, at k = 0 the base model.
 
     Source: saturation factors by table, Kundur 1994, ch. 3; Milano 2010, ch. 15.
-    Departures: those of `magnetic_saturation`; two slopes stand for the curve; behind a feeder the core still sees
-    the bus.
+    Departures: the factor is told by the flux that an unsaturated core would have, counted from its value before the
+    event; two slopes stand for the curve; behind a feeder the core still sees the bus.
     """
 
     curve_saturation = Parameter(
@@ -50,16 +53,19 @@ class SaturationCurve(Effect):
     def edit(self, eq, curve_saturation, saturation_bend, saturation_corner, saturation_rounding, flux_depth):
         from sympy import conjugate, re
 
-        psi = eq.define("gap_flux", (1 - flux_depth) * eq.v + flux_depth * eq["E"], r"\psi")
-        square = lambda x: re(x * conjugate(x))  # noqa: E731
-        fall = eq.define("flux_fall", square(eq.before(psi)) - square(psi), r"\Delta E^2")
+        unsaturated = (1 - flux_depth) * eq.v + flux_depth * eq["E"]
+        squared = eq.define("flux_squared", re(unsaturated * conjugate(unsaturated)), r"|\psi_u|^2")
+        fall = eq.define("flux_fall", eq.before(squared) - squared, r"\Delta\psi_u^2")
         h = bent(fall, (saturation_corner,), (saturation_bend,), saturation_rounding)
-        less = (1 - eq["C"]) * curve_saturation * h
-        for site in (sites.coupling, sites.time_constant):
-            eq.edit(site, lambda x: x / (1 - less))
-        taken = (1 - flux_depth) * less
-        eq.edit(sites.stator_current, lambda current: current - eq["E"] * taken / eq[sites.stator_impedance])
-        eq.edit(sites.electrical_torque, lambda torque: torque * (1 + taken))
+        share = (1 - eq["C"]) / (1 - flux_depth * (1 - eq["C"]))  # X'/X_m
+        less = eq.define("saturation_fall", curve_saturation * h * share, r"(1 - \sigma) X'/X_m")
+        g = eq.define("gap_factor", 1 - (1 - flux_depth) * less, "g")
+        kappa = -eq["C"] * less / g
+        psi = unsaturated / (1 + flux_depth * (g - 1))
+        eq.edit(sites.coupling, lambda C: (C - (1 - flux_depth) * kappa) / (1 + flux_depth * kappa))
+        eq.edit(sites.time_constant, lambda T: T / (1 + flux_depth * kappa))
+        eq.edit(sites.stator_current, lambda current: current + (g - 1) * psi / eq[sites.stator_impedance])
+        eq.edit(sites.electrical_torque, lambda torque: torque / g)
 
     def curve(self, curve_saturation, saturation_bend, saturation_corner, saturation_rounding, flux_depth):
         x = np.linspace(0.0, 0.7, 71)
