@@ -1,4 +1,4 @@
-"""Rows of the study as the tables and figures of docs/missing-effects.md. Shares come with exact 95 % intervals."""
+"""Rows of judgement sets as the tables and figures of the docs. Shares come with exact 95 % intervals."""
 
 import itertools
 import json
@@ -15,8 +15,8 @@ VERDICTS = ("none", "named", "tied", "unexplained")
 FITTED = 3  # events, where nothing else is said
 OTHERS = ("rotor_skin_effect", "stator_transients")  # orders of the model, which have no law of their own
 BINS = ((0, 20), (20, 40), (40, 80), (80, np.inf))  # of the non-centrality that the best single effect leaves
-MARK = "benchmarks/hidden_effects_study.py --docs"  # what makes the tables of missing-effects.md
-MARK_ANEW = f"{MARK}, frozen anew"
+MARK = "benchmarks/hidden_effects_study.py --docs"  # what makes the tables
+NEWEST, EARLIER = "missing-effects.md", "earlier-judgements.md"  # the pages that hold them
 _POWER, _STATIC = {"power", "power_P", "power_Q", "whole"}, {"static", "static_P", "static_Q"}
 RIGHT = {  # of a stranger: balances and signals of a proposal that are called right, fixed before any seed was drawn;
     # "voltage" was no balance of the library before the set with near rivals
@@ -31,7 +31,8 @@ RIGHT = {  # of a stranger: balances and signals of a proposal that are called r
     "phase_jump": ({"angle"}, {"power", "knee", "knee_squared", "below", "lag"}),
     "voltage_rate": (_POWER | _STATIC, {"rate"}),
 }
-_TWO = ("with more members", "ten of each")
+_FIRST = ("of the first", "frozen anew")  # no member had a law of its own
+_TWO = (*_FIRST, "with more members", "ten of each")
 SINCE = {  # laws of members that came after these sets
     "thermostat_recovery": _TWO,
     "switched_capacitors": _TWO,
@@ -46,44 +47,28 @@ def read(path: Path) -> Rows:
     return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
 
 
-def tables(rows: Rows) -> str:
-    """All tables and figures, Markdown."""
-    return "\n\n".join([_all(rows), *(f"![{told}]({_path(name)})" for name, told in _figures(_usual(rows)).items())])
+def mark(what: str = "") -> str:
+    """Where the tables of a set stand: of the newest, or of that in which `what` is new."""
+    return f"{MARK}, {what}" if what else MARK
 
 
-def tables_later(rows: Rows, what: str) -> str:
-    """The tables of a set frozen later, Markdown, `what` is new to it in words: laws of members apart from others.
+def tables(rows: Rows, what: str = "") -> str:
+    """The tables of a set, Markdown: of the newest with times and figures, or of that in which `what` is new.
 
-    Without their times: other work ran on the machine.
+    Laws that a member of a family was built to tell stand apart from others.
     """
-    known = {law for law in MEMBERS_LAW if what not in SINCE.get(law, ())}
-    return _all(rows, f", {what}", known, timed=False)
-
-
-def mark_later(what: str) -> str:
-    """Where they stand."""
-    return f"{MARK}, {what}"
-
-
-def _all(rows: Rows, when: str = "", known: Container[str] = (), *, timed: bool = True) -> str:
+    known = {law for law in MEMBERS_LAW if what not in SINCE.get(law, _FIRST)}
     good, usual = [r for r in rows if "failed" not in r], _usual(rows)
-    failed = len(rows) - len(good)
+    failed, when = len(rows) - len(good), what and f", {what}"
     parts = [
         f"{len(rows)} data sets" + (f", of which {failed} could not be made or investigated." if failed else "."),
         *(_table(title + when, head, lines) for title, head, lines in (
             _false_alarms(usual), _singles(usual), _laws(usual, known), _each_law(usual), _events(good),
-            _abstention(usual), _proposals(usual), _pairs(usual), _sizes(usual), _seconds(usual if timed else []),
+            _abstention(usual), _proposals(usual), _pairs(usual), _sizes(usual), _seconds([] if what else usual),
         ) if lines),
+        *(() if what else (f"![{told}]({_path(name)})" for name, told in _figures(usual).items())),
     ]  # fmt: skip
     return "\n\n".join(parts)
-
-
-def tables_anew(rows: Rows) -> str:
-    """The nulls of the set frozen anew, Markdown."""
-    good = [r for r in rows if "failed" not in r]
-    _, head, lines = _false_alarms(good)
-    told = f"{len(rows)} data sets, of which {len(rows) - len(good)} could not be investigated."
-    return f"{told}\n\n{_table('Nothing is missing, frozen anew', head, lines)}"
 
 
 def _usual(rows: Rows) -> Rows:
@@ -106,15 +91,15 @@ def _multiples(rows: Rows) -> list[float]:
     return [m for m in (0.5, 1.0, 2.0, 4.0, 8.0) if any(r["group"] == f"{m:g} x" and reached(r, m) for r in rows)]
 
 
-def write(rows: Rows, anew: Rows, later: Mapping[str, Rows], docs: Path) -> None:
-    """Put the tables between the marks in missing-effects.md, and the figures into images/."""
-    usual = _usual(rows)
-    marked.replace(docs / "missing-effects.md", MARK, tables(rows))
-    marked.replace(docs / "missing-effects.md", MARK_ANEW, tables_anew(anew))
-    for what, drawn in later.items():
-        marked.replace(docs / "missing-effects.md", mark_later(what), tables_later(drawn, what))
-    for name in _figures(usual):
-        {"detection": _draw_detection, "confusion": _draw_confusion}[name](usual, docs / _path(name))
+def write(sets: Mapping[str, Rows], docs: Path) -> None:
+    """Put the tables of all sets between their marks, the figures of the newest, which is the last, into images/."""
+    *earlier, newest = sets
+    for what in earlier:
+        marked.replace(docs / EARLIER, mark(what), tables(sets[what], what))
+    rows = sets[newest]
+    marked.replace(docs / NEWEST, mark(), tables(rows))
+    for name in _figures(_usual(rows)):
+        {"detection": _draw_detection, "confusion": _draw_confusion}[name](_usual(rows), docs / _path(name))
 
 
 def share(right: int, of: int) -> str:

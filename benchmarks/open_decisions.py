@@ -5,7 +5,7 @@
 Data set by data set as in judgement_members.jsonl, whose seeds were drawn before this was thought of; open is a data
 set on which p of what a fit leaves was within a factor of `MISSED` of the one that decides. All others are decided as
 they were: their draws are the same. Rows are appended to open_decisions.jsonl, so that it can be stopped and taken up;
-`--docs` writes the table into docs/missing-effects.md.
+`--docs` writes the table into docs/earlier-judgements.md.
 """
 
 import argparse
@@ -24,7 +24,7 @@ from tractexp import files
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.disagreement import MISSED
 
-OUT, DOCS = Path(__file__).with_suffix(".jsonl"), study.ROOT / "docs" / "missing-effects.md"
+OUT, DOCS = Path(__file__).with_suffix(".jsonl"), study.ROOT / "docs" / evidence.EARLIER
 MARK = "benchmarks/open_decisions.py --docs"  # what makes the table there
 MOST = 40  # data sets of a row that a judgement set may have
 
@@ -55,7 +55,7 @@ def judged(row: dict) -> str:
 
 def stored() -> dict[tuple, dict]:
     """The open data sets as they were decided."""
-    return {key(row): row for row in evidence.read(study.LATER["with more members"]) if is_open(row)}
+    return {key(row): row for row in evidence.read(study.SETS["with more members"]) if is_open(row)}
 
 
 def table(before: dict[tuple, dict], after: list[dict]) -> str:
