@@ -72,7 +72,7 @@ def table(before: dict[tuple, dict], after: list[dict]) -> str:
 def main() -> None:
     """Investigate what is missing; write the table where it is asked for."""
     asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    asked.add_argument("--docs", action="store_true", help="write the table into docs/missing-effects.md and stop")
+    asked.add_argument("--docs", action="store_true", help="write the table into the docs and stop")
     asked.add_argument("--jobs", type=int, default=2)
     chosen = asked.parse_args()
     before = stored()
