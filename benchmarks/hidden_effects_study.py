@@ -253,9 +253,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--out", type=Path, help="default: the newest set, or outputs/hidden_effects.jsonl")
     parser.add_argument("--minutes", type=float, default=1e9, help="begin no further trial after so long")
-    parser.add_argument(
-        "--docs", action="store_true", help="write tables and figures of all judgement sets, and stop"
-    )
+    parser.add_argument("--docs", action="store_true", help="write tables and figures of all judgement sets, and stop")
     chosen = parser.parse_args()
     out = chosen.out or ([*SETS.values()][-1] if chosen.frozen else Path("outputs/hidden_effects.jsonl"))
     if chosen.docs:
