@@ -96,14 +96,15 @@ def test_a_law_that_the_textbook_has_not_is_told_by_its_family(hidden, size, see
     assert made.validate.closed > 0.9
 
 
-def test_a_bounded_flux_is_a_saturation_with_a_round_corner():
-    """Its curve is followed beyond the fitted events, too."""
-    made = events("froelich_saturation", size=1.8, seed=820084, count=4, noise=LOUD)
+@pytest.mark.parametrize(("seed", "least"), [(820081, 0.85), (820084, 0.97)])
+def test_a_bounded_flux_is_a_saturation_with_a_round_corner(seed, least):
+    """How well one held-out event is met by a curve drawn beyond the fitted ones is chance: 0.90 and 0.998 here."""
+    made = events("froelich_saturation", size=1.8, seed=seed, count=4, noise=LOUD)
     told = investigate(base(), made[:3], made[3:], {}, {}, only=("magnetic_saturation",))
     (form,) = forms(told)
     assert form.effect.name == "saturation_curve"
     assert told.bench.coordinates.value("saturation_rounding", told.extended.unit) > 0.1
-    assert told.validate.closed > 0.97
+    assert told.validate.closed > least
 
 
 def test_members_of_other_families_that_come_near_are_tried_beside_a_name_that_suffices():
