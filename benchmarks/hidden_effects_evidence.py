@@ -96,10 +96,10 @@ def write(sets: Mapping[str, Rows], docs: Path) -> None:
     *earlier, newest = sets
     for what in earlier:
         marked.replace(docs / EARLIER, mark(what), tables(sets[what], what))
-    rows = sets[newest]
-    marked.replace(docs / NEWEST, mark(), tables(rows))
-    for name in _figures(_usual(rows)):
-        {"detection": _draw_detection, "confusion": _draw_confusion}[name](_usual(rows), docs / _path(name))
+    marked.replace(docs / NEWEST, mark(), tables(sets[newest]))
+    usual = _usual(sets[newest])
+    for name in _figures(usual):
+        {"detection": _draw_detection, "confusion": _draw_confusion}[name](usual, docs / _path(name))
 
 
 def share(right: int, of: int) -> str:

@@ -26,7 +26,8 @@ class SaturationCurve(Effect):
 
     Source: saturation factors by table, Kundur 1994, ch. 3; Milano 2010, ch. 15.
     Departures: the factor is told by the flux that an unsaturated core would have, counted from its value before the
-    event; two slopes stand for the curve; behind a feeder the core still sees the bus.
+    event; two slopes stand for the curve; behind a feeder the core still sees the bus, and beside a stator
+    resistance what it drops is not in the flux.
     """
 
     curve_saturation = Parameter(
