@@ -170,7 +170,7 @@ def coverage_record(seed: int, only: Sequence[str] = tuple(CONDITIONS)) -> dict:
             "inside": ((known.intervals[:, 0] <= truth) & (truth <= known.intervals[:, 1])).tolist(),
             "relative": (1.96 * limit / truth).tolist(),
             "words": [v.word for v in known.verdicts.values()],
-            "notes": int(known.widened > 1.0),  # more than noise is left
+            "notes": int(not known.exact),  # more than noise is left
         }
     return rows
 

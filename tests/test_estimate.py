@@ -13,6 +13,7 @@ from tractexp.identification.adequacy import Grade, Surprise, graded
 from tractexp.identification.descent import Descent
 from tractexp.identification.estimate import estimate, polished
 from tractexp.identification.likelihood import Likelihood
+from tractexp.identification.model_error import ModelError
 from tractexp.identification.observed import Observed
 from tractexp.identification.problem import Problem
 from tractexp.identification.valleys import distinct
@@ -106,10 +107,10 @@ def test_nothing_missing_is_graded_adequate_and_a_step_of_the_load_is_not():
     missing = identified(recorded(spoil=stepped(0.02)))
     assert missing.grade == "effect_missing"
     assert missing.result.adequacy["p"] < 1e-6
-    assert "do not use its intervals" in missing.headline
-    assert "interval" not in " ".join(missing.table().columns)
-    assert missing.advice == ["find the missing effect: task=discrepancy"]
-    assert "interval" not in repr(missing.parameters["M"])
+    assert "an effect is missing" in missing.headline
+    assert "95 % interval" in missing.table().columns
+    assert missing.advice[0] == "find the missing effect: task=discrepancy"
+    assert "interval" in repr(missing.parameters["M"])
 
 
 def test_a_model_that_is_off_by_more_than_eq_20_allows_is_the_wrong_one():
@@ -160,12 +161,25 @@ def test_p_of_noise_alone_is_no_smaller_than_it_says():
 
 def test_the_thresholds_of_the_grades_are_where_they_are_said_to_be():
     """Loosened, each of these would give another grade."""
-    errors = [("P of dip", 0.049)]
-    assert graded(Surprise(0.0011, "", 2.0, "P"), errors).grade is Grade.ADEQUATE
-    assert graded(Surprise(0.0009, "", 2.0, "P"), errors).grade is Grade.EFFECT_MISSING
-    assert graded(Surprise(0.0009, "", 2.0, "P"), [("P of dip", 0.051)]).grade is Grade.WRONG_MODEL
-    assert graded(Surprise(None, "", None, ""), errors).grade is Grade.EFFECT_MISSING
-    assert "less than one in a million" in graded(Surprise(1e-19, "", 2.0, "P"), errors).sentence
+    small, large = (ModelError(e, (0.9 * e, 1.1 * e), 0.1 * e) for e in (0.19, 0.21))
+    seen, unseen = Surprise(0.0009, "", 2.0, "P"), Surprise(0.0011, "", 2.0, "P")
+    assert graded(unseen, small).grade is Grade.ADEQUATE
+    assert graded(seen, small).grade is Grade.EFFECT_MISSING
+    assert graded(seen, large).grade is Grade.WRONG_MODEL
+    assert graded(seen, small, large).grade is Grade.WRONG_MODEL
+    assert graded(Surprise(None, "", None, ""), small).grade is Grade.EFFECT_MISSING
+    # where noise leaves as much, a held-out dip must be off by more than chance
+    assert graded(unseen, small, large).grade is Grade.ADEQUATE
+    assert graded(unseen, small, ModelError(0.3, (0.21, 0.4), 0.03)).grade is Grade.WRONG_MODEL
+
+
+def test_a_headline_tells_the_size_and_the_bounds_that_hold_a_parameter():
+    error = ModelError(0.0567, (0.05, 0.06), 0.0078)
+    told = graded(Surprise(0.0009, "", 2.0, "P of dip"), error, ModelError(0.074, (0.07, 0.08), 0.011), ["T_m at 1"])
+    assert told.sentence == (
+        "the model describes this load within 5.7 % of its response (0.78 % of S), the held-out dips within 7.4 % of"
+        " its response (1.1 % of S); an effect is missing, P of dip is 2 times as loud as the noise; a bound holds T_m at 1"
+    )
 
 
 def test_correlated_noise_of_p_and_q_is_seen_and_used():
@@ -208,7 +222,7 @@ def test_a_search_that_found_a_better_valley_leads_to_the_estimate(monkeypatch):
     problem = Problem(study.model(), [recorded(seed=77)])
     whole = polished(problem).known
 
-    def one_bad_start(likelihood):
+    def one_bad_start(likelihood, points):
         from tractexp.identification.descent import descend
 
         bad = likelihood.to_unit(TRUTH * np.array([1, 0.4, 0.45, 1, 1, 1, 0.5]))

@@ -202,7 +202,7 @@ def test_one_shallow_dip_leaves_c_weak_and_three_dips_identify_it(model):
     truth = study.TYPICAL
     one = checked(study.judged(Problem(model, records((0.15,), 0.01)), truth).known)
     three = checked(study.judged(Problem(model, records((0.15, 0.3, 0.5), 0.01)), truth).known)
-    assert one.verdicts["C"].word == WEAK
+    assert one.verdicts["C"].word == UNIDENTIFIED  # beyond a crest at 0.75 smaller values fit as well
     assert "trades against" in one.verdicts["C"].detail
     assert "q_v (correlation -0.9" in one.verdicts["C"].detail
     assert "open upwards" in one.verdicts["C"].detail

@@ -28,6 +28,7 @@ class SecondCage(Effect):
     cage_time = Parameter(0.01, (0.001, 0.05), "s", "subtransient time constant X''/X' T0''", SOURCE, "T''")
 
     places, kind = ("stator impedance", "load torque"), "lag"
+    rival = True
     order = -1
     phasors_only = "of waveforms take model/motor=double_cage, which has two cages and a stator flux"
     grid = {"cage_time": (0.003, 0.01, 0.03)}

@@ -20,6 +20,7 @@ class StatorResistance(Effect):
     R_s = Parameter(0.0, (-0.02, 0.2), "pu", "stator resistance on the record's base", SOURCE, null=0.0)
 
     places, kind = ("stator impedance",), "law"
+    rival = True
     relevant = {"R_s": 0.01}
     confused_with = ("feeder_impedance", "dc_link_lag", "time_skew")
 

@@ -41,6 +41,7 @@ class StatorTransients(Effect):
     offset_decay = Parameter(10.0, (0.0, 150.0), "1/s", "rate at which the offset of the flux decays", SOURCE, "r")
 
     places, kind = ("stator impedance",), "lag"
+    rival = True
     phasors_only = "of waveforms the stator flux of every motor moves already"
     grid = {"offset_decay": (3.0, 40.0)}
     relevant = {"stator_share": 0.1}

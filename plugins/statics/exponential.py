@@ -24,5 +24,7 @@ class Exponential(Static):
     p_v = Parameter(1.5, (0.0, 4.0), "1", "voltage exponent of active power", PAPER)
     q_v = Parameter(2.5, (0.0, 8.0), "1", "voltage exponent of reactive power", PAPER)
 
+    rival = True
+
     def law(self, u, p_v, q_v):
         return u**p_v, u**q_v

@@ -32,6 +32,8 @@ class Zip(Static):
     b_Z = Parameter(0.7, (0.0, 1.0), "1", "share of constant impedance in Q_s", SOURCE, "b_Z")
     b_I = Parameter(0.2, (0.0, 1.0), "1", "share of constant current in Q_s", SOURCE, "b_I")
 
+    rival = True
+
     def law(self, u, a_Z, a_I, b_Z, b_I):
         return a_Z * u**2 + a_I * u + 1 - a_Z - a_I, b_Z * u**2 + b_I * u + 1 - b_Z - b_I
 

@@ -23,6 +23,7 @@ from tractexp.wording import as_sentence
 if TYPE_CHECKING:
     from tractexp.identification.adequacy import Adequacy
     from tractexp.identification.estimate import Estimated
+    from tractexp.identification.model_error import ModelError
     from tractexp.identification.result import Fit
     from tractexp.identification.search import Found
     from tractexp.identification.together import Together
@@ -70,11 +71,8 @@ class Estimate:
     verdict: str
     bounds: tuple[float, float]
     about: str
-    trusted: bool = True  # whether the model describes the load, so that interval and verdict mean what they say
 
     def __repr__(self) -> str:
-        if not self.trusted:
-            return f"{self.name} = {self.value:.5g} {self.unit}: not sure, for the model does not describe this load"
         span = f", 95 % interval {self.interval[0]:.4g} .. {self.interval[1]:.4g}" if self.interval else ""
         return f"{self.name} = {self.value:.5g} {self.unit}{span}: {self.verdict}"
 
@@ -153,7 +151,6 @@ class Identification(Written):
             made[name] = Estimate(
                 name, value, search[name], r.units.get(of, ""), tuple(interval) if interval else None,  # type: ignore[arg-type]
                 r.standard_errors.get(name), verdict, bounds, about.get(of, ""),  # type: ignore[arg-type]
-                trusted=self.trusted or not self.grade,
             )  # fmt: skip
         return made
 
@@ -168,9 +165,28 @@ class Identification(Written):
         return self.result.adequacy.get("sentence", "")
 
     @property
-    def trusted(self) -> bool:
-        """Whether the model describes the load, so that intervals and verdicts mean what they say."""
+    def adequate(self) -> bool:
+        """Whether nothing but noise is left of the fitted dips."""
         return self.grade == "adequate"
+
+    @functools.cached_property
+    def model_error(self) -> "ModelError":
+        """What the model leaves of the response of the fitted dips."""
+        return self._error(self.result.model_error)
+
+    @functools.cached_property
+    def model_error_held_out(self) -> "ModelError | None":
+        """What it leaves of the held-out ones; None where there are none."""
+        held_out = self.result.model_error.get("held_out")
+        return held_out and self._error(held_out)
+
+    @staticmethod
+    def _error(content: Mapping[str, Any]) -> "ModelError":
+        from tractexp.identification.model_error import ModelError
+
+        if not content:
+            raise UserError("this result.json has no model_error: it is of an earlier version; identify again")
+        return ModelError.of(content)
 
     @functools.cached_property
     def advice(self) -> list[str]:
@@ -203,17 +219,28 @@ class Identification(Written):
         return Response("prediction", time, voltage, *self.result.predict(time, voltage, f, P0, Q0))
 
     def table(self) -> Table:
-        """Estimates; intervals only where the model describes the load, the search's end only where it lies outside."""
-        span, trusted = "{:.4g} .. {:.4g}".format, self.trusted
-        astray = self.astray
+        """Estimates with intervals and verdicts, the search's end only where it lies outside."""
+        span, astray = "{:.4g} .. {:.4g}".format, self.astray
         rows = [
             [e.name, e.value, e.unit]
-            + [span(*e.interval) if e.interval else "", e.verdict] * trusted
+            + [span(*e.interval) if e.interval else "", e.verdict]
             + [e.search if e.name in astray else ""] * bool(astray)
             for e in self.parameters.values()
         ]
-        columns = ["parameter", "value", "unit", *["95 % interval", "verdict"] * trusted, *["search"] * bool(astray)]
+        columns = ["parameter", "value", "unit", "95 % interval", "verdict", *["search"] * bool(astray)]
         return Table(columns, rows, self.model.model.title, self._said())
+
+    @property
+    def moves(self) -> dict[str, tuple[str, float]]:
+        """By parameter the rival structure that moves it farther than its interval, and the value there."""
+        far = {}
+        for rival in self.result.rival_structures:
+            for e in (self.parameters[name] for name in rival["parameters"]):
+                value, before = rival["parameters"][e.name], far.get(e.name, ("", e.value))[1]
+                outside = e.interval is None or not e.interval[0] <= value <= e.interval[1]
+                if outside and abs(value - e.value) > abs(before - e.value):
+                    far[e.name] = rival["name"], value
+        return far
 
     @property
     def astray(self) -> list[str]:
@@ -263,8 +290,8 @@ class Identification(Written):
 
         judged, about = self.judged, {p.name: p.about for p in self.model.model.parameters}
         made = identify.page(
-            self.result, judged.fits, judged.estimated, judged.known, judged.together, judged.adequacy, self.advice,
-            self.ended.history, about, self.search_told(), command(),
+            self.result, judged.fits, judged.estimated, judged.known, judged.together, judged.adequacy, self.moves,
+            self.advice, self.ended.history, about, self.search_told(), command(),
         )  # fmt: skip
         return made.write(path)
 
@@ -306,7 +333,8 @@ def identify(
     `objective` and `optimizer` are names, or mappings of `name` and settings: `{"name": "pso", "population": 100}`. A
     model, an objective or an optimizer left out is that of `conf/config.yaml`, as on the command line. The search ends
     after `budget` simulations, `time_limit` [s], at the objective `target` [pu²], or by itself. The same `seed` gives
-    the same bits. `check_intervals` confirms wide intervals by profile likelihood. `progress`: None shows how far the
+    the same bits. `check_intervals` confirms wide intervals by profile likelihood, and fits the structures that most
+    loads may have as well, to tell by how much they would move each parameter. `progress`: None shows how far the
     search is, False does not; a callable is told what is read and done, a sentence at a time.
 
     Raises `UserError` for wrong names or values, records that lack what the model reads, and where nothing tried can be
@@ -330,24 +358,25 @@ def _judge(setup: Asked, found: "Found") -> tuple[Result, Judged]:
     from tractexp.identification.adequacy import graded
     from tractexp.identification.estimate import estimate
     from tractexp.identification.profile import checked
-    from tractexp.identification.result import conclude, refuse_nothing_found
+    from tractexp.identification.result import active_bounds, conclude, errors_of, refuse_nothing_found
+    from tractexp.identification.rivals import with_rivals
     from tractexp.identification.together import compare_events
 
     problem = setup.problem
     refuse_nothing_found(problem, found)
     estimated = estimate(problem, found.values)
     known = estimated.known
-    if setup.check_intervals and estimated.surprise.adequate:
-        known = checked(known)
+    if setup.check_intervals:
+        known = with_rivals(checked(known))
     result, fits = conclude(
         problem, found, setup.validate, setup.seed, setup.model.node, setup.optimizer.name, known.values
     )
-    adequacy = graded(estimated.surprise, [(f"{c} of {e['name']}", e[f"epsilon_{c.lower()}"])
-                                           for e in result.events for c in "PQ"])  # fmt: skip
+    adequacy = graded(estimated.surprise, *errors_of(result), active_bounds(problem, known.values))
     together = compare_events(known) if len(problem.events) > 1 else None
     fields = known.fields()
     fields["uncertainty"] |= together.fields() if together else {"gains": {}, "odd_events": []}
     fields["uncertainty"]["notes"] += together.notes if together else []
     starts = [s.told(problem.space.names) for s in estimated.starts]
-    result = replace(result, **fields, adequacy=adequacy.told(), starts=starts)
+    structures = [rival.to_dict() for rival in known.rivals]
+    result = replace(result, **fields, adequacy=adequacy.told(), starts=starts, rival_structures=structures)
     return result, Judged(fits, estimated, known, together, adequacy)

@@ -73,8 +73,8 @@ class Sampled(Written):
         from tractexp.report import posterior
 
         fit = self.fit
-        known, told = fit.judged.known, (fit.headline, fit.trusted)
-        return {"posterior.html": lambda path: posterior.page(path, known, self.drawn, *told)}
+        known = fit.judged.known
+        return {"posterior.html": lambda path: posterior.page(path, known, self.drawn, fit.headline)}
 
 
 @public

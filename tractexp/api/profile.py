@@ -60,7 +60,7 @@ class Profiled(Written):
         ]
         fit = self.fit
         said = [as_sentence(fit.headline)] if fit.headline else []
-        said += [f"{name}: {p['verdict']}" for name, p in self.profiles.items()] if fit.trusted else []
+        said += [f"{name}: {p['verdict']}" for name, p in self.profiles.items()]
         return Table(["parameter", "most likely", "by curvature", "by profile"], rows, "95 % intervals", said)
 
     def to_dict(self) -> dict[str, Any]:
@@ -79,8 +79,7 @@ class Profiled(Written):
     def _drawings(self) -> Mapping[str, Drawing]:
         from tractexp.report import profile
 
-        told = self.fit.headline, self.fit.trusted
-        return {"profile.html": lambda path: profile.page(path, self.made, *told)}
+        return {"profile.html": lambda path: profile.page(path, self.made, self.fit.headline)}
 
 
 @public

@@ -9,11 +9,12 @@ from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.linear import two_sided
 from tractexp.discrepancy.pushes import push_points
 from tractexp.discrepancy.tangent import resting
+from tractexp.identification.model_error import ModelError, model_error
 from tractexp.identification.result import current_error, relative_error
 from tractexp.identification.seen import seen_by_estimator
 from tractexp.noise import Noise
 from tractexp.noise.span import spanned
-from tractexp.record import WaveEvent
+from tractexp.record import Event, WaveEvent
 
 SAME = 0.03  # singular values below this share of the largest: pushes that differ from others in noise only
 
@@ -23,7 +24,7 @@ class Curves:
     """What a model calculates of all events end to end, (C, N) [pu], and what is left against the measurement.
 
     Of waveforms P and Q are those that the record's estimator sees in calculated and in recorded currents, and
-    `epsilon_i` is what the currents miss; over several events it is the rms of theirs.
+    `epsilon_i` is what the currents miss; over several events it is the rms of theirs. `error` is the model's.
     """
 
     calculated: np.ndarray
@@ -31,6 +32,7 @@ class Curves:
     epsilon_q: float
     deviance: float
     chi2_per_sample: float
+    error: ModelError
     epsilon_i: float | None = None
 
 
@@ -71,12 +73,21 @@ def curves(bench: Bench, unit: np.ndarray, noise: Noise, names: Sequence[str] | 
     measured = bench.drive.measured
     calculated = residual[0] + measured
     deviance = float(np.nan_to_num(white @ white, nan=np.inf))
-    P, Q, i = _errors(bench, calculated)
-    return Curves(calculated, P, Q, deviance, deviance / max(bench.samples, 1), i)
+    P, Q, error, i = _errors(bench, calculated)
+    return Curves(calculated, P, Q, deviance, deviance / max(bench.samples, 1), error, i)
 
 
-def _errors(bench: Bench, calculated: np.ndarray) -> tuple[float, float, float | None]:
-    """epsilon_p, epsilon_q and, of waveforms, epsilon_i of what is calculated (C, N) [pu], as fractions."""
+@dataclass(frozen=True, eq=False)
+class _Played:
+    """An event, and P and Q (N,) [pu] calculated of it."""
+
+    event: Event
+    P: np.ndarray
+    Q: np.ndarray
+
+
+def _errors(bench: Bench, calculated: np.ndarray) -> tuple[float, float, ModelError, float | None]:
+    """epsilon_p, epsilon_q, the model's error and, of waveforms, epsilon_i of what is calculated (C, N) [pu]."""
     each = [
         (event, calculated[:, bench.drive.part(e)])
         for e, event in enumerate(bench.events)
@@ -85,12 +96,15 @@ def _errors(bench: Bench, calculated: np.ndarray) -> tuple[float, float, float |
     if not each:
         counted = np.where(bench.known, bench.drive.measured, np.nan)
         P, Q = (relative_error(counted[c], calculated[c]) for c in (0, 1))
-        return P, Q, None
+        parts = [calculated[:, bench.drive.part(e)] for e in range(bench.drive.events)]
+        played = [_Played(event, *part) for event, part in zip(bench.events, parts, strict=True)]
+        return P, Q, model_error(played), None
     seen = [seen_by_estimator(event, currents) for event, currents in each]
     measured = np.concatenate([np.stack([event.record.P, event.record.Q]) for event, _, _ in seen], axis=1)
     made = np.concatenate([np.stack(power) for _, *power in seen], axis=1)
     P, Q = (relative_error(measured[c], made[c]) for c in (0, 1))
-    return P, Q, float(np.sqrt(np.mean([current_error(*one) ** 2 for one in each])))
+    error = model_error([_Played(*one) for one in seen])
+    return P, Q, error, float(np.sqrt(np.mean([current_error(*one) ** 2 for one in each])))
 
 
 def gap(

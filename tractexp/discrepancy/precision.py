@@ -99,5 +99,5 @@ def _words(
     others = [i for i in range(len(columns)) if i not in own]
     lower, upper = (np.array([bound[at.column[n]] for n in names]) for bound in (at.lower, at.upper))
     information = Information.of(names, np.array(values), upper - lower, R[:, own], R[:, others])
-    judged = judge(information, lower, upper, WIDE * np.array(errors), WIDE)
+    judged = judge(information, lower, upper, WIDE * np.array(errors), np.full(len(errors), WIDE))
     return {name: str(verdict) for name, verdict in judged.items()}

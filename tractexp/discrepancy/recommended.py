@@ -8,7 +8,6 @@ from dataclasses import replace
 
 from tractexp.discrepancy.adequacy import channels_of
 from tractexp.discrepancy.disagreement import Disagreement
-from tractexp.discrepancy.gap import Gap
 from tractexp.discrepancy.investigate import Investigation
 from tractexp.discrepancy.verdict import NONE, TIED
 from tractexp.identification.adequacy import Adequacy, Surprise, graded, loudest_stretch
@@ -21,16 +20,11 @@ def adequacy(found: Investigation) -> Adequacy:
     ratio, where = loudest_stretch(channels_of(tests.projection, found.bench)[0], found.bench)
     p = 1.0 if found.verdict.word == NONE else tests.p_left  # no disagreement: by the same false-alarm rate
     surprise = Surprise(p, tests.loudest, ratio, where)
-    errors = [*_errors("the fitted events", found.train), *_errors("the held-out events", found.validate)]
-    grade = graded(surprise, errors, found.bench.criteria.adequate_p)
+    held_out = found.validate and found.validate.after.error
+    grade = graded(surprise, found.train.after.error, held_out, least_p=found.bench.criteria.adequate_p)
     if grade.good and found.verdict.word == TIED:
         return replace(grade, sentence="it describes these events with any of the sets named; which is missing is open")
     return grade
-
-
-def _errors(label: str, gap: Gap | None) -> list[tuple[str, float]]:
-    """Relative errors of Eq. (20) of the model that is recommended."""
-    return [] if gap is None else [(f"P of {label}", gap.after.epsilon_p), (f"Q of {label}", gap.after.epsilon_q)]
 
 
 def held(found: Investigation) -> dict[str, float]:

@@ -1,8 +1,11 @@
 """Does the model describe the load? What an estimate leaves, against what noise alone leaves, and the grade for it.
 
 Draws of the estimated noise go through the same whitening and projection as the residual; windows, steps, pulses,
-oscillations and, of several events, parameters of their own tell how much louder the residual is. A model is
-*adequate* where chance may leave as much; where it may not, an effect is missing, or the model is the wrong one.
+oscillations and, of several events, parameters of their own tell how much louder the residual is. Under a right model
+least squares and the likelihood agree, too: a last test asks whether the likelihood gives up more of Eq. (8) than it
+would on the draws (Hausman 1978), which it does where it takes a model's error for slow noise. A model is
+*adequate* where chance may leave as much. Where it may not, the size of the model's error grades it: an effect is
+missing, or the model is the wrong one.
 """
 
 from collections.abc import Sequence
@@ -14,10 +17,10 @@ import numpy as np
 
 from tractexp.identification import surprises
 from tractexp.identification.likelihood import Likelihood
+from tractexp.identification.model_error import ModelError
 from tractexp.identification.observed import Observed
 from tractexp.identification.surprises import SMALLEST_P, Layout, tail
 from tractexp.noise.span import spanned
-from tractexp.wording import in_words
 
 DRAWS = 199
 # p of what a fit leaves, below which it leaves something. Chosen on the calibration series of benchmarks/adequacy.py:
@@ -27,7 +30,9 @@ DISTINCT = 1e-3  # of the largest: weaker directions are rounding
 WALL = 1e-3  # of a range: what rests on a bound takes nothing from the residual
 SEED = 20201  # of the draws: the judgement of one record is always the same
 ACCEPTED = 0.05  # Eq. (20): a load model is acceptable below 5 %
+WRONG = 0.2  # of the response: a model that leaves a fifth of it does not describe the load. A word for a size.
 PER_EVENT = "parameters of each event"
+APART = "least squares apart from the likelihood"
 
 
 class Grade(StrEnum):
@@ -42,7 +47,8 @@ class Grade(StrEnum):
 class Surprise:
     """How often noise alone leaves as much as the estimate does: `p` by the most surprised test, corrected for all.
 
-    `ratio` is the loudest stretch of the whitened residual over what noise leaves there. None: not judged.
+    `ratio` is the loudest stretch of the whitened residual over what noise leaves there. None: not judged, for too few
+    samples are quiet.
     """
 
     p: float | None
@@ -52,7 +58,8 @@ class Surprise:
 
     @property
     def adequate(self) -> bool:
-        return self.p is None or self.p >= ADEQUATE_P
+        """Whether nothing but noise is left, as far as that can be told."""
+        return self.p is not None and self.p >= ADEQUATE_P
 
 
 @dataclass(frozen=True)
@@ -72,8 +79,14 @@ class Adequacy:
         return {"grade": str(self.grade), "sentence": self.sentence, "p": self.p}
 
 
-def surprise(observed: Observed, likelihood: Likelihood, unit: np.ndarray, seed: int = SEED) -> Surprise:
-    """How surprising what the fit at coordinates (D,) leaves is; not judged where there is too little quiet."""
+def surprise(
+    observed: Observed, likelihood: Likelihood, unit: np.ndarray, squares: Likelihood | None = None,
+    least: float = np.inf, seed: int = SEED,
+) -> Surprise:  # fmt: skip
+    """How surprising what the fit at coordinates (D,) leaves is; not judged where there is too little quiet.
+
+    `least` is the least sum of squares, over those of `squares`, Eq. (8).
+    """
     if likelihood.noise.mix is None or not observed.quiet:
         return Surprise(None, "", None, "")
     rows, J = likelihood.jacobian(unit)
@@ -82,7 +95,8 @@ def surprise(observed: Observed, likelihood: Likelihood, unit: np.ndarray, seed:
     J = J[:, inside]
     rng = np.random.default_rng(seed)
     drawn = likelihood.noise.draw(rng, DRAWS, np.diff(observed.drive.first).tolist()) * likelihood.known
-    white = likelihood.whiten(drawn) / _level(likelihood, observed, rng)[:, None]
+    drawn /= _level(likelihood, observed, rng)[:, None, None]
+    white = likelihood.whiten(drawn)
     Q, _ = np.linalg.qr(J)
     rest = np.concatenate([rows[None], white])
     rest -= (rest @ Q) @ Q.T
@@ -90,10 +104,42 @@ def surprise(observed: Observed, likelihood: Likelihood, unit: np.ndarray, seed:
     by_test = surprises.statistics(channels, observed)
     if observed.drive.events > 1:
         by_test[PER_EVENT] = ((rest @ _of_each_event(likelihood, J[:, : len(steady)][:, steady], Q).T) ** 2).sum(axis=1)
+    if squares is not None:
+        by_test[APART] = given_up(squares, unit, least, J, white, drawn)
     left = {name: tail(values[1:], values[:1]) for name, values in by_test.items()}
     loudest = min(left, key=left.__getitem__)
     ratio, where = loudest_stretch(channels[0], observed)
     return Surprise(min(1.0, max(len(left) * left[loudest], SMALLEST_P)), loudest, ratio, where)
+
+
+def given_up(
+    squares: Likelihood, unit: np.ndarray, least: float, J: np.ndarray, white: np.ndarray, drawn: np.ndarray
+) -> np.ndarray:
+    """What the likelihood leaves of Eq. (8) over what least squares leave: of the records, then of each draw, (1 + b,).
+
+    `J` (R, d) are the whitened sensitivities to the coordinates inside, `white` (b, R) and `drawn` (b, C, N) the draws.
+    """
+    plain, free = squares.with_initial_power, squares.free
+    rows, columns = plain.jacobian(unit)
+    raw = plain.whiten(drawn)
+    inside = (unit > WALL) & (unit < 1 - WALL)
+    likely = raw - np.linalg.lstsq(J, white.T, rcond=None)[0].T @ columns[:, inside].T
+    known = raw + _means(plain, drawn) @ columns[:, free:].T
+    Q, _ = np.linalg.qr(columns[:, :free][:, inside[:free]])
+    rest = known - (known @ Q) @ Q.T
+    ratio = (likely**2).sum(axis=1) / np.maximum((rest**2).sum(axis=1), 1e-300)
+    return np.concatenate([[rows @ rows / max(least, 1e-300)], ratio])
+
+
+def _means(plain: Likelihood, drawn: np.ndarray) -> np.ndarray:
+    """By how much draws (b, C, N) would have P0 and Q0 of each event wrong, (b, 2 E), in ranges, for Eq. (8)."""
+    problem = plain.problem
+    wrong = np.zeros((len(drawn), problem.drive.events, 2))
+    if problem.drive.channels == 2:
+        for e, event in enumerate(problem.events):
+            first = int(problem.drive.first[e])
+            wrong[:, e] = drawn[:, :, first + event.steady.start : first + event.steady.stop].mean(axis=2)
+    return -wrong.reshape(len(drawn), -1) / plain.width[plain.free :]
 
 
 def _level(likelihood: Likelihood, observed: Observed, rng: np.random.Generator) -> np.ndarray:
@@ -131,33 +177,29 @@ def loudest_stretch(channels: np.ndarray, layout: Layout) -> tuple[float, str]:
     return level[k], f"{cell.channel} of {name} from {cell.start:.3f} to {cell.end:.3f} s"
 
 
-def graded(surprise: Surprise, errors: Sequence[tuple[str, float]], least_p: float = ADEQUATE_P) -> Adequacy:
-    """The grade of an estimate that leaves this, with relative errors [(event and channel, epsilon of Eq. (20))].
+def graded(
+    surprise: Surprise, fitted: ModelError, held_out: ModelError | None = None, active_bounds: Sequence[str] = (),
+    least_p: float = ADEQUATE_P,
+) -> Adequacy:  # fmt: skip
+    """The grade of an estimate that leaves this of the fitted and of held-out events.
 
-    What is left is nothing but noise from p = `least_p` on.
+    What is left is nothing but noise from p = `least_p` on. `active_bounds` say which bounds hold a parameter.
     """
+    errors = [fitted, *([held_out] if held_out else [])]
+    noise = surprise.p is not None and surprise.p >= least_p
+    sure = max(e.interval[0] if noise else e.value for e in errors)
+    held = "".join(f"; a bound holds {told}" for told in active_bounds)
+    if sure >= WRONG:
+        size = f"it leaves {fitted}" + (f", and of the held-out dips {held_out}" if held_out else "")
+        return Adequacy(Grade.WRONG_MODEL, f"this model does not describe this load: {size}{held}", surprise.p)
+    size = f"within {fitted}" + (f", the held-out dips within {held_out}" if held_out else "")
+    said = f"the model describes this load {size}"
+    if noise:
+        return Adequacy(Grade.ADEQUATE, f"{said}: noise alone leaves as much{held}", surprise.p)
     if surprise.p is None:
-        where, worst = max(errors, key=lambda e: e[1])
-        if worst >= ACCEPTED:
-            return Adequacy(Grade.WRONG_MODEL, _wrong(where, worst), None)
-        return Adequacy(
-            Grade.EFFECT_MISSING,
-            f"it fits within {worst:.1%}, but too few samples before and after the dips are quiet to tell whether an"
-            " effect is missing: do not rely on its intervals", None,
-        )  # fmt: skip
-    if surprise.p >= least_p:
-        return Adequacy(Grade.ADEQUATE, "the model describes this load: use it", surprise.p)
-    where, worst = max(errors, key=lambda e: e[1])
-    if worst >= ACCEPTED:
-        return Adequacy(Grade.WRONG_MODEL, _wrong(where, worst), surprise.p)
-    return Adequacy(
-        Grade.EFFECT_MISSING,
-        f"it fits within {worst:.1%}, but an effect is missing: do not use its intervals ({surprise.where} is"
-        f" {surprise.ratio:.2g} times as loud as the noise; p of what is left by chance: {in_words(surprise.p)})",
-        surprise.p,
-    )
-
-
-def _wrong(where: str, worst: float) -> str:
-    off = f"{where} is off by {worst:.1%}, beyond the {ACCEPTED:.0%} of Eq. (20)"
-    return f"this model does not describe this load: {off}"
+        why = "too few samples before and after the dips are quiet to tell whether an effect is missing"
+    else:
+        why = "an effect is missing"
+        if surprise.ratio is not None and surprise.loudest != APART:
+            why += f", {surprise.where} is {surprise.ratio:.2g} times as loud as the noise"
+    return Adequacy(Grade.EFFECT_MISSING, f"{said}; {why}{held}", surprise.p)

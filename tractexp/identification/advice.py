@@ -28,7 +28,7 @@ def advise(known: Uncertainty, adequacy: Adequacy, odd: Sequence[str] = (), data
         missing = f"find what is missing: {search}; or choose another model: tractexp list model"
         return [*better, missing, *said]
     if adequacy.grade is Grade.EFFECT_MISSING:
-        return [*better, f"find the missing effect: {search}", *said]
+        said.insert(0, f"find the missing effect: {search}")
     said += [
         f"widen model.bounds.{name}, or ask whether the model is the right one"
         for name, verdict in known.verdicts.items()
@@ -41,7 +41,13 @@ def advise(known: Uncertainty, adequacy: Adequacy, odd: Sequence[str] = (), data
         else:
             said.append(f"fix {tied[0]} by model.fixed: the record does not change with it")
     said += _deeper(known)
-    return [*said, *better] if said else ["nothing: every parameter is identified"]
+    return (
+        [*better, *said]
+        if adequacy.grade is Grade.EFFECT_MISSING
+        else [*said, *better]
+        if said
+        else ["nothing: every parameter is identified"]
+    )
 
 
 def waves_better(problem: Problem) -> list[str]:

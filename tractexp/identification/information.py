@@ -13,13 +13,15 @@ SHARE = 0.02  # of a direction's largest component: smaller ones do not take par
 class Information:
     """The whitened sensitivities `J` (R, d) to the free parameters, in ranges, nuisances projected out.
 
-    `values` and `width` (d,) turn ranges into physical and relative changes.
+    `values` and `width` (d,) turn ranges into physical and relative changes. Directions whose singular value is below
+    `structural` times the largest change nothing.
     """
 
     names: tuple[str, ...]
     values: np.ndarray
     width: np.ndarray
     J: np.ndarray
+    structural: float = STRUCTURAL
 
     @classmethod
     def of(
@@ -39,7 +41,7 @@ class Information:
         size = np.linalg.norm(self.J, axis=0)
         scale = np.where(size > 0, size, 1.0)
         _, singular, directions = np.linalg.svd(self.J / scale, full_matrices=False)
-        seen = singular > STRUCTURAL * singular.max(initial=0.0)
+        seen = singular > self.structural * singular.max(initial=0.0)
         object.__setattr__(self, "_directions", directions / scale)
         object.__setattr__(self, "_singular", singular)
         object.__setattr__(self, "_seen", seen & (singular > 0))

@@ -1,11 +1,12 @@
-"""How likely the records are under a model: residuals whitened by the noise, the power before each event left free.
+"""Whitened residuals of a problem: those of Eq. (8), and those of the likelihood of the noise.
 
-Eq. (8) holds P0 and Q0 at the means before the dip, which are themselves uncertain, and counts every sample alike.
-The likelihood does neither: its least squares are the most precise estimate there is, and its curvature says how
-precise. Coordinates are the free parameters followed by P0 and Q0 of each event, in the unit cube.
+Eq. (8) counts every sample alike and holds P0 and Q0 at the means before the dip. Nothing has to be known of the noise
+for that, and a model's own error cannot ruin it. The likelihood whitens by the noise and leaves P0 and Q0 free: where
+nothing but noise is left its least squares are the most precise estimate there is. Coordinates are the free parameters
+followed, in the likelihood, by P0 and Q0 of each event, in the unit cube.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,11 +33,15 @@ def before_the_event(event: Event) -> Pair:
 
 @dataclass(frozen=True, eq=False)
 class Likelihood:
-    """Whitened residuals of a problem. `known` (2, N) marks the samples of P and Q that count."""
+    """Whitened residuals of a problem. `known` (2, N) marks the samples of P and Q that count.
+
+    With `initial_power` P0 and Q0 of each event are coordinates beside the parameters; else they are the means before.
+    """
 
     problem: Problem
     noise: Noise
     known: np.ndarray
+    initial_power: bool = True
 
     @classmethod
     def of(cls, problem: Problem, noise: Noise | None = None) -> "Likelihood":
@@ -44,9 +49,25 @@ class Likelihood:
         found = noise or Noise(tuple(before_the_event(e) for e in problem.events))
         return cls(problem, found, problem.drive.weights > 0)
 
+    @classmethod
+    def of_squares(cls, problem: Problem, deviation: float) -> "Likelihood":
+        """Eq. (8), with the weights of the problem's objective, over `deviation`² [pu²]: all samples count alike."""
+        weights = problem.drive.weights.max(axis=1)
+        white = Noise.white(*(deviation / np.sqrt(np.where(weights > 0, weights, 1.0))).tolist())
+        return cls(problem, white, problem.drive.weights > 0, initial_power=False)
+
+    @property
+    def with_initial_power(self) -> "Likelihood":
+        """The same with P0 and Q0 of each event free."""
+        return replace(self, initial_power=True)
+
+    def scaled(self, factor: float) -> "Likelihood":
+        """The same with noise `factor` times as loud."""
+        return replace(self, noise=self.noise.scaled(factor))
+
     @property
     def free(self) -> int:
-        """Number of free parameters; 2 coordinates per event follow."""
+        """Number of free parameters."""
         return self.problem.space.dimension
 
     @property
@@ -56,12 +77,13 @@ class Likelihood:
 
     @property
     def lower(self) -> np.ndarray:
-        return np.concatenate((self.problem.lower, (self.problem.drive.before - self._reach()).ravel()))
+        before = (self.problem.drive.before - self._reach()).ravel() if self.initial_power else []
+        return np.concatenate((self.problem.lower, before))
 
     @property
     def width(self) -> np.ndarray:
         """Range of each coordinate, (D,)."""
-        reach = np.repeat(2 * self._reach(), 2, axis=1).ravel()
+        reach = np.repeat(2 * self._reach(), 2, axis=1).ravel() if self.initial_power else []
         return np.concatenate((self.problem.upper - self.problem.lower, reach))
 
     def _reach(self) -> np.ndarray:
@@ -69,9 +91,15 @@ class Likelihood:
 
     def to_unit(self, values: np.ndarray) -> np.ndarray:
         """Free values (n, free), at the measured power before each event, as coordinates (n, D)."""
-        values = np.atleast_2d(values)
-        before = np.full((len(values), 2 * self.problem.drive.events), 0.5)
-        return np.concatenate((self.problem.space.to_unit(values), before), axis=1)
+        return self.placed(self.problem.space.to_unit(np.atleast_2d(values)))
+
+    def placed(self, unit: np.ndarray) -> np.ndarray:
+        """Parameters (n, free or more) in the unit cube as coordinates (n, D), at the measured power before each event.
+
+        Whatever power the given ones have is left out.
+        """
+        before = np.full((len(unit), 2 * self.problem.drive.events * self.initial_power), 0.5)
+        return np.concatenate((unit[:, : self.free], before), axis=1)
 
     def values(self, unit: np.ndarray) -> np.ndarray:
         """Free values (..., free) of coordinates (..., D)."""
@@ -80,10 +108,10 @@ class Likelihood:
     def residuals(self, unit: np.ndarray) -> np.ndarray:
         """Calculated minus measured (n, 2, N) [pu] at coordinates (n, D): 0 in gaps, nan where not simulated."""
         problem, drive = self.problem, self.problem.drive
-        before = (self.lower + self.width * unit)[:, self.free :].reshape(len(unit), drive.events, 2)
-        response = problem.model.simulate(
-            drive, problem.candidates(self.values(unit)), problem.step.substeps, np.swapaxes(before, 0, 1)
-        )
+        before = None
+        if self.initial_power:
+            before = (self.lower + self.width * unit)[:, self.free :].reshape(len(unit), drive.events, 2).swapaxes(0, 1)
+        response = problem.model.simulate(drive, problem.candidates(self.values(unit)), problem.step.substeps, before)
         rows = response.by_candidate - drive.measured
         with np.errstate(invalid="ignore"):  # what diverged is no number in gaps either
             rows *= self.known
@@ -118,6 +146,8 @@ class Likelihood:
     def apart(self) -> list[Apart]:
         """P0 and Q0 act on the rows of their own event only: one simulation has the differences of all events."""
         events = self.problem.drive.events
+        if not self.initial_power:
+            return []
         rows = np.array([self.part_of(e) for e in range(events)])
         return [Apart(self.free + np.arange(events) * 2 + c, rows) for c in (0, 1)]
 

@@ -15,9 +15,9 @@ from tractexp.identification.problem import Problem, excitation, excited
 from tractexp.model.drive import Drive
 from tractexp.noise.color import SMALLEST
 from tractexp.noise.model import Noise
-from tractexp.noise.quiet import estimate, quiet_stretches
+from tractexp.noise.quiet import estimate, louder, quiet_stretches
 from tractexp.noise.voltage import Smoothed, smoothed
-from tractexp.noise.wander import LESS, WITHIN, Load, Rest, Wander, find
+from tractexp.noise.wander import LESS, WITHIN, Load, Rest, Wander, find, without_slow
 from tractexp.noise.waves import of_waves
 from tractexp.record import Event, WaveEvent
 
@@ -85,7 +85,7 @@ class Observed:
         apart = np.linalg.qr(columns.reshape(len(columns), -1)[np.any(columns != 0, axis=(1, 2))].T)[0]
         kept = np.maximum(1 - (apart**2).sum(axis=1), LEAST_KEPT).reshape(residuals.shape)  # the fit took the rest
         first = self.events[0]
-        where = [self.drive.part(e) for e in range(self.drive.events)] if whole else self.quiet
+        where = [self.drive.part(e) for e in range(self.drive.events)] if whole else self._noisy(residuals, known)
         try:
             if answers is not None and isinstance(first, WaveEvent):
                 return of_waves(residuals / np.sqrt(kept), known, where, answers, first.phases, blur)
@@ -93,6 +93,25 @@ class Observed:
             return estimate(residuals / np.sqrt(kept), known, where, wander, blur)
         except UserError:
             return None
+
+    def _noisy(self, residuals: np.ndarray, known: np.ndarray) -> list[slice]:
+        """The quiet stretches whose residual (C, N) is noise: those after a dip only where no louder than before it.
+
+        Where a record has less noise than the model has error, what is left at its end is the model's.
+        """
+        before = [part for part, calm in self._stretches if calm]
+        after = [part for part, calm in self._stretches if not calm]
+        for c in np.flatnonzero(known.any(axis=1)):
+            calm, late = ([without_slow(residuals[c, p][known[c, p]]) for p in parts] for parts in (before, after))
+            if louder(late, calm):
+                return before
+        return self.quiet
+
+    @functools.cached_property
+    def _stretches(self) -> list[tuple[slice, bool]]:
+        """The quiet stretches, and whether each lies before its dip."""
+        starts = [int(self.drive.first[e]) + event.start for e, event in enumerate(self.events)]
+        return [(part, part.stop in starts) for part in self.quiet]
 
     def _wander(self, left: np.ndarray, columns: np.ndarray, known: np.ndarray, mix: np.ndarray) -> Wander | None:
         """How the load wanders before the events and during them, in mixed channels."""

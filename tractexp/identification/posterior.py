@@ -67,6 +67,6 @@ def sample(known: Uncertainty, walkers: int, steps: int, seed: int) -> Posterior
 
 def _spread(known: Uncertainty) -> np.ndarray:
     """Standard deviation of the start (D,), in ranges: that of the information matrix, at most a tenth."""
-    wide = known.half / known.factor / (known.upper - known.lower)
+    wide = known.information.standard_errors / (known.upper - known.lower)
     rest = np.full(len(known.unit) - len(wide), 1e-3)
     return np.concatenate((np.clip(wide, 1e-6, 0.1), rest))

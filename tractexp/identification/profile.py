@@ -2,7 +2,11 @@
 
 Where the likelihood is no parabola, the interval of the information matrix misleads; the profile does not. All
 profiles advance in lockstep, two lanes (down and up) for each parameter, so that one simulation call carries a
-step of every one of them.
+step of every one of them. A lane ends where the deviance has risen too far, though beyond a crest it may fall again:
+so the rest of each range is looked at, too, from every valley, and lanes go on from where the records fit as well.
+
+Deviances are told over what a parameter's may rise by, in units of the chi-squared quantile: under least squares, that
+of another scatter (`Uncertainty.limits`), one threshold holds for all. Source: Chandler and Bate 2007.
 """
 
 from collections.abc import Sequence
@@ -12,7 +16,7 @@ from enum import StrEnum
 import numpy as np
 
 from tractexp.identification.descent import descend
-from tractexp.identification.uncertainty import Uncertainty, conclude, threshold
+from tractexp.identification.uncertainty import Uncertainty, threshold
 from tractexp.identification.verdict import BOUND, IDENTIFIED, UNIDENTIFIED, WEAK, WITHIN, Verdict, size
 
 BEYOND = 1.6  # of the threshold: a lane ends when its deviance has risen so far
@@ -24,6 +28,8 @@ BETTER = 0.05  # fall of the deviance that makes a point a better optimum
 RISE = 0.5  # of the deviance between two minima, for them to count as two
 RESTARTS = 5
 DOUBTFUL = 0.05  # of the value: wider half intervals are checked by a profile
+GRID = np.linspace(0.02, 0.98, 13)  # of the range, at which the rest of it is looked at
+SEEN = 0.04  # of the range: places closer than this to an interval are part of it
 
 
 class End(StrEnum):
@@ -79,11 +85,18 @@ class Profiles:
         """The verdicts of the information matrix, corrected by what the profiles show."""
         known = self.known
         bounds = dict(zip(known.names, zip(known.lower, known.upper, strict=True), strict=True))
-        return known.verdicts | {p.name: revised(known.verdicts[p.name], p, *bounds[p.name]) for p in self.profiles}
+        other = dict(zip(known.names, known.elsewhere, strict=True))
+        return known.verdicts | {
+            p.name: revised(known.verdicts[p.name], p, *bounds[p.name], elsewhere=bool(other[p.name]))
+            for p in self.profiles
+        }
 
 
-def revised(verdict: Verdict, profile: Profile, low: float, high: float) -> Verdict:
-    """A verdict in the light of a profile: its width decides; an open side or a second minimum is a weakness."""
+def revised(verdict: Verdict, profile: Profile, low: float, high: float, elsewhere: bool = False) -> Verdict:
+    """A verdict in the light of a profile: its width decides; an open side or a second minimum is a weakness.
+
+    So is another valley, `elsewhere`.
+    """
     a, b = profile.interval
     detail = "; ".join([f"profile {a:.4g} .. {b:.4g}", *([profile.verdict] if profile.verdict else [])])
     if verdict.word == UNIDENTIFIED and "leave the record unchanged" in verdict.detail:
@@ -94,7 +107,7 @@ def revised(verdict: Verdict, profile: Profile, low: float, high: float) -> Verd
         word = UNIDENTIFIED
     elif verdict.word == BOUND:
         word = BOUND
-    elif any(opened) or profile.minima or (b - a) / 2 > WITHIN * size(value, low, high):
+    elif any(opened) or profile.minima or elsewhere or (b - a) / 2 > WITHIN * size(value, low, high):
         word = WEAK
     else:
         word = IDENTIFIED
@@ -104,12 +117,13 @@ def revised(verdict: Verdict, profile: Profile, low: float, high: float) -> Verd
 def checked(known: Uncertainty) -> Uncertainty:
     """The judgement with profiles in place of curvature wherever the curvature may mislead.
 
-    That is for intervals wider than `DOUBTFUL` of the value; a narrow one is a parabola anyway. Parameters that
-    are not identifiable by structure have no profile.
+    That is for intervals wider than `DOUBTFUL` of the value, and for parameters that have another value in another
+    valley; a narrow one is a parabola anyway. Parameters that are not identifiable by structure have no profile.
     """
     bounds = zip(known.lower, known.upper, strict=True)
     sizes = np.array([size(v, *pair) for v, pair in zip(known.values, bounds, strict=True)])
     doubtful = known.information.identifiable & (known.half > DOUBTFUL * sizes)
+    doubtful |= known.information.identifiable & known.elsewhere
     if not doubtful.any():
         return known
     made = profiles(known, names=[n for n, d in zip(known.names, doubtful, strict=True) if d])
@@ -126,42 +140,103 @@ def profiles(known: Uncertainty, points: int = 24, names: Sequence[str] | None =
 
     Where a point fits better than the optimum did, everything starts again from there.
     """
-    simulations, restarts, limit = 0, 0, threshold()
+    simulations, restarts, names = 0, 0, names or known.names
     while True:
-        lanes = _Lanes(known, limit, names or known.names)
-        for _ in range(points):
-            if not lanes.advance():
-                break
-            if lanes.better is not None:
-                break
-        simulations += lanes.simulations
-        if lanes.better is None or restarts == RESTARTS:
-            break
-        found = descend(known.likelihood.rows, lanes.better[None])
+        column = np.array([known.names.index(name) for name in names])
+        lanes = _Lanes(known, column, np.tile(known.unit, (len(names), 1)), np.zeros(len(names)))
+        simulations += lanes.run(points)
+        made = [lanes.profile(k) for k in range(len(names))]
+        better = lanes.better
+        if better is None:
+            places, spent = _elsewhere(known, column, made)
+            further = _Lanes(known, places.column, places.unit, places.rise)
+            simulations += spent + further.run(points)
+            better = further.better
+            made = [_joined(p, [further.profile(int(k)) for k in np.flatnonzero(places.column == c)])
+                    for p, c in zip(made, column, strict=True)]  # fmt: skip
+        if better is None or restarts == RESTARTS:
+            return Profiles(known, tuple(made), threshold(), simulations, restarts)
+        found = descend(known.likelihood.rows, better[None], apart=known.likelihood.apart)
         simulations += found.simulations
-        known = conclude(known.likelihood, found.unit[0], known.notes)
+        known = known.at(found.unit[0])
         restarts += 1
-    made = tuple(lanes.profile(k) for k in range(len(names or known.names)))
-    return Profiles(known, made, limit, simulations, restarts)
+
+
+@dataclass(frozen=True, eq=False)
+class _Places:
+    """Where lanes begin: the parameter's column (k,), coordinates (k, D) and how far the deviance is up there (k,)."""
+
+    column: np.ndarray
+    unit: np.ndarray
+    rise: np.ndarray
+
+
+def _elsewhere(known: Uncertainty, column: np.ndarray, made: Sequence[Profile]) -> tuple[_Places, int]:
+    """The best place of each range beyond the profile's interval that fits as well, and the simulations spent."""
+    begin = np.array([known.unit, *(valley.unit for valley in known.valleys)])
+    width = known.upper - known.lower
+    wanted = []  # (column, value in the range)
+    for c, profile in zip(column, made, strict=True):
+        low, high = (np.array(profile.interval) - known.lower[c]) / width[c]
+        values = np.concatenate([GRID, begin[1:, c]])
+        wanted += [(c, v) for v in values[(values < low - SEEN) | (values > high + SEEN)]]
+    if not wanted:
+        return _Places(np.empty(0, dtype=int), np.empty((0, len(known.unit))), np.empty(0)), 0
+    columns = np.repeat([c for c, _ in wanted], len(begin))
+    start = np.tile(begin, (len(wanted), 1))
+    rows = np.arange(len(start))
+    start[rows, columns] = np.repeat([v for _, v in wanted], len(begin))
+    frozen = np.zeros(start.shape, dtype=bool)
+    frozen[rows, columns] = True
+    found = descend(known.likelihood.rows, start, frozen, tolerance=0.05, apart=known.likelihood.apart)
+    rise = (found.deviance - known.deviance) * threshold() / known.limits[columns]
+    best = [rows[columns == c][rise[columns == c].argmin()] for c in np.unique(columns)]
+    best = np.array([k for k in best if rise[k] < threshold()], dtype=int)
+    return _Places(columns[best], found.unit[best], rise[best]), found.simulations
+
+
+def _joined(profile: Profile, others: Sequence[Profile]) -> Profile:
+    """A profile with what was found beyond a crest: its interval reaches over both."""
+    for other in others:
+        every = sorted((profile, other), key=lambda p: p.interval)
+        values = np.concatenate([profile.values, other.values])
+        order = np.argsort(values, kind="stable")
+        profile = replace(
+            profile,
+            values=values[order],
+            deviance=np.concatenate([profile.deviance, other.deviance])[order],
+            interval=(every[0].interval[0], max(p.interval[1] for p in every)),
+            ends=(every[0].ends[0], max(every, key=lambda p: p.interval[1]).ends[1]),
+            minima=(*profile.minima, float(other.values[other.deviance.argmin()])),
+        )
+    return profile
 
 
 class _Lanes:
-    """The state of all lanes: lane 2 k goes down, lane 2 k + 1 up from the optimum of the k-th parameter profiled."""
+    """The state of all lanes: lane 2 k goes down, lane 2 k + 1 up from the k-th place, in its parameter."""
 
-    def __init__(self, known: Uncertainty, limit: float, names: Sequence[str]):
-        self.known, self.limit = known, limit
-        d = len(names)
-        self.column = np.repeat([known.names.index(name) for name in names], 2)
-        self.sign = np.tile([-1.0, 1.0], d)
-        self.unit = np.tile(known.unit, (2 * d, 1))
+    def __init__(self, known: Uncertainty, column: np.ndarray, unit: np.ndarray, rise: np.ndarray):
+        """From coordinates `unit` (k, D), where the deviance is up by `rise` (k,)."""
+        self.known, self.limit = known, threshold()
+        self.origin, self.risen = unit, rise
+        self.column, self.unit = np.repeat(column, 2), np.repeat(unit, 2, axis=0)
+        self.sign = np.tile([-1.0, 1.0], len(column))
+        self.scale = self.limit / known.limits[self.column]
         self.slope = np.zeros_like(self.unit)  # how the others move with the profiled one
-        errors = known.half / known.factor / (known.upper - known.lower)
+        errors = known.information.standard_errors / (known.upper - known.lower)
         self.step = np.clip(STEP * errors, SMALLEST_STEP, LARGEST_STEP)[self.column]
-        self.rise = np.zeros(2 * d)
-        self.open = np.ones(2 * d, dtype=bool)
-        self.path: list[list[tuple[float, float]]] = [[] for _ in range(2 * d)]
+        self.rise = np.repeat(rise, 2)
+        self.open = np.ones(len(self.column), dtype=bool)
+        self.path: list[list[tuple[float, float]]] = [[] for _ in self.column]
         self.better: np.ndarray | None = None
         self.simulations = 0
+
+    def run(self, points: int) -> int:
+        """At most so many points on every lane, until one is better than the optimum; the simulations spent."""
+        for _ in range(points):
+            if not self.advance() or self.better is not None:
+                break
+        return self.simulations
 
     def advance(self) -> bool:
         """One more point on every open lane; False when there is none left."""
@@ -176,9 +251,9 @@ class _Lanes:
         start[pick, column] = target
         frozen = np.zeros(start.shape, dtype=bool)
         frozen[pick, column] = True
-        found = descend(self.known.likelihood.rows, start, frozen, tolerance=0.01)
+        found = descend(self.known.likelihood.rows, start, frozen, tolerance=0.01, apart=self.known.likelihood.apart)
         self.simulations += found.simulations
-        rise = found.deviance - self.known.deviance
+        rise = (found.deviance - self.known.deviance) * self.scale[lanes]
         moved = target - here
         if (over := self._overshoots(rise, lanes) & (np.abs(moved) > 2 * SMALLEST_STEP)).any():
             self.step[lanes[over]] = np.abs(moved[over]) / 3
@@ -215,7 +290,7 @@ class _Lanes:
         """The profile of the k-th parameter, from its two lanes."""
         sides, ends, limits = [], [], []
         j = int(self.column[2 * k])
-        optimum = (float(self.known.unit[j]), 0.0)
+        optimum = (float(self.origin[k, j]), float(self.risen[k]))
         for lane in (2 * k, 2 * k + 1):
             path = np.array([optimum, *self.path[lane]])
             limit, end = self._crossing(path, lane)

@@ -11,6 +11,7 @@ import numpy as np
 from tractexp import files, provenance
 from tractexp.errors import UserError
 from tractexp.identification.adequacy import ACCEPTED
+from tractexp.identification.model_error import ModelError, in_percent, model_error
 from tractexp.identification.periodic import unsettled
 from tractexp.identification.play import play
 from tractexp.identification.problem import Problem, excited
@@ -19,9 +20,11 @@ from tractexp.identification.seen import seen_by_estimator
 from tractexp.model.drive import PHASORS, Drive
 from tractexp.model.model import CLASSICAL, Model, compose
 from tractexp.plugin import build
-from tractexp.record import Event, WaveEvent, find_dips, in_waves
+from tractexp.record import Event, Record, WaveEvent, find_dips, in_waves
 
+TRAIN, VALIDATE = "train", "validate"
 EPSILONS = ("epsilon_p", "epsilon_q", "epsilon_i")
+SMALL_Q = 0.3  # of S: with less, an epsilon_q beyond Eq. (20) may be a small error of the load
 AFTER = 0.15  # s after a dip's start in which the currents' error counts
 
 
@@ -42,7 +45,7 @@ class Fit:
     """
 
     event: Event
-    role: str  # "train" or "validate"
+    role: str  # TRAIN or VALIDATE
     P: np.ndarray  # calculated, pu
     Q: np.ndarray
     epsilon_p: float
@@ -55,8 +58,9 @@ class Fit:
     @property
     def told(self) -> dict[str, Any]:
         """As `result.json` has it."""
-        made = {"name": self.event.record.name, "role": self.role}
-        made |= {"epsilon_p": self.epsilon_p, "epsilon_q": self.epsilon_q}
+        record = self.event.record
+        made: dict[str, Any] = {"name": record.name, "role": self.role}
+        made |= {"epsilon_p": self.epsilon_p, "epsilon_q": self.epsilon_q, "Q_over_S": reactive_share(record)}
         return made if self.epsilon_i is None else made | {"epsilon_i": self.epsilon_i, "unsettled": self.unsettled}
 
 
@@ -70,6 +74,11 @@ def relative_error(measured: np.ndarray, calculated: np.ndarray) -> float:
     """epsilon of Eq. (20) as a fraction: RMS of the difference over RMS of the measurement, gaps left out."""
     known = np.isfinite(measured)
     return float(np.linalg.norm((calculated - measured)[known]) / np.linalg.norm(measured[known]))
+
+
+def reactive_share(record: Record) -> float:
+    """The rms of Q over that of the apparent power: where it is small, Eq. (20) divides the error of Q by little."""
+    return float(np.sqrt(np.nansum(record.Q**2) / max(np.nansum(record.P**2 + record.Q**2), 1e-30)))
 
 
 def respond(model: Model, values: np.ndarray, event: Event, role: str) -> Fit:
@@ -136,6 +145,9 @@ class Result:
     optimizer: str = ""
     search: dict[str, Any] = field(default_factory=dict)
     adequacy: dict[str, Any] = field(default_factory=dict)  # grade, sentence, p; empty where it was not judged
+    # value, interval, of_S of the fitted events; held_out the same of those; events: name, role, value, interval, of_S
+    model_error: dict[str, Any] = field(default_factory=dict)
+    rival_structures: list[dict[str, Any]] = field(default_factory=list)  # name, model_error, parameters
     notes: list[str] = field(default_factory=list)
     per_event: dict[str, list[float]] = field(default_factory=dict)  # of which `parameters` holds the mean
     standard_errors: dict[str, float | None] = field(default_factory=dict)  # None: not identifiable
@@ -162,6 +174,16 @@ class Result:
     def acceptable(self) -> bool:
         """Whether both relative errors are below the 5 % of Eq. (20)."""
         return self.epsilon_p < ACCEPTED and self.epsilon_q < ACCEPTED
+
+    @property
+    def acceptance(self) -> str:
+        """Whether Eq. (20) accepts the model, in a sentence; where Q is small, what its error is divided by."""
+        holds = "holds" if self.acceptable else "does NOT hold"
+        said = f"acceptance of Eq. (20), epsilon_p and epsilon_q below {ACCEPTED:.0%}: {holds}"
+        shares = [e["Q_over_S"] for e in self.events if e["role"] == TRAIN and "Q_over_S" in e]
+        if shares and min(shares) < SMALL_Q and self.epsilon_q >= ACCEPTED > self.epsilon_p:
+            said += f" (epsilon_q divides by Q alone, here {in_percent(min(shares))} of S)"
+        return said
 
     def write(self, path: Path) -> Path:
         """Write the file in one move, so that no half-written one is ever seen."""
@@ -228,7 +250,7 @@ def conclude(
     model = problem.model
     free = found.values if estimate is None else estimate
     fits, epsilon_p, epsilon_q = fitted(problem, free)
-    fits += [respond(model, problem.full(free)[0], event, "validate") for event in validate]
+    fits += [respond(model, problem.full(free)[0], event, VALIDATE) for event in validate]
     first = problem.events[0]
     result = Result(
         **_values(problem, free),
@@ -242,6 +264,7 @@ def conclude(
         status=found.status,
         seed=seed,
         events=[f.told for f in fits],
+        model_error=_model_error(fits),
         at_bound=at_bound(problem, free),
         units={p.name: p.unit for p in problem.parameters},
         bounds={p.name: list(p.bounds) for p in problem.parameters},
@@ -259,6 +282,14 @@ def conclude(
     return result, fits
 
 
+def _model_error(fits: Sequence[Fit]) -> dict[str, Any]:
+    """The model's error on the fitted events together, on those held out, and on each."""
+    held_out = [f for f in fits if f.role != TRAIN]
+    each = [{"name": f.event.record.name, "role": f.role, **model_error([f]).to_dict()} for f in fits]
+    fitted = model_error([f for f in fits if f.role == TRAIN]).to_dict()
+    return {**fitted, "held_out": model_error(held_out).to_dict() if held_out else None, "events": each}
+
+
 def refuse_nothing_found(problem: Problem, found: Found) -> None:
     """Raise `UserError` where no candidate at all had a steady state."""
     if found.objective >= REFUSED:
@@ -272,7 +303,7 @@ def refuse_nothing_found(problem: Problem, found: Found) -> None:
 def fitted(problem: Problem, free: np.ndarray) -> tuple[list[Fit], float, float]:
     """The fitted events at free values (d,), and epsilon_p and epsilon_q of Eq. (20) over all of them, as fractions."""
     own = problem.by_event(free)[:, 0]
-    fits = [respond(problem.model, v, event, "train") for v, event in zip(own, problem.events, strict=True)]
+    fits = [respond(problem.model, v, event, TRAIN) for v, event in zip(own, problem.events, strict=True)]
     measured = {c: np.concatenate([getattr(f.event.record, c) for f in fits]) for c in "PQ"}
     calculated = {c: np.concatenate([getattr(f, c) for f in fits]) for c in "PQ"}
     return fits, relative_error(measured["P"], calculated["P"]), relative_error(measured["Q"], calculated["Q"])
@@ -308,3 +339,14 @@ def at_bound(problem: Problem, values: np.ndarray, share: float = 1e-3) -> list[
     """Names of the free parameters within a thousandth of their range of a bound."""
     unit = problem.space.to_unit(values)
     return [n for n, z in zip(problem.space.names, unit, strict=True) if z < share or z > 1 - share]
+
+
+def active_bounds(problem: Problem, values: np.ndarray) -> list[str]:
+    """The same, as a sentence tells them: 'T_m at 1'."""
+    return [f"{n} at {values[problem.space.index(n)]:.4g}" for n in at_bound(problem, values)]
+
+
+def errors_of(result: Result) -> tuple[ModelError, ModelError | None]:
+    """The model's error on the fitted events and on those held out."""
+    held_out = result.model_error["held_out"]
+    return ModelError.of(result.model_error), held_out and ModelError.of(held_out)

@@ -33,12 +33,16 @@ def compare_events(known: Uncertainty) -> Together:
     """Each event's share in the precision, and the events that do not fit with the rest (deviance test)."""
     likelihood = known.likelihood
     _, J = likelihood.jacobian(known.unit)
-    free, errors = likelihood.free, known.information.standard_errors
+    free, width = likelihood.free, known.upper - known.lower
+
+    def errors(rows: np.ndarray) -> np.ndarray:
+        own, nuisances = rows[:, :free], rows[:, free:]
+        return Information.of(known.names, known.values, width, own, nuisances).standard_errors
+
+    whole = errors(J)
     gains: dict[str, dict[str, float]] = {}
     for e, event in enumerate(likelihood.problem.events):
-        rest = J * ~likelihood.part_of(e)[:, None]
-        without = Information.of(known.names, known.values, known.upper - known.lower, rest[:, :free], rest[:, free:])
-        ratio = without.standard_errors / errors
+        ratio = errors(J * ~likelihood.part_of(e)[:, None]) / whole
         gains[event.record.name] = dict(zip(known.names, ratio.tolist(), strict=True))
     odd, notes = disagreeing(known)
     return Together(gains, odd, notes)

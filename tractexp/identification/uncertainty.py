@@ -1,23 +1,45 @@
-"""How sure an estimate is: the curvature of the likelihood at its maximum gives intervals and verdicts."""
+"""How sure an estimate is, in intervals and verdicts.
 
+Where nothing but noise is left, by the curvature of the likelihood at its maximum; else by the scatter of least squares
+(`sandwich`), under which the likelihood of everything that follows is as wide.
+"""
+
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tractexp.identification.blocks import LEVEL
 from tractexp.identification.information import Information
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.residual_tests import Test, jarque_bera, ljung_box
+from tractexp.identification.sandwich import scatter
 from tractexp.identification.verdict import Verdict, judge
 from tractexp.noise.color import FEWEST
 
-LEVEL = 0.95
+if TYPE_CHECKING:
+    from tractexp.identification.rivals import Rival
+
+
+@dataclass(frozen=True, eq=False)
+class Valley:
+    """Another minimum: coordinates (D,), free values (d,), and its deviance above the best."""
+
+    unit: np.ndarray
+    values: np.ndarray
+    above: float
 
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """What is known about the free parameters; arrays (d,) in the order of `names`."""
+    """What is known about the free parameters; arrays (d,) in the order of `names`.
+
+    `likelihood` is what intervals, profiles and samples stand on. Where more than noise is left it is that of
+    Eq. (8), as wide as the estimate scatters: its deviance may rise by `limits`. `of_noise` is the likelihood of the
+    noise.
+    """
 
     likelihood: Likelihood
     unit: np.ndarray  # (D,) its maximum
@@ -25,15 +47,51 @@ class Uncertainty:
     information: Information
     lower: np.ndarray  # bounds
     upper: np.ndarray
-    half: np.ndarray  # half of the 95 % interval, inf where not identifiable
-    factor: float  # half over standard error
+    factors: np.ndarray  # half of the 95 % interval over the standard error
+    limits: np.ndarray  # what the deviance may rise by within the interval
     verdicts: dict[str, Verdict]
-    tests: list[dict[str, Any]]
-    noise: list[dict[str, Any]]
+    of_noise: Likelihood
     notes: list[str]
     profiled: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # intervals that replace the curvature's
-    rivals: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # intervals of valleys that fit as well
-    widened: float = 1.0  # by which the noise was made louder, because more than noise is left
+    valleys: tuple[Valley, ...] = ()  # others that fit as well
+    rivals: "tuple[Rival, ...]" = ()  # structures that fit as well
+
+    @property
+    def elsewhere(self) -> np.ndarray:
+        """(d,) Whether another valley has another value than the interval by curvature holds."""
+        values = np.array([valley.values for valley in self.valleys]).reshape(-1, len(self.names))
+        return np.any(np.abs(values - self.values) > self.half, axis=0)
+
+    @property
+    def half(self) -> np.ndarray:
+        """Half of the 95 % interval by curvature, inf where not identifiable."""
+        return self.factors * self.information.standard_errors
+
+    def at(self, unit: np.ndarray) -> "Uncertainty":
+        """The same judgement of another point (D,) of the same likelihood."""
+        if self.exact:
+            return conclude(self.likelihood, unit, self.notes)
+        return conclude_squares(self.likelihood, unit, self.of_noise, self.notes)
+
+    @property
+    def exact(self) -> bool:
+        """Whether nothing but noise is left, so that the likelihood is that of the noise."""
+        return self.likelihood.initial_power
+
+    @functools.cached_property
+    def whitened(self) -> np.ndarray:
+        """The residual of the estimate over the noise, (2 N,)."""
+        return self.of_noise.rows(self.unit[None] if self.exact else self.of_noise.placed(self.unit[None]))[0]
+
+    @functools.cached_property
+    def tests(self) -> list[dict[str, Any]]:
+        """Whether the whitened residual is white and normal."""
+        return test(self.of_noise, self.whitened)
+
+    @functools.cached_property
+    def noise(self) -> list[dict[str, Any]]:
+        """Level and color of the noise of each event and channel."""
+        return describe_noise(self.of_noise)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -48,14 +106,19 @@ class Uncertainty:
     def intervals(self) -> np.ndarray:
         """(d, 2), 95 %, inside the bounds: by profile where there is one, else by the curvature.
 
-        Where another valley fits as well, they reach over it, too.
+        Where another valley fits as well, they reach over it, too. Where more than noise is left, so do they over what
+        each rival structure makes of a parameter, as far beyond it as beyond the estimate.
         """
         ends = self.values[:, None] + self.half[:, None] * [-1.0, 1.0]
         for name, interval in self.profiled.items():
             ends[self.names.index(name)] = interval
-        for name, (low, high) in self.rivals.items():
-            a, b = ends[self.names.index(name)]
-            ends[self.names.index(name)] = min(a, low), max(b, high)
+        for valley in self.valleys:
+            ends = np.stack([np.minimum(ends[:, 0], valley.values), np.maximum(ends[:, 1], valley.values)], axis=1)
+        own = ends.copy()
+        for rival in () if self.exact else self.rivals:
+            there = [rival.values.get(n, value) for n, value in zip(self.names, self.values.tolist(), strict=True)]
+            there = own + (np.array(there) - self.values)[:, None]
+            ends = np.stack([np.fmin(ends[:, 0], there[:, 0]), np.fmax(ends[:, 1], there[:, 1])], axis=1)
         return np.clip(ends, self.lower[:, None], self.upper[:, None])
 
     def fields(self) -> dict[str, Any]:
@@ -86,29 +149,39 @@ def threshold(level: float = LEVEL) -> float:
 
 
 def conclude(likelihood: Likelihood, unit: np.ndarray, notes: Sequence[str] = ()) -> Uncertainty:
-    """Intervals and verdicts at the maximum `unit` (D,) of a likelihood."""
+    """Intervals and verdicts at the maximum `unit` (D,) of the likelihood of the noise."""
     from scipy.special import stdtrit
 
     problem, free = likelihood.problem, likelihood.free
     rows, J = likelihood.jacobian(unit)
     width = problem.upper - problem.lower
-    values = likelihood.values(unit)
-    information = Information.of(problem.space.names, values, width, J[:, :free], J[:, free:])
+    information = Information.of(problem.space.names, likelihood.values(unit), width, J[:, :free], J[:, free:])
     factor = float(stdtrit(max(likelihood.samples - len(unit), 1), (1 + LEVEL) / 2))
-    half = factor * information.standard_errors
+    factors, limits = np.full(free, factor), np.full(free, threshold())
+    return _judged(likelihood, unit, float(rows @ rows), information, factors, limits, likelihood, notes)
+
+
+def conclude_squares(
+    squares: Likelihood, unit: np.ndarray, noise: Likelihood, notes: Sequence[str] = ()
+) -> Uncertainty:
+    """Intervals and verdicts at the minimum `unit` (d,) of Eq. (8), of which more than `noise` is left."""
+    left = float(np.sum(squares.rows(unit[None])[0] ** 2)) / max(squares.samples - len(unit), 1)
+    scattered = scatter(squares.scaled(np.sqrt(left)), unit)
+    likelihood = squares.scaled(np.sqrt(left) * scattered.spread)
+    rows = likelihood.rows(unit[None])[0]
+    factors = np.full(len(unit), scattered.quantile)
+    limits = (factors * scattered.ratio / scattered.spread) ** 2
+    return _judged(likelihood, unit, float(rows @ rows), scattered.information, factors, limits, noise, notes)
+
+
+def _judged(
+    likelihood: Likelihood, unit: np.ndarray, deviance: float, information: Information, factors: np.ndarray,
+    limits: np.ndarray, noise: Likelihood, notes: Sequence[str],
+) -> Uncertainty:  # fmt: skip
+    lower, upper = likelihood.problem.lower, likelihood.problem.upper
+    verdicts = judge(information, lower, upper, factors * information.standard_errors, factors)
     return Uncertainty(
-        likelihood=likelihood,
-        unit=unit,
-        deviance=float(rows @ rows),
-        information=information,
-        lower=problem.lower,
-        upper=problem.upper,
-        half=half,
-        factor=factor,
-        verdicts=judge(information, problem.lower, problem.upper, half, factor),
-        tests=test(likelihood, rows),
-        noise=describe_noise(likelihood),
-        notes=list(notes),
+        likelihood, unit, deviance, information, lower, upper, factors, limits, verdicts, noise, list(notes)
     )
 
 

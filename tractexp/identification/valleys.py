@@ -7,6 +7,7 @@ import numpy as np
 
 from tractexp.identification.descent import Descent, descend
 from tractexp.identification.likelihood import Likelihood
+from tractexp.identification.problem import Problem
 from tractexp.identification.starts import best_distinct, even
 
 SCREENED = 4096  # points of the box that are simulated
@@ -17,14 +18,18 @@ KEPT, DISTINCT = 4, 0.2  # of their ends, and how far apart in the unit cube: se
 ALONG = (0.3, 0.6, 0.9)  # of the way to the wall: where other valleys are looked for
 
 
-def explored(likelihood: Likelihood) -> Descent:
-    """Where descents from the most promising points of the box end: coordinates (at most 10, free + 2 E)."""
-    problem, apart = likelihood.problem, likelihood.apart
+def screened(problem: Problem) -> tuple[np.ndarray, float]:
+    """The most promising points (at most 24, d) of the box by Eq. (8), far apart, and the least objective [pu²]."""
     points = even(SCREENED, problem.space.dimension)
-    points = points[best_distinct(points, problem.objective(problem.space.from_unit(points)), APART, STARTS, norm=2)]
-    begin = np.full((len(points), points.shape[1] + 2 * problem.drive.events), 0.5)
-    begin[:, : points.shape[1]] = points
-    begun = descend(likelihood.rows, begin, None, FEW, TOLERANCE, apart)
+    objective = problem.objective(problem.space.from_unit(points))
+    return points[best_distinct(points, objective, APART, STARTS, norm=2)], float(objective.min())
+
+
+def explored(likelihood: Likelihood, points: np.ndarray | None = None) -> Descent:
+    """Where descents from promising `points` (n, d) of the box, by default those screened, end: at most 10."""
+    apart = likelihood.apart
+    points = screened(likelihood.problem)[0] if points is None else points
+    begun = descend(likelihood.rows, likelihood.placed(points), None, FEW, TOLERANCE, apart)
     free = slice(points.shape[1])
     promising = begun.unit[best_distinct(begun.unit[:, free], begun.deviance, SAME, PROMISING, norm=2)]
     return descend(likelihood.rows, promising, None, MORE, TOLERANCE, apart)

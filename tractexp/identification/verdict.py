@@ -45,9 +45,9 @@ def shown(value: float, half: float, low: float, high: float) -> str:
 
 
 def judge(
-    information: Information, lower: np.ndarray, upper: np.ndarray, half: np.ndarray, factor: float
+    information: Information, lower: np.ndarray, upper: np.ndarray, half: np.ndarray, factors: np.ndarray
 ) -> dict[str, Verdict]:
-    """A verdict for each parameter: `half` (d,) is half of its 95 % interval, `factor` times a standard error."""
+    """A verdict for each parameter: `half` (d,) is half of its 95 % interval, `factors` (d,) that over its error."""
     width = upper - lower
     unseen, identifiable = information.unseen, information.identifiable
     verdicts = {}
@@ -59,9 +59,9 @@ def judge(
             verdicts[name] = Verdict(UNIDENTIFIED, _structural(information, unseen, j))
         elif low <= lower[j] and high >= upper[j]:
             span = f"its 95 % interval holds its whole range {lower[j]:g} .. {upper[j]:g}"
-            verdicts[name] = Verdict(UNIDENTIFIED, "; ".join([span, *_trade(information, j, factor)]))
+            verdicts[name] = Verdict(UNIDENTIFIED, "; ".join([span, *_trade(information, j, factors[j])]))
         elif half[j] > WITHIN * size(value, lower[j], upper[j]):
-            why = _trade(information, j, factor) or ["the record hardly changes with it"]
+            why = _trade(information, j, factors[j]) or ["the record hardly changes with it"]
             edge = [f"the estimate is at its bound {at[0]}"] if at else []
             verdicts[name] = Verdict(WEAK, "; ".join([shown(value, half[j], lower[j], upper[j]), *why, *edge]))
         elif at:
@@ -72,6 +72,12 @@ def judge(
             tight = "" if lower[j] <= low and high <= upper[j] else "; the interval reaches past its bounds"
             verdicts[name] = Verdict(IDENTIFIED, shown(value, half[j], lower[j], upper[j]) + tight)
     return verdicts
+
+
+def elsewhere(verdict: Verdict, value: float) -> Verdict:
+    """A verdict where the records fit as well in another valley, in which the parameter has this value."""
+    word = WEAK if verdict.word == IDENTIFIED else verdict.word
+    return Verdict(word, f"{verdict.detail}; another valley, at {value:.4g}, fits as well")
 
 
 def _trade(information: Information, j: int, factor: float) -> list[str]:

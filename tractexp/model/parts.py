@@ -35,6 +35,9 @@ class Part(Plugin):
     reads: ClassVar[tuple[str, ...]] = ()
     phasors_only: ClassVar[str] = ""  # why it makes no sense of waveforms; "" where it does
     waves_only: ClassVar[str] = ""  # why it makes no sense of phasors
+    # A structure that most loads may have as well: every fit tells by how much it would move the parameters. A static
+    # load takes the place of the model's own, an effect is added.
+    rival: ClassVar[bool] = False
 
     @classmethod
     def check_class(cls, where: str) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.model.drive import Drive
-from tractexp.noise.color import FEWEST, Autoregression, fit_autoregression, white_noise
+from tractexp.noise.color import FEWEST, SMALLEST, Autoregression, fit_autoregression, white_noise
 from tractexp.noise.model import Noise
 from tractexp.noise.wander import Wander, without_slow
 from tractexp.record import Event
@@ -18,6 +18,7 @@ SHORTEST = 8  # samples of a stretch
 MANY = 200  # quiet samples from which shocks are drawn as they were seen, with their tails and steps
 DEGREES = np.array([2.5, 3, 3.5, 4, 5, 6, 8, 10, 15, 20])  # of freedom of Student's t that are tried
 CLEARLY = 10.0  # of twice the log-likelihood: by chance once in some 1,500
+LOUDER = 1e-3  # p below which the end of a record is louder than its beginning
 QUANTILES = 20_000  # that stand for a law
 
 
@@ -70,6 +71,26 @@ def estimate(
     colors = iter(found)
     pair = tuple(next(colors) if there else white_noise(1.0) for there in measured)
     return Noise((pair,), mix, shocks, slow, blur)
+
+
+def louder(late: Sequence[np.ndarray], calm: Sequence[np.ndarray], level: float = LOUDER) -> bool:
+    """Whether stretches `late` (n_i,) of a channel are louder than `calm` ones by more than chance.
+
+    An F test with as many samples as tell of the slowest of each one's color.
+    """
+    from scipy.special import fdtrc
+
+    if not (late and calm):
+        return False
+    (a, n), (b, m) = (_variance(pieces) for pieces in (late, calm))
+    return bool(fdtrc(n, m, a / max(b, SMALLEST**2)) < level)
+
+
+def _variance(pieces: Sequence[np.ndarray]) -> tuple[float, float]:
+    """Variance of stretches, and how many independent samples it is worth."""
+    count = sum(map(len, pieces))
+    color = fit_autoregression(list(pieces), min(HIGHEST, max(count // 10, 0)), sparing=True)
+    return sum(float(p @ p) for p in pieces) / max(count, 1), max(Noise(((color,),)).worth(count), 2.0)
 
 
 def _shocks(channel: Autoregression, pieces: Sequence[np.ndarray]) -> np.ndarray:

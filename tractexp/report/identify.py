@@ -1,6 +1,6 @@
 """The page of an identification, to be read in a minute: what it is good for, what was found, how sure, what next."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from typing import Any
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from tractexp.identification.adequacy import Adequacy
 from tractexp.identification.estimate import Estimated
+from tractexp.identification.model_error import in_percent
 from tractexp.identification.residual_tests import LAGS, REJECTED, autocorrelation
 from tractexp.identification.result import by_event
 from tractexp.identification.search import REFUSED, History
@@ -26,6 +27,21 @@ ROLES = {"train": "fitted", "validate": "held out"}
 KIND = {"adequate": "good", "effect_missing": "plain", "wrong_model": "bad"}
 SHOWN = 4  # events whose curves are not folded away
 CHANNELS = (style.ACTIVE, style.REACTIVE, style.PALETTE[2])  # of what is compared
+EXACT = (
+    "Nothing but noise is left: the estimate is the most likely set, noise whitened, the power before each dip free."
+    " pu: per unit of the record's base."
+)
+SCATTERED = (
+    "More than noise is left: the estimate is the minimum of Eq. (8), and intervals say by how much it scatters where"
+    " stretches of 0.1 s are left out. pu: per unit of the record's base."
+)
+RIVALS = (
+    " With another structure: where that fits as well and moves a parameter beyond its interval, the value with it."
+)
+MODEL_ERROR = (
+    "Model error: rms of what is left beyond the noise, from the dip on, over the rms of the load's response, both in"
+    " apparent power S. epsilon: Eq. (20)."
+)
 SMALLEST = 0.01  # of the deviance: starts closer than this ended in the same place
 
 
@@ -35,20 +51,26 @@ def digits(value: float) -> str:
 
 def page(
     result: Any, fits: Sequence[Any], estimated: Estimated, known: Uncertainty, together: Together | None,
-    adequacy: Adequacy, advice: Sequence[str], history: History, about: dict[str, str], search: str, command: str,
+    adequacy: Adequacy, moves: Mapping[str, tuple[str, float]], advice: Sequence[str], history: History,
+    about: dict[str, str], search: str, command: str,
 ) -> Page:  # fmt: skip
     """The whole page. `about` {parameter: meaning}; `search` is where the optimizer ended, in words."""
     names = ", ".join(e["name"] for e in result.events if e["role"] == "train")
     made = Page(f"Identification of {names}", f"{result.optimizer}, seed {result.seed}.")
     made.verdict(
-        as_sentence(adequacy.sentence), _acceptance(result), *_identified(known, adequacy), kind=KIND[adequacy.grade]
+        as_sentence(adequacy.sentence),
+        f"{as_sentence(result.acceptance)}{_of_currents(result)}",
+        headline(known),
+        kind=KIND[adequacy.grade],
     )
     made.heading("Measured and calculated")
     _curves(made, fits, known)
     made.heading("Parameters")
-    _parameters(made, result, known, adequacy, about)
+    _parameters(made, result, known, moves, about)
+    made.heading("How well it fits")
+    _errors(made, result)
     made.heading("What to do next").items(advice)
-    if together is not None and adequacy.good:
+    if together is not None:
         _events(made, known, together)
     made.heading("The search and the estimate").text(as_sentence(search))
     made.chart(_fitness(history, result), "Best objective of the search; dashed: the estimate's.")
@@ -62,20 +84,10 @@ def page(
     return made
 
 
-def _acceptance(result: Any) -> str:
-    holds = "holds" if result.acceptable else "does not hold"
-    errors = f"epsilon_p {result.epsilon_p:.2%}, epsilon_q {result.epsilon_q:.2%}"
-    return f"Acceptance of Eq. (20), below 5 %, {holds}: {errors}.{_of_currents(result)}"
-
-
 def _of_currents(result: Any) -> str:
     """epsilon_i of each event, in a sentence; "" in phasors."""
     told = [f"{e['epsilon_i']:.2%} ({e['name']}, {ROLES[e['role']]})" for e in result.events if "epsilon_i" in e]
     return f" Of the currents themselves epsilon_i is {', '.join(told)}." if told else ""
-
-
-def _identified(known: Uncertainty, adequacy: Adequacy) -> list[str]:
-    return [headline(known)] if adequacy.good else []
 
 
 def headline(known: Uncertainty) -> str:
@@ -90,7 +102,7 @@ def _curves(made: Page, fits: Sequence[Any], known: Uncertainty) -> None:
     likelihood = known.likelihood
     waves = likelihood.problem.model.waves
     made.text(*[IN_WAVES] * waves)
-    deviation = likelihood.noise.deviation(likelihood.problem.drive) / known.widened
+    deviation = known.of_noise.noise.deviation(likelihood.problem.drive)
     parts = [likelihood.problem.drive.part(e) for e in range(likelihood.problem.drive.events)]
     made.text(CAPTION)
     for k, fit in enumerate(fits):
@@ -116,32 +128,51 @@ def _event(made: Page, fit: Any, noise: np.ndarray | None) -> None:
     made.chart(chart, " ".join([f"{about}: epsilon_p {fit.epsilon_p:.3%}, epsilon_q {fit.epsilon_q:.3%}.", *notes]))
 
 
-def _parameters(made: Page, result: Any, known: Uncertainty, adequacy: Adequacy, about: dict[str, str]) -> None:
-    """Table and, where intervals mean something, their picture against the bounds."""
+def _parameters(
+    made: Page, result: Any, known: Uncertainty, moves: Mapping[str, tuple[str, float]], about: dict[str, str]
+) -> None:  # fmt: skip
+    """Table and picture against the bounds; `moves` {parameter: (rival structure, value with it)}."""
     search = by_event(result.search["parameters"], result.search["per_event"])
-    good = adequacy.good
-    columns = ["parameter", "meaning", "value", "unit", *["95 % interval", "verdict"] * good, "bounds"]
     values = result.free | {n: v for n, v in result.parameters.items() if n not in result.per_event}
     rows = [
-        [name, about.get(_base(name), ""), digits(value), result.units.get(_base(name), ""),
-         *(_sure(known, name) if good else []), "{:g} .. {:g}".format(*result.bounds[_base(name)]),
-         digits(search[name])]
+        [name, about.get(_base(name), ""), digits(value), result.units.get(_base(name), ""), *_sure(known, name),
+         *["{1:.4g} ({0})".format(*moves[name]) if name in moves else ""] * bool(moves),
+         "{:g} .. {:g}".format(*result.bounds[_base(name)]), digits(search[name])]
         for name, value in values.items()
     ]  # fmt: skip
-    withheld = " Intervals are withheld: they tell how far noise moves the values, not how far what is missing does."
+    beside = ["with another structure"] * bool(moves)
+    columns = [
+        "parameter",
+        "meaning",
+        "value",
+        "unit",
+        "95 % interval",
+        "verdict",
+        *beside,
+        "bounds",
+        "search ended at",
+    ]
     made.table(
-        [*columns, "search ended at"], rows, words=(1, 5) if good else (1,),
-        caption="The estimate is the most likely set: noise whitened, the power before each dip left free. pu: per unit"
-        " of the record's base." + withheld * (not good),
+        columns, rows,
+        words=(1, 5), caption=(EXACT if known.exact else SCATTERED) + RIVALS * bool(moves),
     )  # fmt: skip
-    if not good:
-        return
     made.chart(
         _forest(known, search),
         "Estimates and 95 % intervals within the bounds of each parameter (0 is the lower, 1 the upper bound); cross:"
         " where the search ended.",
     )
     made.items([f"{name}: {v}." for name, v in known.verdicts.items() if v.word != IDENTIFIED])
+
+
+def _errors(made: Page, result: Any) -> None:
+    """The model's error on each event, and the errors of Eq. (20)."""
+    columns = ["event", "", "model error", "95 % interval", "of S", *result.epsilons]
+    rows = [
+        [e["name"], ROLES[e["role"]], in_percent(m["value"]), " .. ".join(map(in_percent, m["interval"])),
+         in_percent(m["of_S"]), *(f"{e[key]:.3%}" for key in result.epsilons)]
+        for e, m in zip(result.events, result.model_error["events"], strict=True)
+    ]  # fmt: skip
+    made.table(columns, rows, caption=MODEL_ERROR)
 
 
 def _base(name: str) -> str:
@@ -214,11 +245,11 @@ def _starts(made: Page, estimated: Estimated, known: Uncertainty) -> None:
 
 def _left(made: Page, known: Uncertainty) -> None:
     """Whitened residuals, their autocorrelation, and what the tests of them say."""
-    likelihood = known.likelihood
+    likelihood, tests = known.of_noise, known.tests
     drive, events = likelihood.problem.drive, likelihood.problem.events
-    white = known.widened * likelihood.rows(known.unit[None])[0].reshape(drive.channels, -1)
-    colored = [t for t in known.tests if t["p"] < REJECTED]
-    made.text(_conclusion(colored, len(known.tests)))
+    white = known.whitened.reshape(drive.channels, -1)
+    colored = [t for t in tests if t["p"] < REJECTED]
+    made.text(_conclusion(colored, len(tests)))
     for e, event in enumerate(events[:SHOWN]):
         part = drive.part(e)
         compared = [c for c in range(drive.channels) if likelihood.known[c, part].any()]
@@ -239,13 +270,13 @@ def _left(made: Page, known: Uncertainty) -> None:
         made.table(
             ["event", "channel", "test", "statistic", "p", "says"],
             [[t["event"], t["channel"], t["name"], digits(t["statistic"]), in_words(t["p"]), t["says"]]
-             for t in known.tests],
+             for t in tests],
             caption=f"Of the residuals after whitening; below p = {REJECTED} a test speaks.", words=(1, 2, 4, 5),
         )  # fmt: skip
         made.table(
             ["event", "channel", "noise [pu]", "before the dip [pu]", "order", "neighbors' correlation",
              f"correlation of {drive.names[0]} and {drive.names[1]}"],
-            [[n["event"], n["channel"], digits(n["deviation"] / known.widened), digits(n["before"]), str(n["order"]),
+            [[n["event"], n["channel"], digits(n["deviation"]), digits(n["before"]), str(n["order"]),
               f"{n['correlation']:.2f}", f"{n['between_P_and_Q']:.2f}"] for n in known.noise],
             caption="Noise of each channel, told from what the fit leaves before the dips and at the end of the"
                     " records: an autoregression of the channels mixed until they are independent.", words=(1,),

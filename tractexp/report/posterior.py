@@ -8,7 +8,7 @@ from tractexp.identification.posterior import ENOUGH, Posterior
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.report.chart import Chart
 from tractexp.report.page import Page
-from tractexp.report.profile import ALIKE, NOISE_ALONE, axis, declared, span
+from tractexp.report.profile import ALIKE, SCATTER, axis, declared, span
 from tractexp.report.style import ACTIVE, FAINT, PALETTE
 from tractexp.wording import as_sentence
 
@@ -20,15 +20,15 @@ CAPTION = (
 )
 
 
-def page(path: Path, known: Uncertainty, drawn: Posterior, grade: str = "", trusted: bool = True) -> Path:
-    """Write the page; returns its path. `grade` and `trusted` as on the page of the profiles."""
+def page(path: Path, known: Uncertainty, drawn: Posterior, grade: str = "") -> Path:
+    """Write the page; returns its path. `grade` as on the page of the profiles."""
     names = ", ".join(e.record.name for e in known.likelihood.problem.events)
     made = Page(
         f"Posterior: {names}",
         f"A flat prior within the bounds; {len(drawn.draws)} draws of {drawn.steps} steps of emcee's ensemble.",
     )
-    told = [as_sentence(grade)] * bool(grade) + [_agreement(known, drawn)] + [NOISE_ALONE] * (not trusted)
-    made.verdict(*told, _settled(drawn), kind="bad" if not trusted else "good" if drawn.converged else "plain")
+    told = [as_sentence(grade)] * bool(grade) + [_agreement(known, drawn)] + [SCATTER] * (not known.exact)
+    made.verdict(*told, _settled(drawn), kind="good" if known.exact and drawn.converged else "plain")
     made.charts([_chart(known, drawn, j) for j in range(len(drawn.names))])
     made.text(CAPTION)
     made.heading("Intervals")
@@ -72,7 +72,7 @@ def _chart(known: Uncertainty, drawn: Posterior, j: int) -> Chart:
     chart = Chart(axis(known, drawn.names[j]), ["density"], pixels=250, legend=False)
     chart.shade(float(low), float(high), PALETTE[5], opacity=0.25)
     if np.isfinite(half):
-        at, error = np.linspace(edges[0], edges[-1], 151), half / known.factor
+        at, error = np.linspace(edges[0], edges[-1], 151), known.information.standard_errors[j]
         normal = np.exp(-(((at - value) / error) ** 2) / 2) / (error * np.sqrt(2 * np.pi))
         chart.line("curvature", at, normal, FAINT, dash="dash")
     chart.line("posterior", edges, np.append(density, density[-1]), PALETTE[0], step=True)

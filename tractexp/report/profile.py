@@ -18,20 +18,23 @@ ALIKE = 0.2  # of the half interval by curvature: closer ends are the same inter
 ABOVE = 2.2  # thresholds that a chart shows
 BELOW = 0.12  # thresholds of room below the best fit
 ENOUGH = "is enough"
-NOISE_ALONE = "The intervals below say what the noise leaves open, not what the model lacks."
+SCATTER = (
+    "More than noise is left, so these are intervals of least squares: they hold by how much the estimate scatters, not"
+    " by how much what the model lacks moves it."
+)
 CURVE, PARABOLA, SHADE = PALETTE[0], FAINT, PALETTE[5]
 CAPTION = (
     "Blue: the deviance (twice the fall of the log-likelihood) of the best fit for each value of the parameter, above"
-    " the best of all. Dashed: the parabola of the curvature at the estimate. Where the blue curve crosses the line at"
+    " the best of all, over what this parameter's may rise by in units of {threshold:.2f}. Dashed: the"
+    " parabola of the curvature at the estimate. Where the blue curve crosses the line at"
     " {threshold:.2f}, the 95 % interval ends; it is shaded. The mark is the estimate."
 )
 
 
-def page(path: Path, found: Profiles, grade: str = "", trusted: bool = True) -> Path:
+def page(path: Path, found: Profiles, grade: str = "") -> Path:
     """Write the page; returns its path.
 
-    `grade` is the sentence that grades the identification. Where its intervals are not `trusted`, because the model
-    lacks something, no parameter is called identified.
+    `grade` is the sentence that grades the identification.
     """
     known, verdicts = found.known, found.verdicts
     names = ", ".join(e.record.name for e in known.likelihood.problem.events)
@@ -40,10 +43,10 @@ def page(path: Path, found: Profiles, grade: str = "", trusted: bool = True) -> 
         "One parameter is held at value after value, all others are fitted again each time.",
     )
     says = {profile.name: meaning(found, profile) for profile in found.profiles}
-    told = [*_where(says), *_poor(verdicts)] if trusted else [NOISE_ALONE, *_where(says)]
+    told = [*[SCATTER] * (not known.exact), *_where(says), *_poor(verdicts)]
     graded = [as_sentence(grade)] * bool(grade)
-    made.verdict(*graded, *told, *(as_sentence(note) for note in found.notes), kind=_kind(verdicts, trusted))
-    titles = {name: f"{name}: {verdict.word}" if trusted else "" for name, verdict in verdicts.items()}
+    made.verdict(*graded, *told, *(as_sentence(note) for note in found.notes), kind=_kind(verdicts, known.exact))
+    titles = {name: f"{name}: {verdict.word}" for name, verdict in verdicts.items()}
     made.charts([_chart(found, profile, titles[profile.name]) for profile in found.profiles])
     made.text(CAPTION.format(threshold=found.threshold))
     made.heading("Intervals")
@@ -122,10 +125,8 @@ def _where(says: Mapping[str, str]) -> list[str]:
     return told
 
 
-def _kind(verdicts: Mapping[str, Verdict], trusted: bool) -> str:
-    if not trusted:
-        return "bad"
-    return "good" if all(verdict.word == IDENTIFIED for verdict in verdicts.values()) else "plain"
+def _kind(verdicts: Mapping[str, Verdict], exact: bool) -> str:
+    return "good" if exact and all(verdict.word == IDENTIFIED for verdict in verdicts.values()) else "plain"
 
 
 def _poor(verdicts: Mapping[str, Verdict]) -> list[str]:

@@ -33,7 +33,7 @@ class Export(Task):
         made = call(export, fit, self.format, bus=self.bus, power=self.power, voltage=self.voltage)
         path = made.write(job.folder / f"load{made.suffix}")
         say(f"model: {made.title}, from {self.parameters}")
-        if fit.grade and not fit.trusted:
+        if fit.grade and not fit.adequate:
             say(f"  mind: {fit.headline}")
         for note in made.notes:
             say(f"note: {note}")

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tractexp.identification.model_error import in_percent
 from tractexp.identification.search import REFUSED
 from tractexp.plugin import plugin
 from tractexp.tasks.console import listed, say, table
@@ -41,22 +42,28 @@ def report(fit: "Identification") -> None:
     say()
     say(as_sentence(fit.headline))
     estimates(fit)
-    errors = fit.result.epsilons
-    rows = [[e["name"], e["role"], *(f"{e[key]:.3%}" for key in errors)] for e in fit.result.events]
-    table(["event", "role", *errors], rows)
-    for event in fit.result.events:
-        if told := unsettled_told(event):
-            say(told)
-    holds = "holds" if fit.result.acceptable else "does NOT hold"
-    say(f"acceptance of Eq. (20), epsilon_p and epsilon_q below 5 %: {holds}")
-    if fit.trusted:
-        sure(fit)
+    events(fit)
+    say(fit.result.acceptance)
+    sure(fit)
     for sentence in fit.result.uncertainty["notes"]:
         say(f"note: {sentence}")
     say(fit.search_told())
     for sentence in fit.advice:
         say(f"next: {sentence}")
     say()
+
+
+def events(fit: "Identification") -> None:
+    """Print how well the model fits each event: its error beside the errors of Eq. (20)."""
+    epsilons, errors = fit.result.epsilons, fit.result.model_error["events"]
+    rows = [
+        [e["name"], e["role"], in_percent(error["value"]), *(f"{e[key]:.3%}" for key in epsilons)]
+        for e, error in zip(fit.result.events, errors, strict=True)
+    ]
+    table(["event", "role", "model error", *epsilons], rows)
+    for event in fit.result.events:
+        if told := unsettled_told(event):
+            say(told)
 
 
 def unsettled_told(event: dict[str, Any]) -> str:
@@ -69,17 +76,16 @@ def unsettled_told(event: dict[str, Any]) -> str:
 
 def estimates(fit: "Identification") -> None:
     """Print the estimates; where the search ended outside an interval, that too."""
-    from tractexp.api.identify import FIXED
     from tractexp.report.identify import brief
 
-    astray, trusted, rows = fit.astray, fit.trusted, []
+    astray, moves, rows = fit.astray, fit.moves, []
     for e in fit.parameters.values():
         interval = "{:.4g} .. {:.4g}".format(*e.interval) if e.interval else ""
-        mark = "fixed" if e.verdict == FIXED else "at its bound" if e.name in fit.result.at_bound else ""
-        sure = [interval, brief(e.verdict)] if trusted else ["{:g} .. {:g}".format(*e.bounds), mark]
-        rows.append([e.name, f"{e.value:.5g}", e.unit, *sure, *[f"{e.search:.4g}" * (e.name in astray)] * bool(astray)])
-    columns = ["95 % interval", "verdict"] if trusted else ["bounds", ""]
-    table(["parameter", "value", "unit", *columns, *["search ended at"] * bool(astray)], rows)
+        moved = ["{1:.4g} ({0})".format(*moves[e.name]) if e.name in moves else ""] * bool(moves)
+        ended = [f"{e.search:.4g}" * (e.name in astray)] * bool(astray)
+        rows.append([e.name, f"{e.value:.5g}", e.unit, interval, *ended, *moved, brief(e.verdict)])
+    further = [*["search ended at"] * bool(astray), *["with another structure"] * bool(moves)]
+    table(["parameter", "value", "unit", "95 % interval", *further, "verdict"], rows)
 
 
 def sure(fit: "Identification") -> None:
@@ -101,6 +107,9 @@ def track(job: Job, fit: "Identification", paths: list[Path], predictor: bool) -
     metrics = {key: getattr(result, key) for key in ("objective", "epsilon_p", "epsilon_q", "simulations", "seconds")}
     of_search = ("objective", "epsilon_p", "epsilon_q", "simulations", "seconds")
     metrics |= {f"search_{key}": result.search[key] for key in of_search}
+    metrics["model_error"] = result.model_error["value"]
+    if result.model_error["held_out"]:
+        metrics["model_error_held_out"] = result.model_error["held_out"]["value"]
     for k, event in enumerate(result.events, start=1):
         metrics |= {f"{event['role']}_{k}_{e}": event[e] for e in result.epsilons}
     if "epsilon_i" in result.epsilons:

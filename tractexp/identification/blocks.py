@@ -1,0 +1,39 @@
+"""Stretches of a tenth of a second: what a model leaves in one of them tells little of what it leaves in the next.
+
+A residual that is no noise is correlated, in a way that no noise model knows. Blocks longer than its memory are nearly
+independent, and to leave out one of them at a time tells how far an estimate hangs on each: the delete-a-block
+jackknife. Source: Kunsch 1989 (blocks of a series); MacKinnon, Nielsen and Webb 2023 (clusters of a regression).
+"""
+
+import itertools
+from collections.abc import Sequence
+
+from tractexp.model.drive import Drive
+from tractexp.record import Event
+
+LENGTH = 0.1  # s, longer than the memory of what third-order motors leave
+FEWEST = 3  # blocks for each parameter: of records with fewer, blocks are shorter
+LEVEL = 0.95
+
+
+def blocks_of(events: Sequence[Event], drive: Drive, parameters: int = 1, *, from_dip: bool = False) -> list[slice]:
+    """Blocks of the drive's samples, counted from the start of each dip; `from_dip` leaves out what is before it."""
+    parts = [drive.part(e) for e in range(drive.events)]
+    starts = [part.start + event.start for part, event in zip(parts, events, strict=True)]
+    first = starts if from_dip else [part.start for part in parts]
+    seconds = sum((p.stop - a) * e.record.step for p, a, e in zip(parts, first, events, strict=True))
+    length = min(LENGTH, seconds / (FEWEST * max(parameters, 1)))
+    made = []
+    for part, begin, start, event in zip(parts, first, starts, events, strict=True):
+        n = max(1, round(length / event.record.step))
+        edges = [begin, *range(start - (start - begin - 1) // n * n, start, n), *range(start, part.stop - n // 2, n)]
+        edges = sorted({*edges, part.stop})
+        made += [slice(a, b) for a, b in itertools.pairwise(edges)]
+    return made
+
+
+def quantile(blocks: int) -> float:
+    """Student's t at 97.5 % of a jackknife over so many blocks."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(max(blocks - 1, 1), (1 + LEVEL) / 2))

@@ -1,0 +1,95 @@
+r"""The size of a model's error: what it leaves of a load's response beyond the noise, both in apparent power.
+
+    e² = (sum |S_calculated - S|² - n s²) / (sum |S - S_0|² - n s²)
+
+over the n samples from each dip on, S = P + jQ, S_0 its mean before, s² the variance of the noise before the dip, its
+slow part left out: that is drift. Its interval is that of the delete-a-block jackknife. A test of significance says
+whether something is left; this says how much it matters.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from tractexp.identification.blocks import LENGTH, quantile
+from tractexp.noise.wander import SLOW, without_drift, without_slow
+from tractexp.record import Event
+
+
+class Playback(Protocol):
+    """An event, and P and Q (N,) [pu] that a model calculates of it."""
+
+    @property
+    def event(self) -> Event: ...
+    @property
+    def P(self) -> np.ndarray: ...
+    @property
+    def Q(self) -> np.ndarray: ...
+
+
+@dataclass(frozen=True)
+class ModelError:
+    """A model's error as a share of the response, its 95 % interval, and as a share of the apparent power."""
+
+    value: float
+    interval: tuple[float, float]
+    of_S: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """As `result.json` has it."""
+        return {"value": self.value, "interval": list(self.interval), "of_S": self.of_S}
+
+    @classmethod
+    def of(cls, content: Mapping[str, Any]) -> "ModelError":
+        """From `to_dict`."""
+        low, high = content["interval"]
+        return cls(content["value"], (low, high), content["of_S"])
+
+    def __str__(self) -> str:
+        return f"{in_percent(self.value)} of its response ({in_percent(self.of_S)} of S)"
+
+
+def in_percent(share: float) -> str:
+    """A share to two digits: '0.57 %', '12 %'."""
+    percent = 100 * share
+    return f"{percent:.2g} %" if percent < 99.5 else f"{percent:.0f} %"
+
+
+def model_error(played: Sequence[Playback]) -> ModelError:
+    """The error of a model over some events together."""
+    sums = np.concatenate([_sums(one) for one in played])  # (blocks, 3)
+    left, response, power = sums.sum(axis=0)
+    ratio = left / max(response, 1e-30)
+    if not np.isfinite(left):
+        return ModelError(np.inf, (np.inf, np.inf), np.inf)
+    without = (left - sums[:, 0]) / np.maximum(response - sums[:, 1], 1e-30)
+    count = len(sums)
+    error = float(np.sqrt((count - 1) / count * np.sum((without - ratio) ** 2))) if count > 1 else np.inf
+    reach = quantile(count) * error
+    root = lambda square: float(np.sqrt(max(square, 0.0)))  # noqa: E731
+    return ModelError(root(ratio), (root(ratio - reach), root(ratio + reach)), root(left / max(power, 1e-30)))
+
+
+def _sums(played: Playback) -> np.ndarray:
+    """Squares of what is left, of the response, both less those of the noise, and of the power; by block (b, 3)."""
+    event, record = played.event, played.event.record
+    S, S_0 = record.P + 1j * record.Q, event.P0 + 1j * event.Q0
+    squares = np.stack([np.abs(played.P + 1j * played.Q - S) ** 2, np.abs(S - S_0) ** 2, np.abs(S) ** 2])
+    squares[:2] -= noise_variance(event)
+    known = np.isfinite(S)
+    squares[0, known & ~np.isfinite(squares[0])] = np.inf  # what diverged
+    squares = np.where(known, squares, 0.0)[:, event.start :]
+    return np.add.reduceat(squares, np.arange(0, squares.shape[1], max(1, round(LENGTH / record.step))), axis=1).T
+
+
+def noise_variance(event: Event) -> float:
+    """Variance of P plus that of Q before the dip [pu²], without mean, slope and slow part: drift."""
+    total = 0.0
+    for row in event.calm:
+        quiet = row[np.isfinite(row)]
+        if len(quiet) > 4 * SLOW:
+            fast = without_slow(without_drift([quiet - quiet.mean()])[0])
+            total += float(np.sum(fast**2) / (len(quiet) - SLOW - 2))
+    return total

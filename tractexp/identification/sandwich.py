@@ -1,0 +1,130 @@
+r"""How far an estimate by least squares scatters where what it leaves is no noise.
+
+With the sensitivities J and the residual r in blocks b, the estimate without block b is, to first order,
+
+    theta_(-b) - theta = (J'J - J_b'J_b)^-1 J_b' r_b
+
+and the covariance is (G - 1)/G times the sum of their outer products over the G blocks: the sandwich
+(J'J)^-1 (sum_b J_b' r_b r_b' J_b) (J'J)^-1 of White (1982) for residuals that are correlated within blocks, with each
+residual given back what the fit took of it. P0 and Q0 are means before the dip; leaving out a block of that moves them,
+and the estimate with them. In no direction is the variance less than that of independent residuals.
+
+Source: White 1982; Bell and McCaffrey 2002 (CR3); MacKinnon, Nielsen and Webb 2023.
+It holds the scatter and not the bias: what a missing effect moves a parameter by is told by rival structures.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.identification.blocks import blocks_of, quantile
+from tractexp.identification.information import STRUCTURAL, Information
+from tractexp.identification.likelihood import Likelihood
+
+ROUNDING = 1e-13  # of the largest singular value of a covariance's root: what the records do not see is 0 there
+WALL = 1e-3  # of a range: what rests on a bound stays there when a block is left out
+
+
+@dataclass(frozen=True, eq=False)
+class Scatter:
+    """The scatter of least squares: its `information`, and beside it what intervals need.
+
+    `quantile` is Student's t at 97.5 %; `ratio` (d,) is each standard error over that of independent residuals, and
+    `spread` their geometric mean over all directions.
+    """
+
+    information: Information
+    quantile: float
+    ratio: np.ndarray
+    spread: float
+
+
+def scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
+    """Of a fit by Eq. (8) at coordinates (d,), whose rows are in units of what it leaves.
+
+    Parameters inside their bounds are told with those on a bound held there; one on a bound as if all were free,
+    beyond the bounds, too.
+    """
+    problem, whole = likelihood.problem, likelihood.with_initial_power
+    rows, J = whole.jacobian(whole.placed(unit[None])[0])
+    free, drive = likelihood.free, problem.drive
+    blocks = blocks_of(problem.events, drive, free)
+    shaped, rows, power = (
+        J.reshape(drive.channels, -1, J.shape[1]),
+        rows.reshape(drive.channels, -1),
+        _of_power(whole, blocks),
+    )
+    influences = lambda columns: _influences(shaped, rows, columns, free, blocks, power)  # noqa: E731
+    every = np.arange(free)
+    inside = every[(unit[:free] > WALL) & (unit[:free] < 1 - WALL)]
+    root, ratio = np.zeros((free, free)), np.ones(free)
+    own, ratio[inside], spread = _root(J[:, inside], influences(inside))
+    root[np.ix_(every[: len(own)], inside)] = own
+    if len(inside) < free:
+        held = np.setdiff1d(every, inside)
+        rows = rows - (J[:, :free] @ np.linalg.lstsq(J[:, :free], rows.ravel())[0]).reshape(rows.shape)
+        full, wider, _ = _root(J[:, :free], influences(every))
+        ratio[held] = wider[held]
+        root[len(own) + np.arange(len(held)), held] = 1 / np.sqrt(np.diag(np.linalg.pinv(full.T @ full))[held])
+    information = Information(
+        problem.space.names, likelihood.values(unit), problem.upper - problem.lower, root, ROUNDING
+    )
+    return Scatter(information, quantile(len(blocks)), ratio, spread)
+
+
+def _of_power(likelihood: Likelihood, blocks: Sequence[slice]) -> np.ndarray:
+    """The change of P0 and Q0 of each event when a block is left out of their means, (G, 2 E), in ranges."""
+    drive, free = likelihood.problem.drive, likelihood.free
+    change = np.zeros((len(blocks), drive.events, 2))
+    if drive.channels == 2:
+        for e, event in enumerate(likelihood.problem.events):
+            first = int(drive.first[e])
+            steady = slice(first + event.steady.start, first + event.steady.stop)
+            n = steady.stop - steady.start
+            for b, block in enumerate(blocks):
+                a, z = max(block.start, steady.start), min(block.stop, steady.stop)
+                if 0 < z - a < n:
+                    off = np.nanmean(drive.measured[:, a:z], axis=1) - drive.before[e]
+                    change[b, e] = -np.nan_to_num(off) * (z - a) / (n - (z - a))
+    return change.reshape(len(blocks), -1) / likelihood.width[free:]
+
+
+def _influences(
+    J: np.ndarray, rows: np.ndarray, columns: np.ndarray, free: int, blocks: Sequence[slice], power: np.ndarray
+) -> np.ndarray:  # fmt: skip
+    """The change (G, columns) of the estimate when each block of J (C, N, D) and rows (C, N) is left out."""
+    own, before = J[:, :, columns], J[:, :, free:]
+    flat = own.reshape(-1, len(columns))
+    whole, cross = flat.T @ flat, flat.T @ before.reshape(len(flat), -1)
+    scale = np.sqrt(np.maximum(np.diag(whole), 1e-300))
+    made = []
+    for block, change in zip(blocks, power, strict=True):
+        a, r = own[:, block].reshape(-1, len(columns)), rows[:, block].ravel()
+        rest = (whole - a.T @ a) / np.outer(scale, scale)
+        made.append(np.linalg.pinv(rest, STRUCTURAL**2, hermitian=True) @ ((a.T @ r - cross @ change) / scale) / scale)
+    return np.array(made)
+
+
+def _root(J: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Rows (k, d) whose inverse products are the covariance of what J (R, d) sees, and how that compares with J's own.
+
+    `moved` (G, d) are the estimates without each block. Along the directions of J, in which independent residuals of
+    unit variance have unit variance, less is raised to it. The ratios are those of `Scatter`.
+    """
+    size = np.linalg.norm(J, axis=0)
+    scale = np.where(size > 0, size, 1.0)
+    _, singular, directions = np.linalg.svd(J / scale, full_matrices=False)
+    seen = singular > STRUCTURAL * singular.max(initial=0.0)
+    along = singular[seen, None] * directions[seen] * scale
+    z = moved @ along.T
+    values, vectors = np.linalg.eigh((len(moved) - 1) / len(moved) * z.T @ z)
+    values = np.maximum(values, 1.0)
+    back = np.linalg.pinv(along)
+    plain, whole = (np.sqrt(((back @ v) ** 2).sum(axis=1)) for v in (vectors, vectors * np.sqrt(values)))
+    ratio = np.divide(whole, plain, out=np.ones_like(whole), where=plain > 0)
+    return (
+        (vectors / np.sqrt(values)).T @ along,
+        ratio,
+        float(np.exp(np.mean(np.log(values)) / 2)) if seen.any() else 1.0,
+    )
