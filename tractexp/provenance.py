@@ -57,8 +57,24 @@ def folders() -> set[Path]:
     return {PACKAGE, *(Path(path) for package in plugin.packages() for path in package.__path__)}
 
 
+def told(record: Any) -> dict[str, Any]:
+    """The identity of a `Record`: sha256, source, base and, where another one, that of its file.
+
+    Kilovolts and MVA are null where nobody said what one per unit is.
+    """
+    known = record.file_base.known
+    made = {"sha256": digest(record), "source": record.source, "base": _base(record.base, known)}
+    return made | ({} if record.given_base is None else {"given_base": _base(record.given_base, known)})
+
+
+def _base(base: Any, known: bool) -> dict[str, Any]:
+    voltage = None if base.voltage == 1.0 else base.voltage
+    power = base.power if known else None
+    return {"voltage_kV": voltage, "power_MVA": power, "frequency_Hz": base.frequency, "origin": base.origin}
+
+
 def digest(record: Any) -> str:
-    """SHA-256 of the channels of a `Record` as they were read: equal for equal numbers, whatever the file is called."""
+    """SHA-256 of the channels of a `Record` on its base: equal for equal numbers, whatever the file is called."""
     import numpy as np
 
     made = hashlib.sha256()

@@ -187,7 +187,7 @@ class Identification(Written):
         self, event: Any = None, *, t: Any = None, U: Any = None, f: Any = None, P0: float | None = None,
         Q0: float | None = None,
     ) -> Response:  # fmt: skip
-        """P and Q [pu] (N,) that the identified load draws in an event, or from a voltage.
+        """P and Q [pu] (N,) that the identified load draws in an event, or from a voltage, on the base of its file.
 
         `event` is one that `tractexp.read` gave (or what it reads, holding one dip): its voltage, and the power before
         it. Otherwise `U` [pu] at uniform times `t` [s], (N,) each, with `f` [Hz] where known; `P0` and `Q0` are by
@@ -198,7 +198,7 @@ class Identification(Written):
         if event is not None:
             values = np.array([self.result.parameters[name] for name in self.model.model.names])
             (one,) = dips_of("event", event, least=1)[:1]
-            return respond_to(self.model.model, values, one)
+            return respond_to(self.model.model, values, one, self.result.base)
         time, voltage = (np.asarray(values, dtype=float) for values in (t, U))
         return Response("prediction", time, voltage, *self.result.predict(time, voltage, f, P0, Q0))
 

@@ -13,6 +13,7 @@ from tractexp.overrides import assigned
 from tractexp.record import Base, Events, Reader, Record, Waves, detect
 from tractexp.record.dips import Dip, check_numbers, chosen, level, numbered
 from tractexp.record.phasor import Phasors
+from tractexp.record.record import LOAD
 from tractexp.recording.arrangement import arranged, tuned
 from tractexp.recording.connection import usual
 from tractexp.recording.estimator import estimator_of
@@ -84,7 +85,7 @@ class WaveformReader(Reader):
         U, S = level(first)
         if S < 1e-6:
             raise UserError(f"{self.path}: data.currents carry no power before the first dip ({1e6 * S:.2g} VA)")
-        return [replace(dip, made=_per_unit(dip.made, Base(U, S, frequency))) for dip in made]
+        return [replace(dip, made=_per_unit(dip.made, Base(U, S, frequency, LOAD))) for dip in made]
 
     def _whole(self, feeder: Feeder, stream: Stream, frequency: float) -> Record:
         """All of one segment, in kV, MW and Mvar."""

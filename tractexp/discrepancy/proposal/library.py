@@ -88,8 +88,10 @@ class Size:
     def parameter(self, name: str, about: str, default: float = 0.0) -> Parameter:
         """As a parameter of an effect."""
         bounds = (-self.bound, self.bound)
-        told = {"null": 0.0, "power_exponent": self.power_exponent, "name": name}
-        return Parameter(default, bounds, self.unit, about, SOURCE, self.latex, **told)
+        return Parameter(
+            default, bounds, self.unit, about, SOURCE, self.latex, null=0.0, power_exponent=self.power_exponent,
+            name=name,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
