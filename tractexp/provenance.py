@@ -4,6 +4,7 @@ import functools
 import hashlib
 import shlex
 import subprocess
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -63,8 +64,20 @@ def told(record: Any) -> dict[str, Any]:
     Kilovolts and MVA are null where nobody said what one per unit is.
     """
     known = record.file_base.known
-    made = {"sha256": digest(record), "source": record.source, "base": _base(record.base, known)}
+    source = {"file": record.source, **record.identity}
+    made = {"sha256": digest(record), "source": source, "base": _base(record.base, known)}
     return made | ({} if record.given_base is None else {"given_base": _base(record.given_base, known)})
+
+
+def in_words(told: Mapping[str, Any]) -> str:
+    """The identity of a record as `told` gives it: where it is from and what one per unit is; "" in early results."""
+    source, said = told.get("source", {}), []
+    said += [f"{key} {text}" * (key != "file") or text for key, text in source.items() if text]
+    for key, name in (("base", "per unit of"), ("given_base", "in the file of")):
+        base = told.get(key, {})
+        sizes = [f"{base[size]:.6g} {size.partition('_')[2]}" for size in ("voltage_kV", "power_MVA") if base.get(size)]
+        said += [f"{name} {' and '.join(sizes)}"] if sizes else []
+    return "; ".join(said)
 
 
 def _base(base: Any, known: bool) -> dict[str, Any]:

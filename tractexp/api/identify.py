@@ -72,6 +72,15 @@ class Estimate:
     about: str
     trusted: bool = True  # whether the model describes the load, so that interval and verdict mean what they say
 
+    def times(self, factor: float) -> "Estimate":
+        """The estimate in a unit of which one is a `factor`-th of its own."""
+        low, high = self.bounds
+        return replace(
+            self, value=factor * self.value, search=factor * self.search, bounds=(factor * low, factor * high),
+            interval=self.interval and (factor * self.interval[0], factor * self.interval[1]),
+            standard_error=None if self.standard_error is None else factor * self.standard_error,
+        )  # fmt: skip
+
     def __repr__(self) -> str:
         if not self.trusted:
             return f"{self.name} = {self.value:.5g} {self.unit}: not sure, for the model does not describe this load"
@@ -157,6 +166,14 @@ class Identification(Written):
             )  # fmt: skip
         return made
 
+    @functools.cached_property
+    def on_given_base(self) -> Estimates:
+        """The estimates on the base of the record's file: those of `parameters` where that is the record's own."""
+        ratio, exponents = self.result.base.ratio, {p.name: p.power_exponent for p in self.model.model.parameters}
+        return Estimates(
+            {name: e.times(ratio ** exponents[name.partition("[")[0]]) for name, e in self.parameters.items()}
+        )
+
     @property
     def grade(self) -> str:
         """`adequate`, `effect_missing` or `wrong_model`; "" where it was not judged."""
@@ -236,7 +253,7 @@ class Identification(Written):
         said += [
             f"{e['name']} ({e['role']}): {', '.join(f'{key} {e[key]:.3%}' for key in r.epsilons)}" for e in r.events
         ]
-        said += [told] if (told := self.search_told()) else []
+        said += [told for told in (self.result.on_given_base(), self.search_told()) if told]
         said += [f"note: {note}" for note in r.uncertainty.get("notes", ())]
         return said + [f"next: {sentence}" for sentence in (self.advice if "judged" in self.__dict__ else ())]
 

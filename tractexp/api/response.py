@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Response:
-    """Voltage and calculated power, (N,) each, in pu of the file; `measured` P and Q, and `epsilon` of Eq. (20), where recorded."""
+    """Voltage and calculated power, (N,) each, in pu of the file; where recorded `measured` P and Q, `epsilon` (20)."""
 
     title: str
     t: np.ndarray  # s

@@ -19,7 +19,8 @@ from tractexp.identification.seen import seen_by_estimator
 from tractexp.model.drive import PHASORS, Drive
 from tractexp.model.model import CLASSICAL, Model, compose
 from tractexp.plugin import build
-from tractexp.record import Event, OwnBase, WaveEvent, find_dips, in_waves
+from tractexp.record import Event, OwnBase, Record, WaveEvent, find_dips, in_waves
+from tractexp.record.own_base import scaled
 
 EPSILONS = ("epsilon_p", "epsilon_q", "epsilon_i")
 AFTER = 0.15  # s after a dip's start in which the currents' error counts
@@ -156,6 +157,19 @@ class Result:
         """The base of power that the parameters are on, and that of the file."""
         return OwnBase(**self.own_base)
 
+    def on_base_of(self, record: Record) -> dict[str, float]:
+        """The parameters on the base that a record is on."""
+        ratio = self.base.over(record)
+        motor, static, effects, *_ = parts(self.model)
+        exponents = {p.name: p.power_exponent for part in (motor, static, *effects) for p in part.parameters}
+        return {name: scaled(value, exponents[name], ratio) for name, value in self.parameters.items()}
+
+    def on_given_base(self) -> str:
+        """The parameters whose values are others on the file's base, in one line; "" where it is the record's own."""
+        own = by_event(self.parameters, self.per_event)
+        told = [f"{n} = {v:.5g}" for n, v in self.parameters_on_given_base.items() if v != own[n]]
+        return f"on {self.base.file}: {', '.join(told)}" if told else ""
+
     @property
     def free(self) -> dict[str, float]:
         """The estimate by the names of intervals and verdicts: T_m[1], T_m[2] where events have values of their own."""
@@ -186,9 +200,10 @@ class Result:
     ) -> tuple[np.ndarray, np.ndarray]:
         """P and Q [pu] for a new voltage U [pu] at uniform times t [s]; f [Hz] where the frequency is known.
 
-        Powers, given and calculated, are on the file's base. The voltage before the first dip (all of it where there is none) gives the steady state. P0 and Q0 are
-        the power drawn there; by default that of the event the model was identified on. Of a model identified in
-        waveforms the voltage is taken as balanced, and the power is instantaneous.
+        Powers, given and calculated, are on the file's base. The voltage before the first dip (all of it where there is
+        none) gives the steady state. P0 and Q0 are the power drawn there; by default that of the event the model was
+        identified on. Of a model identified in waveforms the voltage is taken as balanced, and the power is
+        instantaneous.
         """
         model = compose(*parts(self.model))
         t, U = np.asarray(t, dtype=float), np.asarray(U, dtype=float)

@@ -17,8 +17,8 @@ def seen_by_estimator(event: WaveEvent, currents: np.ndarray) -> tuple[Event, np
     measured, calculated = (_phasors(event, i) for i in (np.nan_to_num(event.currents), currents))
     was, own = event.phasors, event.phasors.record
     record = Record(
-        own.name, measured.t, measured.U, measured.S.real, measured.S.imag, base=own.base, given_base=own.given_base, source=own.source,
-        notes=own.notes,
+        own.name, measured.t, measured.U, measured.S.real, measured.S.imag, base=own.base, source=own.source,
+        notes=own.notes, given_base=own.given_base, identity=own.identity,
     )  # fmt: skip
     start, end = np.searchsorted(measured.t, [was.t_start, was.t_end]).tolist()
     last = len(measured.t) - 1

@@ -65,7 +65,8 @@ class Record:
     Arrays have shape (N,), are finite except where `P` or `Q` is missing (nan: a gap, left out of every sum),
     and are sampled uniformly. `window` is what its phasors are averages over, where that is known; `more` are further
     channels, which no model reads. `source` says where the record came from, `notes` what was done to it or found
-    odd about it, one sentence each. `given_base` is the base in which the file was, None where that is `base`.
+    odd about it, one sentence each. `given_base` is the base in which the file was, None where that is `base`;
+    `identity` is what else tells which load it is: station, device, load, channels.
     """
 
     name: str
@@ -82,6 +83,7 @@ class Record:
     more: Mapping[str, np.ndarray] = field(default_factory=dict)  # P_3, P_5, ... [pu], THD_u, THD_i
     waves: Waves | None = None  # what the phasors were measured from, where the recorder kept it
     given_base: Base | None = None
+    identity: Mapping[str, str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         span = f"{self.samples} samples of {', '.join(self.channels)}"

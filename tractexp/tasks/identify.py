@@ -41,6 +41,8 @@ def report(fit: "Identification") -> None:
     say()
     say(as_sentence(fit.headline))
     estimates(fit)
+    if told := fit.result.on_given_base():
+        say(told)
     errors = fit.result.epsilons
     rows = [[e["name"], e["role"], *(f"{e[key]:.3%}" for key in errors)] for e in fit.result.events]
     table(["event", "role", *errors], rows)
@@ -110,7 +112,7 @@ def track(job: Job, fit: "Identification", paths: list[Path], predictor: bool) -
     best = history.objective[known]
     job.log(
         name=f"{job.variant}, {' and '.join(e.record.name for e in job.events.train)}, seed {job.seed}",
-        values=result.parameters,
+        values=result.parameters | {f"given_base.{n}": v for n, v in result.parameters_on_given_base.items()},
         metrics=metrics,
         curves={
             "fitness": (np.flatnonzero(known), best),
