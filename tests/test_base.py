@@ -15,6 +15,7 @@ from test_wave_input import columns, table
 import tractexp
 from tractexp.errors import UserError
 from tractexp.exchange.format import Identified
+from tractexp.provenance import digest
 from tractexp.record import Base, OwnBase, detect, in_waves, on_own_base
 from tractexp.record.own_base import rebased
 from tractexp.tracking.model import Predictor
@@ -220,6 +221,8 @@ def test_what_is_saved_comes_back_on_its_bases(fits, records, tmp_path):
     again = tractexp.load(fit.save(tmp_path / "fit.json"))
     assert again.result == fit.result
     assert again.setup.train[0].record.given_base == Base()
+    assert again.result.records[0]["sha256"] == digest(scaled(records[0], 5.04))  # as it was read
+    assert digest(again.setup.train[0].record) == again.result.records[0]["sha256"]
     assert again.setup.train[0].record.base == fit.setup.train[0].record.base
     assert np.array_equal(again.predict(held).P, fit.predict(held).P)
     fit.result.write(tmp_path / "result.json")

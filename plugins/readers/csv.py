@@ -110,10 +110,11 @@ class CSV(Tabular, Reader):
         raw = Record(name=self._name(path, told), source=path, notes=(*told.notes, *made.notes), **arrays)
         even = raw if told.uniform else raw.uniform(table.place)
         base, note = self._base(even, made, told, base)
-        by = Base(*(
+        voltage, power = (
             size if made.absolute[key] or (made.absolute[key] is None and size_given) else 1.0
             for key, size, size_given in (("U", base.voltage, given), ("P", base.power, self.base_power or told.base))
-        ))  # fmt: skip
+        )
+        by = Base(voltage, power)
         arrays = by.per_unit(even.channels)
         record = replace(even, base=base, notes=(*even.notes, *note), **arrays)
         return record.check(table.place if record.samples == raw.samples else None)
@@ -133,7 +134,8 @@ class CSV(Tabular, Reader):
                 f"{record.where}: U is in kV, and the unit of P and Q is not told; say data.units={{P: MW, Q: Mvar}} "
                 "or data.units={P: pu, Q: pu}, or the base, data.base_voltage and data.base_power"
             )
-        origin = next((by.origin for by in (told.base, same) if by), GIVEN) if self.base_power is None else GIVEN
+        chosen_by = None if self.base_power else told.base or same
+        origin = chosen_by.origin if chosen_by else GIVEN
         told_by = []
         if (voltage is None and made.absolute["U"]) or (power is None and made.absolute["P"]):
             U, S = level(record)

@@ -198,5 +198,5 @@ def record_again(content: Mapping[str, Any]) -> Record:
     waves = Waves.of(content["waves"]) if content.get("waves") else None
     return Record(
         content["name"], base=base, source=content["source"], notes=notes, window=window, more=more, waves=waves,
-        given_base=given, identity=content.get("identity", {}), **arrays,
+        given_base=given, identity=content.get("identity", {}), digest=content.get("digest", ""), **arrays,
     )  # fmt: skip

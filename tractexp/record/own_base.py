@@ -11,6 +11,7 @@ from typing import TypeVar
 import numpy as np
 
 from tractexp.errors import UserError
+from tractexp.provenance import digest
 from tractexp.record.event import Event, detect
 from tractexp.record.record import GIVEN, LOAD, Base, Record
 from tractexp.record.wave_event import WaveEvent, in_waves
@@ -108,7 +109,7 @@ def rebased(event: Event, ratio: float, own: OwnBase) -> Event:
     arrays = by.per_unit({"P": record.P, "Q": record.Q})
     note = said(own) if record.given_base is None else ""
     return detect(
-        replace(record, base=base, given_base=record.file_base, more=by.per_unit(record.more),
+        replace(record, base=base, given_base=record.file_base, digest=digest(record), more=by.per_unit(record.more),
                 notes=(*record.notes, *[note] * bool(note)), **arrays)
     )  # fmt: skip
 

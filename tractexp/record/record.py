@@ -66,7 +66,8 @@ class Record:
     and are sampled uniformly. `window` is what its phasors are averages over, where that is known; `more` are further
     channels, which no model reads. `source` says where the record came from, `notes` what was done to it or found
     odd about it, one sentence each. `given_base` is the base in which the file was, None where that is `base`;
-    `identity` is what else tells which load it is: station, device, load, channels.
+    `identity` is what else tells which load it is: station, device, load, channels; `digest` is the SHA-256 of its
+    channels as they were read, "" where they still are that.
     """
 
     name: str
@@ -84,6 +85,7 @@ class Record:
     waves: Waves | None = None  # what the phasors were measured from, where the recorder kept it
     given_base: Base | None = None
     identity: Mapping[str, str] = field(default_factory=dict)
+    digest: str = ""
 
     def __repr__(self) -> str:
         span = f"{self.samples} samples of {', '.join(self.channels)}"
