@@ -2,6 +2,8 @@
 
 Bounds and priors of a model mean a load that draws about one per unit. A record in per unit of a system (100 MVA) is
 therefore fitted per unit of the apparent power before the first dip that is fitted, and so are all events beside it.
+A load that draws between a half and one of its per unit is on a base of its own, its rating: there the bounds mean what
+they say, and its user knows the values on that base.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,7 +18,7 @@ from tractexp.record.event import Event, detect
 from tractexp.record.record import GIVEN, LOAD, Base, Record
 from tractexp.record.wave_event import WaveEvent, in_waves
 
-NEAR = 0.05  # of P or S before the dip: so near to one it is on the base of its own load
+LEAST_S, MOST_P = 0.5, 1.05  # pu before the dip, on a base of the load: bounds reach to a torque of one
 SMALLEST = 1e-6  # pu: less apparent power is no load, and no base
 
 Scalable = TypeVar("Scalable", float, np.ndarray)
@@ -39,10 +41,10 @@ class OwnBase:
 
     @classmethod
     def of(cls, event: Event) -> "OwnBase":
-        """That of the first event that is fitted; what it is on already where P or S before its dip is about one."""
+        """That of the first event that is fitted; what it is on already where that is one of the load."""
         at, S = cls.at(event.record), float(np.hypot(event.P0, event.Q0))
-        own = event.record.base.origin == LOAD or min(abs(S - 1), abs(abs(event.P0) - 1)) <= NEAR or not S > SMALLEST
-        return at if own else replace(at, power=S * at.power)
+        own = event.record.base.origin == LOAD or (S >= LEAST_S and abs(event.P0) <= MOST_P)
+        return at if own or not S > SMALLEST else replace(at, power=S * at.power)
 
     @property
     def ratio(self) -> float:
