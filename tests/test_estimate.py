@@ -178,7 +178,8 @@ def test_a_headline_tells_the_size_and_the_bounds_that_hold_a_parameter():
     told = graded(Surprise(0.0009, "", 2.0, "P of dip"), error, ModelError(0.074, (0.07, 0.08), 0.011), ["T_m at 1"])
     assert told.sentence == (
         "the model describes this load within 5.7 % of its response (0.78 % of S), the held-out dips within 7.4 % of"
-        " its response (1.1 % of S); an effect is missing, P of dip is 2 times as loud as the noise; a bound holds T_m at 1"
+        " its response (1.1 % of S); an effect is missing, P of dip is 2 times as loud as the noise; a bound holds"
+        " T_m at 1"
     )
 
 

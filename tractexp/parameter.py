@@ -12,7 +12,9 @@ class Parameter:
     """One number to identify: its default, bounds, unit, meaning and source.
 
     The attribute a plugin assigns it to is its name. `null`, where given, is the value at which the
-    equations are as if the term were absent. `symbol` is LaTeX.
+    equations are as if the term were absent. `symbol` is LaTeX. `power_exponent` says how the value goes with
+    the base of power, whatever its unit: on a base of a k-th of the MVA the same load has k^power_exponent times the
+    value. A power, a torque, an inertia or an admittance has 1, an impedance -1; shares, times and voltages have 0.
     """
 
     default: float
@@ -22,6 +24,7 @@ class Parameter:
     source: str
     symbol: str = ""
     null: float | None = None
+    power_exponent: int = field(default=0, kw_only=True)
     name: str = field(default="", compare=False)
 
     @property
@@ -47,6 +50,11 @@ class Parameter:
             raise UserError(f"{where}: the default {self.default:g} is outside the bounds [{low:g}, {high:g}]")
         if self.null is not None and not low <= self.null <= high:
             raise UserError(f"{where}: the null {self.null:g} is outside the bounds [{low:g}, {high:g}]")
+        if not isinstance(self.power_exponent, int):
+            raise UserError(
+                f"{where}: power_exponent={self.power_exponent!r} must be a whole number: 1 of a power or an"
+                " admittance, -1 of an impedance, 0 of what no base of power changes"
+            )
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ import functools
 import hashlib
 import shlex
 import subprocess
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -57,8 +58,39 @@ def folders() -> set[Path]:
     return {PACKAGE, *(Path(path) for package in plugin.packages() for path in package.__path__)}
 
 
+def told(record: Any) -> dict[str, Any]:
+    """The identity of a `Record`: sha256, source, base and, where another one, that of its file.
+
+    Kilovolts and MVA are null where nobody said what one per unit is.
+    """
+    known = record.file_base.known
+    source = {"file": record.source, **record.identity}
+    made = {"sha256": digest(record), "source": source, "base": _base(record.base, known)}
+    return made | ({} if record.given_base is None else {"given_base": _base(record.given_base, known)})
+
+
+def in_words(told: Mapping[str, Any]) -> str:
+    """The identity of a record as `told` gives it: where it is from and what one per unit is; "" in early results."""
+    source, said = told.get("source", {}), []
+    said += [f"{key} {text}" * (key != "file") or text for key, text in source.items() if text]
+    for key, name in (("base", "per unit of"), ("given_base", "in the file of")):
+        base = told.get(key, {})
+        sizes = [f"{base[size]:.6g} {size.partition('_')[2]}" for size in ("voltage_kV", "power_MVA") if base.get(size)]
+        said += [f"{name} {' and '.join(sizes)}"] if sizes else []
+    return "; ".join(said)
+
+
+def _base(base: Any, known: bool) -> dict[str, Any]:
+    voltage = None if base.voltage == 1.0 else base.voltage
+    power = base.power if known else None
+    return {"voltage_kV": voltage, "power_MVA": power, "frequency_Hz": base.frequency, "origin": base.origin}
+
+
 def digest(record: Any) -> str:
     """SHA-256 of the channels of a `Record` as they were read: equal for equal numbers, whatever the file is called."""
+    if record.digest:
+        return record.digest
+
     import numpy as np
 
     made = hashlib.sha256()

@@ -20,8 +20,9 @@ class FaultResistance(Effect):
     Departures: the same in three phases; that it begins and ends is told from the voltage.
     """
 
-    fault_conductance = Parameter(0.0, (0.0, 5.0), "pu", "on the record's base", SOURCE, "g_f", null=0.0)
-
+    fault_conductance = Parameter(
+        0.0, (0.0, 5.0), "pu", "on the record's base", SOURCE, "g_f", null=0.0, power_exponent=1
+    )
     places, kind = ("bus",), "law"
     waves_only = "phasors do not tell when a fault begins and ends"
     relevant = {"fault_conductance": 0.05}

@@ -39,9 +39,12 @@ class FeederImpedance(Effect):
     no solution (voltage collapse) the last iterate stands.
     """
 
-    R_f = Parameter(0.0, (-0.02, 0.1), "pu", "feeder resistance on the record's base", SOURCE, null=0.0)
-    X_f = Parameter(0.0, (-0.05, 0.2), "pu", "feeder reactance on the record's base", SOURCE, null=0.0)
-
+    R_f = Parameter(
+        0.0, (-0.02, 0.1), "pu", "feeder resistance on the record's base", SOURCE, null=0.0, power_exponent=-1
+    )
+    X_f = Parameter(
+        0.0, (-0.05, 0.2), "pu", "feeder reactance on the record's base", SOURCE, null=0.0, power_exponent=-1
+    )
     places, kind = ("bus",), "law"
     order = 2
     relevant = {"R_f": 0.01, "X_f": 0.02}

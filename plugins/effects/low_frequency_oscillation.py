@@ -20,8 +20,12 @@ class LowFrequencyOscillation(Effect):
     Departures: one mode, with one phase for P and Q.
     """
 
-    oscillation_P = Parameter(0.0, (-0.6, 0.6), "pu", "active power of the mode per U_0", SOURCE, "a_P", null=0.0)
-    oscillation_Q = Parameter(0.0, (-0.6, 0.6), "pu", "reactive power of the mode per U_0", SOURCE, "a_Q", null=0.0)
+    oscillation_P = Parameter(
+        0.0, (-0.6, 0.6), "pu", "active power of the mode per U_0", SOURCE, "a_P", null=0.0, power_exponent=1
+    )
+    oscillation_Q = Parameter(
+        0.0, (-0.6, 0.6), "pu", "reactive power of the mode per U_0", SOURCE, "a_Q", null=0.0, power_exponent=1
+    )
     mode_frequency = Parameter(2.0, (0.5, 10.0), "Hz", "frequency of the mode", SOURCE, "f_o")
     mode_damping = Parameter(0.1, (0.005, 0.5), "1", "damping ratio of the mode", SOURCE, r"\zeta")
     mode_phase = Parameter(0.0, (0.0, 3.141593), "rad", "phase of the mode", SOURCE, r"\varphi")

@@ -20,8 +20,12 @@ class NegativeSequencePath(Effect):
     Departures: linear in the voltage, with one lag.
     """
 
-    conjugate_conductance = Parameter(0.0, (-3.0, 3.0), "pu", "of conj(v), its real part", SOURCE, "g_n", null=0.0)
-    conjugate_susceptance = Parameter(0.0, (-3.0, 3.0), "pu", "of conj(v), its imaginary part", SOURCE, "b_n", null=0.0)
+    conjugate_conductance = Parameter(
+        0.0, (-3.0, 3.0), "pu", "of conj(v), its real part", SOURCE, "g_n", null=0.0, power_exponent=1
+    )
+    conjugate_susceptance = Parameter(
+        0.0, (-3.0, 3.0), "pu", "of conj(v), its imaginary part", SOURCE, "b_n", null=0.0, power_exponent=1
+    )
     conjugate_lag = Parameter(0.002, (0.0003, 0.03), "s", "time in which it follows", SOURCE, "T_n")
 
     places, kind = ("bus",), "law"

@@ -22,8 +22,9 @@ class RotorSpeed(Effect):
     Departures: written with the inverse of the inertia, which has a null.
     """
 
-    swing = Parameter(0.0, (0.0, 2000.0), "rad/(s² pu)", "inverse of the inertia M", SOURCE, "w", null=0.0)
-
+    swing = Parameter(
+        0.0, (0.0, 2000.0), "rad/(s² pu)", "inverse of the inertia M", SOURCE, "w", null=0.0, power_exponent=-1
+    )
     places, kind = ("speed",), "lag"
     order = -1
     relevant = {"swing": 10.0}

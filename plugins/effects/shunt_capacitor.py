@@ -20,8 +20,9 @@ class ShuntCapacitor(Effect):
     Departures: none.
     """
 
-    capacitor = Parameter(0.0, (0.0, 1.0), "pu", "susceptance on the record's base", SOURCE, "b", null=0.0)
-
+    capacitor = Parameter(
+        0.0, (0.0, 1.0), "pu", "susceptance on the record's base", SOURCE, "b", null=0.0, power_exponent=1
+    )
     places, kind = ("bus",), "law"
     relevant = {"capacitor": 0.05}
     confused_with = ("static_var_compensator", "negative_sequence_braking")

@@ -19,7 +19,9 @@ class StaticVarCompensator(Effect):
     Departures: the limit is symmetric.
     """
 
-    compensator = Parameter(0.0, (0.0, 1.0), "pu", "rating on the record's base", SOURCE, "q_c", null=0.0)
+    compensator = Parameter(
+        0.0, (0.0, 1.0), "pu", "rating on the record's base", SOURCE, "q_c", null=0.0, power_exponent=1
+    )
     compensator_gain = Parameter(10.0, (1.0, 100.0), "1/pu", "gain per rating, 1/droop", SOURCE, "K")
     compensator_time = Parameter(0.03, (0.005, 0.3), "s", "time constant", SOURCE, "T_c")
 

@@ -17,8 +17,9 @@ class StatorResistance(Effect):
     Departures: none.
     """
 
-    R_s = Parameter(0.0, (-0.02, 0.2), "pu", "stator resistance on the record's base", SOURCE, null=0.0)
-
+    R_s = Parameter(
+        0.0, (-0.02, 0.2), "pu", "stator resistance on the record's base", SOURCE, null=0.0, power_exponent=-1
+    )
     places, kind = ("stator impedance",), "law"
     rival = True
     relevant = {"R_s": 0.01}

@@ -23,7 +23,9 @@ class SwitchedBanks(Effect):
     sample so that derivatives exist; no current of the switching itself.
     """
 
-    bank_rating = Parameter(0.0, (0.0, 1.0), "pu", "reactive power of all banks at U_0", SOURCE, "b_b", null=0.0)
+    bank_rating = Parameter(
+        0.0, (0.0, 1.0), "pu", "reactive power of all banks at U_0", SOURCE, "b_b", null=0.0, power_exponent=1
+    )
     bank_first = Parameter(0.9, (0.75, 0.98), "1", "voltage below which the first goes in, over U_0", SOURCE, "u_{b1}")
     bank_last = Parameter(0.7, (0.3, 0.95), "1", "voltage below which the last goes in, over U_0", SOURCE, "u_{b3}")
     bank_delay = Parameter(0.02, (0.0, 0.5), "s", "time below its level before a bank goes in", SOURCE, "T_{b+}")

@@ -25,7 +25,9 @@ class TransformerInrush(Effect):
     first two terms.
     """
 
-    inrush = Parameter(0.0, (0.0, 5.0), "pu", "reactive power at an excess flux of 1 pu", SOURCE, "q_i", null=0.0)
+    inrush = Parameter(
+        0.0, (0.0, 5.0), "pu", "reactive power at an excess flux of 1 pu", SOURCE, "q_i", null=0.0, power_exponent=1
+    )
     inrush_time = Parameter(0.3, (0.03, 2.0), "s", "time constant of the decay", SOURCE, "T_i")
     knee_margin = Parameter(0.1, (0.0, 0.6), "pu", "flux before to knee", SOURCE, "m")
     offset_exponent = Parameter(1.0, (0.0, 1.5), "1", "how the offset grows with the rise", SOURCE, "g")

@@ -22,7 +22,9 @@ class TransformerSaturation(Effect):
     event belongs to the static load.
     """
 
-    saturated_admittance = Parameter(0.0, (0.0, 10.0), "pu", "slope beyond the knee", SOURCE, "y", null=0.0)
+    saturated_admittance = Parameter(
+        0.0, (0.0, 10.0), "pu", "slope beyond the knee", SOURCE, "y", null=0.0, power_exponent=1
+    )
     flux_knee = Parameter(1.1, (1.0, 1.6), "1", "flux at the knee over its peak before", SOURCE, "k")
     flux_decay = Parameter(0.2, (0.02, 3.0), "s", "decay of the flux's offset", SOURCE, "T_l")
 

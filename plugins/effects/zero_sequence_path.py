@@ -18,7 +18,9 @@ class ZeroSequencePath(Effect):
     Departures: none.
     """
 
-    zero_susceptance = Parameter(0.0, (0.0, 100.0), "pu", "1/X_0 on the record's base", SOURCE, "b_0", null=0.0)
+    zero_susceptance = Parameter(
+        0.0, (0.0, 100.0), "pu", "1/X_0 on the record's base", SOURCE, "b_0", null=0.0, power_exponent=1
+    )
     zero_resistance = Parameter(0.05, (0.003, 3.0), "1", "R_0/X_0", SOURCE, "r_0")
 
     places, kind = ("bus",), "law"

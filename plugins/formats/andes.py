@@ -14,7 +14,7 @@ class Andes(Format):
     """Tables of an ANDES case in JSON: the bus, the motor, and the static load with the PQ it replaces.
 
     `electromechanical`, and `stator_flux` without its transients, is Motor3 and `double_cage` Motor5, on a machine base
-    equal to the record's, with constant load torque (c1 = T_m) and the T-circuit of `tractexp.exchange.circuit`;
+    equal to that of the export, with constant load torque (c1 = T_m) and the T-circuit of `tractexp.exchange.circuit`;
     `exponential` and `exponential_frequency` are FLoad, the other static loads ZIP. Add the tables to a case and
     connect the bus.
 

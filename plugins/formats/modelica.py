@@ -32,9 +32,11 @@ class Modelica(Format):
                 " export the model without the effect it belongs to"
             )
         rows = _equations(eq)
-        lines = [f"model TractionLoad {_quoted(f'{load.model.title}, per unit of the record')}"]
+        base = f"per unit of {load.power:.6g} MVA and {load.voltage:.6g} kV"
+        lines = [f"model TractionLoad {_quoted(f'{load.model.title}, {base}')}"]
         for p in load.model.parameters:
-            lines.append(f"  parameter Real {p.name} = {load.values[p.name]!r} {_quoted(f'{p.about} [{p.unit}]')};")
+            about = f"{p.about.replace(RECORD, 'this base')} [{p.unit}]"
+            lines.append(f"  parameter Real {p.name} = {load.values[p.name]!r} {_quoted(about)};")
         for name, about in BEFORE.items():
             if any(_reads(right, name) for _, right in rows) or name in ("U0", "omega_s0"):
                 lines.append(f"  parameter Real {name} = {known[name]!r} {_quoted(about)};")
@@ -49,6 +51,8 @@ class Modelica(Format):
         lines += ["equation", *(f"  {left} = {right};" for left, right in rows), "end TractionLoad;"]
         return "\n".join(lines) + "\n"
 
+
+RECORD = "the record's base"  # as parameters tell what they are on
 
 BEFORE = {
     "U0": "voltage before the event [pu]",

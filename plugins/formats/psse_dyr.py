@@ -9,7 +9,7 @@ class PsseDyr(Format):
     """Records of a PSS/E .dyr file: the motor as CIM5BL on load 'M' of the bus, the static load as IEELBL on load 'S'.
 
     CIM5BL: bus, model, load, IT, RA, XA, XM, R1, X1, R2, X2, E1, S(E1), E2, S(E2), MBASE, PMULT, H, VI, TI, TB, D,
-    TNOM. Type 1, no saturation, constant torque (D = 0), no undervoltage trip (VI = 0); MBASE is the record's base.
+    TNOM. Type 1, no saturation, constant torque (D = 0), no undervoltage trip (VI = 0); MBASE is the export's base.
     R2 = X2 = 0 is a single cage; of `stator_flux` the stator's transients are left out. IEELBL: three terms a V^n
     each for P and for Q, then the frequency coefficients, then the exponents, n1..n6; coefficients are divided by
     U_0^n, because V is the bus voltage and not U/U_0.

@@ -5,10 +5,14 @@ from tractexp.extend import Parameter, sites
 PAPER = "Wu, Fan, Zou 2022, Energies 15(14) 5034"
 
 T_PRIME = Parameter(0.1, (0.005, 0.5), "s", "transient time constant X'/X T0'", f"{PAPER}, Eq. (1)", "T'")
-X_PRIME = Parameter(0.3, (0.05, 1.5), "pu", "transient reactance on the record's base", f"{PAPER}, Eq. (2)", "X'")
+X_PRIME = Parameter(
+    0.3, (0.05, 1.5), "pu", "transient reactance on the record's base", f"{PAPER}, Eq. (2)", "X'", power_exponent=-1
+)
 C = Parameter(0.9, (0.3, 0.99), "1", "(X - X')/X", f"{PAPER}, Eq. (1)")
-M = Parameter(0.005, (0.0005, 0.03), "pu s²/rad", "inertia, H = M omega_s/2", f"{PAPER}, Eq. (1)")
-T_M = Parameter(0.5, (0.05, 1.0), "pu", "load torque, the motor's power before the event", f"{PAPER}, Eq. (1)")
+M = Parameter(0.005, (0.0005, 0.03), "pu s²/rad", "inertia, H = M omega_s/2", f"{PAPER}, Eq. (1)", power_exponent=1)
+T_M = Parameter(
+    0.5, (0.05, 1.0), "pu", "load torque, the motor's power before the event", f"{PAPER}, Eq. (1)", power_exponent=1
+)
 
 
 def single_cage(eq, T_prime, X_prime, C, T_m):

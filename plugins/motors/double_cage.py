@@ -33,7 +33,9 @@ class DoubleCage(Motor):
 
     T_prime, X_prime, C, M, T_m = _machine.T_PRIME, _machine.X_PRIME, _machine.C, _machine.M, _machine.T_M
     T_second = Parameter(0.01, (0.001, 0.05), "s", "subtransient time constant X''/X' T0''", SOURCE, "T''")
-    X_second = Parameter(0.2, (0.03, 1.2), "pu", "subtransient reactance on the record's base", SOURCE, "X''")
+    X_second = Parameter(
+        0.2, (0.03, 1.2), "pu", "subtransient reactance on the record's base", SOURCE, "X''", power_exponent=-1
+    )
 
     def declare(self, eq, T_prime, X_prime, C, M, T_m, T_second, X_second):
         from sympy import I, conjugate, re

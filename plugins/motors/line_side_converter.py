@@ -46,12 +46,22 @@ class LineSideConverter(Motor):
     resistance: float = 0.05  # of the transformer and choke, over their reactance
     weakening: float = 5.0  # gamma: how fast the inverters give way to a falling dc voltage
 
-    P_c = Parameter(0.7, (0.05, 2.0), "pu", "the converter's power before the event", STEIMEL, "P_c")
-    X_c = Parameter(0.3, (0.05, 1.5), "pu", "reactance between line and converter on the record's base", STEIMEL, "X_c")
+    P_c = Parameter(0.7, (0.05, 2.0), "pu", "the converter's power before the event", STEIMEL, "P_c", power_exponent=1)
+    X_c = Parameter(
+        0.3,
+        (0.05, 1.5),
+        "pu",
+        "reactance between line and converter on the record's base",
+        STEIMEL,
+        "X_c",
+        power_exponent=-1,
+    )
     current_bandwidth = Parameter(800.0, (100.0, 3000.0), "rad/s", "bandwidth of the current control", HARNEFORS, "a_c")
     control_delay = Parameter(4e-4, (1e-4, 2e-3), "s", "lag of computation and modulation", HARNEFORS, "T_d")
     pll_bandwidth = Parameter(60.0, (10.0, 400.0), "rad/s", "of the phase-locked loop", TEODORESCU, r"\omega_p")
-    dc_link = Parameter(0.02, (0.002, 0.2), "s", "energy of the dc link over the base power", STEIMEL, "T_{dc}")
+    dc_link = Parameter(
+        0.02, (0.002, 0.2), "s", "energy of the dc link over the base power", STEIMEL, "T_{dc}", power_exponent=1
+    )
     dc_bandwidth = Parameter(50.0, (5.0, 300.0), "rad/s", "bandwidth of the dc voltage's control", STEIMEL, "a_{dc}")
     current_limit = Parameter(1.5, (1.02, 4.0), "1", "largest current over that before the event", STEIMEL, "b")
 

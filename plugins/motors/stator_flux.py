@@ -33,8 +33,7 @@ class StatorFlux(Motor):
     """
 
     T_prime, X_prime, C, M, T_m = _machine.T_PRIME, _machine.X_PRIME, _machine.C, _machine.M, _machine.T_M
-    R_s = Parameter(0.02, (0.001, 0.2), "pu", "stator resistance on the record's base", SOURCE)
-
+    R_s = Parameter(0.02, (0.001, 0.2), "pu", "stator resistance on the record's base", SOURCE, power_exponent=-1)
     within_a_cycle = True
 
     def declare(self, eq, T_prime, X_prime, C, M, T_m, R_s):

@@ -11,7 +11,7 @@ from tractexp.filetypes.tabulated import Powers, Tabular, kind_of, powers
 from tractexp.plugin import plugin
 from tractexp.record import Base, Events, Reader, Record
 from tractexp.record.dips import Dip, check_numbers, chosen, level, numbered
-from tractexp.record.record import SIZES
+from tractexp.record.record import GIVEN, LOAD, SIZES
 from tractexp.wording import counted
 
 PRE, POST = 1.0, 10.0  # s kept of a table that holds several dips
@@ -110,10 +110,11 @@ class CSV(Tabular, Reader):
         raw = Record(name=self._name(path, told), source=path, notes=(*told.notes, *made.notes), **arrays)
         even = raw if told.uniform else raw.uniform(table.place)
         base, note = self._base(even, made, told, base)
-        by = Base(*(
+        voltage, power = (
             size if made.absolute[key] or (made.absolute[key] is None and size_given) else 1.0
             for key, size, size_given in (("U", base.voltage, given), ("P", base.power, self.base_power or told.base))
-        ))  # fmt: skip
+        )
+        by = Base(voltage, power)
         arrays = by.per_unit(even.channels)
         record = replace(even, base=base, notes=(*even.notes, *note), **arrays)
         return record.check(table.place if record.samples == raw.samples else None)
@@ -133,6 +134,8 @@ class CSV(Tabular, Reader):
                 f"{record.where}: U is in kV, and the unit of P and Q is not told; say data.units={{P: MW, Q: Mvar}} "
                 "or data.units={P: pu, Q: pu}, or the base, data.base_voltage and data.base_power"
             )
+        chosen_by = None if self.base_power else told.base or same
+        origin = chosen_by.origin if chosen_by else GIVEN
         told_by = []
         if (voltage is None and made.absolute["U"]) or (power is None and made.absolute["P"]):
             U, S = level(record)
@@ -145,7 +148,7 @@ class CSV(Tabular, Reader):
                 voltage = U
                 told_by.append(f"{U:.4g} kV line to line")
             if power is None and made.absolute["P"]:
-                power = S
+                power, origin = S, LOAD
                 told_by.append(f"{S:.4g} MVA")
         note = [f"base: {' and '.join(told_by)}, the steady state before the first dip"] if told_by else []
-        return Base(voltage or 1.0, power or 1.0, frequency), note
+        return Base(voltage or 1.0, power or 1.0, frequency, origin), note

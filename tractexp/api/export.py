@@ -3,13 +3,19 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from tractexp import files, plugin
 from tractexp.api.arguments import public
 from tractexp.api.identify import Identification
-from tractexp.errors import check_range
+from tractexp.errors import check_choice, check_range
 from tractexp.outcome import Outcome, Table
+
+if TYPE_CHECKING:
+    from tractexp.exchange.format import Identified
+
+OWN, FILE = BASES = ("own", "file")
+POWER, VOLTAGE = 100.0, 110.0  # MVA and kV, where nobody said what one per unit is
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -42,19 +48,37 @@ class Exported(Outcome):
 
 @public
 def export(
-    fit: Identification, format: str, *, bus: int = 1, power: float = 100.0, voltage: float = 110.0
+    fit: Identification, format: str, *, bus: int = 1, power: float | None = None, voltage: float | None = None,
+    base: str = OWN,
 ) -> Exported:  # fmt: skip
     """Turn an identification into the file of another simulator's format ("andes", "psse_dyr", "modelica", ...).
 
-    The load is on `bus`; 1 pu of its record stands for `power` [MVA] and `voltage` [kV, line to line]. Raises
-    `UserError` where the format cannot represent a part of the model.
+    The load is on `bus`; 1 pu of the record's file stands for `power` [MVA] and `voltage` [kV, line to line], by
+    default what the record says, else 100 and 110. `base` "own" writes values on the base of the fit, "file" on that of
+    the record's file, where it was another. Raises `UserError` where the format cannot represent a part of the model.
     """
     from tractexp.exchange.format import Identified
 
     for name, value, least in (("bus", bus, 1), ("power", power, 1e-6), ("voltage", voltage, 1e-6)):
-        check_range(f"task.{name}", value, least)
-    identified = Identified(fit.result, bus, power, voltage)
+        if value is not None:
+            check_range(f"task.{name}", value, least)
+    check_choice("task.base", base, BASES)
+    own, told = fit.result.base, fit.result.records[0].get("base", {}) if fit.result.records else {}
+    file_power = power or (own.file_power if own.known else POWER)
+    on_file = base == FILE
+    identified = Identified(
+        fit.result, bus, file_power * (1.0 if on_file else own.ratio), voltage or told.get("voltage_kV") or VOLTAGE,
+        own.ratio if on_file else 1.0,
+    )  # fmt: skip
     form = plugin.build("format", {"name": format})
     form.check_parts(identified)
     text = form.text(identified)
-    return Exported(format, form.suffix, identified.model.title, text, tuple(form.notes(identified)))
+    notes = [_told(identified, base, own.ratio, guessed=power is None and not own.known), *form.notes(identified)]
+    return Exported(format, form.suffix, identified.model.title, text, tuple(notes))
+
+
+def _told(load: "Identified", base: str, ratio: float, guessed: bool) -> str:
+    """On which base the values of an export are, in a sentence."""
+    which = "" if ratio == 1 else ", the base of the record's file" if base == FILE else ", the record's own base"
+    said = f"per unit of {load.power:.6g} MVA and {load.voltage:.6g} kV{which}"
+    return said + f"; 1 pu of the file is taken for {POWER:g} MVA, for no power is given" * guessed

@@ -72,6 +72,15 @@ class Estimate:
     bounds: tuple[float, float]
     about: str
 
+    def times(self, factor: float) -> "Estimate":
+        """The estimate in a unit of which one is a `factor`-th of its own."""
+        low, high = self.bounds
+        return replace(
+            self, value=factor * self.value, search=factor * self.search, bounds=(factor * low, factor * high),
+            interval=self.interval and (factor * self.interval[0], factor * self.interval[1]),
+            standard_error=None if self.standard_error is None else factor * self.standard_error,
+        )  # fmt: skip
+
     def __repr__(self) -> str:
         span = f", 95 % interval {self.interval[0]:.4g} .. {self.interval[1]:.4g}" if self.interval else ""
         return f"{self.name} = {self.value:.5g} {self.unit}{span}: {self.verdict}"
@@ -154,6 +163,14 @@ class Identification(Written):
             )  # fmt: skip
         return made
 
+    @functools.cached_property
+    def on_given_base(self) -> Estimates:
+        """The estimates on the base of the record's file: those of `parameters` where that is the record's own."""
+        ratio, exponents = self.result.base.ratio, {p.name: p.power_exponent for p in self.model.model.parameters}
+        return Estimates(
+            {name: e.times(ratio ** exponents[name.partition("[")[0]]) for name, e in self.parameters.items()}
+        )
+
     @property
     def grade(self) -> str:
         """`adequate`, `effect_missing` or `wrong_model`; "" where it was not judged."""
@@ -203,7 +220,7 @@ class Identification(Written):
         self, event: Any = None, *, t: Any = None, U: Any = None, f: Any = None, P0: float | None = None,
         Q0: float | None = None,
     ) -> Response:  # fmt: skip
-        """P and Q [pu] (N,) that the identified load draws in an event, or from a voltage.
+        """P and Q [pu] (N,) that the identified load draws in an event, or from a voltage, on the base of its file.
 
         `event` is one that `tractexp.read` gave (or what it reads, holding one dip): its voltage, and the power before
         it. Otherwise `U` [pu] at uniform times `t` [s], (N,) each, with `f` [Hz] where known; `P0` and `Q0` are by
@@ -214,7 +231,7 @@ class Identification(Written):
         if event is not None:
             values = np.array([self.result.parameters[name] for name in self.model.model.names])
             (one,) = dips_of("event", event, least=1)[:1]
-            return respond_to(self.model.model, values, one)
+            return respond_to(self.model.model, values, one, self.result.base)
         time, voltage = (np.asarray(values, dtype=float) for values in (t, U))
         return Response("prediction", time, voltage, *self.result.predict(time, voltage, f, P0, Q0))
 
@@ -263,7 +280,7 @@ class Identification(Written):
         said += [
             f"{e['name']} ({e['role']}): {', '.join(f'{key} {e[key]:.3%}' for key in r.epsilons)}" for e in r.events
         ]
-        said += [told] if (told := self.search_told()) else []
+        said += [told for told in (self.result.on_given_base(), self.search_told()) if told]
         said += [f"note: {note}" for note in r.uncertainty.get("notes", ())]
         return said + [f"next: {sentence}" for sentence in (self.advice if "judged" in self.__dict__ else ())]
 

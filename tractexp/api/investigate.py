@@ -17,7 +17,7 @@ from tractexp.api.arguments import public
 from tractexp.api.compose import LoadModel, model_of
 from tractexp.api.identify import Identification
 from tractexp.api.pages import Drawing, Written
-from tractexp.api.read import dips_of
+from tractexp.api.read import dips_together
 from tractexp.api.response import Response
 from tractexp.api.setup import Given
 from tractexp.errors import UserError, check_range
@@ -303,7 +303,7 @@ def investigate(
     base = model_of(model, domain).with_(bounds=bounds, fixed=fixed, substeps=substeps)
     if base.per_event:
         raise UserError(f"model.per_event={list(base.per_event)} has no meaning in an investigation; leave it out")
-    train, held = dips_of("records", records, least=1), dips_of("validate", validate)
+    train, held = dips_together(records, validate)
     question = Question(
         train=train, validate=held, model=base, seed=seed, effects=tuple(effects),
         false_alarms=chosen["false_alarms"], criteria=dict(criteria or {}),

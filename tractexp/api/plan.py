@@ -134,7 +134,7 @@ def plan(
     known = {"bounds": bounds, "fixed": fixed, "substeps": substeps, "domain": domain}
     setup = Setup.of(records, model, (), None, known)
     if isinstance(values, Identification):
-        values = values.result.parameters
+        values = values.result.on_base_of(setup.train[0].record)
     asked = {
         "parameter": parameter, "within": within, "depth": depth, "duration": duration, "rate": rate, "noise": noise,
         "jump": jump, "unbalance": unbalance, "values": values, "least": least, "events": events,
@@ -216,7 +216,7 @@ def _guess(setup: Setup, event: Event, values: Any) -> "tuple[np.ndarray, str, N
         defaults = [p.default for p in problem.parameters if p.name in problem.space.names]
         return np.array(defaults), "the model's default values", None
     given = isinstance(values, Mapping)
-    known = values if given else load(Path(values)).parameters
+    known = values if given else load(Path(values)).on_base_of(setup.train[0].record)
     if missing := [name for name in problem.space.names if name not in known]:
         raise UserError(f"task.values={values}: that result has no {', '.join(missing)}; it is of another model")
     origin = f"the values of {'an identification' if given else values}"

@@ -11,7 +11,7 @@ from tractexp import plugin
 from tractexp.api.arguments import Choice, check_kind, choices, public
 from tractexp.errors import UserError, among
 from tractexp.outcome import Table, Tabulated
-from tractexp.record import Base, Event, Record, Waves, Window, describe, detect, reader_of
+from tractexp.record import Base, Event, Record, Waves, Window, describe, detect, on_own_base, reader_of
 
 REQUIRED, OPTIONAL = ("t", "U", "P", "Q"), ("f", "U2")
 GROUP = "data"
@@ -89,6 +89,13 @@ def dips_of(argument: str, given: Any, least: int = 0) -> Dips:
     if len(made) < least:
         raise UserError(f"{argument} is empty; give at least one event, as tractexp.read gives them")
     return made
+
+
+def dips_together(records: Any, validate: Any) -> tuple[Dips, Dips]:
+    """Events fitted and held out, as `dips_of`, all on the base of the load in the first one."""
+    train, held = dips_of("records", records, least=1), dips_of("validate", validate)
+    events = on_own_base([*train, *held])
+    return Dips(events[: len(train)]), Dips(events[len(train) :])
 
 
 def table(columns: Mapping[str, Any], name: str, settings: Mapping[str, Any]) -> Record:
@@ -171,7 +178,8 @@ def kept(event: Event) -> dict[str, Any]:
 def kept_record(record: Record) -> dict[str, Any]:
     """A record as plain data."""
     plain = {"base": asdict(record.base), "window": record.window and record.window.to_dict(), "more": {**record.more},
-             "waves": record.waves and record.waves.to_dict()}  # fmt: skip
+             "waves": record.waves and record.waves.to_dict(), "identity": {**record.identity},
+             "given_base": record.given_base and asdict(record.given_base)}  # fmt: skip
     return {f.name: getattr(record, f.name) for f in fields(Record)} | plain
 
 
@@ -184,10 +192,11 @@ def record_again(content: Mapping[str, Any]) -> Record:
     """The record of what `kept_record` told."""
     arrays: Any = {k: np.array(content[k], dtype=float) for k in (*REQUIRED, *OPTIONAL) if content[k] is not None}
     base, notes = Base(**content["base"]), tuple(content["notes"])
+    given = Base(**content["given_base"]) if content.get("given_base") else None
     window = Window.of(content["window"]) if content.get("window") else None
     more = {name: np.array(values, dtype=float) for name, values in content.get("more", {}).items()}
     waves = Waves.of(content["waves"]) if content.get("waves") else None
     return Record(
         content["name"], base=base, source=content["source"], notes=notes, window=window, more=more, waves=waves,
-        **arrays,
+        given_base=given, identity=content.get("identity", {}), digest=content.get("digest", ""), **arrays,
     )  # fmt: skip

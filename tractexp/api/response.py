@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tractexp import files
-from tractexp.record import Event
+from tractexp.record import Event, OwnBase
 
 if TYPE_CHECKING:
     from tractexp.identification.result import Fit
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Response:
-    """Voltage and calculated power, (N,) each, in pu; `measured` P and Q, and `epsilon` of Eq. (20), where recorded."""
+    """Voltage and calculated power, (N,) each, in pu of the file; where recorded `measured` P and Q, `epsilon` (20)."""
 
     title: str
     t: np.ndarray  # s
@@ -86,20 +86,26 @@ def _csv(path: Path, columns: Mapping[str, np.ndarray]) -> Path:
     return files.write(path, text.getvalue())
 
 
-def respond_to(model: "Model", values: np.ndarray, event: Event) -> Response:
-    """A recorded event played through a model. Raises `UserError` where it has no steady state there."""
+def respond_to(model: "Model", values: np.ndarray, event: Event, own: OwnBase | None = None) -> Response:
+    """A recorded event played through a model, power and currents on the base of the event's file.
+
+    `own` is the base that the values are on, None that of the event. Raises `UserError` where it has no steady state
+    there.
+    """
     from tractexp.identification.result import respond
 
-    fit = respond(model, values, event, "validate")
+    fit = respond(model, values, event if own is None else own.put(event), "validate")
     record = fit.event.record  # of waveforms, as the estimator sees recorded and calculated currents
-    measured, epsilon = (record.P, record.Q), (fit.epsilon_p, fit.epsilon_q)
+    ratio = OwnBase.at(record).ratio if own is not None else 1.0
+    P, Q, *measured = (ratio * power for power in (fit.P, fit.Q, record.P, record.Q))
+    errors, notes = (fit.epsilon_p, fit.epsilon_q), tuple(event.record.notes if own is not None else record.notes)
     return Response(
-        record.name, record.t, record.U, fit.P, fit.Q, measured, epsilon, tuple(record.notes), _currents(fit),
+        record.name, record.t, record.U, P, Q, (measured[0], measured[1]), errors, notes, _currents(fit, ratio),
         fit.epsilon_i,
     )  # fmt: skip
 
 
-def _currents(fit: "Fit") -> dict[str, np.ndarray]:
+def _currents(fit: "Fit", ratio: float) -> dict[str, np.ndarray]:
     """t [s] and the currents of each phase [pu of their peak], calculated and measured; none of phasors."""
     if fit.waves is None or fit.currents is None:
         return {}
@@ -107,5 +113,5 @@ def _currents(fit: "Fit") -> dict[str, np.ndarray]:
     made = {"t": event.record.t[kept]}
     for end, currents in (("", fit.currents), ("_measured", np.nan_to_num(event.currents))):
         names = [f"i_{n}{end}" for n in "abc"] if event.phases == 3 else [f"i{end}"]
-        made |= dict(zip(names, event.of_phases(currents)[:, kept], strict=True))
+        made |= dict(zip(names, ratio * event.of_phases(currents)[:, kept], strict=True))
     return made

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from tractexp.api.arguments import Choice
 from tractexp.api.compose import LoadModel, Portable, model_of
-from tractexp.api.read import Dips, again, dips_of, kept
+from tractexp.api.read import Dips, again, dips_together, kept
 from tractexp.errors import check_range
 from tractexp.progress import Progress, searching
 from tractexp.record import Event, describe
@@ -60,9 +60,10 @@ class Setup(Given):
         for key, least in LEAST.items():
             if search.get(key) is not None:
                 check_range(key, search[key], least)
+        train, held = dips_together(records, validate)
         return cls(
-            train=dips_of("records", records, least=1),
-            validate=dips_of("validate", validate),
+            train=train,
+            validate=held,
             model=model_of(model, known.get("domain")).with_(**known),
             objective=Choice.of("objective", objective),
             **search,

@@ -126,6 +126,9 @@ def simulate(
     within `fall` [s], and `duration` [s] later it recovers within `recovery` [s]; `length` [s] at `rate` [1/s].
     `U0`, `P0`, `Q0` [pu] stand before such a dip: by default those of the identification, else 1, 1 and 0.5.
 
+    Powers, given and calculated, are on the base of the records' file. `values` are on the identification's own base
+    where there is one, as its parameters are; without one nothing is rebased, and they are on that of the records.
+
     Raises `UserError` for unknown names, values that are missing, and where there is no steady state.
     """
     dip = Dip(0.0 if depth is None else depth, duration, fall, recovery, start, length, rate)
@@ -141,19 +144,21 @@ def simulate(
     events = dips_of("records", records)
     if bool(events) == (depth is not None):
         raise UserError("give either records to play, or the depth of a dip")
-    before = BEFORE | (fit.result.before if fit else {}) | given
-    played = [respond_to(load.model, at, event) for event in events] or [_played(load, at, dip, before)]
+    own = fit.result.base if fit else None
+    ratio = own.ratio if own else 1.0
+    before = BEFORE | (fit.result.before if fit else {}) | {k: v if k == "U0" else v / ratio for k, v in given.items()}
+    played = [respond_to(load.model, at, e, own) for e in events] or [_played(load, at, dip, before, ratio)]
     return Simulation(load, dict(zip(load.model.names, at.tolist(), strict=True)), tuple(played))
 
 
-def _played(load: LoadModel, values: np.ndarray, dip: Dip, before: Mapping[str, float]) -> Response:
-    """The response to a dip made by hand."""
+def _played(load: LoadModel, values: np.ndarray, dip: Dip, before: Mapping[str, float], ratio: float) -> Response:
+    """The response to a dip made by hand, `ratio` times the power that the model draws on its own base."""
     from tractexp.identification.play import play
 
     t, shape = dip.voltage()
     U = before["U0"] * shape
     P, Q = play(load.model, values, t, U, before)
-    return Response(f"dip of {dip.depth:.0%} for {dip.duration:g} s", t, U, P, Q)
+    return Response(f"dip of {dip.depth:.0%} for {dip.duration:g} s", t, U, ratio * P, ratio * Q)
 
 
 def smooth(x: np.ndarray) -> np.ndarray:

@@ -14,16 +14,21 @@ from tractexp.identification.result import Result, parts
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import Model, compose
 from tractexp.plugin import Plugin
+from tractexp.record.own_base import scaled
 
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """An identified load on a bus, and the base its per-unit values stand for."""
+    """An identified load on a bus, and the base its per-unit values stand for.
+
+    `ratio` is how many per units of power of that base one of the base of the fit is.
+    """
 
     result: Result
     bus: int = 1
     power: float = 100.0  # MVA
     voltage: float = 110.0  # kV
+    ratio: float = 1.0
 
     @cached_property
     def model(self) -> Model:
@@ -31,9 +36,12 @@ class Identified:
         motor, static, effects, integration, _ = parts(self.result.model)
         return compose(motor, static, effects, integration)
 
-    @property
+    @cached_property
     def values(self) -> dict[str, float]:
-        return self.result.parameters
+        """The parameters on the base of the export."""
+        exponents = {p.name: p.power_exponent for p in self.model.parameters}
+        found = self.result.parameters
+        return {name: scaled(value, exponents.get(name, 0), self.ratio) for name, value in found.items()}
 
     @property
     def omega_n(self) -> float:
@@ -42,14 +50,15 @@ class Identified:
 
     @property
     def inertia(self) -> float:
-        """H [s] on the record's base, M = 2 H/omega_n."""
+        """H [s] on the base of the export, M = 2 H/omega_n."""
         return self.values["M"] * self.omega_n / 2
 
     @cached_property
     def before(self) -> dict[str, float]:
         """States and named quantities before the event. Raises `UserError` where there is no steady state."""
         kept, flat = self.result.before, np.full(2, self.result.before["U0"])
-        event = Excitation(1e-3, flat, flat, flat, kept["U0"], kept["P0"], kept["Q0"], omega_n=self.omega_n)
+        P0, Q0 = self.ratio * kept["P0"], self.ratio * kept["Q0"]
+        event = Excitation(1e-3, flat, flat, flat, kept["U0"], P0, Q0, omega_n=self.omega_n)
         drive, values = Drive.of([event]), np.array([self.values[name] for name in self.model.names])
         if refusal := self.model.refusal(values, drive):
             raise UserError(f"these parameters cannot be exported: {refusal}")

@@ -78,7 +78,7 @@ def narrowed(parameters: Sequence[Parameter], bounds: Mapping[str, Sequence[floa
         low, high = map(float, pair)
         old = known[name]
         inside = min(max(old.default, low), high) if low < high else old.default
-        known[name] = Parameter(inside, (low, high), old.unit, old.about, old.source, old.symbol, old.null, name)
+        known[name] = replace(old, default=inside, bounds=(low, high))
         known[name].check(f"model.bounds.{name}")
     return tuple(known.values())
 

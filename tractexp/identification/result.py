@@ -20,7 +20,8 @@ from tractexp.identification.seen import seen_by_estimator
 from tractexp.model.drive import PHASORS, Drive
 from tractexp.model.model import CLASSICAL, Model, compose
 from tractexp.plugin import build
-from tractexp.record import Event, Record, WaveEvent, find_dips, in_waves
+from tractexp.record import Event, OwnBase, Record, WaveEvent, find_dips, in_waves
+from tractexp.record.own_base import scaled
 
 TRAIN, VALIDATE = "train", "validate"
 EPSILONS = ("epsilon_p", "epsilon_q", "epsilon_i")
@@ -123,7 +124,9 @@ class Result:
     """The content of `result.json`. `model` and `before` are what it takes to simulate it again.
 
     Parameters, errors, intervals and verdicts belong to the estimate; `search` is where the optimizer itself ended, and
-    simulations, iterations, seconds and status are what it took to get there.
+    simulations, iterations, seconds and status are what it took to get there. Everything is on the record's own base;
+    `own_base` says which that is, and `parameters_on_given_base` are the parameters on that of the file where it
+    differs.
     """
 
     parameters: dict[str, float]
@@ -155,9 +158,29 @@ class Result:
     verdicts: dict[str, str] = field(default_factory=dict)
     uncertainty: dict[str, Any] = field(default_factory=dict)
     starts: list[dict[str, Any]] = field(default_factory=list)  # of the descents to the estimate, the best first
-    records: list[dict[str, str]] = field(default_factory=list)  # name, role, sha256 of its channels
+    records: list[dict[str, Any]] = field(default_factory=list)  # name, role, sha256 of its channels, source, base ...
+    own_base: dict[str, Any] = field(default_factory=dict)  # power and file_power, in MVA where known; origin
+    parameters_on_given_base: dict[str, float] = field(default_factory=dict)
     tractexp_version: str = ""
     commit: str = ""  # of the package's repository; "" for a wheel
+
+    @property
+    def base(self) -> OwnBase:
+        """The base of power that the parameters are on, and that of the file."""
+        return OwnBase(**self.own_base)
+
+    def on_base_of(self, record: Record) -> dict[str, float]:
+        """The parameters on the base that a record is on."""
+        ratio = self.base.over(record)
+        motor, static, effects, *_ = parts(self.model)
+        exponents = {p.name: p.power_exponent for part in (motor, static, *effects) for p in part.parameters}
+        return {name: scaled(value, exponents[name], ratio) for name, value in self.parameters.items()}
+
+    def on_given_base(self) -> str:
+        """The parameters whose values are others on the file's base, in one line; "" where it is the record's own."""
+        own = by_event(self.parameters, self.per_event)
+        told = [f"{n} = {v:.5g}" for n, v in self.parameters_on_given_base.items() if v != own[n]]
+        return f"on {self.base.file}: {', '.join(told)}" if told else ""
 
     @property
     def free(self) -> dict[str, float]:
@@ -199,9 +222,10 @@ class Result:
     ) -> tuple[np.ndarray, np.ndarray]:
         """P and Q [pu] for a new voltage U [pu] at uniform times t [s]; f [Hz] where the frequency is known.
 
-        The voltage before the first dip (all of it where there is none) gives the steady state. P0 and Q0 are
-        the power drawn there; by default that of the event the model was identified on. Of a model identified in
-        waveforms the voltage is taken as balanced, and the power is instantaneous.
+        Powers, given and calculated, are on the file's base. The voltage before the first dip (all of it where there is
+        none) gives the steady state. P0 and Q0 are the power drawn there; by default that of the event the model was
+        identified on. Of a model identified in waveforms the voltage is taken as balanced, and the power is
+        instantaneous.
         """
         model = compose(*parts(self.model))
         t, U = np.asarray(t, dtype=float), np.asarray(U, dtype=float)
@@ -209,10 +233,12 @@ class Result:
         steady = slice(0, max(dips[0][0], 1) if dips else None)
         nominal = 2 * np.pi * self.before["frequency"]
         omega_s = None if f is None else 2 * np.pi * np.asarray(f, dtype=float) - nominal
-        known = {key: value for key, value in {"P0": P0, "Q0": Q0}.items() if value is not None}
+        ratio = self.base.ratio
+        known = {key: value / ratio for key, value in {"P0": P0, "Q0": Q0}.items() if value is not None}
         before = self.before | known | {"U0": float(U[steady].mean())}
         values = np.array([self.parameters[name] for name in model.names])
-        return play(model, values, t, U, before, omega_s, 0.0 if omega_s is None else float(omega_s[steady].mean()))
+        P, Q = play(model, values, t, U, before, omega_s, 0.0 if omega_s is None else float(omega_s[steady].mean()))
+        return ratio * P, ratio * Q
 
 
 def write_history(path: Path, history: History) -> Path:
@@ -251,9 +277,11 @@ def conclude(
     free = found.values if estimate is None else estimate
     fits, epsilon_p, epsilon_q = fitted(problem, free)
     fits += [respond(model, problem.full(free)[0], event, VALIDATE) for event in validate]
-    first = problem.events[0]
+    first, found_values = problem.events[0], _values(problem, free)
+    own = OwnBase.at(first.record)
+    exponents = {p.name: p.power_exponent for p in problem.parameters}
     result = Result(
-        **_values(problem, free),
+        **found_values,
         objective=float(problem.objective(free[None])[0]),
         epsilon_p=epsilon_p,
         epsilon_q=epsilon_q,
@@ -273,9 +301,9 @@ def conclude(
         optimizer=optimizer,
         search=searched(problem, found),
         notes=[note for f in fits for note in f.event.record.notes],
-        records=[
-            {"name": f.event.record.name, "role": f.role, "sha256": provenance.digest(f.event.record)} for f in fits
-        ],
+        records=[{"name": f.event.record.name, "role": f.role} | provenance.told(f.event.record) for f in fits],
+        own_base=asdict(own),
+        parameters_on_given_base={} if own.ratio == 1 else own.values(by_event(*found_values.values()), exponents),
         tractexp_version=provenance.version(),
         commit=provenance.commit(),
     )
@@ -296,8 +324,14 @@ def refuse_nothing_found(problem: Problem, found: Found) -> None:
         why = problem.model.refusal(problem.full(found.values)[0], problem.drive) or "all diverged"
         raise UserError(
             f"none of the {found.simulations} parameter sets tried could be simulated: {why};"
-            " widen model.bounds or free model.fixed"
+            f" widen model.bounds or free model.fixed{_meant(problem)}"
         )
+
+
+def _meant(problem: Problem) -> str:
+    """On which base bounds are meant, where that is not the file's."""
+    own = OwnBase.at(problem.events[0].record)
+    return "" if own.ratio == 1 else f", which are meant on the record's own base of {own}"
 
 
 def fitted(problem: Problem, free: np.ndarray) -> tuple[list[Fit], float, float]:

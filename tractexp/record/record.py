@@ -22,13 +22,26 @@ PLAUSIBLE_POWER = 20.0  # pu, at the start of a record
 SIZES = {"voltage": (1e-6, 1e5), "power": (1e-6, 1e7), "frequency": (0.1, 1e4)}  # of a base [kV, MVA, Hz]
 
 
+GIVEN, LOAD = "given", "load"
+
+
 @dataclass(frozen=True)
 class Base:
-    """What one per unit stands for. Voltage is line-to-line RMS; power is three-phase."""
+    """What one per unit stands for. Voltage is line-to-line RMS; power is three-phase.
+
+    `origin` says who chose it: "load", the steady state of the load itself before a dip, or "given", by a user or by
+    the file. A power of 1 that was given is one of which nobody said how many MVA it is.
+    """
 
     voltage: float = 1.0  # kV
     power: float = 1.0  # MVA
     frequency: float = 50.0  # Hz, nominal
+    origin: str = field(default=GIVEN, compare=False)
+
+    @property
+    def known(self) -> bool:
+        """Whether it is known how many MVA one per unit of power is, of the base of a file."""
+        return self.origin == LOAD or self.power != 1.0
 
     def per_unit(self, columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Columns by name, U and U2 [kV], P and P_3, P_5, ... [MW] and Q [Mvar] made per unit."""
@@ -52,7 +65,9 @@ class Record:
     Arrays have shape (N,), are finite except where `P` or `Q` is missing (nan: a gap, left out of every sum),
     and are sampled uniformly. `window` is what its phasors are averages over, where that is known; `more` are further
     channels, which no model reads. `source` says where the record came from, `notes` what was done to it or found
-    odd about it, one sentence each.
+    odd about it, one sentence each. `given_base` is the base in which the file was, None where that is `base`;
+    `identity` is what else tells which load it is: station, device, load, channels; `digest` is the SHA-256 of its
+    channels as they were read, "" where they still are that.
     """
 
     name: str
@@ -68,6 +83,9 @@ class Record:
     window: Window | None = None
     more: Mapping[str, np.ndarray] = field(default_factory=dict)  # P_3, P_5, ... [pu], THD_u, THD_i
     waves: Waves | None = None  # what the phasors were measured from, where the recorder kept it
+    given_base: Base | None = None
+    identity: Mapping[str, str] = field(default_factory=dict)
+    digest: str = ""
 
     def __repr__(self) -> str:
         span = f"{self.samples} samples of {', '.join(self.channels)}"
@@ -86,6 +104,11 @@ class Record:
     def rate(self) -> float:
         """Samples per second [Hz]."""
         return 1 / self.step
+
+    @property
+    def file_base(self) -> Base:
+        """The base in which its file was."""
+        return self.given_base or self.base
 
     @property
     def where(self) -> str:

@@ -13,6 +13,7 @@ from tractexp.overrides import assigned
 from tractexp.record import Base, Events, Reader, Record, Waves, detect
 from tractexp.record.dips import Dip, check_numbers, chosen, level, numbered
 from tractexp.record.phasor import Phasors
+from tractexp.record.record import LOAD
 from tractexp.recording.arrangement import arranged, tuned
 from tractexp.recording.connection import usual
 from tractexp.recording.estimator import estimator_of
@@ -67,7 +68,9 @@ class WaveformReader(Reader):
         feeder = self.feeder(recording)
         dips = self.dips(feeder, self._streams(recording, feeder), recording.frequency)
         events = chosen(self.path, dips, self.train, self.validate, self._notes(recording, feeder, dips))
-        return Events(list(map(_kept, events.train)), list(map(_kept, events.validate)))
+        identity = _identity(recording, feeder)
+        train, validate = ([_kept(replace(r, identity=identity)) for r in g] for g in (events.train, events.validate))
+        return Events(train, validate)
 
     def dips(self, feeder: Feeder, streams: Sequence[Stream], frequency: float) -> list[Dip]:
         """The dips of one load, on one base: voltage and apparent power before the first that can be used.
@@ -84,7 +87,7 @@ class WaveformReader(Reader):
         U, S = level(first)
         if S < 1e-6:
             raise UserError(f"{self.path}: data.currents carry no power before the first dip ({1e6 * S:.2g} VA)")
-        return [replace(dip, made=_per_unit(dip.made, Base(U, S, frequency))) for dip in made]
+        return [replace(dip, made=_per_unit(dip.made, Base(U, S, frequency, LOAD))) for dip in made]
 
     def _whole(self, feeder: Feeder, stream: Stream, frequency: float) -> Record:
         """All of one segment, in kV, MW and Mvar."""
@@ -181,6 +184,13 @@ class WaveformReader(Reader):
         if skew > 0 and not self.skew:
             notes.append(f"time skew of up to {1e6 * skew:.3g} microseconds not corrected (data.skew=true does)")
         return tuple(notes)
+
+
+def _identity(recording: Recording, feeder: Feeder) -> dict[str, str]:
+    """Which load it is, as far as the file says."""
+    names = [", ".join(recording.channels[i].name.strip() for i in each) for each in (feeder.voltages, feeder.currents)]
+    told = {"station": recording.station, "device": recording.device, "load": feeder.name}
+    return {key: text for key, text in (told | dict(zip(("voltages", "currents"), names, strict=True))).items() if text}
 
 
 def _kept(record: Record) -> Record:

@@ -15,6 +15,7 @@ from tractexp.identification.search import REFUSED, History
 from tractexp.identification.together import Together
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED, TRADES
+from tractexp.provenance import in_words as identity_in_words
 from tractexp.report import style
 from tractexp.report.chart import Chart
 from tractexp.report.events import CAPTION, Curve, event_chart
@@ -156,6 +157,8 @@ def _parameters(
         columns, rows,
         words=(1, 5), caption=(EXACT if known.exact else SCATTERED) + RIVALS * bool(moves),
     )  # fmt: skip
+    if told := result.on_given_base():
+        made.text(f"{as_sentence(told)} Values and bounds in the table are on the record's own base of {result.base}.")
     made.chart(
         _forest(known, search),
         "Estimates and 95 % intervals within the bounds of each parameter (0 is the lower, 1 the upper bound); cross:"
@@ -310,7 +313,10 @@ def _correlation(made: Page, known: Uncertainty) -> None:
 def _origin(result: Any, command: str) -> list[list[str]]:
     told = [["command", command]] if command else []
     told.append(["tractexp", f"{result.tractexp_version}{f', commit {result.commit}' if result.commit else ''}"])
-    told += [[f"record {r['name']} ({r['role']})", f"SHA-256 {r['sha256']}"] for r in result.records]
+    told += [
+        [f"record {r['name']} ({r['role']})", "; ".join(filter(None, [identity_in_words(r), f"SHA-256 {r['sha256']}"]))]
+        for r in result.records
+    ]
     return told
 
 

@@ -31,7 +31,7 @@ class Discrepancy(Task):
     def run(self, job: Job) -> None:
         from tractexp.api.investigate import investigate
 
-        events, node = job.events, job.config["model"]
+        events, node = job.events_of_fit, job.config["model"]
         read(events)
         job.prepare_log()
         found = call(

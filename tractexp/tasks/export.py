@@ -19,8 +19,9 @@ class Export(Task):
     parameters: str | None = None  # pyright: ignore[reportIncompatibleVariableOverride]
     format: str = ""  # andes, psse_dyr, modelica, or a format of an installed package
     bus: int = 1  # number of the bus the load is on
-    power: float = 100.0  # MVA, what 1 pu of the record stands for
-    voltage: float = 110.0  # kV, line to line
+    power: float | None = None  # MVA, what 1 pu of the record's file stands for; null: what the record says, else 100
+    voltage: float | None = None  # kV, line to line; null: what the record says, else 110
+    base: str = "own"  # own: values on the base of the fit; file: on that of the record's file
 
     def run(self, job: Job) -> None:
         from tractexp.api.export import export
@@ -30,7 +31,8 @@ class Export(Task):
         if self.parameters is None:
             raise UserError("task.parameters is not given; it is the path of a result.json, which task=identify writes")
         fit = Identification(load(Path(self.parameters)))
-        made = call(export, fit, self.format, bus=self.bus, power=self.power, voltage=self.voltage)
+        asked = {key: getattr(self, key) for key in ("bus", "power", "voltage", "base")}
+        made = call(export, fit, self.format, **asked)
         path = made.write(job.folder / f"load{made.suffix}")
         say(f"model: {made.title}, from {self.parameters}")
         if fit.grade and not fit.adequate:

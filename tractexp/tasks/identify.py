@@ -42,6 +42,8 @@ def report(fit: "Identification") -> None:
     say()
     say(as_sentence(fit.headline))
     estimates(fit)
+    if told := fit.result.on_given_base():
+        say(told)
     events(fit)
     say(fit.result.acceptance)
     sure(fit)
@@ -119,7 +121,7 @@ def track(job: Job, fit: "Identification", paths: list[Path], predictor: bool) -
     best = history.objective[known]
     job.log(
         name=f"{job.variant}, {' and '.join(e.record.name for e in job.events.train)}, seed {job.seed}",
-        values=result.parameters,
+        values=result.parameters | {f"given_base.{n}": v for n, v in result.parameters_on_given_base.items()},
         metrics=metrics,
         curves={
             "fitness": (np.flatnonzero(known), best),

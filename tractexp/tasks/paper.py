@@ -34,7 +34,7 @@ class Paper(Task):
 
         started = time.perf_counter()
         job = job.holding_out(self.held_out)
-        for line in recorded(job.events.train, job.events.validate, "hold out"):
+        for line in recorded(job.events_of_fit.train, job.events_of_fit.validate, "hold out"):
             say(line)
         made = call(
             paper, **job.asked, parts=self.parts, seeds=self.seeds, workers=self.workers,

@@ -61,6 +61,15 @@ class Job:
         records = build("data", self.config["data"]).read()
         return Events([detect(r) for r in records.train], [detect(r) for r in records.validate])
 
+    @functools.cached_property
+    def events_of_fit(self) -> Any:
+        """The events as a fit takes them: on the base of the load in the first (`Events` of `Event`)."""
+        from tractexp.record import Events, on_own_base
+
+        train, validate = self.events.train, self.events.validate
+        moved = on_own_base([*train, *validate])
+        return Events(moved[: len(train)], moved[len(train) :])
+
     def holding_out(self, siblings: Mapping[str, list[str]]) -> "Job":
         """The job with those files held out that belong to its choice of data, where it names none itself."""
         data: Mapping[str, Any] = self.config["data"]

@@ -1,5 +1,7 @@
 """The events that contracts play: smooth dips with sagging frequency and an unbalance, steady voltage; and in waves."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from tractexp.model.drive import WAVES, Drive, Excitation, Waveforms
@@ -36,10 +38,10 @@ def wave_flat(voltage: float = 0.97, rate: float = 3200.0, samples: int = 640) -
     return _waves(np.full(samples, voltage + 0j), np.zeros(samples), (100 * np.pi - 1.5) * t, rate)
 
 
-def drive(*depths: float, domain: str = "") -> Drive:
-    """Dips of these depths, end to end."""
+def drive(*depths: float, domain: str = "", power: float = 1.0) -> Drive:
+    """Dips of these depths, end to end; `power` is how many times P0 and Q0 are drawn before each."""
     made = wave_dip if domain == WAVES else dip
-    return Drive.of([made(depth) for depth in depths])
+    return Drive.of([replace(one, P0=power * P0, Q0=power * Q0) for one in map(made, depths)])
 
 
 def _waves(v: np.ndarray, v_zero: np.ndarray, theta: np.ndarray, rate: float) -> Waveforms:

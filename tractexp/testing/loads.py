@@ -18,6 +18,7 @@ from tractexp.testing import drives
 SAME = 1e-12  # pu: what rounding leaves between equal equations
 STILL = 1e-9  # pu: what a steady state solved to rounding drifts by
 SHOWN = 1e-5  # pu: what a record can show at all
+SCALED = 1e-8  # of the largest power: what two bases of power may differ by
 LARGEST = 30.0  # pu: no load draws more
 SUBSTEPS = 4
 COUNTS = (2, 4, 8, 16, 32, 64, 128, 256)  # Runge-Kutta steps a sample, of which those in the asymptotic range count
@@ -178,6 +179,20 @@ def is_finite_or_refused_at_its_bounds(cls: type[Part]) -> None:
     assert np.abs(power).max(initial=0.0) < LARGEST, f"{of.title} draws more than {LARGEST:g} pu in a corner"
 
 
+def scales_with_its_base(cls: type[Part]) -> None:
+    """In another base of power the same load answers the same: each parameter goes as its `power_exponent` says."""
+    of, per_unit = with_part(cls), 2.5
+    chosen = values(of, on)
+    other = chosen * per_unit ** np.array([p.power_exponent for p in of.parameters], dtype=float)
+    one = play(of, drives.drive(0.3, 0.5, domain=of.domain), chosen)
+    scaled = play(of, drives.drive(0.3, 0.5, domain=of.domain, power=per_unit), other) / per_unit
+    off = np.abs(scaled - one).max() / np.abs(one).max()
+    assert off < SCALED, (
+        f"{of.title} answers otherwise in another base of power (by {off:.2g}): say in 'power_exponent' how each"
+        f" parameter of '{cls.name}' goes with it"
+    )
+
+
 def converges_in_order_four(cls: type[Part]) -> None:
     """Halving the step divides the error by 16 on a smooth dip, where the equations are smooth."""
     import sympy
@@ -324,7 +339,7 @@ def sees_each_event_by_itself(cls: type[Measurement]) -> None:
 
 
 Check = Callable[[type], None]
-EVERY: tuple[Check, ...] = (says_what_it_is, is_finite_or_refused_at_its_bounds)
+EVERY: tuple[Check, ...] = (says_what_it_is, is_finite_or_refused_at_its_bounds, scales_with_its_base)
 EQUATIONS: tuple[Check, ...] = (prints_its_equations, rests, converges_in_order_four)
 PARTS: tuple[Check, ...] = (*EVERY, *EQUATIONS, composes_with_every_other, takes_or_refuses_every_effect)
 EFFECTS: tuple[Check, ...] = (

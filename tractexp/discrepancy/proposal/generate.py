@@ -86,6 +86,7 @@ def _declared(term: Term, values: Mapping[str, float]) -> list[str]:
     lines = []
     for p in made:
         null = "" if p.null is None else f", null={p.null}"
+        null += f", power_exponent={p.power_exponent}" if p.power_exponent else ""
         told = f'"{p.unit}", "{p.about}", SOURCE, r"{p.symbol}"{null}'
         lines.append(f"    {PREFIX}{p.name} = Parameter({p.default!r}, {p.bounds!r}, {told})")
     return lines

@@ -72,7 +72,10 @@ class Clock:
 
 @dataclass(frozen=True)
 class Size:
-    """How large a term is: `relevant` is what a linear step uses as its unit, `where` it acts if not in all."""
+    """How large a term is: `relevant` is what a linear step uses as its unit, `where` it acts if not in all.
+
+    Signals are shares, so that `power_exponent` is that of what the size is added to.
+    """
 
     name: str
     bound: float
@@ -80,11 +83,15 @@ class Size:
     relevant: float
     latex: str = "k"
     where: str = ""
+    power_exponent: int = 0
 
     def parameter(self, name: str, about: str, default: float = 0.0) -> Parameter:
         """As a parameter of an effect."""
         bounds = (-self.bound, self.bound)
-        return Parameter(default, bounds, self.unit, about, SOURCE, self.latex, null=0.0, name=name)
+        return Parameter(
+            default, bounds, self.unit, about, SOURCE, self.latex, null=0.0, power_exponent=self.power_exponent,
+            name=name,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -212,10 +219,10 @@ CLOCKS = (
     Clock("of_return", "at a time after the voltage returns"),
 )
 
-_PU, _SHARE = Size("size", 2.0, "pu", 0.02), Size("size", 3.0, "1", 0.05)
+_PU, _SHARE = Size("size", 2.0, "pu", 0.02, power_exponent=1), Size("size", 3.0, "1", 0.05)
 _BOTH = (
-    Size("size_P", 2.0, "pu", 0.02, "k_P", "active power"),
-    Size("size_Q", 2.0, "pu", 0.02, "k_Q", "reactive power"),
+    Size("size_P", 2.0, "pu", 0.02, "k_P", "active power", 1),
+    Size("size_Q", 2.0, "pu", 0.02, "k_Q", "reactive power", 1),
 )
 _ANY = (ANSWER, TIMED)
 _Z = sites.stator_impedance
@@ -238,8 +245,8 @@ BALANCES = (
     Balance("motor", "the motors' power by one share",
             r"P_d + \mathrm{j} Q_d \rightarrow (P_d + \mathrm{j} Q_d)(1 + k\,{g})", (_SHARE,),
             (sites.P_motor, sites.Q_motor), without=_SWITCHED),
-    Balance("torque", "the load torque", r"T_L \rightarrow T_L + k\,{g}", (Size("size", 20.0, "pu", 0.05),),
-            (sites.load_torque,), without=_SWITCHED),
+    Balance("torque", "the load torque", r"T_L \rightarrow T_L + k\,{g}",
+            (Size("size", 20.0, "pu", 0.05, power_exponent=1),), (sites.load_torque,), without=_SWITCHED),
     Balance("coupling", "the coupling of rotor and stator", r"c \rightarrow c\,(1 + k\,{g})",
             (Size("size", 3.0, "1", 0.02),), (sites.coupling,)),
     Balance("decay", "the decay of the rotor's flux", r"\frac{1}{\tau'} \rightarrow \frac{1}{\tau'}\,(1 + k\,{g})",
@@ -247,10 +254,10 @@ BALANCES = (
     Balance("magnetizing", "the magnetizing reactance",
             r"c \rightarrow c/(1 + k\,{g}),\quad \tau' \rightarrow \tau'/(1 + k\,{g})",
             (Size("size", 10.0, "1", 0.05),), (sites.coupling, sites.time_constant)),
-    Balance("resistance", "the stator's resistance", r"Z' \rightarrow Z' + k\,{g}", (Size("size", 0.5, "pu", 0.005),),
-            (_Z,), without=_OWN_CURRENT),
+    Balance("resistance", "the stator's resistance", r"Z' \rightarrow Z' + k\,{g}",
+            (Size("size", 0.5, "pu", 0.005, power_exponent=-1),), (_Z,), without=_OWN_CURRENT),
     Balance("reactance", "the stator's reactance", r"Z' \rightarrow Z' + \mathrm{j} k\,{g}",
-            (Size("size", 0.5, "pu", 0.005),), (_Z,), without=(*_OWN_CURRENT, "constant")),
+            (Size("size", 0.5, "pu", 0.005, power_exponent=-1),), (_Z,), without=(*_OWN_CURRENT, "constant")),
     Balance("angle", "the angle of the voltage", r"V \rightarrow V (1 + \mathrm{j} k\,{g})",
             (Size("size", 2.0, "rad", 0.02),), (sites.motor_voltage,)),
     Balance("voltage", "the voltage that the load sees", r"V \rightarrow V (1 + k\,{g})",

@@ -1,0 +1,129 @@
+"""Records on the base of their own load, whatever unit of power their files are in.
+
+Bounds and priors of a model mean a load that draws about one per unit. A record in per unit of a system (100 MVA) is
+therefore fitted per unit of the apparent power before the first dip that is fitted, and so are all events beside it.
+A load that draws between a half and one of its per unit is on a base of its own, its rating: there the bounds mean what
+they say, and its user knows the values on that base.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.provenance import digest
+from tractexp.record.event import Event, detect
+from tractexp.record.record import GIVEN, LOAD, Base, Record
+from tractexp.record.wave_event import WaveEvent, in_waves
+
+LEAST_S, MOST_P = 0.5, 1.05  # pu before the dip, on a base of the load: bounds reach to a torque of one
+SMALLEST = 1e-6  # pu: less apparent power is no load, and no base
+
+Scalable = TypeVar("Scalable", float, np.ndarray)
+
+
+@dataclass(frozen=True)
+class OwnBase:
+    """The base of power that a load is fitted on, and that of its file, both in MVA or in the file's per unit."""
+
+    power: float = 1.0
+    file_power: float = 1.0
+    known: bool = False  # whether these are MVA
+    origin: str = GIVEN  # of the file's base
+
+    @classmethod
+    def at(cls, record: Record) -> "OwnBase":
+        """That which a record is on."""
+        file = record.file_base
+        return cls(record.base.power, file.power, file.known, file.origin)
+
+    @classmethod
+    def of(cls, event: Event) -> "OwnBase":
+        """That of the first event that is fitted; what it is on already where that is one of the load."""
+        at, S = cls.at(event.record), float(np.hypot(event.P0, event.Q0))
+        own = event.record.base.origin == LOAD or (S >= LEAST_S and abs(event.P0) <= MOST_P)
+        return at if own or not S > SMALLEST else replace(at, power=S * at.power)
+
+    @property
+    def ratio(self) -> float:
+        """How many per units of the file one of this base is."""
+        return self.power / self.file_power
+
+    def over(self, record: Record) -> float:
+        """How many per units of a record one of this base is.
+
+        A record of which nobody said how many MVA its per unit is, is taken to be in the unit of this one's file, and
+        the other way round. Bases that were each the steady state of a load stay beside each other.
+        """
+        file = record.file_base
+        if self.origin == file.origin == LOAD:
+            return 1.0
+        if self.known != file.known:
+            return self.ratio / (record.base.power / file.power)
+        return self.power / record.base.power
+
+    def put(self, event: Event) -> Event:
+        """The event on this base; itself where it is on it."""
+        ratio = self.over(event.record)
+        return event if ratio == 1 else rebased(event, ratio, self)
+
+    @property
+    def file(self) -> str:
+        """The file's base, in words."""
+        return f"the file's base ({self.file_power:.6g} MVA)" if self.known else "the file's base"
+
+    def values(self, values: Mapping[str, float], exponents: Mapping[str, int]) -> dict[str, float]:
+        """Parameters by name, or by name and event as `T_m[1]`, on the file's base."""
+        return {name: scaled(value, exponents[name.partition("[")[0]], self.ratio) for name, value in values.items()}
+
+    def __str__(self) -> str:
+        return f"{self.power:.4g} MVA" if self.known else f"{self.power:.4g} pu of the file"
+
+
+def on_own_base(events: Sequence[Event]) -> list[Event]:
+    """Events of one call, the first one fitted, all on the base of the load in that.
+
+    Raises `UserError` where they must be rebased and it is not known how many MVA one per unit of some of them is.
+    """
+    if not events:
+        return []
+    first, own = events[0].record, OwnBase.of(events[0])
+    for event in events:
+        record = event.record
+        if own.power != first.base.power and record.file_base.known != own.known:
+            which, other = (first, record) if own.known else (record, first)
+            raise UserError(
+                f"{other.where} does not say how many MVA one per unit is, and {which.where} is per unit of"
+                f" {which.file_base.power:g} MVA, so that they cannot be put on one base; say it of both"
+                " (data.base_power in MVA, with data.units={P: pu, Q: pu}), or of none"
+            )
+    return [own.put(event) for event in events]
+
+
+def rebased(event: Event, ratio: float, own: OwnBase) -> Event:
+    """An event on a base of `ratio` times the power. Voltages, times and frequencies stay."""
+    if isinstance(event, WaveEvent):  # its currents are per unit of the record's base
+        return in_waves(rebased(event.phasors, ratio, own))
+    record = event.record
+    by, base = Base(1.0, ratio), replace(record.base, power=ratio * record.base.power, origin=LOAD)
+    arrays = by.per_unit({"P": record.P, "Q": record.Q})
+    note = said(own) if record.given_base is None else ""
+    return detect(
+        replace(record, base=base, given_base=record.file_base, digest=digest(record), more=by.per_unit(record.more),
+                notes=(*record.notes, *[note] * bool(note)), **arrays)
+    )  # fmt: skip
+
+
+def said(own: OwnBase) -> str:
+    """What was done to a record, in one sentence."""
+    return (
+        f"put on a base of {own}, the apparent power before the first dip that is fitted: on {own.file} powers, torque"
+        f" and inertia are {own.ratio:.5g} times, impedances {1 / own.ratio:.5g} times the values on this base"
+    )
+
+
+def scaled(value: Scalable, power_exponent: int, ratio: float) -> Scalable:
+    """A parameter's value on a base of a `ratio`-th of the power."""
+    return value * ratio**power_exponent
