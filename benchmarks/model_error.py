@@ -38,7 +38,7 @@ KINDS = ("record", "andes", "null", "effect")
 EXPONENTIAL, ZIP = "third_order_exponential", "third_order_zip"
 MULTIPLES = (1.0, 2.0, 4.0, 8.0)
 EVENTS, TRAIN = 3, 2  # of a generated data set
-BLOCK = 0.1  # s: residuals of the same block are one observation
+BLOCK, CYCLE, BLOCKS = 0.1, 0.02, 10  # s, s: residuals of a block are one observation, fewer than ten are no sample
 WORSE = 1.05  # times the search's end: an estimate beyond counts as worse
 NAMES = ("T_prime", "X_prime", "M", "T_m", "p_v", "C", "q_v", "a_Z", "a_I", "b_Z", "b_I")
 
@@ -250,12 +250,13 @@ def block_difference(estimate: Sequence[Compared], search: Sequence[Compared]) -
     """Mean difference of the squared error in S (estimate less search), its standard error, and the search's mean.
 
     All over the mean square of how far S moved. Differences are paired by sample and averaged over blocks of 0.1 s,
-    whose scatter gives the standard error.
+    whose scatter gives the standard error; of a short record over tenths of it, but no less than a cycle.
     """
     means, sizes = [], []
+    block = float(np.clip(min(one.t[-1] - one.t[0] for one in search) / BLOCKS, CYCLE, BLOCK))
     for one, other in zip(estimate, search, strict=True):
         difference = one.missed - other.missed
-        number = ((one.t - one.t[0]) / BLOCK).astype(int)
+        number = ((one.t - one.t[0]) / block).astype(int)
         sizes += np.bincount(number).tolist()
         means += (np.bincount(number, difference) / np.maximum(np.bincount(number), 1)).tolist()
     weight = np.array(sizes) / np.sum(sizes)
@@ -325,20 +326,21 @@ def identification(task: Task, data: Data) -> tuple[Any, float, float]:
 
 
 def comparisons(fit: Any, data: Data) -> dict[str, tuple[list[Compared], list[Compared]]]:
-    """Of the fitted and of the held-out events: at the estimate, and where the search ended.
+    """Of the fitted, of the held-out and of all events: at the estimate, and where the search ended.
 
     An event that one of them gives no steady state raises `UserError`.
     """
     import tractexp
 
-    sides = {}
+    sides: dict[str, tuple[list[Compared], list[Compared]]] = {}
     for role, events in (("train", data.train), ("validate", data.validate)):
         if not events:
             continue
         played = tractexp.simulate(fit.model, fit.result.search["parameters"], records=list(events)).responses
         here = [Compared.of(event, fit.predict(event)) for event in events]
         sides[role] = here, [Compared.of(event, response) for event, response in zip(events, played, strict=True)]
-    return sides
+    here, there = (list(itertools.chain.from_iterable(some)) for some in zip(*sides.values(), strict=True))
+    return sides | {"all": (here, there)}
 
 
 def size_of_error(fit: Any, data: Data) -> dict[str, Any]:
@@ -346,9 +348,11 @@ def size_of_error(fit: Any, data: Data) -> dict[str, Any]:
     content: dict[str, Any] = {"S": {}, "chance": {}}
     for role, (here, there) in comparisons(fit, data).items():
         sides = {"estimate": here, "search": there}
+        content["chance"][role] = [*block_difference(here, there), worse_than_chance(here, there)]
+        if role == "all":
+            continue
         content["S"][role] = {name: [one.error for one in some] for name, some in sides.items()}
         content["S"][role] |= {f"all {name}": overall(some) for name, some in sides.items()}
-        content["chance"][role] = [*block_difference(here, there), worse_than_chance(here, there)]
     return content
 
 
@@ -426,13 +430,14 @@ def coverage_lines(groups: dict[str, list[dict[str, Any]]]) -> list[str]:
 def worse_lines(groups: dict[str, list[dict[str, Any]]]) -> list[str]:
     """Estimate against the search's end: how often worse, the error in S of both, and the time taken."""
     lines = ["estimate against the search's end: worse by more than 5 % in Eq. (8), held out in S; by more than chance"]
-    lines += ["explains, fitted and held out; median error in S held out; wall and processor time", ""]
-    lines += ["| sets | n | Eq. (8) | held out | chance, fitted | chance, held out | S estimate | S search | largest"
-              " ratio | wall s | cpu s | grades |", "|---" * 12 + "|"]  # fmt: skip
+    lines += ["explains, fitted, held out and on all events; median error in S held out; wall and processor time", ""]
+    lines += ["| sets | n | Eq. (8) | held out | chance, fitted | held out | all | S estimate | S search | largest"
+              " ratio | wall s | cpu s | grades |", "|---" * 13 + "|"]  # fmt: skip
     for group, some in groups.items():
         held = [row["S"]["validate"] for row in some if "validate" in row["S"]]
         ratios = [one["all estimate"] / one["all search"] for one in held]
-        chance = [sum(bool(row["chance"].get(role, [False])[-1]) for row in some) for role in ("train", "validate")]
+        roles = "train", "validate", "all"
+        chance = [sum(bool(row["chance"].get(role, [False])[-1]) for row in some) for role in roles]
         grades: dict[str, int] = {}
         for row in some:
             grades[row["grade"]] = grades.get(row["grade"], 0) + 1
@@ -462,6 +467,28 @@ def record_lines(rows: Sequence[dict[str, Any]]) -> list[str]:
     return lines
 
 
+def shift_lines(rows: Sequence[dict[str, Any]], before: Sequence[dict[str, Any]]) -> list[str]:
+    """How far estimates moved from those of another file, in its standard errors, and how wide intervals are to its."""
+    lines = ["largest move of a parameter in standard errors of before: median over the sets, and the most; median"]
+    lines += ["half width over that of before; by set", "", "| sets | n | median | most | width |", "|---" * 5 + "|"]
+    others = {row["key"]: row for row in before if "parameters" in row}
+    groups: dict[str, list[tuple[float, float]]] = {}
+    for row in rows:
+        if "parameters" not in row or row["key"] not in others:
+            continue
+        other = others[row["key"]]
+        errors = {name: error for name, error in other["errors"].items() if error}
+        moves = [abs(row["parameters"][n] - other["parameters"][n]) / error for n, error in errors.items()]
+        spans = [row["intervals"].get(n) for n in errors], [other["intervals"].get(n) for n in errors]
+        ratios = [np.ptp(a) / np.ptp(b) for a, b in zip(*spans, strict=True) if a and b and None not in (*a, *b)]
+        groups.setdefault(group_of(row), []).append((max(moves, default=np.nan), float(np.median(ratios or [np.nan]))))
+    for group, some in groups.items():
+        moves, ratios = np.array(some).T
+        numbers = f"{np.nanmedian(moves):.2g} | {np.nanmax(moves):.2g} | {np.nanmedian(ratios):.2f}"
+        lines.append(f"| {group} | {len(some)} | {numbers} |")
+    return lines
+
+
 def rows_of(path: Path) -> list[dict[str, Any]]:
     """The rows of a file; none where it is absent."""
     return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()] if path.exists() else []
@@ -477,10 +504,13 @@ def main() -> int:
     parser.add_argument("--shared", type=Path, default=SHARED, help="folder of the records at hand")
     parser.add_argument("--out", type=Path, default=Path("model_error.jsonl"))
     parser.add_argument("--tables", action="store_true", help="print what is stored, and run nothing")
+    parser.add_argument("--against", type=Path, help="a file of rows before: how far estimates moved")
     chosen = parser.parse_args()
     rows = rows_of(chosen.out)
     if chosen.tables:
         print(tables(rows))
+        if chosen.against:
+            print("", *shift_lines(rows, rows_of(chosen.against)), sep="\n")
         return 0
     known = {row["key"] for row in rows}
     every = tasks(chosen.series, chosen.count, chosen.multiples, chosen.models)
