@@ -176,9 +176,9 @@ def system(load: Load, fault: Fault) -> Any:
     pq = {"idx": "static", "bus": load.bus, "Vn": VOLTAGE, "p0": load.static.real, "q0": load.static.imag}
     case.add("PQ", pq)
     s = load.shares
-    named = {"kpz": s["a_Z"], "kpi": s["a_I"], "kqz": s["b_Z"], "kqi": s["b_I"]}
-    named |= {"kpp": 1 - s["a_Z"] - s["a_I"], "kqp": 1 - s["b_Z"] - s["b_I"]}
-    case.add("ZIP", {"idx": "law", "pq": "static", **{name: 100 * share for name, share in named.items()}})
+    percentages = {"kpz": s["a_Z"], "kpi": s["a_I"], "kqz": s["b_Z"], "kqi": s["b_I"]}
+    percentages |= {"kpp": 1 - s["a_Z"] - s["a_I"], "kqp": 1 - s["b_Z"] - s["b_I"]}
+    case.add("ZIP", {"idx": "law", "pq": "static", **{name: 100 * share for name, share in percentages.items()}})
     case.add(load.kind, {"idx": "motor", "bus": load.bus, **load.motor})
     impedance = {"xf": fault.reactance, "rf": fault.resistance}
     case.add("Fault", {"bus": fault.bus, "tf": AT, "tc": AT + fault.duration, **impedance})
@@ -209,15 +209,15 @@ def simulate(load: Load, fault: Fault) -> dict[str, np.ndarray]:
 
 def series_of(case: Any, motor: Any, bus: int) -> dict[str, np.ndarray]:
     """What the load's bus saw and the load drew: the motor's own variables, and the static load by its law."""
-    stored, k = case.dae.ts, list(case.Bus.idx.v).index(bus)
-    U, angle = stored.y[:, case.Bus.v.a[k]], stored.y[:, case.Bus.a.a[k]]
+    history, k = case.dae.ts, list(case.Bus.idx.v).index(bus)
+    U, angle = history.y[:, case.Bus.v.a[k]], history.y[:, case.Bus.a.a[k]]
     law = case.ZIP
     active = tuple(float(term.v[0]) for term in (law.pp0, law.pi0, law.pz0))
     reactive = tuple(float(term.v[0]) for term in (law.qp0, law.qi0, law.qz0))
-    p, q = stored.y[:, motor.p.a[0]], stored.y[:, motor.q.a[0]]
+    p, q = history.y[:, motor.p.a[0]], history.y[:, motor.q.a[0]]
     P, Q = (own + terms[0] + terms[1] * U + terms[2] * U**2 for own, terms in ((p, active), (q, reactive)))
-    slip = stored.x[:, motor.slip.a[0]]
-    rows = {"t": np.array(stored.t), "U": U, "P": P, "Q": Q, "motor": p, "slip": slip, "angle": np.unwrap(angle)}
+    slip = history.x[:, motor.slip.a[0]]
+    rows = {"t": np.array(history.t), "U": U, "P": P, "Q": Q, "motor": p, "slip": slip, "angle": np.unwrap(angle)}
     return rows | {"static_P": np.array(active), "static_Q": np.array(reactive)}
 
 
@@ -263,17 +263,17 @@ def angle_jumps(rows: dict[str, np.ndarray], instants: tuple[float, float]) -> l
     return [float(rows["angle"][k + 1] - rows["angle"][k]) for k in last]
 
 
-def recovered(rows: dict[str, np.ndarray]) -> bool:
+def is_recovery(rows: dict[str, np.ndarray]) -> bool:
     """Whether the motor came through: a stalled one, or one that crawls at the end, did not."""
     slip = rows["slip"]
     return bool(slip.max() < STALLED and slip[-1] < 1.5 * slip[0] + 0.005 and rows["U"][-1] > 0.9 * rows["U"][0])
 
 
-def survived(load: Load, fault: Fault) -> tuple[Fault, dict[str, np.ndarray]]:
+def survivable(load: Load, fault: Fault) -> tuple[Fault, dict[str, np.ndarray]]:
     """The fault, shorter where the motor would stall, and its time series; `StalledMotor` where nothing helps."""
     for _ in range(3):
         rows = simulate(load, fault)
-        if recovered(rows):
+        if is_recovery(rows):
             return fault, rows
         fault = fault.milder
     raise StalledMotor(f"the motor stalls even in a fault of {fault.duration:.3g} s behind {fault.reactance:.3g} pu")
@@ -285,23 +285,23 @@ def make(series: str, number: int) -> Set:
     load = draw_load(rng, number)
     rate = float(rng.choice(RATES))
     dips, faults, jumps = [], [], []
-    for wanted in draw_faults(rng, load.bus):
-        fault, rows = survived(load, wanted)
+    for draw in draw_faults(rng, load.bus):
+        fault, rows = survivable(load, draw)
         dips.append(record(rows, fault, rate, float(rng.uniform(0, 1 / rate))))
         faults.append(asdict(fault))
         jumps.append(np.degrees(angle_jumps(rows, (AT, AT + fault.duration))).tolist())
     P0 = float(rows["P"][0])
     truth = {name: value for name, value in circuit(load.motor, P0).items()} | {"T_m": float(rows["motor"][0]) / P0}
     truth |= composition({"P": tuple(rows["static_P"]), "Q": tuple(rows["static_Q"])}, float(rows["U"][0]))
-    described = {
+    description = {
         "series": series, "number": number, "kind": load.kind, "bus": load.bus, "rate": rate, "motor": load.motor,
         "power": P0 * SYSTEM, "U0": float(rows["U"][0]), "slip": float(rows["slip"][0]), "faults": faults,
         "jumps": jumps, "depths": [float(1 - d["U"].min() / d["U"][0]) for d in dips], "parameters": truth,
     }  # fmt: skip
-    return Set(f"{series} {number}", dips, truth=described)
+    return Set(f"{series} {number}", dips, truth=description)
 
 
-def stored(series: str, number: int, folder: Path = FOLDER) -> Set:
+def set_of(series: str, number: int, folder: Path = FOLDER) -> Set:
     """A set of the folder, made there where it is absent. `StalledMotor` where there is none, with the reason."""
     place = folder / series / f"{number:03d}"
     if not (place / "truth.json").exists():
@@ -355,17 +355,17 @@ def main() -> int:
     parser.add_argument("--series", default="calibration")
     parser.add_argument("--count", type=int, default=40)
     parser.add_argument("--folder", type=Path, default=FOLDER)
-    chosen = parser.parse_args()
-    for number in range(chosen.count):
-        started = time.perf_counter()
+    options = parser.parse_args()
+    for number in range(options.count):
+        start = time.perf_counter()
         try:
-            truth = stored(chosen.series, number, chosen.folder).truth
+            truth = set_of(options.series, number, options.folder).truth
             values = ", ".join(f"{name} {value:.4g}" for name, value in truth["parameters"].items())
             depths = " ".join(f"{depth:.0%}" for depth in truth["depths"])
             line = f"{truth['kind']} at {truth['rate']:.0f} Hz, dips of {depths}: {values}"
         except StalledMotor as error:
             line = f"refused: {error}"
-        print(f"{number}: {line} ({time.perf_counter() - started:.1f} s)", flush=True)
+        print(f"{number}: {line} ({time.perf_counter() - start:.1f} s)", flush=True)
     return 0
 
 

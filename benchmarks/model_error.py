@@ -27,6 +27,7 @@ for library in ("OPENBLAS", "OMP", "MKL", "NUMBA"):
 import andes_loads  # noqa: E402
 import numpy as np  # noqa: E402
 from andes_loads import StalledMotor  # noqa: E402
+from model_error_tables import shift_lines, tables  # noqa: E402
 
 from hidden_effects import cases  # noqa: E402
 from hidden_effects.effects import CATALOG  # noqa: E402
@@ -39,8 +40,6 @@ EXPONENTIAL, ZIP = "third_order_exponential", "third_order_zip"
 MULTIPLES = (1.0, 2.0, 4.0, 8.0)
 EVENTS, TRAIN = 3, 2  # of a generated data set
 BLOCK, CYCLE, BLOCKS = 0.1, 0.02, 10  # s, s: residuals of a block are one observation, fewer than ten are no sample
-WORSE = 1.05  # times the search's end: an estimate beyond counts as worse
-NAMES = ("T_prime", "X_prime", "M", "T_m", "p_v", "C", "q_v", "a_Z", "a_I", "b_Z", "b_I")
 
 
 @dataclass(frozen=True)
@@ -70,9 +69,6 @@ class Task:
         return f"{self.series}|{self.kind}|{self.name}|{self.model}|{self.multiple:g}|{self.seed}"
 
 
-# --- the data sets --------------------------------------------------------------------------------------------------
-
-
 def tasks(series: str, count: int, multiples: Sequence[float], models: Sequence[str]) -> Iterator[Task]:
     """Every identification of a series: `count` ANDES sets, nulls, and data sets of each effect at each multiple."""
     for name, model in itertools.product(RECORDS, models):
@@ -92,12 +88,12 @@ def data_of(task: Task, shared: Path = SHARED) -> Data:
     """The data set of a task; FileNotFoundError or UserError, with the reason, where it cannot be had."""
     if task.kind == "record":
         return RECORDS[task.name](shared)
-    return andes_set(task) if task.kind == "andes" else generated(task)
+    return andes_set(task) if task.kind == "andes" else generator_set(task)
 
 
 def andes_set(task: Task) -> Data:
     """A load by ANDES; half of the sets have noise."""
-    one = andes_loads.stored(task.series, task.seed)
+    one = andes_loads.set_of(task.series, task.seed)
     rng = andes_loads.generator(task.series, task.seed, "noise")
     dips, level = one.dips, 0.0
     if rng.random() < 0.5:
@@ -114,12 +110,12 @@ def floor(values: dict[str, float], events: Sequence[Any]) -> float:
     import tractexp
 
     model = tractexp.compose(ZIP)
-    played = tractexp.simulate(model, {name: values[name] for name in model.parameters}, records=list(events))
-    squares = [Compared.of(e, r) for e, r in zip(events, played.responses, strict=True)]
+    simulation = tractexp.simulate(model, {name: values[name] for name in model.parameters}, records=list(events))
+    squares = [Compared.of(e, r) for e, r in zip(events, simulation.responses, strict=True)]
     return overall(squares)
 
 
-def generated(task: Task) -> Data:
+def generator_set(task: Task) -> Data:
     """Nothing missing under one of the generator's noises, or an effect at a multiple of its detection limit."""
     import tractexp
 
@@ -153,7 +149,7 @@ def station(voltages: Sequence[int], currents: Sequence[int], domain: str | None
         import tractexp
 
         path = shared / "data" / "dfr220kv-shandong" / "xtz.cfg"
-        events = tractexp.read(present(path), voltages=voltages, currents=currents)
+        events = tractexp.read(path_of(path), voltages=voltages, currents=currents)
         return Data(events[:1], events[1:], {}, {}, domain)
 
     return data
@@ -166,7 +162,7 @@ def pole_slip(currents: Sequence[int]) -> Callable[[Path], Data]:
         import tractexp
 
         path = shared / "data" / "async110kv-wisp" / "async110.cfg"
-        dips = {e.record.name: e for e in tractexp.read(present(path), voltages=[0, 1, 2], currents=currents)}
+        dips = {e.record.name: e for e in tractexp.read(path_of(path), voltages=[0, 1, 2], currents=currents)}
         events = [dips[f"async110_dip{k}"] for k in (15, 16, 17)]
         return Data(events[:1], events[1:], {}, {})
 
@@ -177,7 +173,7 @@ def keating(shared: Path) -> Data:
     """The low-voltage feeder, which holds no dip so far."""
     import tractexp
 
-    events = tractexp.read(present(shared / "data" / "keating-lv" / "keating_1999.cfg"))
+    events = tractexp.read(path_of(shared / "data" / "keating-lv" / "keating_1999.cfg"))
     return Data(events[:1], events[1:], {}, {})
 
 
@@ -194,7 +190,7 @@ def tibet(*depths: int) -> Callable[[Path], Data]:
     return data
 
 
-def present(path: Path) -> str:
+def path_of(path: Path) -> str:
     """The path of a file that is there; FileNotFoundError otherwise."""
     if not path.exists():
         raise FileNotFoundError(f"there is no {path.parent.name}/{path.name} beside the repository")
@@ -213,9 +209,6 @@ RECORDS: dict[str, Callable[[Path], Data]] = {
     "tibet": tibet(50, 30),
     "tibet_50pct": tibet(50),
 }
-
-
-# --- the error in S -------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,9 +270,6 @@ def worse_than_chance(estimate: Sequence[Compared], search: Sequence[Compared]) 
     return mean > 2 * deviation and mean > (1.01**2 - 1) * missed
 
 
-# --- one row --------------------------------------------------------------------------------------------------------
-
-
 def run(task: Task, shared: Path = SHARED) -> dict[str, Any]:
     """One data set identified. What fails, or is absent, is a row with its message."""
     from tractexp.errors import UserError
@@ -293,12 +283,12 @@ def run(task: Task, shared: Path = SHARED) -> dict[str, Any]:
     except (StalledMotor, UserError, ValueError) as error:
         return row | {"skipped": f"{type(error).__name__}: {error}".replace(str(shared), "shared")}
     try:
-        return row | data.about | judged(task, data)
+        return row | data.about | judgement(task, data)
     except (UserError, ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
         return row | {"failed": f"{type(error).__name__}: {error}".replace(str(shared), "shared")}
 
 
-def judged(task: Task, data: Data) -> dict[str, Any]:
+def judgement(task: Task, data: Data) -> dict[str, Any]:
     """What an identification says of a data set, against what is known of it."""
     fit, wall, cpu = identification(task, data)
     result = fit.result
@@ -336,9 +326,9 @@ def comparisons(fit: Any, data: Data) -> dict[str, tuple[list[Compared], list[Co
     for role, events in (("train", data.train), ("validate", data.validate)):
         if not events:
             continue
-        played = tractexp.simulate(fit.model, fit.result.search["parameters"], records=list(events)).responses
+        simulation = tractexp.simulate(fit.model, fit.result.search["parameters"], records=list(events)).responses
         here = [Compared.of(event, fit.predict(event)) for event in events]
-        sides[role] = here, [Compared.of(event, response) for event, response in zip(events, played, strict=True)]
+        sides[role] = here, [Compared.of(event, response) for event, response in zip(events, simulation, strict=True)]
     here, there = (list(itertools.chain.from_iterable(some)) for some in zip(*sides.values(), strict=True))
     return sides | {"all": (here, there)}
 
@@ -356,137 +346,15 @@ def size_of_error(fit: Any, data: Data) -> dict[str, Any]:
     return content
 
 
-def rounded(value: Any) -> Any:
+def six_digits(value: Any) -> Any:
     """Floats to six digits, so that a row stays short; what is not finite is None."""
     if isinstance(value, float | np.floating):
         return float(f"{value:.6g}") if np.isfinite(value) else None
     if isinstance(value, dict):
-        return {key: rounded(one) for key, one in value.items()}
+        return {key: six_digits(one) for key, one in value.items()}
     if isinstance(value, list | tuple):
-        return [rounded(one) for one in value]
+        return [six_digits(one) for one in value]
     return bool(value) if isinstance(value, np.bool_) else value
-
-
-# --- the tables -----------------------------------------------------------------------------------------------------
-
-
-def group_of(row: dict[str, Any]) -> str:
-    """The line of the tables that a row belongs to."""
-    if row["kind"] == "andes":
-        resistance = "without" if row["R_s"] < 1e-4 else "with"
-        structure = "double cage" if row["motor"] == "Motor5" else f"{resistance} stator resistance"
-        return f"andes, {row['model']}, {structure}"
-    if row["kind"] == "effect":
-        inside = "catalogue" if row["name"] in CATALOG else "outside"
-        return f"effect of the {inside} at {row['multiple']:g} limits"
-    return {"null": "nothing missing", "record": "records at hand"}[row["kind"]]
-
-
-def coverage(rows: Sequence[dict[str, Any]], name: str) -> tuple[int, int, list[float], list[float]]:
-    """How many intervals of a parameter hold its truth, of how many; |z|, and half widths over the truth."""
-    inside, z, width = [], [], []
-    for row in rows:
-        true, interval = row["truth"].get(name), row["intervals"].get(name)
-        if true is None or interval is None or None in interval:
-            continue
-        inside.append(interval[0] <= true <= interval[1])
-        width.append((interval[1] - interval[0]) / 2 / abs(true))
-        if error := row["errors"].get(name):
-            z.append(abs(row["parameters"][name] - true) / error)
-    return sum(inside), len(inside), z, width
-
-
-def middle(values: Sequence[float]) -> str:
-    return f"{np.median(values):.2g}" if len(values) else "-"
-
-
-def tables(rows: Sequence[dict[str, Any]]) -> str:
-    """What the stored rows say."""
-    judged_rows = [row for row in rows if "parameters" in row]
-    groups: dict[str, list[dict[str, Any]]] = {}
-    for row in judged_rows:
-        groups.setdefault(group_of(row), []).append(row)
-    lines = [f"{len(rows)} rows, {len(judged_rows)} judged", "", *coverage_lines(groups), "", *worse_lines(groups)]
-    lines += ["", *record_lines(judged_rows), ""]
-    others = [(row, row.get(why)) for row in rows for why in ("absent", "skipped", "failed") if why in row]
-    lines += [f"{row['key']}: {reason}" for row, reason in others]
-    return "\n".join(lines)
-
-
-def coverage_lines(groups: dict[str, list[dict[str, Any]]]) -> list[str]:
-    """Intervals of 95 % that hold the truth, the median of |z|, and of the half width over the truth."""
-    lines = ["95 % intervals that hold the truth (median |z|; median half width over the truth)", ""]
-    lines += ["| sets | " + " | ".join(NAMES) + " |", "|---" * (len(NAMES) + 1) + "|"]
-    for group, some in groups.items():
-        cells = []
-        for name in NAMES:
-            inside, count, z, width = coverage(some, name)
-            cells.append(f"{inside}/{count} ({middle(z)}; {middle(width)})" if count else "")
-        if any(cells):
-            lines.append(f"| {group} | " + " | ".join(cells) + " |")
-    return lines
-
-
-def worse_lines(groups: dict[str, list[dict[str, Any]]]) -> list[str]:
-    """Estimate against the search's end: how often worse, the error in S of both, and the time taken."""
-    lines = ["estimate against the search's end: worse by more than 5 % in Eq. (8), held out in S; by more than chance"]
-    lines += ["explains, fitted, held out and on all events; median error in S held out; wall and processor time", ""]
-    lines += ["| sets | n | Eq. (8) | held out | chance, fitted | held out | all | S estimate | S search | largest"
-              " ratio | wall s | cpu s | grades |", "|---" * 13 + "|"]  # fmt: skip
-    for group, some in groups.items():
-        held = [row["S"]["validate"] for row in some if "validate" in row["S"]]
-        ratios = [one["all estimate"] / one["all search"] for one in held]
-        roles = "train", "validate", "all"
-        chance = [sum(bool(row["chance"].get(role, [False])[-1]) for row in some) for role in roles]
-        grades: dict[str, int] = {}
-        for row in some:
-            grades[row["grade"]] = grades.get(row["grade"], 0) + 1
-        errors = [100 * np.median([one[f"all {side}"] for one in held]) for side in ("estimate", "search")]
-        cells = [
-            group, str(len(some)), str(sum(row["objective"] > WORSE * row["search"]["objective"] for row in some)),
-            str(sum(ratio > WORSE for ratio in ratios)), *map(str, chance), *(f"{error:.2f} %" for error in errors),
-            f"{max(ratios):.2f}", *(f"{np.median([row[key] for row in some]):.1f}" for key in ("wall", "cpu")),
-            ", ".join(f"{grade} {count}" for grade, count in sorted(grades.items())),
-        ]  # fmt: skip
-        lines.append("| " + " | ".join(cells) + " |")
-    return lines
-
-
-def record_lines(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """The records at hand, one by one."""
-    lines = ["| record | Eq. (8) estimate | search | S fitted estimate | search | S held out estimate | search | worse"
-             " than chance | at a bound |", "|---" * 9 + "|"]  # fmt: skip
-    for row in rows:
-        if row["kind"] != "record":
-            continue
-        sizes = [f"{100 * row['S'][role][f'all {side}']:.2f} %" if role in row["S"] else "" for role in
-                 ("train", "validate") for side in ("estimate", "search")]  # fmt: skip
-        beyond = ", ".join(role for role, chance in row["chance"].items() if chance[-1])
-        cells = [f"{row['name']}, {row['model']}", f"{row['objective']:.4g}", f"{row['search']['objective']:.4g}"]
-        lines.append("| " + " | ".join([*cells, *sizes, beyond or "no", ", ".join(row["at_bound"])]) + " |")
-    return lines
-
-
-def shift_lines(rows: Sequence[dict[str, Any]], before: Sequence[dict[str, Any]]) -> list[str]:
-    """How far estimates moved from those of another file, in its standard errors, and how wide intervals are to its."""
-    lines = ["largest move of a parameter in standard errors of before: median over the sets, and the most; median"]
-    lines += ["half width over that of before; by set", "", "| sets | n | median | most | width |", "|---" * 5 + "|"]
-    others = {row["key"]: row for row in before if "parameters" in row}
-    groups: dict[str, list[tuple[float, float]]] = {}
-    for row in rows:
-        if "parameters" not in row or row["key"] not in others:
-            continue
-        other = others[row["key"]]
-        errors = {name: error for name, error in other["errors"].items() if error}
-        moves = [abs(row["parameters"][n] - other["parameters"][n]) / error for n, error in errors.items()]
-        spans = [row["intervals"].get(n) for n in errors], [other["intervals"].get(n) for n in errors]
-        ratios = [np.ptp(a) / np.ptp(b) for a, b in zip(*spans, strict=True) if a and b and None not in (*a, *b)]
-        groups.setdefault(group_of(row), []).append((max(moves, default=np.nan), float(np.median(ratios or [np.nan]))))
-    for group, some in groups.items():
-        moves, ratios = np.array(some).T
-        numbers = f"{np.nanmedian(moves):.2g} | {np.nanmax(moves):.2g} | {np.nanmedian(ratios):.2f}"
-        lines.append(f"| {group} | {len(some)} | {numbers} |")
-    return lines
 
 
 def rows_of(path: Path) -> list[dict[str, Any]]:
@@ -505,24 +373,24 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("model_error.jsonl"))
     parser.add_argument("--tables", action="store_true", help="print what is stored, and run nothing")
     parser.add_argument("--against", type=Path, help="a file of rows before: how far estimates moved")
-    chosen = parser.parse_args()
-    rows = rows_of(chosen.out)
-    if chosen.tables:
+    options = parser.parse_args()
+    rows = rows_of(options.out)
+    if options.tables:
         print(tables(rows))
-        if chosen.against:
-            print("", *shift_lines(rows, rows_of(chosen.against)), sep="\n")
+        if options.against:
+            print("", *shift_lines(rows, rows_of(options.against)), sep="\n")
         return 0
-    known = {row["key"] for row in rows}
-    every = tasks(chosen.series, chosen.count, chosen.multiples, chosen.models)
-    wanted = [t for t in every if {t.kind, t.name} & {*chosen.only} and t.key not in known]
-    with chosen.out.open("a", encoding="utf-8") as out:
-        for k, task in enumerate(wanted, start=1):
-            row = rounded(run(task, chosen.shared))
+    keys = {row["key"] for row in rows}
+    every = tasks(options.series, options.count, options.multiples, options.models)
+    rest = [t for t in every if {t.kind, t.name} & {*options.only} and t.key not in keys]
+    with options.out.open("a", encoding="utf-8") as out:
+        for k, task in enumerate(rest, start=1):
+            row = six_digits(run(task, options.shared))
             if "absent" not in row:
                 out.write(json.dumps(row, ensure_ascii=False, separators=(",", ":")) + "\n")
                 out.flush()
             rows.append(row)
-            print(f"\r{k} of {len(wanted)}: {task.key}", end="", file=sys.stderr, flush=True)
+            print(f"\r{k} of {len(rest)}: {task.key}", end="", file=sys.stderr, flush=True)
     print(tables(rows))
     return 0
 
