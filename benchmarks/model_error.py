@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-for library in ("OPENBLAS", "OMP", "MKL", "NUMBA"):
+for library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 import andes_loads  # noqa: E402
@@ -117,16 +117,18 @@ def floor(values: dict[str, float], events: Sequence[Any]) -> float:
 
 def generator_set(task: Task) -> Data:
     """Nothing missing under one of the generator's noises, or an effect at a multiple of its detection limit."""
+    if task.kind == "null":
+        return events_of(Case(noise=cases.NOISES[task.name], events=EVENTS), task.seed)
+    trial = cases.at_limit((task.name,), task.multiple, task.seed, events=EVENTS)
+    return events_of(trial.case, task.seed, trial.multiples[0])
+
+
+def events_of(case: Case, seed: int, multiple: float = 0.0) -> Data:
+    """The events of a case of the generator, the last one held out."""
     import tractexp
 
-    if task.kind == "null":
-        case, multiple = Case(noise=cases.NOISES[task.name], events=EVENTS), 0.0
-    else:
-        trial = cases.at_limit((task.name,), task.multiple, task.seed, events=EVENTS)
-        case, multiple = trial.case, trial.multiples[0]
-    events = [tractexp.read(**r, name=f"event{k}")[0] for k, r in enumerate(make(case, task.seed), 1)]
-    about = {"multiple_hidden": multiple}
-    return Data(events[:TRAIN], events[TRAIN:], truth(case, task.seed)["load"], about)
+    events = [tractexp.read(**columns, name=f"event{k}")[0] for k, columns in enumerate(make(case, seed), 1)]
+    return Data(events[:TRAIN], events[TRAIN:], truth(case, seed)["load"], {"multiple_hidden": multiple})
 
 
 def andes_dips(shared: Path) -> Data:
@@ -374,6 +376,7 @@ def main() -> int:
     parser.add_argument("--tables", action="store_true", help="print what is stored, and run nothing")
     parser.add_argument("--against", type=Path, help="a file of rows before: how far estimates moved")
     options = parser.parse_args()
+    os.environ.setdefault("NUMBA_NUM_THREADS", "1")  # times are of one thread
     rows = rows_of(options.out)
     if options.tables:
         print(tables(rows))

@@ -66,6 +66,22 @@ def test_an_error_of_the_same_size_is_chance_and_one_of_twice_the_square_is_not(
     assert all(worse_than_chance(*sides(2.0, seed)) for seed in range(20))
 
 
+def test_few_alarms_where_a_short_record_s_error_is_correlated_and_fades():
+    """Two dips of 0.2 s at 1067 Hz, as those of station xtz: errors of one size, correlated over 20 ms."""
+    from scipy.signal import lfilter
+
+    rng, t = np.random.default_rng(3), np.arange(213) / 1067
+    memory = np.exp(-1 / (1067 * 0.02))
+
+    def error() -> Compared:
+        white = rng.normal(size=(2, len(t) + 500))
+        colored = lfilter([np.sqrt(1 - memory**2)], [1, -memory], white)[:, 500:] * np.exp(-t / 0.05)
+        return Compared(t, (colored**2).sum(axis=0), np.ones_like(t))
+
+    alarms = [worse_than_chance([error(), error()], [error(), error()]) for _ in range(400)]
+    assert sum(alarms) < 24
+
+
 def test_a_growth_below_one_percent_of_the_error_does_not_count():
     _, search = sides(1.0)
     for growth, worse in ((1.015, False), (1.025, True)):  # of the square

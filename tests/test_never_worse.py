@@ -10,10 +10,13 @@ import pytest
 from model_error import EXPONENTIAL, Data, Task
 
 import tractexp
+from hidden_effects import Case
 
 AT_HAND = ("andes a", "xtz T1 phasors", "xtz T2 phasors", "async110 VL2", "async110 VL3", "keating")
 SHIPPED = ("tibet", "tibet_50pct")
-HIDDEN = {"voltage_gain_drift": 989877896, "measurement_window": 2140662154}  # seeds of three dips, at four limits
+# effect, size (in its references) and seed of three dips: about four detection limits, and of those tried once each of
+# the few in which the estimate was worse while the likelihood of the noise before the dip decided
+HIDDEN = [("exponential_recovery", 0.229, 1143329030), ("measurement_window", 2.3, 2140662154)]
 
 
 def hold(task: Task, data: Data) -> None:
@@ -22,7 +25,8 @@ def hold(task: Task, data: Data) -> None:
     for role, (estimate, search) in model_error.comparisons(fit, data).items():
         errors = [f"{100 * model_error.overall(side):.2f} %" for side in (estimate, search)]
         sentence = f"{role}: the estimate misses {errors[0]} of the excursion in S, where the search ended {errors[1]}"
-        assert not model_error.worse_than_chance(estimate, search), sentence
+        worse = model_error.worse_than_chance(estimate, search)
+        assert not worse, sentence
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -45,7 +49,11 @@ def test_on_records_at_hand(name, shared_data):
     hold(task, data)
 
 
-@pytest.mark.parametrize("name", HIDDEN)
-def test_where_an_effect_is_hidden(name):
-    task = Task("effect", name, EXPONENTIAL, HIDDEN[name], multiple=4.0)
-    hold(task, model_error.data_of(task))
+@pytest.mark.parametrize(("name", "size", "seed"), HIDDEN, ids=lambda value: value if isinstance(value, str) else "")
+def test_where_an_effect_is_hidden(name, size, seed):
+    case = Case(effect=name, size=size, events=model_error.EVENTS)
+    hold(Task("effect", name, EXPONENTIAL), model_error.events_of(case, seed))
+
+
+def test_where_nothing_is_missing():
+    hold(Task("null", "", EXPONENTIAL), model_error.events_of(Case(events=model_error.EVENTS), 1))
