@@ -1,4 +1,4 @@
-"""Play a dip through a load in ANDES: run by a Python that has it (see andes_check.py); nothing else imports this.
+"""Play a dip through a load in ANDES: run by a Python that has it (see andes_check.py); `andes_loads` alone imports it.
 
     python andes_run.py load.json dip.json response.npz
 
