@@ -235,3 +235,29 @@ def test_a_search_that_found_a_better_valley_leads_to_the_estimate(monkeypatch):
     found = estimate(problem, TRUTH)
     np.testing.assert_allclose(found.known.values, whole.values, rtol=1e-3)
     assert found.starts[0].origin in ("search", "beside the best")
+
+
+def test_a_model_that_takes_its_error_for_slow_noise_is_found_out_by_least_squares():
+    """Had least squares left half as much, the likelihood would give up far more of Eq. (8) than it does on draws."""
+    fit = polished(Problem(study.model(), [recorded()]))
+    known, likelihood = fit.known, fit.known.of_noise
+    squares = Likelihood.of_squares(likelihood.problem, 0.004)
+    rows = squares.with_initial_power.rows(known.unit[None])[0]
+    least = float(rows @ rows)
+    observed = Observed.of(likelihood.problem)
+    agree = adequacy.surprise(observed, likelihood, known.unit, squares, least)
+    apart = adequacy.surprise(observed, likelihood, known.unit, squares, least / 2)
+    assert agree.p > adequacy.ADEQUATE_P
+    assert (apart.loudest, apart.p < adequacy.ADEQUATE_P) == (adequacy.APART, True)
+
+
+def test_a_quiet_start_of_a_record_tells_the_noise_of_one_whose_end_is_louder():
+    from tractexp.noise.quiet import louder
+
+    rng = np.random.default_rng(1)
+    calm, same, loud = 0.001 * rng.standard_normal((3, 200))
+    assert not louder([same], [calm])
+    assert louder([2 * loud], [calm])
+    slow = study.noise(rng, 4000, 0.001, 0.95)  # colored alike: few samples tell, and ends may differ by chance
+    wrong = [louder([row[a : a + 200]], [row[a + 400 : a + 600]]) for row in slow for a in range(0, 3200, 200)]
+    assert np.mean(wrong) < 0.1

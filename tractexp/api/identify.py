@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from tractexp.identification.uncertainty import Uncertainty
 
 FIXED = "fixed"
+MOVED = 2.0  # standard errors from which a rival structure's move is told
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -249,13 +250,12 @@ class Identification(Written):
 
     @property
     def moves(self) -> dict[str, tuple[str, float]]:
-        """By parameter the rival structure that moves it farther than its interval, and the value there."""
+        """By parameter the rival structure that moves it most, and by more than it scatters; and the value there."""
         far = {}
         for rival in self.result.rival_structures:
             for e in (self.parameters[name] for name in rival["parameters"]):
                 value, before = rival["parameters"][e.name], far.get(e.name, ("", e.value))[1]
-                outside = e.interval is None or not e.interval[0] <= value <= e.interval[1]
-                if outside and abs(value - e.value) > abs(before - e.value):
+                if abs(value - e.value) > max(MOVED * (e.standard_error or 0.0), abs(before - e.value)):
                     far[e.name] = rival["name"], value
         return far
 

@@ -202,7 +202,7 @@ class Result:
     def acceptance(self) -> str:
         """Whether Eq. (20) accepts the model, in a sentence; where Q is small, what its error is divided by."""
         holds = "holds" if self.acceptable else "does NOT hold"
-        said = f"acceptance of Eq. (20), epsilon_p and epsilon_q below {ACCEPTED:.0%}: {holds}"
+        said = f"acceptance of Eq. (20), epsilon_p and epsilon_q below {in_percent(ACCEPTED)}: {holds}"
         shares = [e["Q_over_S"] for e in self.events if e["role"] == TRAIN and "Q_over_S" in e]
         if shares and min(shares) < SMALL_Q and self.epsilon_q >= ACCEPTED > self.epsilon_p:
             said += f" (epsilon_q divides by Q alone, here {in_percent(min(shares))} of S)"
