@@ -51,7 +51,8 @@ def cases() -> Iterator[dict[str, Any]]:
                 if m == motor or s == static or (m in ("double_cage", "mechanical") and s in ("zip", "none")):
                     yield case(domain, m, s)
         for name in sorted(known["effect"]):
-            yield case(domain, motor, static, name)
+            if name != "harmonics_source":  # fits more harmonics than these samples tell apart: rounding, magnified
+                yield case(domain, motor, static, name)
         for names in (*PAIRS, SEVEN, ("injection",), *((f"library {kind}",) for kind in LIBRARIES)):
             yield case(domain, motor, static, *names)
         yield case(domain, "double_cage", static, "undervoltage_trip", "second_motor_group")
@@ -126,12 +127,13 @@ def _usual(p: Parameter) -> float:
     return p.null + (max(p.bounds, key=lambda bound: abs(bound - p.null)) - p.null) / 3
 
 
-def played(of: Model, values: np.ndarray) -> dict[str, np.ndarray]:
-    """What the kernel gives: sums (E, C, n), miss (E, n), and outputs (C, 4, some) of a few candidates."""
+def played(of: Model, values: np.ndarray, shown: bool = True) -> dict[str, np.ndarray]:
+    """What the kernel gives: sums (E, C, n), miss (E, n), and, if `shown`, outputs (C, 4, some) of a few candidates."""
     driven, substeps = drive(of.domain), np.array(SUBSTEPS[of.domain] if of.integration == "classical" else (1, 1))
     with np.errstate(all="ignore"):
         errors, response = of.errors(driven, values, substeps), of.simulate(driven, values, substeps)
-    return {"sums": errors.sums, "miss": response.miss, "outputs": response.outputs[:, SHOWN, ::EVERY]}
+    outputs = {"outputs": response.outputs[:, SHOWN, ::EVERY]} if shown else {}
+    return {"sums": errors.sums, "miss": response.miss, **outputs}
 
 
 def _made(of: dict[str, Any]) -> tuple[dict[str, Any], dict[str, np.ndarray]] | None:
@@ -167,6 +169,12 @@ def main() -> None:
     chosen = parser.parse_args()
     if chosen.make:
         make(chosen.processes)
+        return
+    for of, before in stored():
+        now = played(model(of), before["values"].astype(float))
+        with np.errstate(all="ignore"):
+            off = np.abs(now["sums"] / before["sums"] - 1)[:, :, :25]
+        print(f"{np.nanmax(off):10.1e}  {' '.join(map(str, of.values()))}")
 
 
 if __name__ == "__main__":
