@@ -1,26 +1,28 @@
 """How fast a kernel could be: its operations, counted in the machine code, at the rate this processor is seen to do.
 
-Counted are the packed floating-point instructions of the two loops over candidates: the one run once a sample (power,
-its squared errors) and the one run once a step. A fused multiply-add is one operation; what a load, a store, a move or
-an integer shift costs is not counted, so the limit is one that no code with these operations can pass.
+Counted are the packed floating-point instructions of the loop over groups of candidates: what is run once a sample
+(power, its squared errors) and what is run once a step. A fused multiply-add is one operation; what a load, a store, a
+move or an integer shift costs is not counted, so the limit is one that no code with these operations can pass.
 """
 
+import ctypes
 import re
 import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numba import njit
 
-from tractexp.doors.numba_vector_width import prefer_vectors
+from tractexp.kernel import objects
+from tractexp.kernel.function import Function
+from tractexp.kernel.numbers import Numbers
+from tractexp.kernel.room import Room
 
 PACKED = re.compile(r"v(fn?m|mul|div|sqrt|add|sub|max|min|rndscale|round)\w*pd\b|vcvt")
 MULTIPLIES = re.compile(r"vfn?m|vmul")
 DIVIDES = re.compile(r"vdiv|vsqrt")
-CHAINS, DEPTH, LANES = 12, 20, 64  # of the loop that shows the rate: enough to hide that an operation takes 4 cycles
+CHAINS, DEPTH, TIMES = 12, 20, 400  # of the loop that shows the rate: enough to hide that an operation takes 4 cycles
 
 
 @dataclass(frozen=True)
@@ -51,71 +53,77 @@ class Limit:
         return (self.sample.all / self.substeps + self.step.all) / self.lanes / self.rate
 
 
-def limit(run: Any, states: int, substeps: int, bits: int, rounds: int) -> Limit:
-    """Of a kernel's `run`, compiled in this process with vectors of so many bits."""
-    sample, step = counts(run.inspect_asm(run.signatures[0]), states)
+def limit(text: str, substeps: int, rounds: int) -> Limit:
+    """Of a kernel by its IR."""
+    width = Room.of(text).width
+    sample, step = counts(objects.assembly(text), Room.of(text).outputs)
     mix = (step.multiplications * substeps + sample.multiplications, step.others * substeps + sample.others)
-    measured = rate(Count(*mix), bits)
-    return Limit(sample, step, substeps, bits // 64, max(measured() for _ in range(rounds)))
+    measured = rate(Count(*mix), width)
+    return Limit(sample, step, substeps, width, max(measured() for _ in range(rounds)))
 
 
-def counts(assembly: str, states: int) -> tuple[Count, Count]:
-    """Operations once a sample and once a step, of a kernel without memories. Raises `ValueError` for other code."""
-    loops = [_operations(body) for body in _loops(assembly)]
-    loops = [(stores, operations) for stores, operations in loops if operations.total() > 5]
-    samples = [operations for stores, operations in loops if stores == 4]  # P, Q and both sums
-    steps = [operations for stores, operations in loops if stores == states != 4]
-    if len(samples) != 1 or len(steps) != 1:
-        raise ValueError("the loops over candidates are not those of a kernel on x86 with AVX")
-    if samples[0]["divides"] or steps[0]["divides"]:
+def counts(assembly: str, outputs: int) -> tuple[Count, Count]:
+    """Operations once a sample and once a step, of a kernel without memories. Raises `ValueError` for other code.
+
+    A step is the run of instructions with most operations; outputs and sums are stored by one of their own.
+    """
+    blocks = [_operations(body) for body in _blocks(assembly)]
+    samples = [operations for stores, operations in blocks if stores == 2 * outputs]
+    steps = [operations for stores, operations in blocks if stores != 2 * outputs]
+    sample, step = (max(some, key=Counter.total, default=Counter()) for some in (samples, steps))
+    if not sample or not step:
+        raise ValueError("the loop over candidates is not that of a kernel on x86 with AVX")
+    if sample["divides"] or step["divides"]:
         raise ValueError("a division takes many times as long as other operations; its kernel has no limit stated here")
-    return tuple(Count(o["multiplies"], o["other"]) for o in (samples[0], steps[0]))
+    return tuple(Count(o["multiplies"], o["other"]) for o in (sample, step))
 
 
-def _loops(assembly: str) -> list[list[str]]:
-    """Bodies of the loops that are one run of instructions."""
-    found, label, body = [], "", []
+def _blocks(assembly: str) -> list[list[str]]:
+    """Instructions from label to label."""
+    blocks: list[list[str]] = [[]]
     for line in assembly.splitlines():
-        if named := re.match(r"(\.L\w+):", line):
-            label, body = named[1], []
+        if re.match(r"\.?L\w+:", line):
+            blocks.append([])
         elif line.startswith("\t") and not line.startswith("\t."):
-            body.append(line.split("#")[0].strip())
-            if re.fullmatch(rf"j\w+\s+{re.escape(label)}", body[-1]):
-                found.append(body)
-    return found
+            blocks[-1].append(line.split("#")[0].strip())
+    return blocks
 
 
 def _operations(body: list[str]) -> tuple[int, Counter]:
     """Vectors stored, and operations by kind."""
-    packed = [line for line in body if re.search(r"%[yz]mm", line)]
+    packed = [line for line in body if re.search(r"%[xyz]mm", line)]
     stores = sum(bool(re.match(r"vmov[au]pd\s+%[yz]mm\d+, .*\)$", line)) for line in packed)
     operations = Counter()
     for line in packed:
-        if PACKED.match(line):
+        if PACKED.match(line) and re.search(r"%[yz]mm", line):
             kind = "divides" if DIVIDES.match(line) else "multiplies" if MULTIPLIES.match(line) else "other"
             operations[kind] += 1
     return stores, operations
 
 
-def rate(mix: Count, bits: int) -> Callable[[], float]:
+def rate(mix: Count, width: int) -> Callable[[], float]:
     """A call that does such a mix of operations in registers only, and returns vector operations per nanosecond."""
     fused = round(CHAINS * mix.multiplications / mix.all)
-    names = [f"a{c}" for c in range(CHAINS)]
-    once = [f"{a} = {a} * x + y" if c < fused else f"{a} = {a} + y" for c, a in enumerate(names)]
-    body = [f"{a} = W[{c * LANES} + k]" for c, a in enumerate(names)]
-    body += once * DEPTH + [f"W[{c * LANES} + k] = {a}" for c, a in enumerate(names)]
-    text = ["def work(W, x, y, times):", "    prefer_vectors(bits)", "    for _ in range(times):"]
-    text += [f"        for k in range({LANES}):", *(f"            {line}" for line in body)]
-    space = {"prefer_vectors": prefer_vectors, "bits": bits}
-    exec("\n".join(text), space)
-    work, W, times = njit(fastmath={"contract"})(space["work"]), np.ones(CHAINS * LANES + 8), 50
-    W = W[(64 - W.ctypes.data % 64) // 8 :]
+    f = Function()
+    n = Numbers(f, width)
+    x = n.load("%work")
+    with f.loop(0, TIMES):
+        values = [n.load(f.at("%work", c * width)) for c in range(CHAINS)]
+        for _ in range(DEPTH):
+            values = [n.fused(a, x, x, "contract") if c < fused else n.add(a, x, "") for c, a in enumerate(values)]
+        for c, a in enumerate(values):
+            n.store(a, f.at("%work", c * width))
+    loaded = objects.load("\n".join([*f.intrinsics.values(), f.text("define void @run(ptr %work)")]))
+    call = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(loaded.address)
+    work = np.full(CHAINS * width + 8, 0.5)
+    address = -(-work.ctypes.data // 64) * 64
 
     def measured() -> float:
+        work[:] = 0.5
         started = time.perf_counter()
-        work(W, 0.5, 0.5, times)
-        seconds = time.perf_counter() - started
-        return times * CHAINS * DEPTH * LANES / (bits / 64) / seconds * 1e-9
+        call(address)
+        return TIMES * CHAINS * DEPTH / (time.perf_counter() - started) * 1e-9
 
+    measured.code = loaded  # type: ignore[attr-defined] # which goes with the last that holds it
     measured()
     return measured

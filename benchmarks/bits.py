@@ -38,7 +38,7 @@ SIMULATED = """if True:
         made.append(np.stack([response.P, response.Q])[:, response.miss[0] == 0])
     np.savez(sys.argv[1], *made)
 """
-GENERIC = {"NUMBA_CPU_NAME": "generic"}
+GENERIC = {"TRACTEXP_CPU": "generic"}
 
 
 def identified(folder: Path, arguments: list[str], **environment: str) -> list[dict]:

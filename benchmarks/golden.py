@@ -11,7 +11,6 @@ descent carries that on.
 import argparse
 import json
 import math
-import os
 import subprocess
 import sys
 import tempfile
@@ -77,8 +76,7 @@ def investigations() -> Iterator[tuple[str, Case, int, list[str]]]:
 def command(folder: Path, *arguments: str) -> dict[str, Any]:
     """Run tractexp in a folder; what it refuses is a row with its sentence."""
     told = [sys.executable, "-m", "tractexp", *arguments, "tracking.enabled=false", "hydra.run.dir=run"]
-    environment = os.environ | {"NUMBA_NUM_THREADS": "1"}
-    done = subprocess.run(told, cwd=folder, capture_output=True, text=True, env=environment)
+    done = subprocess.run(told, cwd=folder, capture_output=True, text=True)
     if done.returncode:
         return {"refused": done.stderr.strip().splitlines()[-1]}
     file = folder / "run" / ("discrepancy.json" if "task=discrepancy" in arguments else "result.json")

@@ -12,10 +12,10 @@ from numba import njit
 from scipy.integrate import solve_ivp
 
 from tractexp.model.drive import Excitation, slopes
-from tractexp.model.template import FAST
 
-fast = njit(cache=True, fastmath=set(FAST), error_model="numpy")  # as the kernel
-inlined = njit(cache=True, fastmath=set(FAST), error_model="numpy", forceinline=True)
+FAST = {"contract", "reassoc", "arcp", "nsz"}  # as the kernel
+fast = njit(cache=True, fastmath=FAST, error_model="numpy")
+inlined = njit(cache=True, fastmath=FAST, error_model="numpy", forceinline=True)
 
 
 @inlined
@@ -176,7 +176,7 @@ class NumbaLSODA:
 
         size, h = len(record.U), record.h
 
-        @cfunc(lsoda_sig, fastmath=set(FAST), error_model="numpy")
+        @cfunc(lsoda_sig, fastmath=FAST, error_model="numpy")
         def right_hand_side(t, y, dy, data):
             given = carray(data, (4 + 2 * size,))
             d = _slope(y[0], y[1], y[2], _voltage(t, given[4 : 4 + size], given[4 + size :], h), given)
@@ -184,7 +184,7 @@ class NumbaLSODA:
 
         solve, address = {"LSODA": lsoda, "DOP853": dop853}[method], right_hand_side.address
 
-        @njit(fastmath=set(FAST), error_model="numpy")
+        @njit(fastmath=FAST, error_model="numpy")
         def run(values, t, U, rise, log_U, P, Q):
             data, totals = np.empty(4 + 2 * size), np.empty(len(values))
             data[4 : 4 + size], data[4 + size :] = U, rise

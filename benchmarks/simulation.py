@@ -25,10 +25,11 @@ import numpy as np
 import rivals
 
 from tractexp.exchange.format import Identified
-from tractexp.model import kernel, vectors
+from tractexp.kernel import emit, target
+from tractexp.kernel.kernel import Kernel
 from tractexp.model.drive import Drive, Excitation
+from tractexp.model.lowering import lower
 from tractexp.model.model import Model, compose
-from tractexp.model.template import VECTORS
 from tractexp.plugin import build, get
 
 TRUTH = np.array([0.12, 0.25, 0.9, 0.006, 0.55, 1.4, 3.0])  # T', X', C, M, T_m, p_v, q_v
@@ -83,12 +84,12 @@ def ours(model: Model, drive: Drive, substeps: int = 1) -> Callable[[np.ndarray]
     return lambda values: model.errors(drive, values, substeps).sums.sum(axis=(0, 1))
 
 
-def base(bits: int | None = None) -> Model:
-    """The base model, its kernel as it is used here, or compiled anew with vectors of so many bits."""
+def base(width: int | None = None) -> Model:
+    """The base model, its kernel as it is used here, or for vectors of so many doubles."""
     model = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
-    if bits is not None:
-        source = model.source.replace(VECTORS, f"VECTORS = {bits}").replace("cache=True", "cache=False")
-        model.__dict__["kernel"] = kernel.load(source)
+    if width is not None:
+        text = emit.text(lower(model.equations), model.title, "classical", width)
+        model.__dict__ |= {"source": text, "kernel": Kernel(text)}
     return model
 
 
@@ -156,30 +157,28 @@ def andes_row() -> dict[str, float] | None:
 
 
 def kernels(drive: Drive) -> dict[tuple[int, int, int], Way]:
-    """Our public batch call by width, number of candidates and substeps; a width of 0 is the compiler's own."""
+    """Our public batch call by width [doubles], number of candidates and substeps."""
     found = {}
-    for bits in vectors.WIDTHS if vectors.width(kernel.cache_folder()) else (0,):
-        model = base(bits)
+    for width in sorted({min(4, target.width()), target.width()}):
+        model = base(width)
         for n, substeps in ((CANDIDATES, 1), (CANDIDATES, 2), (POPULATION, 1), (FEW, 1)):
-            found[bits, n, substeps] = Way(
-                f"tractexp, vectors of {bits} bits", ours(model, drive, substeps), n, substeps
-            )
+            label = f"tractexp, vectors of {64 * width} bits"
+            found[width, n, substeps] = Way(label, ours(model, drive, substeps), n, substeps)
     return found
 
 
 def limits(ways: dict[tuple[int, int, int], Way], rounds: int) -> list[dict]:
     """What each kernel's arithmetic alone would take, and the share of that reached."""
     rows, least = [], {}
-    for (bits, n, substeps), way in ways.items():
-        row = {"bits": bits, "candidates": n, "substeps": substeps, "nanoseconds_per_step": way.nanoseconds}
+    for (width, n, substeps), way in ways.items():
+        row = {"bits": 64 * width, "candidates": n, "substeps": substeps, "nanoseconds_per_step": way.nanoseconds}
         try:
-            if (bits, substeps) not in least:
-                run = base(bits).kernel.run
-                least[bits, substeps] = arithmetic.limit(run, 3, substeps, bits or 256, rounds)
+            if (width, substeps) not in least:
+                least[width, substeps] = arithmetic.limit(base(width).source, substeps, rounds)
         except ValueError as reason:
             rows.append(row | {"no_limit": str(reason)})
             continue
-        found = least[bits, substeps]
+        found = least[width, substeps]
         row |= {"operations_per_step": found.step.all, "operations_per_sample": found.sample.all}
         row |= {"vector_operations_per_nanosecond": found.rate, "limit": found.nanoseconds}
         rows.append(row | {"share": found.nanoseconds / way.nanoseconds})
@@ -222,7 +221,7 @@ def measure(rounds: int) -> dict:
     figures |= {f"ratio_to_{key}": per_sample[key] / own.nanoseconds for key in others}
     return figures | {
         "simulations_per_second": CANDIDATES / own.seconds, "largest_difference_to_numpy": float(difference),
-        "vector_bits_chosen": model.kernel.VECTORS, "candidates": CANDIDATES, "samples": SAMPLES,
+        "vector_bits": 64 * target.width(), "candidates": CANDIDATES, "samples": SAMPLES,
         "machine": platform.processor() or platform.machine(),
     }  # fmt: skip
 
@@ -246,7 +245,7 @@ def tell(figures: dict) -> None:
             operations = row["operations_per_step"] + row["operations_per_sample"] / row["substeps"]
             line += f"{operations:>12.1f}{row['limit']:>8.2f}{row['share']:>7.0%}"
         print(line + row.get("no_limit", ""))
-    print(f"\nwidth chosen here: {figures['vector_bits_chosen'] or 'left to the compiler'}\n")
+    print(f"\nwidth here: {figures['vector_bits']} bits\n")
 
 
 def main():

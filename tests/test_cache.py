@@ -1,17 +1,21 @@
 """What is kept on disk and executed later: only what was written there whole, in a folder of the user's own."""
 
+import ctypes
 import os
-import pickle
 import stat
 import subprocess
 import sys
-import types
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from tractexp import cache, texts
 from tractexp.errors import UserError
-from tractexp.model import cache, kernel
+from tractexp.kernel import objects, target
+from tractexp.model import compiling
+from tractexp.model.model import compose
+from tractexp.plugin import get
 
 WITHOUT_OWNERS = pytest.mark.skipif(not hasattr(os, "geteuid"), reason="folders have no owner in this system")
 
@@ -40,16 +44,6 @@ class Part:
 
 class Nameless:
     """A part whose `repr` is Python's own: it tells where it lies, not what it is set to."""
-
-
-class Planted:
-    """A pickle that leaves a mark where it is loaded."""
-
-    def __init__(self, mark: Path):
-        self.mark = mark
-
-    def __reduce__(self):
-        return Path.touch, (self.mark,)
 
 
 # what is read
@@ -88,80 +82,53 @@ def test_a_sound_file_in_the_place_of_another_is_none(folder):
     assert not list(folder.glob("*.part"))
 
 
-def test_a_planted_pickle_is_not_run_and_the_file_heals(folder, tmp_path):
-    """Numba's own cache unpickles whatever lies there; so did ours."""
-    from numba import njit
-
-    def twice(x):
-        return 2 * x
-
-    def called(x):
-        function = kernel._keep(njit(twice), "made")
-        return function(x), sum(function.stats.cache_hits.values())
-
-    assert called(3.0) == (6.0, 0)
-    assert called(3.0) == (6.0, 1)
-    (file,) = folder.iterdir()
-    sound = file.read_bytes()
-    for planted in (pickle.dumps(Planted(tmp_path / "mark")), sound[: cache.SUM] + pickle.dumps(Planted(tmp_path))):
-        file.write_bytes(planted)
-        assert called(3.0) == (6.0, 0)
-        assert called(3.0) == (6.0, 1)
-    file.write_bytes(sound.replace(sound[-40:-38], b"\xff\xff"))
-    assert called(3.0) == (6.0, 0)
-    assert not (tmp_path / "mark").exists()
-    pickle.loads(pickle.dumps(Planted(tmp_path / "mark")))
-    assert (tmp_path / "mark").exists()  # it does run where nobody looks
+def test_planted_code_is_not_run_and_the_file_heals(folder):
+    """A file whose sum is not its own is none, and is compiled anew; one of another kernel in its place, too."""
+    answer, other = (objects.keep(stored(number)) for number in (42.0, 7.0))
+    assert called(42.0) == 42.0
+    path, theirs = (objects._path(stored(number)) for number in (42.0, 7.0))
+    sound = path.read_bytes()
+    for planted in (theirs.read_bytes(), other, sound[: cache.SUM] + other, sound[:-9], b""):
+        path.write_bytes(planted)
+        assert not objects.held(stored(42.0))
+        assert called(42.0) == 42.0
+        assert path.read_bytes() == sound
+    assert cache.read(path) == answer
 
 
-def test_code_for_another_machine_or_of_another_source_is_another_file(folder, monkeypatch):
-    from numba import njit
-
-    from tractexp.doors import numba_cache
-
-    def made(name, text):
-        module = types.ModuleType(f"made_{name}")
-        monkeypatch.setitem(sys.modules, module.__name__, module)
-        exec(text, vars(module))
-        kernel._keep(njit(module.f), name)(1.0)
-        return len(list(folder.iterdir()))
-
-    assert made("a", "def f(x):\n    return x") == 1
-    assert made("a", "def f(x):\n    return x") == 1
-    assert made("b", "def f(x):\n    return x") == 2
-    assert made("a", "def f(x):\n    return -x") == 3
-    monkeypatch.setattr(numba_cache, "machine", lambda: "another")
-    assert made("a", "def f(x):\n    return x") == 4
+def stored(number):
+    """IR of a function that stores a number."""
+    return f"define void @run(ptr %out) {{\n  store double {number:e}, ptr %out, align 8\n  ret void\n}}\n"
 
 
-def test_a_file_of_a_package_that_has_another_name_now_is_compiled_anew(folder, tmp_path):
-    """What is kept looks its names up in the module that it was compiled in."""
-    text = "from numba import njit\nfrom tractexp.extend import kept\n\n@kept\n@njit\ndef f(x):\n    return 2 * x\n"
-    for name in ("of_old", "renamed"):
-        package = tmp_path / name
-        package.mkdir()
-        (package / "__init__.py").touch()
-        (package / "loops.py").write_text(text)
-        ask = [sys.executable, "-c", f"from {name}.loops import f; print(f(1.5))"]
-        ran = subprocess.run(ask, cwd=tmp_path, capture_output=True, text=True)
-        assert ran.stdout.strip() == "3.0", ran.stderr
-        (package / "loops.py").unlink()
+def called(number):
+    """What that function stores, loaded as a new process would."""
+    objects.load.cache_clear()
+    out = np.zeros(1)
+    loaded = objects.load(stored(number))
+    ctypes.CFUNCTYPE(None, ctypes.c_void_p)(loaded.address)(out.ctypes.data)
+    return out[0]
 
 
-def test_a_changed_digit_in_a_source_is_not_executed(folder):
-    """The text that people may read is never what runs; the text that is remembered is looked at."""
-    source = "TORQUE = 0.55\n"
-    for _ in range(2):
-        loaded = kernel.load.__wrapped__(source)
-        assert loaded.TORQUE == 0.55
-        file = Path(loaded.__file__)
-        assert file.read_text() == source
-        assert file.parent == folder
-        file.write_text(source.replace("5", "6"))
+def test_code_for_another_machine_or_of_another_text_is_another_file(folder, monkeypatch):
+    def files():
+        return len([*folder.glob("code_*.kept")])
+
+    objects.keep(stored(1.0))
+    objects.keep(stored(1.0))
+    assert files() == 1
+    objects.keep(stored(2.0))
+    assert files() == 2
+    monkeypatch.setattr(target, "key", lambda: "another processor")
+    objects.keep(stored(1.0))
+    assert files() == 3
+
+
+def test_a_changed_digit_in_a_text_is_not_compiled(folder):
     made = []
     for _ in range(2):
-        assert kernel.remembered((Part(),), lambda: made.append(1) or source) == source
-        (text,) = folder.glob("source_*.kept")
+        assert texts.derived((Part(),), lambda: made.append(1) or "TORQUE = 0.55", "text") == "TORQUE = 0.55"
+        (text,) = folder.glob("text_*.kept")
         text.write_bytes(text.read_bytes().replace(b"0.55", b"0.66"))
     assert len(made) == 2
 
@@ -171,24 +138,33 @@ def test_nothing_is_remembered_of_a_part_known_by_its_address(folder, parts):
     """Another part at the same address once got the equations of the first."""
     made = []
     for _ in range(2):
-        kernel.remembered(parts, lambda: made.append(1) or "text")
+        texts.derived(parts, lambda: made.append(1) or "text", "text")
     assert len(made) == 2
-    assert not list(folder.glob("source_*"))
+    assert not list(folder.glob("text_*"))
 
 
-def test_a_kernel_whose_file_is_damaged_is_compiled_with_the_others(folder, monkeypatch):
-    compiled = []
-    monkeypatch.setattr(kernel, "_for_this_machine", lambda source: source)
-    monkeypatch.setattr("joblib.Parallel", lambda n_jobs: lambda tasks: compiled.extend(t[1][0] for t in tasks))
-    from tractexp.doors.numba_cache import machine
+def test_a_kernel_whose_file_is_damaged_is_compiled_with_the_others(folder):
+    motor, static = get("model/motor", "none")(), get("model/static", "zip")()
+    models = [compose(motor, static), compose(get("model/motor", "voltage")(), static)]
+    said = []
+    compiling.compile_missing(models, lambda: said.append(1))
+    assert [model.bare().compiled for model in models] == [True, True]
+    objects._path(models[1].source).write_bytes(b"code")
+    assert [model.bare().compiled for model in models] == [True, False]
+    compiling.compile_missing(models, lambda: said.append(1))
+    assert all(model.bare().compiled for model in models)
+    assert not said  # of what takes no two seconds nothing is said
 
-    for source in ("one", "two"):
-        cache.write(folder / f"{kernel._name(source)}.run.{machine()}.x.kept", b"code")
-    kernel.compile_missing(["one", "two", "three"])
-    (damaged,) = folder.glob(f"{kernel._name('two')}*")
-    damaged.write_bytes(b"code")
-    kernel.compile_missing(["one", "two", "three"])
-    assert compiled == ["three", "two", "three"]
+
+def test_many_kernels_are_compiled_side_by_side_and_it_is_said_once(folder, monkeypatch):
+    monkeypatch.setattr(compiling, "FEW", 1)
+    monkeypatch.setattr(compiling, "PATIENCE", 0.0)
+    static = get("model/static", "zip")()
+    models = [compose(get("model/motor", name)(), static) for name in ("none", "voltage", "mechanical")]
+    said = []
+    compiling.compile_missing(models, lambda: said.append(1))
+    assert all(model.bare().compiled for model in models)
+    assert said == [1]
 
 
 # where it is kept
@@ -275,7 +251,7 @@ def test_in_the_place_of_a_usual_folder_that_is_not_the_users_own_comes_a_new_on
 @pytest.mark.parametrize("home", ["/dev/null/nobody", ""])
 def test_without_a_home_a_command_keeps_kernels_until_it_ends(home):
     program = (
-        "import os, sys; from pathlib import Path; from tractexp.model.cache import cache_folder, read, write\n"
+        "import os, sys; from pathlib import Path; from tractexp.cache import cache_folder, read, write\n"
         "if not sys.argv[1]:\n"
         "    def unknown(*_): raise RuntimeError\n"
         "    Path.home = unknown\n"  # as for a user that the system does not know
@@ -296,4 +272,4 @@ def test_a_full_disk_costs_time_and_nothing_else(folder, monkeypatch):
 
     monkeypatch.setattr(cache.tempfile, "mkstemp", full)
     cache.write(folder / "one.kept", b"content")
-    assert kernel.load.__wrapped__("FULL = 1\n").FULL == 1
+    assert called(3.0) == 3.0

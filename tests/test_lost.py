@@ -370,8 +370,8 @@ def test_a_fit_of_an_investigation_is_read_back_to_the_bit_and_never_for_another
 
 
 def test_what_a_shelf_holds_is_never_unpickled(tmp_path, monkeypatch):
+    from tractexp import cache
     from tractexp.identification import shelf
-    from tractexp.model import cache
 
     monkeypatch.setattr(shelf, "cache_folder", lambda: tmp_path)
     written = io.BytesIO()

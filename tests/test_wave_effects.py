@@ -8,7 +8,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline
 
-from tractexp.model.drive import INPUTS, SMOOTH, WAVES, Drive
+from tractexp.kernel.layout import INPUTS, SMOOTH
+from tractexp.model.drive import WAVES, Drive
 from tractexp.model.model import compose
 from tractexp.plugin import discover, get
 from tractexp.testing import drives

@@ -6,9 +6,9 @@ from tractexp.extend import Effect, Parameter, plugin, sites
 from tractexp.errors import UserError, check_choice, check_range
 from tractexp.identification.loss import Loss
 from tractexp.identification.optimizer import Iterative, Optimizer
+from tractexp.kernel.layout import EVENT, INPUTS
+from tractexp.kernel.stencil import Stencil
 from tractexp.model import sites
-from tractexp.model.drive import EVENT, INPUTS
-from tractexp.model.kernel import kept
 from tractexp.model.parts import Curve, Effect, Measurement, Motor, Static
 from tractexp.model.unfit import Unfit
 from tractexp.parameter import Parameter
@@ -38,6 +38,7 @@ __all__ = [
     "Recording",
     "Segment",
     "Static",
+    "Stencil",
     "Unfit",
     "UserError",
     "WaveformReader",
@@ -45,7 +46,6 @@ __all__ = [
     "build",
     "check_choice",
     "check_range",
-    "kept",
     "plugin",
     "sites",
 ]

@@ -8,7 +8,8 @@ import numpy as np
 
 import tractexp
 from tractexp.errors import UserError
-from tractexp.model.drive import INPUTS, WAVES, Drive
+from tractexp.kernel.layout import INPUTS
+from tractexp.model.drive import WAVES, Drive
 from tractexp.model.model import Model, compose
 from tractexp.model.parts import Effect, Motor, Part
 from tractexp.report import style

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from tractexp.extend import Measurement, Parameter, plugin
-from tractexp.model.drive import INPUTS
+from tractexp.extend import INPUTS, Measurement, Parameter, plugin
 
 HIGHEST, CYCLES = 13, 2
 

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from tractexp.extend import Measurement, Parameter, plugin
-from tractexp.model.drive import INPUTS
+from tractexp.extend import INPUTS, Measurement, Parameter, plugin
 
 SOURCE = "ordinary change of load; rates of feeders and trains stay below some percent a second"
 

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from tractexp.extend import Measurement, Parameter, plugin
-from tractexp.model.drive import INPUTS
+from tractexp.extend import INPUTS, Measurement, Parameter, plugin
 
 QUIET = 0.005  # of the voltage before: a change between samples that tells how the current follows it
 

@@ -1,7 +1,6 @@
 """Error of scale and angle between the transformers of current and of voltage."""
 
-from tractexp.extend import Measurement, Parameter, plugin
-from tractexp.model.drive import INPUTS
+from tractexp.extend import INPUTS, Measurement, Parameter, plugin
 
 
 @plugin

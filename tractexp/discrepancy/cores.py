@@ -1,24 +1,28 @@
 """Work on all cores: lanes of one call side by side, and independent items each by themselves."""
 
 import functools
+import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
 import numpy as np
 
-from tractexp.model.template import GROUP
+from tractexp.kernel.layout import LANES
 
-FEWEST, MOST = 2 * GROUP, 7 * GROUP  # lanes that are worth a call, and that one call has
+FEWEST = 16  # lanes that are worth a call
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
+def cores() -> int:
+    """How many this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def side_by_side(function: Callable[[np.ndarray], np.ndarray], lanes: np.ndarray) -> np.ndarray:
     """`function` of lanes (n, ...), on all cores: they do not know of each other, so the bits are the same."""
-    from numba import get_num_threads
-
-    return _in_parts(function, lanes, min(get_num_threads(), -(-len(lanes) // FEWEST)))
+    return _in_parts(function, lanes, min(cores(), -(-len(lanes) // FEWEST)))
 
 
 def in_same_parts(function: Callable[[np.ndarray], np.ndarray], lanes: np.ndarray) -> np.ndarray:
@@ -26,7 +30,7 @@ def in_same_parts(function: Callable[[np.ndarray], np.ndarray], lanes: np.ndarra
 
     How lanes are parted does not depend on the number of cores, so that no result does.
     """
-    return _in_parts(function, lanes, max(-(-len(lanes) // MOST), min(2, -(-len(lanes) // FEWEST))))
+    return _in_parts(function, lanes, max(-(-len(lanes) // LANES), min(2, -(-len(lanes) // FEWEST))))
 
 
 def _in_parts(function: Callable[[np.ndarray], np.ndarray], lanes: np.ndarray, parts: int) -> np.ndarray:
@@ -37,11 +41,9 @@ def _in_parts(function: Callable[[np.ndarray], np.ndarray], lanes: np.ndarray, p
 
 def each_apart(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
     """`function` of each item, on all cores. It may itself work `side_by_side`, whose threads are others."""
-    from numba import get_num_threads
-
-    if min(get_num_threads(), len(items)) < 2:
+    if min(cores(), len(items)) < 2:
         return [function(item) for item in items]
-    with ThreadPoolExecutor(get_num_threads()) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         return list(pool.map(function, items))
 
 

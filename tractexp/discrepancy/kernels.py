@@ -17,8 +17,8 @@ from tractexp.discrepancy.cores import side_by_side
 from tractexp.discrepancy.injection import Injection
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.problem import FINE_OF_WAVES, Problem
+from tractexp.model.compiling import compile_missing
 from tractexp.model.drive import Drive
-from tractexp.model.kernel import compile_missing
 from tractexp.model.model import Model, compose
 from tractexp.record import Event
 
@@ -79,7 +79,7 @@ class Family:
 
     def compile(self, say: Callable[[str], None]) -> None:
         """Compile what is not in the cache yet, side by side."""
-        compile_missing(self._sources(), lambda: say("compiling kernels, once for this base model and these channels"))
+        compile_missing(self._models(), lambda: say("compiling kernels, once for this base model and these channels"))
 
     def joins(self, name: str) -> bool:
         """Whether a member of a family goes with the model of everything, by which what it leaves is tested."""
@@ -88,17 +88,17 @@ class Family:
     def compile_members(self, names: Iterable[str], say: Callable[[str], None], *, whole: bool = False) -> None:
         """Compile what members of families need, side by side: a kernel each, or with everything where `whole`."""
         load = self.catalogue.of_load
-        sources = (self.with_effects((n, *load), True) if whole else self.with_effects((n,)) for n in names)
-        compile_missing((m.source for m in sources), lambda: say("compiling kernels of families, once for this model"))
+        models = (self.with_effects((n, *load), True) if whole else self.with_effects((n,)) for n in names)
+        compile_missing(models, lambda: say("compiling kernels of families, once for this model"))
 
-    def _sources(self) -> Iterator[str]:
-        """Two that are soon derived, so that something compiles while the largest is; then the largest first."""
-        yield self.model.source
-        yield self.with_effects(()).source
-        yield self.whole.source
-        yield self.with_effects(self.short, True).source
+    def _models(self) -> Iterator[Model]:
+        """The largest first."""
+        yield self.whole
+        yield self.with_effects(self.short, True)
+        yield self.model
+        yield self.with_effects(())
         for group in self.groups:
-            yield self.with_effects(group).source
+            yield self.with_effects(group)
 
 
 class Kernels:

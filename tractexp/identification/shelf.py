@@ -17,11 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from tractexp import provenance
-from tractexp.model import cache
-from tractexp.model.cache import cache_folder
+from tractexp import cache, provenance
+from tractexp.cache import cache_folder
 
-BEHIND = ("numpy", "numba", "scipy", "llvmlite")  # whose versions may change the last digits
+BEHIND = ("numpy", "scipy", "llvmlite")  # whose versions may change the last digits
 DAMAGED = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile)
 SHELVES = {"searches": 3000, "descents": 4000, "draws": 100}  # kept on each, draws of 10 MB, others of some kB
 

@@ -6,17 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tractexp.kernel.layout import EVENT
+
 PHASORS, WAVES = DOMAINS = ("phasors", "waves")
-# Rows of `Drive.inputs`: U_rate is the slope of U there [pu/s]. Those of waves follow: the voltage's space vector v in
-# the frame, its zero sequence, their slopes, and the frame's angle to phase a by cosine and sine.
-INPUTS = (
-    "U", "omega_s", "U_rate", "U2", "t",
-    "v_d", "v_q", "v_zero", "v_d_rate", "v_q_rate", "v_zero_rate", "turn_re", "turn_im",
-)  # fmt: skip
-SMOOTH = {name: f"{name}_rate" for name in ("U", "v_d", "v_q", "v_zero")}  # what is a cubic between samples: its slope
 OUTPUTS = {PHASORS: ("P", "Q"), WAVES: ("i_alpha", "i_beta", "i_zero")}  # rows of `Drive.measured`
 IN_WORDS = {"i_alpha": "current alpha", "i_beta": "current beta", "i_zero": "zero-sequence current"}  # as pages say
-EVENT = ("U0", "omega_s0", "U20", "omega_n", "step")  # columns of `Drive.event`
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,12 +13,14 @@ import sympy
 from sympy import I, Symbol, conjugate, im, re
 
 from tractexp.errors import Unknown, UserError, nearest
+from tractexp.kernel.graph import symbols_of
+from tractexp.kernel.layout import EVENT, INPUTS
 from tractexp.model import sites
 from tractexp.model.apart import Apart
 from tractexp.model.circuit import NOTHING, Circuit
-from tractexp.model.drive import EVENT, INPUTS, OUTPUTS, PHASORS, WAVES
+from tractexp.model.drive import OUTPUTS, PHASORS, WAVES
 from tractexp.model.graph import halves as real_and_imaginary
-from tractexp.model.graph import replaced, symbols_of
+from tractexp.model.graph import replaced
 from tractexp.model.names import check_name
 from tractexp.model.sites import Site
 from tractexp.model.states import UNSAID, Memory, Requirement, State

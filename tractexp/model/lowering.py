@@ -6,46 +6,18 @@ becomes exp(exponent * log(base)), whose logarithm is then a signal.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import sympy
 from sympy import Symbol
 
 from tractexp.errors import UserError
-from tractexp.model.drive import EVENT, INPUTS
+from tractexp.kernel.graph import arguments, symbols_of
+from tractexp.kernel.layout import EVENT, INPUTS
+from tractexp.kernel.lowered import Lowered, Phase, symbols
 from tractexp.model.equations import Equations, phasor_parts, start_symbol
-from tractexp.model.graph import arguments, replaced, symbols_of
+from tractexp.model.graph import replaced
 from tractexp.model.rest import settled
-
-
-@dataclass(frozen=True)
-class Phase:
-    """One group of expressions evaluated together, with the signals they need."""
-
-    signals: tuple[tuple[Symbol, sympy.Expr], ...]
-    temporaries: tuple[tuple[Symbol, sympy.Expr], ...]
-    expressions: tuple[sympy.Expr, ...]
-
-
-@dataclass(frozen=True)
-class Lowered:
-    """Everything the code generator prints, in real arithmetic."""
-
-    parameters: tuple[Symbol, ...]
-    inputs: tuple[Symbol, ...]  # sampled; those of `INPUTS` that the equations use
-    event: tuple[Symbol, ...]  # one number per event
-    states: tuple[Symbol, ...]
-    memories: tuple[Symbol, ...]
-    starts: tuple[Symbol, ...]  # states and memories before the event
-    start: Phase  # states and memories before the event, then the slack of each requirement
-    rest: Phase | None  # what vanishes before the event, where the start is only a guess: always with an effect
-    constants: tuple[Symbol, ...]
-    constant: Phase  # their values, which hold for a whole event
-    derivative: Phase
-    renewal: Phase
-    output: Phase
-    outputs: tuple[str, ...]  # what its expressions are called
 
 
 class _Hoister:
@@ -74,12 +46,12 @@ class _Hoister:
     def constant(self, e: sympy.Expr) -> sympy.Expr:
         if e.is_number or e in self.lane:
             return e
-        return self.constants.setdefault(e, Symbol(f"c{len(self.constants)}", real=True))
+        return self.constants.setdefault(e, Symbol(f"_c{len(self.constants)}", real=True))
 
     def signal(self, e: sympy.Expr) -> sympy.Expr:
         if e.is_number or e in self.inputs or -e in self.inputs:
             return e
-        return self.signals.setdefault(e, Symbol(f"s{len(self.signals)}", real=True))
+        return self.signals.setdefault(e, Symbol(f"_s{len(self.signals)}", real=True))
 
     def __call__(self, e: sympy.Expr) -> sympy.Expr:
         if e not in self._made:
@@ -142,12 +114,6 @@ def lower(eq: Equations) -> Lowered:
     return replace(lowered, rest=None) if not eq.edits and settled(eq, start, balances, starts) else lowered
 
 
-def symbols(phase: Phase) -> set[Symbol]:
-    """All symbols a phase reads or makes."""
-    parts = (*phase.expressions, *(e for _, e in (*phase.temporaries, *phase.signals)))
-    return set[Symbol]().union(*map(symbols_of, parts))
-
-
 def _phase(
     hoist: _Hoister | None, expressions: list[sympy.Expr], steps: Mapping[Symbol, sympy.Expr] | None = None
 ) -> Phase:
@@ -158,10 +124,8 @@ def _phase(
         expressions = [hoist(e) for e in expressions]
         used = set().union(*map(symbols_of, expressions))
         signals = tuple((s, e) for e, s in hoist.signals.items() if s in used)
-    found: Any = sympy.cse(expressions, symbols=sympy.numbered_symbols("x", real=True), order="none")
-    temporaries, reduced = found
-    computed = [*temporaries, *zip(targets, reduced, strict=False)]
-    return Phase(signals, _in_order(computed), tuple(reduced[len(targets) :]))
+    computed = [*zip(targets, expressions, strict=False)]
+    return Phase(signals, _in_order(computed), tuple(expressions[len(targets) :]))
 
 
 def _needed(expressions: list[sympy.Expr], steps: Mapping[Symbol, sympy.Expr]) -> dict[Symbol, sympy.Expr]:
@@ -179,7 +143,7 @@ def _in_order(assignments: list[tuple[Symbol, sympy.Expr]]) -> tuple[tuple[Symbo
     waiting, ordered = list(assignments), []
     while waiting:
         open_symbols = {s for s, _ in waiting}
-        ready = [(s, e) for s, e in waiting if not e.free_symbols & open_symbols]
+        ready = [(s, e) for s, e in waiting if not symbols_of(e) & open_symbols]
         ordered += ready
         waiting = [(s, e) for s, e in waiting if s not in {r for r, _ in ready}]
     return tuple(ordered)
@@ -190,7 +154,7 @@ def _check_closed(lowered: Lowered, lane: set[Symbol]) -> None:
     for phase in (lowered.start, lowered.rest, lowered.constant, lowered.derivative, lowered.renewal, lowered.output):
         if phase is None:
             continue
-        own = {*lowered.constants, *(s for s, _ in (*phase.temporaries, *phase.signals))}
+        own = {*lowered.constants, *(s for s, _ in (*phase.steps, *phase.signals))}
         if stray := symbols(phase) - known - own:
             raise UserError(
                 f"the equations use {', '.join(sorted(map(str, stray)))}, which no part of the model declares"

@@ -10,10 +10,14 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import UserError, check_choice
-from tractexp.model.drive import DOMAINS, EVENT, PHASORS, WAVES, Drive
+from tractexp.kernel import objects
+from tractexp.kernel.kernel import NOTHING, Kernel, width
+from tractexp.kernel.layout import EVENT
+from tractexp.model.drive import DOMAINS, PHASORS, WAVES, Drive
 from tractexp.model.parts import Effect, Measurement, Motor, Static
 from tractexp.model.window import seen
 from tractexp.parameter import Parameter
+from tractexp.texts import at_hand, derived
 
 TOLERANCE = 1e-7  # pu, largest step-doubling error of P or Q an automatic substep may leave
 MOST_SUBSTEPS = 256
@@ -119,10 +123,8 @@ class Model:
 
     def acceptance(self, effect: Effect) -> "Acceptance":
         """Whether one more effect makes sense for this model, and what it would edit; remembered beside the kernels."""
-        from tractexp.model.kernel import remembered
-
         parts = (self.motor, self.static, *self.effects, effect)
-        return Acceptance(**json.loads(remembered(parts, lambda: self._tried(effect), self._kept("acceptance"))))
+        return Acceptance(**json.loads(derived(parts, lambda: self._tried(effect), self._in_cache("acceptance"))))
 
     def _tried(self, effect: Effect) -> str:
         from tractexp.model.declaration import Refused
@@ -135,28 +137,49 @@ class Model:
 
     @functools.cached_property
     def source(self) -> str:
-        """Source text of the kernel."""
-        from tractexp.model.kernel import remembered
+        """The kernel's text: LLVM IR for the vectors of this machine."""
+        return derived((self.motor, self.static, *self.effects), self._written, self._text_in_cache)
 
-        what = "source" if self.integration == CLASSICAL else f"source_{self.integration}"
-        return remembered((self.motor, self.static, *self.effects), self._generated, self._kept(what))
+    @property
+    def _text_in_cache(self) -> str:
+        name = "kernel" if self.integration == CLASSICAL else f"kernel_{self.integration}"
+        return self._in_cache(f"{name}_of_{width()}")
 
-    def _kept(self, what: str) -> str:
+    def _in_cache(self, what: str) -> str:
         """What a text is called in the cache: those of phasors by themselves."""
         return f"{what}_{self.domain}" if self.waves else what
 
-    def _generated(self) -> str:
-        from tractexp.model.codegen import source
+    def _written(self) -> str:
+        from tractexp.kernel.emit import text
         from tractexp.model.lowering import lower
 
-        return source(lower(self.equations), self.title, self.integration)
+        return text(lower(self.equations), self.title, self.integration, width())
 
     @functools.cached_property
-    def kernel(self) -> Any:
-        """The compiled kernel module."""
-        from tractexp.model.kernel import load
+    def kernel(self) -> Kernel:
+        """The kernel, compiled where the cache does not hold it."""
+        return Kernel(self.source)
 
-        return load(self.source)
+    @property
+    def compiled(self) -> bool:
+        """Whether the cache holds the kernel."""
+        text = at_hand((self.motor, self.static, *self.effects), self._text_in_cache)
+        return text is not None and objects.held(text)
+
+    def compile(self) -> None:
+        """Have the kernel in the cache."""
+        objects.keep(self.source)
+
+    def bare(self) -> "Model":
+        """The same model before anything was derived from it: little to hand to another process."""
+        return Model(self.motor, self.static, self.effects, self.integration, self.domain)
+
+    def listing(self) -> str:
+        """The kernel for people to read: the equations as they were lowered, and the IR."""
+        from tractexp.kernel.shown import equations
+        from tractexp.model.lowering import lower
+
+        return "\n".join([*equations(lower(self.equations)), "", self.source])
 
     def simulate(
         self,
@@ -187,7 +210,7 @@ class Model:
         """Weighted squared errors of every candidate over every event, in one pass and without storing responses."""
         if self.measurements or drive.windows:
             return self._errors_of(self.simulate(drive, values, substeps), drive)
-        sums, miss = self._run(drive, self._candidates(drive, values), substeps, np.empty((0, 0, 0)))
+        sums, miss = self._run(drive, self._candidates(drive, values), substeps)
         return Errors(sums, miss.sum(axis=0))
 
     @staticmethod
@@ -225,7 +248,7 @@ class Model:
 
     def refusal(self, values: np.ndarray, drive: Drive, event: int = 0) -> str | None:
         """Why these values (d,) have no steady state before an event, as a sentence; None where they have one."""
-        _, miss = self._run(drive, self._candidates(drive, values), 1, np.empty((0, 0, 0)))
+        _, miss = self._run(drive, self._candidates(drive, values), 1)
         if miss[event, 0] == 0:
             return None  # the kernel found one; the sentence takes the symbols, which take a second to load
         eq = self.equations
@@ -249,10 +272,7 @@ class Model:
         eq = self.equations
         given = [*map(float, (*values, *drive.before[event], *drive.event[event]))]
         known = dict(zip((*self.names, "P0", "Q0", *EVENT), given, strict=True))
-        *starts, _ = np.atleast_1d(self.kernel._start(*given)).tolist()
-        if hasattr(self.kernel, "_settle"):
-            *solved, _ = self.kernel._settle(*given, *starts)
-            starts[: len(solved)] = solved
+        starts = self.kernel.starts(self._candidates(drive, values)[[event]], drive.event[[event]])[0, :, 0].tolist()
         symbols = [start_symbol(s) for s in (*eq.states, *eq.memories)]
         names = [p.name for s in symbols for p in ((s,) if s.is_real else phasor_parts(s))]
         known |= dict(zip(names, starts, strict=True))
@@ -277,11 +297,15 @@ class Model:
         rows[:, -2:] = drive.before[:, :, None] if before is None else np.swapaxes(before, -1, -2)
         return rows
 
-    def _run(self, drive, candidates, substeps, outputs):
+    def _run(
+        self, drive: Drive, candidates: np.ndarray, substeps: Sequence[int] | np.ndarray | int,
+        outputs: np.ndarray = NOTHING,
+    ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+        """Sums (E, C, n) and miss (E, n); writes outputs (C, n, N) where there is room."""
         n = candidates.shape[2]
         sums, miss = np.empty((drive.events, drive.channels, n)), np.empty((drive.events, n))
-        steps = np.broadcast_to(np.asarray(substeps, dtype=np.int64), (drive.events,)).copy()
-        sums.fill(np.nan)
+        steps = np.empty(drive.events, dtype=np.int64)
+        steps[:] = substeps
         self.kernel.run(
             candidates,
             drive.event,

@@ -1,17 +1,15 @@
 """Whether the steady state that the parts declare is exact, or a first guess that the kernel has to solve for."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import sympy
 
+from tractexp.kernel.arrays import evaluated
+from tractexp.kernel.lowered import Phase
 from tractexp.model.equations import Equations
 
-if TYPE_CHECKING:
-    from tractexp.model.lowering import Phase
-
-POINTS, TRIES = 5, 200  # admissible points looked at, and points drawn until there are so many
+POINTS, TRIES = 5, 200  # admissible points looked at, of so many that are drawn
 ROUNDING = 1e-7  # of a balance [pu/s, rad/s²]: above what doubles leave of zero, below what a guess misses by
 EVENTS: Mapping[str, tuple[float, float]] = {
     "U0": (0.9, 1.1), "omega_s0": (-3.0, 3.0), "U20": (0.01, 0.05), "omega_n": (310.0, 380.0), "step": (1e-3, 1e-2),
@@ -19,34 +17,20 @@ EVENTS: Mapping[str, tuple[float, float]] = {
 }  # fmt: skip
 
 
-def settled(eq: Equations, start: "Phase", rest: "Phase", starts: Sequence[sympy.Symbol]) -> bool:
+def settled(eq: Equations, start: Phase, rest: Phase, starts: Sequence[sympy.Symbol]) -> bool:
     """Whether every balance vanishes at the declared start, at random parameters and events that have a steady state.
 
     `start` computes `starts` and then the slack of each requirement, `rest` the balances from them.
     """
-    given = [sympy.Symbol(name, real=True) for name in (*eq.parameters, *EVENTS)]
-    begin, balance = _numeric(start, given), _numeric(rest, [*given, *starts])
-    rng, seen = np.random.default_rng(0), 0
-    ranges = np.array([*(p.bounds for p in eq.parameters.values()), *EVENTS.values()])
-    for _ in range(TRIES):
-        point = rng.uniform(*ranges.T).tolist()
-        try:
-            found = begin(*point)
-            first, slack = found[: len(starts)], found[len(starts) :]
-            if not all(s >= 0 for s in slack):
-                continue
-            missed = balance(*point, *first)
-        except (ValueError, ZeroDivisionError, OverflowError):
-            continue
-        if not max(map(abs, missed), default=0.0) < ROUNDING:
-            return False
-        seen += 1
-        if seen == POINTS:
-            return True
-    return False
-
-
-def _numeric(phase: "Phase", symbols: Sequence[sympy.Symbol]) -> Callable[..., list[float]]:
-    """The expressions of a phase as a function of numbers."""
-    ready = lambda _: (list(phase.temporaries), list(phase.expressions))  # noqa: E731
-    return sympy.lambdify(list(symbols), list(phase.expressions), "math", cse=ready)  # type: ignore[arg-type]
+    ranges = {**{name: p.bounds for name, p in eq.parameters.items()}, **EVENTS}
+    low, high = np.array([*ranges.values()]).T
+    drawn = np.random.default_rng(0).uniform(low, high, (TRIES, len(ranges))).T
+    known = {sympy.Symbol(name, real=True): values for name, values in zip(ranges, drawn, strict=True)}
+    values = evaluated(start, known, TRIES)
+    first, slacks = values[: len(starts)], values[len(starts) :]
+    balances = evaluated(rest, known | dict(zip(starts, first, strict=True)), TRIES)
+    finite = np.isfinite(np.array([*first, *slacks, *balances])).all(axis=0)
+    admissible = finite & (np.array([np.ones(TRIES), *slacks]) >= 0).all(axis=0)
+    points = np.flatnonzero(admissible)[:POINTS]
+    missed = np.abs(np.array([np.zeros(TRIES), *balances])[:, points]).max(axis=0)
+    return len(points) == POINTS and bool((missed < ROUNDING).all())

@@ -3,7 +3,7 @@
 import sympy
 from sympy import I, Symbol
 
-from tractexp.model.graph import symbols_of
+from tractexp.kernel.graph import symbols_of
 
 
 def is_real(expression: sympy.Expr) -> bool:

@@ -100,8 +100,8 @@ def disk(folder: Path) -> Iterator[Finding]:
 
 def caches() -> Iterator[Finding]:
     """Whether kernels and searches can be kept, and what is kept can be read."""
+    from tractexp.cache import cache_folder
     from tractexp.identification.shelf import damaged
-    from tractexp.model.kernel import cache_folder
 
     try:
         folder = cache_folder()
@@ -114,7 +114,7 @@ def caches() -> Iterator[Finding]:
         path.unlink(missing_ok=True)
     if gone:
         yield HEALED, f"{len(gone)} damaged or unfinished files of the cache {folder} are removed"
-    yield SOUND, f"the cache {folder} holds {len(list(folder.glob('kernel_*.py')))} kernels"
+    yield SOUND, f"the cache {folder} holds {len(list(folder.glob('code_*.kept')))} kernels"
 
 
 def leavings(folder: Path) -> Iterator[Finding]:

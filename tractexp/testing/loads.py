@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from tractexp.errors import UserError, among
+from tractexp.kernel.layout import INPUTS
 from tractexp.model import sites
-from tractexp.model.drive import INPUTS, PHASORS, WAVES, Drive
+from tractexp.model.drive import PHASORS, WAVES, Drive
 from tractexp.model.model import Model, compose
 from tractexp.model.parts import Effect, Measurement, Motor, Part, Static
 from tractexp.parameter import Parameter

@@ -14,7 +14,7 @@ from tractexp.discrepancy.coordinates import Coordinates
 from tractexp.discrepancy.kernels import Family, Key
 from tractexp.discrepancy.proposal.effect import Library
 from tractexp.discrepancy.proposal.library import ANSWER, TIMED, Size, Term, shape_of
-from tractexp.model.kernel import compile_missing
+from tractexp.model.compiling import compile_missing
 from tractexp.model.model import Model
 from tractexp.model.parts import Effect
 from tractexp.parameter import Parameter
@@ -34,7 +34,7 @@ class Terms(Family):
 
     def compile_kinds(self, say: Callable[[], None]) -> None:
         """Compile both kernels, side by side, where the cache lacks them."""
-        compile_missing((self.with_effects((kind,)).source for kind in KINDS), say)
+        compile_missing((self.with_effects((kind,)) for kind in KINDS), say)
 
 
 def kind_of(name: str) -> str:

@@ -1,0 +1,1 @@
+"""Kernels: lowered equations as LLVM IR that is written here, compiled, kept, and called with checked arrays."""

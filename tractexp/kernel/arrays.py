@@ -1,0 +1,97 @@
+"""The arithmetic of kernels on arrays of NumPy: what expressions give at some points, without compiling anything."""
+
+from typing import Any
+
+import numpy as np
+
+COMPARISONS = {
+    "olt": np.less, "ole": np.less_equal, "ogt": np.greater, "oge": np.greater_equal, "oeq": np.equal,
+    "une": np.not_equal,
+}  # fmt: skip
+LOGIC = {"and": np.logical_and, "or": np.logical_or, "xor": np.logical_xor}
+INTEGERS = {
+    "add": np.add, "sub": np.subtract, "shl": np.left_shift, "ashr": np.right_shift, "and": np.bitwise_and,
+    "xor": np.bitwise_xor,
+}  # fmt: skip
+CALLS = {"fabs": np.abs, "floor": np.floor, "ceil": np.ceil, "sqrt": np.sqrt}
+
+
+class Arrays:
+    """As `numbers.Numbers`, of arrays (points,); `flags` mean nothing here."""
+
+    def __init__(self, points: int):
+        self.points = points
+
+    def constant(self, x: float) -> np.ndarray:
+        return np.full(self.points, float(x))
+
+    def whole(self, x: int) -> np.ndarray:
+        return np.full(self.points, x, dtype=np.int64)
+
+    def truth(self, holds: bool) -> np.ndarray:
+        return np.full(self.points, holds)
+
+    def add(self, a: np.ndarray, b: np.ndarray, flags: str = "") -> np.ndarray:
+        return a + b
+
+    def subtract(self, a: np.ndarray, b: np.ndarray, flags: str = "") -> np.ndarray:
+        return a - b
+
+    def multiply(self, a: np.ndarray, b: np.ndarray, flags: str = "") -> np.ndarray:
+        return a * b
+
+    def divide(self, a: np.ndarray, b: np.ndarray, flags: str = "") -> np.ndarray:
+        return a / b
+
+    def negative(self, a: np.ndarray) -> np.ndarray:
+        return -a
+
+    def fused(self, a: np.ndarray, b: np.ndarray, c: np.ndarray, flags: str = "") -> np.ndarray:
+        return a * b + c
+
+    def polynomial(self, x: np.ndarray, coefficients: tuple[float, ...], flags: str = "") -> np.ndarray:
+        return np.polyval(coefficients, x)
+
+    def compare(self, how: str, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return COMPARISONS[how](a, b)
+
+    def differ(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return a != b
+
+    def select(self, condition: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return np.where(condition, a, b)
+
+    def larger(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return np.where(a > b, a, b)
+
+    def smaller(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return np.where(a < b, a, b)
+
+    def logic(self, operation: str, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return LOGIC[operation](a, b)
+
+    def call(self, name: str, a: np.ndarray) -> np.ndarray:
+        return CALLS[name](a)
+
+    def size(self, a: np.ndarray) -> np.ndarray:
+        return np.abs(a)
+
+    def root(self, a: np.ndarray) -> np.ndarray:
+        return np.sqrt(a)
+
+    def as_bits(self, a: np.ndarray) -> np.ndarray:
+        return a.view(np.int64)
+
+    def of_bits(self, a: np.ndarray) -> np.ndarray:
+        return a.view(np.float64)
+
+    def integer(self, operation: str, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return INTEGERS[operation](a, b)
+
+
+def evaluated(phase: Any, known: dict[Any, np.ndarray], points: int) -> list[np.ndarray]:
+    """The values (points,) of a phase's expressions; nan and infinity where they have none."""
+    from tractexp.kernel.expressions import Expressions
+
+    with np.errstate(all="ignore"):
+        return Expressions(Arrays(points), known).of(phase)

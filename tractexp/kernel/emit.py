@@ -1,0 +1,415 @@
+"""A kernel's IR from lowered equations: many candidates simulated over events, their squared errors summed.
+
+Candidates are lanes of vectors. What does not differ between lanes, the inputs at the points in time that a step looks
+at and what follows from them, is computed once an event, many samples at once. Then, block by block of lanes that fit
+the cache, sample by sample and step by step, each group of lanes takes its outputs, its errors and its step, without
+a branch between lanes. Nothing per sample is stored unless asked for.
+
+Work space, a group of lanes: a row of `width` doubles each for states, memories, what is constant over an event,
+outputs, sums of squared errors, and by how much the steady state is missed.
+"""
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
+
+from sympy import Symbol
+
+from tractexp.kernel import steady
+from tractexp.kernel.expressions import Expressions
+from tractexp.kernel.function import Function
+from tractexp.kernel.layout import EVENT, INPUTS, SMOOTH
+from tractexp.kernel.lowered import Lowered, symbols
+from tractexp.kernel.numbers import Numbers
+from tractexp.kernel.room import PREFIX, Room
+
+HALF_WAY = {"classical": 0.5, "printed": 1 / 6}  # of a step: how far the two stages in the middle go along a slope
+ARRAYS = (
+    "candidates", "event", "first", "inputs", "measured", "weights", "substeps", "sums", "miss", "outputs", "starts",
+    "work", "points", "signals",
+)  # fmt: skip
+SIZES = ("events", "n", "samples", "block", "stored", "started")
+Values = Mapping[Symbol, str]
+
+
+def text(lowered: Lowered, title: str, integration: str, width: int) -> str:
+    """The kernel's IR, for vectors of `width` doubles. The same equations give the same text.
+
+    Its second line tells the room that a call needs.
+    """
+    return _Emitter(lowered, integration, width).text(title)
+
+
+def _real(name: str) -> Symbol:
+    return Symbol(name, real=True)
+
+
+class _Emitter:
+    """One kernel's text. Names of the IR's arguments are those of `ARRAYS` and `SIZES`."""
+
+    def __init__(self, lowered: Lowered, integration: str, width: int):
+        self.lowered, self.half_way, self.width = lowered, HALF_WAY[integration], width
+        self.given = [*lowered.parameters, _real("P0"), _real("Q0")]
+        self.used = {name: symbols(getattr(lowered, name)) for name in ("derivative", "renewal", "output")}
+        sampled = self.used["renewal"] | self.used["output"]
+        lane = [*self.given, *lowered.starts, *lowered.constants]
+        self.carried = [s for s in lane if s in sampled | self.used["derivative"]]
+        moving = (*lowered.inputs, *(s for s, _ in lowered.derivative.signals))
+        self.moving = [s for s in moving if s in self.used["derivative"]] if lowered.states else []
+        self.signals = dict([*lowered.output.signals, *lowered.renewal.signals])
+        sums = (f"_sum_{o}" for o in lowered.outputs)  # no name of a symbol begins like this
+        shown = (f"_{o}" for o in lowered.outputs)
+        own = (*lowered.states, *lowered.memories, *self.carried, *shown, *sums, "_miss")
+        self.rows = {str(name): k for k, name in enumerate(own)}
+        self.solves = lowered.rest is not None and bool(lowered.states)
+        self.functions: list[Function] = []
+
+    def text(self, title: str) -> str:
+        room = Room(
+            width=self.width, given=len(self.given), event=len(EVENT), outputs=len(self.lowered.outputs),
+            starts=len(self.lowered.starts), rows=len(self.rows), points=len(self.moving), signals=len(self.signals),
+        )  # fmt: skip
+        bodies = [*([self._rest()] if self.solves else []), self._run()]
+        known = {name: line for f in self.functions for name, line in f.intrinsics.items()}
+        head = [f"; {title}", PREFIX + json.dumps(asdict(room))]
+        return "\n".join([*head, "", *known.values(), "", *bodies])
+
+    def _function(self) -> tuple[Function, Numbers, Numbers]:
+        """A new function, its lanes and its scalars."""
+        f = Function()
+        self.functions.append(f)
+        return f, Numbers(f, self.width), Numbers(f, 1)
+
+    # The steady state
+
+    def _rest(self) -> str:
+        """What vanishes before the event, as `steady` calls it."""
+        f, lanes, scalars = self._function()
+        lowered, phase = self.lowered, self.lowered.rest
+        assert phase is not None
+        known = {_real(s): lanes.everywhere(scalars.load(f.at("%event", k))) for k, s in enumerate(EVENT)}
+        memories = lowered.starts[len(lowered.states) :]
+        known |= {s: lanes.load(f.at("%given", k * self.width)) for k, s in enumerate((*self.given, *memories))}
+        states = enumerate(lowered.starts[: len(lowered.states)])
+        known |= {s: lanes.load(f.at("%x", k * self.width)) for k, s in states}
+        for k, balance in enumerate(Expressions(lanes, known).of(phase)):
+            lanes.store(balance, f.at("%balances", k * self.width))
+        return f.text("define internal void @rest(ptr %event, ptr %given, ptr %x, ptr noalias %balances) nounwind")
+
+    # All events
+
+    def _run(self) -> str:
+        self.f, self.lanes, self.scalars = self._function()
+        f, scalars = self.f, self.scalars
+        self.reachable = f.room("i64", 8)
+        memories, states = len(self.lowered.memories), len(self.lowered.states)
+        self.copied = f.room(f"[{(len(self.given) + memories) * self.width} x double]")
+        self.solved = f.room(f"[{(steady.room(states) + len(self.lowered.starts) + 1) * self.width} x double]")
+        with f.loop(0, "%events") as e:
+            self.event_at = f.at("%event", f.integer("mul", e, len(EVENT)))
+            self.event = {_real(s): scalars.part(f.at(self.event_at, k), "") for k, s in enumerate(EVENT)}
+            self.begin, self.end = f.count("%first", e), f.count("%first", f.integer("add", e, 1))
+            self.substeps = f.count("%substeps", e)
+            self._point_pass()
+            self._signal_pass()
+            with f.loop(0, "%n", "%block") as first:
+                self._block(e, first)
+        arguments = (*(f"ptr noalias %{a}" for a in ARRAYS), "ptr %steady", *(f"i64 %{s}" for s in SIZES))
+        return f.text(f"define void @run({', '.join(arguments)}) nounwind")
+
+    def _block(self, e: str, first: str) -> None:
+        """Some lanes over one event."""
+        f = self.f
+        some = f.smaller(f.integer("sub", "%n", first), "%block")
+        self.groups = f.integer("sdiv", f.integer("add", some, self.width - 1), self.width)
+        f.do(f"store i64 0, ptr {self.reachable}, align 8")
+        with f.loop(0, self.groups, always=True) as g:
+            self._start(e, f.integer("add", first, f.integer("mul", g, self.width)), self._group(g))
+        reached = f.fresh(f"icmp ne i64 {f.fresh(f'load i64, ptr {self.reachable}, align 8')}, 0")
+        with f.when(reached), f.loop(self.begin, self.end) as i:
+            self._sample(i)
+            with f.when(f.value("icmp ne i64 %stored, 0")), f.loop(0, some, always=True) as lane:
+                self._store_outputs(i, first, lane)
+        with f.loop(0, some, always=True) as lane:
+            self._store_sums(e, first, lane)
+
+    def _group(self, g: str) -> str:
+        """Where a group's rows begin."""
+        return self.f.at("%work", self.f.integer("mul", g, len(self.rows) * self.width))
+
+    def _row(self, group: str, name: object) -> str:
+        return self.f.at(group, self.rows[str(name)] * self.width)
+
+    def _read(self, group: str, names: Iterable[Symbol]) -> dict[Symbol, str]:
+        return {s: self.lanes.load(self._row(group, s)) for s in names}
+
+    # What is the same in all lanes, for many samples at once
+
+    def _samples(self, i: str, ahead: int = 0) -> "_Samples":
+        """The inputs from sample i on, of those in the record."""
+        left = self.f.integer("sub", "%samples", self.f.integer("add", i, ahead))
+        return _Samples(self, self.f.integer("add", i, ahead) if ahead else i, left)
+
+    def _point_pass(self) -> None:
+        """Inputs and signals of the derivative at both ends and in the middle of each step."""
+        if not self.moving:
+            return
+        f, scalars, count = self.f, self.scalars, len(self.moving)
+        per_sample = f.integer("mul", self.substeps, 2)
+        step = self.lanes.everywhere(self.event[_real("step")])
+        event = {s: self.lanes.everywhere(value) for s, value in self.event.items()}
+        with (
+            f.loop(self.begin, self.end, self.width) as i,
+            f.loop(0, per_sample, always=True) as q,
+            f.passage("points"),
+        ):
+            here, there = self._samples(i), self._samples(i, 1)
+            share = scalars.divide(f.value(f"sitofp i64 {q} to double"), f.value(f"sitofp i64 {per_sample} to double"))
+            x, known = self.lanes.everywhere(share), dict(event)
+            for symbol in self.lowered.inputs:
+                known[symbol] = self._between(symbol.name, here, there, x, step)
+            values = Expressions(self.lanes, known)
+            known |= {s: values(e) for s, e in self.lowered.derivative.signals}
+            place = f.integer("add", f.integer("mul", f.integer("sub", i, self.begin), per_sample), q)
+            self._scatter([known[s] for s in self.moving], "%points", place, per_sample, count)
+
+    def _signal_pass(self) -> None:
+        """Signals of outputs and memories, a sample each."""
+        if not self.signals:
+            return
+        f = self.f
+        event = {s: self.lanes.everywhere(value) for s, value in self.event.items()}
+        with f.loop(self.begin, self.end, self.width) as i, f.passage("signals"):
+            here = self._samples(i)
+            values = Expressions(self.lanes, event | {s: here(s.name) for s in self.lowered.inputs})
+            made = [values(e) for e in self.signals.values()]
+            self._scatter(made, "%signals", f.integer("sub", i, self.begin), 1, len(made))
+
+    def _scatter(self, values: Sequence[str], array: str, place: str, apart: object, count: int) -> None:
+        """Lanes of values written side by side: those of sample k at the row `place` + k `apart` of `count` each."""
+        f = self.f
+        for k in range(self.width):
+            row = f.integer("add", place, f.integer("mul", apart, k)) if k else place
+            address = f.at(array, f.integer("mul", row, count))
+            for j, value in enumerate(values):
+                f.do(f"store double {self.lanes.lane(value, k)}, ptr {f.at(address, j)}, align 8")
+
+    def _between(self, name: str, here: "_Samples", there: "_Samples", x: str, step: str) -> str:
+        """An input by x from one sample to the next: on the cubic of its slopes, or on a straight line."""
+        n = self.lanes
+        rates = {rate: smooth for smooth, rate in SMOOTH.items()}
+        smooth = rates.get(name, name)
+        if smooth not in SMOOTH:
+            return n.fused(n.subtract(there(name), here(name)), x, here(name))
+        a, b = here(smooth), there(smooth)
+        da, db = (n.multiply(step, end(SMOOTH[smooth])) for end in (here, there))
+        rise = n.subtract(b, a)
+        square = n.subtract(n.subtract(n.multiply(n.constant(3.0), rise), n.multiply(n.constant(2.0), da)), db)
+        cube = n.subtract(n.add(da, db), n.multiply(n.constant(2.0), rise))
+        if name == smooth:
+            return n.fused(x, n.fused(x, n.fused(x, cube, square), da), a)
+        bend = n.fused(n.multiply(n.constant(3.0), x), cube, n.multiply(n.constant(2.0), square))
+        return n.divide(n.fused(x, bend, da), step)
+
+    # Before an event
+
+    def _start(self, e: str, first: str, group: str) -> None:
+        """States, constants and misses of a group of lanes, the last candidate repeated where lanes are left over."""
+        f, n, lowered = self.f, self.lanes, self.lowered
+        self._copy_candidates(e, first)
+        known = {s: n.everywhere(value) for s, value in self.event.items()}
+        known |= {s: n.load(f.at(self.copied, k * self.width)) for k, s in enumerate(self.given)}
+        values = Expressions(n, known).of(lowered.start)
+        starts, miss = values[: len(lowered.starts)], self._missed(values[len(lowered.starts) :])
+        if self.solves:
+            starts, miss = self._settled(starts, miss)
+        with f.when(f.value("icmp ne i64 %started, 0")):
+            self._store_starts(e, first, starts)
+        known |= zip(lowered.starts, starts, strict=True)
+        known |= zip(lowered.constants, Expressions(n, known).of(lowered.constant), strict=True)
+        zero = n.constant(0.0)
+        begin: dict[object, str] = dict(zip((*lowered.states, *lowered.memories), starts, strict=True))
+        begin |= {s: known[s] for s in self.carried} | {f"_sum_{o}": zero for o in lowered.outputs} | {"_miss": miss}
+        for name, value in begin.items():
+            n.store(value, self._row(group, name))
+        good = f.value(f"zext i1 {n.some(n.compare('ole', miss, zero))} to i64")
+        before = f.fresh(f"load i64, ptr {self.reachable}, align 8")
+        f.do(f"store i64 {f.fresh(f'or i64 {before}, {good}')}, ptr {self.reachable}, align 8")
+
+    def _copy_candidates(self, e: str, first: str) -> None:
+        f, count = self.f, len(self.given)
+        last = f.integer("sub", "%n", 1)
+        source = f.at("%candidates", f.integer("mul", f.integer("mul", e, count), "%n"))
+        with f.loop(0, self.width, always=True) as lane:
+            candidate, target = f.at(source, f.smaller(f.integer("add", first, lane), last)), f.at(self.copied, lane)
+            for k in range(count):
+                value = f.fresh(f"load double, ptr {f.at(candidate, f.integer('mul', '%n', k))}, align 8")
+                f.do(f"store double {value}, ptr {f.at(target, k * self.width)}, align 8")
+
+    def _missed(self, slacks: Sequence[str]) -> str:
+        """By how much the requirements are missed in all; 0 where a steady state exists."""
+        n = self.lanes
+        zero, most = n.constant(0.0), n.constant(steady.MOST)
+        miss = zero
+        for slack in slacks:
+            short = n.larger(zero, n.negative(slack))
+            miss = short if miss == zero else n.add(miss, short)
+        miss = n.smaller(miss, most)
+        return n.select(n.compare("oge", miss, zero), miss, most)
+
+    def _settled(self, starts: Sequence[str], miss: str) -> tuple[list[str], str]:
+        """The states solved for, and by how much more the steady state is missed."""
+        f, n, states = self.f, self.lanes, len(self.lowered.states)
+        for k, memory in enumerate(starts[states:], len(self.given)):
+            n.store(memory, f.at(self.copied, k * self.width))
+        x, left = self.solved, f.at(self.solved, states * self.width)
+        work = f.at(self.solved, (states + 1) * self.width)
+        for k, value in enumerate(starts[:states]):
+            n.store(value, f.at(x, k * self.width))
+        f.do(
+            f"call void %steady(ptr @rest, ptr {self.event_at}, ptr {self.copied}, ptr {x}, ptr {left}, ptr {work},"
+            f" i64 {states})"
+        )
+        found = [n.load(f.at(x, k * self.width)) for k in range(states)]
+        return [*found, *starts[states:]], n.smaller(n.add(miss, n.load(left)), n.constant(steady.MOST))
+
+    # A sample and its steps
+
+    def _sample(self, i: str) -> None:
+        """Outputs and errors at sample i, and the steps to the next; the last one's step is computed in vain."""
+        f, states = self.f, bool(self.lowered.states)
+        self.i, local = i, f.integer("sub", i, self.begin)
+        self.signal_at = f.at("%signals", f.integer("mul", local, len(self.signals)))
+        if not states:
+            with f.loop(0, self.groups, always=True) as g, f.passage("outputs"):
+                self._outputs(self._group(g), {})
+            return
+        last = f.value(f"icmp eq i64 {f.integer('add', i, 1)}, {self.end}")
+        steps = f.value(f"select i1 {last}, i64 1, i64 {self.substeps}")
+        length = self.scalars.divide(self.event[_real("step")], f.value(f"sitofp i64 {self.substeps} to double"))
+        with f.loop(0, steps, always=True) as j:
+            row = f.integer("mul", f.integer("add", f.integer("mul", local, self.substeps), j), 2 * len(self.moving))
+            points = self._points(f.at("%points", row))
+            first = f.value(f"icmp eq i64 {j}, 0")
+            ahead = {
+                share: self.lanes.everywhere(self.scalars.multiply(self.scalars.constant(share), length))
+                for share in (self.half_way, 1.0, 1 / 6)
+            }
+            with f.loop(0, self.groups, always=True) as g, f.passage("step"):
+                self._step(self._group(g), first, points, ahead)
+
+    def _points(self, address: str) -> list[dict[Symbol, str]]:
+        """What is the same in all lanes at the beginning, the middle and the end of a step."""
+        count = len(self.moving)
+        return [{s: self._wide(self.f.at(address, k * count + j)) for j, s in enumerate(self.moving)} for k in range(3)]
+
+    def _wide(self, address: str) -> str:
+        return self.lanes.everywhere(self.f.fresh(f"load double, ptr {address}, align 8"))
+
+    def _step(self, group: str, first: str, points: Sequence[Values], ahead: Mapping[float, str]) -> None:
+        """A step of four stages, Eq. (4), by shares `ahead` of its length; before the first of a sample its outputs."""
+        f, n, lowered = self.f, self.lanes, self.lowered
+        y = [n.load(self._row(group, s)) for s in lowered.states]
+        known = self._read(group, (s for s in self.carried if s in self.used["derivative"]))
+
+        def slope(stage: str, states: Sequence[str], point: Values) -> list[str]:
+            f.remark(stage)
+            at = {**known, **point, **dict(zip(lowered.states, states, strict=True))}
+            return Expressions(n, at).of(lowered.derivative)
+
+        def along(states: Sequence[str], share: float, slopes: Sequence[str]) -> list[str]:
+            return [n.fused(ahead[share], slope, s) for s, slope in zip(states, slopes, strict=True)]
+
+        a, b, c = points
+        k1 = [] if lowered.memories else slope("slope at the beginning", y, a)
+        with f.when(first), f.passage("outputs"):
+            self._outputs(group, known | dict(zip(lowered.states, y, strict=True)))
+        if lowered.memories:
+            known |= self._read(group, (m for m in lowered.memories if m in self.used["derivative"]))
+            k1 = slope("slope at the beginning", y, a)
+        k2 = slope("first slope in the middle", along(y, self.half_way, k1), b)
+        k3 = slope("second slope in the middle", along(y, self.half_way, k2), b)
+        k4 = slope("slope at the end", along(y, 1.0, k3), c)
+        total = [
+            n.add(n.fused(n.constant(2.0), n.add(second, third), one), four)
+            for one, second, third, four in zip(k1, k2, k3, k4, strict=True)
+        ]
+        for symbol, state in zip(lowered.states, along(y, 1 / 6, total), strict=True):
+            n.store(state, self._row(group, symbol))
+
+    def _outputs(self, group: str, known: Mapping[Symbol, str]) -> None:
+        """Memories renewed, outputs, and their errors added to the sums."""
+        f, n, lowered = self.f, self.lanes, self.lowered
+        used = self.used["renewal"] | self.used["output"]
+        own = (*lowered.states, *lowered.memories, *self.carried)
+        known = dict(known) | self._read(group, (s for s in own if s in used and s not in known))
+        for s in lowered.inputs:
+            if s in used:
+                known[s] = self._wide(f.at(self._input(s.name), self.i))
+        known |= {s: self._wide(f.at(self.signal_at, j)) for j, s in enumerate(self.signals) if s in used}
+        if lowered.memories:
+            renewed = Expressions(n, known).of(lowered.renewal)
+            known |= zip(lowered.memories, renewed, strict=True)
+            for symbol, value in zip(lowered.memories, renewed, strict=True):
+                n.store(value, self._row(group, symbol))
+        for c, (name, value) in enumerate(zip(lowered.outputs, Expressions(n, known).of(lowered.output), strict=True)):
+            n.store(value, self._row(group, f"_{name}"))
+            place = f.integer("add", f.integer("mul", "%samples", c), self.i)
+            off = n.subtract(self._wide(f.at("%measured", place)), value)
+            row = self._row(group, f"_sum_{name}")
+            n.store(n.fused(n.multiply(self._wide(f.at("%weights", place)), off), off, n.load(row)), row)
+
+    def _input(self, name: str) -> str:
+        return self.f.at("%inputs", self.f.integer("mul", "%samples", INPUTS.index(name)))
+
+    # Results, lane by lane
+
+    def _lane(self, lane: str) -> str:
+        """Where the first row of a lane of this block lies."""
+        f = self.f
+        group = self._group(f.integer("sdiv", lane, self.width))
+        return f.at(group, f.integer("srem", lane, self.width))
+
+    def _copy(self, lane: str, name: str, target: str) -> None:
+        f = self.f
+        value = f.fresh(f"load double, ptr {f.at(self._lane(lane), self.rows[name] * self.width)}, align 8")
+        f.do(f"store double {value}, ptr {target}, align 8")
+
+    def _store_outputs(self, i: str, first: str, lane: str) -> None:
+        """outputs (C, n, N)."""
+        f = self.f
+        for c, name in enumerate(self.lowered.outputs):
+            row = f.integer("add", f.integer("mul", "%n", c), f.integer("add", first, lane))
+            self._copy(lane, f"_{name}", f.at("%outputs", f.integer("add", f.integer("mul", row, "%samples"), i)))
+
+    def _store_sums(self, e: str, first: str, lane: str) -> None:
+        """sums (E, C, n) and miss (E, n)."""
+        f, count, candidate = self.f, len(self.lowered.outputs), self.f.integer("add", first, lane)
+        for c, name in enumerate(self.lowered.outputs):
+            row = f.integer("add", f.integer("mul", e, count), c)
+            self._copy(lane, f"_sum_{name}", f.at("%sums", f.integer("add", f.integer("mul", row, "%n"), candidate)))
+        self._copy(lane, "_miss", f.at("%miss", f.integer("add", f.integer("mul", e, "%n"), candidate)))
+
+    def _store_starts(self, e: str, first: str, starts: Sequence[str]) -> None:
+        """starts (E, K, n)."""
+        f, count = self.f, len(starts)
+        for k, value in enumerate(starts):
+            self.lanes.store(value, f.at(self.solved, k * self.width))
+        left = f.integer("sub", "%n", first)
+        with f.loop(0, f.smaller(left, self.width), always=True) as lane:
+            for k in range(count):
+                value = f.fresh(f"load double, ptr {f.at(f.at(self.solved, lane), k * self.width)}, align 8")
+                row = f.integer("mul", f.integer("add", f.integer("mul", e, count), k), "%n")
+                place = f.integer("add", row, f.integer("add", first, lane))
+                f.do(f"store double {value}, ptr {f.at('%starts', place)}, align 8")
+
+
+class _Samples:
+    """Inputs by name as vectors of the samples from one on."""
+
+    def __init__(self, emitter: _Emitter, i: str, left: str):
+        self.emitter, self.i, self.left = emitter, i, left
+
+    def __call__(self, name: str) -> str:
+        e = self.emitter
+        return e.lanes.part(e.f.at(e._input(name), self.i), self.left)

@@ -1,0 +1,195 @@
+"""SymPy's expressions written as values of a function."""
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+import sympy
+from sympy import Symbol
+from sympy.logic.boolalg import Boolean, BooleanFalse, BooleanTrue
+
+from tractexp.errors import UserError
+from tractexp.kernel import math as lanes
+from tractexp.kernel.lowered import Phase
+
+RELATIONS = {
+    sympy.StrictLessThan: "olt", sympy.LessThan: "ole", sympy.StrictGreaterThan: "ogt", sympy.GreaterThan: "oge",
+    sympy.Equality: "oeq", sympy.Unequality: "une",
+}  # fmt: skip
+NAMES = ("exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh")
+OURS: dict[type, Callable[..., Any]] = {getattr(sympy, name): getattr(lanes, name) for name in NAMES}
+LLVMS = {sympy.Abs: "fabs", sympy.floor: "floor", sympy.ceiling: "ceil"}
+HALF = sympy.Rational(1, 2)
+
+
+class Expressions:
+    """Values of expressions in known symbols, each part of them written once.
+
+    `numbers` is the arithmetic: of lanes (`numbers.Numbers`) or of arrays (`arrays.Arrays`).
+    """
+
+    def __init__(self, numbers: Any, known: Mapping[Symbol, Any]):
+        self.numbers, self.known = numbers, dict(known)
+        self._values: dict[sympy.Basic, Any] = {}
+
+    def of(self, phase: Phase) -> list[Any]:
+        """The values of a phase's expressions."""
+        for symbol, expression in phase.steps:
+            self.known[symbol] = self(expression)
+        return [self(e) for e in phase.expressions]
+
+    def __call__(self, e: sympy.Basic) -> Any:
+        """Its value. Raises `UserError` for a function that kernels do not know."""
+        if e not in self._values:
+            self._values[e] = self._written(e)
+        return self._values[e]
+
+    def _written(self, e: sympy.Basic) -> Any:
+        n = self.numbers
+        if isinstance(e, Symbol):
+            return self.known[e]
+        if isinstance(e, sympy.Number | sympy.NumberSymbol):
+            return n.constant(float(e))
+        if isinstance(e, sympy.Add):
+            return self._sum(e.args)
+        if isinstance(e, sympy.Mul):
+            return self._product(*e.as_coeff_Mul())
+        if isinstance(e, sympy.Pow):
+            return self._power(e.base, e.exp)
+        if isinstance(e, sympy.Max | sympy.Min):
+            return self._extreme(e)
+        if isinstance(e, sympy.Piecewise):
+            return self._piecewise(e.args)
+        return self._function(e)
+
+    def _function(self, e: sympy.Basic) -> Any:
+        n = self.numbers
+        if type(e) in OURS:
+            return OURS[type(e)](n, *map(self, e.args))
+        if type(e) in LLVMS:
+            return n.call(LLVMS[type(e)], self(e.args[0]))
+        if isinstance(e, sympy.sign | sympy.Heaviside):
+            above, below = (1.0, -1.0) if isinstance(e, sympy.sign) else (1.0, 0.0)
+            x, zero = self(e.args[0]), n.constant(0.0)
+            at = zero if isinstance(e, sympy.sign) else self(e.args[1])
+            rest = n.select(n.compare("olt", x, zero), n.constant(below), at)
+            return n.select(n.compare("ogt", x, zero), n.constant(above), rest)
+        known = ", ".join(sorted(kind.__name__ for kind in (*OURS, *LLVMS)))
+        raise UserError(
+            f"the equations contain {type(e).__name__}, in {e}, which kernels cannot compute; write it by sums,"
+            f" products, powers, Max, Min, Piecewise, sign, Heaviside or {known}"
+        )
+
+    # Sums, products, powers
+
+    def _sum(self, terms: Sequence[sympy.Basic]) -> Any:
+        """Single terms first, then the products one by one: each a fused multiplication and addition."""
+        single, products = [], []
+        for term in terms:
+            coefficient, rest = term.as_coeff_Mul()  # type: ignore[attr-defined]
+            item = bool(coefficient < 0), abs(coefficient), rest
+            fuses = isinstance(rest, sympy.Mul) or (coefficient not in (1, -1) and rest is not sympy.S.One)
+            (products if fuses else single).append(item)
+        items = sorted(single, key=_negative) + sorted(products, key=_negative)
+        first = next((k for k, item in enumerate(items) if not item[0]), 0)
+        items.insert(0, items.pop(first))
+        n, total = self.numbers, None
+        for negative, coefficient, rest in items:
+            value = self._product(coefficient, rest)
+            if total is None:
+                total = n.negative(value) if negative else value
+            else:
+                total = n.subtract(total, value) if negative else n.add(total, value)
+        return total
+
+    def _product(self, coefficient: sympy.Expr, rest: sympy.Expr) -> Any:
+        """A coefficient times factors, over the product of those that divide."""
+        n, above, below = self.numbers, [], []
+        for factor in sympy.Mul.make_args(rest):
+            if isinstance(factor, sympy.Pow) and isinstance(factor.exp, sympy.Number) and factor.exp.is_negative:
+                below.append((factor.base, -factor.exp))
+            elif factor is not sympy.S.One:
+                above.append(factor)
+        value = self._multiplied(map(self, above))
+        if value is not None and coefficient == -1:
+            value = n.negative(value)
+        elif value is None or coefficient != 1:
+            size = n.constant(float(coefficient))
+            value = size if value is None else n.multiply(size, value)
+        divisor = self._multiplied(self._power(*factor) for factor in below)
+        return value if divisor is None else n.divide(value, divisor)
+
+    def _multiplied(self, values: Iterable[Any]) -> Any:
+        """Their product; None of none."""
+        product = None
+        for value in values:
+            product = value if product is None else self.numbers.multiply(product, value)
+        return product
+
+    def _power(self, base: sympy.Expr, exponent: sympy.Expr) -> Any:
+        n = self.numbers
+        if base == sympy.E:
+            return lanes.exp(n, self(exponent))
+        if not isinstance(exponent, sympy.Number):
+            raise UserError(f"{base}**({exponent}) reached a kernel; powers of symbols are exponentials there")
+        if exponent.is_negative:
+            return n.divide(n.constant(1.0), self._power(base, -exponent))
+        x, whole = self(base), math.floor(exponent)
+        if exponent == whole:
+            return self._repeated(x, whole)
+        if exponent - whole == HALF:
+            return self._repeated(x, whole, n.root(x))
+        return lanes.power(n, x, float(exponent))
+
+    def _repeated(self, x: Any, times: int, by: Any = None) -> Any:
+        """x multiplied by itself, and by another value."""
+        n = self.numbers
+        while times:
+            if times % 2:
+                by = x if by is None else n.multiply(by, x)
+            times //= 2
+            if times:
+                x = n.multiply(x, x)
+        return n.constant(1.0) if by is None else by
+
+    # Choices
+
+    def _extreme(self, e: sympy.Max | sympy.Min) -> Any:
+        choose = self.numbers.larger if isinstance(e, sympy.Max) else self.numbers.smaller
+        first, *others = sorted(e.args, key=sympy.default_sort_key)
+        value = self(first)
+        for other in others:
+            value = choose(value, self(other))
+        return value
+
+    def _piecewise(self, pieces: Sequence[sympy.Basic]) -> Any:
+        """nan where no condition holds."""
+        value = self.numbers.constant(math.nan)
+        for piece in reversed(pieces):
+            expression, condition = piece.args
+            there = self(expression)
+            always = condition == sympy.true
+            value = there if always else self.numbers.select(self._condition(condition), there, value)
+        return value
+
+    def _condition(self, condition: Boolean | sympy.Basic) -> Any:
+        n = self.numbers
+        if isinstance(condition, BooleanTrue | BooleanFalse):
+            return n.truth(bool(condition))
+        if how := RELATIONS.get(type(condition)):
+            return n.compare(how, self(condition.args[0]), self(condition.args[1]))
+        if isinstance(condition, sympy.Not):
+            return n.logic("xor", self._condition(condition.args[0]), n.truth(True))
+        if isinstance(condition, sympy.And | sympy.Or):
+            operation = "and" if isinstance(condition, sympy.And) else "or"
+            first, *others = (self._condition(a) for a in sorted(condition.args, key=sympy.default_sort_key))
+            for other in others:
+                first = n.logic(operation, first, other)
+            return first
+        raise UserError(
+            f"the equations contain the condition {condition}, which kernels cannot decide; compare numbers"
+        )
+
+
+def _negative(item: tuple[bool, sympy.Expr, sympy.Expr]) -> bool:
+    return item[0]

@@ -1,0 +1,31 @@
+"""Expressions as graphs: what occurs a thousand times in a nested expression is looked at once.
+
+SymPy walks an expression as a tree. The steady state of a double cage, Newton's steps put into each other, is a small
+graph and a tree of millions.
+"""
+
+from collections.abc import Iterator
+
+import sympy
+from sympy import Basic, Symbol
+
+
+def nodes(expression: Basic) -> Iterator[Basic]:
+    """Each different part of an expression, itself first."""
+    seen, waiting = {expression}, [expression]
+    while waiting:
+        found = waiting.pop()
+        yield found
+        new = [part for part in found.args if part not in seen]
+        seen.update(new)
+        waiting += new
+
+
+def symbols_of(expression: Basic) -> set[Symbol]:
+    """The symbols that an expression is made of."""
+    return {part for part in nodes(expression) if isinstance(part, Symbol)}
+
+
+def arguments(expression: sympy.Expr) -> tuple[sympy.Expr, ...]:
+    """The arguments of an expression, which are expressions."""
+    return expression.args  # pyright: ignore[reportReturnType] # SymPy calls them `Basic`, as those of a set are

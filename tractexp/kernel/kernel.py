@@ -1,0 +1,144 @@
+"""A kernel to call: the arrays it is given are looked at first, since machine code looks at none."""
+
+import ctypes
+import functools
+import itertools
+from typing import Any
+
+import numpy as np
+
+from tractexp.kernel import objects, steady, target
+from tractexp.kernel.layout import INPUTS, LANES
+from tractexp.kernel.room import Room
+
+FUNCTION = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 15, *[ctypes.c_int64] * 6)  # releases Python's lock
+VECTOR = 64  # bytes: a vector across two cache lines would take twice the time
+NOTHING = np.empty((0, 0, 0))
+NUMBERS, WHOLE = np.dtype(np.float64), np.dtype(np.int64)
+
+
+class Kernel:
+    """The kernel of a text of `emit`. Safe in threads: each call has a work space of its own."""
+
+    def __init__(self, text: str):
+        self.text, self.room = text, Room.of(text)
+
+    @functools.cached_property
+    def _function(self) -> tuple[Any, Any, int]:
+        code, newton = objects.load(self.text), objects.load(steady.text(self.room.width))
+        return FUNCTION(code.address), (code, newton), newton.address
+
+    def run(
+        self,
+        candidates: np.ndarray,
+        event: np.ndarray,
+        first: np.ndarray,
+        inputs: np.ndarray,
+        measured: np.ndarray,
+        weights: np.ndarray,
+        substeps: np.ndarray,
+        sums: np.ndarray,
+        miss: np.ndarray,
+        outputs: np.ndarray = NOTHING,
+        starts: np.ndarray = NOTHING,
+    ) -> None:
+        """Simulate candidates over events and sum their weighted squared errors.
+
+        candidates (E, given, n): parameters, then P0 and Q0; event (E, columns as in EVENT); first (E + 1,) where each
+        event begins in the samples; inputs (rows as in INPUTS or its first five, N); measured, weights (C, N);
+        substeps (E,) Runge-Kutta steps a sample. Written are sums (E, C, n), miss (E, n), and, unless they are empty,
+        outputs (C, n, N) and starts (E, K, n): states and memories before the event. All are C-contiguous, of
+        float64, `first` and `substeps` of int64. Raises `ValueError` for anything else.
+        """
+        room = self.room
+        events, n, samples = self._sizes(candidates, inputs)
+        _check("candidates", candidates, (events, room.given, n))
+        _check("event", event, (events, room.event))
+        _check("first", first, (events + 1,), WHOLE)
+        _check("inputs", inputs, (inputs.shape[0], samples))
+        _check("measured", measured, (room.outputs, samples))
+        _check("weights", weights, (room.outputs, samples))
+        _check("substeps", substeps, (events,), WHOLE)
+        _check("sums", sums, (events, room.outputs, n))
+        _check("miss", miss, (events, n))
+        stored, started = int(outputs.size > 0), int(starts.size > 0)
+        if stored:
+            _check("outputs", outputs, (room.outputs, n, samples))
+        if started:
+            _check("starts", starts, (events, room.starts, n))
+        lengths = _lengths(first.tolist(), substeps.tolist(), samples)
+        block, work, points, signals, space = self._space(n, lengths)
+        arrays = (candidates, event, first, inputs, measured, weights, substeps, sums, miss, outputs, starts)
+        function, _, newton = self._function
+        function(
+            *map(_address, arrays), work, points, signals, newton,
+            events, n, samples, block, stored, started,
+        )  # fmt: skip
+        del space  # not before the call has ended
+
+    def starts(self, candidates: np.ndarray, event: np.ndarray) -> np.ndarray:
+        """States and memories before the events (E, K, n); candidates and event as `run` takes them."""
+        events, _, n = candidates.shape
+        none, whole = np.empty((0, 0)), np.zeros(events + 1, dtype=np.int64)
+        room = self.room
+        starts = np.empty((events, room.starts, n))
+        self.run(
+            candidates, event, whole, none.reshape(len(INPUTS), 0), none.reshape(room.outputs, 0),
+            none.reshape(room.outputs, 0), whole[1:] + 1, np.empty((events, room.outputs, n)), np.empty((events, n)),
+            NOTHING, starts,
+        )  # fmt: skip
+        return starts
+
+    def _space(self, n: int, lengths: list[tuple[int, int]]) -> tuple[int, int, int, int, np.ndarray]:
+        """Lanes of a block, addresses of work space, points and signals, and the array in which they lie."""
+        room, width = self.room, self.room.width
+        groups = -(-n // width)
+        blocks = max(-(-groups * width // LANES), 1)
+        block = max(width * -(-groups // blocks), width)
+        work = room.rows * block  # whole vectors
+        whole = [(-(-length // width) * width, steps) for length, steps in lengths]
+        points = room.points * max((2 * steps * length + 1 for length, steps in whole), default=0)
+        signals = room.signals * max((length for length, _ in whole), default=0)
+        space = np.empty(work + points + signals + VECTOR // 8)
+        address = -(-_address(space) // VECTOR) * VECTOR
+        return block, address, address + 8 * work, address + 8 * (work + points), space
+
+    def _sizes(self, candidates: np.ndarray, inputs: np.ndarray) -> tuple[int, int, int]:
+        if candidates.ndim != 3 or inputs.ndim != 2 or inputs.shape[0] not in (5, len(INPUTS)):
+            raise ValueError(
+                f"candidates {candidates.shape} and inputs {inputs.shape} must have shapes (events, {self.room.given},"
+                f" n) and (5 or {len(INPUTS)}, samples)"
+            )
+        return candidates.shape[0], candidates.shape[2], inputs.shape[1]
+
+
+def width() -> int:
+    """Doubles in a vector of this machine's kernels."""
+    return target.width()
+
+
+def _check(name: str, array: np.ndarray, shape: tuple[int, ...], kind: np.dtype = NUMBERS) -> None:
+    if array.shape == shape and array.flags.c_contiguous and array.dtype == kind:
+        return
+    order = "" if array.flags.c_contiguous else ", not C-contiguous"
+    raise ValueError(
+        f"a kernel's {name} is {array.dtype} {array.shape}{order}; it must be {kind} {shape}, C-contiguous"
+    )
+
+
+def _address(array: np.ndarray) -> int:
+    """Where its first element lies; a third of the time that `array.ctypes` takes, where the array can be written."""
+    try:
+        return ctypes.addressof(ctypes.c_char.from_buffer(array))  # pyright: ignore[reportArgumentType] # it is a buffer
+    except (TypeError, ValueError):  # of what is empty or must not be written
+        return array.ctypes.data
+
+
+def _lengths(first: list[int], substeps: list[int], samples: int) -> list[tuple[int, int]]:
+    """Samples and steps a sample of each event. Raises `ValueError` where they point outside the arrays."""
+    lengths = [end - begin for begin, end in itertools.pairwise(first)]
+    if first[0] < 0 or first[-1] > samples or any(length < 0 for length in lengths):
+        raise ValueError(f"a kernel's first = {first} must rise from 0 at least to at most the {samples} samples")
+    if any(steps < 1 for steps in substeps):
+        raise ValueError(f"a kernel's substeps = {substeps}: each must be 1 or more")
+    return list(zip(lengths, substeps, strict=True))

@@ -1,0 +1,11 @@
+"""What a kernel is given: the rows of its sampled inputs, the columns of an event, and how many lanes go together."""
+
+# Rows of the inputs: U_rate is the slope of U there [pu/s]. Those of waves follow: the voltage's space vector v in
+# the frame, its zero sequence, their slopes, and the frame's angle to phase a by cosine and sine.
+INPUTS = (
+    "U", "omega_s", "U_rate", "U2", "t",
+    "v_d", "v_q", "v_zero", "v_d_rate", "v_q_rate", "v_zero_rate", "turn_re", "turn_im",
+)  # fmt: skip
+SMOOTH = {name: f"{name}_rate" for name in ("U", "v_d", "v_q", "v_zero")}  # what is a cubic between samples: its slope
+EVENT = ("U0", "omega_s0", "U20", "omega_n", "step")  # one number each per event
+LANES = 56  # candidates advanced together at most: enough to fill the waits of one step, and few enough for the cache

@@ -1,0 +1,173 @@
+"""Arithmetic on numbers of one type, written into a function: doubles, or vectors of them, one lane a candidate.
+
+`FAST` lets LLVM fuse and reorder, as vectors and scalars gain by it; nan and infinity keep their meaning, since they
+mark candidates that diverged. `ORDERED` does not reorder: where the order of operations is the point.
+"""
+
+import struct
+
+from tractexp.kernel.function import Function
+
+FAST, ORDERED = "contract reassoc arcp nsz", "contract arcp nsz"
+COMMUTES = {"fadd", "fmul", "and", "or", "xor", "add"}
+
+
+class Numbers:
+    """Operations on doubles (width 1) or vectors of `width` doubles; operands and results are names of values."""
+
+    def __init__(self, function: Function, width: int):
+        self.f, self.width = function, width
+        self.kind, self.integers, self.bits = (
+            one if width == 1 else f"<{width} x {one}>" for one in ("double", "i64", "i1")
+        )
+        self._suffix = "f64" if width == 1 else f"v{width}f64"
+
+    # Constants
+
+    def constant(self, x: float) -> str:
+        exact = "0x" + struct.pack(">d", float(x)).hex().upper()
+        return exact if self.width == 1 else f"splat (double {exact})"
+
+    def whole(self, x: int) -> str:
+        return str(x) if self.width == 1 else f"splat (i64 {x})"
+
+    def truth(self, holds: bool) -> str:
+        bit = "true" if holds else "false"
+        return bit if self.width == 1 else f"splat (i1 {bit})"
+
+    # Arithmetic
+
+    def add(self, a: str, b: str, flags: str = FAST) -> str:
+        return self._two("fadd", a, b, flags)
+
+    def subtract(self, a: str, b: str, flags: str = FAST) -> str:
+        return self._two("fsub", a, b, flags)
+
+    def multiply(self, a: str, b: str, flags: str = FAST) -> str:
+        return self._two("fmul", a, b, flags)
+
+    def divide(self, a: str, b: str, flags: str = FAST) -> str:
+        return self._two("fdiv", a, b, flags)
+
+    def negative(self, a: str) -> str:
+        return self.f.value(f"fneg {FAST} {self.kind} {a}")
+
+    def fused(self, a: str, b: str, c: str, flags: str = FAST) -> str:
+        """a b + c, which LLVM makes one operation where the processor has it."""
+        return self.add(self.multiply(a, b, flags), c, flags)
+
+    def polynomial(self, x: str, coefficients: tuple[float, ...], flags: str = FAST) -> str:
+        """Horner's scheme, highest power first."""
+        first, *others = map(self.constant, coefficients)
+        for coefficient in others:
+            first = self.fused(first, x, coefficient, flags)
+        return first
+
+    def _two(self, name: str, a: str, b: str, flags: str) -> str:
+        if name in COMMUTES and b < a:
+            a, b = b, a
+        return self.f.value(f"{name} {flags} {self.kind} {a}, {b}")
+
+    # Comparison and choice
+
+    def compare(self, how: str, a: str, b: str) -> str:
+        return self.f.value(f"fcmp {how} {self.kind} {a}, {b}")
+
+    def differ(self, a: str, b: str) -> str:
+        """Whether whole numbers are not the same."""
+        return self.f.value(f"icmp ne {self.integers} {a}, {b}")
+
+    def select(self, condition: str, a: str, b: str) -> str:
+        return self.f.value(f"select {self.bits} {condition}, {self.kind} {a}, {self.kind} {b}")
+
+    def larger(self, a: str, b: str) -> str:
+        """b where one of them is nan."""
+        return self.select(self.compare("ogt", a, b), a, b)
+
+    def smaller(self, a: str, b: str) -> str:
+        """b where one of them is nan."""
+        return self.select(self.compare("olt", a, b), a, b)
+
+    def logic(self, operation: str, a: str, b: str) -> str:
+        if b < a:
+            a, b = b, a
+        return self.f.value(f"{operation} {self.bits} {a}, {b}")
+
+    def some(self, condition: str) -> str:
+        """Whether a condition holds in any lane (i1)."""
+        if self.width == 1:
+            return condition
+        packed = self.f.value(f"bitcast {self.bits} {condition} to i{self.width}")
+        return self.f.value(f"icmp ne i{self.width} {packed}, 0")
+
+    # Functions of the processor
+
+    def call(self, name: str, *arguments: str) -> str:
+        """An intrinsic of LLVM."""
+        full = f"llvm.{name}.{self._suffix}"
+        self.f.intrinsic(full, f"declare {self.kind} @{full}({', '.join([self.kind] * len(arguments))})")
+        given = ", ".join(f"{self.kind} {a}" for a in arguments)
+        return self.f.value(f"call {FAST} {self.kind} @{full}({given})")
+
+    def size(self, a: str) -> str:
+        return self.call("fabs", a)
+
+    def root(self, a: str) -> str:
+        return self.call("sqrt", a)
+
+    # The bits of doubles
+
+    def as_bits(self, a: str) -> str:
+        return self.f.value(f"bitcast {self.kind} {a} to {self.integers}")
+
+    def of_bits(self, a: str) -> str:
+        return self.f.value(f"bitcast {self.integers} {a} to {self.kind}")
+
+    def integer(self, operation: str, a: str, b: str) -> str:
+        return self.f.value(f"{operation} {self.integers} {a}, {b}")
+
+    # Memory
+
+    def everywhere(self, scalar: str) -> str:
+        """A double in all lanes."""
+        if self.width == 1:
+            return scalar
+        first = self.f.value(f"insertelement {self.kind} poison, double {scalar}, i64 0")
+        return self.f.value(
+            f"shufflevector {self.kind} {first}, {self.kind} poison, <{self.width} x i32> zeroinitializer"
+        )
+
+    def lane(self, a: str, k: int) -> str:
+        return a if self.width == 1 else self.f.value(f"extractelement {self.kind} {a}, i64 {k}")
+
+    def load(self, address: str) -> str:
+        """A vector from where whole vectors lie."""
+        return self.f.fresh(f"load {self.kind}, ptr {address}, align {8 * self.width}")
+
+    def store(self, a: str, address: str) -> None:
+        self.f.do(f"store {self.kind} {a}, ptr {address}, align {8 * self.width}")
+
+    def part(self, address: str, left: str) -> str:
+        """The next samples of an array that does not change, wherever they lie: those that are `left`, at most all."""
+        if self.width == 1:
+            return self.f.value(f"load double, ptr {address}, align 8")
+        name = f"llvm.masked.load.{self._suffix}.p0"
+        self.f.intrinsic(name, f"declare {self.kind} @{name}(ptr, i32, {self.bits}, {self.kind})")
+        counted = self._counted(left)
+        return self.f.value(
+            f"call {self.kind} @{name}(ptr {address}, i32 8, {self.bits} {counted}, {self.kind} zeroinitializer)"
+        )
+
+    def store_part(self, a: str, address: str, left: str) -> None:
+        """The first `left` lanes, at most all, to wherever they lie."""
+        name = f"llvm.masked.store.{self._suffix}.p0"
+        self.f.intrinsic(name, f"declare void @{name}({self.kind}, ptr, i32, {self.bits})")
+        self.f.do(f"call void @{name}({self.kind} {a}, ptr {address}, i32 8, {self.bits} {self._counted(left)})")
+
+    def _counted(self, left: str) -> str:
+        """The first `left` lanes."""
+        kind = self.integers
+        first = self.f.value(f"insertelement {kind} poison, i64 {left}, i64 0")
+        wide = self.f.value(f"shufflevector {kind} {first}, {kind} poison, <{self.width} x i32> zeroinitializer")
+        lanes = ", ".join(f"i64 {k}" for k in range(self.width))
+        return self.f.value(f"icmp slt {kind} <{lanes}>, {wide}")

@@ -1,0 +1,39 @@
+"""Lowered equations for people to read."""
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import sympy
+
+    from tractexp.kernel.lowered import Lowered, Phase
+
+LONG = 500  # letters of an expression: no one reads more
+
+
+def equations(lowered: "Lowered") -> Iterator[str]:
+    """The equations as they were lowered, a line each, by when they are computed."""
+    yield from _phase("before the event", [f"{s}" for s in lowered.starts], lowered.start)
+    if lowered.rest is not None:
+        yield from _phase("zero before the event", [f"balance {s}" for s in lowered.states], lowered.rest)
+    yield from _phase("over an event", [f"{s}" for s in lowered.constants], lowered.constant)
+    yield from _phase("in each stage of a step", [f"d {s}/dt" for s in lowered.states], lowered.derivative)
+    yield from _phase("at each sample, memories", [f"{s}" for s in lowered.memories], lowered.renewal)
+    yield from _phase("at each sample", list(lowered.outputs), lowered.output)
+
+
+def _phase(when: str, names: Sequence[str], phase: "Phase") -> Iterator[str]:
+    if not phase.expressions:
+        return
+    yield f"{when}:"
+    yield from (f"  {s} = {_told(e)}" for s, e in (*phase.signals, *phase.steps))
+    slacks = (f"slack {k}" for k in range(1, len(phase.expressions) - len(names) + 1))
+    yield from (f"  {name} = {_told(e)}" for name, e in zip((*names, *slacks), phase.expressions, strict=True))
+
+
+def _told(expression: "sympy.Expr") -> str:
+    nodes, waiting = 0, [expression]
+    while waiting and nodes <= LONG:  # a small graph may be a tree of millions
+        nodes += 1
+        waiting += waiting.pop().args  # type: ignore[arg-type]
+    return str(expression) if nodes <= LONG else f"({nodes} terms and more)"

@@ -1,0 +1,50 @@
+"""What kernels are compiled for: this processor, as LLVM tells it, or the most general one of its kind."""
+
+import functools
+import os
+from typing import Any
+
+import llvmlite
+from llvmlite import binding as llvm
+
+from tractexp.errors import check_choice
+
+CHOICE, GENERIC = "TRACTEXP_CPU", "generic"  # the environment's; set to `generic` results do not hang on the processor
+WIDTHS = {"avx512f": 8, "avx": 4}  # doubles in the widest vectors of processors with a feature; of others 2
+FEWEST = 2
+
+
+@functools.cache
+def processor() -> tuple[str, str]:
+    """LLVM's name of the processor and its features, as `+avx2,-avx512f,...`.
+
+    Raises `UserError` where TRACTEXP_CPU is set to anything but `generic`.
+    """
+    if chosen := os.environ.get(CHOICE):
+        check_choice(CHOICE, chosen, (GENERIC,))
+        return GENERIC, ""
+    return llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+
+
+@functools.cache
+def machine() -> Any:
+    """LLVM's target machine."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    name, features = processor()
+    return llvm.Target.from_default_triple().create_target_machine(
+        cpu=name, features=features, opt=2, reloc="pic", codemodel="small"
+    )
+
+
+@functools.cache
+def width() -> int:
+    """Doubles in a vector of this processor's."""
+    own = processor()[1].split(",")
+    return next((doubles for feature, doubles in WIDTHS.items() if f"+{feature}" in own), FEWEST)
+
+
+@functools.cache
+def key() -> str:
+    """All that object code hangs on beside its text: system, processor, features, and the versions of LLVM."""
+    return repr((llvm.get_process_triple(), processor(), llvm.llvm_version_info, llvmlite.__version__))
