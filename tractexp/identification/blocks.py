@@ -8,11 +8,14 @@ jackknife. Source: Kunsch 1989 (blocks of a series); MacKinnon, Nielsen and Webb
 import itertools
 from collections.abc import Sequence
 
+import numpy as np
+
 from tractexp.model.drive import Drive
 from tractexp.record import Event
 
 LENGTH = 0.1  # s, longer than the memory of what third-order motors leave
 FEWEST = 3  # blocks for each parameter: of records with fewer, blocks are shorter
+ALIKE = 0.02  # of a sum of squares, 1 % of an error: less is no difference
 LEVEL = 0.95
 
 
@@ -30,6 +33,17 @@ def blocks_of(events: Sequence[Event], drive: Drive, parameters: int = 1, *, fro
         edges = sorted({*edges, part.stop})
         made += [slice(a, b) for a, b in itertools.pairwise(edges)]
     return made
+
+
+def exceeds(squares: np.ndarray, others: np.ndarray, blocks: Sequence[slice]) -> bool:
+    """Whether squares (N,) exceed others by more than chance explains: by twice the scatter of their differences.
+
+    Paired by sample, summed over blocks; and by more than `ALIKE` of the others.
+    """
+    difference = np.array([float(np.sum(squares[b] - others[b])) for b in blocks])
+    count, total = len(difference), float(difference.sum())
+    scatter = np.sqrt(count / max(count - 1, 1) * np.sum((difference - difference.mean()) ** 2))
+    return total > 2 * scatter and total > ALIKE * sum(float(others[b].sum()) for b in blocks)
 
 
 def quantile(blocks: int) -> float:

@@ -20,6 +20,7 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.identification.adequacy import Surprise, surprise
+from tractexp.identification.blocks import blocks_of, exceeds
 from tractexp.identification.descent import Descent, descend
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.observed import Observed
@@ -104,6 +105,16 @@ class Ends:
         return self.joined(
             descend(self.likelihood.rows, along_least_known(self.likelihood, self.best)), "beside the best"
         )
+
+    def no_worse(self, unit: np.ndarray) -> bool:
+        """Whether coordinates (D,) of the likelihood fit as well by Eq. (8) as the best do, as far as chance explains.
+
+        From the dips on: a load that swings before them makes a loud noise, to which a likelihood gives up too much.
+        """
+        squares, problem = self.likelihood, self.likelihood.problem
+        rows = squares.rows(np.stack([unit[: squares.free], self.best]))
+        polished, least = (rows**2).reshape(2, problem.drive.channels, -1).sum(axis=1)
+        return not exceeds(polished, least, blocks_of(problem.events, problem.drive, 3, from_dip=True))
 
     @property
     def starts(self) -> tuple[Start, ...]:
@@ -191,14 +202,21 @@ def _finished(ends: Ends, *, robust: bool = False) -> Estimated:
     likelihood, units = _under_noise(ends, robust=robust)
     seen = surprise(observed, likelihood, units[0], ends.likelihood, ends.lowest)
     if not seen.adequate:
-        known = conclude_squares(ends.likelihood, ends.best, likelihood)
-        return Estimated(with_valleys(known, ends.near), seen, ends.starts)
+        return _of_squares(ends, likelihood, seen)
     whole = noise_at(observed, likelihood, units[0], observed.blurred(likelihood.values(units[0])), whole=True)
     likelihood = replace(likelihood, noise=whole)  # nothing but noise is left: all of it tells
     found = descend(likelihood.rows, units, apart=likelihood.apart)
     best = int(found.deviance.argmin())
+    if not ends.no_worse(found.unit[best]):
+        return _of_squares(ends, likelihood, seen)
     others = found.unit[np.arange(len(units)) != best]
     return Estimated(with_valleys(conclude(likelihood, found.unit[best]), others), seen, ends.starts)
+
+
+def _of_squares(ends: Ends, noise: Likelihood, seen: Surprise) -> Estimated:
+    """The minimum of Eq. (8) as the estimate."""
+    known = conclude_squares(ends.likelihood, ends.best, noise)
+    return Estimated(with_valleys(known, ends.near), seen, ends.starts)
 
 
 def _under_noise(ends: Ends, *, robust: bool) -> tuple[Likelihood, np.ndarray]:

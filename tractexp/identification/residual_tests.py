@@ -49,11 +49,3 @@ def jarque_bera(rows: np.ndarray) -> Test:
     statistic = len(z) / 6 * float(np.mean(z**3) ** 2 + (np.mean(z**4) - 3) ** 2 / 4)
     p = float(chdtrc(2, statistic))
     return Test("normality (Jarque-Bera)", statistic, 2, p, "not normal" if p < REJECTED else "normal")
-
-
-def louder(inside: np.ndarray, outside: np.ndarray, level: float = 1e-3) -> bool:
-    """Whether the variance of `inside` (n,) exceeds that of `outside` (m,) by more than chance (F test)."""
-    from scipy.special import fdtri
-
-    ratio = float(np.mean(inside**2) / max(np.mean(outside**2), 1e-30))
-    return ratio > fdtri(len(inside), len(outside), 1 - level)

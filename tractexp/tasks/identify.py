@@ -1,5 +1,7 @@
 """Identify a load model's parameters from recorded dips."""
 
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -80,14 +82,14 @@ def estimates(fit: "Identification") -> None:
     """Print the estimates; where the search ended outside an interval, that too."""
     from tractexp.report.identify import brief
 
-    astray, moves, rows = fit.astray, fit.moves, []
+    astray, rows = fit.astray, []
     for e in fit.parameters.values():
         interval = "{:.4g} .. {:.4g}".format(*e.interval) if e.interval else ""
-        moved = ["{1:.4g} ({0})".format(*moves[e.name]) if e.name in moves else ""] * bool(moves)
         ended = [f"{e.search:.4g}" * (e.name in astray)] * bool(astray)
-        rows.append([e.name, f"{e.value:.5g}", e.unit, interval, *ended, *moved, brief(e.verdict)])
-    further = [*["search ended at"] * bool(astray), *["with another structure"] * bool(moves)]
-    table(["parameter", "value", "unit", "95 % interval", *further, "verdict"], rows)
+        rows.append([e.name, f"{e.value:.5g}", e.unit, interval, *ended, brief(e.verdict)])
+    table(["parameter", "value", "unit", "95 % interval", *["search ended at"] * bool(astray), "verdict"], rows)
+    for structure, values in groupby(sorted((by, f"{n} {v:.4g}") for n, (by, v) in fit.moves.items()), itemgetter(0)):
+        say(f"with {structure}, which fits as well: {', '.join(told for _, told in values)}")
 
 
 def sure(fit: "Identification") -> None:
