@@ -318,7 +318,7 @@ def effect(edit, **attributes):
         (load(lambda self, p_v: (1, 1), p_v=replace(PLAIN)), r"law\(\) must take u first"),
         (load(lambda self, u, *p: (1, 1), p_v=replace(PLAIN)), r"by name, so it cannot take \*p"),
         (load(lambda self, u: (1, 1), reads=("frequency",)), "reads names the channel 'frequency'"),
-        (load(lambda self, u, c1: (1, 1), c1=replace(PLAIN)), "called 'c1': the kernel uses that name"),
+        (load(lambda self, u, _c: (1, 1), _c=replace(PLAIN)), "called '_c': that is no name of Python's"),
         (load(lambda self, u, U0: (1, 1), U0=replace(PLAIN)), "called 'U0': the equations give that name"),
         (load(lambda self, u, a, b: (1, 1), **dict.fromkeys("ab", replace(PLAIN))), "'b' is the parameter 'a' again"),
         (load(lambda self, u, a: (1, 1), a=replace(PLAIN, unit="")), "a: the parameter has no unit"),

@@ -21,9 +21,11 @@ from tractexp.model.compiling import compile_missing
 from tractexp.model.drive import Drive
 from tractexp.model.model import Model, compose
 from tractexp.record import Event
+from tractexp.texts import ADDRESS
 
 LONG = 2.0  # times the source of the base model
 SHARED = 2  # effects of one kernel: one each would take longer to compile, more would be slower
+_lengths: dict[str, int] = {}  # of kernels' texts, by their parts: families of one model ask for the same
 Key = tuple[frozenset[str], bool] | None  # load effects and whether pushes are in; None: everything is
 
 
@@ -61,7 +63,11 @@ class Family:
         return *together, *(frozenset((n,)) for n in self.catalogue.of_load if n not in self.short)
 
     def _length(self, names: Iterable[str]) -> int:
-        return len(self.with_effects(names).source)
+        model = self.with_effects(names)
+        key = repr((model.motor, model.static, model.effects, model.domain))
+        if key not in _lengths or ADDRESS.search(key):
+            _lengths[key] = len(model.source)
+        return _lengths[key]
 
     def key(self, names: Iterable[str], pushed: bool = False) -> Key:
         """The kernel that serves a set of names, with pushes or without.

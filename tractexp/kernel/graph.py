@@ -29,3 +29,8 @@ def symbols_of(expression: Basic) -> set[Symbol]:
 def arguments(expression: sympy.Expr) -> tuple[sympy.Expr, ...]:
     """The arguments of an expression, which are expressions."""
     return expression.args  # pyright: ignore[reportReturnType] # SymPy calls them `Basic`, as those of a set are
+
+
+def operations(expression: Basic) -> int:
+    """How many operations compute an expression, each different part of it once."""
+    return sum(max(len(part.args) - 1, 1) for part in nodes(expression) if part.args)

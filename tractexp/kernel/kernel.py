@@ -68,10 +68,11 @@ class Kernel:
             _check("starts", starts, (events, room.starts, n))
         lengths = _lengths(first.tolist(), substeps.tolist(), samples)
         block, work, points, signals, space = self._space(n, lengths)
-        arrays = (candidates, event, first, inputs, measured, weights, substeps, sums, miss, outputs, starts)
+        arrays = (candidates, event, first, inputs, measured, weights, substeps, sums, miss)
+        further = _address(outputs) if stored else 0, _address(starts) if started else 0
         function, _, newton = self._function
         function(
-            *map(_address, arrays), work, points, signals, newton,
+            *map(_address, arrays), *further, work, points, signals, newton,
             events, n, samples, block, stored, started,
         )  # fmt: skip
         del space  # not before the call has ended
@@ -96,9 +97,10 @@ class Kernel:
         blocks = max(-(-groups * width // LANES), 1)
         block = max(width * -(-groups // blocks), width)
         work = room.rows * block  # whole vectors
-        whole = [(-(-length // width) * width, steps) for length, steps in lengths]
-        points = room.points * max((2 * steps * length + 1 for length, steps in whole), default=0)
-        signals = room.signals * max((length for length, _ in whole), default=0)
+        points = signals = 0
+        for length, steps in lengths:
+            whole = -(-length // width) * width
+            points, signals = max(points, room.points * (2 * steps * whole + 1)), max(signals, room.signals * whole)
         space = np.empty(work + points + signals + VECTOR // 8)
         address = -(-_address(space) // VECTOR) * VECTOR
         return block, address, address + 8 * work, address + 8 * (work + points), space

@@ -13,7 +13,7 @@ import sympy
 from sympy import I, Symbol, conjugate, im, re
 
 from tractexp.errors import Unknown, UserError, nearest
-from tractexp.kernel.graph import symbols_of
+from tractexp.kernel.graph import nodes, operations, symbols_of
 from tractexp.kernel.layout import EVENT, INPUTS
 from tractexp.model import sites
 from tractexp.model.apart import Apart
@@ -499,7 +499,12 @@ def _shorter(expression: sympy.Expr) -> sympy.Expr:
     """
     if sum(1 for _ in itertools.islice(sympy.preorder_traversal(expression), LONG + 1)) > LONG:
         return expression
-    return min(expression, sympy.expand(expression), key=sympy.count_ops)
+    extremes = [part for part in nodes(expression) if isinstance(part, sympy.Max | sympy.Min)]
+    hidden: dict[Any, Any] = {part: _real(f"_extreme{k}") for k, part in enumerate(extremes)}
+    plain: Any = expression.xreplace(hidden)  # SymPy compares the arguments of a maximum for seconds
+    expanded = plain.expand(power_exp=False, power_base=False, log=False, basic=False)
+    chosen: Any = min(plain, expanded, key=operations)
+    return chosen.xreplace({symbol: part for part, symbol in hidden.items()})
 
 
 __all__ = ["Equations", "I", "Memory", "Requirement", "State", "phasor_parts", "start_symbol", "sympy"]

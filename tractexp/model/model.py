@@ -292,8 +292,8 @@ class Model:
         if values.shape[-1] != len(self.names):
             raise ValueError(f"values {values.shape} must end in {len(self.names)} columns: {', '.join(self.names)}")
         n = values.shape[-2]
-        rows = np.empty((drive.events, len(self.names) + 2, n))
-        rows[:, :-2] = np.swapaxes(values, -1, -2)
+        rows = np.empty((drive.events, values.shape[-1] + 2, n))
+        rows[:, :-2] = values.swapaxes(-1, -2)
         rows[:, -2:] = drive.before[:, :, None] if before is None else np.swapaxes(before, -1, -2)
         return rows
 
