@@ -216,7 +216,7 @@ def chain() -> list[dict[str, Any]]:
             for stage, told in (("search", found.result.search), ("estimate", vars(found.result))):
                 record = names[0] if len(names) == 1 else "all three"
                 rows.append({"record": record, "model": model, "from": source, "stage": stage})
-                rows[-1]["trusted"] = found.trusted
+                rows[-1]["trusted"] = found.adequate
                 for n, true in LOAD.truth().items():
                     rows[-1][n] = float(100 * (told["parameters"][n] * scale.get(n, 1.0) / true - 1))
                 rows[-1] |= {key: told[key] for key in ("epsilon_p", "epsilon_q")}

@@ -36,9 +36,7 @@ SCATTERED = (
     "More than noise is left: the estimate is the minimum of Eq. (8), and intervals say by how much it scatters where"
     " stretches of 0.1 s are left out. pu: per unit of the record's base."
 )
-RIVALS = (
-    " With another structure: where that fits as well and moves a parameter beyond its interval, the value with it."
-)
+RIVALS = " Rival structure: where one fits as well and moves a parameter by more than two standard errors, the value with it."
 MODEL_ERROR = (
     "Model error: rms of what is left beyond the noise, from the dip on, over the rms of the load's response, both in"
     " apparent power S. epsilon: Eq. (20)."
@@ -141,7 +139,7 @@ def _parameters(
          "{:g} .. {:g}".format(*result.bounds[_base(name)]), digits(search[name])]
         for name, value in values.items()
     ]  # fmt: skip
-    beside = ["with another structure"] * bool(moves)
+    beside = ["rival structure"] * bool(moves)
     columns = [
         "parameter",
         "meaning",
