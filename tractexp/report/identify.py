@@ -36,7 +36,7 @@ SCATTERED = (
     "More than noise is left: the estimate is the minimum of Eq. (8), and intervals say by how much it scatters where"
     " stretches of 0.1 s are left out. pu: per unit of the record's base."
 )
-RIVALS = " Rival structure: where one fits as well and moves a parameter by more than two standard errors, the value with it."
+RIVALS = " Rival structure: one that fits as well and moves the value by more than two standard errors."
 MODEL_ERROR = (
     "Model error: rms of what is left beyond the noise, from the dip on, over the rms of the load's response, both in"
     " apparent power S. epsilon: Eq. (20)."
