@@ -101,11 +101,11 @@ class Model:
         made.recorder, made.measurements = recorder, (recorder, *self.measurements)
         return made
 
-    @property
+    @functools.cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         return tuple(p for part in (self.motor, self.static, *self.effects) for p in part.parameters)
 
-    @property
+    @functools.cached_property
     def names(self) -> tuple[str, ...]:
         return tuple(p.name for p in self.parameters)
 
