@@ -19,7 +19,7 @@ _numbers = itertools.count()
 _one_at_a_time = threading.Lock()
 
 
-class Loaded:
+class Code:
     """A function of machine code, which stays in memory as long as this object."""
 
     def __init__(self, library: Any, name: str):
@@ -28,16 +28,16 @@ class Loaded:
 
 
 @functools.lru_cache(maxsize=512)
-def load(text: str) -> Loaded:
+def load(text: str) -> Code:
     """The function that this IR defines, compiled where the cache does not hold it."""
     name = next(name for name in FUNCTIONS if f"define void @{name}(" in text)
     code = keep(text)
     with _one_at_a_time:
         library = llvm.JITLibraryBuilder().add_object_img(code).add_current_process().export_symbol(name)
-        return Loaded(library.link(_linker(), f"{name}_{next(_numbers)}"), name)
+        return Code(library.link(_linker(), f"{name}_{next(_numbers)}"), name)
 
 
-def held(text: str) -> bool:
+def available(text: str) -> bool:
     """Whether the cache holds sound object code of this IR for this machine."""
     return cache.read(_path(text)) is not None
 
@@ -47,7 +47,7 @@ def keep(text: str) -> bytes:
     path = _path(text)
     code = cache.read(path)
     if code is None:
-        code = compiled(text)
+        code = machine_code(text)
         cache.write(path, code)
     return code
 
@@ -57,7 +57,7 @@ def _path(text: str) -> Any:
     return cache.cache_folder() / f"code_{digest.hexdigest()[:32]}.kept"
 
 
-def compiled(text: str, machine: Any = None) -> bytes:
+def machine_code(text: str, machine: Any = None) -> bytes:
     """Object code of IR, for this machine or another that LLVM knows.
 
     Of LLVM's passes over IR only the one that reorders sums and products is of use: the text has its common values once
