@@ -9,8 +9,6 @@ import itertools
 import threading
 from typing import Any
 
-from llvmlite import binding as llvm
-
 from tractexp import cache
 from tractexp.kernel import target
 
@@ -31,6 +29,8 @@ class Code:
 def load(text: str) -> Code:
     """The function that this IR defines, compiled where the cache does not hold it."""
     name = next(name for name in FUNCTIONS if f"define void @{name}(" in text)
+    from llvmlite import binding as llvm
+
     code = keep(text)
     with _one_at_a_time:
         library = llvm.JITLibraryBuilder().add_object_img(code).add_current_process().export_symbol(name)
@@ -76,6 +76,8 @@ def assembly(text: str) -> str:
 
 def _ready(text: str, machine: Any) -> Any:
     """The module of a text, its passes made."""
+    from llvmlite import binding as llvm
+
     module = llvm.parse_assembly(text, llvm.create_context())
     module.triple, module.data_layout = machine.triple, str(machine.target_data)
     module.verify()
@@ -87,4 +89,6 @@ def _ready(text: str, machine: Any) -> Any:
 
 @functools.cache
 def _linker() -> Any:
+    from llvmlite import binding as llvm
+
     return llvm.create_lljit_compiler(target.machine())
