@@ -90,7 +90,7 @@ def test_planted_code_is_not_run_and_the_file_heals(folder):
     sound = path.read_bytes()
     for planted in (theirs.read_bytes(), other, sound[: cache.SUM] + other, sound[:-9], b""):
         path.write_bytes(planted)
-        assert not objects.held(stored(42.0))
+        assert not objects.available(stored(42.0))
         assert called(42.0) == 42.0
         assert path.read_bytes() == sound
     assert cache.read(path) == answer
@@ -127,7 +127,7 @@ def test_code_for_another_machine_or_of_another_text_is_another_file(folder, mon
 def test_a_changed_digit_in_a_text_is_not_compiled(folder):
     made = []
     for _ in range(2):
-        assert texts.derived((Part(),), lambda: made.append(1) or "TORQUE = 0.55", "text") == "TORQUE = 0.55"
+        assert texts.text_of((Part(),), lambda: made.append(1) or "TORQUE = 0.55", "text") == "TORQUE = 0.55"
         (text,) = folder.glob("text_*.kept")
         text.write_bytes(text.read_bytes().replace(b"0.55", b"0.66"))
     assert len(made) == 2
@@ -138,7 +138,7 @@ def test_nothing_is_remembered_of_a_part_known_by_its_address(folder, parts):
     """Another part at the same address once got the equations of the first."""
     made = []
     for _ in range(2):
-        texts.derived(parts, lambda: made.append(1) or "text", "text")
+        texts.text_of(parts, lambda: made.append(1) or "text", "text")
     assert len(made) == 2
     assert not list(folder.glob("text_*"))
 
@@ -148,11 +148,11 @@ def test_a_kernel_whose_file_is_damaged_is_compiled_with_the_others(folder):
     models = [compose(motor, static), compose(get("model/motor", "voltage")(), static)]
     said = []
     compiling.compile_missing(models, lambda: said.append(1))
-    assert [model.bare().compiled for model in models] == [True, True]
+    assert [model.bare().has_kernel for model in models] == [True, True]
     objects._path(models[1].source).write_bytes(b"code")
-    assert [model.bare().compiled for model in models] == [True, False]
+    assert [model.bare().has_kernel for model in models] == [True, False]
     compiling.compile_missing(models, lambda: said.append(1))
-    assert all(model.bare().compiled for model in models)
+    assert all(model.bare().has_kernel for model in models)
     assert not said  # of what takes no two seconds nothing is said
 
 
@@ -163,7 +163,7 @@ def test_many_kernels_are_compiled_side_by_side_and_it_is_said_once(folder, monk
     models = [compose(get("model/motor", name)(), static) for name in ("none", "voltage", "mechanical")]
     said = []
     compiling.compile_missing(models, lambda: said.append(1))
-    assert all(model.bare().compiled for model in models)
+    assert all(model.bare().has_kernel for model in models)
     assert said == [1]
 
 

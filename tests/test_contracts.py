@@ -179,7 +179,7 @@ def test_a_law_that_is_none_is_refused_when_the_model_is_composed(stranger, law,
         (lambda self, eq, a: eq.place(sites.coupling, a), "coupling is taken already|belongs to the motor"),
         (lambda self, eq, a: eq.moves(eq.U, a, 0), "given 'U', which is no state"),
         (lambda self, eq, a: eq.lag("idle", "x"), "nothing says how the state 'idle' moves"),
-        (lambda self, eq, a: eq.lag("x1", "x"), "called 'x1': the kernel uses that name"),
+        (lambda self, eq, a: eq.lag("_x1", "x"), "called '_x1': that is no name of Python's"),
         (lambda self, eq, a: eq.lag("omega", "x"), "quantity 'omega' already, declared by the motor; prefix the names"),
         (
             lambda self, eq, a: eq.edit(sites.load_torqe, lambda T: T),

@@ -8,7 +8,7 @@ import sympy
 from llvmlite import binding as llvm
 
 from tractexp.errors import UserError
-from tractexp.kernel import arrays, emit, math, objects, shown, target
+from tractexp.kernel import arrays, emit, listing, math, objects, target
 from tractexp.kernel.expressions import Expressions
 from tractexp.kernel.function import Function
 from tractexp.kernel.kernel import Kernel
@@ -122,7 +122,7 @@ def test_an_expression_is_what_sympy_says(expression):
     x, y = np.round(rng.normal(size=(2, 61)), 1)
     theirs = np.array([float(expression.subs({X: a, Y: b})) for a, b in zip(x, y, strict=True)])
     assert computed(expression, x, y) == pytest.approx(theirs, rel=1e-12, abs=1e-12)
-    played = arrays.evaluated(sympy_phase(expression), {X: x, Y: y}, len(x))[0]
+    played = arrays.values_of(sympy_phase(expression), {X: x, Y: y}, len(x))[0]
     assert played == pytest.approx(theirs, rel=1e-12, abs=1e-12)
 
 
@@ -266,7 +266,7 @@ def test_a_kernel_is_compiled_for_other_processors(model, triple):
     except RuntimeError:
         pytest.skip(f"this LLVM does not know {triple}")
     text = emit.text(lower(model.equations), model.title, "classical", FOREIGN[triple])
-    assert objects.compiled(text, machine)[:4] == b"\x7fELF"
+    assert objects.machine_code(text, machine)[:4] == b"\x7fELF"
 
 
 @pytest.mark.parametrize("motor", ["electromechanical", "double_cage"])
@@ -288,7 +288,7 @@ def test_a_kernel_is_printed_for_people(model):
     assert "in each stage of a step:" in told
     assert "d omega/dt = " in told
     assert "define void @run(" in told
-    lines = [*shown.equations(lower(model.equations))]
+    lines = [*listing.equations(lower(model.equations))]
     assert any(line.strip().startswith("P = ") for line in lines)
     assert any(line.strip().startswith("slack 1 = ") for line in lines)
 

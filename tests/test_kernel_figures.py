@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[1]
 def test_the_page_has_the_tables_of_the_stored_run():
     rows = json.loads(kernel.FILE.read_text(encoding="utf-8"))
     page = (ROOT / "docs" / "model.md").read_text(encoding="utf-8")
-    assert kernel.tables(rows) in page
+    assert all(table in page for table in kernel.tables(rows).split("\n\n"))
     assert rows["processor"] in page
 
 

@@ -300,7 +300,7 @@ def test_a_kernel_is_shared_by_processes_that_start_together(tmp_path):
     program = (
         "from tractexp.plugin import get; from tractexp.model.model import compose;"
         "m = compose(get('model/motor', 'electromechanical')(), get('model/static', 'exponential')());"
-        "m.compile(); assert m.compiled"
+        "m.compile(); assert m.has_kernel"
     )
     environment = os.environ | {"TRACTEXP_CACHE_DIR": str(tmp_path)}
     started = [subprocess.Popen([sys.executable, "-c", program], env=environment) for _ in range(3)]
@@ -321,9 +321,9 @@ def test_a_text_is_remembered_until_code_or_settings_change(tmp_path, monkeypatc
         made.append(1)
         return f"text {len(made)}"
 
-    assert texts.derived((motor, static), generate, "text") == "text 1"
-    assert texts.derived((motor, static), generate, "text") == "text 1"
-    assert texts.derived((static, motor), generate, "text") == "text 2"
+    assert texts.text_of((motor, static), generate, "text") == "text 1"
+    assert texts.text_of((motor, static), generate, "text") == "text 1"
+    assert texts.text_of((static, motor), generate, "text") == "text 2"
 
 
 @pytest.mark.parametrize("name", ["lambda", "two words", "_c0", "U"])
@@ -414,7 +414,7 @@ def test_two_plugins_of_one_class_name_in_one_folder_have_sources_of_their_own(t
         monkeypatch.setitem(sys.modules, f"load_{name}", module := ModuleType(f"load_{name}"))
         module.__file__ = str(tmp_path / f"load_{name}.py")
         exec("class Load:\n    def __repr__(self): return 'Load()'", {"__name__": f"load_{name}"}, namespace := {})
-        made.append(texts.derived((namespace["Load"](),), lambda name=name: name, "text"))
+        made.append(texts.text_of((namespace["Load"](),), lambda name=name: name, "text"))
     assert made == ["one", "two"]
 
 

@@ -89,9 +89,9 @@ class Arrays:
         return INTEGERS[operation](a, b)
 
 
-def evaluated(phase: Any, known: dict[Any, np.ndarray], points: int) -> list[np.ndarray]:
+def values_of(phase: Any, scope: dict[Any, np.ndarray], points: int) -> list[np.ndarray]:
     """The values (points,) of a phase's expressions; nan and infinity where they have none."""
     from tractexp.kernel.expressions import Expressions
 
     with np.errstate(all="ignore"):
-        return Expressions(Arrays(points), known).of(phase)
+        return Expressions(Arrays(points), scope).of(phase)

@@ -70,9 +70,9 @@ class _Emitter:
             starts=len(self.lowered.starts), rows=len(self.rows), points=len(self.moving), signals=len(self.signals),
         )  # fmt: skip
         bodies = [*([self._rest()] if self.solves else []), self._run()]
-        known = {name: line for f in self.functions for name, line in f.intrinsics.items()}
+        intrinsics = {name: line for f in self.functions for name, line in f.intrinsics.items()}
         head = [f"; {title}", PREFIX + json.dumps(asdict(room))]
-        return "\n".join([*head, "", *known.values(), "", *bodies])
+        return "\n".join([*head, "", *intrinsics.values(), "", *bodies])
 
     def _function(self) -> tuple[Function, Numbers, Numbers]:
         """A new function, its lanes and its scalars."""
@@ -87,12 +87,12 @@ class _Emitter:
         f, lanes, scalars = self._function()
         lowered, phase = self.lowered, self.lowered.rest
         assert phase is not None
-        known = {_real(s): lanes.everywhere(scalars.load(f.at("%event", k))) for k, s in enumerate(EVENT)}
+        scope = {_real(s): lanes.everywhere(scalars.load(f.at("%event", k))) for k, s in enumerate(EVENT)}
         memories = lowered.starts[len(lowered.states) :]
-        known |= {s: lanes.load(f.at("%given", k * self.width)) for k, s in enumerate((*self.given, *memories))}
+        scope |= {s: lanes.load(f.at("%given", k * self.width)) for k, s in enumerate((*self.given, *memories))}
         states = enumerate(lowered.starts[: len(lowered.states)])
-        known |= {s: lanes.load(f.at("%x", k * self.width)) for k, s in states}
-        for k, balance in enumerate(Expressions(lanes, known).of(phase)):
+        scope |= {s: lanes.load(f.at("%x", k * self.width)) for k, s in states}
+        for k, balance in enumerate(Expressions(lanes, scope).of(phase)):
             lanes.store(balance, f.at("%balances", k * self.width))
         return f.text("define internal void @rest(ptr %event, ptr %given, ptr %x, ptr noalias %balances) nounwind")
 
@@ -165,13 +165,13 @@ class _Emitter:
         ):
             here, there = self._samples(i), self._samples(i, 1)
             share = scalars.divide(f.value(f"sitofp i64 {q} to double"), f.value(f"sitofp i64 {per_sample} to double"))
-            x, known = self.lanes.everywhere(share), dict(event)
+            x, scope = self.lanes.everywhere(share), dict(event)
             for symbol in self.lowered.inputs:
-                known[symbol] = self._between(symbol.name, here, there, x, step)
-            values = Expressions(self.lanes, known)
-            known |= {s: values(e) for s, e in self.lowered.derivative.signals}
+                scope[symbol] = self._between(symbol.name, here, there, x, step)
+            values = Expressions(self.lanes, scope)
+            scope |= {s: values(e) for s, e in self.lowered.derivative.signals}
             place = f.integer("add", f.integer("mul", f.integer("sub", i, self.begin), per_sample), q)
-            self._scatter([known[s] for s in self.moving], "%points", place, per_sample, count)
+            self._scatter([scope[s] for s in self.moving], "%points", place, per_sample, count)
 
     def _signal_pass(self) -> None:
         """Signals of outputs and memories, a sample each."""
@@ -182,8 +182,8 @@ class _Emitter:
         with f.loop(self.begin, self.end, self.width) as i, f.passage("signals"):
             here = self._samples(i)
             values = Expressions(self.lanes, event | {s: here(s.name) for s in self.lowered.inputs})
-            made = [values(e) for e in self.signals.values()]
-            self._scatter(made, "%signals", f.integer("sub", i, self.begin), 1, len(made))
+            signals = [values(e) for e in self.signals.values()]
+            self._scatter(signals, "%signals", f.integer("sub", i, self.begin), 1, len(signals))
 
     def _scatter(self, values: Sequence[str], array: str, place: str, apart: object, count: int) -> None:
         """Lanes of values written side by side: those of sample k at the row `place` + k `apart` of `count` each."""
@@ -217,19 +217,19 @@ class _Emitter:
         """States, constants and misses of a group of lanes, the last candidate repeated where lanes are left over."""
         f, n, lowered = self.f, self.lanes, self.lowered
         self._copy_candidates(e, first)
-        known = {s: n.everywhere(value) for s, value in self.event.items()}
-        known |= {s: n.load(f.at(self.copied, k * self.width)) for k, s in enumerate(self.given)}
-        values = Expressions(n, known).of(lowered.start)
+        scope = {s: n.everywhere(value) for s, value in self.event.items()}
+        scope |= {s: n.load(f.at(self.copied, k * self.width)) for k, s in enumerate(self.given)}
+        values = Expressions(n, scope).of(lowered.start)
         starts, miss = values[: len(lowered.starts)], self._missed(values[len(lowered.starts) :])
         if self.solves:
             starts, miss = self._settled(starts, miss)
         with f.when(f.value("icmp ne i64 %started, 0")):
             self._store_starts(e, first, starts)
-        known |= zip(lowered.starts, starts, strict=True)
-        known |= zip(lowered.constants, Expressions(n, known).of(lowered.constant), strict=True)
+        scope |= zip(lowered.starts, starts, strict=True)
+        scope |= zip(lowered.constants, Expressions(n, scope).of(lowered.constant), strict=True)
         zero = n.constant(0.0)
         begin: dict[object, str] = dict(zip((*lowered.states, *lowered.memories), starts, strict=True))
-        begin |= {s: known[s] for s in self.carried} | {f"_sum_{o}": zero for o in lowered.outputs} | {"_miss": miss}
+        begin |= {s: scope[s] for s in self.carried} | {f"_sum_{o}": zero for o in lowered.outputs} | {"_miss": miss}
         for name, value in begin.items():
             n.store(value, self._row(group, name))
         good = f.value(f"zext i1 {n.some(n.compare('ole', miss, zero))} to i64")
@@ -270,8 +270,8 @@ class _Emitter:
             f"call void %steady(ptr @rest, ptr {self.event_at}, ptr {self.copied}, ptr {x}, ptr {left}, ptr {work},"
             f" i64 {states})"
         )
-        found = [n.load(f.at(x, k * self.width)) for k in range(states)]
-        return [*found, *starts[states:]], n.smaller(n.add(miss, n.load(left)), n.constant(steady.MOST))
+        solution = [n.load(f.at(x, k * self.width)) for k in range(states)]
+        return [*solution, *starts[states:]], n.smaller(n.add(miss, n.load(left)), n.constant(steady.MOST))
 
     # A sample and its steps
 
@@ -310,11 +310,11 @@ class _Emitter:
         """A step of four stages, Eq. (4), by shares `ahead` of its length; before the first of a sample its outputs."""
         f, n, lowered = self.f, self.lanes, self.lowered
         y = [n.load(self._row(group, s)) for s in lowered.states]
-        known = self._read(group, (s for s in self.carried if s in self.used["derivative"]))
+        scope = self._read(group, (s for s in self.carried if s in self.used["derivative"]))
 
         def slope(stage: str, states: Sequence[str], point: Values) -> list[str]:
             f.remark(stage)
-            at = {**known, **point, **dict(zip(lowered.states, states, strict=True))}
+            at = {**scope, **point, **dict(zip(lowered.states, states, strict=True))}
             return Expressions(n, at).of(lowered.derivative)
 
         def along(states: Sequence[str], share: float, slopes: Sequence[str]) -> list[str]:
@@ -323,9 +323,9 @@ class _Emitter:
         a, b, c = points
         k1 = [] if lowered.memories else slope("slope at the beginning", y, a)
         with f.when(first), f.passage("outputs"):
-            self._outputs(group, known | dict(zip(lowered.states, y, strict=True)))
+            self._outputs(group, scope | dict(zip(lowered.states, y, strict=True)))
         if lowered.memories:
-            known |= self._read(group, (m for m in lowered.memories if m in self.used["derivative"]))
+            scope |= self._read(group, (m for m in lowered.memories if m in self.used["derivative"]))
             k1 = slope("slope at the beginning", y, a)
         k2 = slope("first slope in the middle", along(y, self.half_way, k1), b)
         k3 = slope("second slope in the middle", along(y, self.half_way, k2), b)
@@ -337,22 +337,22 @@ class _Emitter:
         for symbol, state in zip(lowered.states, along(y, 1 / 6, total), strict=True):
             n.store(state, self._row(group, symbol))
 
-    def _outputs(self, group: str, known: Mapping[Symbol, str]) -> None:
+    def _outputs(self, group: str, scope: Mapping[Symbol, str]) -> None:
         """Memories renewed, outputs, and their errors added to the sums."""
         f, n, lowered = self.f, self.lanes, self.lowered
         used = self.used["renewal"] | self.used["output"]
         own = (*lowered.states, *lowered.memories, *self.carried)
-        known = dict(known) | self._read(group, (s for s in own if s in used and s not in known))
+        scope = dict(scope) | self._read(group, (s for s in own if s in used and s not in scope))
         for s in lowered.inputs:
             if s in used:
-                known[s] = self._wide(f.at(self._input(s.name), self.i))
-        known |= {s: self._wide(f.at(self.signal_at, j)) for j, s in enumerate(self.signals) if s in used}
+                scope[s] = self._wide(f.at(self._input(s.name), self.i))
+        scope |= {s: self._wide(f.at(self.signal_at, j)) for j, s in enumerate(self.signals) if s in used}
         if lowered.memories:
-            renewed = Expressions(n, known).of(lowered.renewal)
-            known |= zip(lowered.memories, renewed, strict=True)
+            renewed = Expressions(n, scope).of(lowered.renewal)
+            scope |= zip(lowered.memories, renewed, strict=True)
             for symbol, value in zip(lowered.memories, renewed, strict=True):
                 n.store(value, self._row(group, symbol))
-        for c, (name, value) in enumerate(zip(lowered.outputs, Expressions(n, known).of(lowered.output), strict=True)):
+        for c, (name, value) in enumerate(zip(lowered.outputs, Expressions(n, scope).of(lowered.output), strict=True)):
             n.store(value, self._row(group, f"_{name}"))
             place = f.integer("add", f.integer("mul", "%samples", c), self.i)
             off = n.subtract(self._wide(f.at("%measured", place)), value)

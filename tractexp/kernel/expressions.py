@@ -23,19 +23,19 @@ HALF = sympy.Rational(1, 2)
 
 
 class Expressions:
-    """Values of expressions in known symbols, each part of them written once.
+    """Values of expressions in symbols whose values are in scope, each part of them written once.
 
     `numbers` is the arithmetic: of lanes (`numbers.Numbers`) or of arrays (`arrays.Arrays`).
     """
 
-    def __init__(self, numbers: Any, known: Mapping[Symbol, Any]):
-        self.numbers, self.known = numbers, dict(known)
+    def __init__(self, numbers: Any, scope: Mapping[Symbol, Any]):
+        self.numbers, self.scope = numbers, dict(scope)
         self._values: dict[sympy.Basic, Any] = {}
 
     def of(self, phase: Phase) -> list[Any]:
         """The values of a phase's expressions."""
         for symbol, expression in phase.steps:
-            self.known[symbol] = self(expression)
+            self.scope[symbol] = self(expression)
         return [self(e) for e in phase.expressions]
 
     def __call__(self, e: sympy.Basic) -> Any:
@@ -47,7 +47,7 @@ class Expressions:
     def _written(self, e: sympy.Basic) -> Any:
         n = self.numbers
         if isinstance(e, Symbol):
-            return self.known[e]
+            return self.scope[e]
         if isinstance(e, sympy.Number | sympy.NumberSymbol):
             return n.constant(float(e))
         if isinstance(e, sympy.Add):
@@ -74,10 +74,10 @@ class Expressions:
             at = zero if isinstance(e, sympy.sign) else self(e.args[1])
             rest = n.select(n.compare("olt", x, zero), n.constant(below), at)
             return n.select(n.compare("ogt", x, zero), n.constant(above), rest)
-        known = ", ".join(sorted(kind.__name__ for kind in (*OURS, *LLVMS)))
+        functions = ", ".join(sorted(kind.__name__ for kind in (*OURS, *LLVMS)))
         raise UserError(
             f"the equations contain {type(e).__name__}, in {e}, which kernels cannot compute; write it by sums,"
-            f" products, powers, Max, Min, Piecewise, sign, Heaviside or {known}"
+            f" products, powers, Max, Min, Piecewise, sign, Heaviside or {functions}"
         )
 
     # Sums, products, powers

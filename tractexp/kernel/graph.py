@@ -14,9 +14,9 @@ def nodes(expression: Basic) -> Iterator[Basic]:
     """Each different part of an expression, itself first."""
     seen, waiting = {expression}, [expression]
     while waiting:
-        found = waiting.pop()
-        yield found
-        new = [part for part in found.args if part not in seen]
+        node = waiting.pop()
+        yield node
+        new = [part for part in node.args if part not in seen]
         seen.update(new)
         waiting += new
 

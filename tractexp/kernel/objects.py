@@ -9,8 +9,6 @@ import itertools
 import threading
 from typing import Any
 
-from llvmlite import binding as llvm
-
 from tractexp import cache
 from tractexp.kernel import target
 
@@ -19,7 +17,7 @@ _numbers = itertools.count()
 _one_at_a_time = threading.Lock()
 
 
-class Loaded:
+class Code:
     """A function of machine code, which stays in memory as long as this object."""
 
     def __init__(self, library: Any, name: str):
@@ -28,16 +26,18 @@ class Loaded:
 
 
 @functools.lru_cache(maxsize=512)
-def load(text: str) -> Loaded:
+def load(text: str) -> Code:
     """The function that this IR defines, compiled where the cache does not hold it."""
     name = next(name for name in FUNCTIONS if f"define void @{name}(" in text)
+    from llvmlite import binding as llvm
+
     code = keep(text)
     with _one_at_a_time:
         library = llvm.JITLibraryBuilder().add_object_img(code).add_current_process().export_symbol(name)
-        return Loaded(library.link(_linker(), f"{name}_{next(_numbers)}"), name)
+        return Code(library.link(_linker(), f"{name}_{next(_numbers)}"), name)
 
 
-def held(text: str) -> bool:
+def available(text: str) -> bool:
     """Whether the cache holds sound object code of this IR for this machine."""
     return cache.read(_path(text)) is not None
 
@@ -47,7 +47,7 @@ def keep(text: str) -> bytes:
     path = _path(text)
     code = cache.read(path)
     if code is None:
-        code = compiled(text)
+        code = machine_code(text)
         cache.write(path, code)
     return code
 
@@ -57,7 +57,7 @@ def _path(text: str) -> Any:
     return cache.cache_folder() / f"code_{digest.hexdigest()[:32]}.kept"
 
 
-def compiled(text: str, machine: Any = None) -> bytes:
+def machine_code(text: str, machine: Any = None) -> bytes:
     """Object code of IR, for this machine or another that LLVM knows.
 
     Of LLVM's passes over IR only the one that reorders sums and products is of use: the text has its common values once
@@ -76,6 +76,8 @@ def assembly(text: str) -> str:
 
 def _ready(text: str, machine: Any) -> Any:
     """The module of a text, its passes made."""
+    from llvmlite import binding as llvm
+
     module = llvm.parse_assembly(text, llvm.create_context())
     module.triple, module.data_layout = machine.triple, str(machine.target_data)
     module.verify()
@@ -87,4 +89,6 @@ def _ready(text: str, machine: Any) -> Any:
 
 @functools.cache
 def _linker() -> Any:
+    from llvmlite import binding as llvm
+
     return llvm.create_lljit_compiler(target.machine())

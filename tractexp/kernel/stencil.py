@@ -12,7 +12,7 @@ import numpy as np
 
 from tractexp.kernel import objects, target
 from tractexp.kernel.kernel import NUMBERS, WHOLE
-from tractexp.texts import derived_in
+from tractexp.texts import text_in
 
 FUNCTION = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3, *[ctypes.c_int64] * 3)
 
@@ -32,15 +32,15 @@ class Stencil:
         self.expression, self.rows, self.shared, self.numbers = expression, tuple(rows), tuple(shared), tuple(numbers)
 
     @functools.cached_property
-    def _written(self) -> tuple[str, int, int]:
+    def _ir(self) -> tuple[str, int, int]:
         settings = repr((self.expression.__qualname__, self.rows, self.shared, self.numbers, target.width()))
-        told = derived_in(self.expression.__module__, settings, lambda: "\n".join(map(str, written(self))), "stencil")
-        first, last, text = told.split("\n", 2)
+        description = text_in(self.expression.__module__, settings, lambda: "\n".join(map(str, ir_of(self))), "stencil")
+        first, last, text = description.split("\n", 2)
         return text, int(first), int(last)
 
     @functools.cached_property
     def _function(self) -> tuple[Any, Any]:
-        code = objects.load(self._written[0])
+        code = objects.load(self._ir[0])
         return FUNCTION(code.address), code
 
     def __call__(self, out: np.ndarray, shifts: np.ndarray | Mapping[str, np.ndarray], **given: np.ndarray) -> None:
@@ -50,7 +50,7 @@ class Stencil:
         integers, the same for all arrays or by the names of those of rows, of which shared ones follow the first.
         Raises `ValueError` for another shape or type, and where a sample asked for is not there.
         """
-        _, first, last = self._written
+        _, first, last = self._ir
         count, samples = out.shape
         length = given[(*self.rows, *self.shared)[0]].shape[-1]
         shapes = dict.fromkeys(self.rows, (count, length)) | dict.fromkeys(self.shared, (length,))
@@ -74,7 +74,7 @@ class Stencil:
         self._function[0](out.ctypes.data, shifts.ctypes.data, places.ctypes.data, count, samples, length)
 
 
-def written(stencil: Stencil) -> tuple[int, int, str]:
+def ir_of(stencil: Stencil) -> tuple[int, int, str]:
     """The first and last sample that a stencil reads, counted from each one's own, and its IR for this machine."""
     import sympy
 
@@ -100,7 +100,7 @@ def written(stencil: Stencil) -> tuple[int, int, str]:
         shifts = [
             f.count("%shifts", f.integer("add", f.integer("mul", "%rows", k), row)) for k in range(len(stencil.rows))
         ]
-        known: dict[Any, str] = {
+        scope: dict[Any, str] = {
             symbol: lanes.everywhere(scalars.part(f.at(places[name], row), "")) for name, symbol in single.items()
         }
         begin = {name: f.at(places[name], shifts[0]) for name in stencil.shared}
@@ -111,9 +111,9 @@ def written(stencil: Stencil) -> tuple[int, int, str]:
             used = symbols_of(expression)
             for symbol, (name, k) in elements.items():
                 if symbol in used:
-                    known[symbol] = lanes.part(f.at(begin[name], f.integer("add", i, k)), left)
+                    scope[symbol] = lanes.part(f.at(begin[name], f.integer("add", i, k)), left)
             place = f.at("%out", f.integer("add", f.integer("mul", row, "%samples"), i))
-            lanes.store_part(Expressions(lanes, known)(expression), place, left)
+            lanes.store_part(Expressions(lanes, scope)(expression), place, left)
     arguments = (*(f"ptr noalias %{a}" for a in ("out", "shifts", "places")), "i64 %rows, i64 %samples, i64 %length")
     text = "\n".join([*f.intrinsics.values(), f.text(f"define void @run({', '.join(arguments)}) nounwind")])
     offsets = [k for _, k in elements.values()]

@@ -1,11 +1,11 @@
-"""What kernels are compiled for: this processor, as LLVM tells it, or the most general one of its kind."""
+"""What kernels are compiled for: this processor, as LLVM tells it, or the most general one of its kind.
+
+LLVM is loaded where it is first needed, which takes longer than what a command without a simulation does.
+"""
 
 import functools
 import os
 from typing import Any
-
-import llvmlite
-from llvmlite import binding as llvm
 
 from tractexp.errors import check_choice
 
@@ -23,12 +23,16 @@ def processor() -> tuple[str, str]:
     if chosen := os.environ.get(CHOICE):
         check_choice(CHOICE, chosen, (GENERIC,))
         return GENERIC, ""
+    from llvmlite import binding as llvm
+
     return llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
 
 
 @functools.cache
 def machine() -> Any:
     """LLVM's target machine."""
+    from llvmlite import binding as llvm
+
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     name, features = processor()
@@ -47,4 +51,7 @@ def width() -> int:
 @functools.cache
 def key() -> str:
     """All that object code hangs on beside its text: system, processor, features, and the versions of LLVM."""
+    import llvmlite
+    from llvmlite import binding as llvm
+
     return repr((llvm.get_process_triple(), processor(), llvm.llvm_version_info, llvmlite.__version__))

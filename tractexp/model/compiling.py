@@ -17,7 +17,7 @@ def compile_missing(models: Iterable[Model], tell: Callable[[], None] = lambda: 
 
     `tell` is called once, where it takes longer than `PATIENCE`.
     """
-    missing = [model for model in models if not model.compiled]
+    missing = [model for model in models if not model.has_kernel]
     started, said = time.monotonic(), False
     for _ in _compiling(missing):
         if not said and time.monotonic() - started > PATIENCE:

@@ -17,7 +17,7 @@ from tractexp.model.drive import DOMAINS, PHASORS, WAVES, Drive
 from tractexp.model.parts import Effect, Measurement, Motor, Static
 from tractexp.model.window import seen
 from tractexp.parameter import Parameter
-from tractexp.texts import at_hand, derived
+from tractexp.texts import at_hand, text_of
 
 TOLERANCE = 1e-7  # pu, largest step-doubling error of P or Q an automatic substep may leave
 MOST_SUBSTEPS = 256
@@ -101,11 +101,11 @@ class Model:
         made.recorder, made.measurements = recorder, (recorder, *self.measurements)
         return made
 
-    @property
+    @functools.cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         return tuple(p for part in (self.motor, self.static, *self.effects) for p in part.parameters)
 
-    @property
+    @functools.cached_property
     def names(self) -> tuple[str, ...]:
         return tuple(p.name for p in self.parameters)
 
@@ -124,7 +124,7 @@ class Model:
     def acceptance(self, effect: Effect) -> "Acceptance":
         """Whether one more effect makes sense for this model, and what it would edit; remembered beside the kernels."""
         parts = (self.motor, self.static, *self.effects, effect)
-        return Acceptance(**json.loads(derived(parts, lambda: self._tried(effect), self._in_cache("acceptance"))))
+        return Acceptance(**json.loads(text_of(parts, lambda: self._tried(effect), self._in_cache("acceptance"))))
 
     def _tried(self, effect: Effect) -> str:
         from tractexp.model.declaration import Refused
@@ -138,7 +138,7 @@ class Model:
     @functools.cached_property
     def source(self) -> str:
         """The kernel's text: LLVM IR for the vectors of this machine."""
-        return derived((self.motor, self.static, *self.effects), self._written, self._text_in_cache)
+        return text_of((self.motor, self.static, *self.effects), self._written, self._text_in_cache)
 
     @property
     def _text_in_cache(self) -> str:
@@ -161,10 +161,10 @@ class Model:
         return Kernel(self.source)
 
     @property
-    def compiled(self) -> bool:
+    def has_kernel(self) -> bool:
         """Whether the cache holds the kernel."""
         text = at_hand((self.motor, self.static, *self.effects), self._text_in_cache)
-        return text is not None and objects.held(text)
+        return text is not None and objects.available(text)
 
     def compile(self) -> None:
         """Have the kernel in the cache."""
@@ -176,7 +176,7 @@ class Model:
 
     def listing(self) -> str:
         """The kernel for people to read: the equations as they were lowered, and the IR."""
-        from tractexp.kernel.shown import equations
+        from tractexp.kernel.listing import equations
         from tractexp.model.lowering import lower
 
         return "\n".join([*equations(lower(self.equations)), "", self.source])

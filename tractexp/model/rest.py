@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import sympy
 
-from tractexp.kernel.arrays import evaluated
+from tractexp.kernel.arrays import values_of
 from tractexp.kernel.lowered import Phase
 from tractexp.model.equations import Equations
 
@@ -26,9 +26,9 @@ def settled(eq: Equations, start: Phase, rest: Phase, starts: Sequence[sympy.Sym
     low, high = np.array([*ranges.values()]).T
     drawn = np.random.default_rng(0).uniform(low, high, (TRIES, len(ranges))).T
     known = {sympy.Symbol(name, real=True): values for name, values in zip(ranges, drawn, strict=True)}
-    values = evaluated(start, known, TRIES)
+    values = values_of(start, known, TRIES)
     first, slacks = values[: len(starts)], values[len(starts) :]
-    balances = evaluated(rest, known | dict(zip(starts, first, strict=True)), TRIES)
+    balances = values_of(rest, known | dict(zip(starts, first, strict=True)), TRIES)
     finite = np.isfinite(np.array([*first, *slacks, *balances])).all(axis=0)
     admissible = finite & (np.array([np.ones(TRIES), *slacks]) >= 0).all(axis=0)
     points = np.flatnonzero(admissible)[:POINTS]

@@ -26,12 +26,12 @@ def _phase(when: str, names: Sequence[str], phase: "Phase") -> Iterator[str]:
     if not phase.expressions:
         return
     yield f"{when}:"
-    yield from (f"  {s} = {_told(e)}" for s, e in (*phase.signals, *phase.steps))
+    yield from (f"  {s} = {_printed(e)}" for s, e in (*phase.signals, *phase.steps))
     slacks = (f"slack {k}" for k in range(1, len(phase.expressions) - len(names) + 1))
-    yield from (f"  {name} = {_told(e)}" for name, e in zip((*names, *slacks), phase.expressions, strict=True))
+    yield from (f"  {name} = {_printed(e)}" for name, e in zip((*names, *slacks), phase.expressions, strict=True))
 
 
-def _told(expression: "sympy.Expr") -> str:
+def _printed(expression: "sympy.Expr") -> str:
     nodes, waiting = 0, [expression]
     while waiting and nodes <= LONG:  # a small graph may be a tree of millions
         nodes += 1
