@@ -33,7 +33,7 @@ def test_the_main_job_prints_what_it_read_did_and_found(main_job):
     _, done = main_job
     for part in (
         "dip of 50 %", "500 Hz", "noise", "synthetic stand-in for an unpublished record", "7 parameters",
-        "Runge-Kutta steps", "T_prime", "pu s²/rad", "0.0005 .. 0.03", "epsilon_p", "objective", "simulations in",
+        "Runge-Kutta steps", "T_prime", "pu s²/rad", "95 % interval", "model error", "epsilon_p", "objective", "simulations in",
         "below 5 %: holds", "report.html", "result.json", "tractexp ui", "search ended at",
     ):  # fmt: skip
         assert part in done.stdout, part
@@ -41,12 +41,11 @@ def test_the_main_job_prints_what_it_read_did_and_found(main_job):
 
 
 def test_the_first_line_of_the_answer_is_what_it_is_good_for(main_job):
-    """The stand-in's stator transients are missing in the model: no interval is printed, and one table."""
+    """The stand-in's stator transients are missing in the model: the size of its error comes first, then one table."""
     _, done = main_job
     answer = done.stdout.partition("optimizer: issa, seed 0")[2].strip()
-    assert answer.startswith("It fits within 0.6%, but an effect is missing: do not use its intervals")
-    assert answer.count("X_prime") == 1
-    assert "95 % interval" not in answer
+    assert answer.startswith("The model describes this load within 1.8 % of its response (0.47 % of S); an effect is")
+    assert answer.count("95 % interval") == 1
     assert "task=discrepancy" in answer
 
 
@@ -167,7 +166,7 @@ def test_bounds_and_fixed_values_are_kept_and_a_value_at_its_bound_is_marked(tmp
     assert 0.2 <= result["parameters"]["q_v"] <= 0.4
     assert result["parameters"]["C"] == 0.85
     assert result["at_bound"] == ["q_v"]
-    assert "at its bound" in done.stdout
+    assert "a bound holds q_v at 0." in done.stdout
     assert "fixed" in done.stdout
 
 

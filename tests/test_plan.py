@@ -196,7 +196,7 @@ def test_the_plan_task_answers_with_a_number_and_a_figure(tmp_path):
     for part in (
         answer,
         "How deep must a dip be for M to be known within ± 5 %?",
-        "the estimate of tibet_50pct, though an effect is missing there",
+        "the estimate of tibet_50pct, though more than noise is left there",
         "inertia constant M omega_s / 2",
         "kinetic energy at synchronous speed",
         "transient reactance on the record's base",

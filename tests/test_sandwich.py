@@ -140,3 +140,34 @@ def test_the_deviance_rises_to_its_limit_where_the_interval_ends():
 def test_students_t_of_few_blocks_is_wide():
     assert quantile(5) == pytest.approx(2.776, abs=1e-3)
     assert quantile(1000) == pytest.approx(1.96, abs=5e-3)
+
+
+def test_a_parameter_on_a_bound_that_changes_nothing_is_not_known_and_ruins_nothing():
+    """Reactive power of the static part is none, so that q_v means nothing; it rests on a bound."""
+    t, U = study.Shape(0.5).voltage()
+    power = study.printed(study.TYPICAL, t, U, 0.0)
+    power += NOISE * np.random.default_rng(1).standard_normal(power.shape)
+    case = Problem(study.model(), [study.event(t, U, power)])
+    squares = Likelihood.of_squares(case, NOISE)
+    unit = squares.to_unit(study.TYPICAL)[0]
+    unit[-1] = 0.0
+    frozen = np.zeros((1, 7), dtype=bool)
+    frozen[0, -1] = True
+    unit = descend(squares.rows, unit[None], frozen).unit[0]
+    silent = Silent(case, squares.noise, squares.known, initial_power=False)
+    errors = scatter(silent, unit).information.standard_errors
+    assert np.isinf(errors[-1])
+    assert np.isfinite(errors[:-1]).all()
+
+
+class Silent(Likelihood):
+    """One whose last parameter changes nothing."""
+
+    @property
+    def with_initial_power(self):
+        return Silent(self.problem, self.noise, self.known, initial_power=True)
+
+    def jacobian(self, unit):
+        rows, J = super().jacobian(unit)
+        J[:, self.free - 1] = 0.0
+        return rows, J

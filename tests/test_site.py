@@ -137,7 +137,7 @@ def test_every_page_is_in_the_contents():
 def test_what_computes_a_number_is_where_the_page_says():
     page = (DOCS / "numbers.md").read_text(encoding="utf-8")
     places = re.findall(r"`(tractexp/[\w/]+\.py)`((?: `\w+`(?:, `\w+`)*)?)", page)
-    assert len(places) > 30
+    assert len(places) > 25
     for path, names in places:
         tree = ast.parse((ROOT / path).read_text(encoding="utf-8"))
         defined = {n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef | ast.ClassDef)}

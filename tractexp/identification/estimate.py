@@ -181,6 +181,8 @@ def _of_box(problem: Problem) -> tuple[Ends, Estimated | None]:
         if not np.isfinite(ends.lowest):
             return ends, None
         ends = _in_own_units(ends)
+        for _ in range(ROUNDS):
+            ends = _without_offsets(ends)
         refined = descend(ends.likelihood.rows, distinct(ends.descent, likelihood.free))
         ends = ends.joined(refined, "box").looked_beside()
         _remembered[key] = ends, _finished(ends)
@@ -194,6 +196,19 @@ def _in_own_units(ends: Ends) -> Ends:
     left = max(ends.lowest / ends.likelihood.samples, 1e-12)
     descent = replace(ends.descent, deviance=ends.descent.deviance / left)
     return replace(ends, likelihood=ends.likelihood.scaled(np.sqrt(left)), descent=descent)
+
+
+def _without_offsets(ends: Ends) -> Ends:
+    """The ends of waveforms where what their channels' offsets do is left out of the sum of squares; else the same.
+
+    Offsets of the currents, and of the voltage as the model passes them on, are larger than a model's error there.
+    """
+    offsets = ends.observed.offsets(ends.likelihood.values(ends.best))
+    if offsets is None:
+        return ends
+    squares = ends.likelihood
+    likelihood = replace(squares, noise=replace(squares.noise, blur=offsets))
+    return replace(ends, likelihood=likelihood, descent=descend(likelihood.rows, ends.descent.unit))
 
 
 def _finished(ends: Ends, *, robust: bool = False) -> Estimated:

@@ -131,8 +131,8 @@ class Observed:
 
         Of waveforms, whose voltage stands as recorded, what `unsure` tells.
         """
-        if self.problem.model.waves:
-            return unsure(self.problem, values)
+        if (offsets := self.offsets(values)) is not None:
+            return offsets
         most = max(len(s.errors) for s in self.smoothed)
         if not most:
             return None
@@ -141,6 +141,10 @@ class Observed:
         parts = [self._driven(values, shapes[k : k + together]) for k in range(0, len(shapes), together)]
         power = np.concatenate(parts)
         return np.nan_to_num(power[1:] - power[0])
+
+    def offsets(self, values: np.ndarray) -> np.ndarray | None:
+        """What may be wrong with waveforms and is neither noise nor the model's error, `unsure`; None of phasors."""
+        return unsure(self.problem, values) if self.problem.model.waves else None
 
     def answers(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
         """`answers` of this problem at free values (d,); None of phasors."""

@@ -66,7 +66,9 @@ def scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
         rows = rows - (J[:, :free] @ np.linalg.lstsq(J[:, :free], rows.ravel())[0]).reshape(rows.shape)
         full, wider, _ = _root(J[:, :free], influences(every))
         ratio[held] = wider[held]
-        root[len(own) + np.arange(len(held)), held] = 1 / np.sqrt(np.diag(np.linalg.pinv(full.T @ full))[held])
+        errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(full.T @ full))[held], 0.0))
+        seen = errors > 0  # what changes nothing has no error, and stays out of what is known
+        root[len(own) + np.flatnonzero(seen), held[seen]] = 1 / errors[seen]
     information = Information(
         problem.space.names, likelihood.values(unit), problem.upper - problem.lower, root, ROUNDING
     )

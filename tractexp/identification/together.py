@@ -42,7 +42,8 @@ def compare_events(known: Uncertainty) -> Together:
     whole = errors(J)
     gains: dict[str, dict[str, float]] = {}
     for e, event in enumerate(likelihood.problem.events):
-        ratio = errors(J * ~likelihood.part_of(e)[:, None]) / whole
+        with np.errstate(invalid="ignore"):  # what is not identifiable with the event is not without it either
+            ratio = errors(J * ~likelihood.part_of(e)[:, None]) / whole
         gains[event.record.name] = dict(zip(known.names, ratio.tolist(), strict=True))
     odd, notes = disagreeing(known)
     return Together(gains, odd, notes)
