@@ -33,8 +33,8 @@ def test_the_main_job_prints_what_it_read_did_and_found(main_job):
     _, done = main_job
     for part in (
         "dip of 50 %", "500 Hz", "noise", "synthetic stand-in for an unpublished record", "7 parameters",
-        "Runge-Kutta steps", "T_prime", "pu s²/rad", "95 % interval", "model error", "epsilon_p", "objective", "simulations in",
-        "below 5 %: holds", "report.html", "result.json", "tractexp ui", "search ended at",
+        "Runge-Kutta steps", "T_prime", "pu s²/rad", "95 % interval", "model error", "epsilon_p", "objective",
+        "simulations in", "below 5 %: holds", "report.html", "result.json", "tractexp ui", "search ended at",
     ):  # fmt: skip
         assert part in done.stdout, part
     assert done.stderr == ""
