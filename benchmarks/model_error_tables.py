@@ -147,3 +147,30 @@ def shift_lines(rows: Sequence[dict[str, Any]], before: Sequence[dict[str, Any]]
         numbers = f"{np.nanmedian(moves):.2g} | {np.nanmax(moves):.2g} | {np.nanmedian(ratios):.2f}"
         lines.append(f"| {group} | {len(some)} | {numbers} |")
     return lines
+
+
+TOLD = ("T_prime", "X_prime", "M", "T_m", "p_v", "C")  # parameters of the table in docs/uncertainty.md
+
+
+def documented(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """The lines of the table in docs/uncertainty.md: how many intervals hold the truth, of how many, and the grades."""
+    groups: dict[str, list[dict[str, Any]]] = {}
+    for row in rows:
+        if "intervals" in row and row["kind"] != "record":
+            groups.setdefault(_documented_group(row), []).append(row)
+    lines = []
+    for label, some in groups.items():
+        held = [coverage(some, name)[:2] for name in TOLD]
+        cells = [f"{inside} of {count}" if count else "" for inside, count in held]
+        lines.append(
+            f"| {label} | {' | '.join(cells)} | {sum(r['grade'] == 'adequate' for r in some)} of {len(some)} |"
+        )
+    return lines
+
+
+def _documented_group(row: dict[str, Any]) -> str:
+    """The line of that table which a row belongs to."""
+    if row["kind"] == "andes":
+        static = row["model"].removeprefix("third_order_")
+        return f"ANDES, {'two cages' if row['motor'] == 'Motor5' else 'one cage'}, fitted with `{static}`"
+    return "nothing missing" if row["kind"] == "null" else f"an effect at {row['multiple']:g} times its limit"

@@ -1,9 +1,13 @@
 """What judges the estimate is right itself: truths of ANDES's motors on a record's base, and the rule of chance."""
 
+import json
+from pathlib import Path
+
 import andes_loads
 import numpy as np
 import pytest
 from model_error import Compared, block_difference, overall, worse_than_chance
+from model_error_tables import documented
 
 MOTOR = {"Sn": 300.0, "rs": 0.013, "xs": 0.1, "rr1": 0.014, "xr1": 0.12, "xm": 3.4, "Hm": 0.7}
 TORQUE = {"c1": 1.05, "c2": 0.0, "c3": 1.05}
@@ -94,3 +98,13 @@ def test_the_error_in_S_is_of_the_excursion():
     estimate, _ = sides(1.0)
     assert overall(estimate) == pytest.approx(np.sqrt(estimate[0].missed.mean()) / 10)
     assert block_difference(estimate, estimate)[:2] == (0.0, 0.0)
+
+
+def test_the_page_tells_what_the_stored_rows_hold():
+    root = Path(__file__).parents[1]
+    stored = (root / "benchmarks" / "model_error.jsonl").read_text(encoding="utf-8").splitlines()
+    page = (root / "docs" / "uncertainty.md").read_text(encoding="utf-8")
+    lines = documented([json.loads(line) for line in stored])
+    assert len(lines) > 6
+    for line in lines:
+        assert line in page, line

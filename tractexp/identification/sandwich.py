@@ -105,7 +105,7 @@ def _influences(
         a, r = own[:, block].reshape(-1, len(columns)), rows[:, block].ravel()
         rest = (whole - a.T @ a) / np.outer(scale, scale)
         made.append(np.linalg.pinv(rest, STRUCTURAL**2, hermitian=True) @ ((a.T @ r - cross @ change) / scale) / scale)
-    return np.array(made)
+    return np.clip(made, -1.0, 1.0)  # no estimate leaves its box
 
 
 def _root(J: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
