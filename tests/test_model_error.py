@@ -116,3 +116,16 @@ def test_a_small_reactive_power_is_told_where_its_error_is_divided_by_it(fit):
     assert small.acceptance.endswith("does NOT hold (epsilon_q divides by Q alone, here 12 % of S)")
     large = replace(fit.result, epsilon_q=0.2)
     assert large.acceptance.endswith("does NOT hold")
+
+
+def test_a_rival_structure_is_told_of_the_parameters_that_it_moves_by_more_than_they_scatter(fit):
+    error, value = fit.result.standard_errors, fit.result.parameters
+    near, far = value["M"] + 1.9 * error["M"], value["T_m"] - 2.1 * error["T_m"]
+    rivals = [
+        {"name": "zip", "objective_ratio": 1.0, "parameters": {"M": near, "T_m": value["T_m"] - 2.05 * error["T_m"]}},
+        {"name": "second_cage", "objective_ratio": 0.9, "parameters": {"M": near, "T_m": far}},
+    ]
+    told = replace(fit, result=replace(fit.result, rival_structures=rivals))
+    assert told.moves == {"T_m": ("second_cage", far)}
+    assert told.structures == [f"with second_cage, which fits as well: T_m {far:.4g}"]
+    assert fit.structures == []

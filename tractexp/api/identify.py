@@ -260,6 +260,14 @@ class Identification(Written):
         return far
 
     @property
+    def structures(self) -> list[str]:
+        """What each rival structure makes of the parameters that it moves most, a sentence each."""
+        by_name: dict[str, list[str]] = {}
+        for name, (structure, value) in sorted(self.moves.items()):
+            by_name.setdefault(structure, []).append(f"{name} {value:.4g}")
+        return [f"with {name}, which fits as well: {', '.join(values)}" for name, values in by_name.items()]
+
+    @property
     def astray(self) -> list[str]:
         """Parameters whose interval does not hold the value that the search ended at."""
         return [
@@ -307,7 +315,7 @@ class Identification(Written):
 
         judged, about = self.judged, {p.name: p.about for p in self.model.model.parameters}
         made = identify.page(
-            self.result, judged.fits, judged.estimated, judged.known, judged.together, judged.adequacy, self.moves,
+            self.result, judged.fits, judged.estimated, judged.known, judged.together, judged.adequacy, self.structures,
             self.advice, self.ended.history, about, self.search_told(), command(),
         )  # fmt: skip
         return made.write(path)

@@ -1,6 +1,6 @@
 """The page of an identification, to be read in a minute: what it is good for, what was found, how sure, what next."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import nullcontext
 from typing import Any
 
@@ -36,7 +36,6 @@ SCATTERED = (
     "More than noise is left: the estimate is the minimum of Eq. (8), and intervals say by how much it scatters where"
     " stretches of 0.1 s are left out. pu: per unit of the record's base."
 )
-RIVALS = " Rival structure: one that fits as well and moves the value by more than two standard errors."
 MODEL_ERROR = (
     "Model error: rms of what is left beyond the noise, from the dip on, over the rms of the load's response, both in"
     " apparent power S. epsilon: Eq. (20)."
@@ -50,7 +49,7 @@ def digits(value: float) -> str:
 
 def page(
     result: Any, fits: Sequence[Any], estimated: Estimated, known: Uncertainty, together: Together | None,
-    adequacy: Adequacy, moves: Mapping[str, tuple[str, float]], advice: Sequence[str], history: History,
+    adequacy: Adequacy, structures: Sequence[str], advice: Sequence[str], history: History,
     about: dict[str, str], search: str, command: str,
 ) -> Page:  # fmt: skip
     """The whole page. `about` {parameter: meaning}; `search` is where the optimizer ended, in words."""
@@ -65,7 +64,7 @@ def page(
     made.heading("Measured and calculated")
     _curves(made, fits, known)
     made.heading("Parameters")
-    _parameters(made, result, known, moves, about)
+    _parameters(made, result, known, structures, about)
     made.heading("How well it fits")
     _errors(made, result)
     made.heading("What to do next").items(advice)
@@ -128,33 +127,18 @@ def _event(made: Page, fit: Any, noise: np.ndarray | None) -> None:
 
 
 def _parameters(
-    made: Page, result: Any, known: Uncertainty, moves: Mapping[str, tuple[str, float]], about: dict[str, str]
+    made: Page, result: Any, known: Uncertainty, structures: Sequence[str], about: dict[str, str]
 ) -> None:  # fmt: skip
-    """Table and picture against the bounds; `moves` {parameter: (rival structure, value with it)}."""
+    """Table and picture against the bounds; `structures` say what rivals make of the parameters."""
     search = by_event(result.search["parameters"], result.search["per_event"])
     values = result.free | {n: v for n, v in result.parameters.items() if n not in result.per_event}
     rows = [
         [name, about.get(_base(name), ""), digits(value), result.units.get(_base(name), ""), *_sure(known, name),
-         *["{1:.4g} ({0})".format(*moves[name]) if name in moves else ""] * bool(moves),
          "{:g} .. {:g}".format(*result.bounds[_base(name)]), digits(search[name])]
         for name, value in values.items()
     ]  # fmt: skip
-    beside = ["rival structure"] * bool(moves)
-    columns = [
-        "parameter",
-        "meaning",
-        "value",
-        "unit",
-        "95 % interval",
-        "verdict",
-        *beside,
-        "bounds",
-        "search ended at",
-    ]
-    made.table(
-        columns, rows,
-        words=(1, 5), caption=(EXACT if known.exact else SCATTERED) + RIVALS * bool(moves),
-    )  # fmt: skip
+    columns = ["parameter", "meaning", "value", "unit", "95 % interval", "verdict", "bounds", "search ended at"]
+    made.table(columns, rows, words=(1, 5), caption=EXACT if known.exact else SCATTERED)
     if told := result.on_given_base():
         made.text(f"{as_sentence(told)} Values and bounds in the table are on the record's own base of {result.base}.")
     made.chart(
@@ -162,7 +146,8 @@ def _parameters(
         "Estimates and 95 % intervals within the bounds of each parameter (0 is the lower, 1 the upper bound); cross:"
         " where the search ended.",
     )
-    made.items([f"{name}: {v}." for name, v in known.verdicts.items() if v.word != IDENTIFIED])
+    poor = [f"{name}: {v}." for name, v in known.verdicts.items() if v.word != IDENTIFIED]
+    made.items([*map(as_sentence, structures), *poor])
 
 
 def _errors(made: Page, result: Any) -> None:

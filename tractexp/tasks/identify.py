@@ -1,7 +1,5 @@
 """Identify a load model's parameters from recorded dips."""
 
-from itertools import groupby
-from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -88,8 +86,8 @@ def estimates(fit: "Identification") -> None:
         ended = [f"{e.search:.4g}" * (e.name in astray)] * bool(astray)
         rows.append([e.name, f"{e.value:.5g}", e.unit, interval, *ended, brief(e.verdict)])
     table(["parameter", "value", "unit", "95 % interval", *["search ended at"] * bool(astray), "verdict"], rows)
-    for structure, values in groupby(sorted((by, f"{n} {v:.4g}") for n, (by, v) in fit.moves.items()), itemgetter(0)):
-        say(f"with {structure}, which fits as well: {', '.join(told for _, told in values)}")
+    for sentence in fit.structures:
+        say(sentence)
 
 
 def sure(fit: "Identification") -> None:
