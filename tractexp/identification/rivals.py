@@ -2,9 +2,8 @@
 
 A model that lacks a stator resistance, or whose static load follows another law, is fitted again with it, from where
 its own fit ended. Where that fits as well or better, each parameter that both have moves. The move is told beside the
-estimate and, where more than noise is left, its interval reaches over it: measured on ANDES, intervals without it hold
-62 to 90 % of the truths, with it 95 %. Which structures are tried the plugins say (`Part.rival`); an effect that the
-equations refuse is none.
+estimate, and where more than noise is left the interval reaches over it (docs/uncertainty.md has how often that holds).
+Which structures are tried the plugins say (`Part.rival`); an effect that the equations refuse is none.
 """
 
 from collections.abc import Iterator, Sequence
