@@ -235,6 +235,7 @@ def outcome(call, *given):
         finally:
             signal.setitimer(signal.ITIMER_PROF, 0)
             signal.setitimer(signal.ITIMER_REAL, 0)
+    words = words.replace(str(Path.cwd()), "…")  # a folder of random name may hold any characters of a leak
     for one in (*map(str, given), *(str(each) for each in given[0])) if isinstance(given[0], list) else ():
         for part in {one, one.partition("=")[2], one.partition("=")[0]} - {""}:
             words = words.replace(part, "…") if len(part) > 3 else words
