@@ -64,7 +64,8 @@ def test_values_have_names(fit, dips):
     assert response.P.shape == dips[1].record.t.shape
     record = dips[1].record
     assert response.epsilon[0] == pytest.approx(np.linalg.norm(response.P - record.P) / np.linalg.norm(record.P))
-    assert repr(fit).startswith("electromechanical motor and exponential static load\nparameter  value")
+    assert "electromechanical motor and exponential static load\n" in repr(fit)
+    assert "95 % interval" in repr(fit)
     assert fit.headline[1:] in repr(fit)
     assert "<table>" in fit._repr_html_()
     assert fit.to_frame()["parameter"].tolist() == list(MOTOR)
@@ -92,12 +93,12 @@ def test_where_nothing_is_named_there_is_no_extended_model(dips, tmp_path):
         _ = found.extended
     assert found.question.model.effects == ()
     assert found.fit.parameters.keys() == set(MOTOR)
-    assert [row[1] for row in found.table().rows] == ["before"]
+    assert [row[1] for row in found.table().rows] == ["base model"]
     assert found.content["extended"] is None
     written = {path.name for path in found.write(tmp_path)}
     assert "extended.yaml" not in written
     assert ("unexplained.csv" in written) == (found.verdict == "unexplained")
-    assert found.remainder.said == ([found.content["remainder"]["sentence"]] if found.content["remainder"] else [])
+    assert found.remainder.caption == (found.content["remainder"]["sentence"] if found.content["remainder"] else "")
 
 
 def test_what_is_saved_is_json_and_comes_back_the_same(fit, found, dips, tmp_path):

@@ -10,8 +10,8 @@ import subprocess
 import numpy as np
 import pytest
 
-from tractexp.report.chart import MOST, Chart
-from tractexp.report.page import Page
+from tractexp.blocks import Report
+from tractexp.blocks.chart import MOST, Chart
 
 BLUE = "#0072B2"
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -19,7 +19,7 @@ BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "
 
 def drawn(page, folder, *options):
     """What a browser that reaches no other computer makes of a page: its elements, and what it complains of."""
-    path = page.write(folder / "page.html")
+    path = page.save(folder / "page.html")
     command = [
         BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking",
         f"--user-data-dir={folder / 'browser'}", "--host-resolver-rules=MAP * ~NOTFOUND", "--enable-logging=stderr",
@@ -93,7 +93,7 @@ def test_a_legend_that_takes_several_lines_on_a_phone_leaves_a_line_to_the_butto
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed here")
 @pytest.mark.parametrize("opened", [False, True])
 def test_a_folded_chart_is_drawn_when_it_is_opened(tmp_path, opened):
-    page, chart = Page("charts"), Chart("x", ["y"]).line("one", np.arange(3), np.arange(3), BLUE)
+    page, chart = Report("charts"), Chart("x", ["y"]).line("one", np.arange(3), np.arange(3), BLUE)
     page.chart(chart, "shown")
     with page.folded("more"):
         page.chart(chart, "folded")
@@ -113,7 +113,7 @@ def test_a_browser_draws_every_kind_and_complains_of_nothing(tmp_path, width):
     bars = Chart("gain", [""]).bars("gain", ["a", "b"], [2, 1], BLUE, told=["two", "one"])
     forest = Chart("value", [""]).points("est", [0.3], ["C"], BLUE, spans=np.array([[0.1, 0.4]]), told=["C"])
     fitness = Chart("n", ["f"], log_x=True, log_y=True).line("f", x + 1, x + 1, BLUE, step=True).level(1.5, "floor")
-    page = Page("charts").chart(chart, "one").charts([bars, forest, fitness], "three")
+    page = Report("charts").chart(chart, "one").charts([bars, forest, fitness], "three")
     dom, complaints = drawn(page, tmp_path, f"--window-size={width},900")
     assert complaints == []
     assert dom.count('class="chart js-plotly-plot"') == 4
@@ -156,7 +156,7 @@ class Worked:
         self.page, self.script = page, script
 
     def write(self, path):
-        text = self.page.write(path).read_text(encoding="utf-8")
+        text = self.page.save(path).read_text(encoding="utf-8")
         path.write_text(text.replace("</body>", f"<p id=told></p><script>{self.script}</script></body>"))
         return path
 
@@ -176,7 +176,7 @@ def test_zoomed_in_every_sample_is_drawn_and_zoomed_out_no_spike_is_lost(tmp_pat
       Plotly.relayout(charts[0], {"xaxis.autorange": true}).then(() => { tell();
         document.getElementById("told").textContent = JSON.stringify(told); }); });
     """
-    dom, complaints = drawn(Worked(Page("zoom").chart(chart, "one"), script), tmp_path, "--virtual-time-budget=5000")
+    dom, complaints = drawn(Worked(Report("zoom").chart(chart, "one"), script), tmp_path, "--virtual-time-budget=5000")
     assert complaints == []
     whole, near, again = json.loads(re.search(r'id="told">(.*?)</p>', dom)[1])
     assert whole[0] < 2200

@@ -251,7 +251,7 @@ def test_a_store_without_runs_opens_on_the_plain_page(tmp_path):
 
 
 def test_a_view_that_cannot_be_stored_opens_on_the_plain_page(monkeypatch, capsys):
-    from tractexp.tasks import ui
+    from tractexp.cli import ui
     from tractexp.tracking import view
 
     def refuse(uri):

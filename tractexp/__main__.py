@@ -29,19 +29,19 @@ def main() -> int:
     gc.set_threshold(*SELDOM)
     try:
         if sys.argv[1:2] == ["ui"]:
-            from tractexp.tasks.ui import ui
+            from tractexp.cli.ui import ui
 
             return ui(sys.argv[2:])
         if sys.argv[1:2] == ["look"]:
-            from tractexp.tasks.look import look
+            from tractexp.cli.look import look
 
             return look(sys.argv[2:])
         if sys.argv[1:2] == ["sync"]:
-            from tractexp.tasks.sync import sync
+            from tractexp.cli.sync import sync
 
             return sync(sys.argv[2:])
         if sys.argv[1:2] == ["doctor"]:
-            from tractexp.tasks.doctor import doctor
+            from tractexp.cli.doctor import doctor
 
             return doctor(sys.argv[2:])
         if sys.argv[1:2] == ["list"]:
@@ -104,8 +104,8 @@ def _run() -> int:
         from hydra.core.hydra_config import HydraConfig
         from hydra.types import RunMode
 
+        from tractexp.cli.run import run
         from tractexp.sweep.job import run_job
-        from tractexp.tasks.run import run
 
         try:
             with explained():

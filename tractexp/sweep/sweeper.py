@@ -18,6 +18,8 @@ from hydra.plugins.sweeper import Sweeper
 from omegaconf import OmegaConf
 
 from tractexp import files
+from tractexp.api.task import Job
+from tractexp.cli.chosen import refuse_unread
 from tractexp.doors.hydra_plugins import NAMESPACE
 from tractexp.errors import Stopped, UserError
 from tractexp.plugin import build, get
@@ -28,8 +30,6 @@ from tractexp.sweep.launcher import Cores
 from tractexp.sweep.parent import parent_run
 from tractexp.sweep.status import FAILED, FINISHED, INTERRUPTED, RUNNING
 from tractexp.tasks.console import say, table
-from tractexp.tasks.given import refuse_unread
-from tractexp.tasks.task import Job
 
 REPEAT = "repeat the command to go on with the jobs that are left"
 

@@ -4,10 +4,10 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+from tractexp.api.task import Job
+from tractexp.cli.chosen import given, refuse_unread
 from tractexp.errors import Stopped, UserError
 from tractexp.plugin import build
-from tractexp.tasks.given import given, refuse_unread
-from tractexp.tasks.task import Job
 
 TERMINATED = 143  # the exit code of a process that SIGTERM ended
 

@@ -1,7 +1,7 @@
 """Find where simulation and measurement disagree, name the missing effect, add it, show the gap shrink.
 
-The investigation itself is `tractexp.discrepancy`; everything this file asks of it stands in `_made`, `_estimated`,
-`Investigation._results` and `Investigation._drawings`.
+The investigation itself is `tractexp.discrepancy`; everything this file asks of it stands in `_steps`, `_estimated`
+and `Investigation.write_results`.
 """
 
 import functools
@@ -16,15 +16,19 @@ from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.compose import LoadModel, model_of
 from tractexp.api.identify import Identification
-from tractexp.api.pages import Drawing, Written
 from tractexp.api.read import dips_together
 from tractexp.api.response import Response
-from tractexp.api.setup import Given
+from tractexp.api.setup import Given, recorded
+from tractexp.api.task import Job, Task
+from tractexp.blocks import Report, Table
+from tractexp.blocks.terminal import show
+from tractexp.discrepancy.discrepancy_json import use_of
 from tractexp.errors import UserError, check_range
 from tractexp.identification.result import Result
-from tractexp.outcome import Table
-from tractexp.progress import Progress, telling
-from tractexp.wording import with_error
+from tractexp.outcome import Written
+from tractexp.plugin import plugin
+from tractexp.progress import Progress, console, say, telling
+from tractexp.wording import joined, with_error
 
 if TYPE_CHECKING:
     from tractexp.discrepancy.criteria import Criteria
@@ -76,10 +80,12 @@ class Investigation(Written):
     """What is missing in a model, how sure that is, and the model with it. `content` is that of `discrepancy.json`."""
 
     kind = "investigation"
+    page = "discrepancy.html"
 
     question: Question
     content: Mapping[str, Any]
     result: Result  # the extended model's parameters, as `result.json` holds them
+    behind: "Steps | None" = None  # None where it was loaded
 
     @property
     def verdict(self) -> str:
@@ -129,8 +135,8 @@ class Investigation(Written):
         told = self.content["remainder"]
         shapes = told["of_base"] if told else []
         columns = [*shapes[0]] if shapes else []
-        said = [told["sentence"]] if told else []
-        return Table(columns, [[shape[key] for key in columns] for shape in shapes], "what is left", said)
+        rows = [[shape[key] for key in columns] for shape in shapes]
+        return Table(columns, rows, "what is left", told["sentence"] if told else "")
 
     @property
     def proposal(self) -> Mapping[str, Any] | None:
@@ -205,28 +211,23 @@ class Investigation(Written):
     @functools.cached_property
     def steps(self) -> "Steps":
         """The chain of results, from the records to the verdict; of a loaded result it is investigated again."""
-        return _made(self.question, False)
+        return self.behind or _steps(self.question, False)
 
     def table(self) -> Table:
-        rows, waves = [], self.gap.train.before.epsilon_i is not None
-        for label, gap in (("fitted", self.gap.train), ("held out", self.gap.validate)):
-            stages = (("before", gap.before), ("after", gap.after)) if gap else ()
-            for stage, misfit in stages if self.names else stages[:1]:
-                errors = [f"{e:.3%}" for e in (misfit.epsilon_p, misfit.epsilon_q, misfit.epsilon_i) if e is not None]
-                errors.append(f"{misfit.chi2_per_sample:.3f}")
-                closed = f"{gap.closed:.0%}" if gap and stage == "after" and gap.closed is not None else ""
-                rows.append([label, stage, *errors, closed])
-        left = self.remainder.said
-        said = [
-            self.reason,
-            *self.sizes,
-            *left,
-            *self.proposed,
-            f"noise: {self.content['noise']}",
-            f"next: {self.recommendation}",
-        ]
-        columns = ["events", "", "epsilon_p", "epsilon_q", *["epsilon_i"] * waves, "chi2 per sample", "gap closed"]
-        return Table(columns, rows, f"{self.verdict.upper()} {' and '.join(self.names)}".strip(), said)
+        """How far off the models are, on the fitted and on the held-out events."""
+        from tractexp.report import discrepancy
+
+        return discrepancy.gap(self)
+
+    def summary(self) -> Report:
+        from tractexp.report import discrepancy
+
+        return discrepancy.summary(self)
+
+    def report(self) -> Report:
+        from tractexp.report import discrepancy
+
+        return discrepancy.report(self)
 
     def to_dict(self) -> dict[str, Any]:
         return {"question": self.question.to_dict(), "content": dict(self.content), "result": asdict(self.result)}
@@ -235,7 +236,7 @@ class Investigation(Written):
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         return cls(Question.from_dict(content["question"]), content["content"], Result(**content["result"]))
 
-    def _results(self, folder: Path) -> list[Path]:
+    def write_results(self, folder: Path) -> list[Path]:
         """discrepancy.json and result.json.
 
         conf/model/extended.yaml where an effect was named, unexplained.csv where nothing explains, and the plugin of
@@ -255,12 +256,6 @@ class Investigation(Written):
         if self.content["proposal"]:
             paths.append(discrepancy_json.write_plugin(self.steps, folder / self.content["proposal"]["plugin"]))
         return paths
-
-    def _drawings(self) -> Mapping[str, Drawing]:
-        from tractexp.report import discrepancy
-
-        records = ", ".join(e.record.name for e in self.question.train)
-        return {"discrepancy.html": lambda path: discrepancy.page(path, self.steps, records)}
 
 
 def _size(name: str, at: Mapping[str, Any], unit: str) -> str:
@@ -308,10 +303,10 @@ def investigate(
         train=train, validate=held, model=base, seed=seed, effects=tuple(effects),
         false_alarms=chosen["false_alarms"], criteria=dict(criteria or {}),
     )  # fmt: skip
-    return _concluded(question, _made(question, progress))
+    return _concluded(question, _steps(question, progress))
 
 
-def _made(question: Question, progress: Progress) -> "Steps":
+def _steps(question: Question, progress: Progress) -> "Steps":
     """The investigation."""
     from tractexp.discrepancy.investigate import investigate as found
 
@@ -337,9 +332,7 @@ def _criteria(chosen: Mapping[str, float]) -> "Criteria":
 def _concluded(question: Question, steps: "Steps") -> Investigation:
     from tractexp.discrepancy.discrepancy_json import content
 
-    made = Investigation(question, files.plain(content(steps)), _estimated(question, steps))
-    made.__dict__["steps"] = steps
-    return made
+    return Investigation(question, files.plain(content(steps)), _estimated(question, steps), steps)
 
 
 def _estimated(question: Question, steps: "Steps") -> Result:
@@ -359,3 +352,64 @@ def _estimated(question: Question, steps: "Steps") -> Result:
     found = Found(values, objective, bench.effort.simulations, 0, 0, 0.0, status, history)
     result, _ = conclude(problem, found, question.validate, question.seed, model.node, "descent")
     return replace(result, adequacy=adequacy(steps).told())
+
+
+@plugin
+class Discrepancy(Task, call=investigate):
+    """Investigate the training events and judge what is found on the held-out ones."""
+
+    resumes = True
+    instead = {"model.per_event": "its parameters are shared by all events, so leave it out"}
+
+    def perform(self, job: Job, **instead: Any) -> Investigation:
+        events = job.events_of_fit
+        for line in recorded(events.train, events.validate, "hold out"):
+            say(line)
+        job.prepare_log()
+        return super().perform(
+            job, records=events.train, validate=events.validate, progress=lambda line: say(f"  {line}"), **instead
+        )
+
+    def conclude(self, job: Job, result: Written) -> None:
+        """The page's path and the command that uses the extended model end what is printed."""
+        assert isinstance(result, Investigation)
+        paths = {path.name: path for path in (*result.write_results(job.folder), *result.write_drawings(job.folder))}
+        show(result.summary(), console())
+        if page := paths.get(result.page):
+            say(f"page: {page}")
+        say(f"beside it: {', '.join(sorted(paths.keys() - {result.page}))}")
+        conf = job.folder / "conf"
+        if model := paths.get("extended.yaml"):
+            which = f", which has {joined(result.names)}" * (result.verdict == "tied")
+            say(f"use the extended model{which}: {use_of(result.question.model.domain, str(conf))}")
+        artifacts = [*(p for p in paths.values() if conf not in p.parents), *([conf] if model else [])]
+        content = {"values": {}, "artifacts": [*artifacts, job.folder / ".hydra"]}
+        job.log(**content | self.logged(job, result))
+
+    def logged(self, job: Job, result: Investigation) -> dict[str, Any]:
+        """Verdict, gap and page, and below this run one for every set of effects that was refitted."""
+        from tractexp import tracking
+
+        metrics = {}
+        for role in ("train", "validate"):
+            if (gap := getattr(result.gap, role)) is None:
+                continue
+            for stage in ("before", "after"):
+                off = {key: value for key, value in vars(getattr(gap, stage)).items() if value is not None}
+                metrics |= {f"{role}_{stage}_{key}": value for key, value in off.items()}
+            if gap.closed is not None:
+                metrics[f"{role}_gap_closed"] = gap.closed
+        children = [
+            tracking.Run(
+                experiment=job.experiment,
+                name=" and ".join(row["effects"]),
+                metrics={"deviance_lowered_by": row["likelihood_ratio"] or 0.0}
+                | {name: at["value"] for name, at in row["parameters"].items()},
+                tags={"candidate": row["status"], "task": "discrepancy"},
+            )
+            for row in result.sets
+        ]
+        return {
+            "name": f"{result.verdict} {' '.join(result.names)}".strip(), "metrics": metrics, "children": children,
+            "description": result.reason, "model": job.folder / "result.json",
+        }  # fmt: skip

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from tractexp import files
+from tractexp.cli.sync import FOLDER, brought
 from tractexp.errors import UserError
-from tractexp.tasks.console import say
-from tractexp.tasks.sync import FOLDER, brought
+from tractexp.progress import say
 
 DOES = "Check versions, cores, caches, disk, the MLflow store and its runs; heal what can be, say what is wrong."
 ROOM = 500e6  # bytes of a disk that is not nearly full

@@ -1,15 +1,13 @@
 """What the user chose for a run, and the refusal of what the task would silently ignore."""
 
 import functools
-import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Any
 
+from tractexp.api.task import ALWAYS
 from tractexp.errors import UserError
 
-ALWAYS = ("task", "experiment", "seed", "tracking", "hydra")  # open to every task
 OF = {"domain": "model"}  # groups that choose for another
-NAMED = ("optimizer", "data")  # choices that a run is named after anyway
 
 
 def given(overrides: Iterable[str], choices: Mapping[str, Any]) -> dict[str, str]:
@@ -20,16 +18,6 @@ def given(overrides: Iterable[str], choices: Mapping[str, Any]) -> dict[str, str
         key, _, value = text.lstrip("+~").partition("=")
         chosen[key.partition("@")[0].replace("/", ".")] = value or "null"
     return chosen
-
-
-def variant(optimizer: str, chosen: Mapping[str, str]) -> str:
-    """What an optimizer is called with the settings that were chosen beside it, whatever the seed: "issa levy=false".
-
-    Files go without their folders.
-    """
-    told = {key: value for key, value in chosen.items() if key.partition(".")[0] not in ALWAYS}
-    parts = [f"{key.removeprefix('optimizer.')}={value}" for key, value in sorted(told.items()) if key not in NAMED]
-    return " ".join([optimizer, *(re.sub(r"[^\s,\[=']*/", "", part) for part in parts)])
 
 
 def refuse_unread(task: Any, chosen: Mapping[str, str], needless: Collection[str] = ()) -> None:

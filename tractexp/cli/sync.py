@@ -5,7 +5,7 @@ from collections import Counter
 from pathlib import Path
 
 from tractexp.errors import UserError
-from tractexp.tasks.console import say
+from tractexp.progress import say
 
 FOLDER = Path("outputs")
 DOES = "Log the runs whose results are in files but not in MLflow; what is there already is left as it is."
