@@ -159,11 +159,11 @@ def keys_of(arguments):
     from hydra import compose
     from omegaconf import OmegaConf
 
-    from tractexp.cli.chosen import _leaves
+    from tractexp.composition import leaves
     from tractexp.overrides import overrides
 
     whole = OmegaConf.to_container(compose("config", overrides(arguments)))
-    keys = [key for key, _ in _leaves(whole)]
+    keys = [key for key, _ in leaves(whole)]
     sections = sorted({key.rpartition(".")[0] for key in keys} - {""})
     groups = ["optimizer", "data", "objective", "model", "model/motor", "model/static", "task", "domain", "experiment"]
     return [*keys, *keys, *sections, *groups, "model.bounds.C", "model.fixed.T_m", "data.columns.U"]

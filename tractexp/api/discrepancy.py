@@ -22,7 +22,6 @@ from tractexp.api.setup import Given, recorded
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.blocks.terminal import show
-from tractexp.discrepancy.discrepancy_json import use_of
 from tractexp.errors import UserError, check_range
 from tractexp.identification.result import Result
 from tractexp.outcome import Written
@@ -372,8 +371,11 @@ class Discrepancy(Task, call=investigate):
 
     def conclude(self, job: Job, result: Written) -> None:
         """The page's path and the command that uses the extended model end what is printed."""
+        from tractexp.discrepancy.discrepancy_json import use_of
+
         assert isinstance(result, Investigation)
         paths = {path.name: path for path in (*result.write_results(job.folder), *result.write_drawings(job.folder))}
+        say()
         show(result.summary(), console())
         if page := paths.get(result.page):
             say(f"page: {page}")

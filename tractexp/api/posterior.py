@@ -63,7 +63,7 @@ class Sampled(Written):
             f" autocorrelation time {c['autocorrelation']:.0f} steps"
         )
         short = "note: the chain is shorter than 50 autocorrelation times; raise steps"
-        return self.fit.summary().add(self.table()).text(made, *[short] * (not c["converged"]), "")
+        return self.fit.summary().add(self.table()).text(made, *[short] * (not c["converged"]))
 
     def report(self) -> Report:
         from tractexp.report import posterior
@@ -87,8 +87,7 @@ class Sampled(Written):
 
 
 @public
-def posterior(fit: Identification, *, walkers: int = 48, steps: int = 2000, seed: int | None = None
-) -> Sampled:
+def posterior(fit: Identification, *, walkers: int = 48, steps: int = 2000, seed: int | None = None) -> Sampled:
     """Sample the posterior of an identification's free parameters under a flat prior within their bounds.
 
     `walkers` go `steps` steps each (at least 4 and 100), of which the first 30 % are thrown away; `seed` is by default

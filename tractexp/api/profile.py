@@ -66,7 +66,7 @@ class Profiled(Written):
         effort = f"{len(self.profiles)} profiles: {c['simulations']} simulations in {c['seconds']:.2f} s"
         verdicts = [f"{name}: {p['verdict']}" for name, p in self.profiles.items()]
         report = self.fit.summary().add(self.table()).items([*verdicts, *(f"note: {note}" for note in notes)])
-        return report.text(effort, "")
+        return report.text(effort)
 
     def report(self) -> Report:
         from tractexp.report import profile

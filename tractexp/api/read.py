@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from tractexp import plugin
-from tractexp.api.arguments import Choice, check_kind, choices, public
+from tractexp.api.arguments import Choice, check_kind, public
 from tractexp.blocks import Report, Table
+from tractexp.composition import choices
 from tractexp.errors import UserError, among
 from tractexp.outcome import Tabulated
 from tractexp.record import Base, Event, Record, Waves, Window, describe, detect, on_own_base, reader_of

@@ -115,7 +115,9 @@ class Task(Plugin):
     def conclude(self, job: "Job", result: Written) -> None:
         """Write a result, show it, draw it, log it."""
         paths = result.write_results(job.folder)
+        say()
         show(result.summary(), console())
+        say()
         if self.draws(job):
             paths += result.write_drawings(job.folder)
         listed(paths)
