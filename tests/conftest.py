@@ -38,7 +38,7 @@ def resistive_dips(tmp_path_factory) -> list[Path]:
     return paths
 
 
-collect_ignore = ["acme"]  # a package of its own, whose tests run where it is installed
+collect_ignore = ["process/acme"]  # a package of its own, whose tests run where it is installed
 
 
 @pytest.fixture

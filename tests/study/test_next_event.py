@@ -1,6 +1,6 @@
 """What to record next: the chances are those of the product's own decision, and what is recommended ends a tie.
 
-The events come from the independent generator of `benchmarks/hidden_effects`. The study over many ties, which counts
+The events come from the independent generator of `tests/oracle/hidden_effects`. The study over many ties, which counts
 how often the predicted chances come true, is `benchmarks/next_event.py`.
 """
 
@@ -247,7 +247,7 @@ def test_a_plan_for_rivals_says_what_an_investigation_says(tied, tmp_path):
 
 
 def test_the_docs_report_what_the_stored_study_holds():
-    root = Path(__file__).parents[1]
+    root = Path(__file__).parents[2]
     rows = json.loads((root / "benchmarks" / "next_event.json").read_text())["rows"]
     docs = (root / "docs" / "missing-effects.md").read_text()
     part = docs.partition("<!-- next event -->")[2].partition("<!-- end of next event -->")[0]

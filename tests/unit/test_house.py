@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "tractexp"
 # anything else right in the package is the ground, which imports nothing above it
 ABOVE = {"conf", "data", "extend", "testing"}  # for authors of plugins, and what is no code

@@ -195,7 +195,7 @@ def truth(case: Case, seed: int) -> dict[str, Any]:
     """
     made = scene(case, seed)
     return {
-        "note": "synthetic: hidden by an independent generator, see benchmarks/hidden_effects",
+        "note": "synthetic: hidden by an independent generator, see tests/oracle/hidden_effects",
         "seed": seed,
         "effects": [{"name": name, **effect.truth()} for name, effect in made.effects],
         "nuisances": [{"name": name, **effect.truth()} for name, effect in made.nuisances],

@@ -140,7 +140,7 @@ def test_values_given_by_hand_replace_those_found():
 
 @pytest.mark.parametrize(("motor", "static"), PAIRS)
 def test_every_pair_predicts_its_power_before_a_dip_and_less_in_it(motor, static, tmp_path):
-    """From a written result.json, as mlflow.pyfunc.load_model reads it (tests/test_cli.py loads one for real)."""
+    """From a written result.json, as mlflow.pyfunc.load_model reads it (test_cli.py loads one for real)."""
     parts = get("model/motor", motor)(), get("model/static", static)()
     defaults = {p.name: p.default for part in parts for p in part.parameters}
     path = result(motor, static, defaults).write(tmp_path / "result.json")

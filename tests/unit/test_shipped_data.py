@@ -9,7 +9,7 @@ import pytest
 
 from independent.source import OMEGA
 
-DATA = Path(__file__).parents[1] / "tractexp" / "data"
+DATA = Path(__file__).parents[2] / "tractexp" / "data"
 NAMES = ("tibet_50pct", "tibet_30pct", "tibet_65pct")
 # Bounds the motor and static plugins search in: a truth near one of them would be a bad example.
 BOUNDS = {
@@ -65,7 +65,7 @@ def test_a_sidecar_says_what_the_record_is_and_who_made_it(name):
     about = sidecar(name)
     assert about["name"] == name
     assert about["note"].startswith("synthetic stand-in for an unpublished record")
-    assert (Path(__file__).parents[1] / about["made_by"]).is_file()
+    assert (Path(__file__).parents[2] / about["made_by"]).is_file()
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
-PAGE = Path(__file__).parents[1] / "docs" / "sweeps.md"
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+PAGE = Path(__file__).parents[2] / "docs" / "sweeps.md"
 DERIVED = """if True:
     from tractexp.model.model import compose
     from tractexp.plugin import get

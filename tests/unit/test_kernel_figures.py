@@ -5,7 +5,7 @@ from pathlib import Path
 
 import kernel
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 
 def test_the_page_has_the_tables_of_the_stored_run():

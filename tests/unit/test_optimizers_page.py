@@ -14,7 +14,7 @@ from tractexp.comparison.statistics import vargha_delaney
 from tractexp.plugin import build, discover, schema
 
 STORED = json.loads(optimizers.STORED.read_text(encoding="utf-8"))
-PAGE = Path(__file__).parents[1] / "docs" / "optimizers.md"
+PAGE = Path(__file__).parents[2] / "docs" / "optimizers.md"
 SMALL = replace(
     optimizers.SERIES["choice"], seeds=2, instances=(11, 12), budgets=(60, 120), optimizers=("random_search", "cmaes")
 )

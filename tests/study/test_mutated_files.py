@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mutated_files import LEAKS, damaged, originals, outcome
 
-BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from test_cli import tractexp
 
-PAGE = Path(__file__).parents[1] / "docs" / "start.md"
+PAGE = Path(__file__).parents[2] / "docs" / "start.md"
 BLOCK = re.compile(r"```(\w*)\n(.*?)```", re.DOTALL)
 
 

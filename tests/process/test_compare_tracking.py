@@ -26,7 +26,7 @@ from tractexp.tracking.find import find
 from tractexp.tracking.view import TAG, comparison_view
 
 EXPERIMENT = "identify tibet_50pct"
-SCREENSHOT = Path(__file__).parents[1] / "outputs" / "mlflow_comparison.png"
+SCREENSHOT = Path(__file__).parents[2] / "outputs" / "mlflow_comparison.png"
 
 
 def log(uri, run, parent=None, variant=None):

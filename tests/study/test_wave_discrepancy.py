@@ -1,6 +1,6 @@
 """An investigation of waveforms: what is planted is named and closes the gap held out, what is not there is not.
 
-Records come from the independent generator of `benchmarks/independent`: other equations, another solver, noise of the
+Records come from the independent generator of `tests/oracle/independent`: other equations, another solver, noise of the
 voltage and of the currents, offsets, quantization.
 """
 

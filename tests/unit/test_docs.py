@@ -10,7 +10,7 @@ import pytest
 from tractexp import PUBLIC
 from tractexp.plugin import discover
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 

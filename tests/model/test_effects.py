@@ -112,7 +112,7 @@ def test_no_two_effects_share_a_parameter():
 
 
 def test_the_documentation_lists_every_effect_and_parameter():
-    text = (Path(__file__).parents[1] / "docs" / "effects.md").read_text()
+    text = (Path(__file__).parents[2] / "docs" / "effects.md").read_text()
     for name in discover()["effect"]:
         assert f"`{name}`" in text
         assert all(f"`{p.name}`" in text for p in effect(name).parameters)

@@ -25,7 +25,7 @@ from tractexp.filetypes.comtrade_writer import write
 from tractexp.overrides import overrides
 from tractexp.plugin import build
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 TUTORIALS = ("start.md", "ten-minutes.md")  # followed by tests of their own
 SHOWN = [c for page in PAGES for c in commands.of(page)]
@@ -188,7 +188,7 @@ def test_extras_files_and_modules_are_there():
     asked = [extra for c in ALL for w in c.words if "pip" in c.line for extra in re.findall(r"\[(\w+)\]$", w)]
     assert {"test", "benchmark", "posterior", "slurm", "dask", "cmaes", "dev"} <= {*asked}
     assert {*asked} <= project["optional-dependencies"].keys()
-    for name in (".ci/run", ".ci/constraints.txt", "tests/test_cli.py"):
+    for name in (".ci/run", ".ci/constraints.txt", "tests/process/test_cli.py"):
         assert any(name in c.line for c in ALL)
         assert (ROOT / name).is_file()
 

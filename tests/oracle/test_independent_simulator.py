@@ -12,7 +12,7 @@ from independent import Dip, Load, Machine, Recorder, Stall, Static, Waveforms, 
 from independent.recorder import PHASES
 from independent.source import NOMINAL_FREQUENCY, OMEGA
 
-PACKAGE = Path(__file__).parents[1] / "benchmarks" / "independent"
+PACKAGE = Path(__file__).parent / "independent"
 MACHINE = Machine(Rs=0.03, Xs=0.10, Xm=3.2, Rr=0.018, Xr=0.18, H=0.7)
 LOSSLESS = replace(MACHINE, Rs=0.0)
 NOTHING = Static(P=0.0, Q=0.0, p_v=0.0, q_v=0.0)

@@ -15,7 +15,7 @@ import tractexp
 from tractexp import files
 from tractexp.errors import UserError
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 DOOR = ROOT / "tractexp" / "files.py"
 WRITERS = {  # calls that make or change a file, whatever they are called on
     "write_text", "write_bytes", "mkstemp", "NamedTemporaryFile", "fdopen", "copyfile", "copy2", "savez",

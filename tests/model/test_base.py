@@ -315,7 +315,7 @@ def command(folder, *arguments):
 
 @pytest.fixture
 def andes():
-    folder = Path(__file__).parents[2] / "shared" / "cases" / "andes"
+    folder = Path(__file__).parents[3] / "shared" / "cases" / "andes"
     if not folder.is_dir():
         pytest.skip("the dips of ANDES are not beside the repository (shared/cases/andes)")
     return [tractexp.read(folder / f"dip_{name}.csv", frequency=60)[0].record for name in "ac"]

@@ -12,7 +12,7 @@ from tractexp.extend import Effect, Parameter
 from tractexp.model.printed import changed
 from tractexp.plugin import discover, get
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 
 

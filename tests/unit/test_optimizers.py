@@ -12,7 +12,7 @@ from tractexp.identification.optimizer import REFUSED, Box
 from tractexp.identification.search import Limits, search
 from tractexp.plugin import build, discover, schema
 
-CONF = Path(__file__).parents[1] / "conf"
+CONF = Path(__file__).parents[2] / "conf"
 NAMES = sorted(n for n, cls in discover()["optimizer"].items() if cls.__module__.startswith(folder.__name__))
 VARIANTS = sorted(path.stem for path in (CONF / "optimizer").glob("*.yaml"))
 

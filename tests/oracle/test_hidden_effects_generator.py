@@ -53,7 +53,7 @@ from independent import Dip, Load, Machine, Static, simulate
 from independent.source import OMEGA
 from tractexp.plugin import discover
 
-PACKAGE = Path(__file__).parents[1] / "benchmarks" / "hidden_effects"
+PACKAGE = Path(__file__).parent / "hidden_effects"
 LOAD = Load(
     Machine(Rs=0.0, Xs=0.10, Xm=3.2, Rr=0.018, Xr=0.14, H=0.8),
     rating=0.6,
