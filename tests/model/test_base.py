@@ -2,12 +2,11 @@
 
 import dataclasses
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import run_command
 from conftest import MOTOR
 from made_recordings import constant
 from test_wave_input import columns, table
@@ -308,7 +307,7 @@ def test_the_command_line_tells_both_bases(records, tmp_path):
 
 
 def command(folder, *arguments):
-    done = subprocess.run([sys.executable, "-m", "tractexp", *arguments], cwd=folder, capture_output=True, text=True)
+    done = run_command(*arguments, cwd=folder)
     assert done.returncode == 0, done.stderr
     return done.stdout.replace("\n", " ").replace("  ", " ")
 

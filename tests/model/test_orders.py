@@ -5,7 +5,7 @@ import json
 import make_contactors
 import numpy as np
 import pytest
-from test_cli import tractexp
+from command_line import run_command
 from test_shipped_data import DATA
 
 from tractexp.choices import set_holding
@@ -177,7 +177,9 @@ def test_what_it_does_comes_from_another_simulator_s_law():
 
 def test_the_line_of_the_readme_names_the_stator_transients_and_closes_the_gap_on_the_deep_dip(tmp_path):
     only = "task.effects=[stator_transients,stator_resistance,dc_link_lag]"
-    done = tractexp("data=tibet", "task=discrepancy", only, "tracking.enabled=false", "hydra.run.dir=run", cwd=tmp_path)
+    done = run_command(
+        "data=tibet", "task=discrepancy", only, "tracking.enabled=false", "hydra.run.dir=run", cwd=tmp_path
+    )
     assert done.returncode == 0, done.stderr
     made = json.loads((tmp_path / "run" / "discrepancy.json").read_text())
     assert made["verdict"] == "named", done.stdout

@@ -8,23 +8,18 @@ import sys
 
 import numpy as np
 import pytest
+from command_line import run_command, start_command
 
 SHIPPED = "pkg://tractexp.data/tibet_50pct.csv"
 QUICK = ("optimizer.iterations=8", "optimizer.population=20", "tracking.enabled=false")
 EXACT = ("optimizer=multistart_least_squares", "optimizer.starts=2", "tracking.enabled=false")
 
 
-def tractexp(*arguments, cwd):
-    """Run `python -m tractexp` in a folder."""
-    command = [sys.executable, "-m", "tractexp", *arguments]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, env=os.environ | {"COLUMNS": "140"})
-
-
 @pytest.fixture(scope="module")
 def main_job(tmp_path_factory):
     """The README's main job in an empty folder, run once."""
     folder = tmp_path_factory.mktemp("main")
-    done = tractexp("optimizer=issa", "data=tibet_50pct", "hydra.run.dir=run", cwd=folder)
+    done = start_command("optimizer=issa", "data=tibet_50pct", "hydra.run.dir=run", cwd=folder)
     assert done.returncode == 0, done.stderr
     return folder, done
 
@@ -135,7 +130,7 @@ def test_the_logged_model_predicts_in_a_clean_process(main_job):
 
 def run_quickly(folder, *arguments):
     """result.json of a short run."""
-    done = tractexp(*QUICK, *arguments, "hydra.run.dir=run", cwd=folder)
+    done = run_command(*QUICK, *arguments, "hydra.run.dir=run", cwd=folder)
     assert done.returncode == 0, done.stderr
     return json.loads((folder / "run" / "result.json").read_text())
 
@@ -160,7 +155,7 @@ def test_a_held_out_event_is_judged_but_not_fitted(quick, tmp_path):
 
 
 def test_bounds_and_fixed_values_are_kept_and_a_value_at_its_bound_is_marked(tmp_path):
-    done = tractexp(*EXACT, "model.bounds.q_v=[0.2,0.4]", "model.fixed.C=0.85", "hydra.run.dir=run", cwd=tmp_path)
+    done = run_command(*EXACT, "model.bounds.q_v=[0.2,0.4]", "model.fixed.C=0.85", "hydra.run.dir=run", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     result = json.loads((tmp_path / "run" / "result.json").read_text())
     assert 0.2 <= result["parameters"]["q_v"] <= 0.4
@@ -171,7 +166,7 @@ def test_bounds_and_fixed_values_are_kept_and_a_value_at_its_bound_is_marked(tmp
 
 
 def test_a_budget_is_spent_to_the_last_simulation(tmp_path):
-    done = tractexp("budget=333", "tracking.enabled=false", "hydra.run.dir=run", cwd=tmp_path)
+    done = run_command("budget=333", "tracking.enabled=false", "hydra.run.dir=run", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     result = json.loads((tmp_path / "run" / "result.json").read_text())
     assert result["simulations"] == 333
@@ -205,7 +200,7 @@ def test_a_budget_is_spent_to_the_last_simulation(tmp_path):
     ],
 )
 def test_bad_input_gets_one_sentence_and_leaves_nothing_behind(arguments, sentence, tmp_path):
-    done = tractexp(*arguments, "hydra.run.dir=run", cwd=tmp_path)
+    done = run_command(*arguments, "hydra.run.dir=run", cwd=tmp_path)
     assert done.returncode != 0
     assert sentence in done.stderr
     assert done.stderr.startswith("tractexp: ")
@@ -218,7 +213,7 @@ def test_the_papers_values_get_the_reason_they_cannot_be_simulated(tmp_path):
     """Table 2, fixed all but one: no candidate has a steady state, and Eq. (3) is named."""
     paper = {"T_prime": 4.1354, "X_prime": 1.6654, "C": -2.6241, "M": 0.82, "T_m": 3.378, "p_v": 3.5867}
     fixed = [f"model.fixed.{name}={value}" for name, value in paper.items()]
-    done = tractexp(*QUICK, *fixed, "hydra.run.dir=run", cwd=tmp_path)
+    done = run_command(*QUICK, *fixed, "hydra.run.dir=run", cwd=tmp_path)
     assert done.returncode == 2
     assert "none of the" in done.stderr
     assert "parameter sets tried could be simulated" in done.stderr
@@ -247,22 +242,19 @@ def test_only_a_single_job_that_logs_starts_the_process_that_logs(arguments, ahe
     started = []
     monkeypatch.setattr(process, "start_ahead", lambda: started.append(True))
     monkeypatch.setattr(hydra, "main", lambda **_: lambda job: lambda: None)
-    monkeypatch.setattr(sys, "argv", ["tractexp", *arguments])
+    monkeypatch.setattr(sys, "argv", ["tractexp"])
     monkeypatch.setenv("HYDRA_FULL_ERROR", "0")  # which the command sets for itself
-    assert __main__._run() == 0
+    assert __main__._run(arguments) == 0
     assert bool(started) == ahead
 
 
 def test_a_traceback_is_shown_when_asked_for(tmp_path):
-    command = [sys.executable, "-m", "tractexp", "seed=-1"]
-    done = subprocess.run(
-        command, cwd=tmp_path, capture_output=True, text=True, env=os.environ | {"HYDRA_FULL_ERROR": "1"}
-    )
+    done = start_command("seed=-1", cwd=tmp_path, HYDRA_FULL_ERROR="1")
     assert "Traceback" in done.stderr
 
 
 def test_the_help_is_short_narrow_and_tells_what_each_task_does(tmp_path):
-    done = tractexp("--help", cwd=tmp_path)
+    done = run_command("--help", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     lines = done.stdout.splitlines()
     assert len(lines) < 60
@@ -283,7 +275,7 @@ def test_the_list_tells_every_choice_as_it_is_registered_and_composed(tmp_path):
     from tractexp.config import register
     from tractexp.plugin import CONF, discover
 
-    done = tractexp("list", cwd=tmp_path)
+    done = run_command("list", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert max(map(len, done.stdout.splitlines())) <= 100
     told = {}
@@ -302,7 +294,7 @@ def test_the_list_tells_every_choice_as_it_is_registered_and_composed(tmp_path):
 
 
 def test_the_list_of_a_group_begins_with_its_default_and_counts_as_people_do(tmp_path):
-    done = tractexp("list", "optimizer", "experiment", cwd=tmp_path)
+    done = run_command("list", "optimizer", "experiment", cwd=tmp_path)
     assert "optimizer: how the parameters are searched; issa by default\n  issa  " in done.stdout
     assert "ISSA without the Lévy flight of Eq. (16).\n" in done.stdout
     assert done.stdout.index("figure3 ") < done.stdout.index("figure10 ")
@@ -310,7 +302,7 @@ def test_the_list_of_a_group_begins_with_its_default_and_counts_as_people_do(tmp
 
 
 def test_a_group_that_is_none_gets_the_nearest_one(tmp_path):
-    done = tractexp("list", "optimisers", cwd=tmp_path)
+    done = run_command("list", "optimisers", cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr.startswith(
         "tractexp: there is no group 'optimisers'; did you mean 'optimizer'? Groups: connection, data, "
@@ -319,7 +311,7 @@ def test_a_group_that_is_none_gets_the_nearest_one(tmp_path):
 
 
 def test_a_name_given_for_a_group_gets_the_groups_that_have_it(tmp_path):
-    done = tractexp("list", "none", cwd=tmp_path)
+    done = run_command("list", "none", cwd=tmp_path)
     assert done.stderr == (
         "tractexp: there is no group 'none', but there is such a name in 'tractexp list model/motor' and"
         " 'tractexp list model/static'\n"
@@ -349,10 +341,7 @@ def test_plugins_of_others_are_listed_and_those_that_cannot_be_imported_say_why(
         (package / f"{name}.py").write_text(text)
     (package / "conf" / "optimizer").mkdir(parents=True)
     (package / "conf" / "optimizer" / "pso_slow.yaml").write_text("# PSO, slowed down.\ndefaults: [pso]\n")
-    command = [sys.executable, "-m", "tractexp", "list", "model/static", "optimizer"]
-    done = subprocess.run(
-        command, cwd=tmp_path, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(tmp_path)}
-    )
+    done = start_command("list", "model/static", "optimizer", cwd=tmp_path, PYTHONPATH=str(tmp_path))
     assert (done.returncode, done.stderr) == (0, "")
     told = " ".join(done.stdout.split())
     for part in (

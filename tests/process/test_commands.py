@@ -15,8 +15,8 @@ import numpy as np
 import pandas
 import pytest
 import test_cev
+from command_line import run_command
 from made_recordings import constant, recording
-from test_cli import tractexp as command_line
 from test_settings import check, hydra  # noqa: F401  a fixture of this module, too
 
 import tractexp
@@ -72,7 +72,7 @@ def desk(tmp_path_factory):
     waveforms(folder)
     (folder / "report.cev").write_bytes("\r\n".join(test_cev.report()).encode("latin-1"))
     quick = ("optimizer=multistart_least_squares", "optimizer.starts=2", "tracking.enabled=false", "hydra.run.dir=RUN")
-    done = command_line("data=csv", "data.train=[dip1.csv]", *quick, cwd=folder)
+    done = run_command("data=csv", "data.train=[dip1.csv]", *quick, cwd=folder)
     assert done.returncode == 0, done.stderr
     return folder
 
@@ -130,7 +130,7 @@ def test_a_quick_command_runs(arguments, desk):
     quiet = ["tracking.enabled=false"] * any(
         "=" in word and word[0] != "-" for word in arguments if "look" not in arguments
     )
-    done = command_line(*arguments, *quiet, cwd=desk)
+    done = run_command(*arguments, *quiet, cwd=desk)
     assert done.returncode == 0, done.stderr
     assert done.stdout
 
@@ -142,7 +142,7 @@ def test_the_command_of_the_extended_model_runs_as_a_page_tells_it(desk):
     (desk / "CONF" / "model" / "extended.yaml").write_text(
         "defaults:\n  - third_order_exponential\n  - _self_\neffects: [stator_resistance]\n"
     )
-    done = command_line(*told, "--cfg", "job", "--package", "model", cwd=desk)
+    done = run_command(*told, "--cfg", "job", "--package", "model", cwd=desk)
     assert done.returncode == 0, done.stderr
     assert "stator_resistance" in done.stdout
 
@@ -150,7 +150,7 @@ def test_the_command_of_the_extended_model_runs_as_a_page_tells_it(desk):
 def test_completion_is_a_line_that_a_shell_takes(desk):
     (told,) = [c.words for c in SHOWN if "-sc" in c.line]
     inside = re.fullmatch(r"\$\(tractexp (.*)\)", told[1])[1].split()
-    done = command_line(*inside, cwd=desk)
+    done = run_command(*inside, cwd=desk)
     assert subprocess.run(["bash", "-n"], input=done.stdout, text=True).returncode == 0
     assert done.stdout.strip()
 
@@ -158,7 +158,7 @@ def test_completion_is_a_line_that_a_shell_takes(desk):
 def test_the_page_of_the_log_is_told_how_to_open():
     for told in (c.arguments for c in ALL if "ui" in (c.arguments or [])):
         options = {word for word in told if word.startswith("--")}
-        help_text = command_line("ui", "--help", cwd=ROOT).stdout
+        help_text = run_command("ui", "--help", cwd=ROOT).stdout
         assert all(option in help_text for option in options)
 
 

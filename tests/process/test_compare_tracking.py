@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import run_command
 from test_compare import samples, write_sweep
 
 from tractexp import tracking
@@ -69,9 +70,8 @@ def filled(tmp_path_factory):
     return folder, uri, parent, runs
 
 
-def tractexp(*arguments, cwd):
-    command = [sys.executable, "-m", "tractexp", "task=compare", *arguments]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, env=os.environ | {"COLUMNS": "140"})
+def compare_command(*arguments, cwd):
+    return run_command("task=compare", *arguments, cwd=cwd)
 
 
 def test_runs_come_back_from_mlflow_as_they_went_in(filled):
@@ -106,7 +106,7 @@ def test_more_runs_than_a_page_holds_come_all_and_oldest_first(filled, monkeypat
 
 def test_the_command_compares_what_a_filter_finds_and_logs_the_page(filled):
     folder, uri, _, _ = filled
-    done = tractexp("task.filter=\"tags.data = 'tibet_50pct'\"", "hydra.run.dir=out", cwd=folder)
+    done = compare_command("task.filter=\"tags.data = 'tibet_50pct'\"", "hydra.run.dir=out", cwd=folder)
     assert (done.returncode, done.stderr) == (0, "")
     assert "issa has the lowest median objective; it is significantly better than ssa." in done.stdout
     (run,) = find(uri, "tags.task = 'compare'")
@@ -121,7 +121,7 @@ def test_the_page_of_a_sweep_is_added_to_the_run_of_the_sweep(filled):
     folder, uri, parent, runs = filled
     write_sweep(folder / "swept", runs)
     (folder / "swept" / "sweep.json").write_text(json.dumps({"run": parent}))
-    done = tractexp("task.sweep=swept", "hydra.run.dir=out2", cwd=folder)
+    done = compare_command("task.sweep=swept", "hydra.run.dir=out2", cwd=folder)
     assert (done.returncode, done.stderr) == (0, "")
     assert "logged on the run of the sweep" in done.stdout
     from mlflow import MlflowClient
@@ -140,7 +140,7 @@ def test_the_page_of_a_sweep_is_added_to_the_run_of_the_sweep(filled):
     ],
 )  # fmt: skip
 def test_a_filter_that_finds_nothing_is_one_sentence(filled, arguments, sentence):
-    done = tractexp(*arguments, cwd=filled[0])
+    done = compare_command(*arguments, cwd=filled[0])
     assert done.returncode == 2
     assert sentence in done.stderr
     assert done.stderr.count("\n") == 1
@@ -237,7 +237,7 @@ def test_a_page_logged_elsewhere_is_told_how_to_be_seen(tmp_path):
         for n in (30, 50) for r in samples({"issa": 1.0}, seeds=range(6))
     ]  # fmt: skip
     write_sweep(tmp_path / "swept", runs)
-    done = tractexp("task.sweep=swept", "hydra.run.dir=out", "tracking.uri=sqlite:///x.db", cwd=tmp_path)
+    done = compare_command("task.sweep=swept", "hydra.run.dir=out", "tracking.uri=sqlite:///x.db", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert "to see it: tractexp ui --uri sqlite:///x.db" in done.stdout
     (run,) = find(tracking.address(f"sqlite:///{tmp_path}/x.db"), "tags.task = 'compare'")

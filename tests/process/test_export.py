@@ -3,14 +3,12 @@
 import dataclasses
 import itertools
 import json
-import os
 import re
-import subprocess
-import sys
 
 import andes_check
 import numpy as np
 import pytest
+from command_line import run_command
 from scipy.integrate import solve_ivp
 from scipy.interpolate import Akima1DInterpolator
 
@@ -223,16 +221,10 @@ def test_every_format_says_how_it_reads_its_standard():
         assert "Departures:" in cls.__doc__
 
 
-def tractexp(*arguments, cwd):
-    """Run `python -m tractexp` in a folder."""
-    command = [sys.executable, "-m", "tractexp", *arguments]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, env=os.environ | {"COLUMNS": "140"})
-
-
 def test_the_command_writes_one_file_or_nothing(tmp_path):
     identified().result.write(tmp_path / "result.json")
     for name, suffix in (("andes", "json"), ("psse_dyr", "dyr"), ("modelica", "mo")):
-        done = tractexp("task=export", "task.parameters=result.json", f"task.format={name}", f"hydra.run.dir={name}",
+        done = run_command("task=export", "task.parameters=result.json", f"task.format={name}", f"hydra.run.dir={name}",
                         cwd=tmp_path)  # fmt: skip
         assert done.returncode == 0, done.stderr
         assert {p.name for p in (tmp_path / name).iterdir()} == {".hydra", f"load.{suffix}"}
@@ -244,7 +236,7 @@ def test_the_command_writes_one_file_or_nothing(tmp_path):
         "task.power=0": "task.power=0",
     }
     for argument, sentence in refused.items():
-        done = tractexp("task=export", "task.parameters=result.json", argument, "hydra.run.dir=none", cwd=tmp_path)
+        done = run_command("task=export", "task.parameters=result.json", argument, "hydra.run.dir=none", cwd=tmp_path)
         assert done.returncode == 2
         assert sentence in done.stderr
         assert done.stderr.count("\n") == 1
@@ -279,6 +271,6 @@ def test_what_a_model_is_not_good_for_is_said_when_it_is_exported(tmp_path):
     for grade, told in (("adequate", False), ("wrong_model", True)):
         graded = dataclasses.replace(good, adequacy={"grade": grade, "sentence": sentence, "p": None})
         graded.write(tmp_path / "result.json")
-        done = tractexp("task=export", "task.parameters=result.json", f"hydra.run.dir={grade}", cwd=tmp_path)
+        done = run_command("task=export", "task.parameters=result.json", f"hydra.run.dir={grade}", cwd=tmp_path)
         assert done.returncode == 0, done.stderr
         assert (f"mind: {sentence}" in done.stdout) == told

@@ -1,12 +1,10 @@
 """`task=simulate` as a person uses it, and every pair of motor and static load as a predictor."""
 
 import itertools
-import os
-import subprocess
-import sys
 
 import numpy as np
 import pytest
+from command_line import run_command
 
 from tractexp.api.simulate import chosen
 from tractexp.errors import UserError
@@ -19,10 +17,8 @@ STATICS = ("exponential", "zip", "constant_impedance", "constant_power", "expone
 PAIRS = [pair for pair in itertools.product(MOTORS, STATICS) if pair != ("none", "none")]
 
 
-def tractexp(*arguments, cwd):
-    """Run `python -m tractexp` in a folder."""
-    command = [sys.executable, "-m", "tractexp", *arguments, "tracking.enabled=false"]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, env=os.environ | {"COLUMNS": "140"})
+def simulate_command(*arguments, cwd):
+    return run_command("task=simulate", *arguments, "tracking.enabled=false", cwd=cwd)
 
 
 def result(motor="electromechanical", static="exponential", parameters=None, effects=()):
@@ -46,7 +42,7 @@ def read(path):
 
 
 def test_a_given_dip_is_played_as_described(saved, tmp_path):
-    done = tractexp("task=simulate", f"task.parameters={saved}", "task.depth=0.4", "task.duration=0.2", "task.rate=500",
+    done = simulate_command(f"task.parameters={saved}", "task.depth=0.4", "task.duration=0.2", "task.rate=500",
                     "task.length=2", "hydra.run.dir=run", cwd=tmp_path)  # fmt: skip
     assert done.returncode == 0, done.stderr
     rows = read(tmp_path / "run" / "response.csv")
@@ -64,7 +60,7 @@ def test_a_given_dip_is_played_as_described(saved, tmp_path):
 
 def test_the_dip_is_the_prediction_of_the_same_result(saved, tmp_path):
     """With a sudden fall: a prediction takes U_0 from the samples before the dip, none of which has begun to fall."""
-    done = tractexp("task=simulate", f"task.parameters={saved}", "task.depth=0.4", "task.fall=0", "hydra.run.dir=run",
+    done = simulate_command(f"task.parameters={saved}", "task.depth=0.4", "task.fall=0", "hydra.run.dir=run",
                     cwd=tmp_path)  # fmt: skip
     assert done.returncode == 0, done.stderr
     rows = read(tmp_path / "run" / "response.csv")
@@ -74,7 +70,9 @@ def test_the_dip_is_the_prediction_of_the_same_result(saved, tmp_path):
 
 
 def test_recorded_events_are_played_and_judged(saved, tmp_path):
-    done = tractexp("task=simulate", f"task.parameters={saved}", "data=tibet_30pct", "hydra.run.dir=run", cwd=tmp_path)
+    done = simulate_command(
+        "task=simulate", f"task.parameters={saved}", "data=tibet_30pct", "hydra.run.dir=run", cwd=tmp_path
+    )
     assert done.returncode == 0, done.stderr
     rows = read(tmp_path / "run" / "response.csv")
     assert list(rows.dtype.names) == ["t", "U", "P", "Q", "P_measured", "Q_measured"]
@@ -87,7 +85,7 @@ def test_values_without_a_result_and_a_value_in_place_of_the_results(saved, tmp_
     runs = {"alone": [f"task.values={given}"], "changed": [f"task.parameters={saved}", "task.values.T_m=0.3"]}
     runs["same"] = [f"task.parameters={saved}"]
     for name, arguments in runs.items():
-        done = tractexp("task=simulate", *arguments, "task.depth=0.4", "task.P0=1", "task.Q0=0.6",
+        done = simulate_command(*arguments, "task.depth=0.4", "task.P0=1", "task.Q0=0.6",
                         f"hydra.run.dir={name}", cwd=tmp_path)  # fmt: skip
         assert done.returncode == 0, done.stderr
     alone, changed, same = (read(tmp_path / name / "response.csv")["P"] for name in ("alone", "changed", "same"))
@@ -106,7 +104,9 @@ PAPER = {  # Table 3
 def test_the_papers_table_3_gets_the_sentence_that_explains_it(column, tmp_path):
     values, ratio = PAPER[column]
     given = "{" + ", ".join(f"{name}: {value}" for name, value in zip(TRUTH, values, strict=True)) + "}"
-    done = tractexp("task=simulate", f"task.values={given}", "task.depth=0.5", "hydra.run.dir=run", cwd=tmp_path)
+    done = simulate_command(
+        "task=simulate", f"task.values={given}", "task.depth=0.5", "hydra.run.dir=run", cwd=tmp_path
+    )
     assert done.returncode == 2
     assert f"Eq. (3) needs |2 T_m X'/(C U0²)| at most 1 and it is {ratio}" in done.stderr
     assert done.stderr.count("\n") == 1
@@ -125,7 +125,7 @@ def test_the_papers_table_3_gets_the_sentence_that_explains_it(column, tmp_path)
     ],
 )
 def test_bad_input_gets_one_sentence_and_leaves_nothing_behind(arguments, sentence, tmp_path):
-    done = tractexp("task=simulate", *arguments, "hydra.run.dir=run", cwd=tmp_path)
+    done = simulate_command(*arguments, "hydra.run.dir=run", cwd=tmp_path)
     assert done.returncode == 2
     assert sentence in done.stderr
     assert done.stderr.count("\n") == 1

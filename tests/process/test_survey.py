@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import pandas
 import pytest
+from command_line import run_command
 from made_recordings import constant, motor_dip, recording
 from test_chart import BROWSER, Worked, drawn
-from test_cli import tractexp as command_line
 
 import tractexp
 from tractexp.api import surveying
@@ -215,14 +215,14 @@ def planted(tmp_path_factory):
 
 def test_the_events_that_tell_most_are_the_deep_ones_and_one_command_fits_them(planted, tmp_path):
     asked = ("task=survey", f"data.path={planted}", "task.informative=2", "tracking.enabled=false")
-    done = command_line(*asked, cwd=tmp_path)
+    done = run_command(*asked, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     (folder,) = (tmp_path / "outputs" / "surveys").iterdir()
     content = json.loads((folder / "survey.json").read_text())
     assert {each["event"] for each in content["informative"]} == {"deep 1.cfg#1.1", "deep 2.cfg#1.1"}
     assert content["command"] in done.stdout
     words = shlex.split(content["command"])
-    fit = command_line(
+    fit = run_command(
         *words[1:], "optimizer=multistart_least_squares", "optimizer.starts=2", "tracking.enabled=false",
         "hydra.run.dir=run", cwd=tmp_path,
     )  # fmt: skip
@@ -230,7 +230,7 @@ def test_the_events_that_tell_most_are_the_deep_ones_and_one_command_fits_them(p
     result = json.loads((tmp_path / "run" / "result.json").read_text())
     assert [e["name"] for e in result["events"]] == [each["event"] for each in content["informative"]]
     assert max(e["epsilon_p"] for e in result["events"]) < 0.01
-    again = command_line(*asked, cwd=tmp_path)
+    again = run_command(*asked, cwd=tmp_path)
     assert "5 files" in again.stdout
     assert "0 of them new or changed" in again.stdout
 
@@ -279,7 +279,7 @@ def test_an_event_that_is_not_there_is_refused(field, train, sentence):
     ],
 )
 def test_what_cannot_be_surveyed_is_refused_in_a_sentence(tmp_path, arguments, sentence):
-    done = command_line("task=survey", *arguments, cwd=tmp_path)
+    done = run_command("task=survey", *arguments, cwd=tmp_path)
     assert done.returncode == 2
     assert sentence in done.stderr
     assert "Traceback" not in done.stderr

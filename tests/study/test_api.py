@@ -8,6 +8,7 @@ import sys
 
 import numpy as np
 import pytest
+from command_line import run_command
 from conftest import MOTOR
 from test_readers_comtrade import waveforms, write
 
@@ -182,13 +183,12 @@ def test_the_command_and_the_call_give_the_same_numbers(resistive_dips, tmp_path
         objective={"name": "squares", "weight_P": 2.0},
         optimizer="issa_polish", progress=False, **settings,
     )  # fmt: skip
-    command = [
-        sys.executable, "-m", "tractexp", "data=csv", f"data.train=[{resistive_dips[0]},{resistive_dips[1]}]",
+    done = run_command(
+        "data=csv", f"data.train=[{resistive_dips[0]},{resistive_dips[1]}]",
         f"data.validate=[{resistive_dips[2]}]", "objective.weight_P=2", "optimizer=issa_polish", "seed=2", "budget=600",
         "model.per_event=[T_m]", "model.bounds.C=[0.5,0.95]", "model.fixed.q_v=3", "task.figures=false",
-        "tracking.enabled=false", "hydra.run.dir=run",
-    ]  # fmt: skip
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+        "tracking.enabled=false", "hydra.run.dir=run", cwd=tmp_path,
+    )  # fmt: skip
     assert done.returncode == 0, done.stderr
     told = tractexp.load(tmp_path / "run" / "result.json")
     assert same(told, call)

@@ -4,14 +4,13 @@ import itertools
 import json
 import os
 import re
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from command_line import run_command
 from test_report_page import read
 
 from tractexp.comparison import claims, floor, load
@@ -583,10 +582,8 @@ def write_sweep(folder: Path, runs) -> Path:
     return folder
 
 
-def tractexp(*arguments, cwd, tracking=False):
-    command = [sys.executable, "-m", "tractexp", "task=compare", *arguments]
-    command += [] if tracking else ["tracking.enabled=false"]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, env=os.environ | {"COLUMNS": "140"})
+def compare_command(*arguments, cwd):
+    return run_command("task=compare", *arguments, "tracking.enabled=false", cwd=cwd)
 
 
 def test_a_sweep_is_read_back_as_it_was_run(tmp_path):
@@ -633,7 +630,7 @@ def swept(tmp_path_factory):
     for path in older.iterdir():
         os.utime(path, (1, 1))
     write_sweep(folder / "outputs" / "sweeps" / "newer", runs)
-    return folder, tractexp("hydra.run.dir=out", cwd=folder)
+    return folder, compare_command("hydra.run.dir=out", cwd=folder)
 
 
 def test_the_command_compares_the_newest_sweep(swept):
@@ -695,7 +692,7 @@ def test_bad_input_is_one_sentence(tmp_path, arguments, sentence):
     (tmp_path / "empty" / "0").mkdir(parents=True)
     runs = samples({"a": 1.0}, seeds=range(2))
     write_sweep(tmp_path / "mixed", [*runs, *(replace(r, data="tibet_30pct") for r in runs)])
-    done = tractexp(*arguments, cwd=tmp_path)
+    done = compare_command(*arguments, cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr.startswith("tractexp: ")
     assert sentence in done.stderr
@@ -705,7 +702,7 @@ def test_bad_input_is_one_sentence(tmp_path, arguments, sentence):
 
 def test_two_seeds_are_compared_without_a_test_and_say_so(tmp_path):
     write_sweep(tmp_path / "few", samples({"a": 1.0, "b": 2.0}, seeds=range(2)))
-    done = tractexp("task.sweep=few", "hydra.run.dir=out", cwd=tmp_path)
+    done = compare_command("task.sweep=few", "hydra.run.dir=out", cwd=tmp_path)
     assert done.returncode == 0
     assert "a and b have 2 in common, and the Wilcoxon signed-rank test needs at least 6" in done.stdout
     assert (tmp_path / "out" / "comparison.html").read_text().count('class="chart"') == 4

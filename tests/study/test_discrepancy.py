@@ -11,8 +11,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from command_line import run_command
 from scipy.special import chdtrc
-from test_cli import tractexp
 
 from hidden_effects import Case, Noise, make, write
 from tractexp.discrepancy import adequacy
@@ -645,7 +645,7 @@ def test_the_command_tells_the_story_and_its_extended_model_runs_at_once(tmp_pat
     write(case, 3, tmp_path)
     only = "task.effects=[stator_resistance,speed_dependent_torque]"
     data = ["data=csv", "data.train=[event1.csv]", "data.validate=[event2.csv]", "tracking.enabled=false"]
-    done = tractexp("task=discrepancy", only, *data, "hydra.run.dir=run", cwd=tmp_path)
+    done = run_command("task=discrepancy", only, *data, "hydra.run.dir=run", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     for part in ("noise:", "verdict: NAMED stator_resistance", "where:", "held out", "discrepancy.html"):
         assert part in done.stdout, part
@@ -669,7 +669,7 @@ def test_the_command_tells_the_story_and_its_extended_model_runs_at_once(tmp_pat
     assert lines[first + 2].startswith("  R_s = 0.0")
     assert not list((tmp_path / "run").glob("*.svg"))
     quick = ["optimizer=multistart_least_squares", "optimizer.starts=2", "hydra.run.dir=again"]
-    done = tractexp("--config-dir", str(Path("run") / "conf"), "model=extended", *data, *quick, cwd=tmp_path)
+    done = run_command("--config-dir", str(Path("run") / "conf"), "model=extended", *data, *quick, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "R_s" in json.loads((tmp_path / "again" / "result.json").read_text())["parameters"]
 
@@ -680,7 +680,7 @@ def test_on_a_real_record_it_says_that_it_does_not_know(shared_data, tmp_path):
     data = ["data=comtrade", f"data.path={record}", "data.voltages=[4,5,6]", "data.currents=[8,9,10]", "data.train=[1]",
             "data.validate=[2]", "tracking.enabled=false"]  # fmt: skip
     only = "task.effects=[exponential_recovery,static_var_compensator]"
-    done = tractexp("task=discrepancy", only, *data, "hydra.run.dir=run", cwd=tmp_path)
+    done = run_command("task=discrepancy", only, *data, "hydra.run.dir=run", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     made = json.loads((tmp_path / "run" / "discrepancy.json").read_text())
     assert made["verdict"] == "unexplained"

@@ -1,16 +1,14 @@
 """The paper's experiments: numbers by hand, planted verdicts, every experiment and part, refusals."""
 
 import json
-import os
 import re
-import subprocess
-import sys
 from dataclasses import replace
 from itertools import product
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from command_line import run_command, start_command
 
 from tractexp.api.paper import PARTS
 from tractexp.errors import UserError
@@ -26,16 +24,11 @@ EXPERIMENTS = [
 ]  # fmt: skip
 
 
-def tractexp(*arguments, cwd):
-    command = [sys.executable, "-m", "tractexp", *arguments]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, env=os.environ | {"COLUMNS": "140"})
-
-
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
     """All parts with one seed and few simulations: (folder, what was printed)."""
     folder = tmp_path_factory.mktemp("paper")
-    done = tractexp(*QUICK, "hydra.run.dir=run", "task.docs=docs/paper.md", cwd=folder)
+    done = start_command(*QUICK, "hydra.run.dir=run", "task.docs=docs/paper.md", cwd=folder)
     assert done.returncode == 0, done.stderr
     return folder, done.stdout
 
@@ -43,7 +36,7 @@ def page(tmp_path_factory):
 @pytest.fixture(scope="module")
 def generalised(tmp_path_factory):
     folder = tmp_path_factory.mktemp("generalise")
-    done = tractexp(
+    done = start_command(
         "task=generalise", "task.optimizers=[pso]", "budget=400", "tracking.enabled=false", "hydra.run.dir=run",
         cwd=folder,
     )  # fmt: skip
@@ -703,7 +696,7 @@ def test_markdown_escapes_what_would_be_markup():
     ],
 )
 def test_what_cannot_be_done_is_refused_in_a_sentence(arguments, sentence, tmp_path):
-    done = tractexp(*arguments, "tracking.enabled=false", cwd=tmp_path)
+    done = run_command(*arguments, "tracking.enabled=false", cwd=tmp_path)
     assert done.returncode == 2
     assert sentence in done.stderr
     assert "Traceback" not in done.stderr
@@ -711,7 +704,7 @@ def test_what_cannot_be_done_is_refused_in_a_sentence(arguments, sentence, tmp_p
 
 
 def test_a_table_that_needs_no_held_out_dip_is_made_without_one(tmp_path):
-    done = tractexp(
+    done = run_command(
         "experiment=figure6", "data=tibet_30pct", "hydra.run.dir=run", "tracking.enabled=false", cwd=tmp_path
     )
     assert done.returncode == 0, done.stderr

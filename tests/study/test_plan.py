@@ -2,15 +2,13 @@
 
 import itertools
 import json
-import os
 import re
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import uncertainty as study
+from command_line import run_command
 from test_chart import unpacked
 from test_report_page import read
 
@@ -164,13 +162,12 @@ def test_marks_of_a_logarithmic_axis_are_few_and_round():
     assert marks(0.9, 12.0) == [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0]
 
 
-def tractexp(*arguments, cwd):
-    command = [sys.executable, "-m", "tractexp", "tracking.enabled=false", *arguments]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, env=os.environ | {"COLUMNS": "160"})
+def plan_command(*arguments, cwd):
+    return run_command("tracking.enabled=false", *arguments, cwd=cwd, COLUMNS="160")
 
 
 def test_the_plan_task_answers_with_a_number_and_a_figure(tmp_path):
-    done = tractexp("task=plan", "task.parameter=M", "task.within=0.05", "hydra.run.dir=run", cwd=tmp_path)
+    done = plan_command("task=plan", "task.parameter=M", "task.within=0.05", "hydra.run.dir=run", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     content = json.loads((tmp_path / "run" / "plan.json").read_text())
     assert 0.05 < content["depth_needed"] < 0.5
@@ -208,7 +205,7 @@ def test_the_plan_task_answers_with_a_number_and_a_figure(tmp_path):
 def test_the_page_of_a_plan_ranks_the_archive(tmp_path):
     shipped = ",".join(f"pkg://tractexp.data/tibet_{depth}pct.csv" for depth in (30, 50, 65))
     arguments = ("data=csv", f"data.train=[{shipped}]", "task.within=1e-4", "task.least=0.3", "model.fixed.q_v=3")
-    done = tractexp("task=plan", "task.values=default", *arguments, "hydra.run.dir=run", cwd=tmp_path)
+    done = plan_command("task=plan", "task.values=default", *arguments, "hydra.run.dir=run", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     content, page = json.loads((tmp_path / "run" / "plan.json").read_text()), read(tmp_path / "run" / "plan.html")
     assert content["depth_needed"] is None
@@ -235,7 +232,7 @@ def test_the_page_of_a_plan_ranks_the_archive(tmp_path):
     ],
 )
 def test_the_plan_task_refuses_bad_input_in_one_sentence(arguments, sentence, tmp_path):
-    done = tractexp("task=plan", *arguments, "hydra.run.dir=run", cwd=tmp_path)
+    done = plan_command("task=plan", *arguments, "hydra.run.dir=run", cwd=tmp_path)
     assert done.returncode != 0
     assert sentence in done.stderr
     assert done.stderr.count("\n") == 1, done.stderr

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_cli import tractexp
+from command_line import run_command
 from test_report_page import read
 
 from tractexp.comparison import bbob
@@ -208,7 +208,7 @@ TINY = ("task=benchmark", "task.functions=[1,15]", "task.dimensions=[2]", "task.
 
 
 def test_the_task_runs_from_the_command_line(ioh, tmp_path):
-    done = tractexp(*TINY, "optimizer=issa_no_levy", "task.against=[pso]", cwd=tmp_path)
+    done = run_command(*TINY, "optimizer=issa_no_levy", "task.against=[pso]", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     for part in ("issa_no_levy", "pso", " f1 ", " f15 ", "of 2", "benchmark.html", "benchmark.json"):
         assert part in done.stdout, part
@@ -228,7 +228,7 @@ def test_the_task_runs_from_the_command_line(ioh, tmp_path):
     ],
 )
 def test_what_the_task_cannot_use_is_refused(ioh, tmp_path, extra, sentence):
-    done = tractexp(*TINY, "task.against=[]", extra, cwd=tmp_path)
+    done = run_command(*TINY, "task.against=[]", extra, cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr.startswith(f"tractexp: {sentence}")
     assert not (tmp_path / "run").exists()

@@ -1,12 +1,11 @@
 """Conversion: what is written and read again is the same, to the last bit or to what the format can hold."""
 
 import json
-import subprocess
-import sys
 from datetime import datetime
 
 import numpy as np
 import pytest
+from command_line import run_command
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -237,9 +236,8 @@ class TestCOMTRADE:
 
 def test_on_the_command_line(tmp_path):
     write_record(a_record(), tmp_path / "dip.csv")
-    command = [sys.executable, "-m", "tractexp", "task=convert", "task.to=parquet", "data=csv", "data.path=dip.csv",
-               "hydra.run.dir=out"]  # fmt: skip
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    asked = ("task=convert", "task.to=parquet", "data=csv", "data.path=dip.csv", "hydra.run.dir=out")
+    done = run_command(*asked, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "there_dip2.parquet: 200 samples of t, U, P, Q, f, U2" in done.stdout
     same_record(a_record(), again(tmp_path / "out" / "there_dip2.parquet"))

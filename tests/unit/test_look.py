@@ -7,8 +7,8 @@ import shlex
 import numpy as np
 import pandas
 import pytest
+from command_line import run_command
 from made_recordings import BASE, RATE, constant, recording, waves
-from test_cli import tractexp as command_line
 
 import tractexp
 import tractexp.progress
@@ -73,7 +73,7 @@ def test_every_command_runs_as_it_stands_and_reads_what_was_shown(looked, statio
             continue
         words = shlex.split(feeder["command"])
         assert words[0] == "tractexp"
-        done = command_line(
+        done = run_command(
             *words[1:], "optimizer=random_search", "budget=50", "tracking.enabled=false", "hydra.run.dir=run",
             cwd=tmp_path,
         )  # fmt: skip
@@ -103,7 +103,7 @@ def test_a_short_dip_is_to_be_fitted_in_waves_and_that_command_runs_too(tmp_path
     short = saved(tmp_path / "short.cfg", constant(start=0.5, end=0.56))
     (command,) = tractexp.look(short).commands
     assert command.endswith(" domain=waves")
-    done = command_line(
+    done = run_command(
         *shlex.split(command)[1:], "model/motor=none", "model/static=branch", "optimizer=random_search", "budget=50",
         "tracking.enabled=false", cwd=tmp_path,
     )  # fmt: skip
@@ -148,7 +148,7 @@ def test_a_long_table_is_one_load_whose_dips_are_numbered(resistive_dips, tmp_pa
     np.testing.assert_allclose([e["depth"] for e in made.events if e["worth"]], [0.3, 0.5, 0.4], atol=0.01)
     words = shlex.split(made.commands[0])
     assert words[-2:] == ["data.train=[1]", "data.validate=[2,3]"]
-    done = command_line(
+    done = run_command(
         *words[1:], "optimizer=random_search", "budget=50", "tracking.enabled=false", "hydra.run.dir=run", cwd=tmp_path
     )
     assert done.returncode == 0, done.stderr
@@ -210,17 +210,17 @@ def test_a_page_of_ten_seconds_of_twenty_channels_is_small(tmp_path):
 
 
 def test_the_command_line_prints_all_of_it_and_says_where(station, tmp_path):
-    done = command_line("look", str(station), cwd=tmp_path)
+    done = run_command("look", str(station), cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     for part in ("North", "3200 Hz", "UA", "Q2", "dip", "worth fitting", "to fit it:", "data=comtrade", "look.html"):
         assert part in done.stdout, part
     (page,) = (tmp_path / "outputs" / "looks").rglob("look.html")
     assert str(page.relative_to(tmp_path)) in done.stdout
-    named = command_line(
+    named = run_command(
         "look", str(station), "voltages=[0,1,2]", "data.currents=[3,4,5]", "--folder", "x", cwd=tmp_path
     )
     assert named.stdout.count("to fit it:") == 1
-    refused = command_line("look", "absent.cfg", cwd=tmp_path)
+    refused = run_command("look", "absent.cfg", cwd=tmp_path)
     assert refused.returncode == 2
     assert "Traceback" not in refused.stderr
     assert "absent.cfg" in refused.stderr

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_compare import SEEDS, SWITCHES, TARGETS, ablation_runs, samples, subsets, tractexp, write_sweep
+from test_compare import SEEDS, SWITCHES, TARGETS, ablation_runs, compare_command, samples, subsets, write_sweep
 
 from tractexp.api import judging
 from tractexp.comparison import overall_claims
@@ -145,7 +145,7 @@ def folder(tmp_path):
 
 
 def test_the_command_compares_several_records_on_one_page(folder):
-    done = tractexp("task.sweep=sweep", "hydra.run.dir=out", cwd=folder.parent)
+    done = compare_command("task.sweep=sweep", "hydra.run.dir=out", cwd=folder.parent)
     assert done.returncode == 0, done.stderr
     told = json.loads((folder / "comparison.json").read_text())
     assert [len(p["variants"]) for p in told["problems"].values()] == [2, 2]

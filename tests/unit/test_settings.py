@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from test_cli import tractexp
+from command_line import run_command, start_command
 
 from tractexp.choices import CONF
 from tractexp.config import register
@@ -129,9 +129,10 @@ def test_every_shipped_experiment_is_read_by_its_task(name):
 )
 def test_an_experiment_that_sets_what_its_task_ignores_is_refused(tmp_path, lines, sentence):
     (tmp_path / "conf" / "experiment").mkdir(parents=True)
-    (tmp_path / "conf" / "experiment" / "mine.yaml").write_text(f"# @package _global_\n{lines}\n")
-    told = ("--config-dir", "conf", "experiment=mine", "task=discrepancy", "hydra.run.dir=run")
-    done = tractexp(*told, "tracking.enabled=false", cwd=tmp_path)
+    name = tmp_path.name  # of its own, as what an experiment sets is kept by its name
+    (tmp_path / "conf" / "experiment" / f"{name}.yaml").write_text(f"# @package _global_\n{lines}\n")
+    told = ("--config-dir", "conf", f"experiment={name}", "task=discrepancy", "hydra.run.dir=run")
+    done = run_command(*told, "tracking.enabled=false", cwd=tmp_path)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith(f"tractexp: {sentence}")
     assert done.stderr.count("\n") == 1
@@ -139,7 +140,7 @@ def test_an_experiment_that_sets_what_its_task_ignores_is_refused(tmp_path, line
 
 
 def test_a_sweep_over_what_its_task_ignores_is_refused_before_its_first_job(tmp_path):
-    done = tractexp("-m", "task=simulate", "task.depth=0.4", "optimizer=pso,ssa", cwd=tmp_path)
+    done = run_command("-m", "task=simulate", "task.depth=0.4", "optimizer=pso,ssa", cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr == "tractexp: optimizer=pso is not read by task=simulate; leave it out\n"
     assert not [path for path in tmp_path.rglob("*") if path.is_file() and path.name != "multirun.yaml"]
@@ -148,6 +149,6 @@ def test_a_sweep_over_what_its_task_ignores_is_refused_before_its_first_job(tmp_
 def test_a_worker_refuses_what_only_the_settings_of_its_task_make_needless(tmp_path):
     """With a depth no record is played: known once the task is built, which is in the job."""
     sweep = ("-m", "task=simulate", "task.depth=0.4", "data=tibet_30pct,tibet_50pct", "tracking.enabled=false")
-    done = tractexp(*sweep, "hydra.launcher.n_jobs=1", cwd=tmp_path)
+    done = start_command(*sweep, "hydra.launcher.n_jobs=1", cwd=tmp_path)
     assert done.returncode == 2
     assert "data=tibet_30pct is not read by task=simulate; with task.depth no record is played" in done.stdout
