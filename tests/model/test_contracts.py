@@ -21,6 +21,8 @@ from tractexp.plugin import get
 from tractexp.record.phasor import Averager
 from tractexp.testing import channels, loads, readers, searches
 
+pytestmark = pytest.mark.usefixtures("registry_as_it_was")
+
 TIBET = [f"pkg://tractexp.data/tibet_{depth}pct.csv" for depth in (50, 30)]
 SAMPLES = {"csv": [{"train": TIBET[:1], "validate": TIBET[1:]}]}
 

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import uncertainty as study
-from test_chart import unpacked
-from test_report_page import read
+from pages import read, unpacked
 
 from tractexp.errors import UserError
 from tractexp.identification.posterior import Posterior

@@ -217,7 +217,7 @@ def test_every_command_is_seen_to():
 
 @pytest.mark.parametrize("page", ["README.md", "docs/records.md", "docs/model.md"])
 def test_the_python_of_a_page_runs_and_has_what_its_comments_name(page, desk, monkeypatch):
-    """That of docs/python.md is run by `test_docs.py`, that of docs/plugins.md by `test_plugins.py`."""
+    """That of docs/python.md is run by `test_docs_run.py`, that of docs/plugins.md by `test_plugins.py`."""
     monkeypatch.chdir(desk)
     names = {}
     for example in re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(encoding="utf-8"), flags=re.DOTALL):

@@ -22,9 +22,11 @@ from tractexp.model.parts import Effect, Measurement, Motor, Static
 from tractexp.parameter import Box, Parameter
 from tractexp.plugin import CONF, Plugin, build, discover, get, plugin, schema
 
+pytestmark = pytest.mark.usefixtures("registry_as_it_was")
+
 TESTS = Path(__file__).parent
-PAGE = TESTS.parent / "docs" / "plugins.md"
-FRAMEWORK = TESTS.parent / "tractexp"
+PAGE = TESTS.parents[1] / "docs" / "plugins.md"
+FRAMEWORK = TESTS.parents[1] / "tractexp"
 
 
 def tractexp(*arguments, cwd, **environment):

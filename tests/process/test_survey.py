@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import pandas
 import pytest
+from browser import BROWSER, Worked, drawn
 from command_line import run_command
 from made_recordings import constant, motor_dip, recording
-from test_chart import BROWSER, Worked, drawn
 
 import tractexp
 from tractexp.api import surveying

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from command_line import run_command
-from test_report_page import read
+from pages import read
 
 from tractexp.comparison import claims, floor, load
 from tractexp.comparison.comparison import compare

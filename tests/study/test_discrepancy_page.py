@@ -9,8 +9,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from pages import read
 from test_discrepancy import FEW, base, events
-from test_report_page import read
 
 from tractexp.discrepancy import verdict
 from tractexp.discrepancy.discrepancy_json import content

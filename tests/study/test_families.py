@@ -25,6 +25,8 @@ from tractexp.errors import UserError
 from tractexp.extend import Effect, Parameter, plugin
 from tractexp.plugin import discover, get
 
+pytestmark = pytest.mark.usefixtures("registry_as_it_was")
+
 TRIPS = ("undervoltage_trip", "exponential_recovery")
 CORE = ("magnetic_saturation", "stator_resistance")
 NODE = {"motor": {"name": "electromechanical"}, "static": {"name": "exponential"}, "bounds": {}, "fixed": {}}

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 import uncertainty as study
 from command_line import run_command
-from test_chart import unpacked
-from test_report_page import read
+from pages import read, unpacked
 
 import tractexp as public
 from tractexp.errors import UserError

@@ -5,7 +5,6 @@ from datetime import datetime
 
 import numpy as np
 import pytest
-from command_line import run_command
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -232,12 +231,3 @@ class TestCOMTRADE:
             tractexp.convert(table, what="recording", folder=tmp_path / "x")
         with pytest.raises(UserError, match="events are taken as they are"):
             tractexp.convert(a_record(), skew=True)
-
-
-def test_on_the_command_line(tmp_path):
-    write_record(a_record(), tmp_path / "dip.csv")
-    asked = ("task=convert", "task.to=parquet", "data=csv", "data.path=dip.csv", "hydra.run.dir=out")
-    done = run_command(*asked, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert "there_dip2.parquet: 200 samples of t, U, P, Q, f, U2" in done.stdout
-    same_record(a_record(), again(tmp_path / "out" / "there_dip2.parquet"))

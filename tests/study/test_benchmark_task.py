@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from command_line import run_command
-from test_report_page import read
+from pages import read
 
 from tractexp.comparison import bbob
 from tractexp.comparison.bbob import GROUPS, Bbob, Benchmark, Plan, Run, perform, run, seed_of
