@@ -7,6 +7,7 @@ from pathlib import Path
 
 import marked
 import numpy as np
+import oracle  # noqa: F401
 
 from hidden_effects.laws import MEMBERS_LAW
 
