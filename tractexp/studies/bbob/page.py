@@ -1,20 +1,18 @@
 """A benchmark as one self-contained page for people, and as one JSON file for machines."""
 
-import json
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from tractexp import files
-from tractexp.comparison.bbob import Benchmark
 from tractexp.report.chart import Chart
-from tractexp.report.compare import runtime_curves
 from tractexp.report.page import Page
+from tractexp.studies.bbob.runs import BbobRuns
+from tractexp.studies.comparison.charts import runtime_curves
 
 
-def scale(benchmark: Benchmark) -> str:
+def scale(benchmark: BbobRuns) -> str:
     """What was run, in words."""
     plan = benchmark.plan
     functions, dimensions = len(plan.functions), " and ".join(map(str, plan.dimensions))
@@ -25,7 +23,7 @@ def scale(benchmark: Benchmark) -> str:
     )
 
 
-def sentences(benchmark: Benchmark) -> list[str]:
+def sentences(benchmark: BbobRuns) -> list[str]:
     """One sentence to quote for each dimension, the best optimizer first."""
     told = []
     plan = benchmark.plan
@@ -44,7 +42,7 @@ def sentences(benchmark: Benchmark) -> list[str]:
     return told
 
 
-def shares(benchmark: Benchmark, dimension: int) -> tuple[list[str], list[list[str]]]:
+def shares(benchmark: BbobRuns, dimension: int) -> tuple[list[str], list[list[str]]]:
     """Columns and rows: the share of targets met, in all and by group of functions, and the functions solved."""
     groups = benchmark.groups()
     functions = benchmark.plan.functions
@@ -56,7 +54,7 @@ def shares(benchmark: Benchmark, dimension: int) -> tuple[list[str], list[list[s
     return ["optimizer", "all", *groups, "solved"], rows
 
 
-def running_times(benchmark: Benchmark, dimension: int, target: int) -> list[list[str]]:
+def running_times(benchmark: BbobRuns, dimension: int, target: int) -> list[list[str]]:
     """One row for each function: ERT in evaluations and the runs that met the target, for each optimizer."""
     count = len(benchmark.plan.instances)
 
@@ -70,7 +68,7 @@ def running_times(benchmark: Benchmark, dimension: int, target: int) -> list[lis
     ]
 
 
-def answer(benchmark: Benchmark, dimension: int) -> str:
+def answer(benchmark: BbobRuns, dimension: int) -> str:
     """Which optimizer to take in one dimension, and where another did better."""
     functions = benchmark.plan.functions
     best, *others = sorted(benchmark.optimizers, key=lambda name: -benchmark.share(name, dimension, functions))
@@ -90,7 +88,7 @@ def answer(benchmark: Benchmark, dimension: int) -> str:
     return told + (f" Another did better in a group of functions: {'; '.join(elsewhere)}." if elsewhere else "")
 
 
-def charts(benchmark: Benchmark, dimension: int) -> dict[str, tuple[Chart, list[Chart]]]:
+def charts(benchmark: BbobRuns, dimension: int) -> dict[str, tuple[Chart, list[Chart]]]:
     """The ECDF over all functions and over each group, {group or "all": the whole, and each where they are many}."""
     groups = benchmark.groups()
     chosen: Mapping[str, Iterable[int]] = {"all": benchmark.plan.functions} | (groups if len(groups) > 1 else {})
@@ -101,7 +99,7 @@ def charts(benchmark: Benchmark, dimension: int) -> dict[str, tuple[Chart, list[
     return drawn
 
 
-def write_page(benchmark: Benchmark, path: Path) -> Path:
+def write_page(benchmark: BbobRuns, path: Path) -> Path:
     """Write `benchmark.html`."""
     plan = benchmark.plan
     page = Page(f"Benchmark of {benchmark.optimizers[0]} on BBOB", f"{scale(benchmark)}; seed {plan.seed}.")
@@ -113,7 +111,7 @@ def write_page(benchmark: Benchmark, path: Path) -> Path:
     return _reading(page).write(path)
 
 
-def _shares(page: Page, benchmark: Benchmark, d: int) -> None:
+def _shares(page: Page, benchmark: BbobRuns, d: int) -> None:
     """The share of targets met, in a table and by evaluations."""
     plan, drawn = benchmark.plan, charts(benchmark, d)
     page.table(
@@ -133,7 +131,7 @@ def _shares(page: Page, benchmark: Benchmark, d: int) -> None:
                 page.chart(chart, f"{group.capitalize()}: {numbers}.")
 
 
-def _times(page: Page, benchmark: Benchmark, d: int) -> None:
+def _times(page: Page, benchmark: BbobRuns, d: int) -> None:
     """The expected running times to each target, the hardest first."""
     hardest = len(benchmark.plan.targets) - 1
     columns = ["function", *benchmark.optimizers]
@@ -163,7 +161,7 @@ def _reading(page: Page) -> Page:
     )
 
 
-def content(benchmark: Benchmark, settings: Mapping[str, Any]) -> dict[str, Any]:
+def content(benchmark: BbobRuns, settings: Mapping[str, Any]) -> dict[str, Any]:
     """What `benchmark.json` holds: the plan, each optimizer's settings, every run; the same for the same seed.
 
     Evaluations to a target that was not met, and running times to one that no run met, are None.
@@ -174,7 +172,7 @@ def content(benchmark: Benchmark, settings: Mapping[str, Any]) -> dict[str, Any]
             "optimizer": name,
             "dimension": d,
             "function": f,
-            "ert": [_finite(benchmark.ert(name, d, f, k)[0]) for k in range(len(plan.targets))],
+            "ert": [benchmark.ert(name, d, f, k)[0] for k in range(len(plan.targets))],
         }
         for name in benchmark.optimizers for d in plan.dimensions for f in plan.functions
     ]  # fmt: skip
@@ -188,21 +186,13 @@ def content(benchmark: Benchmark, settings: Mapping[str, Any]) -> dict[str, Any]
         }
         for name in benchmark.optimizers for d in plan.dimensions
     ]  # fmt: skip
-    return {
-        **asdict(plan),
-        "optimizers": settings,
-        "summary": summary,
-        "running_times": times,
-        "runs": [asdict(run) | {"hits": [_finite(n) for n in run.hits]} for run in benchmark.runs],
-        "sentences": sentences(benchmark),
-    }
-
-
-def write_json(benchmark: Benchmark, settings: Mapping[str, Any], path: Path) -> Path:
-    """Write `benchmark.json`."""
-    text = json.dumps(content(benchmark, settings), indent=1, ensure_ascii=False, allow_nan=False)
-    return files.write(path, text + "\n")
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+    return files.plain(
+        {
+            **asdict(plan),
+            "optimizers": settings,
+            "summary": summary,
+            "running_times": times,
+            "runs": [asdict(run) for run in benchmark.runs],
+            "sentences": sentences(benchmark),
+        }
+    )

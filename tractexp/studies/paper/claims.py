@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.comparison.statistics import ALPHA, LEAST_SEEDS, holm, vargha_delaney, wilcoxon
 from tractexp.identification.result import ACCEPTED
-from tractexp.replication import equations, maps, printed, why
-from tractexp.replication.printed import LABELS
-from tractexp.replication.study import BUDGETS, TARGETS, Study
+from tractexp.studies.comparison.statistics import ALPHA, LEAST_SEEDS, holm, vargha_delaney, wilcoxon
+from tractexp.studies.paper import equations, maps, printed, why
+from tractexp.studies.paper.printed import LABELS
+from tractexp.studies.paper.study import BUDGETS, TARGETS, Study
 from tractexp.wording import joined
 
 CONFIRMED, REFUTED = "confirmed", "not confirmed"

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from tractexp.comparison.ablation import Ablation, Effect
-from tractexp.comparison.comparison import Comparison, Pair, seeds_needed
-from tractexp.comparison.floor import AT_FLOOR
-from tractexp.comparison.statistics import ALPHA
-from tractexp.comparison.summary import Spread
+from tractexp.studies.comparison.ablation import Ablation, Effect
+from tractexp.studies.comparison.comparison import Comparison, Pair, seeds_needed
+from tractexp.studies.comparison.floor import AT_FLOOR
+from tractexp.studies.comparison.statistics import ALPHA
+from tractexp.studies.comparison.summary import Spread
 
 MORE = 1.2  # times the simulations of another variant are worth a word
 

@@ -5,17 +5,17 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.comparison.floor import Floor
-from tractexp.comparison.runs import Run, Variant
-from tractexp.replication import conclusion, equations, maps, printed, why
-from tractexp.replication.claims import BOTH, PAIRS, Claim, counted, number
-from tractexp.replication.printed import COMPARED, LABELS, LITERAL, READINGS, TEN
-from tractexp.replication.study import AT_FLOOR, BUDGETS, LEVEL, RANDOM, TARGETS, TRADED, Study
-from tractexp.report import compare, paper_figures
 from tractexp.report.events import CAPTION, Curve, event_chart
 from tractexp.report.markdown import Markdown, Together
 from tractexp.report.page import Page
 from tractexp.report.style import PALETTE
+from tractexp.studies.comparison import charts
+from tractexp.studies.comparison.floor import Floor
+from tractexp.studies.comparison.runs import Run, Variant
+from tractexp.studies.paper import conclusion, equations, figures, maps, printed, why
+from tractexp.studies.paper.claims import BOTH, PAIRS, Claim, counted, number
+from tractexp.studies.paper.printed import COMPARED, LABELS, LITERAL, READINGS, TEN
+from tractexp.studies.paper.study import AT_FLOOR, BUDGETS, LEVEL, RANDOM, TARGETS, TRADED, Study
 from tractexp.wording import as_sentence
 
 TITLE = "The paper, table by table"
@@ -248,8 +248,8 @@ def figure3(sheet: Any, study: Study) -> None:
     sheet.heading("Figure 3: the tent map")
     orbits = {f"alpha = {a}": maps.tent_orbit(float(a), 200, 1, np.random.default_rng(0))[:, 0] for a in SHOWN}
     where, flock = next(iter(study.uniformity.items()))
-    sheet.chart(paper_figures.orbits(orbits), "Orbits of Eq. (14).")
-    sheet.chart(paper_figures.evenness(flock), f"How even a flock is: {where}, 200 flocks, median and 5 to 95 %.")
+    sheet.chart(figures.orbits(orbits), "Orbits of Eq. (14).")
+    sheet.chart(figures.evenness(flock), f"How even a flock is: {where}, 200 flocks, median and 5 to 95 %.")
     sheet.table(
         ["way to scatter", *study.uniformity],
         [[way, *(_middle(kind[way]) for kind in study.uniformity.values())] for way in flock],
@@ -260,8 +260,8 @@ def figure3(sheet: Any, study: Study) -> None:
 
 def figure4(sheet: Any, study: Study) -> None:
     sheet.heading("Figure 4: Lévy flights")
-    sheet.chart(paper_figures.flights(maps.flights("mantegna", 300, 3, seed=1)), "Steps of Eq. (15), three dimensions.")
-    sheet.chart(paper_figures.tails(study.tails), "How large the steps of the two readings of Eq. (15) become.")
+    sheet.chart(figures.flights(maps.flights("mantegna", 300, 3, seed=1)), "Steps of Eq. (15), three dimensions.")
+    sheet.chart(figures.tails(study.tails), "How large the steps of the two readings of Eq. (15) become.")
     rows = []
     for formula, steps in study.tails.items():
         size = np.abs(steps)
@@ -275,7 +275,7 @@ def figure6(sheet: Any, study: Study) -> None:
     record = event.record
     sheet.heading("Figure 6: the record")
     told = [f"{record.name}, a dip of {100 * event.depth:.0f} %", *record.notes]
-    sheet.chart(paper_figures.record(record.t, record.U, record.P, record.Q), ": ".join(told))
+    sheet.chart(figures.record(record.t, record.U, record.P, record.Q), ": ".join(told))
 
 
 def _fit(sheet: Any, fit: Any, role: str) -> None:
@@ -294,11 +294,11 @@ def figure9(sheet: Any, study: Study) -> None:
     sheet.heading("Figure 9: the searches")
     floor = Floor(study.floor, "")
     one = [_variant(study, name, "iterations", 1) for name in COMPARED]
-    sheet.chart(compare.fitness(one, "iterations", floor)[0], "One run, seed 0, as the paper shows it.")
+    sheet.chart(charts.fitness(one, "iterations", floor)[0], "One run, seed 0, as the paper shows it.")
     for by in BUDGETS:
         all_ = [_variant(study, name, by, study.seeds) for name in COMPARED]
         sheet.chart(
-            compare.fitness(all_, by, floor)[0],
+            charts.fitness(all_, by, floor)[0],
             f"Median and quartiles of {study.seeds} seeds, by {by}; the line is the lowest objective known.",
         )
     rows = []
@@ -360,7 +360,7 @@ def _valleys(sheet: Any, study: Study) -> None:
     own = next(p.bounds for p in study.problem.parameters if p.name == TRADED)
     bottoms = [(float(v[index[TRADED]]), f / study.floor) for f, _, v in study.control.grouped()[:2]]
     sheet.chart(
-        paper_figures.along(TRADED, grid, shown, own, bottoms),
+        figures.along(TRADED, grid, shown, own, bottoms),
         f"The best fit for each value of {TRADED}, all other parameters fitted again. Dots: the two valleys. Shaded:"
         f" beyond the bounds of {TRADED}. Q_s0 is what is left of Q before the dip to the static load.",
     )

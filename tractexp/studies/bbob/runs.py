@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.comparison.statistics import expected_running_time
 from tractexp.errors import UserError
 from tractexp.identification.optimizer import Optimizer
 from tractexp.identification.search import Limits, search
+from tractexp.studies.comparison.statistics import expected_running_time
 from tractexp.workers import replaced
 
 GROUPS = {
@@ -43,6 +43,15 @@ class Bbob:
     Notes the number of evaluations at which each target, given as a distance to the optimum (k,), was first met:
     `hits` (k,), inf before.
     """
+
+    problem: Any  # of ioh
+    lower: np.ndarray
+    upper: np.ndarray
+    optimum: float
+    goals: np.ndarray
+    hits: np.ndarray
+    evaluations: int
+    best: float
 
     def __init__(self, function: int, dimension: int, instance: int, targets: Sequence[float]):
         ioh = package()
@@ -134,7 +143,7 @@ def perform(
     plan: Plan,
     cores: int | None = None,
     count: Callable[[], None] = lambda: None,
-) -> "Benchmark":
+) -> "BbobRuns":
     """Run all of it on `cores` processes (None: all there are); the runs do not depend on how many.
 
     `count()` is called as each run ends.
@@ -153,11 +162,11 @@ def perform(
         runs[name, d, f, i] for name in optimizers for d in plan.dimensions for f in plan.functions
         for i in plan.instances
     ]  # fmt: skip
-    return Benchmark(plan, tuple(optimizers), titles, ordered)
+    return BbobRuns(plan, tuple(optimizers), titles, ordered)
 
 
 @dataclass(frozen=True)
-class Benchmark:
+class BbobRuns:
     """All runs, and what they come to."""
 
     plan: Plan

@@ -13,12 +13,12 @@ from tractexp.progress import counting
 from tractexp.wording import joined
 
 if TYPE_CHECKING:
-    from tractexp.api.benchmark import Benchmarked
-    from tractexp.comparison.comparison import Comparison
-    from tractexp.comparison.floor import Polished
-    from tractexp.comparison.overall import Overall, Several
-    from tractexp.comparison.runs import Gathered, Run
     from tractexp.identification.problem import Problem
+    from tractexp.studies.api.benchmark import BenchmarkResult
+    from tractexp.studies.comparison.comparison import Comparison
+    from tractexp.studies.comparison.floor import Polished
+    from tractexp.studies.comparison.overall import Overall, Several
+    from tractexp.studies.comparison.runs import Gathered, Run
 
 DIMENSION, EVALUATIONS = 5, 15_000  # on BBOB; the evaluations where the searches had no budget in common
 BBOB = "bbob.json"
@@ -26,7 +26,7 @@ BBOB = "bbob.json"
 
 def judged(gathered: "Gathered", progress: Any, judging: Mapping[str, Any]) -> "Comparison":
     """The runs of one problem compared; `judging` are the arguments of `comparison.compare` that a user chooses."""
-    from tractexp.comparison.comparison import compare
+    from tractexp.studies.comparison.comparison import compare
 
     polished, why_not = _polished(gathered, progress)
     return compare(gathered, plain=plain(), polished=polished, why_not=why_not, **judging)
@@ -37,8 +37,8 @@ def several(
     bbob: int, cores: int | None, progress: Any,
 ) -> "Several":  # fmt: skip
     """Each problem by itself, what they come to under the same terms, and the variants on BBOB."""
-    from tractexp.comparison.overall import Several, on_records, terms_of
-    from tractexp.comparison.runs import gather
+    from tractexp.studies.comparison.overall import Several, on_records, terms_of
+    from tractexp.studies.comparison.runs import gather
 
     made: dict[str, Comparison] = {}
     by_terms: dict[str, dict[str, Comparison]] = {}
@@ -72,10 +72,10 @@ def _on_bbob(
 ) -> "Overall":
     """The variants of a comparison on BBOB; the runs are kept beside those of the sweep, under what they depend on."""
     from tractexp import provenance
-    from tractexp.api.benchmark import benchmark
-    from tractexp.comparison.ablation import family
-    from tractexp.comparison.load import nested
-    from tractexp.comparison.overall import on_functions
+    from tractexp.studies.api.benchmark import benchmark
+    from tractexp.studies.comparison.ablation import family
+    from tractexp.studies.comparison.load import nested
+    from tractexp.studies.comparison.overall import on_functions
 
     variants = [v for v in comparison.gathered.variants if not v.settings.get("polish")]
     optimizers = {v.name: nested(v.runs[0].config)["optimizer"] for v in variants}
@@ -88,23 +88,23 @@ def _on_bbob(
         made = unwrap(benchmark)(optimizers, **chosen, cores=cores, progress=progress)
         if folder:
             files.write_json(folder / BBOB, {"of": told, "made": made.to_dict()})
-    return on_functions(made.made, family(variants, plain()))
+    return on_functions(made.bbob, family(variants, plain()))
 
 
-def _kept(folder: Path, told: Mapping[str, Any]) -> "Benchmarked | None":
+def _kept(folder: Path, told: Mapping[str, Any]) -> "BenchmarkResult | None":
     """The runs on BBOB that were made before with the same code and settings."""
-    from tractexp.api.benchmark import Benchmarked
+    from tractexp.studies.api.benchmark import BenchmarkResult
 
     with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
         kept = json.loads((folder / BBOB).read_text(encoding="utf-8"))
         if kept["of"] == files.plain(told):
-            return Benchmarked.from_dict(kept["made"])
+            return BenchmarkResult.from_dict(kept["made"])
     return None
 
 
 def _polished(gathered: "Gathered", progress: Any) -> "tuple[Polished | None, str]":
     """What polishing found on the problem that the runs' configuration describes; None, and why, where it cannot."""
-    from tractexp.comparison.floor import polish
+    from tractexp.studies.comparison.floor import polish
 
     runs = [run for variant in gathered.variants for run in variant.runs]
     try:
@@ -121,9 +121,9 @@ def _polished(gathered: "Gathered", progress: Any) -> "tuple[Polished | None, st
 def _problem(run: "Run") -> "Problem":
     """The problem that a run's configuration describes. Raises `UserError` where its records are not there any more."""
     from tractexp.api.setup import Setup
-    from tractexp.comparison.load import nested
     from tractexp.plugin import build
     from tractexp.record import detect
+    from tractexp.studies.comparison.load import nested
 
     config = nested(run.config)
     home = Path(run.folder) if run.folder else Path()  # relative paths count from where the run was started

@@ -8,15 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.comparison.statistics import expected_running_time, vargha_delaney, wilcoxon
 from tractexp.errors import UserError
+from tractexp.identification.generalization import by_depth, mean_residual
 from tractexp.identification.problem import Problem
 from tractexp.identification.result import Fit, respond
 from tractexp.identification.search import Found, Limits
 from tractexp.record import Event
-from tractexp.replication import equations, maps, orders, printed, searches, valleys
-from tractexp.replication.printed import COMPARED, EQUAL, ITERATIONS, LITERAL, READINGS, TEN
-from tractexp.replication.remembered import Remembered
+from tractexp.studies.comparison.statistics import expected_running_time, vargha_delaney, wilcoxon
+from tractexp.studies.paper import equations, maps, orders, printed, searches, valleys
+from tractexp.studies.paper.printed import COMPARED, EQUAL, ITERATIONS, LITERAL, READINGS, TEN
+from tractexp.studies.paper.remembered import Remembered
 
 ALPHAS = (0.1, 0.3, 0.5, 0.7, 0.9)  # of the tent map
 TARGETS = (10.0, 2.0)  # of running times, times the floor
@@ -268,7 +269,7 @@ class Study:
 
     def held(self, kind: str) -> list[int]:
         """Which of `fitted` are the held-out events of an "interpolation" or "extrapolation"."""
-        kinds = searches.by_depth(self.held_out, self.train)
+        kinds = by_depth(self.held_out, self.train)
         chosen = [len(self.train) + k for k, each in enumerate(kinds) if each == kind]
         if not chosen:
             which = "no deeper" if kind == "interpolation" else "deeper"
@@ -283,7 +284,7 @@ class Study:
         events = self.held(kind)
 
         def residual(fits: list[Fit], channel: str) -> float:
-            each = [searches.mean_residual(getattr(fits[e].event.record, channel), getattr(fits[e], channel))
+            each = [mean_residual(getattr(fits[e].event.record, channel), getattr(fits[e], channel))
                     for e in events]  # fmt: skip
             return float(np.mean(each))
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.comparison.floor import AT_FLOOR, Floor, Polished
-from tractexp.comparison.runs import Run, Variant
-from tractexp.comparison.statistics import expected_running_time
+from tractexp.studies.comparison.floor import AT_FLOOR, Floor, Polished
+from tractexp.studies.comparison.runs import Run, Variant
+from tractexp.studies.comparison.statistics import expected_running_time
 
 COSTS = ("simulations", "seconds")
 ECDF_TARGETS = 1 + 10.0 ** np.arange(3.0, -2.01, -0.2)  # multiples of the floor: 1001 down to 1.01

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from tractexp.comparison.ablation import Effect
-from tractexp.comparison.claims import number
-from tractexp.comparison.overall import Overall, Several
-from tractexp.comparison.statistics import ALPHA
+from tractexp.studies.comparison.ablation import Effect
+from tractexp.studies.comparison.claims import number
+from tractexp.studies.comparison.overall import Overall, Several
+from tractexp.studies.comparison.statistics import ALPHA
 from tractexp.wording import in_words, joined, percent
 
 

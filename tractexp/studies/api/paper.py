@@ -1,10 +1,10 @@
-"""The paper's tables and figures, done again: one page, one verdict for each claim."""
+"""The paper's tables and figures, measured again: one page, one verdict for each claim."""
 
 import functools
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -14,13 +14,16 @@ from tractexp.api.pages import Drawing, Written
 from tractexp.api.setup import Setup
 from tractexp.errors import check_choice, check_range
 from tractexp.outcome import Table
+from tractexp.plugin import plugin
 from tractexp.progress import NEXT_LINES, telling
+from tractexp.tasks.console import listed, say
+from tractexp.tasks.task import Job, Task, call
 
 if TYPE_CHECKING:
-    from tractexp.replication.claims import Claim
-    from tractexp.replication.study import Study
     from tractexp.report.markdown import Markdown
     from tractexp.report.page import Page
+    from tractexp.studies.paper.claims import Claim
+    from tractexp.studies.paper.study import Study
 
 PARTS = (
     "table1", "table2", "table3", "table4", "table5", "figure3", "figure4", "figure6", "figure8", "figure9", "figure10",
@@ -31,8 +34,8 @@ SEEDS = 30
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Replicated(Written):
-    """The paper's claims, judged. Of a loaded result the page is measured again, from the records it holds."""
+class PaperResult(Written):
+    """The paper's claims with their verdicts. A loaded result measures its page again, from the records it holds."""
 
     kind = "paper"
 
@@ -40,11 +43,12 @@ class Replicated(Written):
     settings: Mapping[str, Any]  # seeds, workers
     parts: Sequence[str]
     claims: "Sequence[Claim]"
+    measured: "Study | None" = None  # None in a loaded result
 
     @functools.cached_property
     def study(self) -> "Study":
-        """What stands behind the page, each part measured when first asked for."""
-        return _study(self.setup, **self.settings)
+        """What stands behind the page; each part is measured at its first use."""
+        return self.measured or _study(self.setup, **self.settings)
 
     @property
     def counts(self) -> Counter[str]:
@@ -52,21 +56,21 @@ class Replicated(Written):
         return Counter(claim.word for claim in self.claims)
 
     def table(self) -> Table:
-        from tractexp.replication.claims import counted
+        from tractexp.studies.paper.claims import counted
 
         rows = [[claim.part, claim.text, claim.verdict, claim.measured] for claim in self.claims]
         return Table(["where", "the paper's claim", "verdict", "measured"], rows, counted(self.claims))
 
     @functools.cached_property
     def _sheets(self) -> "tuple[Page, Markdown]":
-        from tractexp.report.paper import sheets
+        from tractexp.studies.paper.page import sheets
 
         return sheets(self.study, self.parts, self.claims)
 
     def _results(self, folder: Path) -> list[Path]:
         """paper.json: the claims and what was measured."""
-        told = {key: value for key, value in self.to_dict().items() if key != "setup"}
-        return [files.write_json(folder / "paper.json", told)]
+        content = {key: value for key, value in self.to_dict().items() if key != "setup"}
+        return [files.write_json(folder / "paper.json", content)]
 
     def _drawings(self) -> Mapping[str, Drawing]:
         return {
@@ -75,15 +79,17 @@ class Replicated(Written):
         }
 
     def to_dict(self) -> dict[str, Any]:
-        told = {"settings": dict(self.settings), "parts": list(self.parts)}
-        return {"claims": [asdict(claim) for claim in self.claims], **told, "setup": self.setup.to_dict()}
+        return {
+            "claims": [asdict(claim) for claim in self.claims], "settings": dict(self.settings),
+            "parts": list(self.parts), "setup": self.setup.to_dict(),
+        }  # fmt: skip
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        from tractexp.replication.claims import Claim
+        from tractexp.studies.paper.claims import Claim
 
-        judged = [Claim(**told) for told in content["claims"]]
-        return cls(Setup.from_dict(content["setup"]), content["settings"], content["parts"], judged)
+        claims = [Claim(**claim) for claim in content["claims"]]
+        return cls(Setup.from_dict(content["setup"]), content["settings"], content["parts"], claims)
 
 
 @public
@@ -105,7 +111,7 @@ def paper(
     target: float | None = None,
     seed: int = 0,
     progress: Any = None,
-) -> Replicated:
+) -> PaperResult:
     """Measure what the paper claims, on `records` fitted and on those of `validate`.
 
     `parts` are tables and figures ("table2", "figure9", "equations"; none: all). Each of the paper's optimizers
@@ -115,21 +121,19 @@ def paper(
     Raises `UserError` for wrong names or values, and where a part needs a held-out dip that is not there.
     """
     check(parts, seeds, workers)
-    known = {"bounds": bounds, "fixed": fixed, "per_event": per_event, "substeps": substeps}
+    model_settings = {"bounds": bounds, "fixed": fixed, "per_event": per_event, "substeps": substeps}
     limits = {"budget": budget, "time_limit": time_limit, "target": target}
-    setup = Setup.of(records, model, validate, objective, known, seed=seed, **limits)
+    setup = Setup.of(records, model, validate, objective, model_settings, seed=seed, **limits)
     settings, chosen = {"seeds": seeds, "workers": workers}, [p for p in PARTS if p in parts or not parts]
     with telling(progress) as tell:
         study = _study(setup, **settings, tell=tell, count=_counted(tell))
-        from tractexp.replication.claims import claims
+        from tractexp.studies.paper.claims import claims
 
         for kind, needing in HELD_OUT.items():
             if needing & set(chosen):
                 study.held(kind)
         study.prepare(chosen)
-        made = Replicated(setup, settings, chosen, claims(study, chosen))
-    vars(made)["study"] = study
-    return made
+        return PaperResult(setup, settings, chosen, claims(study, chosen), study)
 
 
 def check(parts: Sequence[str], seeds: int, workers: int | None) -> None:
@@ -141,26 +145,69 @@ def check(parts: Sequence[str], seeds: int, workers: int | None) -> None:
         check_range("task.workers", workers, 1)
 
 
-def _study(setup: Setup, seeds: int, workers: int | None, **heard: Any) -> "Study":
-    from tractexp.replication.study import Study
+def _study(setup: Setup, seeds: int, workers: int | None, **listeners: Any) -> "Study":
+    from tractexp.studies.paper.study import Study
 
     literal = replace(setup, model=setup.model.with_(integration="printed"))
     return Study(
         recipe=setup.problem_of, literal=literal.problem_of,
         node=asdict(setup.model), train=setup.train, held_out=setup.validate, seeds=seeds,
-        seed=setup.seed, workers=workers, limits=setup.limits, **heard,
+        seed=setup.seed, workers=workers, limits=setup.limits, **listeners,
     )  # fmt: skip
 
 
 def _counted(tell: Callable[[str], None]) -> Callable[[int, int], None]:
-    """What hears of each search that ends, and tells now and then how many have."""
-    told = time.perf_counter()
+    """A counter of the searches that have ended, which reports now and then."""
+    last = time.perf_counter()
 
     def count(done: int, total: int) -> None:
-        nonlocal told
+        nonlocal last
         now = time.perf_counter()
-        if done == total or now - told > NEXT_LINES:
-            told = now
+        if done == total or now - last > NEXT_LINES:
+            last = now
             tell(f"  {done} of {total} searches")
 
     return count
+
+
+@plugin
+class Paper(Task):
+    """Measure what the paper claims, on the shipped stand-ins or on records of your own: paper.json, .html and .md."""
+
+    resumes = True
+    reads = ("data", "model", "objective", "budget", "time_limit", "target")
+    instead = {"optimizer": "it compares the paper's three; task=generalise takes any"}
+
+    parts: list[str] = field(default_factory=list)  # such as [table1,figure9]; empty: all
+    held_out: dict[str, list[str]] = field(default_factory=dict)  # {choice of data: files}; without data.validate
+    seeds: int = SEEDS
+    workers: int | None = None  # processes that search; null: one for each core
+    docs: str | None = None  # write paper.md to this file too
+
+    def check(self) -> None:
+        check(self.parts, self.seeds, self.workers)
+
+    def run(self, job: Job) -> None:
+        from tractexp.api.setup import recorded
+
+        started = time.perf_counter()
+        job = job.holding_out(self.held_out)
+        for line in recorded(job.events_of_fit.train, job.events_of_fit.validate, "hold out"):
+            say(line)
+        result = call(
+            paper, **job.asked, parts=self.parts, seeds=self.seeds, workers=self.workers,
+            progress=lambda line: say(f"  {line}"),
+        )  # fmt: skip
+        paths = result.write_results(job.folder)
+        for claim in result.claims:
+            say(f"  {claim.verdict}: {claim.text}")
+            say(f"    {claim.measured}")
+        if result.claims:
+            say(result.table().title)
+        say(f"in {time.perf_counter() - started:.0f} s")
+        paths += result.write_drawings(job.folder)
+        if self.docs is not None:
+            paths += [files.copy(path, Path(self.docs)) for path in paths if path.suffix == ".md"]
+        listed(paths)
+        metrics = {verdict.replace(" ", "_"): float(n) for verdict, n in result.counts.items()}
+        job.log(name="the paper", values={}, metrics=metrics, artifacts=paths)

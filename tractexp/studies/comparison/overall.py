@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tractexp.comparison.ablation import Ablation, Family, family
-from tractexp.comparison.comparison import Comparison
-from tractexp.comparison.runs import Run
-from tractexp.comparison.statistics import LEAST_SEEDS, Ranks, friedman
+from tractexp.studies.comparison.ablation import Ablation, Family, family
+from tractexp.studies.comparison.comparison import Comparison
+from tractexp.studies.comparison.runs import Run
+from tractexp.studies.comparison.statistics import LEAST_SEEDS, Ranks, friedman
 
 if TYPE_CHECKING:
-    from tractexp.comparison.bbob import Benchmark
+    from tractexp.studies.bbob.runs import BbobRuns
 
 SOLVED = 1e-8  # a distance to the optimum of a BBOB function below which it counts as met
 
@@ -82,7 +82,7 @@ def on_records(terms: str, comparisons: Mapping[str, Comparison], plain: Mapping
     )  # fmt: skip
 
 
-def on_functions(benchmark: "Benchmark", chosen: Family | None) -> Overall:
+def on_functions(benchmark: "BbobRuns", chosen: Family | None) -> Overall:
     """The variants on BBOB: distances to the optimum, a function being one block; the family's effects on them."""
     (dimension,), plan = benchmark.plan.dimensions, benchmark.plan
     names = list(benchmark.optimizers)

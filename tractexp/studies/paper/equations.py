@@ -9,8 +9,8 @@ import numpy as np
 from tractexp.identification.result import ACCEPTED
 from tractexp.identification.search import Limits, search
 from tractexp.plugin import build
-from tractexp.replication import maps, printed
-from tractexp.replication.printed import LABELS
+from tractexp.studies.paper import maps, printed
+from tractexp.studies.paper.printed import LABELS
 
 FAIR = (0.06, 0.75, 0.85, 0.0026, 0.36)  # T', X', C, M, T_m of a motor that has a steady state at U0 = 1
 TOLERANCE = 0.01  # of a printed number that rounding explains
@@ -202,6 +202,10 @@ def motor_reactive(value: Mapping[str, float], U0: float) -> float:
 
 class Sphere:
     """The sum of squares about an optimum, in the box [-5, 5]^d: a problem for the search loop."""
+
+    optimum: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
 
     def __init__(self, optimum: np.ndarray):
         self.optimum = optimum

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.comparison.runs import Run
 from tractexp.errors import UserError
 from tractexp.identification.result import by_event
+from tractexp.studies.comparison.runs import Run
 
 TASK = "identify"  # the task whose runs are compared
 FINISHED, RUNNING, INTERRUPTED = "finished", "running", "interrupted"  # what a job's status.json says

@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from tractexp.replication import equations, why
-from tractexp.replication.claims import CONFIRMED, DEPENDS, PAIRS, Claim, number, ranked
-from tractexp.replication.printed import COMPARED, LABELS
-from tractexp.replication.study import AT_FLOOR, NARROW, TRADED, WIDE, Study
+from tractexp.studies.paper import equations, why
+from tractexp.studies.paper.claims import CONFIRMED, DEPENDS, PAIRS, Claim, number, ranked
+from tractexp.studies.paper.printed import COMPARED, LABELS
+from tractexp.studies.paper.study import AT_FLOOR, NARROW, TRADED, WIDE, Study
 from tractexp.wording import joined
 
 NEAR = 2.0  # times the lowest objective: a valley that a search might take for the right one

@@ -4,13 +4,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from tractexp.comparison.claims import number
-from tractexp.comparison.floor import Floor, Polished
-from tractexp.comparison.runs import Run, Variant
-from tractexp.comparison.statistics import Ranks
-from tractexp.comparison.summary import ECDF_TARGETS, Band, band, runtimes
 from tractexp.report import style
 from tractexp.report.chart import DECADE, Chart
+from tractexp.studies.comparison.claims import number
+from tractexp.studies.comparison.floor import Floor, Polished
+from tractexp.studies.comparison.runs import Run, Variant
+from tractexp.studies.comparison.statistics import Ranks
+from tractexp.studies.comparison.summary import ECDF_TARGETS, Band, band, runtimes
 
 TOGETHER = len(style.PALETTE)  # more curves than colors are not told apart in one panel
 SMALL = 230  # pixels, the height of a chart beside others

@@ -6,16 +6,16 @@ from typing import Any
 import numpy as np
 
 from tractexp import files
-from tractexp.comparison import overall_claims as claims
-from tractexp.comparison.ablation import Ablation, Effect
-from tractexp.comparison.claims import number
-from tractexp.comparison.overall import Overall, Several
-from tractexp.comparison.statistics import ALPHA
-from tractexp.report import compare as figures
-from tractexp.report import comparison as one
 from tractexp.report import style
 from tractexp.report.chart import Chart
 from tractexp.report.page import Page
+from tractexp.studies.comparison import charts
+from tractexp.studies.comparison import overall_claims as claims
+from tractexp.studies.comparison import page as one
+from tractexp.studies.comparison.ablation import Ablation, Effect
+from tractexp.studies.comparison.claims import number
+from tractexp.studies.comparison.overall import Overall, Several
+from tractexp.studies.comparison.statistics import ALPHA
 
 ROW = 26  # pixels of an effect in a chart
 ALL = "all together"
@@ -56,7 +56,7 @@ def _overall(page: Page, overall: Overall) -> None:
     if overall.ranks:
         page.text(claims.of_ranks(overall))
         page.chart(
-            figures.mean_ranks(overall.ranks, f"mean rank within a {overall.block} (1 is best)"),
+            charts.mean_ranks(overall.ranks, f"mean rank within a {overall.block} (1 is best)"),
             f"Mean ranks over {overall.ranks.seeds} blocks, one for each {overall.block}, with half of Nemenyi's"
             f" critical difference to either side: variants whose bars do not overlap differ significantly at"
             f" {ALPHA:.0%}.",
@@ -92,7 +92,7 @@ def effects(overall: Overall) -> Chart:
     chart.ticks(0, range(len(rows)), [label for _, label, _ in rows])
     ends = [bound for effect, *_ in rows for bound in (effect.low, effect.high)]
     low, high = min(0.9, *ends) / 1.02, max(1.1, *ends) * 1.02
-    chart.ticks(None, figures.round_numbers(low, high))
+    chart.ticks(None, charts.round_numbers(low, high))
     return chart.limits(0, len(rows) - 0.4, -0.6).edge(1.0, dash="dash").limits(None, low, high)
 
 

@@ -6,10 +6,10 @@ from itertools import combinations
 
 import numpy as np
 
-from tractexp.comparison.ablation import Ablation, ablate
-from tractexp.comparison.floor import Floor, Polished, floor_of
-from tractexp.comparison.runs import Gathered, Variant
-from tractexp.comparison.statistics import (
+from tractexp.studies.comparison.ablation import Ablation, ablate
+from tractexp.studies.comparison.floor import Floor, Polished, floor_of
+from tractexp.studies.comparison.runs import Gathered, Variant
+from tractexp.studies.comparison.statistics import (
     ALPHA,
     LEAST_SEEDS,
     Ranks,
@@ -18,7 +18,7 @@ from tractexp.comparison.statistics import (
     vargha_delaney,
     wilcoxon,
 )
-from tractexp.comparison.summary import Summary, summarize
+from tractexp.studies.comparison.summary import Summary, summarize
 
 
 @dataclass(frozen=True)

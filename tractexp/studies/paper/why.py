@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tractexp.comparison.statistics import ALPHA, holm, vargha_delaney, wilcoxon
-from tractexp.replication.study import Pair, Shares, Study
+from tractexp.studies.comparison.statistics import ALPHA, holm, vargha_delaney, wilcoxon
+from tractexp.studies.paper.study import Pair, Shares, Study
 
 SPARROWS, RIVAL = ("issa", "ssa"), "pso"
 

@@ -8,8 +8,7 @@ import numpy as np
 from tractexp.identification.problem import Problem
 from tractexp.identification.search import Found, Limits, search
 from tractexp.plugin import build
-from tractexp.record import Event
-from tractexp.replication.remembered import Remembered
+from tractexp.studies.paper.remembered import Remembered
 from tractexp.workers import replaced
 
 CHUNK = 5  # searches that share the composition of a model
@@ -61,14 +60,3 @@ def run(
 def _chunk(recipe: Recipe, settings: dict[str, Any], seeds: Sequence[int], limits: Limits) -> list[Found]:
     problem, optimizer = recipe(), build("optimizer", settings)
     return [search(problem, optimizer, seed, limits) for seed in seeds]
-
-
-def by_depth(events: Sequence[Event], fitted: Sequence[Event]) -> list[str]:
-    """ "interpolation" for a dip no deeper than the deepest that was fitted, else "extrapolation"."""
-    deepest = max(event.depth for event in fitted)
-    return ["interpolation" if event.depth <= deepest else "extrapolation" for event in events]
-
-
-def mean_residual(measured: np.ndarray, calculated: np.ndarray) -> float:
-    """Eq. (21): the mean of |measured - calculated| [pu], both (N,); gaps (nan) left out."""
-    return float(np.nanmean(np.abs(measured - calculated)))

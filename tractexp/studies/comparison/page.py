@@ -6,17 +6,16 @@ from pathlib import Path
 from typing import Any
 
 from tractexp import files
-from tractexp.comparison import claims
-from tractexp.comparison.ablation import Ablation
-from tractexp.comparison.claims import number, p_value
-from tractexp.comparison.comparison import Comparison, Pair
-from tractexp.comparison.floor import AT_FLOOR
-from tractexp.comparison.runs import Run, Variant
-from tractexp.comparison.statistics import ALPHA, size_of
-from tractexp.comparison.summary import Spread
-from tractexp.report import compare as figures
 from tractexp.report.chart import Chart
 from tractexp.report.page import Page
+from tractexp.studies.comparison import charts, claims
+from tractexp.studies.comparison.ablation import Ablation
+from tractexp.studies.comparison.claims import number, p_value
+from tractexp.studies.comparison.comparison import Comparison, Pair
+from tractexp.studies.comparison.floor import AT_FLOOR
+from tractexp.studies.comparison.runs import Run, Variant
+from tractexp.studies.comparison.statistics import ALPHA, size_of
+from tractexp.studies.comparison.summary import Spread
 
 AT_END = "at the end of the search"
 COMPANY = "With most other switches on against with fewest: the factor by which the effect changes."
@@ -52,7 +51,7 @@ def _spread(spread: Spread, scale: float = 1.0) -> list[str]:
 def quality(page: Page, comparison: Comparison) -> None:
     """Where the runs ended: every run, and quartiles."""
     page.heading("Where the runs ended")
-    drawn = figures.spread(comparison.variants, comparison.floor)
+    drawn = charts.spread(comparison.variants, comparison.floor)
     page.chart(drawn, f"Objective {AT_END} of every run that finished. Dashed: the floor.")
     columns = ["variant", "runs", "failed", "best", "lower quartile", "median", "upper quartile", "worst", "at floor"]
     rows = [
@@ -82,7 +81,7 @@ def _parameters(page: Page, comparison: Comparison) -> None:
     if polished is None or not polished.reached:
         return
     page.heading("The parameters of every run")
-    drawn = figures.parameters(comparison.variants, polished)
+    drawn = charts.parameters(comparison.variants, polished)
     inside = sum(polished.in_valley(run) is True for run in polished.reached)
     page.chart(
         drawn,
@@ -111,9 +110,9 @@ def _speed(page: Page, comparison: Comparison) -> None:
     for by in ("simulations", "iterations"):
         told = f"Best objective by {by}: the median" + (" and the quartiles." if _few(comparison) else ".")
         costs = " An iteration may cost several populations." if by == "iterations" else ""
-        _curves(page, comparison, figures.fitness(comparison.variants, by, comparison.floor), told + costs)
-    told = f"Runtimes: the share of {figures.targets_told()} reached by all runs, by simulations."
-    _curves(page, comparison, figures.ecdf(comparison.variants, comparison.floor), told)
+        _curves(page, comparison, charts.fitness(comparison.variants, by, comparison.floor), told + costs)
+    told = f"Runtimes: the share of {charts.targets_told()} reached by all runs, by simulations."
+    _curves(page, comparison, charts.ecdf(comparison.variants, comparison.floor), told)
     page.table(
         columns,
         rows,
@@ -123,13 +122,13 @@ def _speed(page: Page, comparison: Comparison) -> None:
 
 
 def _few(comparison: Comparison) -> bool:
-    return len(comparison.summaries) <= figures.TOGETHER
+    return len(comparison.summaries) <= charts.TOGETHER
 
 
 def _curves(page: Page, comparison: Comparison, drawn: tuple[Chart, list[Chart]], told: str) -> None:
     """A chart of all variants; where there are many, one of each folded away."""
     whole, each = drawn
-    many = f" In color the first {figures.TOGETHER}; gray ones are named when pointed at." if each else ""
+    many = f" In color the first {charts.TOGETHER}; gray ones are named when pointed at." if each else ""
     page.chart(whole, told + many)
     if each:
         with page.folded("each variant in a chart of its own"):
@@ -141,7 +140,7 @@ def _differences(page: Page, comparison: Comparison) -> None:
     if comparison.ranks:
         page.text(claims.of_ranks(comparison))
         page.chart(
-            figures.mean_ranks(comparison.ranks),
+            charts.mean_ranks(comparison.ranks),
             f"Mean ranks over seeds, with half of Nemenyi's critical difference to either side: variants whose bars "
             f"do not overlap differ significantly at {ALPHA:.0%}.",
         )

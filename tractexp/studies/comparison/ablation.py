@@ -12,8 +12,8 @@ from itertools import combinations
 
 import numpy as np
 
-from tractexp.comparison.runs import Variant
-from tractexp.comparison.statistics import bootstrap
+from tractexp.studies.comparison.runs import Variant
+from tractexp.studies.comparison.statistics import bootstrap
 
 On = frozenset[str]  # the switches that are on
 
