@@ -59,6 +59,9 @@ KINDS = ("plain", "good", "bad")
 class Page:
     """Collects the parts of a page in order; every method returns the page, so that calls can be chained."""
 
+    title: str
+    lead: str
+
     def __init__(self, title: str, lead: str = ""):
         self.title, self.lead = title, lead
         self._parts: list[str] = []
