@@ -44,6 +44,10 @@ def main() -> int:
             from tractexp.tasks.doctor import doctor
 
             return doctor(sys.argv[2:])
+        if sys.argv[1:2] == ["new"]:
+            from tractexp.new import new
+
+            return new(sys.argv[2:])
         if sys.argv[1:2] == ["list"]:
             from tractexp.usage import listed
 
