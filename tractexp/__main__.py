@@ -24,7 +24,7 @@ UNLOGGED = (
 SELDOM = (50_000, 20, 50)  # what is imported stays: to look for garbage in it takes a quarter of a short job
 COMMANDS = {  # beside the tasks: where each is
     "ui": "tractexp.cli.ui:ui", "look": "tractexp.cli.look:look", "sync": "tractexp.cli.sync:sync",
-    "doctor": "tractexp.cli.doctor:doctor", "list": "tractexp.usage:listed",
+    "doctor": "tractexp.cli.doctor:doctor", "list": "tractexp.usage:listed", "new": "tractexp.cli.new:new",
 }  # fmt: skip
 FULL_ERROR = "HYDRA_FULL_ERROR"  # Hydra's own switch: set it to see tracebacks
 

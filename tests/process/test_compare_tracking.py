@@ -20,8 +20,8 @@ from command_line import run_command
 from test_compare import samples, write_sweep
 
 from tractexp import tracking
-from tractexp.comparison import load
 from tractexp.errors import UserError
+from tractexp.studies.comparison import load
 from tractexp.tracking.attach import attach
 from tractexp.tracking.find import find
 from tractexp.tracking.view import TAG, comparison_view

@@ -19,10 +19,16 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 SECTIONS = "task|model|data"  # of the configuration, whose keys the arguments of a call are
-WORDS = {
+WORDS: Mapping[Any, str] = {
     int: "a whole number", float: "a number", bool: "True or False", str: "a text", type(None): "None", Any: "anything",
 }  # fmt: skip
-GIVEN = {bool: "a truth value", type(None): "nothing", dict: "a mapping", list: "a list", tuple: "a list"}
+GIVEN: Mapping[Any, str] = {
+    bool: "a truth value",
+    type(None): "nothing",
+    dict: "a mapping",
+    list: "a list",
+    tuple: "a list",
+}
 
 
 def public(function: Callable[P, R]) -> Callable[P, R]:

@@ -168,7 +168,7 @@ def _searched(
 
 def _told(setup: Setup, searched: "Sequence[tuple[Result, list[Fit]]]") -> Generalised:
     """The searches as plain data."""
-    from tractexp.replication.searches import by_depth
+    from tractexp.identification.generalization import by_depth
 
     kinds = by_depth(setup.validate, setup.train)
     rows = [row for result, fits in searched for row in _residuals(result, fits, kinds)]
@@ -184,7 +184,7 @@ def _told(setup: Setup, searched: "Sequence[tuple[Result, list[Fit]]]") -> Gener
 
 def _residuals(result: "Result", fits: "Sequence[Fit]", kinds: Sequence[str]) -> Iterable[dict[str, Any]]:
     """Eq. (21) and Eq. (20) of P and Q on each held-out dip."""
-    from tractexp.replication.searches import mean_residual
+    from tractexp.identification.generalization import mean_residual
 
     for fit, kind in zip(fits, kinds, strict=True):
         yield {

@@ -121,6 +121,10 @@ class Task(Plugin):
         if self.draws(job):
             paths += result.write_drawings(job.folder)
         listed(paths)
+        self.log(job, result, paths)
+
+    def log(self, job: "Job", result: Any, paths: list[Path]) -> None:
+        """Log a result with what was written."""
         content = {"name": self.name, "values": {}, "artifacts": [*paths, job.folder / ".hydra"]}
         job.log(**content | self.logged(job, result))
 

@@ -75,9 +75,7 @@ class Table:
     words: Collection[int] = ()
     detail: Collection[int] = ()
 
-    def __post_init__(self) -> None:  # interim: sentences of the studies' tables
-        if not isinstance(self.caption, str):
-            object.__setattr__(self, "caption", " ".join(self.caption))
+    def __post_init__(self) -> None:
         if wrong := next((row for row in self.rows if len(row) != len(self.columns)), None):
             raise ValueError(f"a row of {len(wrong)} cells in a table of {len(self.columns)} columns: {wrong}")
 

@@ -15,6 +15,13 @@ SHOWN = 3  # variants named in a line of a log file
 class Tally:
     """Counts the ends of a sweep's jobs."""
 
+    total: int
+    done: int
+    failed: int
+    common: set[str]
+    started: float
+    first: float
+
     def __init__(self, jobs: Sequence[SweepJob]):
         self.total, self.done, self.failed = len(jobs), 0, 0
         self.common = shared(jobs)

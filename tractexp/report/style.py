@@ -1,3 +1,0 @@
-"""Interim."""
-
-from tractexp.blocks.style import *  # noqa: F403
