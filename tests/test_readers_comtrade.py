@@ -179,7 +179,7 @@ class TestRefused:
             ({"path": ""}, "data.path is missing"),
             ({"train": []}, "data.train is empty"),
             ({"train": [1], "validate": [1]}, "name dip 1 twice"),
-            ({"train": [3]}, "there is no dip 3; 2 are found; dips that can be used: 1 at .*, 2 at"),
+            ({"train": [3]}, "there is no dip 3; the file has 2; dips that can be used: 1 at .*, 2 at"),
             ({"validate": [0]}, "there is no dip 0"),
             ({"voltages": [0, 1]}, r"data.voltages=\[0, 1\] must name three channels.* 0 'Ua' \[V\], 1 'Ub'"),
             ({"currents": []}, r"data.currents=\[\] must name three channels"),
@@ -263,7 +263,7 @@ class TestRefused:
 
     def test_no_dip(self, tmp_path):
         t = np.arange(4800) / 3200
-        with pytest.raises(UserError, match=r"no dip found: the voltage starts at 110 and falls at most .* \(t = 1.4"):
+        with pytest.raises(UserError, match=r"no dip: the voltage starts at 110 and falls at most .* \(t = 1.4"):
             read(write(tmp_path, waveforms(t, 50.0, []), [(3200, 4800)]))
 
     def test_a_dip_without_recovery_and_a_segment_too_short(self, tmp_path):

@@ -612,7 +612,7 @@ class TestManyDips:
         assert [detect(r).t_start for r in (*events.train, *events.validate)] == pytest.approx([48, 88, 8])
         assert events.train[0].t[-1] - events.train[0].t[0] == pytest.approx(2.49)
         assert self.events(validate=[]).validate == []
-        with pytest.raises(UserError, match="there is no dip 9; 5 are found; dips that can be used: 1 at"):
+        with pytest.raises(UserError, match="there is no dip 9; the file has 5; dips that can be used: 1 at"):
             self.events(train=[9])
 
     def test_tractexp_read_gives_them_all(self):

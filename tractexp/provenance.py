@@ -63,10 +63,10 @@ def told(record: Any) -> dict[str, Any]:
 
     Kilovolts and MVA are null where nobody said what one per unit is.
     """
-    known = record.file_base.known
+    known = record.file_base.in_mva
     source = {"file": record.source, **record.identity}
     made = {"sha256": digest(record), "source": source, "base": _base(record.base, known)}
-    return made | ({} if record.given_base is None else {"given_base": _base(record.given_base, known)})
+    return made | ({} if record.original_base is None else {"given_base": _base(record.original_base, known)})
 
 
 def in_words(told: Mapping[str, Any]) -> str:

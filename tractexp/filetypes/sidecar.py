@@ -7,7 +7,7 @@ from typing import Any
 
 from tractexp.errors import UserError
 from tractexp.files import located
-from tractexp.record.record import GIVEN, LOAD, SIZES, Base
+from tractexp.record.record import DECLARATION, LOAD, SIZES, Base
 from tractexp.record.window import Window
 
 
@@ -87,5 +87,5 @@ def _base(file: Any, told: Any) -> Base | None:
             raise UserError(
                 f"{file}: base.{key} = {json.dumps(value):.60} must be a number from {low:g} to {high:g} (kV, MVA, Hz)"
             )
-    origin = LOAD if told.get("origin") == LOAD else GIVEN  # as task=convert writes it
+    origin = LOAD if told.get("origin") == LOAD else DECLARATION  # as task=convert writes it
     return Base(**{key: float(value) for key, value in numbers.items()}, origin=origin)

@@ -115,7 +115,7 @@ def current_error(event: WaveEvent, currents: np.ndarray) -> float:
     before = slice(event.first, event.start)
     rms = lambda i, part: float(np.sqrt(np.mean(event.of_phases(i)[:, part] ** 2)))  # noqa: E731
     recorded = np.nan_to_num(event.currents)
-    known = np.array(event.known)[:, None]
+    known = np.array(event.compared)[:, None]
     return rms((currents - recorded) * known, window) / rms(recorded, before)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from tractexp.errors import UserError
 from tractexp.plugin import build
 from tractexp.record import Event, Record, detect, find_dips
-from tractexp.record.dips import Dip
+from tractexp.record.dips import FileDip
 from tractexp.record.phasor import Phasors
 from tractexp.recording.arrangement import arranged
 from tractexp.recording.feeder import Feeder, propose
@@ -170,7 +170,7 @@ def sight(reader: WaveformReader, recording: Recording, feeder: Feeder, events: 
     return replace(made, phasors=tuple(phasors), seen=tuple(seen), said=tuple(said))
 
 
-def sight_of(record: Record, dips: Sequence[Dip] | None = None) -> Sight:
+def sight_of(record: Record, dips: Sequence[FileDip] | None = None) -> Sight:
     """The load of a record, looked at; `dips` are those that a reader makes of it.
 
     Without them the record is what would be fitted, and its dips have no numbers.
@@ -187,18 +187,18 @@ def sight_of(record: Record, dips: Sequence[Dip] | None = None) -> Sight:
     return Sight(record.name, tuple(seen), record=record)
 
 
-def _own(record: Record) -> list[Dip]:
+def _own(record: Record) -> list[FileDip]:
     """The dips of a record that is fitted as it is: its first is the one that is meant."""
     later, t = UserError("another dip of the record comes first, and is the one that is fitted"), record.t
     return [
-        Dip(number, float(t[a]), float(t[min(b, record.samples - 1)]), record if number == 1 else later)
+        FileDip(number, float(t[a]), float(t[min(b, record.samples - 1)]), record if number == 1 else later)
         for number, (a, b) in enumerate(find_dips(t, record.U), 1)
     ]
 
 
-def _numbered(found: Sequence[Happening], dips: Sequence[Dip], source: str, refused: str = "") -> Iterator[Seen]:
+def _numbered(found: Sequence[Happening], dips: Sequence[FileDip], source: str, refused: str = "") -> Iterator[Seen]:
     """What happened, with the dip that the reader makes of it."""
-    tried = {dip.number: dip.made for dip in dips}
+    tried = {dip.number: dip.result for dip in dips}
     for what, number in zip(found, _numbers(found, dips), strict=True):
         event, why = _event(tried.get(number) if number else None, refused)
         if event is not None and abs(event.t_start - what.start) > APART:
@@ -216,7 +216,7 @@ def _event(made: Record | UserError | None, refused: str) -> tuple[Event | None,
         return None, str(error)
 
 
-def _numbers(found: Sequence[Happening], dips: Sequence[Dip]) -> list[int | None]:
+def _numbers(found: Sequence[Happening], dips: Sequence[FileDip]) -> list[int | None]:
     """For each happening the dip, counted from 1, that shares more of its time with it than with any other."""
     numbers: list[int | None] = [None] * len(found)
     for dip in dips:

@@ -11,7 +11,7 @@ from tractexp import plugin
 from tractexp.errors import UserError, check_range
 from tractexp.overrides import assigned
 from tractexp.record import Base, Events, Reader, Record, Waves, detect
-from tractexp.record.dips import Dip, check_numbers, chosen, level, numbered
+from tractexp.record.dips import FileDip, check_numbers, chosen, level, numbered
 from tractexp.record.phasor import Phasors
 from tractexp.record.record import LOAD
 from tractexp.recording.arrangement import arranged, tuned
@@ -72,7 +72,7 @@ class WaveformReader(Reader):
         train, validate = ([_kept(replace(r, identity=identity)) for r in g] for g in (events.train, events.validate))
         return Events(train, validate)
 
-    def dips(self, feeder: Feeder, streams: Sequence[Stream], frequency: float) -> list[Dip]:
+    def dips(self, feeder: Feeder, streams: Sequence[Stream], frequency: float) -> list[FileDip]:
         """The dips of one load, on one base: voltage and apparent power before the first that can be used.
 
         Raises `UserError` where there is none, and where the load carries no power.
@@ -81,13 +81,13 @@ class WaveformReader(Reader):
         made = numbered(wholes, self.path, self.pre, self.post)
         if not made:
             detect(max(wholes, key=lambda whole: whole.samples))  # raises, and says what there is instead
-        first = next((dip.made for dip in made if isinstance(dip.made, Record)), None)
+        first = next((dip.result for dip in made if isinstance(dip.result, Record)), None)
         if first is None:
             return made
         U, S = level(first)
         if S < 1e-6:
             raise UserError(f"{self.path}: data.currents carry no power before the first dip ({1e6 * S:.2g} VA)")
-        return [replace(dip, made=_per_unit(dip.made, Base(U, S, frequency, LOAD))) for dip in made]
+        return [replace(dip, result=_per_unit(dip.result, Base(U, S, frequency, LOAD))) for dip in made]
 
     def _whole(self, feeder: Feeder, stream: Stream, frequency: float) -> Record:
         """All of one segment, in kV, MW and Mvar."""
@@ -167,9 +167,9 @@ class WaveformReader(Reader):
             made.append((phasors, Waves(waves, segment.start, segment.rate, self.estimator, late)))
         return made
 
-    def _notes(self, recording: Recording, feeder: Feeder, dips: Sequence[Dip]) -> tuple[str, ...]:
+    def _notes(self, recording: Recording, feeder: Feeder, dips: Sequence[FileDip]) -> tuple[str, ...]:
         kind = estimator_of(self.estimator).name.replace("_", "-")
-        steps = [dip.made.step for dip in dips if isinstance(dip.made, Record)]
+        steps = [dip.result.step for dip in dips if isinstance(dip.result, Record)]
         every = f" every {1000 * steps[0]:.3g} ms" if steps else ""
         notes = [f"{kind} phasors{every}, {counted(len(dips), 'dip')} found", *recording.notes, *feeder.why]
         fast = recording.waveforms()
