@@ -86,7 +86,7 @@ class CSV(Tabular, Reader):
     def _numbered(self) -> Events:
         """The dips of one table: the whole of it where there is one."""
         whole, dips = self._dips()
-        notes = () if dips and dips[0].result is whole else (*whole.notes, f"{counted(len(dips), 'dip')} found")
+        notes = () if dips and dips[0].result is whole else (*whole.notes, counted(len(dips), "dip"))
         return chosen(self.path, dips, self.train or None, self.validate, notes)
 
     def table(self) -> tuple[Record, list[FileDip]] | None:

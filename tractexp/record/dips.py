@@ -1,4 +1,4 @@
-"""Several dips of one file, numbered in order of time: cut out, on one base, fitted and held out."""
+"""Several dips of one file, numbered in order of time, each cut out as a record to be fitted or held out."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,9 +1,9 @@
-"""Which way power flows where P is negative: a load whose current is counted the wrong way, or a source."""
+"""The cause of a negative P: a load whose current is counted the wrong way, or a source."""
 
 import numpy as np
 
-DISTURBED = 0.03  # of the voltage: what a load must answer
-CALM = 0.01  # of the voltage: where P is that before
+DISTURBED = 0.03  # of the voltage: a larger deviation is a disturbance, which a load answers
+CALM = 0.01  # of the voltage: within this deviation P counts as before the disturbance
 FEWEST = 3  # samples in either state
 FALLS = 0.5  # exponent of |P| over U from which on power falls with the voltage as a load's does
 STEEPEST = 4.0  # exponent that no load exceeds: what falls faster was switched off

@@ -63,7 +63,7 @@ class Event:
 
     @property
     def calm(self) -> np.ndarray:
-        """What P and Q do before the dip beside their means, (2, n) [pu]; nan in a gap."""
+        """Deviations of P and Q from their means before the dip, (2, n) [pu]; nan in a gap."""
         quiet = np.stack([self.record.P[self.steady], self.record.Q[self.steady]])
         return np.stack([row - row[np.isfinite(row)].mean() for row in quiet])
 
@@ -241,7 +241,7 @@ def _steady(record: Record, start: int, swells: list[tuple[int, int]]) -> slice:
 
 
 def _no_such_dip(record: Record, start: int, end: int) -> str:
-    """What a fall of the voltage is where it is no dip that can be fitted; "" where it is one."""
+    """Why a fall of the voltage is not a dip that can be fitted, a clause; "" where it is one."""
     t, U = record.t, record.U
     before = float(U[:start].mean())
     inside = U[start:end]
@@ -275,7 +275,7 @@ def _no_such_dip(record: Record, start: int, end: int) -> str:
 
 
 def _unfinished(record: Record, start: int, before: float) -> str:
-    """What is said of a fall that lasts to the record's end."""
+    """The reason against a fall that lasts to the record's end."""
     t, U = record.t, record.U
     fall = 1 - float(np.median(U[start:])) / before
     level = np.abs(U[start:] / float(np.median(U[start:])) - 1) <= _margin(U)
@@ -313,7 +313,7 @@ def _no_dip(record: Record) -> str:
 
 
 def describe(event: Event) -> str:
-    """What a run prints about the record it read, one sentence, a second one where something is unusual."""
+    """The line that a run prints about its record; a second sentence notes anything unusual."""
     record = event.record
     P = max(abs(event.P0), 1e-9)
     sentence = (

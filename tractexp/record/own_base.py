@@ -35,13 +35,13 @@ class OwnBase:
 
     @classmethod
     def at(cls, record: Record) -> "OwnBase":
-        """That which a record is on."""
+        """The base of a record."""
         file = record.file_base
         return cls(record.base.power, file.power, file.in_mva, file.origin)
 
     @classmethod
     def of(cls, event: Event) -> "OwnBase":
-        """That of the first event that is fitted; what it is on already where that is one of the load."""
+        """The base for a first fitted event: its power before the dip, or its present base if that is its own."""
         at, S = cls.at(event.record), float(np.hypot(event.P0, event.Q0))
         own = event.record.base.origin == LOAD or (S >= LEAST_S and abs(event.P0) <= MOST_P)
         return at if own or not S > SMALLEST else replace(at, power=S * at.power)
@@ -117,7 +117,7 @@ def rebased(event: Event, ratio: float, own: OwnBase) -> Event:
 
 
 def said(own: OwnBase) -> str:
-    """What was done to a record, in one sentence."""
+    """A sentence on the change of base."""
     return (
         f"put on a base of {own}, the apparent power before the first dip that is fitted: on {own.file} powers, torque"
         f" and inertia are {own.ratio:.5g} times, impedances {1 / own.ratio:.5g} times the values on this base"

@@ -244,9 +244,7 @@ def measure(
             products = over.means(np.concatenate([x**2, x[:K] * x[K:]]), rate, f, here)
             distortions.append(_distortion(X, products[: 2 * K], products[2 * K :], harmonics))
     X, f = (np.concatenate([part[k] for part in pieces], axis=-1) for k in (0, 1))
-    more = {
-        name: np.concatenate([part[name] for part in distortions]) for name in (distortions[0] if distortions else ())
-    }
+    more = {name: np.concatenate([one[name] for one in distortions]) for name in next(iter(distortions), ())}
     phasors = Phasors(start + at / rate, X[:K], X[K:], f, more)
     return replace(phasors, f=_turned(phasors, rate / every, least))
 

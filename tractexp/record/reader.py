@@ -1,4 +1,4 @@
-"""What a reader plugin must do: turn the `data` configuration into records."""
+"""The interface of reader plugins: records from the `data` configuration."""
 
 from abc import abstractmethod
 from collections.abc import Sequence
@@ -45,7 +45,7 @@ class Reader(Plugin):
         """Read and check everything; raises `UserError` naming the file, the place and the value."""
 
     def table(self) -> tuple["Record", Sequence["FileDip"]] | None:
-        """Of a reader of one table: all of it, and its dips."""
+        """The whole record of a file and its dips, from a reader of one table; None from other readers."""
         return None
 
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from tractexp.errors import UserError
 from tractexp.record.event import Event
+from tractexp.record.noise_filter import NoiseFilter
 from tractexp.record.phasor import TURN
-from tractexp.record.quieted import Quieting
 from tractexp.record.record import Record
 from tractexp.record.waves import Waves
 
@@ -178,10 +178,10 @@ def in_waves(event: Event) -> WaveEvent:
     turn = np.exp(1j * (2 * np.pi * frequency * (time - periodic.origin) + np.angle(V)))
     (v, v_zero), (i, i_zero) = (stationary(part, waves.rate, frequency) for part in np.split(x, 2))
     noise, noise_U = periodic.rest[K:], np.sqrt(np.mean(periodic.rest[:K] ** 2) * (2 / 3 if K == 3 else 1))
-    quieting = Quieting.at(waves.rate, frequency)
+    noise_filter = NoiseFilter.at(waves.rate, frequency)
     course, course_zero = stationary(periodic.at(time)[:K], waves.rate, frequency)
-    v = course + quieting(v - course, 2 * noise_U**2)
-    v_zero = course_zero + quieting(v_zero - course_zero, noise_U**2 / 2)
+    v = course + noise_filter(v - course, 2 * noise_U**2)
+    v_zero = course_zero + noise_filter(v_zero - course_zero, noise_U**2 / 2)
     power = V * np.conj(I)
     start = lead + _onset(t, x[:K, lead:], periodic, K, before)
     half = half_cycle(v / turn, i / turn, turn, waves.rate, frequency)
@@ -206,7 +206,7 @@ def in_waves(event: Event) -> WaveEvent:
         phasors=event, v=v / turn, v_zero=v_zero, turn=turn, currents=currents, lead=lead,
         omega_s0=2 * np.pi * (frequency - nominal), random=tuple(map(float, levels)), unexplained=calm,
         offsets=periodic.offsets * _scale(record, K), phases=K,
-        weights=quieting.weights,
+        weights=noise_filter.weights,
     )  # fmt: skip
 
 

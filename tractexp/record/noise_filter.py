@@ -16,14 +16,14 @@ NEAR = 8  # windows a cycle in which the power of fast changes is averaged
 
 
 @dataclass(frozen=True, eq=False)
-class Quieting:
+class NoiseFilter:
     """A low-pass filter of weights (2 m + 1,) without delay; `near` samples average the power of fast changes."""
 
     weights: np.ndarray
     near: int
 
     @classmethod
-    def at(cls, rate: float, frequency: float) -> "Quieting":
+    def at(cls, rate: float, frequency: float) -> "NoiseFilter":
         """The filter for a sampling rate and a frequency [Hz] in its pass band; at too low a rate all passes."""
         from scipy.signal import firwin, kaiserord
 

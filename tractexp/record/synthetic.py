@@ -8,7 +8,7 @@ from tractexp.record.wave_event import WaveEvent, half_cycle
 from tractexp.record.waves import Waves
 
 
-def unrecorded(
+def synthetic_event(
     name: str, t: np.ndarray, v: np.ndarray, before: tuple[float, float, float], frequency: float, start: int, end: int
 ) -> WaveEvent:
     """The event of a voltage v (N,) complex [pu] in the frame of that before, at uniform times t (N,) [s].
