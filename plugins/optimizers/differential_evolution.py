@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tractexp.doors.scipy_differential_evolution import generations
+from tractexp.compat.scipy_differential_evolution import generations
 from tractexp.errors import check_choice, check_range
 from tractexp.identification.optimizer import Box, Evaluate, Iterative
 from tractexp.plugin import plugin

@@ -18,7 +18,7 @@ from hydra.plugins.sweeper import Sweeper
 from omegaconf import OmegaConf
 
 from tractexp import files
-from tractexp.doors.hydra_plugins import NAMESPACE
+from tractexp.compat.hydra_plugins import NAMESPACE
 from tractexp.errors import Stopped, UserError
 from tractexp.plugin import build, get
 from tractexp.sweep import status
