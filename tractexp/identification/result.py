@@ -301,7 +301,7 @@ def conclude(
         optimizer=optimizer,
         search=searched(problem, found),
         notes=[note for f in fits for note in f.event.record.notes],
-        records=[{"name": f.event.record.name, "role": f.role} | provenance.told(f.event.record) for f in fits],
+        records=[{"name": f.event.record.name, "role": f.role} | provenance.identity(f.event.record) for f in fits],
         own_base=asdict(own),
         parameters_on_given_base={} if own.ratio == 1 else own.values(by_event(*found_values.values()), exponents),
         tractexp_version=provenance.version(),

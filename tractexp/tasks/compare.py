@@ -105,8 +105,8 @@ def track(job: Job, made: Any, paths: list[Path]) -> None:
     if not node["enabled"]:
         return
     from tractexp import tracking
-    from tractexp.tracking.attach import attach
-    from tractexp.tracking.swept import parent_of, waits
+    from tractexp.tracking.run import attach
+    from tractexp.tracking.sweepfile import parent_of, waits
 
     if made.folder is not None and waits(made.folder):
         return  # the page is sent with the run of the sweep
