@@ -21,6 +21,7 @@ from tractexp.discrepancy.gap import Gap
 from tractexp.discrepancy.held_out import HeldOut, Judged, searched_again
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.tangent import tangent
+from tractexp.domain import PHASORS
 from tractexp.errors import UserError
 from tractexp.extend import Effect, Parameter, plugin
 from tractexp.plugin import discover, get
@@ -297,7 +298,7 @@ def test_a_search_in_all_events_that_finds_nothing_new_changes_nothing(names, de
     adequate = [] if names is None else [SimpleNamespace(fit=Refit(names, np.zeros(1), 0.0, 0))]
     found = SimpleNamespace(adequate=adequate, explanations=SimpleNamespace(chosen=SimpleNamespace(names=names)))
     plain = SimpleNamespace(deviance=deviance)
-    both = SimpleNamespace(fitted=SimpleNamespace(waves=False), plain=plain, searched=lambda valleys, seed: found)
+    both = SimpleNamespace(fitted=SimpleNamespace(domain=PHASORS), plain=plain, searched=lambda valleys, seed: found)
     assert searched_again(before, both, 0) is before
 
 

@@ -31,6 +31,7 @@ from tractexp.discrepancy.proposal.refit import fitted
 from tractexp.discrepancy.proposal.screen import Ground, scores, screen
 from tractexp.discrepancy.proposal.wording import proposed_in_words
 from tractexp.discrepancy.records import Records
+from tractexp.domain import PHASORS, WAVES
 from tractexp.model.model import compose
 from tractexp.plugin import get
 from tractexp.record import Record, detect
@@ -217,9 +218,9 @@ def test_nothing_is_proposed_where_nothing_is_missing(seed):
 
 
 def test_without_a_held_out_event_or_on_waveforms_nothing_is_proposed():
-    anything = SimpleNamespace(bench=SimpleNamespace(waves=False))
+    anything = SimpleNamespace(bench=SimpleNamespace(domain=PHASORS))
     assert "none was held out" in propose(anything, None, None, None, (), 0).why
-    anything.bench.waves = True
+    anything.bench.domain = WAVES
     assert "of phasors" in propose(anything, None, None, None, ("an event",), 0).why
     assert proposed_in_words(None, "why not") == ["no term is proposed: why not"]
     assert proposed_in_words(None, None) == []

@@ -13,6 +13,7 @@ from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.kernels import Family, Kernels
 from tractexp.discrepancy.records import Records
+from tractexp.domain import Domain, domain_of
 from tractexp.identification import shelf
 from tractexp.identification.descent import Apart
 from tractexp.identification.problem import Problem
@@ -72,6 +73,11 @@ class Bench:
     def waves(self) -> bool:
         """Whether currents are compared, sample by sample, not the power of phasors."""
         return self.load.waves
+
+    @property
+    def domain(self) -> Domain:
+        """What the load is compared with."""
+        return domain_of(self.load)
 
     @property
     def events(self) -> tuple[Event, ...]:

@@ -105,8 +105,9 @@ def _noise(t: Tangent, noise: Noise, rng: np.random.Generator, draws: int) -> np
 
 
 def noise_known(bench: Bench, noise: Noise) -> bool:
-    """Whether quiet stretches tell the noise exactly enough; two numbers tell that of waveforms."""
-    return bench.waves or bench.criteria.knows_noise(noise.worth(sum(p.stop - p.start for p in bench.quiet)))
+    """Whether quiet stretches tell the noise exactly enough; of one that follows from the model, its size alone."""
+    samples = sum(part.stop - part.start for part in bench.quiet)
+    return bench.domain.noise_from_model or bench.criteria.knows_noise(noise.worth(samples))
 
 
 def _told(t: Tangent, projection: Projection, noise: Noise) -> Chance:

@@ -16,8 +16,8 @@ from tractexp.discrepancy.precision import Estimate, estimates, own_parameters
 from tractexp.discrepancy.proposal import generate
 from tractexp.discrepancy.proposal.propose import told as told_of_proposal
 from tractexp.discrepancy.verdict import NAMED, TIED, UNEXPLAINED
+from tractexp.domain import DOMAINS
 from tractexp.identification.adequacy import Grade
-from tractexp.model.drive import PHASORS
 from tractexp.wording import joined
 
 PLUGIN = f"{generate.NAME}.py"  # of a proposal, beside the page
@@ -94,7 +94,7 @@ def _nearest(investigation: Investigation) -> dict[str, Any] | None:
     assert near.rival.tests is not None
     unit, own = near.rival.fit.unit, own_parameters(investigation.bench, near.names)
     known = {e.parameter.name: e for e in estimates(near.rival.tests, unit, near.names)}
-    on = {"train": near.curves, "validate": near.carried} if investigation.bench.waves else {}
+    on = {"train": near.curves, "validate": near.carried} if investigation.bench.domain.nearest_gap else {}
     told = {role: both and {"before": _curves(both[0]), "after": _curves(both[1])} for role, both in on.items()}
     return {
         "effects": list(near.names),
@@ -187,7 +187,7 @@ def _number(value: float) -> float | None:
 
 def use_of(domain: str, conf: str) -> str:
     """The command that runs the extended model, to be found in the folder `conf`."""
-    return f"python -m tractexp --config-dir {conf} {f'domain={domain} ' * (domain != PHASORS)}model=extended"
+    return f"python -m tractexp --config-dir {conf} {DOMAINS[domain].setting}model=extended"
 
 
 def write_model(investigation: Investigation, node: dict[str, Any], path: Path) -> Path:

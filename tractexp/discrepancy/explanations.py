@@ -138,7 +138,7 @@ def with_families(base: BaseFit, tests: Disagreement, refits: dict[Names, Refit]
 
     None is tried unless `family_p` asks for them, and none of waveforms: no criterion was calibrated with members.
     """
-    if base.bench.waves or not base.bench.criteria.family_p:
+    if not base.bench.domain.calibrated or not base.bench.criteria.family_p:
         return tests
     tests, fits = against_members(base, tests, refits, seed + FAMILIES)
     refits |= {f.names: f for f in fits}

@@ -9,12 +9,10 @@ from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.linear import two_sided
 from tractexp.discrepancy.pushes import push_points
 from tractexp.discrepancy.tangent import resting
+from tractexp.domain.comparison import relative_error
 from tractexp.identification.model_error import ModelError, model_error
-from tractexp.identification.result import current_error, relative_error
-from tractexp.identification.seen import seen_by_estimator
 from tractexp.noise import Noise
 from tractexp.noise.span import spanned
-from tractexp.record import Event, WaveEvent
 
 SAME = 0.03  # singular values below this share of the largest: pushes that differ from others in noise only
 
@@ -77,34 +75,14 @@ def curves(bench: Bench, unit: np.ndarray, noise: Noise, names: Sequence[str] | 
     return Curves(calculated, P, Q, deviance, deviance / max(bench.samples, 1), error, i)
 
 
-@dataclass(frozen=True, eq=False)
-class _Played:
-    """An event, and P and Q (N,) [pu] calculated of it."""
-
-    event: Event
-    P: np.ndarray
-    Q: np.ndarray
-
-
 def _errors(bench: Bench, calculated: np.ndarray) -> tuple[float, float, ModelError, float | None]:
     """epsilon_p, epsilon_q, the model's error and, of waveforms, epsilon_i of what is calculated (C, N) [pu]."""
-    each = [
-        (event, calculated[:, bench.drive.part(e)])
-        for e, event in enumerate(bench.events)
-        if isinstance(event, WaveEvent)
-    ]
-    if not each:
-        counted = np.where(bench.known, bench.drive.measured, np.nan)
-        P, Q = (relative_error(counted[c], calculated[c]) for c in (0, 1))
-        parts = [calculated[:, bench.drive.part(e)] for e in range(bench.drive.events)]
-        played = [_Played(event, *part) for event, part in zip(bench.events, parts, strict=True)]
-        return P, Q, model_error(played), None
-    seen = [seen_by_estimator(event, currents) for event, currents in each]
-    measured = np.concatenate([np.stack([event.record.P, event.record.Q]) for event, _, _ in seen], axis=1)
-    made = np.concatenate([np.stack(power) for _, *power in seen], axis=1)
-    P, Q = (relative_error(measured[c], made[c]) for c in (0, 1))
-    error = model_error([_Played(*one) for one in seen])
-    return P, Q, error, float(np.sqrt(np.mean([current_error(*one) ** 2 for one in each])))
+    each = [bench.domain.comparison(event, calculated[:, bench.drive.part(e)]) for e, event in enumerate(bench.events)]
+    measured = np.concatenate([np.stack([one.event.record.P, one.event.record.Q]) for one in each], axis=1)
+    power = np.concatenate([np.stack([one.P, one.Q]) for one in each], axis=1)
+    P, Q = (relative_error(measured[c], power[c]) for c in (0, 1))
+    currents = [one.epsilon_i**2 for one in each if one.epsilon_i is not None]
+    return P, Q, model_error(each), float(np.sqrt(np.mean(currents))) if currents else None
 
 
 def gap(

@@ -167,7 +167,7 @@ def searched_again(made: HeldOut, both: AllEvents, seed: int) -> HeldOut:
     Of waveforms nothing is, for no criterion was calibrated with it.
     """
     bench, surviving = both.fitted, made.survivors
-    if bench.waves or not np.isfinite(both.plain.deviance):  # there the base model has no steady state
+    if not bench.domain.calibrated or not np.isfinite(both.plain.deviance):  # there the base model has no steady state
         return made
     found = both.searched(surviving.explanations.base.valleys, seed)
     of_all = {s.fit.names: s for s in found.adequate if s.fit.names}

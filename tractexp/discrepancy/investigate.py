@@ -20,11 +20,12 @@ from tractexp.discrepancy.overlay import Overlay, left, on_fitted, on_held_out
 from tractexp.discrepancy.places import Place, places
 from tractexp.discrepancy.precision import Estimate, estimates
 from tractexp.discrepancy.proposal.propose import Proposed, propose
-from tractexp.discrepancy.records import Records, check_events, in_waves_of
+from tractexp.discrepancy.records import Records, check_events
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.survivors import Survivors, survivors
 from tractexp.discrepancy.verdict import NONE, UNEXPLAINED, Verdict, verdict
 from tractexp.discrepancy.window_search import behind_recorder
+from tractexp.domain import domain_of
 from tractexp.model.model import Model
 from tractexp.record import Event
 
@@ -165,7 +166,7 @@ def investigate(
     `UserError` for wrong events or names.
     """
     criteria = criteria or Criteria()
-    train, validate = (in_waves_of(model, events) for events in (train, validate))
+    train, validate = (domain_of(model).events(events) for events in (train, validate))
     check_events(train, validate)
     with Effort(tell).audible() as effort:
         missing = catalogue(

@@ -12,7 +12,7 @@ from tractexp.discrepancy.held_out import Judged, carried
 from tractexp.discrepancy.places import Place
 from tractexp.discrepancy.remainder import Remainder, remainders
 from tractexp.discrepancy.verdict import Nearest
-from tractexp.identification.problem import excited
+from tractexp.domain import domain_of
 from tractexp.noise import Noise
 from tractexp.record import Event
 
@@ -37,7 +37,7 @@ class Overlay:
     @property
     def measured(self) -> np.ndarray:
         """What the models are compared with (C, n) [pu], nan in gaps."""
-        return excited(self.event).measured
+        return domain_of(self.event).excitation(self.event).measured
 
 
 def on_fitted(

@@ -32,7 +32,7 @@ class Tried:
 def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[BaseFit, Disagreement]:
     """The base model's fit and tests behind the recorder's window, where there is one; else those given."""
     bench, noise = base.bench, first.noise
-    if bench.waves:  # samples have no window
+    if not bench.domain.windowed:
         return base, first
     if bench.drive.windows:  # the model is of a kind that is always looked at through what the records say
         return base, first

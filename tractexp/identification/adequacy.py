@@ -135,10 +135,8 @@ def _means(plain: Likelihood, drawn: np.ndarray) -> np.ndarray:
     """By how much draws (b, C, N) would have P0 and Q0 of each event wrong, (b, 2 E), in ranges, for Eq. (8)."""
     problem = plain.problem
     wrong = np.zeros((len(drawn), problem.drive.events, 2))
-    if problem.drive.channels == 2:
-        for e, event in enumerate(problem.events):
-            first = int(problem.drive.first[e])
-            wrong[:, e] = drawn[:, :, first + event.steady.start : first + event.steady.stop].mean(axis=2)
+    for e, steady in enumerate(problem.steady):
+        wrong[:, e] = drawn[:, :, steady].mean(axis=2)
     return -wrong.reshape(len(drawn), -1) / plain.width[plain.free :]
 
 

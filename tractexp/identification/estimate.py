@@ -203,7 +203,8 @@ def _without_offsets(ends: Ends) -> Ends:
 
     Offsets of the currents, and of the voltage as the model passes them on, are larger than a model's error there.
     """
-    offsets = ends.observed.offsets(ends.likelihood.values(ends.best))
+    problem = ends.observed.problem
+    offsets = problem.domain.input_errors(problem, ends.likelihood.values(ends.best))
     if offsets is None:
         return ends
     squares = ends.likelihood
@@ -218,7 +219,7 @@ def _finished(ends: Ends, *, robust: bool = False) -> Estimated:
     seen = surprise(observed, likelihood, units[0], ends.likelihood, ends.lowest)
     if not seen.adequate:
         return _of_squares(ends, likelihood, seen)
-    whole = noise_at(observed, likelihood, units[0], observed.blurred(likelihood.values(units[0])), whole=True)
+    whole = noise_at(observed, likelihood, units[0], observed.input_errors(likelihood.values(units[0])), whole=True)
     likelihood = replace(likelihood, noise=whole)  # nothing but noise is left: all of it tells
     found = descend(likelihood.rows, units, apart=likelihood.apart)
     best = int(found.deviance.argmin())
@@ -238,7 +239,7 @@ def _under_noise(ends: Ends, *, robust: bool) -> tuple[Likelihood, np.ndarray]:
     """The likelihood of the noise that the fit leaves in quiet, and its maxima (n, D), the best first."""
     observed, likelihood = ends.observed, ends.likelihood.with_initial_power
     units = likelihood.placed(ends.near)
-    blur = observed.blurred(likelihood.values(units[0]))
+    blur = observed.input_errors(likelihood.values(units[0]))
     for _ in range(ROUNDS):
         if robust:
             likelihood = cleaned(likelihood, units[:1])
@@ -254,14 +255,13 @@ def noise_at(
 ) -> Noise:
     """The noise that a fit at coordinates (D,) leaves in quiet; of the `whole` residual where too little is quiet.
 
-    The whole tells more, too, where what is left is nothing but noise. `blur` is that of `Observed.blurred`.
+    The whole tells more, too, where what is left is nothing but noise. `blur` is that of `Observed.input_errors`.
     """
     measured = likelihood.problem.drive.measured
     rows, J = replace(likelihood, noise=Noise.white(*[1.0] * len(measured))).jacobian(unit)
     residual, columns = rows.reshape(measured.shape), J.T.reshape(-1, *measured.shape)
-    answers = observed.answers(likelihood.values(unit))
-    seen = observed.noise(residual, likelihood.known, columns, blur, whole, answers)
-    return seen or noise_of(likelihood, residual)
+    values = likelihood.values(unit)
+    return observed.noise(residual, likelihood.known, columns, values, blur, whole) or noise_of(likelihood, residual)
 
 
 def noise_of(likelihood: Likelihood, residuals: np.ndarray) -> Noise:

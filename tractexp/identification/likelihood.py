@@ -10,14 +10,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tractexp.domain import domain_of
 from tractexp.identification.descent import Apart
 from tractexp.identification.problem import Problem
 from tractexp.noise.color import SMALLEST, fit_autoregression, stretches
 from tractexp.noise.model import Noise, Pair
-from tractexp.record import Event, WaveEvent
+from tractexp.record import Event
 
 POWER_RANGE = 0.2  # of the apparent power before the event: how far P0 and Q0 may move
-QUIET_ORDER = 4  # of an autoregression of the few samples before a dip
 CENTRAL = 1e-5  # of a parameter's range: truncation and rounding both stay below 1e-7 of a column
 
 
@@ -25,8 +25,7 @@ def before_the_event(event: Event) -> Pair:
     """Level and color of each channel's noise before the dip: what is known of it before anything is fitted."""
     pair = []
     for quiet, level in zip(event.calm, event.levels, strict=True):
-        order = 0 if isinstance(event, WaveEvent) else QUIET_ORDER  # harmonics are no colored noise
-        made = fit_autoregression(stretches(quiet, np.isfinite(quiet)), order)
+        made = fit_autoregression(stretches(quiet, np.isfinite(quiet)), domain_of(event).quiet_order)
         pair.append(made.scaled(max(level, SMALLEST) / made.deviation[0]))
     return tuple(pair)
 

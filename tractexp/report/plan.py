@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tractexp.identification.plan import EDGE, INERTIA, SUDDEN, Choice, Forecast, Needed, column
+from tractexp.identification.plan import INERTIA, Choice, Forecast, Needed, column
 from tractexp.identification.problem import Problem
 from tractexp.report.chart import Chart
 from tractexp.report.page import Page
@@ -84,10 +84,10 @@ def page(path: Path, planned: Planned) -> Path:
     _events(made, planned)
     made.heading("What it rests on").items(
         [
-            f"Intervals follow from the sensitivity of {'the currents' if waves else 'P and Q'} to each parameter at"
+            f"Intervals follow from the sensitivity of {planned.problem.domain.compared} to each parameter at"
             " the values above. Where the interval is wide, or the values are far off, so is the forecast.",
             "The planned dip falls from 1 pu and comes back along straight edges of"
-            f" {1000 * (SUDDEN if waves else EDGE):g} ms{', without zero sequence' * waves}.",
+            f" {1000 * planned.problem.domain.edge:g} ms{', without zero sequence' * waves}.",
             "Noise of the recorded voltage, and effects that the model lacks, are not in it.",
         ]
     )

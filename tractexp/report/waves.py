@@ -5,8 +5,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from tractexp.domain.comparison import AFTER
 from tractexp.identification.problem import Problem
-from tractexp.identification.result import AFTER, Fit
+from tractexp.identification.result import Fit
 from tractexp.record import WaveEvent
 from tractexp.report import style
 from tractexp.report.chart import Chart

@@ -51,10 +51,10 @@ class Generalise(Task):
 def show(medians: Sequence[Mapping[str, Any]]) -> None:
     """Print a table for each held-out dip, medians over the seeds."""
     from tractexp.api.generalise import TOLD
-    from tractexp.identification.result import EPSILONS
+    from tractexp.domain import WAVES
 
     say()
-    errors = [key for key in EPSILONS if all(key in row for row in medians)]
+    errors = [key for key in WAVES.epsilons if all(key in row for row in medians)]
     for event, kind in dict.fromkeys((row["event"], row["kind"]) for row in medians):
         cells = [
             [row["optimizer"], *(f"{row[key]:.3e}" for key in ("residual_P", "residual_Q")),

@@ -216,7 +216,8 @@ def _refitted(
     Only of phasors without further channels or rates, which the bench has no records of: others stay linearised about
     their fits.
     """
-    event, plain = best.event, not (bench.waves or bench.records.window is not None or best.event.burden[0])
+    event = best.event
+    plain = bench.domain.recordable and bench.records.window is None and not event.burden[0]
     places = []
     for a in range(1, len(sides)):
         moved = _fitted_to(bench, noise, sides, sides[a], event) if plain else []

@@ -12,7 +12,8 @@ from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.fitting import Start, refit
 from tractexp.discrepancy.kernels import Family
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
-from tractexp.discrepancy.records import Records, check_events, in_waves_of
+from tractexp.discrepancy.records import Records, check_events
+from tractexp.domain import domain_of
 from tractexp.errors import UserError
 from tractexp.model.model import Model
 from tractexp.record import Event
@@ -37,7 +38,7 @@ def event_for(
             f"task.rivals={[list(s) for s in sets]}: an event is planned to tell two explanations or more apart; name"
             " another one, such as 'task.rivals=[stator_resistance,feeder_impedance]'"
         )
-    events = in_waves_of(model, events)
+    events = domain_of(model).events(events)
     check_events(events, ())
     named = sorted({name for names in sets for name in names})
     missing = catalogue(

@@ -14,7 +14,7 @@ import numpy as np
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.linear import two_sided
-from tractexp.discrepancy.next_event.imagined import BRIEF, DURATIONS, Imagined, driven
+from tractexp.discrepancy.next_event.imagined import Imagined, driven
 from tractexp.model.drive import Drive
 
 FOLLOWS = 1e-6  # pu: how near one comes to the other
@@ -43,7 +43,7 @@ class Same:
 
 def same(bench: Bench, one: Refit, other: Refit) -> Same | None:
     """The proof that two explanations are the same function of the voltage, None where they are not."""
-    events = [Imagined(*made) for made in itertools.product(RICH, (BRIEF if bench.waves else DURATIONS)[::2], TURNED)]
+    events = [Imagined(*made) for made in itertools.product(RICH, bench.domain.dips.durations[::2], TURNED)]
     drive = Drive.of([driven(bench, event) for event in events])
     told = []
     for truth, rival in ((one, other), (other, one)):

@@ -91,7 +91,7 @@ def propose(
     `among` are the terms that are tried, by default the whole library.
     """
     bench = base.bench
-    if bench.waves:
+    if not bench.domain.calibrated:
         return Proposed(why="proposals are of phasors: what waveforms lack is told by where and what is left")
     if not validate:
         return Proposed(why="a term is proposed only where a held-out event confirms it, and none was held out")
