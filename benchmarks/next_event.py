@@ -30,7 +30,8 @@ from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.investigate import Investigation, investigate
 from tractexp.discrepancy.next_event import choose
 from tractexp.discrepancy.next_event.choose import HOPELESS, NextEvent
-from tractexp.discrepancy.next_event.imagined import EDGE, Imagined, imagined
+from tractexp.discrepancy.next_event.imagined import Imagined, imagined
+from tractexp.domain import PHASORS
 from tractexp.model.model import compose
 from tractexp.plugin import get
 from tractexp.record import Event, Record, detect
@@ -67,7 +68,7 @@ def with_event(made: Scene, chosen: NextEvent, by_noise: bool) -> Scene:
     tried = chosen.by_noise if by_noise else chosen.best
     assert tried is not None
     event = tried.event
-    dip = Dip(depth=event.depth, start=0.5, duration=event.duration, fall=EDGE, rise=EDGE)
+    dip = Dip(depth=event.depth, start=0.5, duration=event.duration, fall=PHASORS.dips.edge, rise=PHASORS.dips.edge)
     return replace(made, dips=(*made.dips, dip), static=(*made.static, made.static[0]))
 
 

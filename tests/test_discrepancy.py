@@ -15,7 +15,6 @@ from scipy.special import chdtrc
 from test_cli import tractexp
 
 from hidden_effects import Case, Noise, make, write
-from tractexp.discrepancy import adequacy
 from tractexp.discrepancy.all_events import AllEvents
 from tractexp.discrepancy.base_fit import base_fit
 from tractexp.discrepancy.bench import Bench
@@ -31,11 +30,11 @@ from tractexp.discrepancy.held_out import carried, judged_on, weighed
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.noise_in_quiet import QuietNoise
-from tractexp.discrepancy.projection import signed_drop
+from tractexp.discrepancy.projection import Projection, signed_drop
 from tractexp.discrepancy.records import Records, check_events
 from tractexp.discrepancy.tangent import tangent
 from tractexp.errors import UserError
-from tractexp.identification import observed
+from tractexp.identification import observed, surprises
 from tractexp.identification.descent import Apart, normal
 from tractexp.identification.surprises import Scale, tail
 from tractexp.model.model import compose
@@ -437,11 +436,12 @@ def test_only_a_decision_that_is_open_asks_for_exact_scales(silent):
 
 @pytest.mark.parametrize(("events", "asked"), [(1, False), (2, True)])
 def test_parameters_of_each_event_are_asked_for_where_there_are_two(events, asked, monkeypatch):
-    monkeypatch.setattr(adequacy, "channels_of", lambda projection, bench: None)
-    monkeypatch.setattr(adequacy.surprises, "statistics", lambda channels, bench: {})
-    monkeypatch.setattr(adequacy, "least_p", lambda projection: np.ones(1))
-    projection = SimpleNamespace(unrest=lambda: np.zeros(1), unsteadiness=lambda: np.zeros(1))
-    made = adequacy.statistics(projection, SimpleNamespace(events=("a dip",) * events))
+    monkeypatch.setattr(surprises, "statistics", lambda channels, layout: {})
+    projection = SimpleNamespace(
+        unrest=lambda: np.zeros(1), least_p=np.ones(1), channels=lambda layout: None, r=np.zeros((1, 3)),
+        split=np.ones((1, 3)),
+    )  # fmt: skip
+    made = Projection.statistics(projection, SimpleNamespace(events=("a dip",) * events))
     assert ("parameters of each event" in made) == asked
 
 

@@ -27,10 +27,11 @@ from tractexp.discrepancy.fitting import refit
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.next_event import rivals
 from tractexp.discrepancy.next_event.choose import next_event
-from tractexp.discrepancy.next_event.imagined import EDGE, Imagined, as_recorded, imagined
+from tractexp.discrepancy.next_event.imagined import Imagined, as_recorded, imagined
 from tractexp.discrepancy.next_event.same import same
 from tractexp.discrepancy.next_event.separation import Chances, Seen, Separation, _reduced, seen, sided
 from tractexp.discrepancy.records import Records
+from tractexp.domain import PHASORS
 from tractexp.errors import UserError
 from tractexp.extend import Effect, Parameter, sites
 from tractexp.model.model import compose
@@ -108,7 +109,7 @@ def test_two_rivals_tie_and_the_recommended_event_ends_the_tie(tied):
     assert chosen.probability >= chosen.criteria.decided
     assert chosen.sentence().startswith(f"record {chosen.best.event.words}: it tells ")
     event = chosen.best.event
-    dip = Dip(depth=event.depth, start=0.5, duration=event.duration, fall=EDGE, rise=EDGE)
+    dip = Dip(depth=event.depth, start=0.5, duration=event.duration, fall=PHASORS.dips.edge, rise=PHASORS.dips.edge)
     made = hidden(*MILD)
     more = replace(made, dips=(*made.dips, dip), static=(*made.static, made.static[0]))
     after = judged(recorded(more))

@@ -7,7 +7,7 @@ import numpy as np
 
 from tractexp.errors import check_range
 from tractexp.identification.optimizer import REFUSED, Box, Evaluate, Iterative
-from tractexp.identification.starts import best_distinct
+from tractexp.parameter import best_distinct
 from tractexp.plugin import plugin
 
 APART = 0.3  # of the box, in the coordinate in which two starts differ most

@@ -7,7 +7,7 @@ import numpy as np
 from tractexp.errors import check_range
 from tractexp.identification.least_squares import APART, race
 from tractexp.identification.optimizer import REFUSED, Box, Evaluate, Optimizer
-from tractexp.identification.starts import best_distinct
+from tractexp.parameter import best_distinct
 from tractexp.plugin import plugin
 
 CLOSER = 10  # scatters drawn ever closer about the least refused point before a search gives up

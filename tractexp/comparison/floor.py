@@ -12,7 +12,7 @@ from tractexp.comparison.runs import Run
 from tractexp.identification.descent import descend
 from tractexp.identification.problem import Problem
 from tractexp.identification.search import REFUSED
-from tractexp.identification.starts import best_distinct, even
+from tractexp.parameter import best_distinct, even
 
 AT_FLOOR = 0.01  # what ends within this share of the floor has reached it
 SCATTER, STARTS, APART = 400, 60, 0.3  # starts: the best of a scatter that differ by so much of a range somewhere

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from tractexp.discrepancy.adequacy import channels_of, least_p, statistics
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.noise_in_quiet import QuietNoise
@@ -37,7 +36,7 @@ class Chance:
 
     def surprises(self, projection: Projection, bench: Bench) -> dict[str, float]:
         """How often chance leaves as much as a fit does, by each test of adequacy."""
-        found = statistics(projection, bench)
+        found = projection.statistics(bench)
         return {name: tail(self.left[name], value, self.scales.get(name)) for name, value in found.items()}
 
 
@@ -74,7 +73,7 @@ def scales(t: Tangent, own: Projection, noise: Noise, seed: int) -> dict[str, Sc
 
     def part(k: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         drawn = own.of(t.bench.whiten(noise, _noise(t, noise, np.random.default_rng((seed, k)), DRAWS)))
-        found = surprises.statistics(channels_of(drawn, t.bench), t.bench)
+        found = surprises.statistics(drawn.channels(t.bench), t.bench)
         return {name: (values.mean(axis=0), (values**2).mean(axis=0)) for name, values in found.items()}
 
     parts = each_apart(part, range(1, MORE + 1))
@@ -111,8 +110,8 @@ def noise_known(bench: Bench, noise: Noise) -> bool:
 
 
 def _told(t: Tangent, projection: Projection, noise: Noise) -> Chance:
-    p = least_p(projection)
+    p = projection.least_p
     if noise.loudest_blur <= t.bench.criteria.blurred:
         faults = np.array(list(projection.fault_p().values())).reshape(-1, len(p))
         p = np.maximum(np.minimum(p, faults.min(axis=0, initial=1.0)), SMALLEST_P)
-    return Chance(p, statistics(projection, t.bench))
+    return Chance(p, projection.statistics(t.bench))

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.injection import push_points
 from tractexp.discrepancy.linear import two_sided
-from tractexp.discrepancy.pushes import push_points
 from tractexp.discrepancy.tangent import resting
 from tractexp.domain.comparison import relative_error
 from tractexp.identification.model_error import ModelError, model_error

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.adequacy import channels_of
 from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.identification.surprises import LOUDEST, Cell, cells_of, energies, extremes
 
@@ -25,7 +24,7 @@ def places(at: Disagreement) -> list[Place]:
     bench = at.bench
     cells = cells_of(bench)
     (mean, spread), highest = extremes(at.chance.left[LOUDEST])
-    excess = energies(channels_of(at.projection, bench), bench)[0] - mean
+    excess = energies(at.projection.channels(bench), bench)[0] - mean
     loud = excess / spread > np.quantile(highest, 1 - at.criteria.false_alarms)
     total = np.maximum(excess, 0.0).sum()
     standing_out = [

@@ -6,7 +6,6 @@ more of them.
 
 from dataclasses import replace
 
-from tractexp.discrepancy.adequacy import channels_of
 from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.discrepancy.investigate import Investigation
 from tractexp.discrepancy.verdict import NONE, TIED
@@ -17,7 +16,7 @@ from tractexp.identification.verdict import UNIDENTIFIED, size
 def adequacy(found: Investigation) -> Adequacy:
     """The grade of the extended model, or of the base model where nothing is named, on all events."""
     tests: Disagreement = (found.verdict.chosen.tests or found.last) if found.names else found.first
-    ratio, where = loudest_stretch(channels_of(tests.projection, found.bench)[0], found.bench)
+    ratio, where = loudest_stretch(tests.projection.channels(found.bench)[0], found.bench)
     p = 1.0 if found.verdict.word == NONE else tests.p_left  # no disagreement: by the same false-alarm rate
     surprise = Surprise(p, tests.loudest, ratio, where)
     held_out = found.validate and found.validate.after.error

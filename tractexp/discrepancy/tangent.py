@@ -8,9 +8,9 @@ import numpy as np
 
 from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.fitting import WALL, Refit
+from tractexp.discrepancy.injection import push_points
 from tractexp.discrepancy.linear import two_sided
 from tractexp.discrepancy.projection import Column, Projection
-from tractexp.discrepancy.pushes import push_points
 from tractexp.noise import Noise
 from tractexp.noise.span import spanned
 

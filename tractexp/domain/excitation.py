@@ -5,7 +5,7 @@ import numpy as np
 from tractexp.model.drive import Excitation, Waveforms
 from tractexp.model.model import Model
 from tractexp.record import Event, WaveEvent
-from tractexp.record.through import sharpened
+from tractexp.record.window import sharpened
 
 WEIGHTS = {3: (0.5, 0.5, 1.0), 1: (1.0, 0.0, 0.0)}  # by phases, so that the objective is the mean over them
 

@@ -25,7 +25,7 @@ from tractexp.identification.descent import Descent, descend
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.observed import Observed
 from tractexp.identification.problem import Problem
-from tractexp.identification.uncertainty import Uncertainty, Valley, conclude, conclude_squares, threshold
+from tractexp.identification.uncertainty import Uncertainty, Valley, conclude, threshold
 from tractexp.identification.valleys import along_least_known, distinct, explored, screened
 from tractexp.identification.verdict import elsewhere
 from tractexp.noise.color import FEWEST, SMALLEST, fit_autoregression, stretches, white_noise
@@ -231,7 +231,7 @@ def _finished(ends: Ends, *, robust: bool = False) -> Estimated:
 
 def _of_squares(ends: Ends, noise: Likelihood, seen: Surprise) -> Estimated:
     """The minimum of Eq. (8) as the estimate."""
-    known = conclude_squares(ends.likelihood, ends.best, noise)
+    known = conclude(ends.likelihood, ends.best, noise)
     return Estimated(with_valleys(known, ends.near), seen, ends.starts)
 
 

@@ -12,11 +12,10 @@ from tractexp.domain import Domain, domain_of
 from tractexp.errors import UserError, among
 from tractexp.identification.loss import Loss
 from tractexp.identification.search import REFUSED
-from tractexp.identification.starts import even
 from tractexp.model.drive import Drive
 from tractexp.model.model import CLASSICAL, MOST_SUBSTEPS, Model
 from tractexp.model.parts import COMPARED, Effect
-from tractexp.parameter import Box, Parameter
+from tractexp.parameter import Box, Parameter, even
 from tractexp.record import Event
 
 PROBES = 64  # candidates across the box on which the Runge-Kutta step is judged

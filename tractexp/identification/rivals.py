@@ -16,10 +16,10 @@ from tractexp.errors import UserError
 from tractexp.identification.descent import descend
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.problem import Problem
-from tractexp.identification.starts import even
 from tractexp.identification.uncertainty import Uncertainty, threshold
 from tractexp.identification.verdict import IDENTIFIED, WEAK, WITHIN, Verdict, size
 from tractexp.model.model import Model, compose
+from tractexp.parameter import even
 from tractexp.plugin import discover, get
 
 STARTS = 5  # of the parameters that the rival alone has

@@ -15,11 +15,13 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from tractexp.model.drive import Drive
+from tractexp.noise.span import spanned
 from tractexp.record import Event
 
 SMALLEST_P = 1e-300
 HEAVIER = 2.33  # standard errors of its shape: once in 100 a Gumbel distribution passes for a heavier one
-LOUDEST = "the loudest window"
+LOUDEST, PER_EVENT = "the loudest window", "parameters of each event"
+DISTINCT = 1e-3  # of the largest: weaker directions are rounding
 STRIDE = 4  # samples between the instants at which a step is looked for
 BINS = 1024  # of the transform in which an oscillation is looked for
 PULSES = (0.01, 0.03, 0.1)  # s, lengths of the pulses that are looked for after the dips
@@ -78,6 +80,14 @@ def statistics(channels: np.ndarray, layout: Layout) -> dict[str, np.ndarray]:
         "a step or a pulse": np.concatenate([steps(channels, layout), pulses(after, layout)], axis=1),
         "an oscillation": np.concatenate([tones(channels, layout), bursts(after, layout)], axis=1),
     }
+
+
+def of_each_event(rows: np.ndarray, split: np.ndarray, least: float) -> np.ndarray:
+    """How much parameters of their own for each event would lower the deviance of rows (b, R), (b,).
+
+    `split` (k, R) are what each parameter changes in one event alone; those of at most `least` change nothing.
+    """
+    return ((rows @ spanned(split, DISTINCT, least).T) ** 2).sum(axis=1)
 
 
 def tail(draws: np.ndarray, value: np.ndarray, scale: Scale | None = None) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from tractexp.identification.descent import Descent, descend
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.problem import Problem
-from tractexp.identification.starts import best_distinct, even
+from tractexp.parameter import best_distinct, even
 
 SCREENED = 4096  # points of the box that are simulated
 STARTS, APART = 24, 0.5  # the best of them that are so far apart in the unit cube
