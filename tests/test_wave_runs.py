@@ -10,10 +10,10 @@ import pytest
 
 import tractexp
 from tractexp.domain import WAVES, domain_of
-from tractexp.domain.comparison import as_phasors, unsettled
+from tractexp.domain.playback import as_phasors, unsettled
 from tractexp.errors import UserError
 from tractexp.identification.advice import better_domain
-from tractexp.identification.plan import Shape, forecast
+from tractexp.identification.plan import DipShape, forecast
 from tractexp.identification.problem import Problem
 from tractexp.plugin import get
 from tractexp.record import in_waves
@@ -168,7 +168,7 @@ def test_a_result_of_waveforms_predicts_from_a_voltage(fit):
 
 def test_a_forecast_in_waveforms_narrows_with_depth_and_with_a_jump_of_the_phase(fit):
     problem, values = fit.asked.problem, fit.judged.known.values
-    shape = Shape.of(problem.events[0])
+    shape = DipShape.of(problem.events[0])
     assert shape.waves
     assert shape.jump == pytest.approx(0, abs=1)
     shape = replace(shape, depth=0.2, duration=0.1, jump=0.0, noise_P=0.005, noise_Q=0.005)
@@ -185,14 +185,14 @@ def test_a_forecast_in_waveforms_narrows_with_depth_and_with_a_jump_of_the_phase
 
 def test_a_planned_dip_has_the_sequences_that_were_asked_for():
     """Long after the edge the last half cycle shows 1 - depth of the positive and unbalance x depth of the negative."""
-    shape = Shape(0.4, 0.2, 6400.0, 0.005, 0.005, domain=WAVES, jump=20.0, unbalance=0.6)
+    shape = DipShape(0.4, 0.2, 6400.0, 0.005, 0.005, domain=WAVES, jump=20.0, unbalance=0.6)
     event = shape.event()
     low = slice(event.start + 128, event.end - 32)
     np.testing.assert_allclose(event.record.U[low], 0.6, atol=1e-9)
     np.testing.assert_allclose(event.record.U2[low], 0.24, atol=1e-9)
     np.testing.assert_allclose(np.abs(event.v[low]).max(), 0.84, atol=1e-3)
     assert event.depth == pytest.approx(0.4)
-    again = Shape.of(event)
+    again = DipShape.of(event)
     assert (again.depth, again.unbalance) == pytest.approx((0.4, 0.6), abs=1e-6)
     assert again.jump == pytest.approx(20.0, abs=1e-6)
     with pytest.raises(UserError, match=r"task\.unbalance=1\.5 is out of range"):
@@ -203,7 +203,7 @@ def test_an_unbalanced_dip_tells_more_of_the_locked_rotor(fit):
     """The negative sequence sees the machine at a slip of nearly two: its leakages, whatever its flux does."""
     problem, values = fit.asked.problem, fit.judged.known.values
     shape = replace(
-        Shape.of(problem.events[0]), depth=0.2, duration=0.2, jump=0.0, unbalance=0.0, noise_P=0.005, noise_Q=0.005
+        DipShape.of(problem.events[0]), depth=0.2, duration=0.2, jump=0.0, unbalance=0.0, noise_P=0.005, noise_Q=0.005
     )
     plain, unbalanced = (forecast(problem, values, replace(shape, unbalance=u)) for u in (0.0, 1.0))
     X_prime = plain.names.index("X_prime")

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.bench import Bench
-from tractexp.discrepancy.injection import push_points
+from tractexp.discrepancy.context import Context
+from tractexp.discrepancy.injection import perturbations
 from tractexp.discrepancy.linear import two_sided
-from tractexp.discrepancy.tangent import resting
-from tractexp.domain.comparison import relative_error
+from tractexp.discrepancy.linearization import resting
+from tractexp.domain.playback import relative_error
 from tractexp.identification.model_error import ModelError, model_error
 from tractexp.noise import Noise
 from tractexp.noise.span import spanned
@@ -35,7 +35,7 @@ class Curves:
 
 
 @dataclass(frozen=True, eq=False)
-class Gap:
+class GapTest:
     """Before and after: `closed` is the share of the explainable gap, `gain` the deviance gained.
 
     `expected` is the gain to be expected of a true explanation, the squared distance of both curves in standard
@@ -64,7 +64,7 @@ class Gap:
         return self.gain > 0 or not self.telling
 
 
-def curves(bench: Bench, unit: np.ndarray, noise: Noise, names: Sequence[str] | None = None) -> Curves:
+def curves(bench: Context, unit: np.ndarray, noise: Noise, names: Sequence[str] | None = None) -> Curves:
     """What a fit with the named effects (by default any) leaves; beyond all measure where it has no steady state."""
     residual = bench.residuals(unit[None], names)
     white = bench.whiten(noise, residual)[0]
@@ -75,7 +75,7 @@ def curves(bench: Bench, unit: np.ndarray, noise: Noise, names: Sequence[str] | 
     return Curves(calculated, P, Q, deviance, deviance / max(bench.samples, 1), error, i)
 
 
-def _errors(bench: Bench, calculated: np.ndarray) -> tuple[float, float, ModelError, float | None]:
+def _errors(bench: Context, calculated: np.ndarray) -> tuple[float, float, ModelError, float | None]:
     """epsilon_p, epsilon_q, the model's error and, of waveforms, epsilon_i of what is calculated (C, N) [pu]."""
     each = [bench.domain.comparison(event, calculated[:, bench.drive.part(e)]) for e, event in enumerate(bench.events)]
     measured = np.concatenate([np.stack([one.event.record.P, one.event.record.Q]) for one in each], axis=1)
@@ -86,9 +86,9 @@ def _errors(bench: Bench, calculated: np.ndarray) -> tuple[float, float, ModelEr
 
 
 def gap(
-    bench: Bench, base: np.ndarray, extended: np.ndarray, names: Sequence[str], noise: Noise,
+    bench: Context, base: np.ndarray, extended: np.ndarray, names: Sequence[str], noise: Noise,
     fitted: Sequence[int] | np.ndarray,
-) -> Gap:  # fmt: skip
+) -> GapTest:  # fmt: skip
     """Compare the base model's fit and that with the named effects on the events of `bench`.
 
     Coordinates `fitted` were fitted to these events in the extended model.
@@ -100,11 +100,11 @@ def gap(
     apart = (after.calculated - before.calculated)[None] * bench.known
     rows = bench.whiten(noise, apart)[0]
     expected = float(np.nan_to_num(rows @ rows, nan=np.inf))
-    return Gap(before, after, float(closed), float(gained), expected, bench.criteria.shown, noise)
+    return GapTest(before, after, float(closed), float(gained), expected, bench.criteria.shown, noise)
 
 
 def left_over(
-    bench: Bench, unit: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int] | np.ndarray
+    bench: Context, unit: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int] | np.ndarray
 ) -> float:
     """How much more than chance pushes into all balances would still lower the deviance at coordinates (D,).
 
@@ -113,15 +113,15 @@ def left_over(
     return beyond_chance(bench, unit, names, noise, fitted, pushed(bench, unit, names, noise))
 
 
-def pushed(bench: Bench, unit: np.ndarray, names: Sequence[str], noise: Noise) -> np.ndarray:
+def pushed(bench: Context, unit: np.ndarray, names: Sequence[str], noise: Noise) -> np.ndarray:
     """What pushes into all balances in all windows change at coordinates (D,), whitened (c, C N)."""
-    pushes, _ = push_points(bench, unit)
+    pushes, _ = perturbations(bench, unit)
     raw = bench.residuals_of(np.concatenate([unit[None], pushes]), [(names, True)] * (1 + len(pushes)))
     return bench.whiten(noise, np.nan_to_num(raw[1:] - raw[0]))
 
 
 def beyond_chance(
-    bench: Bench, unit: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int] | np.ndarray,
+    bench: Context, unit: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int] | np.ndarray,
     changes: np.ndarray,
 ) -> float:  # fmt: skip
     """How much more than chance `changes` (c, C N) would still lower the deviance at coordinates (D,).

@@ -13,7 +13,7 @@ from tractexp.model.parts import Effect
 from tractexp.parameter import Parameter
 
 if TYPE_CHECKING:
-    from tractexp.discrepancy.bench import Bench
+    from tractexp.discrepancy.context import Context
 
 SOURCE = "a unit push, for the tangent space only"
 EDGE = 0.002  # s: how sharp a window starts and ends
@@ -58,16 +58,16 @@ class Injection(Effect):
             eq.consume(gate * push_P, gate * push_Q)
 
 
-PUSHES = tuple(p.name for p in Injection.parameters[:5])
+PERTURBATIONS = tuple(p.name for p in Injection.parameters[:5])
 PUSH = 1e-3  # how hard
 
 
-def push_points(bench: "Bench", unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def perturbations(bench: "Context", unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Points (c, D) with a push into one balance in one window of the union of the events', and which balance."""
     at = bench.coordinates
     spans = sorted({w for e in range(len(bench.events)) for w in windows(bench, e)})
     points, groups = [], []
-    for g, push in enumerate(PUSHES):
+    for g, push in enumerate(PERTURBATIONS):
         for a, b in spans:
             point = at.placed(unit, {"window_on": a, "window_off": b})
             point[at.column[push]] += PUSH / at.width(push)

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.jumps import jumps
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.problem import Problem
 from tractexp.noise import Noise
-from tractexp.noise.wander import walk_of_load
+from tractexp.noise.random_walk import walk_of_load
 from tractexp.record import Event
 
 
@@ -23,11 +23,11 @@ from tractexp.record import Event
 class QuietNoise:
     """Estimates noise on a bench. `blur` (k, C, N) [pu] is what errors of the record do to what is compared."""
 
-    bench: Bench
+    bench: Context
     blur: np.ndarray | None  # of the voltage's noise, None where it has none; of waveforms, of the currents' offsets
 
     @classmethod
-    def at(cls, bench: Bench, unit: np.ndarray) -> "QuietNoise":
+    def at(cls, bench: Context, unit: np.ndarray) -> "QuietNoise":
         """Where errors of the voltage act as they do on the base model at coordinates (D,)."""
         if (errors := bench.domain.input_errors(bench.problem, _values(bench, unit))) is not None:
             return cls(bench, errors)
@@ -64,20 +64,20 @@ class QuietNoise:
         return bench.domain.noise(residual, bench.known, bench.quiet, bench.problem, values, walk, shapes)
 
 
-def white(bench: Bench) -> Noise:
+def white(bench: Context) -> Noise:
     """White noise of the level before the dips: what is known before the first fit."""
     each = zip(*(e.levels for e in bench.events), strict=True)
     levels = [float(np.sqrt(np.mean([level**2 for level in channel]))) for channel in each]
     return Noise(Noise.white(*levels).pairs, np.eye(len(levels)))
 
 
-def _values(bench: Bench, unit: np.ndarray) -> np.ndarray:
+def _values(bench: Context, unit: np.ndarray) -> np.ndarray:
     """Free values (d,) of the problem of everything at coordinates (D,)."""
     space = bench.problem.space
     return space.from_unit(unit[: space.dimension])
 
 
-def _at_voltage(bench: Bench, events: tuple[Event, ...] | list[Event], unit: np.ndarray) -> np.ndarray:
+def _at_voltage(bench: Context, events: tuple[Event, ...] | list[Event], unit: np.ndarray) -> np.ndarray:
     """Residuals (C, N) of the base model at coordinates (D,), driven by the voltages of other events."""
     kernels, at = bench.kernels, bench.coordinates
     problem = Problem(bench.model, events, kernels.bounds, kernels.fixed, kernels.substeps)

@@ -7,13 +7,13 @@ more of them.
 from dataclasses import replace
 
 from tractexp.discrepancy.disagreement import Disagreement
-from tractexp.discrepancy.investigate import Investigation
+from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.verdict import NONE, TIED
 from tractexp.identification.adequacy import Adequacy, Surprise, graded, loudest_stretch
 from tractexp.identification.verdict import UNIDENTIFIED, size
 
 
-def adequacy(found: Investigation) -> Adequacy:
+def adequacy(found: Findings) -> Adequacy:
     """The grade of the extended model, or of the base model where nothing is named, on all events."""
     tests: Disagreement = (found.verdict.chosen.tests or found.last) if found.names else found.first
     ratio, where = loudest_stretch(tests.projection.channels(found.bench)[0], found.bench)
@@ -26,7 +26,7 @@ def adequacy(found: Investigation) -> Adequacy:
     return grade
 
 
-def held(found: Investigation) -> dict[str, float]:
+def held(found: Findings) -> dict[str, float]:
     """Parameters of the extended model that the events cannot tell (to half their size), at the values found."""
     if not found.names:
         return {}

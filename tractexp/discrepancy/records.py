@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from tractexp.discrepancy.recorder_window import RecorderWindow
 from tractexp.domain import domain_of
 from tractexp.errors import UserError
-from tractexp.noise.voltage import Smoothed
+from tractexp.noise.voltage import SmoothedEvent
 from tractexp.record import Event
 
 
@@ -19,7 +19,7 @@ class Records:
     """Events as recorded, and as a simulation is driven by them."""
 
     recorded: tuple[Event, ...]
-    smoothed: tuple[Smoothed, ...]
+    smoothed: tuple[SmoothedEvent, ...]
     window: RecorderWindow | None = None  # over which the recorder forms phasors, where that is known
 
     @classmethod

@@ -4,9 +4,9 @@
 is asked of the domain.
 """
 
-from tractexp.domain.comparison import Comparison as Comparison
 from tractexp.domain.domain import Domain as Domain
 from tractexp.domain.phasors import PhasorDomain
+from tractexp.domain.playback import Playback as Playback
 from tractexp.domain.waves import WaveDomain
 from tractexp.model.model import Model
 from tractexp.record import Event

@@ -7,22 +7,22 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from tractexp.domain.comparison import Comparison
+from tractexp.domain.playback import Playback
 from tractexp.errors import UserError
 from tractexp.model.drive import IN_WORDS, OUTPUTS, Drive, Excitation, Waveforms
 from tractexp.model.model import Model
 from tractexp.noise import Noise
-from tractexp.noise.voltage import Smoothed
-from tractexp.noise.wander import Wander
+from tractexp.noise.random_walk import RandomWalk
+from tractexp.noise.voltage import SmoothedEvent
 from tractexp.record import Event
 
 if TYPE_CHECKING:
-    from tractexp.identification.plan import Shape
+    from tractexp.identification.plan import DipShape
     from tractexp.identification.problem import Problem
 
 
 @dataclass(frozen=True)
-class Dips:
+class DipGrid:
     """Dips that might be recorded next: durations [s] that are tried, edges [s], time before and from the start on."""
 
     durations: tuple[float, ...]
@@ -56,7 +56,7 @@ class Domain(ABC):
     edge: ClassVar[float]  # s, fall and rise of a planned dip
     further: ClassVar[Mapping[str, str]]  # channels that a jump of the phase and an unbalance have to be recorded with
     shaped_by: ClassVar[tuple[str, ...]]  # what a planned dip has beside depth, duration, rate and noise
-    dips: ClassVar[Dips]  # that might be recorded next
+    dips: ClassVar[DipGrid]  # that might be recorded next
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -83,7 +83,7 @@ class Domain(ABC):
         """What drives a model through an event of this domain; `weights` are those of an objective, of P and Q."""
 
     @abstractmethod
-    def smoothed(self, event: Event) -> Smoothed:
+    def smoothed(self, event: Event) -> SmoothedEvent:
         """The event with the noise taken out of its voltage, where that can be told from it."""
 
     @abstractmethod
@@ -101,7 +101,7 @@ class Domain(ABC):
     @abstractmethod
     def noise(
         self, residual: np.ndarray, valid: np.ndarray, quiet: Sequence[slice], problem: "Problem", values: np.ndarray,
-        walk: Callable[[np.ndarray], Wander | None], shapes: np.ndarray | None,
+        walk: Callable[[np.ndarray], RandomWalk | None], shapes: np.ndarray | None,
     ) -> Noise:  # fmt: skip
         """The noise of residuals (C, N) in quiet stretches, at free values (d,) of the problem.
 
@@ -114,7 +114,7 @@ class Domain(ABC):
         """What errors of the record beside the voltage's noise do at free values (d,), (k, C, N) [pu], or None."""
 
     @abstractmethod
-    def comparison(self, event: Event, outputs: np.ndarray) -> Comparison:
+    def comparison(self, event: Event, outputs: np.ndarray) -> Playback:
         """What is calculated (C, N) of an event of this domain beside what was recorded."""
 
     @abstractmethod
@@ -130,7 +130,7 @@ class Domain(ABC):
         """What `shaped_by` names, of a recorded event."""
 
     @abstractmethod
-    def planned(self, shape: "Shape", name: str, t: np.ndarray, course: np.ndarray, start: int, end: int) -> Event:
+    def planned(self, shape: "DipShape", name: str, t: np.ndarray, course: np.ndarray, start: int, end: int) -> Event:
         """A dip as if it had been recorded at times t (N,) [s], `course` (N,) of it there: 0 to 1."""
 
     @abstractmethod

@@ -6,19 +6,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tractexp.domain import excitation
-from tractexp.domain.comparison import Comparison
-from tractexp.domain.domain import Dips, Domain, simulated
+from tractexp.domain.domain import DipGrid, Domain, simulated
+from tractexp.domain.playback import Playback
 from tractexp.model.drive import PHASORS, Drive, Excitation
 from tractexp.model.model import Model
 from tractexp.noise import Noise
 from tractexp.noise.quiet import estimate
-from tractexp.noise.voltage import Smoothed, smoothed
-from tractexp.noise.wander import Wander
+from tractexp.noise.random_walk import RandomWalk
+from tractexp.noise.voltage import SmoothedEvent, smoothed
 from tractexp.record import Base, Event, Record
 from tractexp.record.wave_event import COARSEST, smeared
 
 if TYPE_CHECKING:
-    from tractexp.identification.plan import Shape
+    from tractexp.identification.plan import DipShape
     from tractexp.identification.problem import Problem
 
 FINEST_STEP = 5e-4  # s, longest Runge-Kutta step of a forecast
@@ -36,7 +36,7 @@ class PhasorDomain(Domain):
     edge = 0.02
     further = {"jump": "the frequency f", "unbalance": "U2"}
     shaped_by = ()
-    dips = Dips((0.1, 0.2, 0.4, 0.8), 0.04, 0.3, 2.5)  # the longest is a tap or a bank that is back after 1 s
+    dips = DipGrid((0.1, 0.2, 0.4, 0.8), 0.04, 0.3, 2.5)  # the longest is a tap or a bank that is back after 1 s
 
     def event(self, event: Event) -> Event:
         return event
@@ -46,7 +46,7 @@ class PhasorDomain(Domain):
     ) -> Excitation:
         return excitation.phasors(event, model, weights)
 
-    def smoothed(self, event: Event) -> Smoothed:
+    def smoothed(self, event: Event) -> SmoothedEvent:
         return smoothed(event)
 
     def steady(self, events: Sequence[Event], drive: Drive) -> list[slice]:
@@ -61,15 +61,15 @@ class PhasorDomain(Domain):
 
     def noise(
         self, residual: np.ndarray, valid: np.ndarray, quiet: Sequence[slice], problem: "Problem", values: np.ndarray,
-        walk: Callable[[np.ndarray], Wander | None], shapes: np.ndarray | None,
+        walk: Callable[[np.ndarray], RandomWalk | None], shapes: np.ndarray | None,
     ) -> Noise:  # fmt: skip
         return estimate(residual, valid, quiet, walk, shapes)
 
     def input_errors(self, problem: "Problem", values: np.ndarray) -> None:
         return None
 
-    def comparison(self, event: Event, outputs: np.ndarray) -> Comparison:
-        return Comparison.of_power(event, outputs[0], outputs[1])
+    def comparison(self, event: Event, outputs: np.ndarray) -> Playback:
+        return Playback.of_power(event, outputs[0], outputs[1])
 
     def better(self, event: Event) -> str:
         """Of records that hold no samples, or too few in a cycle, nothing is said."""
@@ -86,7 +86,7 @@ class PhasorDomain(Domain):
     def shape(self, event: Event) -> dict[str, float]:
         return {}
 
-    def planned(self, shape: "Shape", name: str, t: np.ndarray, course: np.ndarray, start: int, end: int) -> Event:
+    def planned(self, shape: "DipShape", name: str, t: np.ndarray, course: np.ndarray, start: int, end: int) -> Event:
         """P and Q hold the steady state, for no forecast looks at them."""
         record = Record(
             name, t, 1 - shape.depth * course, np.full(len(t), shape.P0), np.full(len(t), shape.Q0),

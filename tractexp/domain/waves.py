@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from tractexp.domain import excitation, wave_errors
-from tractexp.domain.comparison import Comparison
-from tractexp.domain.domain import Dips, Domain, simulated
+from tractexp.domain.domain import DipGrid, Domain, simulated
+from tractexp.domain.playback import Playback
 from tractexp.model.drive import WAVES, Drive, Waveforms
 from tractexp.model.model import Model
 from tractexp.noise import Noise
-from tractexp.noise.voltage import Smoothed
-from tractexp.noise.wander import Wander
+from tractexp.noise.random_walk import RandomWalk
+from tractexp.noise.voltage import SmoothedEvent
 from tractexp.noise.waves import of_waves
 from tractexp.record import Event, WaveEvent, in_waves
 from tractexp.record.unrecorded import unrecorded
 from tractexp.record.wave_event import COARSEST
 
 if TYPE_CHECKING:
-    from tractexp.identification.plan import Shape
+    from tractexp.identification.plan import DipShape
     from tractexp.identification.problem import Problem
 
 PLAYED = 64  # samples per cycle at least, of a voltage that is played
@@ -40,7 +40,7 @@ class WaveDomain(Domain):
     edge = 0.001
     further = {}
     shaped_by = ("jump", "unbalance")
-    dips = Dips((0.04, 0.08, 0.16, 0.32), 0.002, 0.1, 0.62)  # as long as recorders of waveforms go on
+    dips = DipGrid((0.04, 0.08, 0.16, 0.32), 0.002, 0.1, 0.62)  # as long as recorders of waveforms go on
 
     def event(self, event: Event) -> WaveEvent:
         return in_waves(event)
@@ -50,9 +50,9 @@ class WaveDomain(Domain):
     ) -> Waveforms:
         return excitation.waveforms(cast(WaveEvent, event))
 
-    def smoothed(self, event: Event) -> Smoothed:
+    def smoothed(self, event: Event) -> SmoothedEvent:
         """As recorded: within a cycle nothing tells noise of the voltage from the voltage."""
-        return Smoothed(event, np.empty((0, event.record.samples)))
+        return SmoothedEvent(event, np.empty((0, event.record.samples)))
 
     def steady(self, events: Sequence[Event], drive: Drive) -> list[slice]:
         return []
@@ -66,7 +66,7 @@ class WaveDomain(Domain):
 
     def noise(
         self, residual: np.ndarray, valid: np.ndarray, quiet: Sequence[slice], problem: "Problem", values: np.ndarray,
-        walk: Callable[[np.ndarray], Wander | None], shapes: np.ndarray | None,
+        walk: Callable[[np.ndarray], RandomWalk | None], shapes: np.ndarray | None,
     ) -> Noise:  # fmt: skip
         """A load does not wander within so short a record."""
         responses = wave_errors.impulse_responses(problem, values)
@@ -75,8 +75,8 @@ class WaveDomain(Domain):
     def input_errors(self, problem: "Problem", values: np.ndarray) -> np.ndarray:
         return wave_errors.input_errors(problem, values)
 
-    def comparison(self, event: Event, outputs: np.ndarray) -> Comparison:
-        return Comparison.of_currents(cast(WaveEvent, event), outputs)
+    def comparison(self, event: Event, outputs: np.ndarray) -> Playback:
+        return Playback.of_currents(cast(WaveEvent, event), outputs)
 
     def better(self, event: Event) -> str:
         return ""
@@ -94,7 +94,7 @@ class WaveDomain(Domain):
         negative = abs(np.mean(np.conj(v * turn) / turn)) / max(event.U0 * event.depth, 1e-9)
         return {"jump": float(np.degrees(np.angle(v.mean()))), "unbalance": float(min(negative, 1.0))}
 
-    def planned(self, shape: "Shape", name: str, t: np.ndarray, course: np.ndarray, start: int, end: int) -> Event:
+    def planned(self, shape: "DipShape", name: str, t: np.ndarray, course: np.ndarray, start: int, end: int) -> Event:
         """Of a fault between two phases, types C and D of Bollen 2000, where the unbalance is 1."""
         v = (1 - shape.depth * course) * np.exp(1j * np.radians(shape.jump) * course)
         v = v + shape.unbalance * shape.depth * course * np.exp(-4j * np.pi * shape.frequency * t)

@@ -163,7 +163,7 @@ def _of_each_event(likelihood: Likelihood, J: np.ndarray, Q: np.ndarray) -> np.n
 
 def loudest_stretch(channels: np.ndarray, layout: Layout) -> tuple[float, str]:
     """The loudest window of the whitened residual (2, N): how many times the noise, and where it is."""
-    cells = surprises.cells_of(layout)
+    cells = surprises.residual_windows(layout)
     row = layout.drive.spoken.index
     level = [float(np.sqrt(np.mean(channels[row(c.channel), c.part] ** 2))) for c in cells]
     k = int(np.argmax(level))

@@ -7,7 +7,7 @@ import numpy as np
 from tractexp.errors import UserError
 from tractexp.identification.adequacy import Adequacy, Grade
 from tractexp.identification.information import SHARE
-from tractexp.identification.plan import Forecast, Shape, over_depth
+from tractexp.identification.plan import DipShape, Forecast, over_depth
 from tractexp.identification.problem import Problem
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import BOUND, EDGE, UNIDENTIFIED, WEAK, WITHIN, shown, size
@@ -72,7 +72,7 @@ def _deeper(known: Uncertainty) -> list[str]:
     if problem.per_event:
         return [without_figures]
     deepest = int(np.argmax([e.depth for e in problem.events]))
-    shape, noise = Shape.of(problem.events[deepest]), known.likelihood.noise.of(deepest)
+    shape, noise = DipShape.of(problem.events[deepest]), known.likelihood.noise.of(deepest)
     try:
         forecasts = over_depth(problem, known.values, shape, known.information, noise)
     except UserError:  # this model or these values cannot be planned with

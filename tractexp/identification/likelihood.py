@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.domain import domain_of
-from tractexp.identification.descent import Apart
+from tractexp.identification.descent import SeparableColumns
 from tractexp.identification.problem import Problem
 from tractexp.noise.color import SMALLEST, fit_autoregression, stretches
 from tractexp.noise.model import Noise, Pair
@@ -142,13 +142,13 @@ class Likelihood:
         return rows[0], ((above - below) / np.where(span > 0, span, 1.0)[:, None]).T
 
     @property
-    def apart(self) -> list[Apart]:
+    def apart(self) -> list[SeparableColumns]:
         """P0 and Q0 act on the rows of their own event only: one simulation has the differences of all events."""
         events = self.problem.drive.events
         if not self.initial_power:
             return []
         rows = np.array([self.part_of(e) for e in range(events)])
-        return [Apart(self.free + np.arange(events) * 2 + c, rows) for c in (0, 1)]
+        return [SeparableColumns(self.free + np.arange(events) * 2 + c, rows) for c in (0, 1)]
 
     def part_of(self, event: int) -> np.ndarray:
         """Which rows (R,) belong to an event."""

@@ -15,8 +15,8 @@ from tractexp.identification.problem import Problem
 from tractexp.model.drive import Drive
 from tractexp.noise.model import Noise
 from tractexp.noise.quiet import louder, quiet_stretches
-from tractexp.noise.voltage import Smoothed
-from tractexp.noise.wander import LESS, WITHIN, Load, walk_of_load, without_slow
+from tractexp.noise.random_walk import LESS, WITHIN, Load, walk_of_load, without_slow
+from tractexp.noise.voltage import SmoothedEvent
 from tractexp.record import Event
 
 LEAST_REST = 0.2  # of a residual's variance: where the fit takes more, it tells nothing of the noise
@@ -31,7 +31,7 @@ class Observed:
     """A problem driven by smoothed voltages, and what may still be wrong with these."""
 
     problem: Problem
-    smoothed: tuple[Smoothed, ...]
+    smoothed: tuple[SmoothedEvent, ...]
 
     @classmethod
     def of(cls, problem: Problem) -> "Observed":

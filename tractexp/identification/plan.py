@@ -24,7 +24,7 @@ INERTIA = "H"  # H = M omega_s / 2 has the relative precision of M
 
 
 @dataclass(frozen=True)
-class Shape:
+class DipShape:
     """A dip that might be recorded, from 1 pu, with trapezoidal edges. Noise [pu] forgets within `memory` [s].
 
     Of waveforms it is a dip of the positive sequence in which the voltage's phase jumps by `jump` [degrees], with a
@@ -46,7 +46,7 @@ class Shape:
     unbalance: float = 0.0
 
     @classmethod
-    def of(cls, event: Event, noise: Noise | None = None) -> "Shape":
+    def of(cls, event: Event, noise: Noise | None = None) -> "DipShape":
         """The shape of a recorded event, with the noise that a fit found there, or that before the dip."""
         noise, domain = noise or Noise((before_the_event(event),)), domain_of(event)
         (noise_P, noise_Q, *_), memory = noise.levels, noise.memory(event.record.step)
@@ -96,7 +96,7 @@ class Shape:
 class Forecast:
     """What recording `shape` would tell: half 95 % intervals (d,) of the parameters `names`."""
 
-    shape: Shape
+    shape: DipShape
     names: tuple[str, ...]
     values: np.ndarray
     half: np.ndarray
@@ -122,7 +122,7 @@ def like(problem: Problem, events: Sequence[Event]) -> Problem:
 
 
 def forecast(
-    problem: Problem, values: np.ndarray, shape: Shape, known: Information | None = None, noise: Noise | None = None
+    problem: Problem, values: np.ndarray, shape: DipShape, known: Information | None = None, noise: Noise | None = None
 ) -> Forecast:
     """The intervals that `shape` would give at free `values` (d,), added to what is `known` already.
 
@@ -190,7 +190,7 @@ def column(names: Sequence[str], parameter: str) -> int:
 
 
 def over_depth(
-    problem: Problem, values: np.ndarray, shape: Shape, known: Information | None = None, noise: Noise | None = None
+    problem: Problem, values: np.ndarray, shape: DipShape, known: Information | None = None, noise: Noise | None = None
 ) -> list[Forecast]:
     """Forecasts for dips of every depth, otherwise of this `shape`."""
     return [forecast(problem, values, replace(shape, depth=float(d)), known, noise) for d in DEPTHS]
@@ -212,7 +212,7 @@ def depth_needed(forecasts: Sequence[Forecast], parameter: str, within: float) -
 
 
 @dataclass(frozen=True)
-class Choice:
+class ChosenEvent:
     """One event of the best set, in the order of choice: by how much the intervals shrink with it, on average."""
 
     event: int
@@ -221,14 +221,14 @@ class Choice:
     half: tuple[float, ...]  # half intervals of all parameters once it is added
 
 
-def best_events(problem: Problem, values: np.ndarray, least: float, most: int | None = None) -> list[Choice]:
+def best_events(problem: Problem, values: np.ndarray, least: float, most: int | None = None) -> list[ChosenEvent]:
     """The events of a problem that tell most together at free `values` (d,), as `best_of` chooses them."""
     return best_of(each(problem, values), [event.record.name for event in problem.events], least, most)
 
 
 def best_of(
     informations: Sequence[Information], names: Sequence[str], least: float, most: int | None = None
-) -> list[Choice]:
+) -> list[ChosenEvent]:
     """The events that tell most together, greedily by the determinant of the information (D-optimal).
 
     Ends before the event whose gain is below `least`, or after `most`. The parameters' bounds count as what is
@@ -238,7 +238,7 @@ def best_of(
     matrices = [i.J.T @ i.J for i in informations]
     volume = lambda chosen: np.linalg.slogdet(prior + sum(matrices[e] for e in chosen))[1]  # noqa: E731
     chosen: list[int] = []
-    choices: list[Choice] = []
+    choices: list[ChosenEvent] = []
     while len(chosen) < min(most or len(matrices), len(matrices)):
         rest = [e for e in range(len(matrices)) if e not in chosen]
         volumes = [volume([*chosen, e]) for e in rest]
@@ -248,7 +248,7 @@ def best_of(
             break
         chosen.append(best)
         half = normal_quantile() * combined([informations[e] for e in chosen]).standard_errors
-        choices.append(Choice(best, names[best], gain if len(chosen) > 1 else 1.0, tuple(half.tolist())))
+        choices.append(ChosenEvent(best, names[best], gain if len(chosen) > 1 else 1.0, tuple(half.tolist())))
     return choices
 
 

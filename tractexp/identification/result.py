@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from tractexp import files, provenance
-from tractexp.domain import DOMAINS, Comparison, domain_of
-from tractexp.domain.comparison import relative_error
+from tractexp.domain import DOMAINS, Playback, domain_of
+from tractexp.domain.playback import relative_error
 from tractexp.errors import UserError
 from tractexp.identification.adequacy import ACCEPTED
 from tractexp.identification.model_error import ModelError, in_percent, model_error
 from tractexp.identification.problem import Problem
-from tractexp.identification.search import REFUSED, Found, History
+from tractexp.identification.search import REFUSED, History, SearchResult
 from tractexp.model.drive import PHASORS, Drive
 from tractexp.model.model import CLASSICAL, Model, compose
 from tractexp.plugin import build
@@ -34,7 +34,7 @@ def parts(node: Mapping[str, Any]) -> tuple[Any, Any, list[Any], str, str]:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Fit(Comparison):
+class Fit(Playback):
     """Measured and calculated power of one event that was fitted or held out."""
 
     role: str  # TRAIN or VALIDATE
@@ -214,7 +214,7 @@ def load(path: Path) -> Result:
 
 def conclude(
     problem: Problem,
-    found: Found,
+    found: SearchResult,
     validate: Sequence[Event],
     seed: int,
     settings: Mapping[str, Any],
@@ -271,7 +271,7 @@ def _model_error(fits: Sequence[Fit]) -> dict[str, Any]:
     return {**fitted, "held_out": model_error(held_out).to_dict() if held_out else None, "events": each}
 
 
-def refuse_nothing_found(problem: Problem, found: Found) -> None:
+def refuse_nothing_found(problem: Problem, found: SearchResult) -> None:
     """Raise `UserError` where no candidate at all had a steady state."""
     if found.objective >= REFUSED:
         why = problem.model.refusal(problem.full(found.values)[0], problem.drive) or "all diverged"
@@ -296,7 +296,7 @@ def fitted(problem: Problem, free: np.ndarray) -> tuple[list[Fit], float, float]
     return fits, relative_error(measured["P"], calculated["P"]), relative_error(measured["Q"], calculated["Q"])
 
 
-def searched(problem: Problem, found: Found) -> dict[str, Any]:
+def searched(problem: Problem, found: SearchResult) -> dict[str, Any]:
     """Where the optimizer itself ended, and what that took: what optimizers are compared by."""
     _, epsilon_p, epsilon_q = fitted(problem, found.values)
     return {

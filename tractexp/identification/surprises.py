@@ -62,7 +62,7 @@ class Scale(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Cell:
+class ResidualWindow:
     """A stretch of one channel of one event, as samples of the drive and as times of the record."""
 
     event: int
@@ -139,7 +139,7 @@ def extremes(draws: np.ndarray) -> tuple[Scale, np.ndarray]:
     return Scale(draws.mean(axis=0), draws.std(axis=0) + 1e-12), largest
 
 
-def cells_of(layout: Layout) -> list[Cell]:
+def residual_windows(layout: Layout) -> list[ResidualWindow]:
     """Every window of every event, for each channel that is compared."""
     cells = []
     for e, event in enumerate(layout.events):
@@ -149,7 +149,9 @@ def cells_of(layout: Layout) -> list[Cell]:
             if j - i < 2:
                 continue
             part = slice(first + i, first + j)
-            cells += [Cell(e, c, part, origin + i * step, origin + (j - 1) * step) for c in layout.drive.spoken]
+            cells += [
+                ResidualWindow(e, c, part, origin + i * step, origin + (j - 1) * step) for c in layout.drive.spoken
+            ]
     return cells
 
 
@@ -159,7 +161,7 @@ def energies(channels: np.ndarray, layout: Layout) -> np.ndarray:
     quiet = np.mean(np.concatenate([square[:, :, part] for part in layout.quiet], axis=2), axis=2, keepdims=True)
     square /= np.where(quiet > 0, quiet, 1.0)  # a current that is not compared is zero throughout
     row = layout.drive.spoken.index
-    return np.stack([square[:, row(c.channel), c.part].sum(axis=1) for c in cells_of(layout)], axis=1)
+    return np.stack([square[:, row(c.channel), c.part].sum(axis=1) for c in residual_windows(layout)], axis=1)
 
 
 def aligned(channels: np.ndarray, layout: Layout) -> np.ndarray:

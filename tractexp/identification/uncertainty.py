@@ -14,17 +14,17 @@ import numpy as np
 from tractexp.identification.blocks import LEVEL
 from tractexp.identification.information import Information
 from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.residual_tests import Test, jarque_bera, ljung_box
+from tractexp.identification.residual_tests import ResidualTest, jarque_bera, ljung_box
 from tractexp.identification.sandwich import scatter
-from tractexp.identification.verdict import Verdict, judge
+from tractexp.identification.verdict import ParameterVerdict, judge
 from tractexp.noise.color import FEWEST
 
 if TYPE_CHECKING:
-    from tractexp.identification.rivals import Rival
+    from tractexp.identification.rivals import RivalStructure
 
 
 @dataclass(frozen=True, eq=False)
-class Valley:
+class LocalMinimum:
     """Another minimum: coordinates (D,), free values (d,), and its deviance above the best."""
 
     unit: np.ndarray
@@ -49,12 +49,12 @@ class Uncertainty:
     upper: np.ndarray
     factors: np.ndarray  # half of the 95 % interval over the standard error
     limits: np.ndarray  # what the deviance may rise by within the interval
-    verdicts: dict[str, Verdict]
+    verdicts: dict[str, ParameterVerdict]
     of_noise: Likelihood
     notes: list[str]
     profiled: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # intervals that replace the curvature's
-    valleys: tuple[Valley, ...] = ()  # others that fit as well
-    rivals: "tuple[Rival, ...]" = ()  # structures that fit as well
+    valleys: tuple[LocalMinimum, ...] = ()  # others that fit as well
+    rivals: "tuple[RivalStructure, ...]" = ()  # structures that fit as well
 
     @property
     def elsewhere(self) -> np.ndarray:
@@ -202,7 +202,7 @@ def test(likelihood: Likelihood, rows: np.ndarray) -> list[dict[str, Any]]:
             if len(seen) < FEWEST:
                 continue
             order = likelihood.noise.pair(e)[c].order
-            tests: list[Test] = [ljung_box(seen, order), jarque_bera(seen)]
+            tests: list[ResidualTest] = [ljung_box(seen, order), jarque_bera(seen)]
             results += [{"event": event.record.name, "channel": channel, **vars(t)} for t in tests]
     return results
 

@@ -17,11 +17,11 @@ from tractexp.discrepancy.evidence import (
     evidence,
     why_not_the_most_helpful,
 )
-from tractexp.discrepancy.forms import CATALOGUE, Found, forms
+from tractexp.discrepancy.forms import CATALOGUE, FittedLaw, forms
 from tractexp.discrepancy.gap import Curves
-from tractexp.discrepancy.investigate import Investigation
+from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
-from tractexp.discrepancy.precision import Estimate, estimates
+from tractexp.discrepancy.precision import ParameterEstimate, estimates
 from tractexp.discrepancy.recommended import adequacy, held
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.verdict import UNEXPLAINED, Nearest
@@ -51,7 +51,7 @@ CURRENTS = (
 )
 
 
-def page(path: Path, found: Investigation, title: str) -> Path:
+def page(path: Path, found: Findings, title: str) -> Path:
     """Tell the investigation to a reader who was not there."""
     events = len(found.bench.events)
     lead = f"{found.bench.model.title}, {events} event{'s' * (events > 1)} fitted, {len(found.withheld)} held out"
@@ -85,14 +85,14 @@ def page(path: Path, found: Investigation, title: str) -> Path:
     return made.write(path)
 
 
-def _graded(found: Investigation) -> str:
+def _graded(found: Findings) -> str:
     """What the model that the investigation ends with is good for."""
     which = "extended" if found.names else "base"
     grade = adequacy(found)
     return f"The {which} model is graded {grade.grade.replace('_', ' ')}: {grade.sentence}."
 
 
-def _smaller(made: Page, found: Investigation) -> None:
+def _smaller(made: Page, found: Findings) -> None:
     made.heading("How large the gap is" if not found.names else "How much smaller the gap is")
     waves, near = found.bench.waves, found.verdict.nearest
     rows = _with_nearest(near) if waves and near else []
@@ -127,7 +127,7 @@ def _off(c: Curves) -> list[str]:
     return [*errors, f"{c.chi2_per_sample:.3f}"]
 
 
-def _left(made: Page, found: Investigation) -> None:
+def _left(made: Page, found: Findings) -> None:
     """What nothing explains, in words."""
     made.heading("What is left")
     shapes, near = found.remainder, found.verdict.nearest
@@ -139,7 +139,7 @@ def _left(made: Page, found: Investigation) -> None:
         _nearest(made, found)
 
 
-def _shapes(made: Page, found: Investigation, shapes: Sequence[Remainder], whose: str) -> None:
+def _shapes(made: Page, found: Findings, shapes: Sequence[Remainder], whose: str) -> None:
     """The shapes in what one model leaves."""
     if not shapes:
         made.text(f"Missed by {whose}: nothing of a simple shape, no ringing, decay, step or pulse.")
@@ -160,7 +160,7 @@ def _shapes(made: Page, found: Investigation, shapes: Sequence[Remainder], whose
     )  # fmt: skip
 
 
-def _nearest(made: Page, found: Investigation) -> None:
+def _nearest(made: Page, found: Findings) -> None:
     """The candidates that come nearest, with their shares and sizes."""
     near = found.verdict.nearest
     assert near is not None
@@ -185,7 +185,7 @@ def _nearest(made: Page, found: Investigation) -> None:
         )  # fmt: skip
 
 
-def _forms(made: Page, found: Investigation) -> None:
+def _forms(made: Page, found: Findings) -> None:
     """Where each effect named acts, what it does there and by which law; curves that were found."""
     if not found.names:
         return
@@ -210,7 +210,7 @@ def _forms(made: Page, found: Investigation) -> None:
             )
 
 
-def _curve(found: Found) -> Chart:
+def _curve(found: FittedLaw) -> Chart:
     """A law with its band, and the textbook's."""
     law = found.curve
     made = Chart(law.x_label, [law.y_label], pixels=320)
@@ -222,7 +222,7 @@ def _curve(found: Found) -> Chart:
     return made.limits(0, float(shown.min()) - room, float(shown.max()) + room)
 
 
-def _candidates(made: Page, found: Investigation) -> None:
+def _candidates(made: Page, found: Findings) -> None:
     rows = evidence(found)
     labels = _labels(rows)
     made.heading("Candidates by their evidence")
@@ -259,7 +259,7 @@ def _labels(rows: Sequence[Evidence]) -> dict[Evidence, str]:
     return {row: f"set {sets.index(row) + 1}" if row in sets else row.names[0] for row in rows}
 
 
-def _bars(found: Investigation, rows: Sequence[Evidence], labels: Mapping[Evidence, str]) -> Chart:
+def _bars(found: Findings, rows: Sequence[Evidence], labels: Mapping[Evidence, str]) -> Chart:
     """How much each candidate explains by itself."""
     colors = [COLORS.get(r.status, REFITTED if r.how == FITTED else ESTIMATED) for r in rows]
     told = [f"{r.drop:.{int(r.drop < 100)}f}{f', {r.status}' * (r.standing < 2)}" for r in rows]
@@ -269,7 +269,7 @@ def _bars(found: Investigation, rows: Sequence[Evidence], labels: Mapping[Eviden
     return made.edge(chance, dash="dash").limits(None, 0.0, ROOM * max(chance, *(r.drop for r in rows)))
 
 
-def _bars_caption(found: Investigation, rows: Sequence[Evidence]) -> str:
+def _bars_caption(found: Findings, rows: Sequence[Evidence]) -> str:
     colors = ["green: added"] * bool(found.names)
     colors += ["orange: tied with it"] * any(r.status == KEPT for r in rows)
     colors += ["blue: refitted"] * any(r.how == FITTED and r.standing == 2 for r in rows)
@@ -281,7 +281,7 @@ def _bars_caption(found: Investigation, rows: Sequence[Evidence]) -> str:
     )
 
 
-def _sets(made: Page, found: Investigation) -> None:
+def _sets(made: Page, found: Findings) -> None:
     """How the refitted sets of the chosen size compare."""
     rows = [
         [joined(r.fit.names) or "the base model", f"{r.fit.deviance:.1f}", f"{r.behind:.1f}", f"{r.distance:.1f}",
@@ -297,7 +297,7 @@ def _sets(made: Page, found: Investigation) -> None:
         )  # fmt: skip
 
 
-def _further(made: Page, found: Investigation) -> None:
+def _further(made: Page, found: Findings) -> None:
     """What the others would add once the chosen effects are in the model."""
     rows = []
     for j in judgements(found):
@@ -313,7 +313,7 @@ def _further(made: Page, found: Investigation) -> None:
         )  # fmt: skip
 
 
-def _parameters(made: Page, found: Investigation) -> None:
+def _parameters(made: Page, found: Findings) -> None:
     """The base model's parameters before and after, and those that came in."""
     made.heading("Parameters before and after" if found.names else "Parameters of the base model")
     before = {e.parameter.name: e for e in found.before}
@@ -340,7 +340,7 @@ def _brief(verdict: str) -> str:
     return verdict.split("; ")[0] if ": " in verdict.split(" (")[0] else verdict
 
 
-def _equations(made: Page, found: Investigation) -> None:
+def _equations(made: Page, found: Findings) -> None:
     """The equations that changed or came in, and how the extended model is used."""
     from tractexp.model.model import compose
     from tractexp.model.printed import changed
@@ -364,7 +364,7 @@ def _equations(made: Page, found: Investigation) -> None:
             made.equation(line)
 
 
-def _disagreement(made: Page, found: Investigation) -> None:
+def _disagreement(made: Page, found: Findings) -> None:
     """Whether and where the base model disagrees with the records."""
     first = found.first
     made.heading("Is there a disagreement, and where?")
@@ -389,7 +389,7 @@ def _disagreement(made: Page, found: Investigation) -> None:
     )  # fmt: skip
 
 
-def _noise(made: Page, found: Investigation) -> None:
+def _noise(made: Page, found: Findings) -> None:
     level, free = found.bench.describe(found.last.noise), joined(found.catalogue.of_measurement)
     if found.bench.waves:
         unjudged = found.last.noise.loudest_blur > found.bench.criteria.blurred
@@ -413,12 +413,12 @@ def _noise(made: Page, found: Investigation) -> None:
         )
 
 
-def _value(known: Estimate) -> str:
+def _value(known: ParameterEstimate) -> str:
     bound = "" if np.isfinite(known.error) else ", at its bound"
     return f"{with_error(known.value, known.error)}{bound}"
 
 
-def _interval(known: Estimate) -> str:
+def _interval(known: ParameterEstimate) -> str:
     low, high = known.interval
     return f"{low:.4g} to {high:.4g}" if np.isfinite(low) else ""
 

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from tractexp.identification.adequacy import Adequacy
-from tractexp.identification.estimate import Estimated
+from tractexp.identification.agreement import EventAgreement
+from tractexp.identification.estimate import EstimationResult
 from tractexp.identification.model_error import in_percent
 from tractexp.identification.residual_tests import LAGS, REJECTED, autocorrelation
 from tractexp.identification.result import by_event
 from tractexp.identification.search import REFUSED, History
-from tractexp.identification.together import Together
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED, TRADES
 from tractexp.provenance import in_words as identity_in_words
@@ -48,7 +48,7 @@ def digits(value: float) -> str:
 
 
 def page(
-    result: Any, fits: Sequence[Any], estimated: Estimated, known: Uncertainty, together: Together | None,
+    result: Any, fits: Sequence[Any], estimated: EstimationResult, known: Uncertainty, together: EventAgreement | None,
     adequacy: Adequacy, structures: Sequence[str], advice: Sequence[str], history: History,
     about: dict[str, str], search: str, command: str,
 ) -> Page:  # fmt: skip
@@ -203,7 +203,7 @@ def _fitness(history: History, result: Any) -> Chart:
     return chart.level(max(result.objective, 1e-30), "estimate")
 
 
-def _starts(made: Page, estimated: Estimated, known: Uncertainty) -> None:
+def _starts(made: Page, estimated: EstimationResult, known: Uncertainty) -> None:
     """Where each descent to the estimate ended."""
     starts = estimated.starts
     above = np.maximum([s.above for s in starts], SMALLEST)
@@ -303,7 +303,7 @@ def _origin(result: Any, command: str) -> list[list[str]]:
     return told
 
 
-def _events(made: Page, known: Uncertainty, together: Together) -> None:
+def _events(made: Page, known: Uncertainty, together: EventAgreement) -> None:
     """What each event of a joint fit adds, and which does not belong."""
     made.heading("What each event adds")
     if together.notes:

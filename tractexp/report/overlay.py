@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tractexp.discrepancy.overlay import Overlay
-from tractexp.domain.comparison import as_phasors
+from tractexp.domain.playback import as_phasors
 from tractexp.record import WaveEvent, describe
 from tractexp.report.chart import Chart
 from tractexp.report.events import CAPTION, Curve, event_chart

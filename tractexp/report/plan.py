@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tractexp.identification.plan import INERTIA, Choice, Forecast, Needed, column
+from tractexp.identification.plan import INERTIA, ChosenEvent, Forecast, Needed, column
 from tractexp.identification.problem import Problem
 from tractexp.report.chart import Chart
 from tractexp.report.page import Page
@@ -41,7 +41,7 @@ class Planned:
     dip: str  # what was planned, in words
     needed: Needed
     scans: Mapping[str, tuple[Sequence[float], Sequence[Forecast]]]
-    chosen: Sequence[Choice]  # none where there is one event
+    chosen: Sequence[ChosenEvent]  # none where there is one event
     least: float  # share by which an event must narrow the intervals to be chosen
     most: int | None  # events asked for
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from tractexp.identification.profile import End, Profile, Profiles
 from tractexp.identification.uncertainty import Uncertainty
-from tractexp.identification.verdict import IDENTIFIED, Verdict, shown
+from tractexp.identification.verdict import IDENTIFIED, ParameterVerdict, shown
 from tractexp.report.chart import Chart
 from tractexp.report.page import Page
 from tractexp.report.style import ACTIVE, FAINT, PALETTE
@@ -125,11 +125,11 @@ def _where(says: Mapping[str, str]) -> list[str]:
     return told
 
 
-def _kind(verdicts: Mapping[str, Verdict], exact: bool) -> str:
+def _kind(verdicts: Mapping[str, ParameterVerdict], exact: bool) -> str:
     return "good" if exact and all(verdict.word == IDENTIFIED for verdict in verdicts.values()) else "plain"
 
 
-def _poor(verdicts: Mapping[str, Verdict]) -> list[str]:
+def _poor(verdicts: Mapping[str, ParameterVerdict]) -> list[str]:
     """Which parameters are not identified."""
     poor = [f"{name} is {verdict.word}" for name, verdict in verdicts.items() if verdict.word != IDENTIFIED]
     return [as_sentence("; ".join(poor)) if poor else "Every parameter is identified."]

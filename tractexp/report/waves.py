@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tractexp.domain.comparison import AFTER
+from tractexp.domain.playback import AFTER
 from tractexp.identification.problem import Problem
 from tractexp.identification.result import Fit
 from tractexp.record import WaveEvent

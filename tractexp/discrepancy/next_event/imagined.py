@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.context import Context
 from tractexp.domain import PHASORS, Domain
 from tractexp.model.drive import Drive, Excitation, Waveforms
 from tractexp.noise import Autoregression, Noise
-from tractexp.noise.wander import Load
+from tractexp.noise.random_walk import Load
 from tractexp.record import Event, Record
 
 DEPTHS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
@@ -23,7 +23,7 @@ FASTEST = 5000.0  # Hz, of phasors
 
 
 @dataclass(frozen=True)
-class Imagined:
+class ImaginedDip:
     """An event from the voltage before it back to that voltage: the phase turns by `jump` [degrees] while it is low.
 
     `rate` is how many times as fast as the records it is sampled, `unbalance` its negative sequence over its depth.
@@ -68,26 +68,26 @@ class Imagined:
         return bool(self.jump) + bool(self.unbalance) + (self.rate > 1), self.depth * self.duration
 
 
-def imagined(bench: Bench, reads: Sequence[str] = ()) -> list[Imagined]:
+def imagined(bench: Context, reads: Sequence[str] = ()) -> list[ImaginedDip]:
     """What is tried on this bench; unbalanced dips that need the channel U2 where one of the rivals `reads` it."""
     domain, durations = bench.domain, bench.domain.dips.durations
     if not domain.further:
         turned = itertools.product(DEPTHS, durations, (0.0, *JUMPS))
         unbalanced = itertools.product(DEPTHS[::2], durations[::2])
-        made = [Imagined(*pair, jump=j, domain=domain) for *pair, j in turned]
-        return made + [Imagined(*pair, unbalance=UNBALANCED, domain=domain) for pair in unbalanced]
-    made = [Imagined(*pair) for pair in itertools.product(DEPTHS, durations)]
-    made += [Imagined(depth, LASTING, switched=True) for depth in SWITCHED]
-    made += [Imagined(*p, jump=j) for *p, j in itertools.product(DEPTHS[::2], durations[::2], JUMPS)]
-    made += [Imagined(SWITCHED[1], LASTING, jump=j, switched=True) for j in (-TURNED_BY_BANK, TURNED_BY_BANK)]
+        made = [ImaginedDip(*pair, jump=j, domain=domain) for *pair, j in turned]
+        return made + [ImaginedDip(*pair, unbalance=UNBALANCED, domain=domain) for pair in unbalanced]
+    made = [ImaginedDip(*pair) for pair in itertools.product(DEPTHS, durations)]
+    made += [ImaginedDip(depth, LASTING, switched=True) for depth in SWITCHED]
+    made += [ImaginedDip(*p, jump=j) for *p, j in itertools.product(DEPTHS[::2], durations[::2], JUMPS)]
+    made += [ImaginedDip(SWITCHED[1], LASTING, jump=j, switched=True) for j in (-TURNED_BY_BANK, TURNED_BY_BANK)]
     if "U2" in reads:
-        made += [Imagined(*pair, unbalance=UNBALANCED) for pair in itertools.product(DEPTHS[::2], durations[::2])]
+        made += [ImaginedDip(*pair, unbalance=UNBALANCED) for pair in itertools.product(DEPTHS[::2], durations[::2])]
     if FASTER / bench.events[0].record.step <= FASTEST:
-        made += [Imagined(depth, durations[1], rate=FASTER) for depth in DEPTHS[2::2]]
+        made += [ImaginedDip(depth, durations[1], rate=FASTER) for depth in DEPTHS[2::2]]
     return made
 
 
-def driven(bench: Bench, event: Imagined) -> Excitation | Waveforms:
+def driven(bench: Context, event: ImaginedDip) -> Excitation | Waveforms:
     """The voltage of an imagined event, at the power before the first recorded one."""
     like, dips = bench.events[0], bench.domain.dips
     step = like.record.step / event.rate
@@ -112,7 +112,7 @@ def noise_of(noise: Noise, drive: Drive, rate: int, step: float) -> Noise:
     return Noise((tuple(Autoregression(color, level * np.array([1.0, shock])) for level in noise.levels),))
 
 
-def as_recorded(bench: Bench, event: Imagined, power: np.ndarray) -> Event:
+def as_recorded(bench: Context, event: ImaginedDip, power: np.ndarray) -> Event:
     """An imagined dip as if it had been recorded without noise, with this power (2, N) [pu]."""
     like, dips, drive = bench.events[0], bench.domain.dips, driven(bench, event)
     assert isinstance(drive, Excitation)

@@ -18,7 +18,7 @@ from tractexp.identification.surprises import PER_EVENT, SMALLEST_P, Layout
 
 
 @dataclass(frozen=True, eq=False)
-class Column:
+class CandidateColumn:
     """A candidate with one setting of its scanned parameters: differences (k, C, N) per unit of each size."""
 
     candidate: Candidate
@@ -39,10 +39,10 @@ class Score:
 
 
 @dataclass(frozen=True, eq=False)
-class Projection:
+class ScoreTest:
     """Whitened and with the nuisances projected out; `r` has one row per residual (one, or the bootstrap's)."""
 
-    columns: tuple[Column, ...]
+    columns: tuple[CandidateColumn, ...]
     faults: Mapping[str, list[int]]  # which nuisances belong to which fault of the measurement
     groups: np.ndarray  # (c,) which balance a push goes into
     Q: np.ndarray
@@ -54,7 +54,7 @@ class Projection:
     split: np.ndarray  # (e, R)
     cells: np.ndarray  # (c, R)
 
-    def of(self, white: np.ndarray) -> "Projection":
+    def of(self, white: np.ndarray) -> "ScoreTest":
         """The same columns with other whitened residuals (b, C N) in place of the fit's own, off no prior mean."""
         rows = np.concatenate([white, np.zeros((len(white), len(self.Q) - white.shape[1]))], axis=1)
         along = rows @ self.Q

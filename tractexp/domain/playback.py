@@ -15,7 +15,7 @@ AFTER = 0.15  # s after a dip's start in which the currents' error counts
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Comparison:
+class Playback:
     """Measured and calculated power of one event, (N,) each, and the relative errors of Eq. (20), as fractions.
 
     Of waveforms the power is that which the record's estimator sees in calculated and in recorded currents, and
@@ -34,13 +34,13 @@ class Comparison:
     unsettled: float | None = None
 
     @classmethod
-    def of_power(cls, event: Event, P: np.ndarray, Q: np.ndarray) -> "Comparison":
+    def of_power(cls, event: Event, P: np.ndarray, Q: np.ndarray) -> "Playback":
         """Calculated P and Q (N,) [pu] beside the recorded ones."""
         record = event.record
         return cls(event=event, P=P, Q=Q, epsilon_p=relative_error(record.P, P), epsilon_q=relative_error(record.Q, Q))
 
     @classmethod
-    def of_currents(cls, event: WaveEvent, currents: np.ndarray) -> "Comparison":
+    def of_currents(cls, event: WaveEvent, currents: np.ndarray) -> "Playback":
         """Calculated currents (3, N) [pu] beside the recorded ones, and the phasors of both by one estimator."""
         return replace(
             cls.of_power(*as_phasors(event, currents)), epsilon_i=current_error(event, currents), waves=event,

@@ -48,7 +48,7 @@ def distinct(ends: Descent, free: int) -> np.ndarray:
     return ends.unit[best_distinct(ends.unit[:, :free], ends.deviance, DISTINCT, KEPT, norm=2)]
 
 
-def along_least_known(likelihood: Likelihood, unit: np.ndarray) -> np.ndarray:
+def along_least_certain(likelihood: Likelihood, unit: np.ndarray) -> np.ndarray:
     """Points (6, D) on either side of an optimum (D,), in the direction that the records know least.
 
     Where q_v is near 2, for instance, the static load takes over the motor's U²/X' and any C will do, so that there
