@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from tractexp.report.chart import script
+from tractexp.blocks.chart import script
 
 VOID = {"meta", "br", "img", "path", "use", "rect", "line"}
 

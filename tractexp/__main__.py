@@ -1,6 +1,7 @@
 """Command line: compose the configuration, run the task, end with a sentence where the input is wrong."""
 
 import gc
+import importlib
 import os
 import signal
 import sys
@@ -21,6 +22,10 @@ UNLOGGED = (
     "hydra.mode=",
 )  # no single job that is logged: maybe
 SELDOM = (50_000, 20, 50)  # what is imported stays: to look for garbage in it takes a quarter of a short job
+COMMANDS = {  # beside the tasks: where each is
+    "ui": "tractexp.cli.ui:ui", "look": "tractexp.cli.look:look", "sync": "tractexp.cli.sync:sync",
+    "doctor": "tractexp.cli.doctor:doctor", "list": "tractexp.usage:listed", "new": "tractexp.cli.new:new",
+}  # fmt: skip
 FULL_ERROR = "HYDRA_FULL_ERROR"  # Hydra's own switch: set it to see tracebacks
 
 
@@ -30,26 +35,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     traceback = os.environ.get(FULL_ERROR, "0") not in ("", "0")
     gc.set_threshold(*SELDOM)
     try:
-        if arguments[:1] == ["ui"]:
-            from tractexp.tasks.ui import ui
-
-            return ui(arguments[1:])
-        if arguments[:1] == ["look"]:
-            from tractexp.tasks.look import look
-
-            return look(arguments[1:])
-        if arguments[:1] == ["sync"]:
-            from tractexp.tasks.sync import sync
-
-            return sync(arguments[1:])
-        if arguments[:1] == ["doctor"]:
-            from tractexp.tasks.doctor import doctor
-
-            return doctor(arguments[1:])
-        if arguments[:1] == ["list"]:
-            from tractexp.usage import listed
-
-            return listed(arguments[1:])
+        if arguments[:1] and (place := COMMANDS.get(arguments[0])):
+            module, _, function = place.partition(":")
+            return getattr(importlib.import_module(module), function)(arguments[1:])
         if {"--help", "-h"} & {*arguments}:
             from tractexp.usage import usage
 
@@ -106,8 +94,8 @@ def _run(arguments: list[str]) -> int:
         from hydra.core.hydra_config import HydraConfig
         from hydra.types import RunMode
 
+        from tractexp.cli.run import run
         from tractexp.sweep.job import run_job
-        from tractexp.tasks.run import run
 
         try:
             with explained():

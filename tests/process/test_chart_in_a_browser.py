@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from browser import BROWSER, Worked, drawn
 
-from tractexp.report.chart import Chart
-from tractexp.report.page import Page
+from tractexp.blocks import Report
+from tractexp.blocks.chart import Chart
 
 BLUE = "#0072B2"
 
@@ -16,7 +16,7 @@ BLUE = "#0072B2"
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed here")
 @pytest.mark.parametrize("opened", [False, True])
 def test_a_folded_chart_is_drawn_when_it_is_opened(tmp_path, opened):
-    page, chart = Page("charts"), Chart("x", ["y"]).line("one", np.arange(3), np.arange(3), BLUE)
+    page, chart = Report("charts"), Chart("x", ["y"]).line("one", np.arange(3), np.arange(3), BLUE)
     page.chart(chart, "shown")
     with page.folded("more"):
         page.chart(chart, "folded")
@@ -36,7 +36,7 @@ def test_a_browser_draws_every_kind_and_complains_of_nothing(tmp_path, width):
     bars = Chart("gain", [""]).bars("gain", ["a", "b"], [2, 1], BLUE, told=["two", "one"])
     forest = Chart("value", [""]).points("est", [0.3], ["C"], BLUE, spans=np.array([[0.1, 0.4]]), told=["C"])
     fitness = Chart("n", ["f"], log_x=True, log_y=True).line("f", x + 1, x + 1, BLUE, step=True).level(1.5, "floor")
-    page = Page("charts").chart(chart, "one").charts([bars, forest, fitness], "three")
+    page = Report("charts").chart(chart, "one").charts([bars, forest, fitness], "three")
     dom, complaints = drawn(page, tmp_path, f"--window-size={width},900")
     assert complaints == []
     assert dom.count('class="chart js-plotly-plot"') == 4
@@ -60,7 +60,7 @@ def test_zoomed_in_every_sample_is_drawn_and_zoomed_out_no_spike_is_lost(tmp_pat
       Plotly.relayout(charts[0], {"xaxis.autorange": true}).then(() => { tell();
         document.getElementById("told").textContent = JSON.stringify(told); }); });
     """
-    dom, complaints = drawn(Worked(Page("zoom").chart(chart, "one"), script), tmp_path, "--virtual-time-budget=5000")
+    dom, complaints = drawn(Worked(Report("zoom").chart(chart, "one"), script), tmp_path, "--virtual-time-budget=5000")
     assert complaints == []
     whole, near, again = json.loads(re.search(r'id="told">(.*?)</p>', dom)[1])
     assert whole[0] < 2200

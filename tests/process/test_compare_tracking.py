@@ -20,8 +20,8 @@ from command_line import run_command
 from test_compare import samples, write_sweep
 
 from tractexp import tracking
-from tractexp.comparison import load
 from tractexp.errors import UserError
+from tractexp.studies.comparison import load
 from tractexp.tracking.attach import attach
 from tractexp.tracking.find import find
 from tractexp.tracking.view import TAG, comparison_view
@@ -251,7 +251,7 @@ def test_a_store_without_runs_opens_on_the_plain_page(tmp_path):
 
 
 def test_a_view_that_cannot_be_stored_opens_on_the_plain_page(monkeypatch, capsys):
-    from tractexp.tasks import ui
+    from tractexp.cli import ui
     from tractexp.tracking import view
 
     def refuse(uri):

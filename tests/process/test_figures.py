@@ -9,8 +9,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from tractexp.blocks import style
 from tractexp.errors import UserError
-from tractexp.report import figures, style
+from tractexp.report import figures
 
 
 def event(samples: int = 1000) -> tuple[np.ndarray, np.ndarray, figures.Power, figures.Power]:

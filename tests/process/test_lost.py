@@ -214,7 +214,7 @@ def test_a_run_whose_store_is_away_ends_well_and_says_where_its_results_are(away
 
 
 def test_sync_brings_it_in_elsewhere(away, tmp_path, uri, capsys):
-    from tractexp.tasks.sync import sync as command
+    from tractexp.cli.sync import sync as command
 
     shutil.copytree(away[0] / "run", tmp_path / "run")
     assert command([str(tmp_path), "--uri", uri]) == 0
@@ -231,7 +231,7 @@ def test_sync_brings_it_in_elsewhere(away, tmp_path, uri, capsys):
 
 
 def doctor(folder, *arguments, capsys):
-    from tractexp.tasks import doctor as module
+    from tractexp.cli import doctor as module
 
     code = module.doctor([str(folder), *arguments])
     return code, " ".join(capsys.readouterr().out.split())
@@ -260,7 +260,7 @@ def test_the_doctor_closes_stale_runs_sets_a_damaged_store_aside_and_makes_it_an
 
 
 def test_the_doctor_says_what_it_cannot_heal(tmp_path, uri, capsys, monkeypatch):
-    from tractexp.tasks import doctor as module
+    from tractexp.cli import doctor as module
 
     monkeypatch.setattr(module, "cores", lambda: iter(()))
     monkeypatch.setattr(module, "BUSY", 0.1)

@@ -5,12 +5,12 @@ import re
 import pytest
 from command_line import run_command, start_command
 
+from tractexp.api.task import Task
 from tractexp.choices import CONF
+from tractexp.cli.chosen import given, refuse_unread
 from tractexp.config import register
 from tractexp.errors import UserError
 from tractexp.plugin import build, discover
-from tractexp.tasks.given import given, refuse_unread
-from tractexp.tasks.task import Task
 
 EXPERIMENTS = sorted(path.stem for path in (CONF / "experiment").glob("*.yaml"))
 

@@ -428,7 +428,7 @@ def test_settings_of_one_optimizer_are_not_pooled_under_its_name(tmp_path):
     ],
 )
 def test_a_variant_is_named_after_what_was_chosen_but_the_seed(chosen, name):
-    from tractexp.tasks.given import variant
+    from tractexp.api.task import variant
 
     assert variant("issa", chosen) == name
 

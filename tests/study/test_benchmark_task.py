@@ -10,12 +10,13 @@ import pytest
 from command_line import run_command
 from pages import read
 
-from tractexp.comparison import bbob
-from tractexp.comparison.bbob import GROUPS, Bbob, Benchmark, Plan, Run, perform, run, seed_of
 from tractexp.errors import UserError
 from tractexp.identification.search import Limits, search
 from tractexp.plugin import build
-from tractexp.report import benchmark as report
+from tractexp.studies.api.benchmark import BenchmarkResult
+from tractexp.studies.bbob import page as report
+from tractexp.studies.bbob import runs as bbob
+from tractexp.studies.bbob.runs import GROUPS, Bbob, BbobRuns, Plan, Run, perform, run, seed_of
 
 TARGETS = tuple(10.0**k for k in range(2, -9, -1))
 SMALL = Plan((1,), (2,), (1,), 500, TARGETS, 0)
@@ -116,7 +117,7 @@ def by_hand():
         ("b", 16, 1, 100, (inf, inf)), ("b", 16, 2, 100, (inf, inf)),
     ]  # fmt: skip
     runs = [Run(name, f, 2, i, spent, 1, 0.5, hits) for name, f, i, spent, hits in rows]
-    return Benchmark(plan, ("a", "b"), {1: "Sphere", 16: "Weierstrass"}, runs)
+    return BbobRuns(plan, ("a", "b"), {1: "Sphere", 16: "Weierstrass"}, runs)
 
 
 def test_running_times_and_shares_are_those_worked_out_by_hand(by_hand):
@@ -138,7 +139,7 @@ def test_page_and_json_hold_the_numbers_and_load_nothing_from_elsewhere(by_hand,
     assert path.read_text().count('class="chart"') == 3  # over all functions, and over each of two groups
     for part in ("180 (1/2)", "160 (1/2)", "–", "88%", "12%", "f16 Weierstrass", "1 of 2"):
         assert part in page.words, part
-    content = json.loads(report.write_json(by_hand, {"a": {}, "b": {}}, tmp_path / "benchmark.json").read_text())
+    content = json.loads(BenchmarkResult(by_hand, {"a": {}, "b": {}}).write_results(tmp_path)[0].read_text())
     assert content["running_times"][1] == {"optimizer": "a", "dimension": 2, "function": 16, "ert": [65.0, 180.0]}
     assert content["running_times"][3]["ert"] == [None, None]
     assert content["runs"][3]["hits"] == [90.0, None]
@@ -150,7 +151,7 @@ def test_page_and_json_hold_the_numbers_and_load_nothing_from_elsewhere(by_hand,
 
 def test_curves_are_drawn_where_no_target_was_met_at_all(tmp_path):
     plan = Plan((1,), (2,), (1,), 50, (1e-8,), 0)
-    nothing = Benchmark(plan, ("a",), {1: "Sphere"}, [Run("a", 1, 2, 1, 100, 1, 3.0, (float("inf"),))])
+    nothing = BbobRuns(plan, ("a",), {1: "Sphere"}, [Run("a", 1, 2, 1, 100, 1, 3.0, (float("inf"),))])
     ((whole, each),) = report.charts(nothing, 2).values()
     (curve,) = whole.plain()["data"]
     assert (np.frombuffer(base64.b64decode(curve["y"]["bdata"]), "<f4") == 0).all()
@@ -235,7 +236,7 @@ def test_what_the_task_cannot_use_is_refused(ioh, tmp_path, extra, sentence):
 
 
 def test_ours_against_the_same_with_other_settings_has_a_name_of_its_own(ioh):
-    from tractexp.tasks.task import Job
+    from tractexp.api.task import Job
 
     task = build("task", {"name": "benchmark", "against": ["pso"]})
     config = {"optimizer": {"name": "pso", "population": 20}}

@@ -13,13 +13,13 @@ import pytest
 from command_line import run_command
 from pages import read
 
-from tractexp.comparison import claims, floor, load
-from tractexp.comparison.comparison import compare
-from tractexp.comparison.floor import Floor, floor_of, polish
-from tractexp.comparison.runs import PROBLEM, REST, SETTINGS, Run, gather
-from tractexp.comparison.runs import on as on_data
-from tractexp.comparison.summary import ECDF_TARGETS, Band, band, running_time, runtimes, summarize
 from tractexp.errors import UserError
+from tractexp.studies.comparison import claims, floor, load
+from tractexp.studies.comparison.comparison import compare
+from tractexp.studies.comparison.floor import Floor, floor_of, polish
+from tractexp.studies.comparison.runs import PROBLEM, REST, SETTINGS, Run, gather
+from tractexp.studies.comparison.runs import on as on_data
+from tractexp.studies.comparison.summary import ECDF_TARGETS, Band, band, running_time, runtimes, summarize
 
 FLOOR = 8.1e-6
 SEEDS = range(30)
@@ -109,7 +109,7 @@ def test_runs_that_all_reach_the_floor_are_equal_whatever_is_left_of_rounding():
 
 
 def test_the_order_of_the_runs_does_not_matter():
-    from tractexp.report.comparison import content
+    from tractexp.studies.comparison.page import content
 
     runs = [*samples({"good": 1.0, "bad": 2.0, "other": 1.05}), a_failure("bad", 99)]
     shuffled = [runs[i] for i in np.random.default_rng(0).permutation(len(runs))]
@@ -488,7 +488,7 @@ def drawn(chart, name):
 
 
 def test_every_run_that_finished_is_drawn():
-    from tractexp.report.compare import spread
+    from tractexp.studies.comparison.charts import spread
 
     result = compared([*samples({"a": 1.0, "b": 2.0}), a_failure("b", 77)])
     points = drawn(spread(result.variants, result.floor), "every run")
@@ -498,7 +498,7 @@ def test_every_run_that_finished_is_drawn():
 
 
 def test_every_runs_parameters_are_drawn_over_their_bounds(polished, problem):
-    from tractexp.report.compare import parameters
+    from tractexp.studies.comparison.charts import parameters
 
     runs, found = polished
     chart = parameters(gather(runs, "x").variants, found)
@@ -517,7 +517,7 @@ def test_every_runs_parameters_are_drawn_over_their_bounds(polished, problem):
 @pytest.mark.parametrize(("count", "each"), [(3, 0), (7, 0), (20, 20)])
 def test_of_many_variants_the_first_are_in_color_and_each_has_a_chart(count, each):
     from tractexp.report import style
-    from tractexp.report.compare import ecdf, fitness
+    from tractexp.studies.comparison.charts import ecdf, fitness
 
     result = compared(samples({f"v{k:02}": 1.5**k for k in range(count)}, seeds=range(6)))
     for whole, small in (fitness(result.variants, "simulations", result.floor), ecdf(result.variants, result.floor)):
@@ -529,7 +529,7 @@ def test_of_many_variants_the_first_are_in_color_and_each_has_a_chart(count, eac
 
 
 def test_mean_ranks_differ_where_their_bars_do_not_overlap():
-    from tractexp.report.compare import mean_ranks
+    from tractexp.studies.comparison.charts import mean_ranks
 
     ranks = compared(samples({"a": 1.0, "b": 1.02, "c": 9.0, "d": 9.5})).ranks
     (trace,) = mean_ranks(ranks).plain()["data"]

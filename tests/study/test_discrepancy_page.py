@@ -97,10 +97,10 @@ def test_the_noise_band_holds_what_the_extended_model_leaves(named):
 
 
 def test_many_events_are_folded_and_none_is_left_out(named, tmp_path):
-    from tractexp.report.page import Page
+    from tractexp.blocks import Report
 
     many = named.overlays[:2] * 3
-    path = overlay.overlaid(Page("many"), many).write(tmp_path / "many.html")
+    path = overlay.overlaid(Report("many"), many).save(tmp_path / "many.html")
     words = words_of(path)
     assert len(re.findall(r"event[12], fitted event[12]: dip of", words)) == 6
     assert "2 more events, fitted" in words

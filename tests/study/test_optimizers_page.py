@@ -10,8 +10,8 @@ import optimizers
 import optimizers_tables
 import pytest
 
-from tractexp.comparison.statistics import vargha_delaney
 from tractexp.plugin import build, discover, schema
+from tractexp.studies.comparison.statistics import vargha_delaney
 
 STORED = json.loads(optimizers.STORED.read_text(encoding="utf-8"))
 PAGE = Path(__file__).parents[2] / "docs" / "optimizers.md"
@@ -96,7 +96,7 @@ def test_runs_do_not_depend_on_what_else_is_run():
 
 
 def test_a_search_that_ends_by_itself_is_started_again_until_its_budget_is_spent():
-    from tractexp.comparison.bbob import Bbob
+    from tractexp.studies.bbob.runs import Bbob
 
     problem = Bbob(3, 5, 11, [1e-8])
     ended = optimizers.restarted(problem, build("optimizer", {"name": "pso", "iterations": 2}), (1,), 700, -np.inf)

@@ -9,15 +9,14 @@ import numpy as np
 import pytest
 from test_compare import SEEDS, SWITCHES, TARGETS, ablation_runs, compare_command, samples, subsets, write_sweep
 
-from tractexp.api import judging
-from tractexp.comparison import overall_claims
-from tractexp.comparison.ablation import Family
-from tractexp.comparison.bbob import Benchmark, Plan, Run
-from tractexp.comparison.comparison import _median
-from tractexp.comparison.load import _readable
-from tractexp.comparison.overall import on_functions
-from tractexp.comparison.runs import parted
 from tractexp.errors import UserError
+from tractexp.studies.bbob.runs import BbobRuns, Plan, Run
+from tractexp.studies.comparison import judging, overall_claims
+from tractexp.studies.comparison.ablation import Family
+from tractexp.studies.comparison.comparison import _median
+from tractexp.studies.comparison.load import _readable
+from tractexp.studies.comparison.overall import on_functions
+from tractexp.studies.comparison.runs import parted
 from tractexp.sweep import sweeper
 
 JUDGING = {"targets": TARGETS, "ties": 1e-3, "floor": 1e-9, "reference": None}
@@ -128,7 +127,7 @@ def test_on_bbob_a_function_is_a_block():
             near = 10 ** rng.uniform(-4, 0) if f > 1 else 1e-13
             for name, distance in (("ssa", near), ("flying", near / 10)):
                 runs.append(Run(name, f, 5, i, 15000, 1, distance, (3.0, np.inf)))
-    benchmark = Benchmark(plan, ("ssa", "flying"), {f: str(f) for f in plan.functions}, runs)
+    benchmark = BbobRuns(plan, ("ssa", "flying"), {f: str(f) for f in plan.functions}, runs)
     made = on_functions(benchmark, family)
     (levy,) = made.ablation.effects
     assert levy.seeds == 24
@@ -156,7 +155,8 @@ def test_the_command_compares_several_records_on_one_page(folder):
 
 def test_the_variants_run_on_bbob_once_and_without_its_package_the_records_are_told(folder, monkeypatch):
     pytest.importorskip("ioh", reason="the extra [benchmark] is not installed")
-    from tractexp.comparison import bbob, load
+    from tractexp.studies.bbob import runs as bbob
+    from tractexp.studies.comparison import load
 
     runs = [replace(r, config=r.config | {"budget": 60}) for r in load.from_sweep(folder)]
     made = several(runs, folder=folder, bbob=1)

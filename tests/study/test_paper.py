@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from command_line import run_command, start_command
 
-from tractexp.api.paper import PARTS
 from tractexp.errors import UserError
-from tractexp.replication import claims, equations, maps, printed, searches, valleys, why
-from tractexp.replication.study import Shares, Study
-from tractexp.replication.valleys import Ends
+from tractexp.identification.generalization import by_depth, mean_residual
 from tractexp.report.markdown import Markdown
+from tractexp.studies.api.paper import PARTS
+from tractexp.studies.paper import claims, equations, maps, printed, searches, valleys, why
+from tractexp.studies.paper.study import Shares, Study
+from tractexp.studies.paper.valleys import Ends
 
 QUICK = ("task=paper", "task.seeds=1", "task.workers=1", "budget=300", "tracking.enabled=false")
 EXPERIMENTS = [
@@ -169,12 +170,12 @@ def test_mantegnas_steps_have_exponent_three_halves_and_the_printed_ones_two_thi
 
 def test_eq_21_by_hand():
     """|1 - 1.5| = 0.5 and |2 - 1| = 1 have mean 0.75; the gap does not count."""
-    assert searches.mean_residual(np.array([1.0, 2.0, np.nan]), np.array([1.5, 1.0, 3.0])) == pytest.approx(0.75)
+    assert mean_residual(np.array([1.0, 2.0, np.nan]), np.array([1.5, 1.0, 3.0])) == pytest.approx(0.75)
 
 
 def test_a_milder_dip_is_interpolated_and_a_deeper_one_extrapolated():
     event = lambda depth: SimpleNamespace(depth=depth)  # noqa: E731
-    kinds = searches.by_depth([event(0.3), event(0.5), event(0.65)], [event(0.4), event(0.5)])
+    kinds = by_depth([event(0.3), event(0.5), event(0.65)], [event(0.4), event(0.5)])
     assert kinds == ["interpolation", "interpolation", "extrapolation"]
 
 
@@ -311,13 +312,13 @@ def test_a_search_that_a_clock_may_end_is_not_remembered(memory, monkeypatch):
 
 def test_a_figure_of_one_run_makes_one_search(memory, tmp_path, monkeypatch):
     """Figure 8 shows ISSA with seed 0; it took the 90 searches of Table 3."""
-    from tractexp.report import paper
+    from tractexp.studies.paper import page
 
     made, told = counted(monkeypatch), []
     for _ in range(2):
         study = Study(_recipe, {}, _recipe().events, (), 30, workers=1, limits=searches.Limits(150), tell=told.append)
         study.prepare(["figure8"])
-        paper.sheets(study, ["figure8"], claims.claims(study, ["figure8"]))
+        page.sheets(study, ["figure8"], claims.claims(study, ["figure8"]))
     assert made == [(["issa"], 1)] * 2
     again = "  1 of them were made before by the same code on the same records, and are read back"
     searched_, wrote = "searches of issa: seed 0, 300 iterations of 50", "writing Figure 8"
@@ -361,7 +362,7 @@ def test_descents_are_made_once_for_the_same_starts(memory, monkeypatch):
     """What least squares reach is kept beside the searches; another floor or start is another descent."""
     made, descend = [], valleys.descended
     monkeypatch.setattr(valleys, "descended", lambda *a, **k: made.append(len(a[1])) or descend(*a, **k))
-    monkeypatch.setattr("tractexp.replication.study.RANDOM", 4)
+    monkeypatch.setattr("tractexp.studies.paper.study.RANDOM", 4)
     first, again = (_study() for _ in range(2))
     for study in (first, again):
         vars(study)["floor"] = 3e-5
@@ -664,13 +665,13 @@ def test_the_page_for_the_documentation_is_the_same_and_links_nothing(page):
 
 
 def test_the_equations_alone_take_no_search(tmp_path, monkeypatch):
-    from tractexp.report import paper
+    from tractexp.studies.paper import page
 
     monkeypatch.setattr(searches, "run", None)
     study = Study(_recipe, {}, _recipe().events, (), 30)
     judged = claims.claims(study, ["equations"])
     assert [claim.verdict for claim in judged] == [claims.REFUTED] * 2
-    text = paper.sheets(study, ["equations"], judged)[1].write(tmp_path / "paper.md").read_text()
+    text = page.sheets(study, ["equations"], judged)[1].write(tmp_path / "paper.md").read_text()
     assert text.count("| does not agree |") == sum(not check.holds for check in equations.checks())
 
 

@@ -164,7 +164,7 @@ def test_the_page_and_the_table_tell_it(stepped, tmp_path):
     assert ">Proposal<" in text
     assert "not a function of the voltage" in text
     assert "proposed_effect.py" in paths
-    assert any(line.startswith("proposed: a step") for line in found.table().said)
+    assert any(line.startswith("proposed: a step") for line in map(str.strip, str(found.summary()).splitlines()))
 
 
 def test_the_plugin_file_reproduces_the_fit(stepped, tmp_path, monkeypatch):

@@ -103,7 +103,7 @@ def test_a_benchmark_is_the_same_by_names_and_by_settings_and_tells_of_each_run(
     assert again.to_dict() == benchmarked.to_dict()
     assert told == [f"{k} of 4 runs" for k in (1, 2, 3, 4)]
     assert benchmarked.optimizers["issa_no_levy"]["levy"] is False
-    assert benchmarked.made.share("issa_no_levy", 2, [1]) == benchmarked.to_dict()["summary"][1]["groups"]["separable"]
+    assert benchmarked.bbob.share("issa_no_levy", 2, [1]) == benchmarked.to_dict()["summary"][1]["groups"]["separable"]
 
 
 def test_medians_are_those_of_the_rows(generalised):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pages import unpacked
 
-from tractexp.report.chart import MOST, Chart
+from tractexp.blocks.chart import MOST, Chart
 
 BLUE = "#0072B2"
 

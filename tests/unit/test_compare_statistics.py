@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tractexp.comparison import statistics as st
+from tractexp.studies.comparison import statistics as st
 
 RNG = np.random.default_rng(7)
 

@@ -48,3 +48,28 @@ def test_a_room_imports_from_its_own_floor_and_below(room):
         if FLOORS.get(other, 0) > FLOORS[room]
     }
     assert up == set()
+
+
+def test_nothing_imports_the_studies():
+    """But for the names that `tractexp` gives, each imported at its first use."""
+    others = (p for p in PACKAGE.rglob("*.py") if "studies" not in p.parts)
+    assert {path.name for path in others if "studies" in imported(path)} == set()
+
+
+def test_plugins_of_ours_import_what_a_plugin_of_others_may():
+    """`tractexp.extend` and what is below it; of their own folder what starts with an underscore."""
+    imports = {
+        f"{path.relative_to(ROOT)}: {name}"
+        for path in (ROOT / "plugins").rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for name in names(node)
+        if name.split(".")[0] in ("tractexp", "tractexp_plugins") and name.split(".")[:2] != ["tractexp", "extend"]
+    }
+    assert imports == set()
+
+
+def names(node: ast.AST) -> list[str]:
+    """The modules that a statement imports by their full names."""
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    return [node.module] if isinstance(node, ast.ImportFrom) and node.module and not node.level else []
