@@ -48,7 +48,7 @@ PUBLIC = {
     "export": "tractexp.api.export",
     "generalise": "tractexp.api.generalise",
     "identify": "tractexp.api.identify",
-    "investigate": "tractexp.api.investigate",
+    "investigate": "tractexp.api.discrepancy",
     "load": "tractexp.api.load",
     "look": "tractexp.api.look",
     "paper": "tractexp.studies.api.paper",

@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+from tractexp.progress import FIRST_LINE, NEXT_LINES, console, say
 from tractexp.sweep.job import SweepJob, shared
 from tractexp.sweep.status import FAILED, Status, search_objective
-from tractexp.tasks.console import FIRST_LINE, NEXT_LINES, console, say
 
 SHOWN = 3  # variants named in a line of a log file
 

@@ -10,13 +10,12 @@ import numpy as np
 
 from tractexp import files, provenance
 from tractexp.api.arguments import Choice, public
-from tractexp.api.pages import Drawing, Written
+from tractexp.api.task import Job, Task
+from tractexp.blocks import Report, Table
 from tractexp.errors import UserError, check_distinct, check_range
-from tractexp.outcome import Table
+from tractexp.outcome import Written
 from tractexp.plugin import build, get, plugin
 from tractexp.progress import counting
-from tractexp.tasks.console import listed, say, table
-from tractexp.tasks.task import Job, Task, call
 
 if TYPE_CHECKING:
     from tractexp.studies.bbob.runs import BbobRuns
@@ -31,6 +30,7 @@ class BenchmarkResult(Written):
     """All runs on BBOB, and what they come to. `optimizers` holds the settings of each, by its name."""
 
     kind = "benchmark"
+    page = "benchmark.html"
 
     bbob: "BbobRuns"
     optimizers: Mapping[str, Mapping[str, Any]]
@@ -52,17 +52,22 @@ class BenchmarkResult(Written):
             for d in bbob.plan.dimensions for name in bbob.optimizers
         ]  # fmt: skip
         columns = ["optimizer", "dimension", "all", *bbob.groups(), "solved"]
-        return Table(columns, rows, f"share of targets met, functions solved: {scale(bbob)}", self.sentences)
+        return Table(columns, rows, f"share of targets met, functions solved: {scale(bbob)}")
 
-    def _results(self, folder: Path) -> list[Path]:
+    def summary(self) -> Report:
+        from tractexp.studies.bbob import page
+
+        return page.summary(self.bbob)
+
+    def report(self) -> Report:
+        from tractexp.studies.bbob import page
+
+        return page.report(self.bbob)
+
+    def write_results(self, folder: Path) -> list[Path]:
         from tractexp.studies.bbob.page import content
 
         return [files.write_json(folder / "benchmark.json", content(self.bbob, self.optimizers))]
-
-    def _drawings(self) -> Mapping[str, Drawing]:
-        from tractexp.studies.bbob.page import write_page
-
-        return {"benchmark.html": lambda path: write_page(self.bbob, path)}
 
     def to_dict(self) -> dict[str, Any]:
         from tractexp.studies.bbob.page import content
@@ -146,7 +151,7 @@ def _tuple(value: Any) -> Any:
 
 
 @plugin
-class Benchmark(Task):
+class Benchmark(Task, call=benchmark, given=("optimizers",)):
     """Run the optimizer and those it is set against on BBOB: ERT and ECDF, one page, JSON."""
 
     reads = ("optimizer",)
@@ -171,67 +176,34 @@ class Benchmark(Task):
         for name in self.against:
             get("optimizer", name)
 
-    def run(self, job: Job) -> None:
-        plan = {key: getattr(self, key) for key in ("functions", "instances", "dimensions", "multiplier", "targets")}
-        cores = self.cores or (1 if job.in_sweep else None)
-        result = call(benchmark, self.optimizers(job), **plan, seed=job.seed, cores=cores)
-        paths = result.write_results(job.folder)
-        show(result.bbob)
-        paths += result.write_drawings(job.folder)
-        listed(paths)
-        track(job, result.bbob, paths)
-
-    def optimizers(self, job: Job) -> dict[str, Any]:
-        """The optimizer of the job, and those it is set against as they are by default, by name."""
+    def perform(self, job: Job, **instead: Any) -> BenchmarkResult:
         chosen = job.choices["optimizer"]
         optimizers = {chosen: job.chosen}
         for name in self.against:
             if build("optimizer", {"name": name}) != job.optimizer:
                 optimizers[f"{name} by default" if name == chosen else name] = {"name": name}
-        return optimizers
+        cores = self.cores or (1 if job.in_sweep else None)
+        return super().perform(job, optimizers=optimizers, cores=cores, progress=None, **instead)
 
+    def log(self, job: Job, result: BenchmarkResult, paths: list[Path]) -> None:
+        """The experiment is named after the benchmark: it has no data of the user's."""
+        node = job.config["tracking"]
+        if not node["enabled"]:
+            return
+        from tractexp import tracking
 
-def show(bbob: "BbobRuns") -> None:
-    """Print the shares and the sentences."""
-    from tractexp.studies.bbob import page
-
-    say(page.scale(bbob))
-    for dimension in bbob.plan.dimensions:
-        _, rows = page.shares(bbob, dimension)
-        columns = ["optimizer", "all", *(span(group) for group in bbob.groups().values()), "solved"]
-        table(columns, rows, f"dimension {dimension}: share of targets met, functions solved")
-    for dimension in bbob.plan.dimensions:
-        say(page.answer(bbob, dimension))
-    for sentence in page.sentences(bbob):
-        say(f"- {sentence}")
-    say()
-
-
-def span(functions: list[int]) -> str:
-    """The functions of a group in short: f1-5."""
-    first, last = min(functions), max(functions)
-    return f"f{first}" if first == last else f"f{first}-{last}"
-
-
-def track(job: Job, bbob: "BbobRuns", paths: list[Path]) -> None:
-    """Log a run whose experiment is named after the benchmark: it has no data of the user's."""
-    node = job.config["tracking"]
-    if not node["enabled"]:
-        return
-    from tractexp import tracking
-
-    metrics = {
-        tracking.metric_name(f"share {name} {d}d"): bbob.share(name, d, bbob.plan.functions)
-        for name in bbob.optimizers for d in bbob.plan.dimensions
-    }  # fmt: skip
-    optimizer = job.choices["optimizer"]
-    run = tracking.Run(
-        experiment=node["experiment"] or "benchmark bbob",
-        name=f"{optimizer} on BBOB",
-        parameters=tracking.flatten({key: job.config[key] for key in ("task", "optimizer", "seed")}),
-        metrics=metrics,
-        tags={"task": "benchmark", "optimizer": optimizer, "seed": str(job.seed), "git_commit": provenance.commit()},
-        artifacts=paths,
-        parent=job.sweep,
-    )
-    job.send(run)
+        metrics = {
+            tracking.metric_name(f"share {name} {d}d"): result.bbob.share(name, d, result.bbob.plan.functions)
+            for name in result.bbob.optimizers for d in result.bbob.plan.dimensions
+        }  # fmt: skip
+        optimizer, seed = job.choices["optimizer"], str(job.seed)
+        run = tracking.Run(
+            experiment=node["experiment"] or "benchmark bbob",
+            name=f"{optimizer} on BBOB",
+            parameters=tracking.flatten({key: job.config[key] for key in ("task", "optimizer", "seed")}),
+            metrics=metrics,
+            tags={"task": "benchmark", "optimizer": optimizer, "seed": seed, "git_commit": provenance.commit()},
+            artifacts=paths,
+            parent=job.sweep,
+        )
+        job.send(run)

@@ -1,19 +1,20 @@
 """Which optimizer is better: the runs of a sweep, or of any filter over MLflow, compared."""
 
 import functools
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from tractexp import files
 from tractexp.api.arguments import public
-from tractexp.api.pages import Drawing, Written
+from tractexp.api.task import Job, Task, listed
+from tractexp.blocks import Report, Table
 from tractexp.errors import UserError, check_choice, check_range
-from tractexp.outcome import Table
+from tractexp.outcome import Written
 from tractexp.plugin import plugin
-from tractexp.tasks.console import listed, say, table
-from tractexp.tasks.task import Job, Task, call
+from tractexp.progress import say
 
 if TYPE_CHECKING:
     from tractexp.studies.comparison.comparison import Comparison
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 SWEEPS = Path("outputs", "sweeps")
 TARGETS = (10.0, 2.0, 1.01)
 APART = ("budget", "time_limit", "target")
-SAID = 8  # sentences on the terminal; the page has all
+QUOTED = 8  # sentences on the terminal; the page has all
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -31,6 +32,7 @@ class ComparisonResult(Written):
     """A comparison. `content` is that of `comparison.json`; from `call`, the arguments, a loaded result is drawn."""
 
     kind = "comparison"
+    page = "comparison.html"
 
     call: Mapping[str, Any]
     source: str  # where the runs are from, in words
@@ -71,18 +73,53 @@ class ComparisonResult(Written):
             for problem, content in each.items() for v in content["variants"]
         ]  # fmt: skip
         columns = ["variant", "failed", "median [pu²]", "worst [pu²]", "share at floor", "ERT [simulations]"]
-        title = f"{self.source}: {', '.join(each)}"
-        said = [self.answer, *self.sentences, *self.content["notes"]]
-        return Table(["problem", *columns] if several else columns, rows, title, said)
+        return Table(["problem", *columns] if several else columns, rows, f"{self.source}: {', '.join(each)}")
 
-    def _results(self, folder: Path) -> list[Path]:
+    def summary(self) -> Report:
+        report, several = Report(), "problems" in self.content
+        if several:
+            report.text(f"{self.source}: {', '.join(self.content['problems'])}").add(*self._over_all())
+        else:
+            report.add(self._of_one())
+            target = min(self.content["targets"])
+            terms = "objectives in pu² at the end of the search; at floor: within 1 %; ERT: simulations to"
+            report.text(f"{terms} {target:g} x floor", self.answer)
+        shown = self.sentences if several else self.sentences[:QUOTED]
+        report.text(*(f"- {sentence}" for sentence in [*shown, *self.content["notes"]]))
+        if (more := len(self.sentences) - len(shown)) > 0:
+            report.text(f"- and {more} more sentences in {self.page}")
+        return report
+
+    def _of_one(self) -> Table:
+        """The table of one problem, as a person reads it."""
+        from tractexp.studies.comparison.claims import number
+
+        rows = [
+            [
+                name,
+                str(failures),
+                number(median),
+                number(worst),
+                f"{at_floor:.0%}",
+                number(inf if ert is None else ert),
+            ]
+            for name, failures, median, worst, at_floor, ert in self.table().rows
+        ]
+        columns = ["variant", "failed", "median", "worst", "at floor", "ERT"]
+        return Table(columns, rows, f"{self.source}: {self.content['problem']}")
+
+    def _over_all(self) -> Iterator[Table]:
+        """What several problems come to under each of the terms, the best variants first."""
+        for overall in getattr(self.comparison, "overall", ()):
+            best = list(overall.figures.items())[:QUOTED]
+            cells = [[name, *(f"{x:.0%}" if overall.share else f"{x:.3g}" for x in values)] for name, values in best]
+            yield Table(["variant", *overall.columns], cells, f"{overall.terms}, {overall.where}: {overall.measure}")
+
+    def report(self) -> Report:
+        return _report(self.comparison).report(self.comparison, self.source)
+
+    def write_results(self, folder: Path) -> list[Path]:
         return [files.write_json(folder / "comparison.json", self.content)]
-
-    def _drawings(self) -> Mapping[str, Drawing]:
-        def page(path: Path) -> Path:
-            return _report(self.comparison).write_page(self.comparison, path, self.source)
-
-        return {"comparison.html": page}
 
     def to_dict(self) -> dict[str, Any]:
         return {"call": dict(self.call), **self.content}
@@ -205,7 +242,7 @@ def _runs(
 
 
 @plugin
-class Compare(Task):
+class Compare(Task, call=compare, given=("uri", "experiment")):
     """Settle which optimizer is better: tables, tests over paired seeds, charts, one page, sentences to quote."""
 
     reads = ()
@@ -214,9 +251,9 @@ class Compare(Task):
     sweep: str | None = None  # folder of a sweep; null: the newest under outputs/sweeps
     filter: str | None = None  # instead: a filter over MLflow, "tags.data = 'tibet_50pct'"
     data: str | None = None  # compare the runs on this choice of data only
-    floor: float | None = None  # objective that the noise leaves; null: polished from the runs and many starts
-    targets: list[float] = field(default_factory=lambda: [10.0, 2.0, 1.01])  # of running times, times the floor
+    targets: list[float] = field(default_factory=lambda: list(TARGETS))  # of running times, times the floor
     ties: float = 1e-3  # objectives within this share of the floor count as equal in the tests
+    floor: float | None = None  # objective that the noise leaves; null: polished from the runs and many starts
     reference: str | None = None  # test only against this variant; null: every pair
     apart: list[str] = field(default_factory=list)  # limits that make comparisons of their own: [budget]
     bbob: int = 0  # instances of each function of BBOB on which the variants are run as well
@@ -225,62 +262,20 @@ class Compare(Task):
     def check(self) -> None:
         check(self.sweep, self.filter, self.targets, self.ties, self.floor, self.apart, self.bbob)
 
-    def run(self, job: Job) -> None:
+    def perform(self, job: Job, **instead: Any) -> ComparisonResult:
         node = job.config["tracking"]
-        result = call(compare, uri=node["uri"], experiment=node["experiment"], **asdict(self))
-        paths = result.write_results(job.folder)
-        if "problems" in result.content:
-            _show_several(result)
-        else:
-            _show_one(result)
-        paths += result.write_drawings(job.folder)
-        beside = result.folder if result.folder != job.folder else None
-        listed([files.copy(path, beside / path.name) for path in paths if beside] + paths)
-        track(job, result, paths)
+        return super().perform(job, uri=node["uri"], experiment=node["experiment"], progress=None, **instead)
+
+    def log(self, job: Job, result: ComparisonResult, paths: list[Path]) -> None:
+        """Put what was written into the sweep's folder, too, and the page on the sweep's run, where there is one."""
+        if result.folder is not None and result.folder != job.folder:
+            listed(files.copy(path, result.folder / path.name) for path in paths)
+        if job.config["tracking"]["enabled"]:
+            _track(job, result, paths)
 
 
-def _show_several(result: ComparisonResult) -> None:
-    """Print what several problems come to under each of the terms."""
-    several: Any = result.comparison
-    say(f"{result.source}: {', '.join(several.comparisons)}")
-    for overall in several.overall:
-        say()
-        best = list(overall.figures.items())[:SAID]
-        cells = [[name, *(f"{x:.0%}" if overall.share else f"{x:.3g}" for x in values)] for name, values in best]
-        table(["variant", *overall.columns], cells, f"{overall.terms}, {overall.where}: {overall.measure}")
-    for text in [*result.sentences, *result.content["notes"]]:
-        say(f"- {text}")
-    say()
-
-
-def _show_one(result: ComparisonResult) -> None:
-    """Print the table and the sentences of one problem."""
-    from tractexp.studies.comparison.claims import number
-
-    content = result.content
-    say(f"{result.source}: {content['problem']}")
-    never = float("inf")  # null in the file
-    rows = [
-        [name, str(failures), number(median), number(worst), f"{at_floor:.0%}", number(never if ert is None else ert)]
-        for name, failures, median, worst, at_floor, ert in result.table().rows
-    ]
-    table(["variant", "failed", "median", "worst", "at floor", "ERT"], rows)
-    target = min(content["targets"])
-    say(f"objectives in pu² at the end of the search; at floor: within 1 %; ERT: simulations to {target:g} x floor")
-    say()
-    say(result.answer)
-    for text in [*result.sentences[:SAID], *content["notes"]]:
-        say(f"- {text}")
-    if (more := len(result.sentences) - SAID) > 0:
-        say(f"- and {more} more sentences in comparison.html")
-    say()
-
-
-def track(job: Job, result: ComparisonResult, paths: list[Path]) -> None:
+def _track(job: Job, result: ComparisonResult, paths: list[Path]) -> None:
     """Add the page to the sweep's run, or log a run of its own where there is no such run."""
-    node = job.config["tracking"]
-    if not node["enabled"]:
-        return
     from tractexp import tracking
     from tractexp.tracking.attach import attach
     from tractexp.tracking.swept import parent_of, waits
@@ -299,7 +294,7 @@ def track(job: Job, result: ComparisonResult, paths: list[Path]) -> None:
         say(f"not logged: {error}")
         return
     run = tracking.Run(
-        experiment=node["experiment"] or f"compare {data}",
+        experiment=job.config["tracking"]["experiment"] or f"compare {data}",
         name=f"comparison of {len(next(iter(comparisons.values())).summaries)} variants",
         parameters=tracking.flatten({"task": job.config["task"]}),
         metrics={

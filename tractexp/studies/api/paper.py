@@ -10,18 +10,15 @@ from typing import TYPE_CHECKING, Any, Self
 
 from tractexp import files
 from tractexp.api.arguments import public
-from tractexp.api.pages import Drawing, Written
-from tractexp.api.setup import Setup
+from tractexp.api.setup import Setup, recorded
+from tractexp.api.task import Job, Task, listed
+from tractexp.blocks import Report, Table
 from tractexp.errors import check_choice, check_range
-from tractexp.outcome import Table
+from tractexp.outcome import Drawing, Written
 from tractexp.plugin import plugin
-from tractexp.progress import NEXT_LINES, telling
-from tractexp.tasks.console import listed, say
-from tractexp.tasks.task import Job, Task, call
+from tractexp.progress import NEXT_LINES, say, telling
 
 if TYPE_CHECKING:
-    from tractexp.report.markdown import Markdown
-    from tractexp.report.page import Page
     from tractexp.studies.paper.claims import Claim
     from tractexp.studies.paper.study import Study
 
@@ -38,12 +35,14 @@ class PaperResult(Written):
     """The paper's claims with their verdicts. A loaded result measures its page again, from the records it holds."""
 
     kind = "paper"
+    page = "paper.html"
 
     setup: Setup
     settings: Mapping[str, Any]  # seeds, workers
     parts: Sequence[str]
     claims: "Sequence[Claim]"
     measured: "Study | None" = None  # None in a loaded result
+    seconds: float = 0.0  # that it took
 
     @functools.cached_property
     def study(self) -> "Study":
@@ -61,22 +60,31 @@ class PaperResult(Written):
         rows = [[claim.part, claim.text, claim.verdict, claim.measured] for claim in self.claims]
         return Table(["where", "the paper's claim", "verdict", "measured"], rows, counted(self.claims))
 
+    def summary(self) -> Report:
+        from tractexp.studies.paper.claims import counted
+
+        report = Report()
+        for claim in self.claims:
+            report.text(f"  {claim.verdict}: {claim.text}", f"    {claim.measured}")
+        report.text(*[counted(self.claims)] * bool(self.claims))
+        return report.text(*[f"in {self.seconds:.0f} s"] * bool(self.seconds))
+
+    def report(self) -> Report:
+        return self._report
+
     @functools.cached_property
-    def _sheets(self) -> "tuple[Page, Markdown]":
-        from tractexp.studies.paper.page import sheets
+    def _report(self) -> Report:
+        from tractexp.studies.paper.page import report
 
-        return sheets(self.study, self.parts, self.claims)
+        return report(self.study, self.parts, self.claims)
 
-    def _results(self, folder: Path) -> list[Path]:
+    def write_results(self, folder: Path) -> list[Path]:
         """paper.json: the claims and what was measured."""
         content = {key: value for key, value in self.to_dict().items() if key != "setup"}
         return [files.write_json(folder / "paper.json", content)]
 
-    def _drawings(self) -> Mapping[str, Drawing]:
-        return {
-            "paper.html": lambda path: self._sheets[0].write(path),
-            "paper.md": lambda path: self._sheets[1].write(path),
-        }
+    def drawings(self) -> Mapping[str, Drawing]:
+        return {**super().drawings(), "paper.md": lambda path: files.write(path, self._report.markdown)}
 
     def to_dict(self) -> dict[str, Any]:
         return {
@@ -120,6 +128,7 @@ def paper(
 
     Raises `UserError` for wrong names or values, and where a part needs a held-out dip that is not there.
     """
+    started = time.perf_counter()
     check(parts, seeds, workers)
     model_settings = {"bounds": bounds, "fixed": fixed, "per_event": per_event, "substeps": substeps}
     limits = {"budget": budget, "time_limit": time_limit, "target": target}
@@ -133,7 +142,7 @@ def paper(
             if needing & set(chosen):
                 study.held(kind)
         study.prepare(chosen)
-        return PaperResult(setup, settings, chosen, claims(study, chosen), study)
+        return PaperResult(setup, settings, chosen, claims(study, chosen), study, time.perf_counter() - started)
 
 
 def check(parts: Sequence[str], seeds: int, workers: int | None) -> None:
@@ -171,7 +180,7 @@ def _counted(tell: Callable[[str], None]) -> Callable[[int, int], None]:
 
 
 @plugin
-class Paper(Task):
+class Paper(Task, call=paper):
     """Measure what the paper claims, on the shipped stand-ins or on records of your own: paper.json, .html and .md."""
 
     resumes = True
@@ -180,34 +189,19 @@ class Paper(Task):
 
     parts: list[str] = field(default_factory=list)  # such as [table1,figure9]; empty: all
     held_out: dict[str, list[str]] = field(default_factory=dict)  # {choice of data: files}; without data.validate
-    seeds: int = SEEDS
-    workers: int | None = None  # processes that search; null: one for each core
     docs: str | None = None  # write paper.md to this file too
 
     def check(self) -> None:
-        check(self.parts, self.seeds, self.workers)
+        check(self.parts, getattr(self, "seeds"), getattr(self, "workers"))  # noqa: B009 # settings of the call
 
-    def run(self, job: Job) -> None:
-        from tractexp.api.setup import recorded
-
-        started = time.perf_counter()
+    def perform(self, job: Job, **instead: Any) -> PaperResult:
         job = job.holding_out(self.held_out)
         for line in recorded(job.events_of_fit.train, job.events_of_fit.validate, "hold out"):
             say(line)
-        result = call(
-            paper, **job.asked, parts=self.parts, seeds=self.seeds, workers=self.workers,
-            progress=lambda line: say(f"  {line}"),
-        )  # fmt: skip
-        paths = result.write_results(job.folder)
-        for claim in result.claims:
-            say(f"  {claim.verdict}: {claim.text}")
-            say(f"    {claim.measured}")
-        if result.claims:
-            say(result.table().title)
-        say(f"in {time.perf_counter() - started:.0f} s")
-        paths += result.write_drawings(job.folder)
+        return super().perform(job, progress=lambda line: say(f"  {line}"), **instead)
+
+    def log(self, job: Job, result: PaperResult, paths: list[Path]) -> None:
         if self.docs is not None:
-            paths += [files.copy(path, Path(self.docs)) for path in paths if path.suffix == ".md"]
-        listed(paths)
+            listed(files.copy(path, Path(self.docs)) for path in paths if path.suffix == ".md")
         metrics = {verdict.replace(" ", "_"): float(n) for verdict, n in result.counts.items()}
         job.log(name="the paper", values={}, metrics=metrics, artifacts=paths)

@@ -2,12 +2,11 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 from tractexp import files
-from tractexp.report.chart import Chart
-from tractexp.report.page import Page
+from tractexp.blocks import Report
+from tractexp.blocks.chart import Chart
 from tractexp.studies.bbob.runs import BbobRuns
 from tractexp.studies.comparison.charts import runtime_curves
 
@@ -99,19 +98,29 @@ def charts(benchmark: BbobRuns, dimension: int) -> dict[str, tuple[Chart, list[C
     return drawn
 
 
-def write_page(benchmark: BbobRuns, path: Path) -> Path:
-    """Write `benchmark.html`."""
+def summary(benchmark: BbobRuns) -> Report:
+    """The shares of targets met, and the sentences."""
+    page = Report().text(scale(benchmark))
+    for dimension in benchmark.plan.dimensions:
+        columns, rows = shares(benchmark, dimension)
+        page.table(columns, rows, title=f"dimension {dimension}: share of targets met, functions solved")
+    page.text(*(answer(benchmark, dimension) for dimension in benchmark.plan.dimensions))
+    return page.text(*(f"- {sentence}" for sentence in sentences(benchmark)))
+
+
+def report(benchmark: BbobRuns) -> Report:
+    """The page."""
     plan = benchmark.plan
-    page = Page(f"Benchmark of {benchmark.optimizers[0]} on BBOB", f"{scale(benchmark)}; seed {plan.seed}.")
+    page = Report(f"Benchmark of {benchmark.optimizers[0]} on BBOB", f"{scale(benchmark)}; seed {plan.seed}.")
     page.verdict(*(answer(benchmark, d) for d in plan.dimensions), *sentences(benchmark))
     for d in plan.dimensions:
         page.heading(f"Dimension {d}")
         _shares(page, benchmark, d)
         _times(page, benchmark, d)
-    return _reading(page).write(path)
+    return _reading(page)
 
 
-def _shares(page: Page, benchmark: BbobRuns, d: int) -> None:
+def _shares(page: Report, benchmark: BbobRuns, d: int) -> None:
     """The share of targets met, in a table and by evaluations."""
     plan, drawn = benchmark.plan, charts(benchmark, d)
     page.table(
@@ -131,7 +140,7 @@ def _shares(page: Page, benchmark: BbobRuns, d: int) -> None:
                 page.chart(chart, f"{group.capitalize()}: {numbers}.")
 
 
-def _times(page: Page, benchmark: BbobRuns, d: int) -> None:
+def _times(page: Report, benchmark: BbobRuns, d: int) -> None:
     """The expected running times to each target, the hardest first."""
     hardest = len(benchmark.plan.targets) - 1
     columns = ["function", *benchmark.optimizers]
@@ -146,7 +155,7 @@ def _caption(plan: Any, target: int) -> str:
     return f"ERT to {plan.targets[target]:g} from the optimum, in evaluations (runs that met it)."
 
 
-def _reading(page: Page) -> Page:
+def _reading(page: Report) -> Report:
     return page.heading("How to read this page").items(
         [
             "ERT, the expected running time, is what all runs spent until they met the target, those that did not all"

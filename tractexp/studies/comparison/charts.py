@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from tractexp.report import style
-from tractexp.report.chart import DECADE, Chart
+from tractexp.blocks import style
+from tractexp.blocks.chart import DECADE, Chart
 from tractexp.studies.comparison.claims import number
 from tractexp.studies.comparison.floor import Floor, Polished
 from tractexp.studies.comparison.runs import Run, Variant

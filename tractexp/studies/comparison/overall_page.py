@@ -1,14 +1,12 @@
 """Comparisons on several problems as one self-contained page for people, and as JSON for machines."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tractexp import files
-from tractexp.report import style
-from tractexp.report.chart import Chart
-from tractexp.report.page import Page
+from tractexp.blocks import Report, style
+from tractexp.blocks.chart import Chart
 from tractexp.studies.comparison import charts
 from tractexp.studies.comparison import overall_claims as claims
 from tractexp.studies.comparison import page as one
@@ -21,12 +19,12 @@ ROW = 26  # pixels of an effect in a chart
 ALL = "all together"
 
 
-def write_page(several: Several, path: Path, source: str) -> Path:
-    """Write `comparison.html`; `source` says where the runs are from."""
+def report(several: Several, source: str) -> Report:
+    """The page; `source` says where the runs are from."""
     first = next(iter(several.comparisons.values()))
     runs = sum(summary.runs for c in several.comparisons.values() for summary in c.summaries)
     title = f"Comparison of {len(first.summaries)} optimizers on {len(several.comparisons)} problems"
-    page = Page(title, f"{runs} runs of {source}. Objectives are those {one.AT_END}.")
+    page = Report(title, f"{runs} runs of {source}. Objectives are those {one.AT_END}.")
     sentences = [claims.of_agreement(several), *(claims.of_ranks(overall) for overall in several.overall)]
     page.verdict(*(text for text in sentences if text))
     if several.notes:
@@ -39,10 +37,10 @@ def write_page(several: Several, path: Path, source: str) -> Path:
             one.quality(page, comparison)
             if comparison.ablation:
                 one.switches(page, comparison.ablation)
-    return _reading(page).write(path)
+    return _reading(page)
 
 
-def _overall(page: Page, overall: Overall) -> None:
+def _overall(page: Report, overall: Overall) -> None:
     page.heading(f"{overall.terms}: {overall.where}" if overall.terms else overall.where)
     if overall.ablation:
         page.text(claims.of_switches(overall))
@@ -96,7 +94,7 @@ def effects(overall: Overall) -> Chart:
     return chart.limits(0, len(rows) - 0.4, -0.6).edge(1.0, dash="dash").limits(None, low, high)
 
 
-def _effects(page: Page, overall: Overall, ablation: Ablation) -> None:
+def _effects(page: Report, overall: Overall, ablation: Ablation) -> None:
     """Main effects with sizes and costs, and interactions."""
     cost = overall.cost
     columns = ["switched on", "factor", "from", "to", "better in", "from", "to", "shown"]
@@ -125,7 +123,7 @@ def _factor(effect: Effect) -> list[str]:
     return [" with ".join(effect.switches), *map(number, (effect.factor, effect.low, effect.high))]
 
 
-def _reading(page: Page) -> Page:
+def _reading(page: Report) -> Report:
     return page.heading("How to read this page").items(
         [
             "Every problem has a floor of its own, the lowest objective that least squares reach; objectives are told"

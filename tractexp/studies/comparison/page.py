@@ -2,12 +2,11 @@
 
 import math
 from dataclasses import asdict, is_dataclass
-from pathlib import Path
 from typing import Any
 
 from tractexp import files
-from tractexp.report.chart import Chart
-from tractexp.report.page import Page
+from tractexp.blocks import Report
+from tractexp.blocks.chart import Chart
 from tractexp.studies.comparison import charts, claims
 from tractexp.studies.comparison.ablation import Ablation
 from tractexp.studies.comparison.claims import number, p_value
@@ -23,11 +22,11 @@ INTERACTIONS = "Interactions: the factor by which one switch's effect changes wh
 QUOTED = 12  # more sentences than these about pairs are folded away
 
 
-def write_page(comparison: Comparison, path: Path, source: str) -> Path:
-    """Write `comparison.html`; `source` says where the runs are from."""
+def report(comparison: Comparison, source: str) -> Report:
+    """The page; `source` says where the runs are from."""
     runs = sum(summary.runs for summary in comparison.summaries)
     title = f"Comparison of {len(comparison.summaries)} optimizers on {comparison.gathered.problem}"
-    page = Page(title, f"{runs} runs of {source}. Objectives, errors and parameters are those {AT_END}.")
+    page = Report(title, f"{runs} runs of {source}. Objectives, errors and parameters are those {AT_END}.")
     headlines = (claims.headline, claims.of_floor, claims.of_valley, claims.of_speed)
     page.verdict(claims.answer(comparison), *(text for claim in headlines if (text := claim(comparison))))
     if comparison.notes:
@@ -40,7 +39,7 @@ def write_page(comparison: Comparison, path: Path, source: str) -> Path:
         switches(page, comparison.ablation)
     _not_judged(page, comparison)
     _reading(page, comparison)
-    return page.write(path)
+    return page
 
 
 def _spread(spread: Spread, scale: float = 1.0) -> list[str]:
@@ -48,7 +47,7 @@ def _spread(spread: Spread, scale: float = 1.0) -> list[str]:
     return [number(x * scale, 4) for x in (spread.best, spread.lower, spread.median, spread.upper, spread.worst)]
 
 
-def quality(page: Page, comparison: Comparison) -> None:
+def quality(page: Report, comparison: Comparison) -> None:
     """Where the runs ended: every run, and quartiles."""
     page.heading("Where the runs ended")
     drawn = charts.spread(comparison.variants, comparison.floor)
@@ -75,7 +74,7 @@ def _share(value: float | None) -> str:
     return "-" if value is None else f"{value:.0%}"
 
 
-def _parameters(page: Page, comparison: Comparison) -> None:
+def _parameters(page: Report, comparison: Comparison) -> None:
     """Every run's parameters against the floor's; nothing where the problem could not be put again."""
     polished = comparison.polished
     if polished is None or not polished.reached:
@@ -97,7 +96,7 @@ def _parameters(page: Page, comparison: Comparison) -> None:
         page.table(["parameter", "unit", "value", "lower bound", "upper bound"], rows)
 
 
-def _speed(page: Page, comparison: Comparison) -> None:
+def _speed(page: Report, comparison: Comparison) -> None:
     page.heading("How fast")
     goals = [f"{target:g} x floor" for target in comparison.targets]
     columns = ["variant", "simulations", *(f"{g} [simulations]" for g in goals), *(f"{g} [s]" for g in goals)]
@@ -125,7 +124,7 @@ def _few(comparison: Comparison) -> bool:
     return len(comparison.summaries) <= charts.TOGETHER
 
 
-def _curves(page: Page, comparison: Comparison, drawn: tuple[Chart, list[Chart]], caption: str) -> None:
+def _curves(page: Report, comparison: Comparison, drawn: tuple[Chart, list[Chart]], caption: str) -> None:
     """A chart of all variants; where there are many, one of each folded away."""
     whole, each = drawn
     many = f" In color the first {charts.TOGETHER}; gray ones are named when pointed at." if each else ""
@@ -135,7 +134,7 @@ def _curves(page: Page, comparison: Comparison, drawn: tuple[Chart, list[Chart]]
             page.charts(each, f"In gray: {comparison.summaries[0].name}.")
 
 
-def _differences(page: Page, comparison: Comparison) -> None:
+def _differences(page: Report, comparison: Comparison) -> None:
     page.heading("Is the difference more than chance?")
     if comparison.ranks:
         page.text(claims.of_ranks(comparison))
@@ -158,7 +157,7 @@ def _differences(page: Page, comparison: Comparison) -> None:
             page.items(sentences[QUOTED:])
 
 
-def _pairs(page: Page, pairs: list[Pair], caption: str) -> None:
+def _pairs(page: Report, pairs: list[Pair], caption: str) -> None:
     columns = ["lower", "higher", "seeds", "median", "median", "p", "p (Holm)", "A", "effect", "significant"]
     rows = [
         [
@@ -180,7 +179,7 @@ def _pairs(page: Page, pairs: list[Pair], caption: str) -> None:
     page.table(columns, rows, f"{caption} {said}".strip(), words=(1, 8))
 
 
-def switches(page: Page, ablation: Ablation) -> None:
+def switches(page: Report, ablation: Ablation) -> None:
     """The effects of the switches on one problem."""
     page.heading("What each ingredient does")
     page.items([claims.of_effect(effect) for effect in ablation.effects])
@@ -204,7 +203,7 @@ def switches(page: Page, ablation: Ablation) -> None:
         page.text(unknown)
 
 
-def _not_judged(page: Page, comparison: Comparison) -> None:
+def _not_judged(page: Report, comparison: Comparison) -> None:
     """The runs without a result: those that failed, and those that were interrupted."""
     failed = _failed(comparison)
     interrupted = [(name, run.seed, run.where, run.interruption) for name, run in comparison.gathered.interrupted]
@@ -218,7 +217,7 @@ def _failed(comparison: Comparison) -> list[tuple[str, int, str, str]]:
     return [(v.name, run.seed, run.where, run.failure) for v in comparison.variants for run in v.runs if run.failure]
 
 
-def _reading(page: Page, comparison: Comparison) -> None:
+def _reading(page: Report, comparison: Comparison) -> None:
     page.heading("How to read this page").items(
         [
             f"Objectives within {comparison.ties:g} of the floor count as equal in the tests: what is left there is "

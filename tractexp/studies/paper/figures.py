@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from tractexp.report.chart import Chart
-from tractexp.report.style import ACTIVE, FAINT, PALETTE, REACTIVE, VOLTAGE
+from tractexp.blocks.chart import Chart
+from tractexp.blocks.style import ACTIVE, FAINT, PALETTE, REACTIVE, VOLTAGE
 
 ITERATIONS = 150  # shown of an orbit
 POINTS = 400  # of a survival curve

@@ -5,10 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from tractexp.blocks import Report
+from tractexp.blocks.style import PALETTE
 from tractexp.report.events import CAPTION, Curve, event_chart
-from tractexp.report.markdown import Markdown, Together
-from tractexp.report.page import Page
-from tractexp.report.style import PALETTE
 from tractexp.studies.comparison import charts
 from tractexp.studies.comparison.floor import Floor
 from tractexp.studies.comparison.runs import Run, Variant
@@ -26,18 +25,17 @@ LEAD = (
 SHOWN = ("0.3", "0.5", "0.7")  # alphas whose orbits are drawn
 
 
-def sheets(study: Study, parts: Sequence[str], claims: Sequence[Claim]) -> tuple[Page, Markdown]:
-    """Measure `parts` and tell them with their claims, as a page and in Markdown."""
-    page, text = Page(TITLE, LEAD), Markdown(TITLE, LEAD)
-    sheet: Any = Together(page, text)
+def report(study: Study, parts: Sequence[str], claims: Sequence[Claim]) -> Report:
+    """Measure `parts`, and report them with their claims."""
+    sheet = Report(TITLE, LEAD)
     _top(sheet, study, claims)
     for part in parts:
         study.tell(f"writing {_place(part)}")
         SECTIONS[part](sheet, study)
-    return page, text
+    return sheet
 
 
-def _top(sheet: Any, study: Study, claims: Sequence[Claim]) -> None:
+def _top(sheet: Report, study: Study, claims: Sequence[Claim]) -> None:
     """What the reader must know first, and the verdicts."""
     sheet.verdict(
         f"Of {counted(claims)}." if claims else "The parts chosen hold no claim.",
@@ -87,7 +85,7 @@ def _middle(values: Sequence[float] | np.ndarray) -> str:
     return f"{number(middle)} ({number(low)} .. {number(high)})"
 
 
-def table1(sheet: Any, study: Study) -> None:
+def table1(sheet: Report, study: Study) -> None:
     sheet.heading("Table 1: three orders of the motor")
     sheet.text(
         "The paper grades the models in words and shows no numbers. Here each is fitted to the same record by least"
@@ -156,7 +154,7 @@ def _label(name: str) -> str:
     return LABELS[name] if name in LABELS else f"{LABELS[reading.optimizer]}, {reading.told}"
 
 
-def _parameters(sheet: Any, study: Study, columns: Sequence[tuple[str, str]], caption: str) -> None:
+def _parameters(sheet: Report, study: Study, columns: Sequence[tuple[str, str]], caption: str) -> None:
     captions = {"paper": "the paper", "one": "one run", "median": "median"}
     heads = [f"{_label(name)}, {captions[what]}" for name, what in columns]
     sheet.table(["", "bounds", *heads], _rows_of_parameters(study, columns), caption)
@@ -165,7 +163,7 @@ def _parameters(sheet: Any, study: Study, columns: Sequence[tuple[str, str]], ca
 THREE = ("paper", "one", "median")
 
 
-def table2(sheet: Any, study: Study) -> None:
+def table2(sheet: Report, study: Study) -> None:
     sheet.heading("Table 2: what ISSA identifies")
     others = [(name, "median") for name in (TEN["issa"], LITERAL["issa"])]
     _parameters(
@@ -182,7 +180,7 @@ TO_THE_LETTER = (
 )
 
 
-def table3(sheet: Any, study: Study) -> None:
+def table3(sheet: Report, study: Study) -> None:
     sheet.heading("Table 3: ISSA, SSA and PSO")
     _parameters(
         sheet, study, [(name, what) for name in COMPARED for what in THREE],
@@ -222,7 +220,7 @@ def _spent(study: Study, name: str) -> list[str]:
 
 
 def _generalized(number_: str, kind: str, table: dict[str, tuple[float, float]]) -> Callable[..., None]:
-    def section(sheet: Any, study: Study) -> None:
+    def section(sheet: Report, study: Study) -> None:
         residuals = study.residuals(kind)
         names = ", ".join((*study.train, *study.held_out)[e].record.name for e in study.held(kind))
         sheet.heading(f"Table {number_}: {kind}")
@@ -244,7 +242,7 @@ def _generalized(number_: str, kind: str, table: dict[str, tuple[float, float]])
     return section
 
 
-def figure3(sheet: Any, study: Study) -> None:
+def figure3(sheet: Report, study: Study) -> None:
     sheet.heading("Figure 3: the tent map")
     orbits = {f"alpha = {a}": maps.tent_orbit(float(a), 200, 1, np.random.default_rng(0))[:, 0] for a in SHOWN}
     where, flock = next(iter(study.uniformity.items()))
@@ -258,7 +256,7 @@ def figure3(sheet: Any, study: Study) -> None:
     )
 
 
-def figure4(sheet: Any, study: Study) -> None:
+def figure4(sheet: Report, study: Study) -> None:
     sheet.heading("Figure 4: Lévy flights")
     sheet.chart(figures.flights(maps.flights("mantegna", 300, 3, seed=1)), "Steps of Eq. (15), three dimensions.")
     sheet.chart(figures.tails(study.tails), "How large the steps of the two readings of Eq. (15) become.")
@@ -270,7 +268,7 @@ def figure4(sheet: Any, study: Study) -> None:
     sheet.table(["formula", "median |s|", "|s| > 10", "|s| > 100", "tail exponent"], rows)
 
 
-def figure6(sheet: Any, study: Study) -> None:
+def figure6(sheet: Report, study: Study) -> None:
     event = study.train[0]
     record = event.record
     sheet.heading("Figure 6: the record")
@@ -278,19 +276,19 @@ def figure6(sheet: Any, study: Study) -> None:
     sheet.chart(figures.record(record.t, record.U, record.P, record.Q), ": ".join(caption))
 
 
-def _fit(sheet: Any, fit: Any, role: str) -> None:
+def _fit(sheet: Report, fit: Any, role: str) -> None:
     record = fit.event.record
     caption = f"{record.name} ({role}), ISSA, one run: epsilon_p {fit.epsilon_p:.2%}, epsilon_q {fit.epsilon_q:.2%}."
     curve = Curve("calculated", np.stack((fit.P, fit.Q)), PALETTE[1])
     sheet.chart(event_chart(fit.event, [curve]), " ".join([caption, CAPTION, *map(as_sentence, record.notes)]))
 
 
-def figure8(sheet: Any, study: Study) -> None:
+def figure8(sheet: Report, study: Study) -> None:
     sheet.heading("Figure 8: the fit")
     _fit(sheet, study.first("issa")[0], "fitted")
 
 
-def figure9(sheet: Any, study: Study) -> None:
+def figure9(sheet: Report, study: Study) -> None:
     sheet.heading("Figure 9: the searches")
     floor = Floor(study.floor, "")
     one = [_variant(study, name, "iterations", 1) for name in COMPARED]
@@ -321,7 +319,7 @@ def _variant(study: Study, name: str, by: str, seeds: int) -> Variant:
             history=f.history.objective) for seed, f in enumerate(study.searched(name, by)[:seeds])))  # fmt: skip
 
 
-def _reasons(sheet: Any, study: Study) -> None:
+def _reasons(sheet: Report, study: Study) -> None:
     sheet.heading("Why they rank so", 3)
     sheet.text(*conclusion.reasons(study))
     rows = []
@@ -348,7 +346,7 @@ def _reasons(sheet: Any, study: Study) -> None:
     )  # fmt: skip
 
 
-def _valleys(sheet: Any, study: Study) -> None:
+def _valleys(sheet: Report, study: Study) -> None:
     sheet.heading(f"The valleys along {TRADED}", 3)
     sheet.text(*conclusion.valley(study))
     grid, path = study.path
@@ -389,7 +387,7 @@ def _valleys(sheet: Any, study: Study) -> None:
 
 
 def _held_figure(figure: str, kind: str) -> Callable[..., None]:
-    def section(sheet: Any, study: Study) -> None:
+    def section(sheet: Report, study: Study) -> None:
         sheet.heading(f"Figure {figure}: {kind}")
         fits = study.first("issa")
         for e in study.held(kind):
@@ -398,7 +396,7 @@ def _held_figure(figure: str, kind: str) -> Callable[..., None]:
     return section
 
 
-def equations_section(sheet: Any, study: Study) -> None:
+def equations_section(sheet: Report, study: Study) -> None:
     sheet.heading("What is printed, in the printed equations")
     sheet.table(
         ["where", "printed", "what the equation gives", "verdict"],
@@ -416,7 +414,7 @@ def equations_section(sheet: Any, study: Study) -> None:
     )
 
 
-def readings_section(sheet: Any, study: Study) -> None:
+def readings_section(sheet: Report, study: Study) -> None:
     sheet.heading("The readings of the text")
     rows = [[READINGS[name].told, *(_middle(study.objectives(n)) for n in (name.replace("issa", "ssa", 1), name))]
             for name in BOTH]  # fmt: skip
@@ -451,7 +449,7 @@ def _costs(study: Study, name: str) -> tuple[str, str]:
     return _middle(study.objectives(name)), f"{spent:,.0f}"
 
 
-SECTIONS: dict[str, Callable[[Any, Study], None]] = {
+SECTIONS: dict[str, Callable[[Report, Study], None]] = {
     "table1": table1,
     "table2": table2,
     "table3": table3,

@@ -185,14 +185,14 @@ class Study:
         self.tell("Figure 9: descending from where the searches ended, and from random points")
         names = (*LEVEL, "random_search")
         starts = np.array([search.values for name in names for search in self.searched(name)])
-        ends = self._kept(self.problem, starts, lambda: valleys.descended(self.problem, starts, self.floor))
+        ends = self._descents(self.problem, starts, lambda: valleys.descended(self.problem, starts, self.floor))
         parts = {name: slice(k * self.seeds, (k + 1) * self.seeds) for k, name in enumerate(names)}
         return {name: valleys.Ends(ends.objective[part], ends.values[part]) for name, part in parts.items()}
 
     def random_ends(self, problem: Problem) -> valleys.Ends:
         """The control: where least squares lead from random points of the bounds."""
         points = valleys.scattered(problem, RANDOM, self.seed)
-        return self._kept(problem, points, lambda: valleys.descended(problem, points, self.floor))
+        return self._descents(problem, points, lambda: valleys.descended(problem, points, self.floor))
 
     def _descents(self, problem: Problem, starts: np.ndarray, descend: Callable[[], valleys.Ends]) -> valleys.Ends:
         """Where descents from these starts (n, free) end, read back where the same code made them before."""
@@ -235,7 +235,7 @@ class Study:
         wide = valleys.within(self.problem, TRADED, *WIDE)
         grid = np.linspace(*WIDE, 63)
         low = np.array([values for _, _, values in self.control.grouped()[:2]])
-        return grid, self._kept(wide, low, lambda: valleys.along(wide, low, TRADED, grid, self.floor))
+        return grid, self._descents(wide, low, lambda: valleys.along(wide, low, TRADED, grid, self.floor))
 
     @functools.cached_property
     def rebounded(self) -> dict[tuple[float, float], valleys.Ends]:
