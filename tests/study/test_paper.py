@@ -677,8 +677,8 @@ def test_the_equations_alone_take_no_search(tmp_path, monkeypatch):
 
 
 def test_markdown_escapes_what_would_be_markup():
-    made = Markdown("t").table(["a", "b"], [["x|y", "_z_"]])
-    assert made._parts[-1] == "| a | b |\n| --- | ---: |\n| x\\|y | \\_z\\_ |"
+    report = Report("t").table(["a", "b"], [["x|y", "_z_"]])
+    assert markdown(report).endswith("\n\n| a | b |\n| --- | ---: |\n| x\\|y | \\_z\\_ |\n")
 
 
 # Refusals
