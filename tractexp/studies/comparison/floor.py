@@ -54,9 +54,9 @@ def polish(problem: Problem, runs: Sequence[Run], counting: Callable[[int], Call
     where the objectives of the runs are not those of this problem: the records have changed since.
     """
     space = problem.space
-    ended = [run for run in runs if run.finished and set(space.names) <= set(run.parameters)]
-    ends = np.array([[run.parameters[name] for name in space.names] for run in ended]).reshape(-1, space.dimension)
-    if not problem.per_event and not _same(problem, ends, ended):
+    complete = [run for run in runs if run.finished and set(space.names) <= set(run.parameters)]
+    ends = np.array([[run.parameters[name] for name in space.names] for run in complete]).reshape(-1, space.dimension)
+    if not problem.per_event and not _same(problem, ends, complete):
         return None
     units = np.concatenate([space.to_unit(ends), _spread(problem)])
     best = max(min(run.objective for run in runs if run.finished), TINY)
@@ -75,8 +75,8 @@ def polish(problem: Problem, runs: Sequence[Run], counting: Callable[[int], Call
     bounds = {name: (low, high) for name, (low, high) in zip(space.names, limits, strict=True)}
     return Polished(
         float(least), parameters, bounds,
-        {n: units_of[n.partition("[")[0]] for n in space.names}, len(units) - len(ended),
-        dict(zip(ended, map(float, objectives[: len(ended)]), strict=True)),
+        {n: units_of[n.partition("[")[0]] for n in space.names}, len(units) - len(complete),
+        dict(zip(complete, map(float, objectives[: len(complete)]), strict=True)),
     )  # fmt: skip
 
 
