@@ -14,8 +14,7 @@ import tractexp
 from tractexp.filetypes import comtrade
 from tractexp.identification.problem import Problem
 from tractexp.identification.result import respond
-from tractexp.model.window import mean
-from tractexp.record.deconvolution import sharpened
+from tractexp.record.window import average, sharpened
 
 STORED = json.loads(field_chain.STORED.read_text(encoding="utf-8"))
 PAGE = field_chain.DOCS.read_text(encoding="utf-8")
@@ -98,7 +97,7 @@ def test_the_voltage_reckoned_back_has_the_recorded_average():
     weights = event.record.window.on(event.record.step)
     back = sharpened(event, weights, event.record.window.length).record.U
     inside = slice(len(weights), -len(weights))
-    assert np.abs(mean(back, weights) - event.record.U)[inside].max() < 5e-3
+    assert np.abs(average(back, weights) - event.record.U)[inside].max() < 5e-3
     assert np.abs(back - event.record.U).max() > 0.01
 
 
