@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from command_line import run_command, start_command
 
+from tractexp.blocks import Report
+from tractexp.blocks.markdown import markdown
 from tractexp.errors import UserError
 from tractexp.identification.generalization import by_depth, mean_residual
-from tractexp.report.markdown import Markdown
 from tractexp.studies.api.paper import PARTS
 from tractexp.studies.paper import claims, equations, maps, printed, searches, valleys, why
 from tractexp.studies.paper.study import Shares, Study
@@ -318,7 +319,7 @@ def test_a_figure_of_one_run_makes_one_search(memory, tmp_path, monkeypatch):
     for _ in range(2):
         study = Study(_recipe, {}, _recipe().events, (), 30, workers=1, limits=searches.Limits(150), tell=told.append)
         study.prepare(["figure8"])
-        page.sheets(study, ["figure8"], claims.claims(study, ["figure8"]))
+        page.report(study, ["figure8"], claims.claims(study, ["figure8"]))
     assert made == [(["issa"], 1)] * 2
     again = "  1 of them were made before by the same code on the same records, and are read back"
     searched_, wrote = "searches of issa: seed 0, 300 iterations of 50", "writing Figure 8"
@@ -671,13 +672,13 @@ def test_the_equations_alone_take_no_search(tmp_path, monkeypatch):
     study = Study(_recipe, {}, _recipe().events, (), 30)
     judged = claims.claims(study, ["equations"])
     assert [claim.verdict for claim in judged] == [claims.REFUTED] * 2
-    text = page.sheets(study, ["equations"], judged)[1].write(tmp_path / "paper.md").read_text()
+    text = markdown(page.report(study, ["equations"], judged))
     assert text.count("| does not agree |") == sum(not check.holds for check in equations.checks())
 
 
 def test_markdown_escapes_what_would_be_markup():
-    made = Markdown("t").table(["a", "b"], [["x|y", "_z_"]])
-    assert made._parts[-1] == "| a | b |\n| --- | ---: |\n| x\\|y | \\_z\\_ |"
+    report = Report("t").table(["a", "b"], [["x|y", "_z_"]])
+    assert markdown(report).endswith("\n\n| a | b |\n| --- | ---: |\n| x\\|y | \\_z\\_ |\n")
 
 
 # Refusals

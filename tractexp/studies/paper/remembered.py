@@ -38,32 +38,32 @@ class Remembered:
     def get(self, settings: Mapping[str, Any], seed: int) -> SearchResult | None:
         """The search that was made before; None where there is none, or its file is damaged."""
         path = self._path(settings, seed)
-        if path is None or (kept := shelf.read(path)) is None:
+        if path is None or (content := shelf.read(path)) is None:
             return None
         with contextlib.suppress(*DAMAGED):
-            history = History(**{name: kept[name] for name in ARRAYS})
-            return SearchResult(**json.loads(str(kept["told"])), values=kept["found"], history=history)
+            history = History(**{name: content[name] for name in ARRAYS})
+            return SearchResult(**json.loads(str(content["told"])), values=content["found"], history=history)
         return None
 
-    def put(self, settings: Mapping[str, Any], seed: int, found: SearchResult) -> None:
+    def put(self, settings: Mapping[str, Any], seed: int, search: SearchResult) -> None:
         """Keep a search; where that is impossible, it is made again next time."""
         path = self._path(settings, seed)
         if path is None:
             return
-        told = {k: v for k, v in vars(found).items() if k not in ("values", "history")}
-        arrays = {name: getattr(found.history, name) for name in ARRAYS}
-        shelf.keep(path, told=np.array(json.dumps(files.plain(told))), found=found.values, **arrays)
+        fields = {k: v for k, v in vars(search).items() if k not in ("values", "history")}
+        arrays = {name: getattr(search.history, name) for name in ARRAYS}
+        shelf.keep(path, told=np.array(json.dumps(files.plain(fields))), found=search.values, **arrays)
 
-    def arrays(self, told: str, make: Callable[[], tuple[np.ndarray, ...]]) -> tuple[np.ndarray, ...]:
-        """What else was computed for this problem from what is `told`, made only where it was not before."""
-        return shelf.arrays(SHELF, f"{self.problem} {told}", make) if self.on else make()
+    def arrays(self, text: str, make: Callable[[], tuple[np.ndarray, ...]]) -> tuple[np.ndarray, ...]:
+        """What else was computed for this problem from what `text` names, once for each."""
+        return shelf.arrays(SHELF, f"{self.problem} {text}", make) if self.on else make()
 
     def _path(self, settings: Mapping[str, Any], seed: int) -> Path | None:
         optimizer = build("optimizer", dict(settings))
         return self._file(f"{optimizer!r} {seed}") if self.on and installed(optimizer) else None
 
-    def _file(self, told: str) -> Path:
-        return shelf.place(SHELF, f"{self.problem} {told}")
+    def _file(self, text: str) -> Path:
+        return shelf.place(SHELF, f"{self.problem} {text}")
 
 
 def _parts(problem: Problem) -> tuple[Any, ...]:
@@ -72,5 +72,5 @@ def _parts(problem: Problem) -> tuple[Any, ...]:
 
 def _digest(problem: Problem, limits: Limits) -> str:
     """SHA-256 of all that a search of this problem depends on, but for the optimizer and the seed."""
-    told = shelf.behind(), _parts(problem), problem.loss, limits, problem.digest()
-    return hashlib.sha256(repr(told).encode()).hexdigest()
+    parts = shelf.behind(), _parts(problem), problem.loss, limits, problem.digest()
+    return hashlib.sha256(repr(parts).encode()).hexdigest()

@@ -35,26 +35,26 @@ def run(
     from joblib import Parallel, cpu_count, delayed
 
     problem, limits = recipe(), limits or Limits()
-    known = Remembered(problem, limits, remember)
-    found = {label: [known.get(settings, seed) for seed in range(seeds)] for label, settings in variants.items()}
-    missing = {label: [seed for seed in range(seeds) if several[seed] is None] for label, several in found.items()}
+    stored = Remembered(problem, limits, remember)
+    results = {label: [stored.get(settings, seed) for seed in range(seeds)] for label, settings in variants.items()}
+    missing = {label: [seed for seed in range(seeds) if several[seed] is None] for label, several in results.items()}
     done, total = 0, sum(map(len, missing.values()))
     if known_before := seeds * len(variants) - total:
         note(f"  {known_before} of them were made before by the same code on the same records, and are read back")
-    chunks = [(label, left[k : k + CHUNK]) for label, left in missing.items() for k in range(0, len(left), CHUNK)]
+    chunks = [(label, part[k : k + CHUNK]) for label, part in missing.items() for k in range(0, len(part), CHUNK)]
     if not chunks:
-        return found  # type: ignore[return-value]
+        return results  # type: ignore[return-value]
     problem.objective(problem.space.from_unit(np.full((1, problem.space.dimension), 0.5)))  # compiled once, for all
     parallel: Any = Parallel(n_jobs=min(workers or cpu_count(), len(chunks)), return_as="generator")
     jobs = (delayed(_chunk)(recipe, dict(variants[label]), part, limits) for label, part in chunks)
     with replaced():
         for (label, part), outcome in zip(chunks, parallel(jobs), strict=True):
             for seed, one in zip(part, outcome, strict=True):
-                found[label][seed] = one
-                known.put(variants[label], seed, one)
+                results[label][seed] = one
+                stored.put(variants[label], seed, one)
             done += len(part)
             tell(done, total)
-    return found  # type: ignore[return-value]
+    return results  # type: ignore[return-value]
 
 
 def _chunk(recipe: Recipe, settings: dict[str, Any], seeds: Sequence[int], limits: Limits) -> list[SearchResult]:
