@@ -420,7 +420,7 @@ def sweeps(work: Path, chance: random.Random) -> Iterator[Fault]:
         time.sleep(chance.uniform(0.1, 0.25) * took)
         if process.poll() is not None:
             break
-        workers = [pid for pid in everyone(process.pid)[:-1] if "spawn_main" in line_of(pid)]
+        workers = [pid for pid in everyone(process.pid)[:-1] if "LokyProcess" in line_of(pid)]
         if workers:
             kill([chance.choice(workers)])
             killed_at.append(len(swept(folder)))

@@ -1,11 +1,10 @@
 """The rows of a survey: made of one file, in worker processes, and kept in a journal as they come."""
 
 import contextlib
+import functools
 import json
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
-from concurrent.futures.process import BrokenProcessPool
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from tractexp.api.look import command, event_row, series
 from tractexp.errors import UserError
 from tractexp.recording import archive
 from tractexp.recording.overview import Seen, Sight, View
-from tractexp.workers import processes
+from tractexp.workers import Workers
 
 Rows = list[dict[str, Any]]
 
@@ -26,7 +25,8 @@ COLUMNS = (
     "event", "file", "station", "load", "kind", "when", "start", "duration", "depth", "U2", "jump", "P_before",
     "Q_before", "P_after", "Q_after", "unit", "noise", "rate", "worth", "why", "command", "U_picture", "P_picture",
 )  # fmt: skip
-AHEAD = 4  # files given to each worker at a time
+KILLED = "the program was killed at this file, as where the computer's memory is too small for it"
+FEW = 2  # files that this process looks at sooner than others have started
 POINTS = 48  # of a small picture
 AROUND = (0.1, 0.3)  # s before and after an event in its picture
 LONGEST = 5.0  # s of an event there
@@ -99,51 +99,12 @@ def _few(values: np.ndarray) -> list[float | None]:
 def looked(folder: Path, names: Sequence[str], cores: int) -> Iterator[tuple[str, Rows]]:
     """(file, its rows) of files within a folder, as they are done, on so many processes.
 
-    A file at which a process dies is looked at again by itself; if that one dies too, its row says so.
+    A file at which a process is killed is looked at again by itself; if that one is killed too, its row says so.
     """
-    if cores == 1 or len(names) < 3:
-        yield from ((name, rows_of(str(folder), name)) for name in names)
-        return
-    left = list(names)
-    while left:
-        suspects: list[str] = []
-        with processes(min(cores, len(left))) as pool:
-            waiting: dict[Future[Rows], str] = {}
-            todo = iter(list(left))
-            try:
-                for name in todo:
-                    waiting[pool.submit(rows_of, str(folder), name)] = name
-                    if len(waiting) >= AHEAD * cores:
-                        for done, rows in _done(waiting):
-                            left.remove(done)
-                            yield done, rows
-                while waiting:
-                    for done, rows in _done(waiting):
-                        left.remove(done)
-                        yield done, rows
-            except BrokenProcessPool:
-                suspects = [name for name in left if name in {*waiting.values()}] or left[:1]
-        for name in suspects:
-            left.remove(name)
-            yield name, _alone(folder, name)
-
-
-def _done(waiting: dict[Future[Rows], str]) -> list[tuple[str, Rows]]:
-    """What is done of what is waited for, which forgets it. Raises `BrokenProcessPool` and forgets nothing of it."""
-    ended, _ = wait(waiting, return_when=FIRST_COMPLETED)
-    made = [(future, future.result()) for future in ended if future.exception() is None]
-    if not made:
-        raise BrokenProcessPool
-    return [(waiting.pop(future), rows) for future, rows in made]
-
-
-def _alone(folder: Path, name: str) -> Rows:
-    try:
-        with processes(1) as pool:
-            return pool.submit(rows_of, str(folder), name).result()
-    except BrokenProcessPool:
-        why = "the program was killed at this file, as where the computer's memory is too small for it"
-        return [dict.fromkeys(COLUMNS) | {"file": name, "kind": UNREAD, "worth": False, "why": why}]
+    workers = Workers(cores if len(names) > FEW else 1)
+    with contextlib.closing(workers.results(functools.partial(rows_of, str(folder)), names)) as results:
+        for name, rows in results:
+            yield name, rows or [dict.fromkeys(COLUMNS) | {"file": name, "kind": UNREAD, "worth": False, "why": KILLED}]
 
 
 def states(paths: Sequence[Path]) -> dict[Path, list[Any]]:

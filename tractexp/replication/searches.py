@@ -10,7 +10,7 @@ from tractexp.identification.search import Found, Limits, search
 from tractexp.plugin import build
 from tractexp.record import Event
 from tractexp.replication.remembered import Remembered
-from tractexp.workers import replaced
+from tractexp.workers import Workers
 
 CHUNK = 5  # searches that share the composition of a model
 Recipe = Callable[[], Problem]  # what a worker builds its problem from: a `Problem` holds compiled code
@@ -33,8 +33,6 @@ def run(
     the same code on the same problem is read back where it is to `remember`, and `note` is told; its seconds are those
     of then.
     """
-    from joblib import Parallel, cpu_count, delayed
-
     problem, limits = recipe(), limits or Limits()
     known = Remembered(problem, limits, remember)
     found = {label: [known.get(settings, seed) for seed in range(seeds)] for label, settings in variants.items()}
@@ -46,19 +44,19 @@ def run(
     if not chunks:
         return found  # type: ignore[return-value]
     problem.objective(problem.space.from_unit(np.full((1, problem.space.dimension), 0.5)))  # compiled once, for all
-    parallel: Any = Parallel(n_jobs=min(workers or cpu_count(), len(chunks)), return_as="generator")
-    jobs = (delayed(_chunk)(recipe, dict(variants[label]), part, limits) for label, part in chunks)
-    with replaced():
-        for (label, part), outcome in zip(chunks, parallel(jobs), strict=True):
-            for seed, one in zip(part, outcome, strict=True):
-                found[label][seed] = one
-                known.put(variants[label], seed, one)
-            done += len(part)
-            tell(done, total)
+    jobs = [(recipe, dict(variants[label]), part, limits) for label, part in chunks]
+    for k, outcome in Workers(workers or -1).completed(_chunk, jobs, len(jobs)):
+        label, part = chunks[k]
+        for seed, one in zip(part, outcome, strict=True):
+            found[label][seed] = one
+            known.put(variants[label], seed, one)
+        done += len(part)
+        tell(done, total)
     return found  # type: ignore[return-value]
 
 
-def _chunk(recipe: Recipe, settings: dict[str, Any], seeds: Sequence[int], limits: Limits) -> list[Found]:
+def _chunk(job: tuple[Recipe, dict[str, Any], Sequence[int], Limits]) -> list[Found]:
+    recipe, settings, seeds, limits = job
     problem, optimizer = recipe(), build("optimizer", settings)
     return [search(problem, optimizer, seed, limits) for seed in seeds]
 

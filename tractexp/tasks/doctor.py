@@ -75,11 +75,10 @@ def cores() -> Iterator[Finding]:
     """How many cores a sweep may use, and whether a worker starts."""
     from joblib import cpu_count
 
-    from tractexp.workers import processes
+    from tractexp.workers import Workers
 
     try:
-        with processes(1) as executor:
-            executor.submit(os.getpid).result(timeout=60)
+        list(Workers(1, apart=True).completed(abs, [1], 1))
     except Exception as error:
         yield WRONG, f"no worker process starts ({type(error).__name__}: {error}): sweeps and surveys cannot run"
         return
