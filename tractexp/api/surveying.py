@@ -1,10 +1,9 @@
-"""The rows of a survey: made of one file, in worker processes, and kept in a journal as they come."""
+"""The rows of a survey: made of one file, in worker processes, and stored as they come."""
 
 import contextlib
 import functools
-import json
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from tractexp.api.look import command, event_row, series
 from tractexp.errors import UserError
 from tractexp.recording import archive
 from tractexp.recording.overview import Seen, Sight, View
+from tractexp.store import key
 from tractexp.workers import Workers
 
 Rows = list[dict[str, Any]]
@@ -107,43 +107,18 @@ def looked(folder: Path, names: Sequence[str], cores: int) -> Iterator[tuple[str
             yield name, rows or [dict.fromkeys(COLUMNS) | {"file": name, "kind": UNREAD, "worth": False, "why": KILLED}]
 
 
-def states(paths: Sequence[Path]) -> dict[Path, list[Any]]:
-    """What changes with each file: name, size and time of the files of its name, and the version of this program."""
+def keys(folder: Path, paths: Sequence[Path]) -> dict[str, str]:
+    """{file within the folder: key of its rows}: name, size and time of the files of its name, and this program."""
     from tractexp import __version__
 
     beside: dict[Path, list[Path]] = defaultdict(list)  # by folder and stem: each folder is listed once
-    for folder in {path.parent for path in paths}:
-        for path in sorted(folder.iterdir()):
-            beside[folder / path.stem].append(path)
-    found: dict[Path, list[Any]] = {}
-    for path in paths:
-        there = [(p, p.stat()) for p in beside[path.parent / path.stem] if p.is_file()]
-        found[path] = [__version__, *([p.name, told.st_size, told.st_mtime_ns] for p, told in there)]
-    return found
+    for place in {path.parent for path in paths}:
+        for path in sorted(place.iterdir()):
+            beside[place / path.stem].append(path)
+    names = {path: path.relative_to(folder).as_posix() for path in paths}
+    return {names[path]: key(__version__, names[path], _states(beside[path.parent / path.stem])) for path in paths}
 
 
-def kept(journal: Path | None) -> dict[str, tuple[list[Any], Rows]]:
-    """{file: (its state then, its rows)} of a journal; lines that were cut short are left out."""
-    found: dict[str, tuple[list[Any], Rows]] = {}
-    if journal is None or not journal.is_file():
-        return found
-    for line in journal.read_text(encoding="utf-8", errors="replace").splitlines():
-        with contextlib.suppress(ValueError, KeyError, TypeError):
-            told: Mapping[str, Any] = json.loads(line)
-            found[told["file"]] = (told["state"], told["rows"])
-    return found
-
-
-@contextlib.contextmanager
-def writing(journal: Path | None) -> Iterator[Callable[[str, list[Any], Rows], None]]:
-    """Yield what keeps the rows of a file: a line each, so that what is killed loses what it was at, and no more."""
-    if journal is None:
-        yield lambda name, state, rows: None
-        return
-    with files.Growing(journal) as growing:
-
-        def write(name: str, state: list[Any], rows: Rows) -> None:
-            told = files.plain({"file": name, "state": state, "rows": rows})
-            growing.add(json.dumps(told, ensure_ascii=False))
-
-        yield write
+def _states(paths: Sequence[Path]) -> list[Any]:
+    there = [(path, path.stat()) for path in paths if path.is_file()]
+    return [[path.name, state.st_size, state.st_mtime_ns] for path, state in there]

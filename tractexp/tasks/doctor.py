@@ -98,9 +98,8 @@ def disk(folder: Path) -> Iterator[Finding]:
 
 
 def caches() -> Iterator[Finding]:
-    """Whether kernels and searches can be kept, and what is kept can be read."""
-    from tractexp.cache import cache_folder
-    from tractexp.identification.shelf import damaged
+    """Whether the store can be written and its entries be read."""
+    from tractexp.store import CODE, cache_folder, damaged
 
     try:
         folder = cache_folder()
@@ -113,7 +112,10 @@ def caches() -> Iterator[Finding]:
         path.unlink(missing_ok=True)
     if gone:
         yield HEALED, f"{len(gone)} damaged or unfinished files of the cache {folder} are removed"
-    yield SOUND, f"the cache {folder} holds {len(list(folder.glob('code_*.kept')))} kernels"
+    yield (
+        SOUND,
+        f"the cache {folder} holds {len(list((folder / CODE.kind).glob('*')))} kernels",
+    )
 
 
 def leavings(folder: Path) -> Iterator[Finding]:
