@@ -22,7 +22,7 @@ def text_of(parts: Iterable[object], generate: Callable[[], str], what: str) -> 
 
     What a text depends on is the settings of its parts (their `repr`), every file beside their plugins, the code that
     makes texts, and SymPy's version. Of a part that stands in no file, such as one typed into a notebook, or whose
-    `repr` tells an address instead of its settings, nothing is stored: another object may stand at that address later.
+    `repr` shows an address instead of its settings, nothing is stored: another object may stand at that address later.
     """
     return _stored(_key_of(parts, what), generate)
 

@@ -115,7 +115,7 @@ class Workers:
 
         with contextlib.ExitStack() as stack:
             if self.backend == "dask":
-                from tractexp.doors.joblib_dask import Dask
+                from tractexp.compat.joblib_dask import Dask
 
                 chosen = {"backend": Dask(client=stack.enter_context(dask_client(self.n_jobs, self.address)))}
             elif self.backend == "loky":

@@ -131,7 +131,7 @@ def test_a_full_disk_is_nothing_for_what_is_printed(tmp_path):
     if not full.exists():
         pytest.skip("there is no /dev/full here")
     (tmp_path / "said").symlink_to(full)
-    with files.Said(tmp_path / "said") as said:
+    with files.Transcript(tmp_path / "said") as said:
         assert said.write("words\n") == 6
         said.flush()
 

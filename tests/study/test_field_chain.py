@@ -15,7 +15,7 @@ from tractexp.filetypes import comtrade
 from tractexp.identification.problem import Problem
 from tractexp.identification.result import respond
 from tractexp.model.window import mean
-from tractexp.record.through import sharpened
+from tractexp.record.deconvolution import sharpened
 
 STORED = json.loads(field_chain.STORED.read_text(encoding="utf-8"))
 PAGE = field_chain.DOCS.read_text(encoding="utf-8")

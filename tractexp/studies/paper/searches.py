@@ -8,7 +8,7 @@ import numpy as np
 from tractexp.identification.problem import Problem
 from tractexp.identification.search import Found, Limits, search
 from tractexp.plugin import build
-from tractexp.studies.paper.remembered import Remembered
+from tractexp.studies.paper.search_store import SearchStore
 from tractexp.workers import Workers
 
 CHUNK = 5  # searches that share the composition of a model
@@ -33,8 +33,8 @@ def run(
     of then.
     """
     problem, limits = recipe(), limits or Limits()
-    known = Remembered(problem, limits, remember)
-    found = {label: [known.get(settings, seed) for seed in range(seeds)] for label, settings in variants.items()}
+    stored = SearchStore(problem, limits, remember)
+    found = {label: [stored.get(settings, seed) for seed in range(seeds)] for label, settings in variants.items()}
     missing = {label: [seed for seed in range(seeds) if several[seed] is None] for label, several in found.items()}
     done, total = 0, sum(map(len, missing.values()))
     if known_before := seeds * len(variants) - total:
@@ -48,7 +48,7 @@ def run(
         label, part = chunks[k]
         for seed, one in zip(part, outcome, strict=True):
             found[label][seed] = one
-            known.put(variants[label], seed, one)
+            stored.put(variants[label], seed, one)
         done += len(part)
         tell(done, total)
     return found  # type: ignore[return-value]

@@ -17,7 +17,7 @@ from tractexp.record import Event
 from tractexp.studies.comparison.statistics import expected_running_time, vargha_delaney, wilcoxon
 from tractexp.studies.paper import equations, maps, orders, printed, searches, valleys
 from tractexp.studies.paper.printed import COMPARED, EQUAL, ITERATIONS, LITERAL, READINGS, TEN
-from tractexp.studies.paper.remembered import Remembered
+from tractexp.studies.paper.search_store import SearchStore
 
 ALPHAS = (0.1, 0.3, 0.5, 0.7, 0.9)  # of the tent map
 TARGETS = (10.0, 2.0)  # of running times, times the floor
@@ -185,24 +185,24 @@ class Study:
         self.tell("Figure 9: descending from where the searches ended, and from random points")
         names = (*LEVEL, "random_search")
         starts = np.array([found.values for name in names for found in self.searched(name)])
-        made = self._kept(self.problem, starts, lambda: valleys.descended(self.problem, starts, self.floor))
+        made = self._stored(self.problem, starts, lambda: valleys.descended(self.problem, starts, self.floor))
         parts = {name: slice(k * self.seeds, (k + 1) * self.seeds) for k, name in enumerate(names)}
         return {name: valleys.Ends(made.objective[part], made.values[part]) for name, part in parts.items()}
 
     def random_ends(self, problem: Problem) -> valleys.Ends:
         """The control: where least squares lead from random points of the bounds."""
         points = valleys.scattered(problem, RANDOM, self.seed)
-        return self._kept(problem, points, lambda: valleys.descended(problem, points, self.floor))
+        return self._stored(problem, points, lambda: valleys.descended(problem, points, self.floor))
 
-    def _kept(self, problem: Problem, starts: np.ndarray, descend: Callable[[], valleys.Ends]) -> valleys.Ends:
+    def _stored(self, problem: Problem, starts: np.ndarray, descend: Callable[[], valleys.Ends]) -> valleys.Ends:
         """Where descents from these starts (n, free) end, read back where the same code made them before."""
-        told = f"descents {self.floor!r} {hashlib.sha256(starts.tobytes()).hexdigest()}"
+        what = f"descents {self.floor!r} {hashlib.sha256(starts.tobytes()).hexdigest()}"
 
-        def made() -> tuple[np.ndarray, ...]:
+        def computed() -> tuple[np.ndarray, ...]:
             ends = descend()
             return ends.objective, ends.values
 
-        return valleys.Ends(*Remembered(problem, Limits()).arrays(told, made))
+        return valleys.Ends(*SearchStore(problem, Limits()).arrays(what, computed))
 
     @functools.cached_property
     def control(self) -> valleys.Ends:
@@ -235,7 +235,7 @@ class Study:
         wide = valleys.within(self.problem, TRADED, *WIDE)
         grid = np.linspace(*WIDE, 63)
         low = np.array([values for _, _, values in self.control.grouped()[:2]])
-        return grid, self._kept(wide, low, lambda: valleys.along(wide, low, TRADED, grid, self.floor))
+        return grid, self._stored(wide, low, lambda: valleys.along(wide, low, TRADED, grid, self.floor))
 
     @functools.cached_property
     def rebounded(self) -> dict[tuple[float, float], valleys.Ends]:

@@ -1,6 +1,6 @@
 """Searches in the store: read back where the same code searched the same problem before, and never otherwise.
 
-The paper's tables and figures show the same searches over and over, and each is made by a command of its own.
+The paper's tables and figures show the same searches over and over, and each has a command of its own.
 """
 
 import contextlib
@@ -19,11 +19,11 @@ from tractexp.store import DAMAGED, SEARCHES
 ARRAYS = ("simulations", "objective", "values", "seconds")  # of a history
 
 
-class Remembered:
+class SearchStore:
     """The searches of one problem under some limits, by optimizer and seed.
 
-    The key of a search is the code, the libraries and the processor, the records, the model with its
-    bounds, the loss, the optimizer's settings, the seed and the limits. A search with a limit in seconds depends on
+    The key of a search is the code, the libraries and the processor, the records, the model with its bounds, the loss,
+    the optimizer's settings, the seed and the limits. A search with a limit in seconds depends on
     more, and a plugin that stands in no installed file may change unseen: these are not stored.
     """
 
@@ -47,9 +47,9 @@ class Remembered:
         key = self._key(settings, seed)
         SEARCHES.write_arrays(key, ending=np.array(json.dumps(files.plain(ending))), found=found.values, **arrays)
 
-    def arrays(self, told: str, make: Callable[[], tuple[np.ndarray, ...]]) -> tuple[np.ndarray, ...]:
-        """What else is computed for this problem from what is `told`, or its entry."""
-        return SEARCHES.arrays(self.problem and store.key(self.problem, told), make)
+    def arrays(self, what: str, compute: Callable[[], tuple[np.ndarray, ...]]) -> tuple[np.ndarray, ...]:
+        """Arrays of something else that is computed for this problem, as `what` says, or of its entry."""
+        return SEARCHES.arrays(self.problem and store.key(self.problem, what), compute)
 
     def _key(self, settings: Mapping[str, Any], seed: int) -> str:
         optimizer = build("optimizer", dict(settings))
