@@ -305,7 +305,7 @@ def test_a_kernel_is_shared_by_processes_that_start_together(tmp_path):
     environment = os.environ | {"TRACTEXP_CACHE_DIR": str(tmp_path)}
     started = [subprocess.Popen([sys.executable, "-c", program], env=environment) for _ in range(3)]
     assert [p.wait() for p in started] == [0, 0, 0]
-    assert len(list(tmp_path.glob("code_*.kept"))) == 1
+    assert len(list(tmp_path.glob("code/*.entry"))) == 1
     assert len(list(tmp_path.iterdir())) == 2  # its text, too
     assert not list(tmp_path.glob("*.part"))
 

@@ -3,10 +3,9 @@
 import os
 import time
 from collections.abc import Callable, Iterable
-from typing import Any
 
-from tractexp import workers
 from tractexp.model.model import Model
+from tractexp.workers import Workers
 
 FEW = 8  # models that one process derives and compiles sooner than several have started
 PATIENCE = 2.0  # s: below it nothing is said about compiling
@@ -25,16 +24,8 @@ def compile_missing(models: Iterable[Model], tell: Callable[[], None] = lambda: 
             said = True
 
 
-def _compiling(missing: list[Model]) -> Iterable[None]:
+def _compiling(missing: list[Model]) -> Iterable[object]:
     if len(missing) <= FEW or (os.cpu_count() or 1) < 2:
         yield from (model.compile() for model in missing)
         return
-    from joblib import Parallel, delayed
-
-    with workers.replaced():
-        several: Any = Parallel(n_jobs=os.cpu_count() or 1, return_as="generator_unordered")
-        yield from several(delayed(_compile)(model.bare()) for model in missing)
-
-
-def _compile(model: Model) -> None:
-    model.compile()
+    yield from Workers(os.cpu_count() or 1).completed(Model.compile, (model.bare() for model in missing), len(missing))
