@@ -93,7 +93,7 @@ class Equations(Circuit):
         drawn = (sites.current, sites.zero_current) if self.waves else (sites.P, sites.Q)
         self._drawn: dict[Site, sympy.Expr] = dict.fromkeys(drawn, sympy.Integer(0))
         self._fluxes: dict[sympy.Expr, Symbol] = {}  # of branches at the bus, by resistance over reactance
-        self._halves: dict[Symbol, tuple[sympy.Expr, sympy.Expr]] = {}  # of named quantities, as they stand now
+        self._halves: dict[sympy.Expr, tuple[sympy.Expr, sympy.Expr]] = {}  # of expressions, as names stand now
         self._lost = NOTHING, NOTHING  # power [pu] between the recorded bus and that which all parts see
         self._owners: dict[str, str] = {}  # who declared the parameter, state or quantity of a name
         self._writer = "bus"
@@ -212,14 +212,33 @@ class Equations(Circuit):
 
     def _check_kind(self, site: Site, expression: sympy.Expr) -> None:
         """Raise `UserError` where a real site would get what is not made of real symbols and real parts."""
+        if site.kind != "real" or self._plainly_real(expression):
+            return
         whole = self.expand(expression, lambda s: s.name not in sites.SITES)
         real = {s for s in symbols_of(whole) if s.name in sites.SITES and sites.SITES[s.name].kind == "real"}
         left: Any = whole.xreplace(dict.fromkeys({*whole.atoms(re, im, sympy.Abs), *real}, _real("part")))
-        if site.kind == "real" and not _is_real(left):
+        if not _is_real(left):
             raise UserError(
                 f"the site {site.name} is real, and what the {self._writer} puts there is not: {expression}; take its"
                 " real part by sympy.re"
             )
+
+    def _plainly_real(self, expression: sympy.Expr) -> bool:
+        """Whether all of it is real but what real parts and sizes are taken of: seen without writing it out."""
+        waiting: list[Any] = [expression]
+        seen = set()
+        while waiting:
+            part = waiting.pop()
+            if part in seen or isinstance(part, re | im | sympy.Abs):
+                continue
+            seen.add(part)
+            site = sites.SITES.get(part.name) if isinstance(part, Symbol) else None
+            if site is None and part in self.definitions:
+                waiting.append(self.definitions[part])
+            elif part is I or (isinstance(part, Symbol) and not part.is_real and not (site and site.kind == "real")):
+                return False
+            waiting += part.args
+        return True
 
     def compute(self, name: str, expression: sympy.Expr, before: sympy.Expr | None = None) -> Symbol:
         """A real quantity that is computed once and then referred to, such as a step of an unrolled iteration.
@@ -438,8 +457,15 @@ class Equations(Circuit):
         """Real and imaginary part in real symbols, names expanded.
 
         A name that stands for something real is lowered by itself and put in last: products are not expanded
-        across it, so that it stays one common subexpression.
+        across it, so that it stays one common subexpression. What was split once is not split again: a derivative is
+        asked for as what moves, and as what vanishes before the event.
         """
+        if expression not in self._halves:
+            self._halves[expression] = self._split(sympy.sympify(expression))
+        return self._halves[expression]
+
+    def _split(self, expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
+        """Real and imaginary part, reckoned anew."""
         split: dict[Symbol, sympy.Expr] = {}
         for state in self.states:
             if not state.is_real:
@@ -447,12 +473,12 @@ class Equations(Circuit):
                 a0, b0 = phasor_parts(start_symbol(state))
                 split |= {state: a + I * b, start_symbol(state): a0 + I * b0}
         if self.waves:  # of space vectors products are not expanded across a name either
-            return self._parts_by_name(sympy.sympify(expression), split)
+            return self._parts_by_name(expression, split)
         lowered = replaced(self.expand(expression, lambda s: not s.is_real), split)
         if _is_real(lowered):
             both = (lowered if lowered.is_real else _shorter(lowered), sympy.Integer(0))
         else:
-            both = map(_shorter, lowered.as_real_imag())
+            both = map(_shorter, real_and_imaginary(lowered))
         real, imaginary = (replaced(e, {s: self.real(s) for s in self._names(e)}) for e in both)
         return real, imaginary
 
@@ -465,9 +491,7 @@ class Equations(Circuit):
         known = {}
         for s, pair in halves.items():
             known |= zip(pair, self._parts_of(s), strict=True)
-        real, imaginary = (
-            replaced(_shorter(e), known | {s: self.real(s) for s in self._names(e)}, plain=True) for e in both
-        )
+        real, imaginary = (replaced(_shorter(e), known | {s: self.real(s) for s in self._names(e)}) for e in both)
         return real, imaginary
 
     def _names(self, expression: sympy.Expr) -> set[Symbol]:
@@ -480,10 +504,8 @@ class Equations(Circuit):
         return self.parts(expression)[0]
 
     def _parts_of(self, name: Symbol) -> tuple[sympy.Expr, sympy.Expr]:
-        """Real and imaginary part of a named quantity, reckoned once."""
-        if name not in self._halves:
-            self._halves[name] = self.parts(self.definitions[name])
-        return self._halves[name]
+        """Real and imaginary part of a named quantity."""
+        return self.parts(self.definitions[name])
 
     def latex(self) -> list[str]:
         """The equations one a line: states, memories, named quantities, power, steady state."""
@@ -498,6 +520,10 @@ def _shorter(expression: sympy.Expr) -> sympy.Expr:
     Long ones stay as they are: they gain nothing, and expanding them takes seconds.
     """
     if sum(1 for _ in itertools.islice(sympy.preorder_traversal(expression), LONG + 1)) > LONG:
+        return expression
+    if not any(
+        isinstance(part, sympy.Mul | sympy.Pow) and any(a.is_Add for a in part.args) for part in nodes(expression)
+    ):
         return expression
     extremes = [part for part in nodes(expression) if isinstance(part, sympy.Max | sympy.Min)]
     hidden: dict[Any, Any] = {part: _real(f"_extreme{k}") for k, part in enumerate(extremes)}

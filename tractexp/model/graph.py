@@ -7,23 +7,23 @@ import sympy
 from sympy import Basic, Symbol
 
 
-def replaced(expression: sympy.Expr, known: Mapping[Symbol, sympy.Expr], plain: bool = False) -> sympy.Expr:
-    """The expression with symbols replaced, as `xreplace` does it; `plain`: maxima and minima are not looked into."""
+def replaced(expression: sympy.Expr, known: Mapping[Symbol, sympy.Expr]) -> sympy.Expr:
+    """The expression with symbols replaced, as `xreplace` does it; maxima and minima are not looked into."""
     made: dict[Basic, Basic] = {**known}
 
     def visit(part: Basic) -> Basic:
         if part not in made:
             args = [visit(a) for a in part.args]
             same = all(a is b for a, b in zip(args, part.args, strict=True))
-            made[part] = part if same else _rebuilt(part, args, plain)
+            made[part] = part if same else _rebuilt(part, args)
         return made[part]
 
     return visit(expression)  # pyright: ignore[reportReturnType] # an expression's parts give one again
 
 
-def _rebuilt(part: Basic, args: Sequence[Basic], plain: bool) -> Any:
+def _rebuilt(part: Basic, args: Sequence[Basic]) -> Any:
     """The same function of other arguments. SymPy compares those of a maximum with each other, which takes seconds."""
-    if plain and isinstance(part, sympy.Max | sympy.Min) and not all(a.is_number for a in args):
+    if isinstance(part, sympy.Max | sympy.Min) and not all(a.is_number for a in args):
         return part.func(*args, evaluate=False)
     return part.func(*args)
 
@@ -31,7 +31,8 @@ def _rebuilt(part: Basic, args: Sequence[Basic], plain: bool) -> Any:
 def halves(expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
     """Real and imaginary part of an expression in real symbols, products left as products.
 
-    SymPy multiplies out what it splits, which of a product of many sums takes minutes.
+    SymPy multiplies out what it splits, which of a product of many sums takes minutes, and leaves parts of a quotient
+    as they are where it does not see through it.
     """
     made: dict[Basic, tuple[sympy.Expr, sympy.Expr]] = {}
 
@@ -64,7 +65,7 @@ def _halves(part: Basic, args: list[tuple[sympy.Expr, sympy.Expr]]) -> tuple[sym
     if isinstance(part, sympy.Abs) and args[0][1] != 0:
         return sympy.sqrt(args[0][0] ** 2 + args[0][1] ** 2), zero
     if part.args and all(b == 0 for _, b in args):
-        return _rebuilt(part, [a for a, _ in args], plain=True), zero
+        return _rebuilt(part, [a for a, _ in args]), zero
     if isinstance(part, sympy.Pow) and part.exp == -1:
         (a, b), _ = args
         return a / (a**2 + b**2), -b / (a**2 + b**2)
