@@ -19,8 +19,8 @@ from tractexp.model import sites
 from tractexp.model.apart import Apart
 from tractexp.model.circuit import NOTHING, Circuit
 from tractexp.model.drive import OUTPUTS, PHASORS, WAVES
+from tractexp.model.graph import as_real_imag, replaced
 from tractexp.model.graph import halves as real_and_imaginary
-from tractexp.model.graph import replaced
 from tractexp.model.names import check_name
 from tractexp.model.sites import Site
 from tractexp.model.states import UNSAID, Memory, Requirement, State
@@ -198,8 +198,8 @@ class Equations(Circuit):
             taken = "is taken already" if site in self else f"belongs to the {site.owner}"
             raise UserError(f"the site {site.name} {taken}, so the {self._writer} cannot place it; edit it instead")
         self._check_kind(site, expression)
-        made = _real if site.kind == "real" and _is_real(expression) else _complex  # what is real keeps its name
-        return self._define(made(site.name), expression, latex or site.latex)
+        symbol_of = _real if site.kind == "real" and _is_real(expression) else _complex  # what is real keeps its name
+        return self._define(symbol_of(site.name), expression, latex or site.latex)
 
     def _define(self, symbol: Symbol, expression: sympy.Expr, latex: str) -> Symbol:
         if symbol.name in self:
@@ -226,12 +226,12 @@ class Equations(Circuit):
     def _plainly_real(self, expression: sympy.Expr) -> bool:
         """Whether all of it is real but what real parts and sizes are taken of: seen without writing it out."""
         waiting: list[Any] = [expression]
-        seen = set()
+        visited = set()
         while waiting:
             part = waiting.pop()
-            if part in seen or isinstance(part, re | im | sympy.Abs):
+            if part in visited or isinstance(part, re | im | sympy.Abs):
                 continue
-            seen.add(part)
+            visited.add(part)
             site = sites.SITES.get(part.name) if isinstance(part, Symbol) else None
             if site is None and part in self.definitions:
                 waiting.append(self.definitions[part])
@@ -336,9 +336,9 @@ class Equations(Circuit):
             raise UserError(
                 f"eq.moves() was given '{state}', which is no state; make one by eq.flux, eq.speed or eq.lag"
             )
-        moved = self.states[state]
-        moved.derivative, moved.initial = sympy.sympify(derivative), sympy.sympify(initial)
-        moved.balance = None if balance is None else sympy.sympify(balance)
+        row = self.states[state]
+        row.derivative, row.initial = sympy.sympify(derivative), sympy.sympify(initial)
+        row.balance = None if balance is None else sympy.sympify(balance)
 
     def memory(self, name: str, latex: str) -> Symbol:
         """A real state that changes once a sample, such as a relay's."""
@@ -392,25 +392,25 @@ class Equations(Circuit):
 
     def _derive_starts(self) -> None:
         """Take the values before the event of states that are written in others' by these."""
-        known: dict[Symbol, sympy.Expr] = {}
+        values: dict[Symbol, sympy.Expr] = {}
         for symbol, state in self.states.items():
             if not state.derived:
-                known[start_symbol(symbol)] = state.initial
+                values[start_symbol(symbol)] = state.initial
                 if not symbol.is_real:
-                    known |= zip(
+                    values |= zip(
                         phasor_parts(start_symbol(symbol)), (re(state.initial), im(state.initial)), strict=True
                     )
         for state in self.states.values():
             if state.derived:
-                state.initial = replaced(self.before(state.initial), known)
+                state.initial = replaced(self.before(state.initial), values)
 
     def _check_still(self, what: str, expression: sympy.Expr) -> None:
         """Raise `UserError` where a value before the event is written in what moves after it."""
         inputs = {self.U: "eq.U0", self.omega_s: "eq.omega_s0", self.U2: "eq.U20"}
         moving = {*map(_real, INPUTS), *self.states, *self.memories}
-        if found := sorted(symbols_of(self.expand(expression)) & moving, key=str):
-            use = "".join(f"{inputs[s]} or " for s in found if s in inputs)
-            raise UserError(f"{what} contains {found[0]}, which moves; use {use}eq.before(...)")
+        if stray := sorted(symbols_of(self.expand(expression)) & moving, key=str):
+            use = "".join(f"{inputs[s]} or " for s in stray if s in inputs)
+            raise UserError(f"{what} contains {stray[0]}, which moves; use {use}eq.before(...)")
 
     def before(self, expression: sympy.Expr) -> sympy.Expr:
         """An expression's value before the event, of constants: `eq.before(eq.omega)` is the speed there."""
@@ -433,8 +433,8 @@ class Equations(Circuit):
     def expand(self, expression: sympy.Expr, named: Callable[[Symbol], bool] = lambda _: True) -> sympy.Expr:
         """The expression with the quantities that are `named` (by default all) replaced by what they stand for."""
         expression = sympy.sympify(expression)
-        while found := {s for s in symbols_of(expression) & self.definitions.keys() if named(s)}:
-            expression = replaced(expression, {s: self.definitions[s] for s in found})
+        while names := {s for s in symbols_of(expression) & self.definitions.keys() if named(s)}:
+            expression = replaced(expression, {s: self.definitions[s] for s in names})
         return expression
 
     def real_states(self) -> list[tuple[Symbol, sympy.Expr, sympy.Expr]]:
@@ -478,7 +478,7 @@ class Equations(Circuit):
         if _is_real(lowered):
             both = (lowered if lowered.is_real else _shorter(lowered), sympy.Integer(0))
         else:
-            both = map(_shorter, real_and_imaginary(lowered))
+            both = map(_shorter, as_real_imag(lowered))
         real, imaginary = (replaced(e, {s: self.real(s) for s in self._names(e)}) for e in both)
         return real, imaginary
 
@@ -488,10 +488,10 @@ class Equations(Circuit):
         halves = {s: phasor_parts(s) for s in names}
         lowered = replaced(expression, split | {s: a + I * b for s, (a, b) in halves.items()})
         both = real_and_imaginary(lowered)
-        known = {}
+        values = {}
         for s, pair in halves.items():
-            known |= zip(pair, self._parts_of(s), strict=True)
-        real, imaginary = (replaced(_shorter(e), known | {s: self.real(s) for s in self._names(e)}) for e in both)
+            values |= zip(pair, self._parts_of(s), strict=True)
+        real, imaginary = (replaced(_shorter(e), values | {s: self.real(s) for s in self._names(e)}) for e in both)
         return real, imaginary
 
     def _names(self, expression: sympy.Expr) -> set[Symbol]:

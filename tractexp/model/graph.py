@@ -9,14 +9,14 @@ from sympy import Basic, Symbol
 
 def replaced(expression: sympy.Expr, known: Mapping[Symbol, sympy.Expr]) -> sympy.Expr:
     """The expression with symbols replaced, as `xreplace` does it; maxima and minima are not looked into."""
-    made: dict[Basic, Basic] = {**known}
+    new: dict[Basic, Basic] = {**known}
 
     def visit(part: Basic) -> Basic:
-        if part not in made:
+        if part not in new:
             args = [visit(a) for a in part.args]
             same = all(a is b for a, b in zip(args, part.args, strict=True))
-            made[part] = part if same else _rebuilt(part, args)
-        return made[part]
+            new[part] = part if same else _rebuilt(part, args)
+        return new[part]
 
     return visit(expression)  # pyright: ignore[reportReturnType] # an expression's parts give one again
 
@@ -28,18 +28,26 @@ def _rebuilt(part: Basic, args: Sequence[Basic]) -> Any:
     return part.func(*args)
 
 
+def as_real_imag(expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
+    """Real and imaginary part of an expression in real symbols, products multiplied out, as SymPy takes them.
+
+    Of some quotients it leaves a part as it is; those are split as `halves` does.
+    """
+    both: Any = expression.as_real_imag()
+    return halves(expression) if any(half.has(sympy.re, sympy.im) for half in both) else both
+
+
 def halves(expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
     """Real and imaginary part of an expression in real symbols, products left as products.
 
-    SymPy multiplies out what it splits, which of a product of many sums takes minutes, and leaves parts of a quotient
-    as they are where it does not see through it.
+    SymPy multiplies out what it splits, which of a product of many sums takes minutes.
     """
-    made: dict[Basic, tuple[sympy.Expr, sympy.Expr]] = {}
+    pairs: dict[Basic, tuple[sympy.Expr, sympy.Expr]] = {}
 
     def visit(part: Basic) -> tuple[sympy.Expr, sympy.Expr]:
-        if part not in made:
-            made[part] = _halves(part, [visit(a) for a in part.args])
-        return made[part]
+        if part not in pairs:
+            pairs[part] = _halves(part, [visit(a) for a in part.args])
+        return pairs[part]
 
     return visit(expression)
 
