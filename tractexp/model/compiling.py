@@ -11,10 +11,10 @@ FEW = 8  # models that one process derives and compiles sooner than several have
 PATIENCE = 2.0  # s: below it nothing is said about compiling
 
 
-def compile_missing(models: Iterable[Model], tell: Callable[[], None] = lambda: None) -> None:
+def compile_missing(models: Iterable[Model], tell: Callable[[], None] = lambda: None) -> bool:
     """Derive and compile the kernels that the cache lacks, side by side in processes where they are many.
 
-    `tell` is called once, where it takes longer than `PATIENCE`.
+    `tell` is called once, where it takes longer than `PATIENCE`. Returns whether it was.
     """
     missing = [model for model in models if not model.has_kernel]
     started, said = time.monotonic(), False
@@ -22,6 +22,7 @@ def compile_missing(models: Iterable[Model], tell: Callable[[], None] = lambda: 
         if not said and time.monotonic() - started > PATIENCE:
             tell()
             said = True
+    return said
 
 
 def _compiling(missing: list[Model]) -> Iterable[object]:
