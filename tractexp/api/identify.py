@@ -390,7 +390,7 @@ def _judge(setup: Asked, found: "SearchResult") -> tuple[Result, Judged]:
     problem = setup.problem
     refuse_nothing_found(problem, found)
     estimated = estimate(problem, found.values)
-    known = estimated.known
+    known = estimated.uncertainty
     if setup.check_intervals:
         known = with_rivals(checked(known))
     result, fits = conclude(
@@ -401,7 +401,7 @@ def _judge(setup: Asked, found: "SearchResult") -> tuple[Result, Judged]:
     fields = known.fields()
     fields["uncertainty"] |= together.fields() if together else {"gains": {}, "odd_events": []}
     fields["uncertainty"]["notes"] += together.notes if together else []
-    starts = [s.told(problem.space.names) for s in estimated.starts]
+    starts = [s.to_dict(problem.space.names) for s in estimated.starts]
     structures = [rival.to_dict() for rival in known.rivals]
-    result = replace(result, **fields, adequacy=adequacy.told(), starts=starts, rival_structures=structures)
+    result = replace(result, **fields, adequacy=adequacy.to_dict(), starts=starts, rival_structures=structures)
     return result, Judged(fits, estimated, known, together, adequacy)

@@ -71,7 +71,7 @@ def recommended(setup: Setup, rivals: Any, progress: Progress = None) -> Recomme
     """Choose the event that tells `rivals` apart. Raises `UserError` for rivals that cannot be planned for."""
     sets = sets_of(rivals)
     found = _found(setup, sets, progress)
-    made = Recommended(setup, sets, files.plain(found.told()))
+    made = Recommended(setup, sets, files.plain(found.to_dict()))
     made.__dict__["_found"] = found
     return made
 

@@ -64,7 +64,7 @@ class WaveEvent(Event):
     @property
     def channels(self) -> tuple[str, ...]:
         """With I0 where the currents' zero sequence is compared."""
-        return (*super().channels, *(("I0",) if self.known[2] else ()))
+        return (*super().channels, *(("I0",) if self.compared[2] else ()))
 
     @property
     def levels(self) -> tuple[float, ...]:
@@ -76,7 +76,7 @@ class WaveEvent(Event):
         return self.unexplained
 
     @property
-    def known(self) -> tuple[bool, ...]:
+    def compared(self) -> tuple[bool, ...]:
         """Which of the three currents are compared."""
         return tuple(bool(np.isfinite(row).any()) for row in self.currents)
 

@@ -87,7 +87,7 @@ def fit(node: Mapping[str, Any], motor: str, train: Sequence[Event], held_out: S
         known,
         found.objective,
         tuple(fits),
-        estimate(problem, found.values).known,
+        estimate(problem, found.values).uncertainty,
         duration(problem),
         substeps,
         count(model.source),

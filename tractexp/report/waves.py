@@ -182,7 +182,7 @@ def _prepared(fit: Fit) -> str:
     event: Any = fit.waves
     cycles = (event.start - event.lead) * event.f0 / event.rate
     volts, amperes = np.abs(event.offsets[: event.phases]).max(), np.abs(event.offsets[event.phases :]).max()
-    zero = "" if event.phases == 1 else " Zero sequence is " + ("" if event.known[2] else "not ") + "compared."
+    zero = "" if event.phases == 1 else " Zero sequence is " + ("" if event.compared[2] else "not ") + "compared."
     return (
         f"{event.record.name}: {event.f0:.3f} Hz, {cycles:.1f} cycles before the dip; offsets of up to"
         f" {1000 * volts:.3g} V and {1000 * amperes:.3g} A taken off.{zero} The periodic voltage before the dip is"
