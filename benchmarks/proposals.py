@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import marked
+import oracle  # noqa: F401
 
 import tractexp  # noqa: F401 before NumPy: it keeps BLAS to one thread
 from hidden_effects import EFFECTS, Case, Noise, make

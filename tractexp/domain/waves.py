@@ -18,7 +18,7 @@ from tractexp.noise.random_walk import RandomWalk
 from tractexp.noise.voltage import SmoothedEvent
 from tractexp.noise.waves import of_waves
 from tractexp.record import Event, WaveEvent, in_waves
-from tractexp.record.unrecorded import unrecorded
+from tractexp.record.synthetic import synthetic_event
 from tractexp.record.wave_event import COARSEST
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ class WaveDomain(Domain):
         """Of a fault between two phases, types C and D of Bollen 2000, where the unbalance is 1."""
         v = (1 - shape.depth * course) * np.exp(1j * np.radians(shape.jump) * course)
         v = v + shape.unbalance * shape.depth * course * np.exp(-4j * np.pi * shape.frequency * t)
-        return unrecorded(name, t, v, (1.0, shape.P0, shape.Q0), shape.frequency, start, end)
+        return synthetic_event(name, t, v, (1.0, shape.P0, shape.Q0), shape.frequency, start, end)
 
     def dip(
         self, like: Event, step: float, course: np.ndarray, depth: float, jump: float, unbalance: float
@@ -131,7 +131,7 @@ class WaveDomain(Domain):
             speed = np.interp(fine, t, omega_s) - omega_s0
             v *= np.exp(1j * np.cumsum(np.concatenate([[0.0], (speed[1:] + speed[:-1]) / 2 * np.diff(fine)])))
         means = before["U0"], before["P0"], before["Q0"]
-        event = unrecorded("played", fine, v, means, nominal + omega_s0 / (2 * np.pi), 1, len(fine) - 1)
+        event = synthetic_event("played", fine, v, means, nominal + omega_s0 / (2 * np.pi), 1, len(fine) - 1)
         i = simulated(model, values, Drive.of([self.excitation(event)]))
         power = (v * np.conj((i[0] + 1j * i[1]) / event.turn))[::every]
         return power.real, power.imag

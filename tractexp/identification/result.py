@@ -102,6 +102,7 @@ class Result:
     # value, interval, of_S of the fitted events; held_out the same of those; events: name, role, value, interval, of_S
     model_error: dict[str, Any] = field(default_factory=dict)
     rival_structures: list[dict[str, Any]] = field(default_factory=list)  # name, model_error, parameters
+    advice: list[str] = field(default_factory=list)  # what to do next, the most pressing first
     notes: list[str] = field(default_factory=list)
     per_event: dict[str, list[float]] = field(default_factory=dict)  # of which `parameters` holds the mean
     standard_errors: dict[str, float | None] = field(default_factory=dict)  # None: not identifiable
@@ -253,7 +254,7 @@ def conclude(
         optimizer=optimizer,
         search=searched(problem, end),
         notes=[note for f in fits for note in f.event.record.notes],
-        records=[{"name": f.event.record.name, "role": f.role} | provenance.told(f.event.record) for f in fits],
+        records=[{"name": f.event.record.name, "role": f.role} | provenance.identity(f.event.record) for f in fits],
         own_base=asdict(own),
         parameters_on_given_base={} if own.ratio == 1 else own.values(by_event(*found_values.values()), exponents),
         tractexp_version=provenance.version(),

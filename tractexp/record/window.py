@@ -2,7 +2,7 @@
 
 With a window h, U = h * u and I = h * i are recorded, and P + jQ = U conj(I). A load whose current is linear in the
 voltage would not show it; any other does wherever the voltage bends. u is computed back from U near the edges of the
-dip, where it is free to bend; the current a model draws at u is then average as the recorder does.
+dip, where it is free to bend; the current a model draws at u is then averaged as the recorder does.
 
 Source: IEC/IEEE 60255-118-1. Departures: the angle of the voltage is taken as steady over a window.
 """
