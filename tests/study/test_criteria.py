@@ -19,7 +19,7 @@ from tractexp.discrepancy.gap import GapTest
 from tractexp.discrepancy.held_out import Assessment
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.judgement import assessment
-from tractexp.discrepancy.next_event.choose import TestedEvent, mildest
+from tractexp.discrepancy.next_event.choose import EventTrial, mildest
 from tractexp.discrepancy.next_event.imagined import ImaginedDip
 from tractexp.discrepancy.next_event.separation import Chances
 from tractexp.discrepancy.proposal.judge import Before, Weighed
@@ -99,7 +99,7 @@ def status(c):
 
 def chosen_dip(c):
     tried = [
-        TestedEvent(
+        EventTrial(
             ImaginedDip(depth, 0.1), Chances(np.array([p]), np.ones((1, 1))), Chances(np.array([p]), np.ones((1, 1)))
         )
         for depth, p in ((0.2, 0.93), (0.6, 0.99))

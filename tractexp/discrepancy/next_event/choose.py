@@ -24,11 +24,11 @@ WORTH = 0.1  # chance below which no refit is worth its time
 REPEATED = (2, 3, 5, 10, 20)  # events of one kind together
 NEARLY = 0.02  # of the chance: of events as sure as this the mildest is the surest
 
-Rule = Callable[["TestedEvent"], Chances]
+Rule = Callable[["EventTrial"], Chances]
 
 
 @dataclass(frozen=True)
-class TestedEvent:
+class EventTrial:
     """An event and how surely it leaves one rival: by the product's own rule, and where formulas are `exact`.
 
     The rule rejects no rival whose curves differ by less than `Criteria.alike` of what the best explains.
@@ -51,9 +51,9 @@ class NextEvent:
     """
 
     rivals: tuple[str, ...]
-    best: TestedEvent
-    by_noise: TestedEvent | None
-    tried: tuple[TestedEvent, ...]
+    best: EventTrial
+    by_noise: EventTrial | None
+    tried: tuple[EventTrial, ...]
     criteria: Criteria
     same: tuple[tuple[int, int, Same], ...] = field(default=())
     hopeless: tuple[tuple[int, int, float], ...] = field(default=())
@@ -103,7 +103,7 @@ class NextEvent:
             ],
         }
 
-    def _row(self, tried: TestedEvent) -> dict[str, Any]:
+    def _row(self, tried: EventTrial) -> dict[str, Any]:
         chances = tried.exact if tried is self.by_noise else tried.chances
         return {
             **asdict(tried.event),
@@ -131,7 +131,7 @@ class NextEvent:
         )
 
 
-def _together(tried: TestedEvent) -> str:
+def _together(tried: EventTrial) -> str:
     """How many such events are sure to."""
     return f", {tried.repeated} of them are sure to" if tried.repeated else ""
 
@@ -160,8 +160,7 @@ def next_event(
         for a, b, _ in open_pairs:
             ignored[a, b] = ignored[b, a] = True
     tried = [
-        TestedEvent(e, Chances.of(d[0], ignored), Chances.of(d[1], ignored))
-        for e, d in zip(events, denied, strict=True)
+        EventTrial(e, Chances.of(d[0], ignored), Chances.of(d[1], ignored)) for e, d in zip(events, denied, strict=True)
     ]
     best = _held(context, noise, sides, tried, ignored, seed, _by_rule)
     sure = best.chances.least >= context.criteria.decided
@@ -172,15 +171,15 @@ def next_event(
     return NextEvent(tuple(labels), best, by_noise, tuple(tried), context.criteria, proved, hopeless)
 
 
-def _by_rule(tried: TestedEvent) -> Chances:
+def _by_rule(tried: EventTrial) -> Chances:
     return tried.chances
 
 
-def _by_noise(tried: TestedEvent) -> Chances:
+def _by_noise(tried: EventTrial) -> Chances:
     return tried.exact
 
 
-def mildest(tried: Sequence[TestedEvent], decided: float, by: Rule) -> TestedEvent:
+def mildest(tried: Sequence[EventTrial], decided: float, by: Rule) -> EventTrial:
     """Of the events that are sure enough the one that asks for least, or else of the surest."""
     enough = [t for t in tried if by(t).least >= min(decided, max(by(t).least for t in tried) - NEARLY)]
     return min(enough, key=lambda t: t.event.burden)
@@ -193,9 +192,9 @@ def _alike(events: Sequence[ImaginedDip]) -> list[list[ImaginedDip]]:
 
 
 def _held(
-    context: Context, noise: Noise, sides: Sequence[Side], tried: Sequence[TestedEvent], ignored: np.ndarray, seed: int,
+    context: Context, noise: Noise, sides: Sequence[Side], tried: Sequence[EventTrial], ignored: np.ndarray, seed: int,
     by: Rule,
-) -> TestedEvent:  # fmt: skip
+) -> EventTrial:  # fmt: skip
     """The mildest event that is sure enough after refits, too."""
     left, checked = list(tried), []
     while left and len(checked) < CHECKED:
@@ -210,8 +209,8 @@ def _held(
 
 
 def _refitted(
-    context: Context, noise: Noise, sides: Sequence[Side], best: TestedEvent, ignored: np.ndarray, seed: int, by: Rule
-) -> TestedEvent:  # fmt: skip
+    context: Context, noise: Noise, sides: Sequence[Side], best: EventTrial, ignored: np.ndarray, seed: int, by: Rule
+) -> EventTrial:  # fmt: skip
     """The chances of one event with rivals linearised where they fit it best, each in turn the truth.
 
     Only of phasors without further channels or rates, which the context has no records of: others stay linearised about
@@ -226,9 +225,9 @@ def _refitted(
         views = [seen(context, noise, side, [event])[0] for side in there]
         places.append((Separation(there, context.criteria, seed=seed), views))
 
-    def again(times: int) -> TestedEvent:
+    def again(times: int) -> EventTrial:
         denied = np.stack([s.denied(views, a, times) for a, (s, views) in enumerate(places, 1)], axis=1)
-        return TestedEvent(event, *(Chances.of(rule, ignored) for rule in denied), refitted=plain)
+        return EventTrial(event, *(Chances.of(rule, ignored) for rule in denied), refitted=plain)
 
     once = again(1)
     if by(once).least >= context.criteria.decided:
