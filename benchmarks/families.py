@@ -16,6 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import marked
+import oracle  # noqa: F401
 
 import tractexp  # noqa: F401 before NumPy: it keeps BLAS to one thread
 from hidden_effects import Case, Noise, make

@@ -20,6 +20,7 @@ from typing import Any
 
 import marked
 import numpy as np
+import oracle  # noqa: F401
 from make_tibet import DIPS, EDGES, LOAD, MACHINE
 
 from independent import Dip, Load, Waveforms, simulate

@@ -30,6 +30,7 @@ for library in ("OPENBLAS", "OMP", "MKL"):
 import baselines  # noqa: E402
 import hidden_effects_evidence as evidence  # noqa: E402
 import numpy as np  # noqa: E402
+import oracle  # noqa: E402, F401
 
 import tractexp  # noqa: E402
 from hidden_effects import cases  # noqa: E402
@@ -40,7 +41,7 @@ from hidden_effects.outside import OUTSIDE  # noqa: E402
 
 LEFT_OUT = "left out "  # the group of trials whose effect is taken from the catalogue
 PAIRED, LARGE = (2.0, 4.0), (2.0, 4.0, 8.0)  # multiples of the detection limit
-FROZEN = ("tractexp", "plugins", "benchmarks/hidden_effects", "benchmarks/independent")  # what judges and is judged
+FROZEN = ("tractexp", "plugins", "tests/oracle/hidden_effects", "tests/oracle/independent")  # what judges and is judged
 ROOT, HERE = Path(__file__).parents[1], Path(__file__).parent
 SETS = {  # judgement sets by what is new to them, the newest last
     "of the first": HERE / "judgement_first.jsonl",
@@ -198,7 +199,7 @@ def _left(found, clean: np.ndarray) -> float:
     At its fit the problem is linear enough: what its parameters and the nuisances can still take is projected out.
     """
     from tractexp.discrepancy.explanations import searched
-    from tractexp.discrepancy.tangent import tangent
+    from tractexp.discrepancy.linearization import tangent
 
     bench, first, refits = found.bench, found.first, found.explanations.refits
     singles = [f for names, f in refits.items() if len(names) == 1 and names == found.catalogue.textbook(names)]

@@ -158,8 +158,9 @@ class Covered:
         self.seconds: dict[str, float] = {}
         for case in ElementTree.parse(TIMES).iter("testcase"):
             where, name = case.get("classname", ""), case.get("name", "")
-            file = "/".join(where.split(".")[:2]) + ".py"
-            inner = where.split(".")[2:]
+            parts = where.split(".")
+            k = next(k for k, part in enumerate(parts, start=1) if part.startswith("test_"))
+            file, inner = "/".join(parts[:k]) + ".py", parts[k:]
             self.seconds["::".join([file, *inner, name])] = float(case.get("time", "0"))
 
     def tests(self, mutant: Mutant) -> list[str]:
@@ -183,8 +184,9 @@ class Covered:
         for test in ranked:
             by_file.setdefault(test.partition("::")[0], []).append(test)
         in_turn = [test for turn in itertools.zip_longest(*by_file.values()) for test in turn if test]
-        named = f"tests/test_{Path(mutant.module).parts[1]}.py"
-        further = sorted((t for t in self.seconds if t.partition("::")[0] == named), key=self.seconds.__getitem__)
+        named = f"test_{Path(mutant.module).parts[1]}.py"
+        alike = (t for t in self.seconds if Path(t.partition("::")[0]).name == named)
+        further = sorted(alike, key=self.seconds.__getitem__)
         return list(dict.fromkeys([*in_turn, *further]))[:MOST]
 
 

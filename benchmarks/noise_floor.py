@@ -16,6 +16,7 @@ import json
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
+import oracle  # noqa: F401
 from make_tibet import EDGES, LOAD, MACHINE, RECORDER
 
 from independent import Dip, record, simulate

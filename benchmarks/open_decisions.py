@@ -17,6 +17,7 @@ from pathlib import Path
 import hidden_effects_evidence as evidence
 import hidden_effects_study as study
 import marked
+import oracle  # noqa: F401
 from joblib import Parallel, delayed
 
 from hidden_effects import cases

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import marked
+import oracle  # noqa: F401
 
 import tractexp  # noqa: F401 before NumPy: it keeps BLAS to one thread
 from hidden_effects import EFFECTS, Case, Noise, make
@@ -108,8 +109,8 @@ CASES: dict[str, tuple[float, set[str], set[str]]] = {
 def row(case: str, seed: int) -> dict:
     """One data set, searched."""
     from tractexp.discrepancy.base_fit import base_fit
-    from tractexp.discrepancy.bench import Bench
     from tractexp.discrepancy.catalogue import catalogue
+    from tractexp.discrepancy.context import Context
     from tractexp.discrepancy.criteria import Criteria
     from tractexp.discrepancy.disagreement import disagreement
     from tractexp.discrepancy.effort import Effort
@@ -126,7 +127,7 @@ def row(case: str, seed: int) -> dict:
     begun, train, held = time.perf_counter(), events[:3], events[3:]
     motor, static = get("model/motor", "electromechanical")(), get("model/static", "exponential")()
     missing = catalogue(motor, static, (), train, ["stator_resistance"])
-    bench = Bench.of(compose(motor, static), missing, Records.of(train), {}, {}, Criteria(), Effort())
+    bench = Context.of(compose(motor, static), missing, Records.of(train), {}, {}, Criteria(), Effort())
     base = base_fit(bench)
     first = disagreement(base, 0)
     bare = refit(bench, first.noise, [((), bench.coordinates.without_faults(first.fit.unit, ()))], faults=())[0]

@@ -11,7 +11,7 @@ from tractexp.errors import UserError, among
 class Parameter:
     """One number to identify: its default, bounds, unit, meaning and source.
 
-    The attribute a plugin assigns it to is its name. `null`, where given, is the value at which the
+    The attribute a plugin assigns it to is its name. `null`, if any, is the value at which the
     equations are as if the term were absent. `symbol` is LaTeX. `power_exponent` says how the value goes with
     the base of power, whatever its unit: on a base of a k-th of the MVA the same load has k^power_exponent times the
     value. A power, a torque, an inertia or an admittance has 1, an impedance -1; shares, times and voltages have 0.
@@ -39,7 +39,7 @@ class Parameter:
             object.__setattr__(self, "symbol", self.symbol or name)
 
     def check(self, where: str) -> None:
-        """Raise `UserError` unless low <= default, null <= high, low < high, all finite, and everything is told."""
+        """Raise `UserError` unless low <= default, null <= high, low < high, all finite, and no text is empty."""
         for what in ("unit", "about", "source"):
             if not getattr(self, what).strip():
                 raise UserError(f"{where}: the parameter has no {what}; say it ('1' where a number has no unit)")
@@ -108,3 +108,24 @@ class Box:
         if name not in self.names:
             raise UserError(f"this model has no parameter '{name}'{among(name, self.names, 'Parameters')}")
         return self.names.index(name)
+
+
+def even(n: int, d: int) -> np.ndarray:
+    """(n, d) points that fill the unit cube evenly. Source: Roberts 2018, the additive sequence R_d."""
+    ratio = 2.0
+    for _ in range(60):  # the root above 1 of x^(d + 1) = x + 1
+        ratio = (1 + ratio) ** (1 / (d + 1))
+    return (0.5 + np.outer(np.arange(1, n + 1), ratio ** -np.arange(1.0, d + 1))) % 1
+
+
+def best_distinct(unit: np.ndarray, f: np.ndarray, distance: float, count: int, norm: float = np.inf) -> np.ndarray:
+    """Indices of at most `count` points, best first, each further than `distance` from every better one chosen.
+
+    `unit` (n, d) in the unit cube, `f` (n,) objectives, lower is better. `norm` is the order of the distance's norm:
+    `np.inf` takes the coordinate that differs most, 2 is Euclid's.
+    """
+    left, chosen = np.argsort(f, kind="stable"), []
+    while len(left) and len(chosen) < count:
+        chosen.append(left[0])
+        left = left[np.linalg.norm(unit[left] - unit[left[0]], norm, axis=1) > distance]
+    return np.array(chosen, dtype=int)

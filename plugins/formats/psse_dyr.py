@@ -1,7 +1,7 @@
 """PSS/E dynamics data: CIM5BL and IEELBL."""
 
-from tractexp.exchange.format import Format
-from tractexp.plugin import plugin
+from tractexp.extend import plugin
+from tractexp.extend.formats import Format
 
 
 @plugin
@@ -44,7 +44,7 @@ class PsseDyr(Format):
         return "".join(records)
 
     def notes(self, load):
-        lines = self.left_out(load)
+        lines = self.omissions(load)
         for identifier, part in (("M", "motor"), ("S", "static")):
             if f"P_{part}" in load.before:
                 P, Q = (load.power * load.before[f"{power}_{part}"] for power in "PQ")

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from tractexp.identification.optimizer import REFUSED, Box, Evaluate
-from tractexp.identification.starts import best_distinct
+from tractexp.parameter import best_distinct
 
 DIFFERENCE = 1e-6  # of the box's width; rounding (3e-13 relative) and curvature both stay below 1e-6 of a column
 EDGE = 1e-9  # SciPy's interior method starts strictly inside the box
@@ -22,6 +22,10 @@ ROUGH, ROUGH_TRIALS = 1e-2, 12  # relative tolerance and trials of a descent tha
 
 class Elite:
     """The best points a search has met that lie apart from each other, best first: where a polish starts."""
+
+    box: Box
+    x: np.ndarray
+    f: np.ndarray
 
     def __init__(self, box: Box):
         self.box = box

@@ -1,30 +1,28 @@
 """What to record next, as a section of an investigation's page and as a page of its own."""
 
-from pathlib import Path
-
 import numpy as np
 
-from tractexp.discrepancy.next_event.choose import NextEvent, Tried
+from tractexp.blocks import Report
+from tractexp.blocks.chart import Chart
+from tractexp.blocks.style import PALETTE
+from tractexp.discrepancy.next_event.choose import NextEvent, TestedEvent
 from tractexp.discrepancy.next_event.separation import Chances
-from tractexp.report.chart import Chart
-from tractexp.report.page import Page
-from tractexp.report.style import PALETTE
 from tractexp.wording import as_sentence
 
 LISTED = 2  # events of each kind that a table has
 KINDS = ("dip", "tap or capacitor bank", "dip with a phase jump and f", "unbalanced dip with U2", "dip sampled faster")
 
 
-def page(path: Path, found: NextEvent, title: str) -> Path:
-    """Write the page of a plan for rivals; returns its path."""
-    made = Page("What to record next", f"For {title}, to tell {' from '.join(found.rivals)}.")
+def report(found: NextEvent, title: str) -> Report:
+    """The page of a plan for rivals."""
+    made = Report("What to record next", f"For {title}, to tell {' from '.join(found.rivals)}.")
     sure = found.probability >= found.criteria.decided
     made.verdict(as_sentence(found.sentence()), kind="good" if sure else "bad" if found.same else "plain")
     section(made, found)
-    return made.write(path)
+    return made
 
 
-def section(made: Page, found: NextEvent) -> None:
+def section(made: Report, found: NextEvent) -> None:
     """The chances by dip as charts, the best events of each kind, and which pair each tells apart."""
     rule = f"the rule of this investigation, which trusts no formula to {found.criteria.alike:.0%} of what it explains"
     if not found.same or len(found.rivals) > 2:
@@ -74,12 +72,12 @@ def _chart(found: NextEvent) -> Chart:
     return chart.level(100 * found.criteria.decided).limits(0, -3, 103)
 
 
-def _chances(found: NextEvent, tried: Tried) -> Chances:
+def _chances(found: NextEvent, tried: TestedEvent) -> Chances:
     """By the rule, or where that is not sure to decide, by the noise alone."""
     return tried.chances if found.by_noise is None else tried.exact
 
 
-def _kind(tried: Tried) -> str:
+def _kind(tried: TestedEvent) -> str:
     event = tried.event
     if event.unbalance:
         return KINDS[3]
@@ -90,12 +88,12 @@ def _kind(tried: Tried) -> str:
     return KINDS[2] if event.jump else KINDS[0]
 
 
-def _best(found: NextEvent, kind: str) -> list[Tried]:
+def _best(found: NextEvent, kind: str) -> list[TestedEvent]:
     ranked = sorted(
         (t for t in found.tried if _kind(t) == kind), key=lambda t: (-t.chances.least, -t.exact.least, t.event.burden)
     )
     return ranked[:LISTED]
 
 
-def _row(tried: Tried) -> list[str]:
+def _row(tried: TestedEvent) -> list[str]:
     return [tried.event.words, f"{100 * tried.chances.least:.0f}", f"{100 * tried.exact.least:.0f}"]

@@ -11,11 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from tractexp import files
+from tractexp.api.task import variant
+from tractexp.cli.chosen import given
 from tractexp.errors import UserError
 from tractexp.sweep import identity
 from tractexp.sweep.status import FAILED, FINISHED, RUNNING, Status
-from tractexp.tasks.given import given, variant
-from tractexp.tracking.swept import parent_of
+from tractexp.tracking.sweepfile import parent_of
 
 OUTPUT, TRACEBACK = "output.txt", "traceback.txt"
 
@@ -67,7 +68,7 @@ def work(job: SweepJob) -> Status:
     _prepare(job)
     job.status.write(job.folder)
     started = time.perf_counter()
-    output = files.Said(job.folder / OUTPUT)
+    output = files.Transcript(job.folder / OUTPUT)
     with output, contextlib.redirect_stdout(output), contextlib.redirect_stderr(output):
         message = _run(job)
     status = FAILED if message else FINISHED
@@ -89,8 +90,8 @@ def run_job(config: Any) -> Status:
 
 def _run(job: SweepJob) -> str:
     """Run the task; returns what went wrong, in one line, or ""."""
-    from tractexp.tasks.run import perform
-    from tractexp.tasks.task import Job
+    from tractexp.api.task import Job
+    from tractexp.cli.run import perform
 
     try:
         perform(Job(job.config, job.choices, job.folder, parent_of(job.folder.parent), in_sweep=True, given=job.given))

@@ -11,7 +11,7 @@ from typing import Any
 from hydra.core.utils import JobReturn, JobStatus
 from hydra.plugins.launcher import Launcher
 
-from tractexp.doors.hydra_plugins import NAMESPACE
+from tractexp.compat.hydra_plugins import NAMESPACE
 from tractexp.errors import UserError, check_choice, check_range
 from tractexp.sweep import status
 from tractexp.sweep.compose import Composer
@@ -147,7 +147,7 @@ def warm(jobs: Sequence[SweepJob]) -> None:
     """Compile the kernels of the jobs' models, once for each, so that the workers find them on disk."""
     import json
 
-    from tractexp.tasks.task import Job
+    from tractexp.api.task import Job
 
     seen = set()
     for job in jobs:

@@ -1,0 +1,98 @@
+"""Recorders that average phasors over whole cycles: the average, the voltage reckoned back, and what is said of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from test_discrepancy import base, events
+
+from tractexp.discrepancy.discrepancy_json import content
+from tractexp.discrepancy.investigate import investigate
+from tractexp.discrepancy.recorder_window import RecorderWindow, window_mean, windows_of
+from tractexp.plugin import chosen
+
+FEW = ("stator_resistance", "exponential_recovery", "second_motor_group")
+
+
+@pytest.mark.parametrize("samples", [1.0, 2.5, 10.0, 16.67])
+def test_the_average_is_the_integral_over_the_window(samples):
+    rng = np.random.default_rng(0)
+    y = rng.normal(size=60)
+    curve = lambda x: np.interp(x, np.arange(60), y)  # noqa: E731
+    for at in (9, 31, 50):  # what it goes on with beyond its ends stands in test_orders
+        low, high = at - samples / 2, at + samples / 2
+        knots = np.arange(np.ceil(low), np.ceil(high))
+        area, _ = quad(curve, low, high, points=knots, limit=200)
+        assert window_mean(y, samples)[at] == pytest.approx(area / samples, abs=1e-10)
+
+
+def test_a_straight_line_is_its_own_average():
+    y = np.outer([1.0, -2.0], np.arange(50))
+    assert window_mean(y, 12.3)[:, 8:-8] == pytest.approx(y[:, 8:-8])
+
+
+@pytest.mark.parametrize("cycles", [1, 2, 4])
+def test_the_voltage_reckoned_back_is_that_which_was_averaged(cycles):
+    (event,) = events(count=1)
+    step, window = event.record.step, 0.02 * cycles
+    shown = replace(event, record=replace(event.record, U=window_mean(event.record.U, window / step)))
+    back = RecorderWindow(window).sharpened(shown).record.U
+    shows, error = shown.record.U - event.record.U, back - event.record.U
+    assert np.abs(shows).max() > 0.01
+    # What repeats with the window itself cannot be told: corners lose a little where it is shorter than the edges.
+    assert error @ error < (0.2 if cycles == 1 else 1e-3) * (shows @ shows)
+
+
+def test_windows_are_whole_cycles_that_the_sampling_resolves():
+    (event,) = events(count=1)
+    assert [w.window for w in windows_of([event])] == pytest.approx([0.02 * k for k in (1, 2, 3, 4, 5, 6)])
+    slow = replace(event, record=replace(event.record, t=event.record.t * 10))
+    assert min(w.window for w in windows_of([slow])) >= 2 * slow.record.step
+
+
+def test_a_window_that_the_records_say_is_the_only_one_tried():
+    (event,) = events(count=1)
+    said = replace(event, record=replace(event.record, window=chosen("estimator", "p_class").window(50.0)))
+    (window,) = windows_of([said, said])
+    assert window.window == pytest.approx(0.04)
+    assert "p_class" in window.describe()
+    assert len(windows_of([said, event])) == 6  # where they contradict each other it is searched for
+
+
+def test_what_a_triangle_did_is_undone():
+    (event,) = events(count=1)
+    known = chosen("estimator", "p_class").window(50.0)
+    recorder = RecorderWindow(known.length, known)
+    weights = recorder.weights(event.record.step)
+    U = np.convolve(np.pad(event.record.U, len(weights) // 2, "edge"), weights, "valid")
+    back = recorder.sharpened(replace(event, record=replace(event.record, U=U))).record.U
+    shows, error = U - event.record.U, back - event.record.U
+    assert np.abs(shows).max() > 0.01
+    assert error @ error < 0.2 * (shows @ shows)
+
+
+def test_a_window_of_phasors_is_no_missing_effect():
+    """The load is nonlinear, so that a window on voltage and current shows, and no effect is named for it."""
+    made = events(count=3, nuisances=(("phasor_window", 3.0),))
+    told = []
+    found = investigate(base(), made[:2], made[2:], {}, {}, only=FEW, tell=told.append)
+    assert found.names == ()
+    assert found.verdict.word == "none"
+    assert content(found)["phasor_window"] == pytest.approx(0.06)
+    assert any("60 ms" in line for line in told)
+    assert "60 ms" in found.verdict.reason
+
+
+def test_no_window_is_found_where_there_is_none():
+    for effect in (None, "stator_resistance"):
+        made = events(effect, size=2.0, count=3)
+        found = investigate(base(), made[:2], made[2:], {}, {}, only=FEW)
+        assert content(found)["phasor_window"] is None
+        assert found.names == ((effect,) if effect else ())
+
+
+def test_an_effect_is_found_behind_a_window():
+    made = events("stator_resistance", size=3.0, count=3, nuisances=(("phasor_window", 2.0),))
+    found = investigate(base(), made[:2], made[2:], {}, {}, only=FEW)
+    assert "stator_resistance" in found.names

@@ -1,0 +1,191 @@
+"""Every decision threshold decides: each has a case that its default settles one way and a looser one the other."""
+
+import dataclasses
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from test_discrepancy import FEW, base, events, steady
+
+from tractexp.discrepancy.all_events import JointFit
+from tractexp.discrepancy.catalogue import candidate, missing_channel
+from tractexp.discrepancy.chance import Chance
+from tractexp.discrepancy.coordinates import Coordinates
+from tractexp.discrepancy.criteria import CHOSEN, DERIVED, Criteria
+from tractexp.discrepancy.disagreement import Disagreement
+from tractexp.discrepancy.families import near, worth
+from tractexp.discrepancy.fitting import Refit
+from tractexp.discrepancy.gap import GapTest
+from tractexp.discrepancy.held_out import Assessment
+from tractexp.discrepancy.investigate import investigate
+from tractexp.discrepancy.judgement import judged
+from tractexp.discrepancy.next_event.choose import TestedEvent, mildest
+from tractexp.discrepancy.next_event.imagined import ImaginedDip
+from tractexp.discrepancy.next_event.separation import Chances
+from tractexp.discrepancy.proposal.judge import Before, Weighed
+from tractexp.discrepancy.score_test import Score
+from tractexp.errors import UserError
+from tractexp.noise.random_walk import Rest, find
+from tractexp.plugin import get
+
+
+def at_fit(c, p, names=(), fault_p=1.0, blur=0.0, left=1.0):
+    """The tests at a fit with these names: p of the best further effect, of a fault of the measurement, of the rest.
+
+    Chance gives every p from 0.001 to 1 with the same probability.
+    """
+    return Disagreement(
+        fit=SimpleNamespace(names=names),
+        noise=SimpleNamespace(loudest_blur=blur),
+        tangent=SimpleNamespace(bench=SimpleNamespace(criteria=c)),
+        projection=SimpleNamespace(fault_p=lambda: {"time_skew": np.array([fault_p])}),
+        chance=SimpleNamespace(
+            critical_p=Chance(np.arange(1, 1001) / 1000, {}).critical_p, surprises=lambda *_: {"a test": left}
+        ),
+        scores=[Score("an effect", 10.0, p, {}, {}, {})],
+    )
+
+
+def refitted(deviance, parameters):
+    """A fit of one effect with so many parameters."""
+    return Refit(("one",), np.zeros(0), deviance, parameters)
+
+
+def judged_by(c, closed=1.0, gain=100.0, expected=100.0, p_left=1.0):
+    """What held-out events say of an explanation."""
+    gap = GapTest(None, None, closed, gain, expected, c.shown, None)
+    return Assessment(gap, SimpleNamespace(criteria=c), (), p_left)
+
+
+def wandering(c, seed, rests=(), walk=0.0):
+    """How a load wanders that shows noise and a random walk before its event; None where it is not said to."""
+    rng = np.random.default_rng(seed)
+    before = rng.normal(size=(2, 250)) + np.cumsum(rng.normal(size=(2, 250)) * np.array([[walk], [0.0]]), axis=1)
+    limits = {"seen": c.wandering_seen, "within": c.wandering_within, "less": c.wandering_likely}
+    return find([before], 0.002, steady(1000), rests, **limits)
+
+
+def wandering_within(c):
+    """The same with what is left of the event, which shows a little more than the stretch before it."""
+    rng = np.random.default_rng(24)
+    left = rng.normal(size=(2, 1000)) + np.cumsum(rng.normal(size=(2, 1000)) * np.array([[0.012], [0.0]]), axis=1)
+    return wandering(c, 73, [Rest(left, np.zeros((1, 2, 1000)), np.ones(1000))])
+
+
+def prior_of_skew(c):
+    """How far clocks are believed to be off [s]."""
+    skew = candidate(get("effect", "time_skew")())
+    known = {"of_measurement": ("time_skew",), "members": (), "__getitem__": lambda self, name: skew}
+    catalogue = type("One", (), known)()
+    one = np.array([0.0])
+    at = Coordinates(("skew",), one - 0.01, one + 0.01, catalogue, one, one, one, c.measurement_prior)
+    return at.prior_deviation[0] * at.width("skew")
+
+
+def swinging(c, swing=0.045):
+    """Why an effect of the frequency cannot be tested where it swings by so much."""
+    record = SimpleNamespace(channels={"f": np.linspace(50.0, 50.0 + swing, 10)})
+    return missing_channel(
+        get("effect", "frequency_dependence")(), [SimpleNamespace(record=record, channels=("f",))], c.frequency_swing
+    )
+
+
+def status(c):
+    """Of an effect that would be seen with a probability of 0.75 at its smallest relevant size."""
+    one = candidate(get("effect", "stator_resistance")())
+    score = Score("stator_resistance", 0.0, 0.5, {"R_s": 0.0}, {"R_s": 0.01 / (1.6449 + 0.6745)}, {})
+    return judged(one, score, 0.05, c.testable)[0]
+
+
+def chosen_dip(c):
+    tried = [
+        TestedEvent(
+            ImaginedDip(depth, 0.1), Chances(np.array([p]), np.ones((1, 1))), Chances(np.array([p]), np.ones((1, 1)))
+        )
+        for depth, p in ((0.2, 0.93), (0.6, 0.99))
+    ]
+    return mildest(tried, c.decided, lambda t: t.chances).event.depth
+
+
+def proposed(closed=0.9, left=1.0, p=1e-6):
+    """A term that would be proposed."""
+
+    def curve(deviance):
+        return SimpleNamespace(deviance=deviance, chi2_per_sample=left)
+
+    before = Before(SimpleNamespace(), curve(2000.0), curve(2000.0 - closed * 1000.0), (1 - closed) * 1000.0)
+    return Weighed(None, before, before, p, None)
+
+
+def near_members(c):
+    """How many members are tried beside a name that suffices, of a family whose textbook explains 35 % as much."""
+    member = SimpleNamespace(effect=SimpleNamespace(family="other"))
+    best = refitted(0.0, 1)
+    fits = {(): refitted(1000.0, 0), ("one",): best, ("other",): Refit(("other",), np.zeros(0), 650.0, 1)}
+    return len(near(SimpleNamespace(criteria=c, catalogue=SimpleNamespace(members=(member,))), best, fits))
+
+
+CASES = {  # criterion: a looser value, the decision, what it is by default
+    "false_alarms": (0.06, lambda c: at_fit(c, 0.022).asks_for_more, False),
+    "naming_share": (0.45, lambda c: at_fit(c, 0.021).asks_for_more, False),
+    "adequate_p": (0.002, lambda c: at_fit(c, 1.0, left=0.0025).adequate, False),
+    "second_name_p": (3e-5, lambda c: at_fit(c, 2e-5, names=("one",)).asks_for_more, False),
+    "third_name_p": (3e-9, lambda c: at_fit(c, 2e-9, names=("one", "two")).asks_for_more, False),
+    "family_p": (3e-5, lambda c: worth(refitted(181.8, 2), refitted(200.0, 1), c.family_p), False),
+    "near_family": (0.3, near_members, 0),
+    "other_valley": (0.7, lambda c: c.promises(75.0, 100.0), False),
+    "beside_measurement": (0.2, lambda c: at_fit(c, 0.003, fault_p=1e-9).asks_for_more, False),
+    "rejected": (3.0, lambda c: c.rejects(10.0, 1.0, 2, 100.0), False),
+    "alike": (0.04, lambda c: c.rejects(45.0, 1e4, 2, 1000.0), False),
+    "shown": (12.0, lambda c: judged_by(c, gain=-1.0, expected=11.0).helps, False),
+    "convincing": (0.75, lambda c: judged_by(c, closed=0.78).convincing, False),
+    "stands": (0.04, lambda c: judged_by(c, p_left=0.045).helps, False),
+    "quieter": (4.0, lambda c: JointFit(None, -3.5, 1.0).confirmed(c, doubted=True), False),
+    "window_least": (9.0, lambda c: c.least_window(best=0.0) < 9.5, False),
+    "window_behind": (7.0, lambda c: c.least_window(best=30.0) < 24.0, False),
+    "window_clear": (25.0, lambda c: c.least_window(best=100.0) < 28.0, False),
+    "window_share": (0.04, lambda c: c.least_window(best=1000.0) < 45.0, False),
+    "blurred": (0.7, lambda c: at_fit(c, 1.0, fault_p=1e-9, blur=0.6).faults, ()),
+    "quiet_worth": (100.0, lambda c: c.knows_noise(120.0), False),
+    "wandering_seen": (1.5, lambda c: wandering(c, 73) is not None, False),
+    "wandering_within": (1.0, lambda c: wandering_within(c) is not None, False),
+    "wandering_likely": (0.5, lambda c: wandering(c, 0, walk=0.1).intensity[0] > 9, True),
+    "measurement_prior": (6.0, lambda c: prior_of_skew(c) < 0.0051, True),
+    "frequency_swing": (0.04, lambda c: "moves by less than" in swinging(c), True),
+    "testable": (0.7, status, "not testable"),
+    "proposal_closed": (0.58, lambda c: proposed(closed=0.59).stands(c), False),
+    "proposal_left": (1.8, lambda c: proposed(left=1.75).stands(c), False),
+    "proposal_p": (0.02, lambda c: proposed(p=0.011).stands(c), False),
+    "decided": (0.9, chosen_dip, 0.6),
+}
+
+
+def test_every_criterion_has_a_case_and_an_origin():
+    fields = {item.name: item.metadata for item in dataclasses.fields(Criteria)}
+    assert fields.keys() == CASES.keys()
+    for name, told in fields.items():
+        assert told["origin"] in (CHOSEN, DERIVED), name
+        assert told["about"], name
+        assert told["why"], name
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_looser_criterion_decides_otherwise(name):
+    looser, decide, by_default = CASES[name]
+    assert decide(Criteria()) == by_default
+    assert decide(Criteria.of({name: looser})) != by_default
+
+
+def test_a_criterion_that_is_unknown_or_out_of_range_is_refused():
+    with pytest.raises(UserError, match=r"criteria\.adequatep: there is no such criterion; did you mean 'adequate_p'"):
+        Criteria.of({"adequatep": 0.1})
+    with pytest.raises(UserError, match=r"criteria\.false_alarms=0\.7 is out of range: .* at most 0\.5"):
+        Criteria(false_alarms=0.7)
+
+
+def test_loose_criteria_name_what_is_not_there():
+    """A step of the load is in no catalogue: by default that is said, by loose criteria something is named for it."""
+    made = events("load_step", size=3.0, count=3)[:2]
+    assert investigate(base(), made, only=FEW).verdict.word == "unexplained"
+    loose = Criteria(adequate_p=0.0, second_name_p=0.5, third_name_p=0.5)
+    assert investigate(base(), made, only=FEW, criteria=loose).names != ()

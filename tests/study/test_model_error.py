@@ -1,0 +1,132 @@
+"""The size of a model's error: known answers, noise and drift told from it, the headline, `result.json` and MLflow."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import uncertainty as study
+
+import tractexp
+from tractexp.identification.model_error import ModelError, in_percent, model_error, noise_variance
+from tractexp.identification.result import Fit
+
+
+def played(off_P=0.0, off_Q=0.0, noise=0.0, drift=0.0, seed=0, depth=0.5, name="dip"):
+    """An event of the printed equations, and a model that is off by a share of the response in P and in Q."""
+    t, U = study.Shape(depth).voltage()
+    clean = study.printed(study.TYPICAL, t, U, 0.35)
+    rng = np.random.default_rng(seed)
+    power = clean + noise * rng.standard_normal(clean.shape) + drift * np.array([[1.0], [0.0]]) * (t - 0.15)
+    event = study.event(t, U, power, name)
+    response = clean - clean[:, :1]
+    P, Q = clean[0] + off_P * response[0], clean[1] + off_Q * response[1]
+    return Fit(event=event, role="train", P=P, Q=Q, epsilon_p=0.0, epsilon_q=0.0)
+
+
+def test_a_model_that_follows_nine_tenths_of_the_response_is_off_by_a_tenth():
+    error = model_error([played(-0.1, -0.1)])
+    assert error.value == pytest.approx(0.1, rel=1e-3)
+    assert error.interval == pytest.approx((0.1, 0.1), rel=2e-3)  # the same share of every block
+    fit = played()
+    S = (fit.P + 1j * fit.Q)[fit.event.start :]
+    response = np.abs(S - S_before(fit))
+    assert error.of_S == pytest.approx(0.1 * np.sqrt(np.mean(response**2) / np.mean(np.abs(S) ** 2)), rel=1e-3)
+
+
+def S_before(fit):
+    return fit.event.P0 + 1j * fit.event.Q0
+
+
+def test_a_static_load_that_never_answers_is_off_by_all_of_it():
+    assert model_error([played(-1.0, -1.0)]).value == pytest.approx(1.0, rel=1e-3)
+
+
+def test_noise_is_not_counted_and_chance_is_in_the_interval():
+    errors = [model_error([played(noise=0.01, seed=seed)]) for seed in range(20)]
+    assert np.median([e.value for e in errors]) < 0.025  # where noise alone is 7 % of the response
+    assert all(e.interval[0] == 0.0 for e in errors)
+    half = [model_error([played(-0.1, -0.1, noise=0.01, seed=seed)]) for seed in range(20)]
+    assert np.mean([e.value for e in half]) == pytest.approx(0.1, rel=0.05)
+    assert np.mean([e.interval[0] <= 0.1 <= e.interval[1] for e in half]) > 0.7
+
+
+def test_a_drift_before_the_dip_is_no_noise():
+    quiet, drifting = (noise_variance(played(noise=4e-3, drift=d).event) for d in (0.0, 0.05))
+    assert drifting == pytest.approx(quiet, rel=0.1)
+    assert np.sqrt(quiet) == pytest.approx(np.sqrt(2) * 4e-3, rel=0.2)
+
+
+def test_events_count_by_the_size_of_their_responses():
+    one, two = played(-0.1, -0.1), played(-0.3, -0.3, depth=0.2, name="mild")
+    error, alone = model_error([one, two]), model_error([two])
+    assert alone.value == pytest.approx(0.3, rel=1e-3)
+    assert 0.1 < error.value < 0.2
+    assert error.interval[0] < error.value < error.interval[1]
+
+
+def test_what_is_missing_of_the_record_counts_nowhere_and_what_diverged_counts_without_bounds():
+    fit = played(-0.1, -0.1)
+    P = fit.event.record.P.copy()
+    P[300:320] = np.nan
+    gaps = replace(fit, event=replace(fit.event, record=replace(fit.event.record, P=P)))
+    assert model_error([gaps]).value == pytest.approx(0.1, rel=1e-3)
+    assert model_error([replace(fit, P=np.where(fit.event.record.t > 1, np.nan, fit.P))]).value == np.inf
+
+
+def test_shares_are_told_to_two_digits():
+    assert [in_percent(x) for x in (0.00571, 0.0567, 0.12345, 1.004, 12.3)] == [
+        "0.57 %",
+        "5.7 %",
+        "12 %",
+        "100 %",
+        "1230 %",
+    ]
+
+
+@pytest.fixture(scope="module")
+def fit():
+    t, U = study.Shape(0.5).voltage()
+    rng = np.random.default_rng(3)
+    dips = []
+    for k, depth in enumerate((0.5, 0.3)):
+        t, U = study.Shape(depth).voltage()
+        power = study.printed(study.TYPICAL, t, U, 0.35) + 0.02 * (t > 0.85) * np.array([[1.0], [0.0]])
+        dips.append(study.event(t, U, power + 0.002 * rng.standard_normal(power.shape), f"dip {k + 1}"))
+    small = {"model": "third_order_exponential", "optimizer": "pso", "budget": 2000, "progress": False}
+    return tractexp.identify(dips[:1], validate=dips[1:], **small, check_intervals=False)
+
+
+def test_result_json_and_the_headline_tell_it(fit, tmp_path):
+    fit.write_results(tmp_path)
+    told = json.loads((tmp_path / "result.json").read_text())["model_error"]
+    assert [(e["name"], e["role"]) for e in told["events"]] == [("dip 1", "train"), ("dip 2", "validate")]
+    assert told["value"] == told["events"][0]["value"] == fit.model_error.value
+    assert told["held_out"]["value"] == told["events"][1]["value"] == fit.model_error_held_out.value
+    low, high = told["interval"]
+    assert low <= told["value"] <= high
+    assert f"within {in_percent(told['value'])} of its response" in fit.headline
+    assert f"the held-out dips within {in_percent(told['held_out']['value'])}" in fit.headline
+    assert ModelError.of(told) == fit.model_error
+
+
+def test_a_small_reactive_power_is_told_where_its_error_is_divided_by_it(fit):
+    assert fit.result.acceptance.endswith("holds")
+    events = [e | {"Q_over_S": 0.12} for e in fit.result.events]
+    small = replace(fit.result, events=events, epsilon_q=0.2)
+    assert small.acceptance.endswith("does NOT hold (epsilon_q divides by Q alone, here 12 % of S)")
+    large = replace(fit.result, epsilon_q=0.2)
+    assert large.acceptance.endswith("does NOT hold")
+
+
+def test_a_rival_structure_is_told_of_the_parameters_that_it_moves_by_more_than_they_scatter(fit):
+    error, value = fit.result.standard_errors, fit.result.parameters
+    near, far = value["M"] + 1.9 * error["M"], value["T_m"] - 2.1 * error["T_m"]
+    rivals = [
+        {"name": "zip", "objective_ratio": 1.0, "parameters": {"M": near, "T_m": value["T_m"] - 2.05 * error["T_m"]}},
+        {"name": "second_cage", "objective_ratio": 0.9, "parameters": {"M": near, "T_m": far}},
+    ]
+    told = replace(fit, result=replace(fit.result, rival_structures=rivals))
+    assert told.moves == {"T_m": ("second_cage", far)}
+    assert told.structures == [f"with second_cage, which fits as well: T_m {far:.4g}"]
+    assert fit.structures == []

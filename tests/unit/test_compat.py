@@ -1,0 +1,161 @@
+"""Our uses of private parts of other packages: each is still needed, works, and is the only one of its kind."""
+
+import ast
+import copy
+import inspect
+import sys
+from pathlib import Path
+
+import pytest
+
+import tractexp
+from tractexp.compat import hydra_config_store, hydra_plugins
+from tractexp.compat.scipy_differential_evolution import generations
+
+HERE = Path(tractexp.__file__).parent
+OURS = {"tractexp", "tractexp_plugins"}
+MENDED = "{} is mended in the version installed: do what tractexp/compat/{}.py says at its end"
+CHANGED = "the version installed has changed what tractexp/compat/{}.py relies on: {}"
+
+
+@pytest.fixture
+def launcher():
+    """A launcher that says where it was made, as a class nobody else registers."""
+    from hydra.plugins.launcher import Launcher
+
+    class Made(Launcher):
+        def setup(self, **_):
+            self.ready = True
+
+        def launch(self, job_overrides, initial_job_idx):
+            return []
+
+    yield Made
+    vars(sys.modules[hydra_plugins.NAMESPACE]).pop("Made", None)
+
+
+def instantiated(target):
+    from hydra.core.plugins import Plugins
+    from omegaconf import OmegaConf
+
+    config = OmegaConf.create({"hydra": {"launcher": {"_target_": target}}})
+    return Plugins.instance().instantiate_launcher(hydra_context=None, task_function=None, config=config)
+
+
+def test_hydra_makes_a_launcher_from_elsewhere_only_through_the_door(launcher):
+    from hydra.core.plugins import Plugins
+
+    launcher.__qualname__ = "Made"
+    Plugins.instance().register(launcher)
+    refused = ""
+    try:
+        instantiated(f"{launcher.__module__}.Made")
+    except RuntimeError as error:
+        refused = str(error)
+    assert "not the hydra_plugins package" in refused, MENDED.format("facebookresearch/hydra#3015", "hydra_plugins")
+    hydra_plugins.admit(launcher)
+    try:
+        made = instantiated(f"{hydra_plugins.NAMESPACE}.Made")
+    except Exception as error:
+        pytest.fail(CHANGED.format("hydra_plugins", error))
+    assert type(made) is launcher
+    assert made.ready
+
+
+def test_hydra_copies_its_store_of_schemas_unless_the_door_is_open(monkeypatch):
+    from hydra.core.config_store import ConfigStore
+
+    try:
+        from hydra._internal.core_plugins.structured_config_source import StructuredConfigSource
+    except ImportError as error:
+        pytest.fail(CHANGED.format("hydra_config_store", error))
+    monkeypatch.setattr(ConfigStore, "__deepcopy__", None, raising=False)
+    monkeypatch.delattr(ConfigStore, "__deepcopy__")
+    source = StructuredConfigSource("test", "structured://")
+    if not hasattr(source, "store"):
+        pytest.fail(MENDED.format("facebookresearch/hydra#2928", "hydra_config_store"))
+    assert copy.deepcopy(source).store is not ConfigStore.instance()
+    hydra_config_store.share()
+    assert copy.deepcopy(source).store is ConfigStore.instance()
+
+
+def test_what_the_store_hands_out_is_a_copy():
+    from hydra.core.config_store import ConfigStore
+
+    store = ConfigStore.instance()
+    store.store(group="compat_test", name="made", node={"value": 1})
+    handed = store.load("compat_test/made.yaml").node
+    handed.value = 2
+    again = store.load("compat_test/made.yaml").node.value
+    store.repo.pop("compat_test")
+    assert again == 1, CHANGED.format("hydra_config_store", "ConfigStore.load hands out the schema itself")
+
+
+def test_differential_evolution_goes_a_generation_at_a_time_as_the_public_function_goes_in_one():
+    import numpy as np
+    from scipy.optimize import differential_evolution
+
+    def valley(x):
+        points.append(x.copy())
+        return ((x - 0.3) ** 2).sum(axis=0)
+
+    bounds, init = [(0, 1)] * 2, np.random.default_rng(1).random((8, 2))
+    settings = {"init": init, "polish": False, "tol": 1e-3}
+    points: list = []
+    try:
+        count = sum(1 for _ in generations(valley, bounds, np.random.default_rng(2), **settings))
+    except (ImportError, AttributeError, TypeError) as error:
+        pytest.fail(CHANGED.format("scipy_differential_evolution", error))
+    stepwise, points = points, []
+    seed = "rng" if "rng" in inspect.signature(differential_evolution).parameters else "seed"
+    seeded = {seed: np.random.default_rng(2)}
+    made = differential_evolution(valley, bounds, updating="deferred", vectorized=True, **seeded, **settings)
+    assert made.nit == count > 5
+    assert np.array_equal(np.hstack(stepwise), np.hstack(points[: len(stepwise)]))
+
+
+def reached(tree):
+    """What a module takes that is not meant for it: (line, what)."""
+    foreign = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names = [(a.name, a.asname or a.name.partition(".")[0]) for a in node.names]
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            names = [(f"{node.module}.{a.name}", a.asname or a.name) for a in node.names]
+        else:
+            continue
+        for path, name in names:
+            parts = path.split(".")
+            if parts[0] in OURS or parts[0] == "__future__":
+                continue
+            foreign[name] = path
+            if any(p == "externals" or (p.startswith("_") and not p.endswith("__")) for p in parts):
+                yield node.lineno, path
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Attribute) or not isinstance(node.value, ast.Name) or node.value.id not in foreign:
+            continue
+        path = f"{foreign[node.value.id]}.{node.attr}"
+        if isinstance(node.ctx, ast.Store) or (node.attr.startswith("_") and not node.attr.endswith("__")):
+            yield node.lineno, path
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("import os\nos._exit(1)", ["os._exit"]),
+        ("from hydra._internal.utils import x", ["hydra._internal.utils.x"]),
+        ("from joblib.externals.loky import x", ["joblib.externals.loky.x"]),
+        ("def f():\n    from hydra import Store\n    Store.__deepcopy__ = 1", ["hydra.Store.__deepcopy__"]),
+        ("from tractexp.sweep import _x\nfrom __future__ import annotations\nimport numpy as np\nnp.__version__", []),
+    ],
+)
+def test_private_parts_are_recognized(text, found):
+    assert [path for _, path in reached(ast.parse(text))] == found
+
+
+def test_private_parts_of_others_are_used_in_compat_only():
+    meant = {"os._exit"}  # documented, whatever its name
+    folders = [HERE, HERE.parent / "plugins"]
+    files = [p for folder in folders for p in folder.rglob("*.py") if p.parent != HERE / "compat"]
+    found = [f"{p}:{k}: {path}" for p in files for k, path in reached(ast.parse(p.read_text())) if path not in meant]
+    assert not found, "give each a module in tractexp/compat:\n" + "\n".join(found)

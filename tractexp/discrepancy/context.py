@@ -1,0 +1,164 @@
+"""What every step of an investigation works with: records, coordinates and the kernels that simulate them."""
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.discrepancy.catalogue import Catalogue
+from tractexp.discrepancy.coordinates import Coordinates
+from tractexp.discrepancy.cores import in_same_parts, side_by_side
+from tractexp.discrepancy.criteria import Criteria
+from tractexp.discrepancy.effort import Effort
+from tractexp.discrepancy.kernels import Family, Kernels
+from tractexp.discrepancy.records import Records
+from tractexp.domain import Domain, domain_of
+from tractexp.identification import shelf
+from tractexp.identification.descent import SeparableColumns
+from tractexp.identification.problem import Problem
+from tractexp.model.drive import Drive
+from tractexp.model.model import Model
+from tractexp.noise import Noise
+from tractexp.noise.quiet import quiet_stretches
+from tractexp.noise.random_walk import Load
+from tractexp.record import Event
+
+
+@dataclass(frozen=True, eq=False)
+class Context:
+    """A base model with its catalogue on the events of `records`. Nothing of it changes but what `effort` counts."""
+
+    load: Model
+    catalogue: Catalogue
+    records: Records
+    kernels: Kernels
+    coordinates: Coordinates
+    criteria: Criteria
+    effort: Effort
+
+    @classmethod
+    def of(
+        cls, load: Model, catalogue: Catalogue, records: Records, bounds: Mapping[str, Sequence[float]],
+        fixed: Mapping[str, float], criteria: Criteria, effort: Effort, substeps: int | None = None,
+        family: type[Family] = Family,
+    ) -> "Context":  # fmt: skip
+        """A bench for these records; the load is simulated behind the recorder's window, where there is one."""
+        kernels = Kernels(family(load.behind(records.window), catalogue), records.events, bounds, fixed, substeps)
+        coordinates = Coordinates.of(kernels.bare, kernels.whole, catalogue, criteria.measurement_prior)
+        return cls(load, catalogue, records, kernels, coordinates, criteria, effort)
+
+    def on(self, records: Records) -> "Context":
+        """The same model and catalogue on other records, with the same Runge-Kutta steps and a count of its own."""
+        kernels, criteria, effort = self.kernels, self.criteria, self.effort.anew()
+        known = kernels.bounds, kernels.fixed, criteria, effort, kernels.substeps
+        return Context.of(self.load, self.catalogue, records, *known, type(kernels.family))
+
+    @property
+    def model(self) -> Model:
+        """The base model, behind the recorder's window."""
+        return self.kernels.family.model
+
+    @functools.cached_property
+    def told(self) -> str:
+        """SHA-256 of all that a fit on this bench depends on beside noise and starts; "" where that cannot be told."""
+        load, at = self.load, self.coordinates
+        parts = (load.motor, load.static, *load.effects, *self.catalogue.effects)
+        if not all(map(shelf.installed, parts)):
+            return ""
+        known = self.problem.digest(), self.kernels.bare.digest(), self.criteria, at.null, at.prior_deviation
+        return shelf.told(shelf.behind(), repr(parts), self.records.window, *known)
+
+    @property
+    def waves(self) -> bool:
+        """Whether currents are compared, sample by sample, not the power of phasors."""
+        return self.load.waves
+
+    @property
+    def domain(self) -> Domain:
+        """What the load is compared with."""
+        return domain_of(self.load)
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        return self.records.events
+
+    @property
+    def problem(self) -> Problem:
+        """The problem of everything: base model, all candidates, pushes."""
+        return self.kernels.whole
+
+    @property
+    def drive(self) -> Drive:
+        return self.problem.drive
+
+    @functools.cached_property
+    def known(self) -> np.ndarray:
+        """Which samples count, (C, N)."""
+        return self.drive.weights > 0
+
+    @property
+    def samples(self) -> int:
+        """Values that count: of P and Q, or of the currents."""
+        return int(np.count_nonzero(self.known))
+
+    def describe(self, noise: Noise) -> str:
+        """Level and color of the noise of what is compared, as a run prints them."""
+        told = noise.describe(self.drive.spoken).split(", ")
+        return ", ".join(part for part, there in zip(told, [*np.any(self.known, axis=1), True], strict=True) if there)
+
+    @functools.cached_property
+    def power(self) -> Load:
+        """What the load takes, over what it took before each event."""
+        return Load.of(self.drive.measured, self.drive.before, self.drive.first)
+
+    @functools.cached_property
+    def quiet(self) -> list[slice]:
+        """The samples in which little happens."""
+        return quiet_stretches(self.events, self.drive)
+
+    def residuals(self, unit: np.ndarray, names: Sequence[str] | None = None, pushed: bool = False) -> np.ndarray:
+        """Calculated minus measured (n, C, N) [pu] at coordinates (n, D) where effects but `names` are at their null.
+
+        By default any effect and any push may be there, at the price of the largest kernel.
+        """
+        self.effort.spend(len(unit))
+        key = None if names is None else self.kernels.family.key(names, pushed)
+        return side_by_side(lambda part: self.kernels.residuals(key, part), unit)
+
+    def residuals_of(self, unit: np.ndarray, sets: Sequence[tuple[Sequence[str], bool]]) -> np.ndarray:
+        """As `residuals`, with a set of names for each of the coordinates, and whether a push is in it."""
+        keys = [self.kernels.family.key(names, pushed) for names, pushed in sets]
+        if len(set(keys)) == 1:
+            return self.residuals(unit, *sets[0])
+        residuals = np.empty((len(unit), self.drive.channels, self.drive.samples))
+        for key in dict.fromkeys(keys):
+            mine = np.array([k == key for k in keys])
+            first = sets[keys.index(key)]
+            residuals[mine] = self.residuals(unit[mine], *first)
+        return residuals
+
+    def whiten(self, noise: Noise, residuals: np.ndarray) -> np.ndarray:
+        """Residuals (n, C, N) as rows (n, C N) of independent unit variance."""
+        return noise.whiten(residuals, self.drive, self.known)
+
+    def whiten_many(self, noise: Noise, residuals: np.ndarray) -> np.ndarray:
+        """As `whiten`, of many residuals on all cores; not for what itself runs beside others."""
+        noise.prepare(self.drive, self.known)
+        return in_same_parts(lambda part: self.whiten(noise, part), residuals)
+
+    def rows(self, unit: np.ndarray, noise: Noise, faults: Sequence[int], sets: Sequence[Sequence[str]]) -> np.ndarray:
+        """Whitened residuals (n, C N) of coordinates with a set of names each, then the prior of the free faults."""
+        raw = self.residuals_of(unit, [(names, False) for names in sets])
+        white = self.whiten_many(noise, raw)
+        at = self.coordinates
+        prior = [(unit[:, k] - at.null[k]) / at.prior_deviation[k] for k in faults]
+        return np.concatenate([white, *(p[:, None] for p in prior)], axis=1)
+
+    def apart(self, further_rows: int) -> list[SeparableColumns]:
+        """P0 and Q0 act on the rows of their own event only; `further_rows` follow those of the records."""
+        events, size = len(self.events), self.drive.measured.size
+        rows = np.zeros((events, size + further_rows), dtype=bool)
+        for e in range(events):
+            rows[e, :size].reshape(self.drive.measured.shape)[:, self.drive.part(e)] = True
+        return [SeparableColumns(len(self.coordinates.base) + np.arange(events) * 2 + c, rows) for c in (0, 1)]

@@ -1,0 +1,161 @@
+"""A tangent under one noise, all nuisances projected out: what each candidate, push or event of its own would gain.
+
+Notation of the score test with nuisances (Rao 1948; Neyman 1959): r whitened residuals, N nuisance columns with
+their prior, M = I - N (N'N)^-1 N', s = M W dy/deta of a candidate. Adding the candidate lowers the deviance by
+(s'r)^2/s's; the one-step estimate of its size is -s'r/s's with standard deviation 1/|s|.
+"""
+
+import functools
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import chdtrc
+
+from tractexp.discrepancy.catalogue import Candidate
+from tractexp.identification import surprises
+from tractexp.identification.surprises import PER_EVENT, SMALLEST_P, Layout
+
+
+@dataclass(frozen=True, eq=False)
+class CandidateColumn:
+    """A candidate with one setting of its scanned parameters: differences (k, C, N) per unit of each size."""
+
+    candidate: Candidate
+    setting: dict[str, float]
+    raw: np.ndarray
+
+
+@dataclass(frozen=True)
+class Score:
+    """What the score test says of one candidate, at its best setting."""
+
+    name: str
+    drop: float  # of the deviance
+    p: float  # of this drop alone, not corrected for the others
+    size: dict[str, float]  # one-step estimates
+    deviation: dict[str, float]
+    setting: dict[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class ScoreTest:
+    """Whitened and with the nuisances projected out; `r` has one row per residual (one, or the bootstrap's)."""
+
+    columns: tuple[CandidateColumn, ...]
+    faults: Mapping[str, list[int]]  # which nuisances belong to which fault of the measurement
+    groups: np.ndarray  # (c,) which balance a push goes into
+    Q: np.ndarray
+    R: np.ndarray
+    r: np.ndarray  # (b, R)
+    along: np.ndarray  # (b, k) the residuals' part along the nuisances
+    departure: np.ndarray  # (k,) where the nuisances stand, off their prior mean
+    blocks: list[np.ndarray]  # per column (k, R)
+    split: np.ndarray  # (e, R)
+    cells: np.ndarray  # (c, R)
+
+    def of(self, white: np.ndarray) -> "ScoreTest":
+        """The same columns with other whitened residuals (b, C N) in place of the fit's own, off no prior mean."""
+        rows = np.concatenate([white, np.zeros((len(white), len(self.Q) - white.shape[1]))], axis=1)
+        along = rows @ self.Q
+        rows -= along @ self.Q.T
+        return replace(self, r=rows, along=along, departure=np.zeros_like(self.departure))
+
+    @functools.cached_property
+    def drops(self) -> tuple[np.ndarray, np.ndarray]:
+        """Drop of the deviance (columns, b) by adding each column, sizes in their allowed direction, and its p."""
+        drops, ps = [], []
+        for column, block in zip(self.columns, self.blocks, strict=True):
+            signs = np.array([column.candidate.sign(p) for p in column.candidate.sizes])
+            drop, p = signed_drop(block, self.r, signs)
+            drops.append(drop)
+            ps.append(p)
+        shape = (len(self.blocks), len(self.r))
+        return np.array(drops).reshape(shape), np.array(ps).reshape(shape)
+
+    def scores(self) -> list[Score]:
+        """The candidates by drop, each at its best setting, for the fit's own residual."""
+        best: dict[str, Score] = {}
+        drops, ps = self.drops
+        for k, (column, block) in enumerate(zip(self.columns, self.blocks, strict=True)):
+            name = column.candidate.name
+            if name in best and best[name].drop >= drops[k, 0]:
+                continue
+            gram = block @ block.T
+            inverse = np.linalg.pinv(gram, rcond=1e-10, hermitian=True)
+            size = -inverse @ (block @ self.r[0])
+            labels = [p.name for p in column.candidate.sizes]
+            spread = np.sqrt(np.maximum(np.diag(inverse), 0.0))
+            spread = np.where(np.diag(gram) > 0, spread, np.inf)
+            best[name] = Score(
+                name, float(drops[k, 0]), float(ps[k, 0]), dict(zip(labels, size.tolist(), strict=True)),
+                dict(zip(labels, spread.tolist(), strict=True)), column.setting,
+            )  # fmt: skip
+        return sorted(best.values(), key=lambda s: (s.p, -s.drop))
+
+    def fault_p(self) -> dict[str, np.ndarray]:
+        """p of each fault of the measurement, (b,): its estimate over its standard deviation, prior included."""
+        result = {}
+        inverse = np.linalg.pinv(self.R, rcond=1e-12)  # N'N = R'R
+        estimate = -self.along @ inverse.T  # departures of the nuisances, (b, k)
+        covariance = inverse @ inverse.T
+        for name, members in self.faults.items():
+            whole = estimate[:, members] + self.departure[members]
+            inner = np.linalg.pinv(covariance[np.ix_(members, members)], rcond=1e-12, hermitian=True)
+            result[name] = chdtrc(len(members), np.einsum("bi,ij,bj->b", whole, inner, whole))
+        return result
+
+    def unrest(self) -> np.ndarray:
+        """How much injections of all balances and windows still find, (b,): the structured test of adequacy."""
+        power = np.einsum("cr,cr->c", self.cells, self.cells)
+        kept = power > 1e-8 * power.max(initial=1e-300)
+        z = (self.r @ self.cells[kept].T) ** 2
+        groups = self.groups[kept]
+        scale = np.array([power[kept][groups == g].mean() for g in groups])
+        return (z / scale).sum(axis=1)
+
+    @property
+    def least_p(self) -> np.ndarray:
+        """The smallest p (b,) of all candidates."""
+        return np.maximum(self.drops[1].min(axis=0, initial=1.0), SMALLEST_P)
+
+    def channels(self, layout: Layout) -> np.ndarray:
+        """The residuals (b, C, N), without the rows of the prior."""
+        drive = layout.drive
+        return self.r[:, : drive.measured.size].reshape(len(self.r), drive.channels, -1)
+
+    def statistics(self, layout: Layout) -> dict[str, np.ndarray]:
+        """What no candidate accounts for, by what each test looks for: a sum (b,), or the largest of many (b, k)."""
+        by_test = {
+            "pushes into the balances": self.unrest(),
+            "a further effect": -np.log(self.least_p)[:, None],
+            **surprises.statistics(self.channels(layout), layout),
+        }
+        if len(layout.events) > 1:
+            by_test[PER_EVENT] = surprises.of_each_event(self.r, self.split, least=1e-12)
+        return by_test
+
+
+def signed_drop(block: np.ndarray, r: np.ndarray, signs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Drop (b,) of |r|^2 by a least-squares multiple of the rows of `block` that keeps the signs, and its p.
+
+    A size on its bound loses half of its chi-square: p is that of a chi-bar-square (Self and Liang 1987).
+    """
+    gram = block @ block.T
+    top = np.diag(gram).max(initial=0.0)
+    if not top > 1e-12:
+        return np.zeros(len(r)), np.ones(len(r))
+    side = r @ block.T  # (b, k)
+    inverse = np.linalg.pinv(gram, rcond=1e-10, hermitian=True)
+    size = -side @ inverse
+    drop = -np.einsum("bi,bi->b", size, side)
+    if len(signs) == 1:
+        if signs[0]:
+            drop = np.where(size[:, 0] * signs[0] > 0, drop, 0.0)
+            return drop, np.where(drop > 0, 0.5 * chdtrc(1, drop), 1.0)
+        return drop, chdtrc(1, drop)
+    wrong = ((size * signs) < 0).any(axis=1)
+    if wrong.any():
+        single = np.where((-side * signs >= 0) | (signs == 0), side**2 / np.maximum(np.diag(gram), 1e-300), 0.0)
+        drop = np.where(wrong, single.max(axis=1), drop)
+    return drop, chdtrc(len(signs), drop)

@@ -1,0 +1,65 @@
+"""The valleys of a model: its best fits from all over its box, because a few random starts may all miss the best.
+
+What a model seems to miss in a wrong valley is not missing, and what is estimated there is not the estimate.
+"""
+
+import numpy as np
+
+from tractexp.identification.descent import Descent, descend
+from tractexp.identification.likelihood import Likelihood
+from tractexp.identification.problem import Problem
+from tractexp.parameter import best_distinct, even
+
+SCREENED = 4096  # points of the box that are simulated
+STARTS, APART = 24, 0.5  # the best of them that are so far apart in the unit cube
+FEW, SAME, PROMISING = 8, 0.05, 10  # iterations after which only so many, so far apart, are refined
+MORE, TOLERANCE = 12, 0.1  # iterations of those, and of the deviance
+KEPT, DISTINCT = 4, 0.2  # of their ends, and how far apart in the unit cube: several end in the same valley
+ALONG = (0.3, 0.6, 0.9)  # of the way to the wall: where other valleys are looked for
+
+
+def screened(problem: Problem) -> tuple[np.ndarray, float]:
+    """The most promising points (at most 24, d) of the box by Eq. (8), far apart, and the least objective [pu²]."""
+    points = even(SCREENED, problem.space.dimension)
+    objective = problem.objective(problem.space.from_unit(points))
+    return points[best_distinct(points, objective, APART, STARTS, norm=2)], float(objective.min())
+
+
+def explored(likelihood: Likelihood, points: np.ndarray | None = None) -> Descent:
+    """Where descents from promising `points` (n, d) of the box, by default those screened, end: at most 10."""
+    apart = likelihood.apart
+    points = screened(likelihood.problem)[0] if points is None else points
+    begun = descend(likelihood.rows, likelihood.placed(points), None, FEW, TOLERANCE, apart)
+    free = slice(points.shape[1])
+    promising = begun.unit[best_distinct(begun.unit[:, free], begun.deviance, SAME, PROMISING, norm=2)]
+    return descend(likelihood.rows, promising, None, MORE, TOLERANCE, apart)
+
+
+def best_fits(likelihood: Likelihood) -> np.ndarray:
+    """Coordinates (at most 4, free + 2 E) of the best fits of distinct valleys: parameters, P0 and Q0 of each event.
+
+    The best of them may not stay so once what the recorder did is free.
+    """
+    return distinct(explored(likelihood), likelihood.free)
+
+
+def distinct(ends: Descent, free: int) -> np.ndarray:
+    """Coordinates (at most 4, D) of the ends of distinct valleys, the best first."""
+    return ends.unit[best_distinct(ends.unit[:, :free], ends.deviance, DISTINCT, KEPT, norm=2)]
+
+
+def along_least_certain(likelihood: Likelihood, unit: np.ndarray) -> np.ndarray:
+    """Points (6, D) on either side of an optimum (D,), in the direction that the records know least.
+
+    Where q_v is near 2, for instance, the static load takes over the motor's U²/X' and any C will do, so that there
+    is one valley on either side of it.
+    """
+    _, J = likelihood.jacobian(unit)
+    direction = np.linalg.svd(J[:, : likelihood.free], full_matrices=False)[2][-1]
+    points = []
+    for way in (direction, -direction):
+        room = np.where(way > 0, 1 - unit[: len(way)], unit[: len(way)]) / np.maximum(np.abs(way), 1e-12)
+        for share in ALONG:
+            points.append(unit.copy())
+            points[-1][: len(way)] += share * room.min() * way
+    return np.array(points)
