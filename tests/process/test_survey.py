@@ -114,7 +114,7 @@ def test_the_page_is_sorted_and_filtered_where_it_is_read(surveyed, tmp_path):
 
     class Whole:
         def write(self, path):
-            return survey.page(path, surveyed.content)
+            return survey.report(surveyed.content).save(path)
 
     script = """
     const names = () => [...document.querySelectorAll("#body tr td:first-child")].map(cell => cell.textContent);
@@ -230,7 +230,7 @@ def test_the_events_that_tell_most_are_the_deep_ones_and_one_command_fits_them(p
     assert max(e["epsilon_p"] for e in result["events"]) < 0.01
     again = run_command(*asked, cwd=tmp_path)
     assert "5 files" in again.stdout
-    assert "0 of them new or changed" in again.stdout
+    assert "0 new or changed" in again.stdout
 
 
 def test_events_are_ranked_by_noise_as_well_as_by_depth(tmp_path):

@@ -39,9 +39,9 @@ def unexplained():
     return investigate(base(), made[:2], made[2:], {}, {}, only=FEW)
 
 
-def page(found, folder, **more):
+def page(found, folder):
     """The words of the page, and what its charts draw."""
-    path = discrepancy.page(folder / "discrepancy.html", found, "event1, event2", **more)
+    path = discrepancy.report(found, content(found), "event1, event2").save(folder / "discrepancy.html")
     drawn = re.findall(r'<script type="application/json">([^<]*)</script>', path.read_text(encoding="utf-8"))
     return words_of(path), [json.loads(each) for each in drawn]
 

@@ -16,7 +16,7 @@ from tractexp.identification.profile import End, Profile, checked, profiles, rev
 from tractexp.identification.uncertainty import conclude, threshold
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, ParameterVerdict
 from tractexp.report import posterior
-from tractexp.report.profile import meaning, page
+from tractexp.report.profile import meaning, report
 
 
 def events(depths, deviation, seed=1, Q_s0=0.35):
@@ -136,7 +136,7 @@ def drawn(path):
 
 def test_the_page_draws_each_profile_with_its_parabola_threshold_and_interval(quiet, tmp_path):
     found = profiles(quiet)
-    told, charts = read(page(tmp_path / "profile.html", found)), drawn(tmp_path / "profile.html")
+    told, charts = read(report(found).save(tmp_path / "profile.html")), drawn(tmp_path / "profile.html")
     for chart, profile, value, half in zip(charts, found.profiles, quiet.values, quiet.half, strict=True):
         assert chart["layout"]["title"]["text"] == f"{profile.name}: identified"
         curves = {trace["name"]: trace for trace in chart["data"] if trace["name"]}
@@ -162,7 +162,7 @@ def test_the_page_of_a_model_that_lacks_something_says_what_its_intervals_hold(t
     known = study.judged(Problem(study.model(), [spoiled]), study.TYPICAL).uncertainty
     assert not known.exact
     found = profiles(known, names=["M", "p_v"])
-    told = read(page(tmp_path / "profile.html", found, "an effect is missing"))
+    told = read(report(found, "an effect is missing").save(tmp_path / "profile.html"))
     assert "An effect is missing." in told.words
     assert "More than noise is left, so these are intervals of least squares" in told.words
     assert all(profile.interval[0] < value < profile.interval[1] for profile, value in zip(
@@ -175,7 +175,7 @@ def test_the_page_of_a_posterior_shows_its_draws_beside_the_fit(quiet, tmp_path)
     draws = quiet.values + error * rng.standard_normal((20_000, len(error)))
     draws[:, 1] += 1.5 * error[1]  # of one parameter they lie elsewhere
     draws[:, 6] = quiet.values[6] + error[6] * (draws[:, 2] - quiet.values[2]) / error[2]  # as C does, so does q_v
-    path = posterior.page(tmp_path / "posterior.html", quiet, Posterior(quiet.names, draws, 2000, 50.0, 0.3, 1))
+    path = posterior.report(quiet, Posterior(quiet.names, draws, 2000, 50.0, 0.3, 1)).save(tmp_path / "posterior.html")
     told, charts = read(path).words, drawn(path)
     assert "but those of X_prime: take the posterior's." in told
     assert "The chain lasts 40 autocorrelation times; 50 are asked for: raise steps." in told

@@ -216,7 +216,7 @@ class Investigation(Written):
         """How far off the models are, on the fitted and on the held-out events."""
         from tractexp.report import discrepancy
 
-        return discrepancy.gap(self)
+        return discrepancy.gap(self.content)
 
     def summary(self) -> Report:
         from tractexp.report import discrepancy
@@ -226,7 +226,7 @@ class Investigation(Written):
     def report(self) -> Report:
         from tractexp.report import discrepancy
 
-        return discrepancy.report(self)
+        return discrepancy.report(self.steps, self.content, ", ".join(e.record.name for e in self.question.train))
 
     def to_dict(self) -> dict[str, Any]:
         return {"question": self.question.to_dict(), "content": dict(self.content), "result": asdict(self.result)}

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,7 +21,6 @@ from tractexp.discrepancy.evidence import (
     why_not_the_most_helpful,
 )
 from tractexp.discrepancy.forms import CATALOGUE, FittedLaw, forms
-from tractexp.discrepancy.gap import Curves
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import ParameterEstimate, estimates
@@ -36,7 +35,6 @@ from tractexp.wording import as_sentence, in_words, joined, percent, with_error
 
 if TYPE_CHECKING:
     from tractexp.api.discrepancy import Investigation as Outcome
-    from tractexp.api.discrepancy import Misfit
 
 KIND = {"none": "good", "named": "good", "tied": "plain", "unexplained": "bad"}
 COLORS = {CHOSEN: "#009E73", KEPT: "#E69F00"}
@@ -64,7 +62,7 @@ def summary(found: "Outcome") -> Report:
     grade, which = content["adequacy"], "extended" if found.names else "base"
     report.items([found.reason, *found.sizes, *[left] * bool(left), *found.proposed])
     report.items([f"the {which} model is graded {grade['grade'].replace('_', ' ')}: {grade['sentence']}"])
-    report.add(gap(found))
+    report.add(gap(content))
     if places := content["where"]:
         loudest, others = places[0], len(places) - 1
         span = f"{loudest['start']:.3f} to {loudest['end']:.3f} s"
@@ -81,27 +79,26 @@ def summary(found: "Outcome") -> Report:
     return report.text(f"noise: {content['noise']}", f"next: {found.recommendation}")
 
 
-def gap(found: "Outcome") -> Table:
+def gap(content: Mapping[str, Any]) -> Table:
     """How far off the base model is, and the extended one where an effect was named."""
-    gaps, waves, rows = found.gap, found.gap.train.before.epsilon_i is not None, []
-    for label, one in (("fitted", gaps.train), ("held out", gaps.validate)):
-        stages = (("base model", one.before), ("extended model", one.after)) if one else ()
-        for stage, c in stages if found.names else stages[:1]:
-            closed = f"{one.closed:.0%}" if one and c is one.after and one.closed is not None else ""
-            rows.append([label, stage, *_off(c), closed])
+    gaps, named, rows = content["gap"], bool(content["effects"]), []
+    for label, role in (("fitted", "train"), ("held out", "validate")):
+        for model, stage in (("base model", "before"), ("extended model", "after"))[: 1 + named]:
+            if (one := gaps[role]) is not None:
+                closed = one["closed"] if stage == "after" else None
+                rows.append([label, model, *_off(one[stage]), "" if closed is None else f"{closed:.0%}"])
+    waves = "epsilon_i" in gaps["train"]["before"]
     columns = ["events", "model", "epsilon_p", "epsilon_q", *["epsilon_i"] * waves, "chi2 per sample"]
     caption = f"epsilon: relative error of P and Q, Eq. (20){CURRENTS * waves}."
     caption += " chi2 per sample: 1 where only noise is left."
-    if found.names:
+    if named:
         columns.append("gap closed")
         caption += " Gap closed: the share of what an explanation could gain at all."
     return Table(columns, [row[: len(columns)] for row in rows], "", caption, words=(1,))
 
 
-def report(outcome: "Outcome") -> Report:
-    """The investigation, for a reader who was not there."""
-    found = outcome.steps
-    title = ", ".join(e.record.name for e in outcome.question.train)
+def report(found: Findings, content: Mapping[str, Any], title: str) -> Report:
+    """The investigation, for a reader who was not there; `content` is that of `discrepancy.json`."""
     events = len(found.context.events)
     lead = f"{found.context.model.title}, {events} event{'s' * (events > 1)} fitted, {len(found.withheld)} held out"
     made = Report(f"Missing effect: {title}", lead)
@@ -111,7 +108,7 @@ def report(outcome: "Outcome") -> Report:
     sentences = [as_sentence(found.verdict.reason), *left, *headlines(found), _graded(found)]
     made.verdict(head, *sentences, f"Next: {recommendation(found)}.", kind=KIND[found.verdict.word])
     overlaid(made.heading("Measured, before, after" if found.names else "Measured and calculated"), found.overlays)
-    _smaller(made, outcome)
+    _smaller(made, found, content)
     if found.verdict.word == UNEXPLAINED:
         proposed(made, found)
         _left(made, found)
@@ -135,11 +132,10 @@ def _graded(found: Findings) -> str:
     return f"The {which} model is graded {grade.grade.replace('_', ' ')}: {grade.sentence}."
 
 
-def _smaller(made: Report, outcome: "Outcome") -> None:
+def _smaller(made: Report, found: Findings, content: Mapping[str, Any]) -> None:
     """The gap; of waveforms that nothing explains, that of the nearest candidates beside it."""
-    found = outcome.steps
     made.heading("How large the gap is" if not found.names else "How much smaller the gap is")
-    table, near = gap(outcome), found.verdict.nearest
+    table, near = gap(content), found.verdict.nearest
     made.add(replace(table, rows=_with_nearest(near)) if found.context.waves and near else table)
     if found.fitted_to_both:
         made.text("The extended model was fitted to the held-out events, too: what they say of it is no test of it.")
@@ -147,15 +143,17 @@ def _smaller(made: Report, outcome: "Outcome") -> None:
 
 def _with_nearest(near: Nearest) -> list[list[str]]:
     """The base model's gap and that of the candidates which come nearest."""
-    told = (("fitted", near.curves), ("held out", near.carried))
+    pairs = (("fitted", near.curves), ("held out", near.carried))
     stages = ("base model", "nearest candidates")
-    return [[label, stage, *_off(c)] for label, both in told if both for stage, c in zip(stages, both, strict=True)]
+    return [
+        [label, stage, *_off(vars(c))] for label, both in pairs if both for stage, c in zip(stages, both, strict=True)
+    ]
 
 
-def _off(c: "Curves | Misfit") -> list[str]:
-    """How far off curves are, as a table tells it."""
-    errors = [f"{e:.3%}" for e in (c.epsilon_p, c.epsilon_q, c.epsilon_i) if e is not None]
-    return [*errors, f"{c.chi2_per_sample:.3f}"]
+def _off(misfit: Mapping[str, Any]) -> list[str]:
+    """How far off curves are, as a table has it."""
+    errors = [misfit["epsilon_p"], misfit["epsilon_q"], *[misfit.get("epsilon_i")]]
+    return [*(f"{e:.3%}" for e in errors if e is not None), f"{misfit['chi2_per_sample']:.3f}"]
 
 
 def _left(made: Report, found: Findings) -> None:
