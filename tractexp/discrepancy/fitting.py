@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tractexp import store
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.fit_effort import (
@@ -28,7 +29,6 @@ from tractexp.discrepancy.fit_effort import (
     STARTS_IN_TURNS,
 )
 from tractexp.discrepancy.promising import promising
-from tractexp.identification import shelf
 from tractexp.identification.descent import descend
 from tractexp.noise import Noise
 
@@ -215,10 +215,10 @@ def _descended(
         done = descend(rows, begin, table == at.dimension, *effort, context.apart(len(prior)))
         return done.unit, done.deviance, np.array(spent)
 
-    what = context.digest and shelf.told(
+    key = context.digest and store.key(
         context.digest, noise, [(tuple(names), unit) for names, unit in wanted], prior, effort
     )
-    unit, deviance, simulations = shelf.arrays("descents", what, descended) if what else descended()
+    unit, deviance, simulations = store.DESCENTS.arrays(key, descended)
     context.effort.spend(int(simulations) - spent)  # of what was made before, what it took then
     np.put_along_axis(starts, table, unit, axis=1)
     return [

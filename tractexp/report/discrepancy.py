@@ -59,9 +59,8 @@ CURRENTS = (
 def summary(found: "Outcome") -> Report:
     """The verdict first, then how large the gap is and how much of it is closed, where, and what to do next."""
     content, left = found.content, found.remainder.caption
-    report = Report().text(
-        "", f"verdict: {found.verdict.upper()} {' or '.join(map(joined, content['name_sets']))}".rstrip()
-    )
+    names = " or ".join(map(joined, content["name_sets"]))
+    report = Report().text(f"verdict: {found.verdict.upper()} {names}".rstrip())
     grade, which = content["adequacy"], "extended" if found.names else "base"
     report.items([found.reason, *found.sizes, *[left] * bool(left), *found.proposed])
     report.items([f"the {which} model is graded {grade['grade'].replace('_', ' ')}: {grade['sentence']}"])
