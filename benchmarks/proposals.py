@@ -115,7 +115,7 @@ def row(case: str, seed: int) -> dict:
     from tractexp.discrepancy.disagreement import disagreement
     from tractexp.discrepancy.effort import Effort
     from tractexp.discrepancy.fitting import refit
-    from tractexp.discrepancy.proposal.propose import propose, told
+    from tractexp.discrepancy.proposal.propose import propose, to_dict
     from tractexp.discrepancy.records import Records
     from tractexp.model.model import compose
     from tractexp.plugin import get
@@ -132,7 +132,7 @@ def row(case: str, seed: int) -> dict:
     first = disagreement(base, 0)
     bare = refit(bench, first.noise, [((), bench.coordinates.without_faults(first.fit.unit, ()))], faults=())[0]
     found = propose(base, first, bare, first.noise, held, 0)
-    content = told(found, "")
+    content = to_dict(found, "")
     best = found.tried[0][1]
     name = found.proposal.term.name if found.proposal else found.tried[0][0].name
     _, balance, signal = name.split(":")[:3]

@@ -20,7 +20,7 @@ import numpy as np  # noqa: E402
 from memory import peak, reset  # noqa: E402
 
 from tractexp import files  # noqa: E402
-from tractexp.recording import Channel, Feeder, Recording, Segment, Status, comtrade  # noqa: E402
+from tractexp.recording import Channel, Feeder, Recording, Segment, StatusChannel, comtrade  # noqa: E402
 from tractexp.recording.measure import phasors_of  # noqa: E402
 
 RATE = 4000
@@ -35,7 +35,7 @@ def record(minutes):
         name, unit, quantity = ("U", "kV", "voltage") if k < 3 else ("I", "A", "current")
         phase = "abc"[k % 3]
         channels.append(Channel(name + phase, np.round(wave).astype(np.int16), unit, quantity, phase, "Bus", 0.01))
-    states = [Status(name, np.zeros(len(t), np.uint8)) for name in ("trip", "close")]
+    states = [StatusChannel(name, np.zeros(len(t), np.uint8)) for name in ("trip", "close")]
     return Recording("made", channels, [Segment(0, len(t), float(RATE), 0.0)], 50.0, status=states)
 
 

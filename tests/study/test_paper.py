@@ -248,11 +248,10 @@ def test_workers_change_no_result():
 
 @pytest.fixture
 def memory(tmp_path, monkeypatch):
-    """A cache of its own, in which nothing is remembered yet; the kernels are those of the others."""
+    """A store of its own for searches, empty; the kernels are those of the others."""
+    from tractexp import store
 
-    from tractexp.identification import shelf
-
-    monkeypatch.setattr(shelf, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(store.SEARCHES, "folder", tmp_path)
     return tmp_path / "searches"
 
 
@@ -292,20 +291,20 @@ def test_a_search_of_anything_else_is_never_read_back(memory, monkeypatch):
     assert searched(monkeypatch)[1] == 2
 
 
-def test_a_damaged_memory_is_made_anew_and_the_oldest_are_forgotten(memory, monkeypatch):
-    from tractexp.identification import shelf
+def test_a_damaged_search_is_made_again_and_the_oldest_are_forgotten(memory, monkeypatch):
+    from tractexp import store
 
     searched(monkeypatch)
     for k, path in enumerate(memory.iterdir()):
         path.write_bytes([b"no zip", path.read_bytes()[:200]][k])
     assert searched(monkeypatch)[1] == 2
     assert searched(monkeypatch)[1] == 0
-    monkeypatch.setitem(shelf.SHELVES, "searches", 3)
+    monkeypatch.setattr(store.SEARCHES, "limit", 3)
     searched(monkeypatch, seeds=5)
     assert len(list(memory.iterdir())) == 3
 
 
-def test_a_search_that_a_clock_may_end_is_not_remembered(memory, monkeypatch):
+def test_a_search_that_a_clock_may_end_is_not_stored(memory, monkeypatch):
     limits = searches.Limits(150, seconds=60.0)
     searches.run(_recipe, {"pso": {"name": "pso"}}, 1, limits, workers=1)
     assert not memory.exists()

@@ -17,7 +17,7 @@ from tractexp.record import Event
 from tractexp.studies.comparison.statistics import expected_running_time, vargha_delaney, wilcoxon
 from tractexp.studies.paper import equations, maps, orders, printed, searches, valleys
 from tractexp.studies.paper.printed import COMPARED, EQUAL, ITERATIONS, LITERAL, READINGS, TEN
-from tractexp.studies.paper.remembered import Remembered
+from tractexp.studies.paper.search_store import SearchStore
 
 ALPHAS = (0.1, 0.3, 0.5, 0.7, 0.9)  # of the tent map
 TARGETS = (10.0, 2.0)  # of running times, times the floor
@@ -202,7 +202,7 @@ class Study:
             ends = descend()
             return ends.objective, ends.values
 
-        return valleys.Ends(*Remembered(problem, Limits()).arrays(text, compute))
+        return valleys.Ends(*SearchStore(problem, Limits()).arrays(text, compute))
 
     @functools.cached_property
     def control(self) -> valleys.Ends:
