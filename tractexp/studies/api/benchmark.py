@@ -177,13 +177,17 @@ class Benchmark(Task, call=benchmark, given=("optimizers",)):
             get("optimizer", name)
 
     def perform(self, job: Job, **instead: Any) -> BenchmarkResult:
+        cores = self.cores or (1 if job.in_sweep else None)
+        return super().perform(job, optimizers=self.optimizers(job), cores=cores, progress=None, **instead)
+
+    def optimizers(self, job: Job) -> dict[str, Any]:
+        """The optimizer of the job, and those it is set against as they are by default, by name."""
         chosen = job.choices["optimizer"]
-        optimizers = {chosen: job.chosen}
+        optimizers: dict[str, Any] = {chosen: job.chosen}
         for name in self.against:
             if build("optimizer", {"name": name}) != job.optimizer:
                 optimizers[f"{name} by default" if name == chosen else name] = {"name": name}
-        cores = self.cores or (1 if job.in_sweep else None)
-        return super().perform(job, optimizers=optimizers, cores=cores, progress=None, **instead)
+        return optimizers
 
     def log(self, job: Job, result: BenchmarkResult, paths: list[Path]) -> None:
         """The experiment is named after the benchmark: it has no data of the user's."""

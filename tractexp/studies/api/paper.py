@@ -80,7 +80,7 @@ class PaperResult(Written):
 
     def write_results(self, folder: Path) -> list[Path]:
         """paper.json: the claims and what was measured."""
-        content = {key: value for key, value in self.to_dict().items() if key != "setup"}
+        content = {key: value for key, value in self.to_dict().items() if key not in ("setup", "seconds")}
         return [files.write_json(folder / "paper.json", content)]
 
     def drawings(self) -> Mapping[str, Drawing]:
@@ -89,7 +89,7 @@ class PaperResult(Written):
     def to_dict(self) -> dict[str, Any]:
         return {
             "claims": [asdict(claim) for claim in self.claims], "settings": dict(self.settings),
-            "parts": list(self.parts), "setup": self.setup.to_dict(),
+            "parts": list(self.parts), "seconds": self.seconds, "setup": self.setup.to_dict(),
         }  # fmt: skip
 
     @classmethod
@@ -97,7 +97,8 @@ class PaperResult(Written):
         from tractexp.studies.paper.claims import Claim
 
         claims = [Claim(**claim) for claim in content["claims"]]
-        return cls(Setup.from_dict(content["setup"]), content["settings"], content["parts"], claims)
+        seconds = content.get("seconds", 0.0)
+        return cls(Setup.from_dict(content["setup"]), content["settings"], content["parts"], claims, seconds=seconds)
 
 
 @public
