@@ -148,7 +148,8 @@ def test_the_package_of_the_documentation_is_the_one_that_is_installed_here():
     assert tomllib.loads(told) == tomllib.loads((TESTS / "acme" / "pyproject.toml").read_text(encoding="utf-8"))
 
 
-def test_the_documentation_tells_every_word_of_the_equations_and_every_site():
+def test_the_documentation_tells_every_word_of_the_equations_and_every_site(tmp_path):
+    from site_pages import sites
     from tractexp.model.equations import Equations
     from tractexp.model.sites import SITES
 
@@ -160,8 +161,9 @@ def test_the_documentation_tells_every_word_of_the_equations_and_every_site():
         "real", "latex", "outputs",
     }  # fmt: skip
     assert told == {w for w in (*dir(Equations), *vars(Equations())) if not w.startswith("_")} - framework
+    listed = sites.write(tmp_path).read_text(encoding="utf-8")
     for site in SITES.values():
-        assert f"| `{site.name}` | {site.owner} | {site.kind} | {site.unit} | {site.about} |" in text
+        assert f"| `{site.name}` | {site.owner} | {site.kind} | {site.unit} | {site.about} |" in listed
 
 
 def test_without_the_package_its_names_are_unknown(tmp_path):

@@ -1,13 +1,15 @@
 """What the site generates, and what its pages say about the code; .ci/run builds it with warnings as errors."""
 
 import ast
+import dataclasses
 import re
 from pathlib import Path
 
 import pytest
 
-from site_pages import api, catalogue, commands, markdown, tasks
+from site_pages import api, catalogue, commands, criteria, markdown, tasks
 from tractexp import PUBLIC
+from tractexp.discrepancy.criteria import Criteria
 from tractexp.extend import Effect, Parameter
 from tractexp.model.printed import changed
 from tractexp.plugin import discover, get
@@ -124,6 +126,13 @@ def test_every_public_call_and_every_base_is_on_the_page_of_calls(tmp_path):
         assert f":: tractexp.{name}\n" in page
     for cls in (Effect, Parameter):
         assert f".. autoclass:: tractexp.extend.{cls.__name__}\n" in page
+
+
+def test_every_criterion_is_on_its_page_with_its_origin(tmp_path):
+    page = criteria.write(tmp_path).read_text(encoding="utf-8")
+    for field in dataclasses.fields(Criteria):
+        assert f"| `{field.name}` | {field.default:g} |" in page
+        assert f"| {field.metadata['origin']} |" in page
 
 
 def test_every_page_is_in_the_contents():

@@ -2,11 +2,17 @@
 
 from pathlib import Path
 
-from site_pages import api, catalogue, tasks
+from site_pages import api, catalogue, criteria, sites, tasks
 
 
 def write(folder: Path) -> None:
-    """Write the catalogues, the pages of the tasks and the list of public calls."""
-    made = [*catalogue.write(folder / "catalogue"), *tasks.write(folder / "tasks"), api.write(folder)]
+    """Write the catalogues, the pages of the tasks, the lists of calls, criteria and sites."""
+    made = [
+        *catalogue.write(folder / "catalogue"),
+        *tasks.write(folder / "tasks"),
+        api.write(folder),
+        criteria.write(folder),
+        sites.write(folder),
+    ]
     for stale in set(folder.rglob("*.md")) - set(made):
         stale.unlink()

@@ -23,7 +23,7 @@ from tractexp.identification.surprises import SMALLEST_P, Layout, tail
 from tractexp.noise.span import spanned
 
 DRAWS = 199
-# p of what a fit leaves, below which it leaves something. Chosen on the calibration series of benchmarks/adequacy.py:
+# p of what a fit leaves, below which it leaves something. Chosen on calibration seeds:
 # where nothing is missing one set in fifty has a smaller one, with an effect of four detection limits nearly all have.
 ADEQUATE_P = 0.001
 DISTINCT = 1e-3  # of the largest: weaker directions are rounding
