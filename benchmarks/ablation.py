@@ -14,32 +14,42 @@ from typing import Any
 import marked
 
 from tractexp import files
+from tractexp.comparison.statistics import ALPHA
 
 ROOT = Path(__file__).resolve().parents[1]
 STORED, PAGE, NAME = ROOT / "benchmarks" / "ablation.json", ROOT / "docs" / "comparison.md", "benchmarks/ablation.py"
-KEPT = ("terms", "where", "columns", "measure", "figures", "ranks", "ablation", "cost", "share")
+FIELDS = ("terms", "where", "columns", "measure", "figures", "ranks", "ablation", "cost", "share")
 
 
 def store(sweep: Path) -> None:
     """Keep what a sweep's `comparison.json` says of all problems together."""
-    told = json.loads((sweep / "comparison.json").read_text(encoding="utf-8"))
-    overall = [{key: part[key] for key in KEPT} for part in told["overall"]]
+    comparison = json.loads((sweep / "comparison.json").read_text(encoding="utf-8"))
+    overall = [{key: part[key] for key in FIELDS} for part in comparison["overall"]]
     job = json.loads((sweep / "0" / "result.json").read_text(encoding="utf-8"))
-    kept = {"commit": job["commit"], "sentences": told["sentences"], "overall": overall}
-    files.write_json(STORED, kept)
+    files.write_json(STORED, {"commit": job["commit"], "overall": overall})
 
 
-def text(kept: Mapping[str, Any]) -> str:
+def text(stored: Mapping[str, Any]) -> str:
     """The text of the docs: the best variants, the effect of each ingredient, and the mean ranks, on each problem."""
-    parts = kept["overall"]
-    ranked = [sentence for sentence in kept["sentences"] if "has the best mean rank" in sentence]
+    parts = stored["overall"]
     lines = [
-        f"Measured at commit `{kept['commit'][:7]}`.",
+        f"Measured at commit `{stored['commit'][:7]}`.",
         "",
-        *(f"- {s}" for s in ranked),
+        *(f"- {_best(part)}" for part in parts),
         f"- {_interactions(parts)}",
     ]
     return "\n".join([*lines, "", *_effects(parts), "", *_ranked(parts)])
+
+
+def _best(part: Mapping[str, Any]) -> str:
+    """Which variant has the best mean rank, and how many do not differ from it significantly."""
+    ranks = part["ranks"]
+    (rank, name), *others = sorted(zip(ranks["mean"], ranks["names"], strict=True))
+    alike = [other for mean, other in others if mean - rank < ranks["critical_difference"]]
+    said = f"{part['terms']}, {part['where']}: `{name}` has the best mean rank, {rank:.2f} of {len(ranks['names'])}"
+    if ranks["p"] >= ALPHA:
+        return f"{said}, but the variants do not differ significantly (Friedman, p = {ranks['p']:.2g})."
+    return f"{said}; {len(alike)} others are not significantly different."
 
 
 def _interactions(parts: Sequence[Mapping[str, Any]]) -> str:
