@@ -1,4 +1,4 @@
-"""Everything generated, written into one folder; what is no longer made is deleted."""
+"""Everything generated, written into one folder; stale pages are deleted."""
 
 from pathlib import Path
 
@@ -7,12 +7,12 @@ from site_pages import api, catalogue, criteria, sites, tasks
 
 def write(folder: Path) -> None:
     """Write the catalogues, the pages of the tasks, the lists of calls, criteria and sites."""
-    made = [
+    pages = [
         *catalogue.write(folder / "catalogue"),
         *tasks.write(folder / "tasks"),
         api.write(folder),
         criteria.write(folder),
         sites.write(folder),
     ]
-    for stale in set(folder.rglob("*.md")) - set(made):
+    for stale in set(folder.rglob("*.md")) - set(pages):
         stale.unlink()

@@ -22,9 +22,9 @@ def write(folder: Path) -> list[Path]:
     pages = [files.write(folder / f"{name}.md", _page(cls, shown)) for name, cls in tasks]
     rows = [[f"[`{name}`]({name}.md)", plain(sentence(cls.__doc__ or ""))] for name, cls in tasks]
     toctree = "```{toctree}\n:hidden:\n\n" + "\n".join(name for name, _ in tasks) + "\n```\n"
-    told = f"Chosen by `task=NAME`; `{defaults()['task']}` where none is named.\n"
+    intro = f"Chosen by `task=NAME`; `{defaults()['task']}` where none is named.\n"
     listed = files.write(
-        folder / "index.md", "\n".join(["# Tasks\n", told, table(["task", "what it does"], rows), toctree])
+        folder / "index.md", "\n".join(["# Tasks\n", intro, table(["task", "what it does"], rows), toctree])
     )
     return [listed, *pages]
 
@@ -52,6 +52,6 @@ def _task(command: Command) -> str:
 def _example(command: Command) -> str:
     anchor = "-".join("".join(c for c in command.heading.lower() if c.isalnum() or c in " -_").split())
     title = command.page.read_text(encoding="utf-8").partition("\n")[0].lstrip("# ")
-    told = title if title == command.heading else f"{title}: {command.heading}"
-    where = f"[{plain(told)}](../../{command.page.name}#{anchor})"
+    label = title if title == command.heading else f"{title}: {command.heading}"
+    where = f"[{plain(label)}](../../{command.page.name}#{anchor})"
     return f"{where}:\n\n```sh\n{command.line}\n```"
