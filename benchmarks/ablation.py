@@ -14,7 +14,7 @@ from typing import Any
 import marked
 
 from tractexp import files
-from tractexp.comparison.statistics import ALPHA
+from tractexp.studies.comparison.statistics import ALPHA
 
 ROOT = Path(__file__).resolve().parents[1]
 STORED, PAGE, NAME = ROOT / "benchmarks" / "ablation.json", ROOT / "docs" / "comparison.md", "benchmarks/ablation.py"

@@ -24,6 +24,7 @@ for library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 import numpy as np  # noqa: E402
+import oracle  # noqa: E402, F401
 
 FOLDER = Path(__file__).parents[1] / "outputs" / "andes_loads"
 FREQUENCY, SYSTEM, VOLTAGE = 60.0, 100.0, 230.0  # Hz, MVA, kV

@@ -8,6 +8,7 @@ resistance, which the model does not know, so its lowest objective is above the 
 from collections.abc import Sequence
 
 import numpy as np
+import oracle  # noqa: F401
 
 from independent import Dip, Load, Machine, Recorder, Stall, Static, record
 from tractexp.errors import UserError

@@ -17,6 +17,7 @@ for library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 import numpy as np  # noqa: E402
+import oracle  # noqa: E402, F401
 
 from hidden_effects import cases  # noqa: E402
 from hidden_effects.generator import make  # noqa: E402

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 from zlib import crc32
 
+import oracle  # noqa: F401
 from joblib import Parallel, delayed
 
 from hidden_effects import Case, Noise, write

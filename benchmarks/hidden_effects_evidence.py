@@ -7,6 +7,7 @@ from pathlib import Path
 
 import marked
 import numpy as np
+import oracle  # noqa: F401
 
 from hidden_effects.laws import MEMBERS_LAW
 
@@ -248,7 +249,7 @@ def _draw_detection(rows: Rows, path: Path) -> None:
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    from tractexp.report import style
+    from tractexp.blocks import style
 
     x = [m for m in MULTIPLES if any(r["group"] == f"{m:g} x" and reached(r, m) for r in rows)]
     with rc_context(style.SETTINGS):
@@ -283,7 +284,7 @@ def _draw_confusion(rows: Rows, path: Path, multiple: float = 4.0) -> None:
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    from tractexp.report import style
+    from tractexp.blocks import style
 
     groups = [f"{sort}{multiple:g} x" for sort in ("", "law ", "outside ")]
     blocks = [list(dict.fromkeys(_hidden(r) for r in rows if r["group"] == group)) for group in groups]

@@ -29,6 +29,7 @@ for library in ("OPENBLAS", "OMP", "MKL"):
 import baselines  # noqa: E402
 import hidden_effects_evidence as evidence  # noqa: E402
 import numpy as np  # noqa: E402
+import oracle  # noqa: E402, F401
 
 import tractexp  # noqa: E402
 from hidden_effects import cases  # noqa: E402
@@ -39,7 +40,7 @@ from hidden_effects.outside import OUTSIDE  # noqa: E402
 
 LEFT_OUT = "left out "  # the group of trials whose effect is taken from the catalogue
 PAIRED, LARGE = (2.0, 4.0), (2.0, 4.0, 8.0)  # multiples of the detection limit
-FROZEN = ("tractexp", "plugins", "benchmarks/hidden_effects", "benchmarks/independent")  # what judges and is judged
+FROZEN = ("tractexp", "plugins", "tests/oracle/hidden_effects", "tests/oracle/independent")  # what judges and is judged
 ROOT, HERE = Path(__file__).parents[1], Path(__file__).parent
 NEWEST = HERE / "judgement_branch.jsonl"  # the judgement set
 KNOWN = {"rotor_skin_effect": "second_cage", "stator_transients": "stator_transients"}  # the catalogue has them, too

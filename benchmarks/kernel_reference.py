@@ -25,7 +25,7 @@ from tractexp.model.model import Model, compose
 from tractexp.parameter import Parameter
 from tractexp.plugin import discover, get
 
-FILE = Path(__file__).parents[1] / "tests" / "kernel_reference.npz"
+FILE = Path(__file__).parents[1] / "tests" / "model" / "kernel_reference.npz"
 LANES, SHOWN, EVERY = 57, (0, 7, 30, 56), 5  # candidates; those whose responses are kept, of which each such sample
 BASE = {PHASORS: ("electromechanical", "exponential"), WAVES: ("stator_flux", "branch")}
 SUBSTEPS = {PHASORS: (2, 3), WAVES: (4, 2)}

@@ -10,6 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 import make_tibet
+import oracle  # noqa: F401
 
 from hidden_effects import Case, Noise, Recorder, make, truth
 

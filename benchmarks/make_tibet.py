@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import oracle  # noqa: F401
 
 from independent import Dip, Load, Machine, Recorder, Static, record
 

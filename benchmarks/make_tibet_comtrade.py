@@ -14,6 +14,7 @@ from datetime import datetime
 from pathlib import Path
 
 import numpy as np
+import oracle  # noqa: F401
 from make_tibet import DIPS, LOAD, main
 
 from independent import Waveforms, simulate

@@ -26,6 +26,7 @@ for library in ("OPENBLAS", "OMP", "MKL"):
 
 import andes_loads  # noqa: E402
 import numpy as np  # noqa: E402
+import oracle  # noqa: E402, F401
 from andes_loads import StalledMotor  # noqa: E402
 from model_error_tables import shift_lines, tables  # noqa: E402
 

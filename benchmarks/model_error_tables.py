@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import oracle  # noqa: F401
 
 from hidden_effects.effects import CATALOG
 

@@ -159,11 +159,11 @@ def keys_of(arguments):
     from hydra import compose
     from omegaconf import OmegaConf
 
+    from tractexp.composition import leaves
     from tractexp.overrides import overrides
-    from tractexp.tasks.given import _leaves
 
     whole = OmegaConf.to_container(compose("config", overrides(arguments)))
-    keys = [key for key, _ in _leaves(whole)]
+    keys = [key for key, _ in leaves(whole)]
     sections = sorted({key.rpartition(".")[0] for key in keys} - {""})
     groups = ["optimizer", "data", "objective", "model", "model/motor", "model/static", "task", "domain", "experiment"]
     return [*keys, *keys, *sections, *groups, "model.bounds.C", "model.fixed.T_m", "data.columns.U"]
@@ -174,12 +174,12 @@ def perform(arguments, folder):
     from hydra import compose
     from omegaconf import OmegaConf, open_dict
 
+    from tractexp.api.task import Job
+    from tractexp.cli.chosen import given, refuse_unread
     from tractexp.overrides import overrides
     from tractexp.plugin import build
     from tractexp.refusal import explained
     from tractexp.schema import check
-    from tractexp.tasks.given import given, refuse_unread
-    from tractexp.tasks.task import Job
 
     with explained():
         config = compose("config", overrides(arguments), return_hydra_config=True)

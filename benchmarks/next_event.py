@@ -22,6 +22,8 @@ import tractexp  # noqa: F401 before NumPy: it keeps BLAS to one thread
 
 import numpy as np  # isort: skip
 
+import oracle  # noqa: F401
+
 from hidden_effects import Case, Noise
 from hidden_effects.generator import Scene, scene
 from independent import Dip

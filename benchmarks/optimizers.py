@@ -31,11 +31,12 @@ import numpy as np
 import yaml
 
 from tractexp import files, provenance
-from tractexp.comparison import bbob, floor
-from tractexp.comparison.runs import Run
 from tractexp.identification.problem import Problem
 from tractexp.identification.search import Found, Limits, search
 from tractexp.plugin import build
+from tractexp.studies.bbob import runs as bbob
+from tractexp.studies.comparison import floor
+from tractexp.studies.comparison.runs import Run
 
 ROOT = Path(__file__).resolve().parents[1]
 STORED = ROOT / "benchmarks" / "optimizers.json"

@@ -7,7 +7,7 @@ from typing import Any
 import marked
 import numpy as np
 
-from tractexp.comparison.statistics import Ranks, friedman, holm, vargha_delaney, wilcoxon
+from tractexp.studies.comparison.statistics import Ranks, friedman, holm, vargha_delaney, wilcoxon
 
 DOCS = Path(__file__).resolve().parents[1] / "docs" / "optimizers.md"
 MAKER = "benchmarks/optimizers.py"

@@ -31,8 +31,8 @@ def compute(folder: Path) -> float:
         os.environ[f"{library}_NUM_THREADS"] = "1"
     import yaml
 
+    from tractexp.api.task import Job
     from tractexp.identification.search import Limits, search
-    from tractexp.tasks.task import Job
 
     spent, problem = 0.0, None
     for path in folder.glob("*/.hydra/config.yaml"):

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import oracle  # noqa: F401
 
 NAMES = ("T_prime", "X_prime", "C", "M", "T_m", "p_v", "q_v")
 LOW = np.array([0.04, 0.2, 0.7, 0.003, 0.3, 0.8, 2.6])  # truths are drawn between these

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import oracle  # noqa: F401
 
 from independent import Machine, Stall
 from independent.circuit import Branch, Device, Group, Shunt, drawn

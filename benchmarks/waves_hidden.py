@@ -20,6 +20,7 @@ for library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 import numpy as np  # noqa: E402
+import oracle  # noqa: E402, F401
 import wave_records as waves  # noqa: E402
 
 from independent import Machine, Stall  # noqa: E402

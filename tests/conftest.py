@@ -10,9 +10,12 @@ import tractexp  # before NumPy: it keeps BLAS to one thread, as every command d
 MOTOR = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p_v": 1.4, "q_v": 3.0}
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture
 def registry_as_it_was():
-    """What a test registers is gone after it: the next one of this process finds what is installed."""
+    """What a test registers is gone after it: the next one of this process finds what is installed.
+
+    For files that register; plugins are discovered once in a process, and a unit test that needs none imports none.
+    """
     from tractexp.plugin import discover
 
     registry = discover()
@@ -38,7 +41,7 @@ def resistive_dips(tmp_path_factory) -> list[Path]:
     return paths
 
 
-collect_ignore = ["acme"]  # a package of its own, whose tests run where it is installed
+collect_ignore = ["process/acme"]  # a package of its own, whose tests run where it is installed
 
 
 @pytest.fixture

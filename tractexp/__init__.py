@@ -5,30 +5,53 @@ Every name below is imported when it is first used, so that `import tractexp` ta
     import tractexp
     dips = tractexp.read("dip1.csv", "dip2.csv")
     fit = tractexp.identify(dips[0], model="third_order_exponential")
-    found = tractexp.investigate(dips)
+    investigation = tractexp.investigate(dips)
 """
 
 import importlib
 import os
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:  # for editors and type checkers; a test holds it to PUBLIC
+    from tractexp.api.compose import compose as compose
+    from tractexp.api.convert import convert as convert
+    from tractexp.api.export import export as export
+    from tractexp.api.generalise import generalise as generalise
+    from tractexp.api.identify import identify as identify
+    from tractexp.api.investigate import investigate as investigate
+    from tractexp.api.load import load as load
+    from tractexp.api.look import look as look
+    from tractexp.api.plan import plan as plan
+    from tractexp.api.posterior import posterior as posterior
+    from tractexp.api.profile import profile as profile
+    from tractexp.api.read import read as read
+    from tractexp.api.simulate import simulate as simulate
+    from tractexp.api.survey import survey as survey
+    from tractexp.errors import UserError as UserError
+    from tractexp.model.site_table import sites as sites
+    from tractexp.studies.api.benchmark import benchmark as benchmark
+    from tractexp.studies.api.compare import compare as compare
+    from tractexp.studies.api.paper import paper as paper
+
+    __version__: str
 
 # Our matrices have a dozen columns: BLAS threads only wait for each other (a hundredfold under load), and their
-# number would change the last bits of a result. Has to be said before NumPy is imported.
+# number would change the last bits of a result. This must stand before NumPy is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 PUBLIC = {
     "UserError": "tractexp.errors",
-    "benchmark": "tractexp.api.benchmark",
-    "compare": "tractexp.api.compare",
+    "benchmark": "tractexp.studies.api.benchmark",
+    "compare": "tractexp.studies.api.compare",
     "compose": "tractexp.api.compose",
     "convert": "tractexp.api.convert",
     "export": "tractexp.api.export",
     "generalise": "tractexp.api.generalise",
     "identify": "tractexp.api.identify",
-    "investigate": "tractexp.api.investigate",
+    "investigate": "tractexp.api.discrepancy",
     "load": "tractexp.api.load",
     "look": "tractexp.api.look",
-    "paper": "tractexp.api.paper",
+    "paper": "tractexp.studies.api.paper",
     "plan": "tractexp.api.plan",
     "posterior": "tractexp.api.posterior",
     "profile": "tractexp.api.profile",
@@ -37,7 +60,7 @@ PUBLIC = {
     "sites": "tractexp.model.site_table",
     "survey": "tractexp.api.survey",
 }
-__all__ = ["__version__", *PUBLIC]  # pyright: ignore[reportUnsupportedDunderAll] # made by __getattr__ when asked for
+__all__ = ["__version__", *PUBLIC]  # pyright: ignore[reportUnsupportedDunderAll] # __getattr__ gives them
 
 
 def __getattr__(name: str) -> Any:

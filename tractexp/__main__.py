@@ -1,9 +1,11 @@
 """Command line: compose the configuration, run the task, end with a sentence where the input is wrong."""
 
 import gc
+import importlib
 import os
 import signal
 import sys
+from collections.abc import Sequence
 
 # The matrices of a fit are small: threads of a BLAS cost more than they bring (30 times on two busy cores), and the
 # cores are for the jobs of a sweep. Set before NumPy is imported; an explicit choice of the user's stands.
@@ -20,40 +22,28 @@ UNLOGGED = (
     "hydra.mode=",
 )  # no single job that is logged: maybe
 SELDOM = (50_000, 20, 50)  # what is imported stays: to look for garbage in it takes a quarter of a short job
+COMMANDS = {  # beside the tasks: where each is
+    "ui": "tractexp.cli.ui:ui", "look": "tractexp.cli.look:look", "sync": "tractexp.cli.sync:sync",
+    "doctor": "tractexp.cli.doctor:doctor", "list": "tractexp.usage:listed", "new": "tractexp.cli.new:new",
+}  # fmt: skip
 FULL_ERROR = "HYDRA_FULL_ERROR"  # Hydra's own switch: set it to see tracebacks
 
 
-def main() -> int:
-    """Entry point of `tractexp` and `python -m tractexp`; returns the exit code."""
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point of `tractexp` and `python -m tractexp`; returns the exit code. `argv` is by default the process's."""
+    arguments = sys.argv[1:] if argv is None else [*argv]
     traceback = os.environ.get(FULL_ERROR, "0") not in ("", "0")
     gc.set_threshold(*SELDOM)
     try:
-        if sys.argv[1:2] == ["ui"]:
-            from tractexp.tasks.ui import ui
-
-            return ui(sys.argv[2:])
-        if sys.argv[1:2] == ["look"]:
-            from tractexp.tasks.look import look
-
-            return look(sys.argv[2:])
-        if sys.argv[1:2] == ["sync"]:
-            from tractexp.tasks.sync import sync
-
-            return sync(sys.argv[2:])
-        if sys.argv[1:2] == ["doctor"]:
-            from tractexp.tasks.doctor import doctor
-
-            return doctor(sys.argv[2:])
-        if sys.argv[1:2] == ["list"]:
-            from tractexp.usage import listed
-
-            return listed(sys.argv[2:])
-        if {"--help", "-h"} & set(sys.argv[1:]):
+        if arguments[:1] and (place := COMMANDS.get(arguments[0])):
+            module, _, function = place.partition(":")
+            return getattr(importlib.import_module(module), function)(arguments[1:])
+        if {"--help", "-h"} & {*arguments}:
             from tractexp.usage import usage
 
             print(usage())
             return 0
-        return _run()
+        return _run(arguments)
     except UserError as error:
         if traceback:
             raise
@@ -78,9 +68,9 @@ def terminated(*_: object) -> None:
     raise Stopped("ended by SIGTERM; nothing was logged for this run", code=143)
 
 
-def _run() -> int:
+def _run(arguments: list[str]) -> int:
     signal.signal(signal.SIGTERM, terminated)
-    if not any(argument.startswith(UNLOGGED) for argument in sys.argv[1:]):
+    if not any(argument.startswith(UNLOGGED) for argument in arguments):
         from tractexp.tracking.process import start_ahead
 
         start_ahead()
@@ -93,10 +83,10 @@ def _run() -> int:
     from tractexp.refusal import explained
 
     register()
-    started(sys.argv[1:])
+    started(arguments)
     os.environ[FULL_ERROR] = "1"  # let exceptions through: they are told below, in one sentence
     with explained():
-        sys.argv[1:] = overrides(sys.argv[1:])
+        sys.argv[1:] = overrides(arguments)  # where Hydra reads them
     ended: list[Exception] = []
 
     @hydra.main(version_base="1.3", config_path=str(CONF), config_name="config")
@@ -104,8 +94,8 @@ def _run() -> int:
         from hydra.core.hydra_config import HydraConfig
         from hydra.types import RunMode
 
+        from tractexp.cli.run import run
         from tractexp.sweep.job import run_job
-        from tractexp.tasks.run import run
 
         try:
             with explained():

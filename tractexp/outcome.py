@@ -1,87 +1,44 @@
-"""What every public call returns: a result that prints, tabulates, saves and loads.
+"""What every public call returns: a result that prints, tabulates, saves and loads, and is written into a folder.
 
 A result is the call that made it (records and settings) and what that call found, both as plain data. What is heavy,
-such as the figures of a page, is reckoned again from the call where it is asked of a result that was loaded: a call
+such as the figures of a page, is computed again from the call where it is asked of a result that was loaded: a call
 with the same records, settings and seed gives the same bits.
 """
 
-import html
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
 from tractexp import files
+from tractexp.blocks import Report, Table
 from tractexp.errors import UserError
+from tractexp.progress import say
 
 MARK = "tractexp"  # the key by which a saved result is known
-
-
-@dataclass(frozen=True)
-class Table:
-    """Rows under columns, as a terminal, a notebook and a frame show them. `said` are sentences below it."""
-
-    columns: Sequence[str]
-    rows: Sequence[Sequence[Any]]
-    title: str = ""
-    said: Sequence[str] = field(default=())
-
-    @property
-    def cells(self) -> list[list[str]]:
-        """The rows as they are read."""
-        return [[_told(cell) for cell in row] for row in self.rows]
-
-    def __str__(self) -> str:
-        cells = [list(map(str, self.columns)), *self.cells]
-        widths = [max(len(row[k]) for row in cells) for k in range(len(self.columns))]
-        lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in cells]
-        ruled = [lines[0], "  ".join("-" * w for w in widths), *lines[1:]] if self.columns else []
-        return "\n".join([*([self.title] if self.title else []), *ruled, *self.said])
-
-    def _repr_html_(self) -> str:
-        def cell(content: Any, tag: str) -> str:
-            side = "left" if isinstance(content, str) else "right"
-            return f'<{tag} style="text-align:{side}">{html.escape(_told(content))}</{tag}>'
-
-        def row(cells: Sequence[Any], tag: str) -> str:
-            return "<tr>" + "".join(cell(content, tag) for content in cells) + "</tr>"
-
-        title = f'<caption style="text-align:left"><b>{html.escape(self.title)}</b></caption>' if self.title else ""
-        head = f"<thead>{row(self.columns, 'th')}</thead>" if self.columns else ""
-        body = "".join(row(cells, "td") for cells in self.rows)
-        said = "<br>".join(html.escape(sentence) for sentence in self.said)
-        return f"<table>{title}{head}<tbody>{body}</tbody></table>" + (f"<p>{said}</p>" if said else "")
-
-    def to_frame(self) -> Any:
-        """A pandas frame of the rows."""
-        import pandas
-
-        return pandas.DataFrame([list(row) for row in self.rows], columns=list(self.columns))
-
-
-def _told(cell: Any) -> str:
-    if cell is None:
-        return ""
-    return f"{cell:.5g}" if isinstance(cell, float) else str(cell)
+Drawing = Callable[[Path], Path]  # makes the file of this path
 
 
 class Tabulated:
-    """Shows itself by its `table`: printed, in a notebook, as a frame."""
+    """Shows itself by its `summary`: printed, in a notebook; as a frame by its `table`."""
 
     def table(self) -> Table:
-        """What a person sees first."""
+        """The rows that a person sees first."""
         raise NotImplementedError
+
+    def summary(self) -> Report:
+        """What a terminal and a notebook show; by default the table."""
+        return Report().add(self.table())
 
     def to_frame(self) -> Any:
         """The table as a pandas frame."""
         return self.table().to_frame()
 
     def __repr__(self) -> str:
-        return str(self.table())
+        return str(self.summary())
 
     def _repr_html_(self) -> str:
-        return self.table()._repr_html_()
+        return self.summary().fragment
 
 
 class Outcome(Tabulated):
@@ -104,7 +61,7 @@ class Outcome(Tabulated):
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        """The result that `to_dict` told."""
+        """The result that `to_dict` gave."""
         raise NotImplementedError
 
     @classmethod
@@ -113,8 +70,8 @@ class Outcome(Tabulated):
         try:
             return cls.from_dict(content)
         except (KeyError, TypeError, ValueError, AttributeError) as error:
-            told = f"it lacks {error}" if isinstance(error, KeyError) else str(error)
-            raise UserError(f"this is not a whole saved {cls.kind}: {told}; save it again") from error
+            reason = f"it lacks {error}" if isinstance(error, KeyError) else str(error)
+            raise UserError(f"this is not a whole saved {cls.kind}: {reason}; save it again") from error
 
     def save(self, path: Path | str) -> Path:
         """Write the result as one JSON file, whole or not at all; `tractexp.load` reads it back."""
@@ -129,6 +86,48 @@ class Outcome(Tabulated):
         if content["kind"] != cls.kind:
             raise UserError(f"{path} holds a result of kind '{content['kind']}', not '{cls.kind}'; read it by load()")
         return cls.revived(content)
+
+
+class Written(Outcome):
+    """Base of the results that are written into a folder: files for machines first, then pages and figures."""
+
+    page: ClassVar[str] = ""  # file of the page; "" for none
+
+    def report(self) -> Report:
+        """The page as a list of blocks: a notebook shows it, `save(path)` writes it. By default the summary."""
+        return self.summary()
+
+    def write_results(self, folder: Path) -> list[Path]:
+        """Write what cannot be had again without the computation; the paths. Raises `UserError` where it cannot."""
+        raise NotImplementedError
+
+    def drawings(self) -> Mapping[str, Drawing]:
+        """What is made from the results, {name of the file: what makes it}."""
+        return {self.page: lambda path: self.report().save(path)} if self.page else {}
+
+    def write(self, folder: Path | str) -> list[Path]:
+        """Write everything into a folder, and return the paths: files for machines first, then pages and figures.
+
+        Raises `UserError` where the results cannot be written. A page or a figure that fails is a sentence on the
+        terminal, for the results are on the disk by then.
+        """
+        return [*self.write_results(Path(folder)), *self.write_drawings(folder)]
+
+    def write_drawings(self, folder: Path | str) -> list[Path]:
+        """Write pages and figures; the paths of those that could be made. A sentence says why another could not."""
+        paths = []
+        for name, draw in self.drawings().items():
+            try:
+                paths.append(draw(Path(folder) / name))
+            except Exception as error:  # whatever it is, the results stand
+                say(f"note: {not_drawn(Path(folder) / name, error)}")
+        return paths
+
+
+def not_drawn(path: Path, error: Exception) -> str:
+    """Why a page or a figure is missing, as a sentence."""
+    reason = str(error) if isinstance(error, UserError) else f"{type(error).__name__}: {error}".strip()
+    return f"{path.name} could not be made, while the results are whole ({reason.partition(chr(10))[0]})"
 
 
 def saved(path: Path | str) -> dict[str, Any]:

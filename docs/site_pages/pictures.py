@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 
 import tractexp
+from tractexp.blocks import style
 from tractexp.errors import UserError
 from tractexp.kernel.layout import INPUTS
 from tractexp.model.drive import WAVES, Drive
 from tractexp.model.model import Model, compose
 from tractexp.model.parts import Effect, Motor, Part
-from tractexp.report import style
 from tractexp.testing import drives, loads
 
 DEPTH = 0.4  # pu

@@ -13,9 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.errors import check_choice, check_range
-from tractexp.recording import Connection
-from tractexp.recording.connection import SINGLE
+from tractexp.extend import SINGLE, Connection, check_choice, check_range
 
 ARMS = ("alpha", "beta")
 

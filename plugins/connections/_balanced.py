@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.errors import check_choice
+from tractexp.extend import check_choice
 
 from ._arms import _Arms
 from ._phases import PAIRS, PHASES, line

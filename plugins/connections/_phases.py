@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tractexp.errors import UserError, check_choice
+from tractexp.extend import UserError, check_choice
 
 PHASES = "abc"
 PAIRS = ("ab", "bc", "ca", "ba", "cb", "ac")

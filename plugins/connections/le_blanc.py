@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tractexp.plugin import plugin
+from tractexp.extend import plugin
 
 from ._balanced import _Balanced
 

@@ -1,6 +1,6 @@
 """Scott traction transformer."""
 
-from tractexp.plugin import plugin
+from tractexp.extend import plugin
 
 from ._balanced import _Balanced
 

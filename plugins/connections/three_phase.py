@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from tractexp.plugin import plugin
-from tractexp.recording import Connection
+from tractexp.extend import Connection, plugin
 
 
 @plugin

@@ -4,9 +4,7 @@ from dataclasses import field
 
 import numpy as np
 
-from tractexp.errors import UserError
-from tractexp.plugin import plugin
-from tractexp.recording import Connection
+from tractexp.extend import Connection, UserError, plugin
 
 from ._phases import check_pairs, check_two, from_lines, from_two
 

@@ -4,8 +4,7 @@ from dataclasses import field
 
 import numpy as np
 
-from tractexp.errors import UserError
-from tractexp.plugin import plugin
+from tractexp.extend import UserError, plugin
 
 from ._arms import _Arms
 from ._phases import check_pairs, line

@@ -3,6 +3,7 @@
 from tractexp.extend import Effect, Parameter, plugin, sites
 
 from ._relay import opened
+from ._trip import relay
 
 SOURCE = "WECC composite load model (Ftr1, Vtr1, Ttr1, Ftr2, Vtr2, Ttr2); NERC 2016, Dynamic Load Modeling, app. A"
 
@@ -19,16 +20,12 @@ class TwoStageTrip(Effect):
     Departures: those of `undervoltage_trip`; both stages return along the same ramp.
     """
 
-    stage_1_tripped = Parameter(0.0, (0.0, 0.6), "1", "share that the first stage lets go", SOURCE, "F_1", null=0.0)
-    stage_1_level = Parameter(0.7, (0.3, 0.95), "1", "voltage below which it trips, over U_0", SOURCE, "u_{t1}")
-    stage_1_delay = Parameter(0.05, (0.0, 0.5), "s", "time below the level before it trips", SOURCE, "T_{t1}")
-    stage_1_wait = Parameter(0.5, (0.02, 5.0), "s", "time after recovery before it returns", SOURCE, "T_{r1}")
-    stage_1_margin = Parameter(0.05, (0.01, 0.5), "1", "recovered is this much above the level", SOURCE, "h_1")
-    stage_2_tripped = Parameter(0.0, (0.0, 0.6), "1", "share that the second stage lets go", SOURCE, "F_2", null=0.0)
-    stage_2_level = Parameter(0.6, (0.3, 0.95), "1", "voltage below which it trips, over U_0", SOURCE, "u_{t2}")
-    stage_2_delay = Parameter(0.1, (0.0, 0.5), "s", "time below the level before it trips", SOURCE, "T_{t2}")
-    stage_2_wait = Parameter(0.5, (0.02, 5.0), "s", "time after recovery before it returns", SOURCE, "T_{r2}")
-    stage_2_margin = Parameter(0.05, (0.01, 0.5), "1", "recovered is this much above the level", SOURCE, "h_2")
+    stage_1_tripped, stage_1_level, stage_1_delay, stage_1_wait, stage_1_margin = relay(
+        "share that the first stage lets go", "1", 0.6, source=SOURCE
+    )[:5]
+    stage_2_tripped, stage_2_level, stage_2_delay, stage_2_wait, stage_2_margin = relay(
+        "share that the second stage lets go", "2", 0.6, 0.6, 0.1, SOURCE
+    )[:5]
     stage_ramp = Parameter(0.1, (0.0, 2.0), "s", "time in which a stage returns", SOURCE, "T_{b12}")
 
     order = 3

@@ -2,9 +2,7 @@
 
 import numpy as np
 
-from tractexp.errors import UserError
-from tractexp.plugin import plugin
-from tractexp.recording import Estimator
+from tractexp.extend import Estimator, UserError, plugin
 
 # {nominal frequency [Hz]: {reporting rate [1/s]: (reference frequency F_fr [Hz], order N at 16 samples a cycle)}}
 FILTERS = {

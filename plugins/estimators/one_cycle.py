@@ -2,9 +2,7 @@
 
 import numpy as np
 
-from tractexp.plugin import plugin
-from tractexp.record.phasor import Averager, one_cycle
-from tractexp.recording import Estimator
+from tractexp.extend import Averager, Estimator, one_cycle, plugin
 
 
 @plugin

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from tractexp.plugin import plugin
-from tractexp.recording import Estimator
+from tractexp.extend import Estimator, plugin
 
 
 @plugin

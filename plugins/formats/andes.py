@@ -2,8 +2,8 @@
 
 import json
 
-from tractexp.exchange.format import Format
-from tractexp.plugin import plugin
+from tractexp.extend import plugin
+from tractexp.extend.formats import Format
 
 SMALLEST = 1e-6  # pu: ANDES reads a resistance of 0 as "not given" and takes 0.01
 SYSTEM = 100.0  # MVA, the system base of ANDES

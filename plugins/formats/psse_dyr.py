@@ -1,7 +1,7 @@
 """PSS/E dynamics data: CIM5BL and IEELBL."""
 
-from tractexp.exchange.format import Format
-from tractexp.plugin import plugin
+from tractexp.extend import plugin
+from tractexp.extend.formats import Format
 
 
 @plugin

@@ -1,7 +1,6 @@
 """Least squares."""
 
-from tractexp.identification.loss import Loss
-from tractexp.plugin import plugin
+from tractexp.extend import Loss, plugin
 
 
 @plugin

@@ -2,9 +2,7 @@
 
 import numpy as np
 
-from tractexp.errors import check_range
-from tractexp.identification.loss import Loss
-from tractexp.plugin import plugin
+from tractexp.extend import Loss, check_range, plugin
 
 
 @plugin

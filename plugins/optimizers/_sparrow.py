@@ -9,8 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.errors import check_choice, check_range
-from tractexp.identification.optimizer import Box, Evaluate, Iterative
+from tractexp.extend import Box, Evaluate, Iterative, check_choice, check_range
 
 TINY = 1e-50  # epsilon of Eq. (13), the value in the SSA authors' code
 EXP_MAX = 700.0  # exp overflows beyond it; any box ends long before

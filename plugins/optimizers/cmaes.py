@@ -5,9 +5,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from tractexp.errors import UserError, check_range
-from tractexp.identification.optimizer import Box, Evaluate, Iterative
-from tractexp.plugin import plugin
+from tractexp.extend import Box, Evaluate, Iterative, UserError, check_range, plugin
 
 
 def _pycma() -> Any:

@@ -5,10 +5,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from tractexp.errors import check_range
-from tractexp.identification.optimizer import REFUSED, Box, Evaluate, Iterative
-from tractexp.identification.starts import best_distinct
-from tractexp.plugin import plugin
+from tractexp.extend import REFUSED, Box, Evaluate, Iterative, check_range, plugin
+from tractexp.extend.search import best_distinct
 
 APART = 0.3  # of the box, in the coordinate in which two starts differ most
 

@@ -4,9 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tractexp.errors import check_range
-from tractexp.identification.optimizer import Box, Evaluate, Iterative
-from tractexp.plugin import plugin
+from tractexp.extend import Box, Evaluate, Iterative, check_range, plugin
 
 from ._sparrow import Flock
 

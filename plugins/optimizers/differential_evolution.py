@@ -4,10 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tractexp.doors.scipy_differential_evolution import generations
-from tractexp.errors import check_choice, check_range
-from tractexp.identification.optimizer import Box, Evaluate, Iterative
-from tractexp.plugin import plugin
+from tractexp.extend import Box, Evaluate, Iterative, check_choice, check_range, plugin
+from tractexp.extend.search import generations
 
 STRATEGIES = tuple(
     f"{kind}{crossover}"

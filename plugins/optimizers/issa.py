@@ -6,9 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from tractexp.errors import check_choice, check_range
-from tractexp.identification.optimizer import Box
-from tractexp.plugin import plugin
+from tractexp.extend import Box, check_choice, check_range, plugin
 
 from ._sparrow import Flock, Sparrow
 

@@ -4,11 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tractexp.errors import check_range
-from tractexp.identification.least_squares import APART, race
-from tractexp.identification.optimizer import REFUSED, Box, Evaluate, Optimizer
-from tractexp.identification.starts import best_distinct
-from tractexp.plugin import plugin
+from tractexp.extend import REFUSED, Box, Evaluate, Optimizer, check_range, plugin
+from tractexp.extend.search import APART, best_distinct, race
 
 CLOSER = 10  # scatters drawn ever closer about the least refused point before a search gives up
 

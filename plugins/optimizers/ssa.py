@@ -1,6 +1,6 @@
 """The traditional sparrow search algorithm."""
 
-from tractexp.plugin import plugin
+from tractexp.extend import plugin
 
 from ._sparrow import Sparrow
 

@@ -3,10 +3,8 @@
 from dataclasses import field
 from pathlib import Path
 
-from tractexp.errors import UserError, check_distinct
-from tractexp.plugin import plugin
-from tractexp.record import Events, Reader
-from tractexp.recording.archive import records
+from tractexp.extend import Events, Reader, UserError, check_distinct, plugin
+from tractexp.extend.files import records
 
 
 @plugin

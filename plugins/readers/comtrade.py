@@ -1,10 +1,7 @@
 """Records from COMTRADE fault recordings: the dips of one file, numbered in order of time."""
 
-from tractexp.files import located
-from tractexp.filetypes import comtrade
-from tractexp.plugin import plugin
-from tractexp.recording import Recording
-from tractexp.recording.reader import WaveformReader
+from tractexp.extend import Recording, WaveformReader, plugin
+from tractexp.extend.files import comtrade, located
 
 
 @plugin

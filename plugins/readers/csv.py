@@ -4,15 +4,25 @@ from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
-from tractexp.errors import UserError, check_range
-from tractexp.files import PACKAGE
-from tractexp.filetypes.sidecar import Sidecar, beside
-from tractexp.filetypes.tabulated import Powers, Tabular, kind_of, powers
-from tractexp.plugin import plugin
-from tractexp.record import Base, Events, Reader, Record
-from tractexp.record.dips import Dip, check_numbers, chosen, level, numbered
-from tractexp.record.record import GIVEN, LOAD, SIZES
-from tractexp.wording import counted
+from tractexp.extend import Base, Events, Reader, Record, UserError, check_range, plugin
+from tractexp.extend.files import (
+    GIVEN,
+    LOAD,
+    PACKAGE,
+    SIZES,
+    Dip,
+    Powers,
+    Sidecar,
+    Tabular,
+    beside,
+    check_numbers,
+    chosen,
+    counted,
+    kind_of,
+    level,
+    numbered,
+    powers,
+)
 
 PRE, POST = 1.0, 10.0  # s kept of a table that holds several dips
 

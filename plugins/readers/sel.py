@@ -2,10 +2,8 @@
 
 from pathlib import Path
 
-from tractexp.filetypes import cev
-from tractexp.plugin import plugin
-from tractexp.recording import Recording
-from tractexp.recording.reader import WaveformReader
+from tractexp.extend import Recording, WaveformReader, plugin
+from tractexp.extend.files import cev
 
 
 @plugin

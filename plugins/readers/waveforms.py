@@ -1,13 +1,7 @@
 """Records from tables of waveforms: the dips of one file, numbered in order of time."""
 
-from tractexp.errors import check_range
-from tractexp.filetypes.sidecar import beside
-from tractexp.filetypes.tabulated import Tabular, kind_of, recording
-from tractexp.filetypes.tidy import restored
-from tractexp.plugin import plugin
-from tractexp.record.record import SIZES
-from tractexp.recording import Recording
-from tractexp.recording.reader import WaveformReader
+from tractexp.extend import Recording, WaveformReader, check_range, plugin
+from tractexp.extend.files import SIZES, Tabular, beside, kind_of, recording, restored
 
 
 @plugin

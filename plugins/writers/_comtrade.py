@@ -2,10 +2,8 @@
 
 from pathlib import Path
 
-from tractexp.filetypes import comtrade, tidy
-from tractexp.record import Record
-from tractexp.recording import Recording
-from tractexp.recording.writer import Writer
+from tractexp.extend import Record, Recording, Writer
+from tractexp.extend.files import comtrade, tidy
 
 
 class _COMTRADE(Writer):

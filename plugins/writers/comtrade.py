@@ -1,6 +1,6 @@
 """COMTRADE in two files."""
 
-from tractexp.plugin import plugin
+from tractexp.extend import plugin
 
 from ._comtrade import _COMTRADE
 

@@ -1,6 +1,6 @@
 """CSV with a sidecar."""
 
-from tractexp.plugin import plugin
+from tractexp.extend import plugin
 
 from ._table import _Table
 

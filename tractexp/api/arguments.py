@@ -8,21 +8,27 @@ import types
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Integral, Real
-from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from tractexp import plugin
 from tractexp.choices import defaults
+from tractexp.composition import read_choice
 from tractexp.errors import UserError, among, check_distinct
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
 SECTIONS = "task|model|data"  # of the configuration, whose keys the arguments of a call are
-WORDS = {
+WORDS: Mapping[Any, str] = {
     int: "a whole number", float: "a number", bool: "True or False", str: "a text", type(None): "None", Any: "anything",
 }  # fmt: skip
-GIVEN = {bool: "a truth value", type(None): "nothing", dict: "a mapping", list: "a list", tuple: "a list"}
+GIVEN: Mapping[Any, str] = {
+    bool: "a truth value",
+    type(None): "nothing",
+    dict: "a mapping",
+    list: "a list",
+    tuple: "a list",
+}
 
 
 def public(function: Callable[P, R]) -> Callable[P, R]:
@@ -153,52 +159,6 @@ def completed(group: str, node: Mapping[str, Any]) -> dict[str, Any]:
         if key != "name" and key in kinds:
             check_kind(f"{group}.{key}", value, kinds[key])
     return {"name": node["name"], **dataclasses.asdict(plugin.build(group, node))}
-
-
-def read_choice(group: str, name: str) -> dict[str, Any]:
-    """The content of a choice of a group: of `conf/GROUP/NAME.yaml`, ours or a plugin package's, else of a plugin.
-
-    Without Hydra, which takes half a second: a `defaults` list of such files names other choices of the same group or
-    of a group below it, and what the file says itself comes last.
-    """
-    file = Path(name) if name.endswith((".yaml", ".yml")) else _file(group, name)
-    if file is None:
-        if name in plugin.discover().get(group, {}):
-            return {"name": name}
-        raise UserError(f"{group}={name}: there is no such choice{among(name, choices(group))}")
-    import yaml
-
-    try:
-        content = yaml.safe_load(file.read_text(encoding="utf-8")) or {}
-    except (OSError, yaml.YAMLError) as error:
-        raise UserError(f"{group}={file} cannot be read: {error}") from error
-    if not isinstance(content, dict):
-        raise UserError(f"{group}={file} must hold keys and values")
-    made: dict[str, Any] = {}
-    for item in content.pop("defaults", []):
-        if isinstance(item, dict):
-            ((part, chosen),) = item.items()
-            made[part] = read_choice(f"{group}/{part}", chosen)
-        elif item != "_self_":
-            place, _, chosen = item.partition("@")[0].rpartition("/")
-            made |= read_choice(place.removeprefix("/").removeprefix("schema/") or group, chosen)
-    for key, value in content.items():
-        made[key] = {**made[key], **value} if isinstance(value, dict) and isinstance(made.get(key), dict) else value
-    return made
-
-
-def choices(group: str, *, files: bool = False) -> list[str]:
-    """The names one may choose in a group, or those among them that have a file."""
-    named = {file.stem for folder in _folders() for file in (folder / group).glob("*.yaml")}
-    return sorted(named if files else {*named, *plugin.discover().get(group, {})})
-
-
-def _folders() -> list[Path]:
-    return [*plugin.configuration_folders(), plugin.CONF]
-
-
-def _file(group: str, name: str) -> Path | None:
-    return next((f for folder in _folders() if (f := folder / group / f"{name}.yaml").is_file()), None)
 
 
 def _settings(group: str) -> list[str]:

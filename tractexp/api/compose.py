@@ -8,10 +8,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tractexp.api.arguments import Choice, check_kind, public, read_choice
+from tractexp.api.arguments import Choice, check_kind, public
+from tractexp.blocks import Table
 from tractexp.choices import choices, defaults, replaced
+from tractexp.composition import read_choice
 from tractexp.errors import UserError, among, check_choice
-from tractexp.outcome import Table, Tabulated
+from tractexp.outcome import Tabulated
 
 if TYPE_CHECKING:
     from tractexp.model.model import Model

@@ -5,12 +5,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tractexp import plugin
 from tractexp.api.arguments import public
 from tractexp.api.read import GROUP, node_of
+from tractexp.api.task import Job, Task
+from tractexp.blocks import Report, Table
+from tractexp.blocks.terminal import show
 from tractexp.errors import UserError, check_choice
 from tractexp.filetypes.tidy import unique
-from tractexp.outcome import Table, Tabulated
+from tractexp.outcome import Tabulated
+from tractexp.plugin import build, discover, plugin
+from tractexp.progress import console
 from tractexp.record import Event, Reader, Record
 from tractexp.recording import Recording, Writer
 from tractexp.recording.cut import cut
@@ -29,7 +33,10 @@ class Converted(Tabulated):
     said: Sequence[str]
 
     def table(self) -> Table:
-        return Table(["file"], [[str(path)] for path in self.files], said=self.said)
+        return Table(["file"], [[str(path)] for path in self.files])
+
+    def summary(self) -> Report:
+        return Report().text(*self.said).items([str(path) for path in self.files])
 
 
 @public
@@ -56,10 +63,8 @@ def convert(
 
 def writer_of(to: str | None) -> Writer:
     """The writer of that name, or the usual one."""
-    known = plugin.discover()["writer"]
-    return plugin.build(
-        "writer", {"name": to or next(name for name, cls in known.items() if getattr(cls, "usual", False))}
-    )
+    known = discover()["writer"]
+    return build("writer", {"name": to or next(name for name, cls in known.items() if getattr(cls, "usual", False))})
 
 
 def parts_of(reader: Any, writer: Writer, what: str | None) -> list[Part]:
@@ -94,7 +99,7 @@ def written(parts: Sequence[Part], writer: Writer, folder: Path) -> Converted:
 def _parts(source: Any, writer: Writer, what: str | None, settings: dict[str, Any]) -> list[Part]:
     """What a file, an event, or a list of such is written as."""
     if isinstance(source, str | Path):
-        reader: Reader = plugin.build(GROUP, node_of(str(source), settings))
+        reader: Reader = build(GROUP, node_of(str(source), settings))
         return parts_of(reader, writer, what)
     if isinstance(source, Sequence):
         return [part for one in source for part in _parts(one, writer, what, settings)]
@@ -129,3 +134,19 @@ def _said(part: Recording | Record, path: Path) -> str:
         return f"{path.name}: {part.samples} samples of {', '.join([*part.channels, *part.more])}"
     status = f" and {len(part.status)} status channels" if part.status else ""
     return f"{path.name}: {part.samples} samples of {len(part.channels)} channels{status}"
+
+
+@plugin
+class Convert(Task, call=convert, given=("sources", "folder", "settings")):
+    """Write what was read as Parquet, CSV or COMTRADE: the whole recording, or the record of each dip."""
+
+    reads = ("data",)
+    instead = {"model": "a conversion has no model"}
+
+    to: str = ""  # parquet (where none is named), csv (both with a sidecar in JSON), comtrade (.cfg and .dat), cff
+    what: str | None = None  # recording or events; null: the recording, where the file holds waveforms
+
+    def run(self, job: Job) -> None:
+        writer = writer_of(self.to)
+        parts = parts_of(build("data", job.config["data"]), writer, self.what)
+        show(written(parts, writer, job.folder).summary(), console())

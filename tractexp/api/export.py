@@ -5,11 +5,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from tractexp import files, plugin
+from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.identify import Identification
-from tractexp.errors import check_choice, check_range
-from tractexp.outcome import Outcome, Table
+from tractexp.api.task import Job, Task
+from tractexp.blocks import Report, Table
+from tractexp.errors import UserError, check_choice, check_range
+from tractexp.outcome import Outcome
+from tractexp.plugin import build, plugin
+from tractexp.progress import say
 
 if TYPE_CHECKING:
     from tractexp.exchange.format import Identified
@@ -35,7 +39,11 @@ class Exported(Outcome):
         return files.write(path, self.text)
 
     def table(self) -> Table:
-        return Table([], [], f"{self.title}, as {self.format}", [*self.notes, "", *self.text.splitlines()])
+        return Table(["note"], [[note] for note in self.notes], f"{self.title}, as {self.format}")
+
+    def summary(self) -> Report:
+        report = Report(f"{self.title}, as {self.format}").text(*(f"note: {note}" for note in self.notes), "")
+        return report.text(*self.text.splitlines())
 
     def to_dict(self) -> dict[str, Any]:
         return {key: getattr(self, key) for key in ("format", "suffix", "title", "text", "notes")}
@@ -70,7 +78,7 @@ def export(
         fit.result, bus, file_power * (1.0 if on_file else own.ratio), voltage or told.get("voltage_kV") or VOLTAGE,
         own.ratio if on_file else 1.0,
     )  # fmt: skip
-    form = plugin.build("format", {"name": format})
+    form = build("format", {"name": format})
     form.check_parts(identified)
     text = form.text(identified)
     notes = [_told(identified, base, own.ratio, guessed=power is None and not own.known), *form.notes(identified)]
@@ -82,3 +90,29 @@ def _told(load: "Identified", base: str, ratio: float, guessed: bool) -> str:
     which = "" if ratio == 1 else ", the base of the record's file" if base == FILE else ", the record's own base"
     said = f"per unit of {load.power:.6g} MVA and {load.voltage:.6g} kV{which}"
     return said + f"; 1 pu of the file is taken for {POWER:g} MVA, for no power is given" * guessed
+
+
+@plugin
+class Export(Task, call=export, given=("fit",)):
+    """Turn `result.json` of an identification into a file of the format chosen; nothing is written where it cannot."""
+
+    instead = {"model": "the model is that of task.parameters"}
+
+    # path of a result.json; of parameters that a model has, a task has none
+    parameters: str | None = None  # pyright: ignore[reportIncompatibleVariableOverride]
+    format: str = ""  # andes, psse_dyr, modelica, or a format of an installed package
+
+    def run(self, job: Job) -> None:
+        from tractexp.identification.result import load
+
+        if self.parameters is None:
+            raise UserError("task.parameters is not given; it is the path of a result.json, which task=identify writes")
+        fit = Identification(load(Path(self.parameters)))
+        exported = self.perform(job, fit=fit)
+        path = exported.write(job.folder / f"load{exported.suffix}")
+        say(f"model: {exported.title}, from {self.parameters}")
+        if fit.grade and not fit.adequate:
+            say(f"  mind: {fit.headline}")
+        for note in exported.notes:
+            say(f"note: {note}")
+        say(f"  {path}")

@@ -1,8 +1,9 @@
 """Identify on some dips, judge on milder and deeper ones, for any optimizers."""
 
 import functools
+import tempfile
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any, Self
@@ -11,22 +12,25 @@ import numpy as np
 
 from tractexp import files
 from tractexp.api.arguments import Choice, public
-from tractexp.api.pages import Drawing, Written
 from tractexp.api.setup import Setup
+from tractexp.api.task import SEARCH, Job, Task
+from tractexp.blocks import Report, Table
 from tractexp.errors import UserError, check_range
-from tractexp.outcome import Table
+from tractexp.outcome import Drawing, Written
+from tractexp.plugin import build, plugin
 from tractexp.progress import Progress, tell
 
 if TYPE_CHECKING:
     from tractexp.identification.result import Fit, Result
 
-TOLD = (
+CAPTION = (
     "residuals: mean absolute value of Eq. (21), pu; medians over the seeds. estimate: the most likely parameters;"
     " beside it where each optimizer's search ended"
 )
 ARRAYS = ("t", "U", "P", "Q", "P_calculated", "Q_calculated")
 ESTIMATE = "estimate"  # stands for an optimizer in what is told of the most likely parameters
-ERRORS = ("residual_P", "residual_Q", "epsilon_p", "epsilon_q")
+RESIDUALS = ("residual_P", "residual_Q")
+ERRORS = (*RESIDUALS, "epsilon_p", "epsilon_q")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -63,14 +67,33 @@ class Generalised(Written):
 
     def table(self) -> Table:
         columns = ["event", "kind", "optimizer", *self.errors]
-        said = [TOLD]
-        return Table(columns, [[row[c] for c in columns] for row in self.medians], "on dips not fitted", said)
+        return Table(columns, [[row[c] for c in columns] for row in self.medians], "on dips not fitted", CAPTION)
 
-    def _results(self, folder: Path) -> list[Path]:
+    def summary(self) -> Report:
+        """A table for each held-out dip, medians over the seeds."""
+        report, medians = Report(), self.medians
+        for event, kind in dict.fromkeys((row["event"], row["kind"]) for row in medians):
+            rows = [
+                [row["optimizer"], *(f"{row[e]:.3e}" if e in RESIDUALS else f"{row[e]:.3%}" for e in self.errors)]
+                for row in medians if row["event"] == event
+            ]  # fmt: skip
+            report.table(["optimizer", *self.errors], rows, title=f"{kind}: {event}")
+        return report.text(CAPTION)
+
+    def report(self) -> Report:
+        """The summary, and a figure of each optimizer and dip."""
+        report = Report("On dips not fitted")
+        report.blocks += self.summary().blocks
+        with tempfile.TemporaryDirectory() as folder:
+            for name, draw in self.drawings().items():
+                report.figure(draw(Path(folder) / name))
+        return report
+
+    def write_results(self, folder: Path) -> list[Path]:
         told = {"residuals": self.residuals, "identified": self.identified}
         return [files.write_json(folder / "generalise.json", told)]
 
-    def _drawings(self) -> Mapping[str, Drawing]:
+    def drawings(self) -> Mapping[str, Drawing]:
         """A figure for each optimizer and held-out dip, of curves and residuals: issa_interpolation.svg, ..."""
         return {told["file"]: functools.partial(_draw, told) for told in self.curves}
 
@@ -145,7 +168,7 @@ def _searched(
 
 def _told(setup: Setup, searched: "Sequence[tuple[Result, list[Fit]]]") -> Generalised:
     """The searches as plain data."""
-    from tractexp.replication.searches import by_depth
+    from tractexp.identification.generalization import by_depth
 
     kinds = by_depth(setup.validate, setup.train)
     rows = [row for result, fits in searched for row in _residuals(result, fits, kinds)]
@@ -161,7 +184,7 @@ def _told(setup: Setup, searched: "Sequence[tuple[Result, list[Fit]]]") -> Gener
 
 def _residuals(result: "Result", fits: "Sequence[Fit]", kinds: Sequence[str]) -> Iterable[dict[str, Any]]:
     """Eq. (21) and Eq. (20) of P and Q on each held-out dip."""
-    from tractexp.replication.searches import mean_residual
+    from tractexp.identification.generalization import mean_residual
 
     for fit, kind in zip(fits, kinds, strict=True):
         yield {
@@ -201,3 +224,36 @@ def _draw(told: Mapping[str, Any], path: Path) -> Path:
         path, t, U, (P, Q), (calculated[0], calculated[1]), title=told["title"], epsilon=(epsilon_p, epsilon_q),
         notes=told["notes"],
     )  # fmt: skip
+
+
+@plugin
+class Generalise(Task, call=generalise):
+    """Mean absolute residuals of Eq. (21) on the held-out dips, by optimizer: generalise.json, curves and residuals.
+
+    The optimizer chosen by `optimizer=` is always among those compared, with its settings; the others have their own
+    defaults. All have the same limits.
+    """
+
+    reads = ("data", "model", *SEARCH)
+
+    optimizers: list[str] = field(default_factory=list)
+    held_out: dict[str, list[str]] = field(default_factory=dict)  # {choice of data: files}; without data.validate
+
+    def check(self) -> None:
+        for name in self.optimizers:
+            build("optimizer", {"name": name})
+
+    def perform(self, job: Job, **instead: Any) -> Generalised:
+        compared = {name: {"name": name} for name in self.optimizers} | {job.choices["optimizer"]: job.chosen}
+        return super().perform(job.holding_out(self.held_out), optimizers=compared, **instead)
+
+    def logged(self, job: Job, result: Generalised) -> dict[str, Any]:
+        """The residuals of each optimizer's first seed, by the number of the held-out dip."""
+        rows = result.residuals
+        dips = sum((row["optimizer"], row["seed"]) == (rows[0]["optimizer"], rows[0]["seed"]) for row in rows)
+        metrics = {
+            f"validate_{1 + k % dips}_residual_{c}_{row['optimizer']}": row[f"residual_{c}"]
+            for k, row in reversed(list(enumerate(rows)))  # the first seed's stand
+            for c in "PQ"
+        }
+        return {"name": "generalisation", "metrics": metrics}

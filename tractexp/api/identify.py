@@ -10,15 +10,16 @@ import numpy as np
 
 from tractexp.api.arguments import Choice, public
 from tractexp.api.compose import LoadModel
-from tractexp.api.pages import Drawing, Written
 from tractexp.api.read import dips_of
 from tractexp.api.response import Response, respond_to
 from tractexp.api.setup import Setup
+from tractexp.api.task import Job, Task
+from tractexp.blocks import Report, Table
 from tractexp.errors import Stopped, UserError
 from tractexp.identification.result import Result, by_event
-from tractexp.outcome import Table
+from tractexp.outcome import Written
+from tractexp.plugin import plugin
 from tractexp.progress import Progress, tell
-from tractexp.wording import as_sentence
 
 if TYPE_CHECKING:
     from tractexp.identification.adequacy import Adequacy
@@ -109,22 +110,23 @@ class Identification(Written):
     """Identified parameters, how sure they are, and how well they fit. `result` is the content of `result.json`."""
 
     kind = "identification"
+    page = "report.html"
 
     result: Result
     setup: Asked | None = None  # None where only a result.json is known
     found: "Found | None" = None
+    behind: "Judged | None" = None  # None where it was loaded
 
     @classmethod
     def of(cls, setup: Asked, found: "Found") -> "Identification":
         """Judge what a search found."""
         result, judged = _judge(setup, found)
-        made = cls(result, setup, found)
-        made.__dict__["judged"] = judged
-        return made
+        return cls(result, setup, found, judged)
 
     @functools.cached_property
     def judged(self) -> Judged:
-        return _judge(self.asked, self.ended)[1]
+        """What stands behind the result: computed again where this was loaded."""
+        return self.behind or _judge(self.asked, self.ended)[1]
 
     @property
     def asked(self) -> Asked:
@@ -206,16 +208,10 @@ class Identification(Written):
             raise UserError("this result.json has no model_error: it is of an earlier version; identify again")
         return ModelError.of(content)
 
-    @functools.cached_property
+    @property
     def advice(self) -> list[str]:
-        """What to do next, the most pressing first."""
-        from tractexp.choices import set_holding
-        from tractexp.identification.advice import advise
-
-        judged = self.judged
-        fitted = tuple(event.record.where for event in judged.known.likelihood.problem.events)
-        odd = judged.together.odd if judged.together else ()
-        return advise(judged.known, judged.adequacy, odd, data=set_holding(fitted))
+        """What to do next, the most pressing first; none where it was not judged."""
+        return self.result.advice
 
     def predict(
         self, event: Any = None, *, t: Any = None, U: Any = None, f: Any = None, P0: float | None = None,
@@ -238,15 +234,19 @@ class Identification(Written):
 
     def table(self) -> Table:
         """Estimates with intervals and verdicts, the search's end only where it lies outside."""
-        span, astray = "{:.4g} .. {:.4g}".format, self.astray
-        rows = [
-            [e.name, e.value, e.unit]
-            + [span(*e.interval) if e.interval else "", e.verdict]
-            + [e.search if e.name in astray else ""] * bool(astray)
-            for e in self.parameters.values()
-        ]
-        columns = ["parameter", "value", "unit", "95 % interval", "verdict", *["search"] * bool(astray)]
-        return Table(columns, rows, self.model.model.title, self._said())
+        from tractexp.report.identify import parameters
+
+        return parameters(self)
+
+    def summary(self) -> Report:
+        from tractexp.report import identify
+
+        return identify.summary(self)
+
+    def report(self) -> Report:
+        from tractexp.report import identify
+
+        return identify.report(self)
 
     @property
     def moves(self) -> dict[str, tuple[str, float]]:
@@ -274,23 +274,14 @@ class Identification(Written):
             e.name for e in self.parameters.values() if e.interval and not e.interval[0] <= e.search <= e.interval[1]
         ]
 
-    def search_told(self) -> str:
+    @property
+    def end_of_search(self) -> str:
         """Where the optimizer itself ended, in one line; "" where that is not known."""
         if not (s := self.result.search):
             return ""
-        told = f"search: {self.result.optimizer} {s['status']}: objective {s['objective']:.4g} pu² (the estimate's is"
-        told += f" {self.result.objective:.4g}), epsilon_p {s['epsilon_p']:.3%}, epsilon_q {s['epsilon_q']:.3%},"
-        return f"{told} {s['simulations']} simulations in {s['seconds']:.2f} s"
-
-    def _said(self) -> list[str]:
-        r = self.result
-        said = [as_sentence(self.headline)] if self.headline else []
-        said += [
-            f"{e['name']} ({e['role']}): {', '.join(f'{key} {e[key]:.3%}' for key in r.epsilons)}" for e in r.events
-        ]
-        said += [told for told in (self.result.on_given_base(), self.search_told()) if told]
-        said += [f"note: {note}" for note in r.uncertainty.get("notes", ())]
-        return said + [f"next: {sentence}" for sentence in (self.advice if "judged" in self.__dict__ else ())]
+        end = f"search: {self.result.optimizer} {s['status']}: objective {s['objective']:.4g} pu² (the estimate's is"
+        end += f" {self.result.objective:.4g}), epsilon_p {s['epsilon_p']:.3%}, epsilon_q {s['epsilon_q']:.3%},"
+        return f"{end} {s['simulations']} simulations in {s['seconds']:.2f} s"
 
     def to_dict(self) -> dict[str, Any]:
         found = None if self.found is None else asdict(self.found)
@@ -306,21 +297,7 @@ class Identification(Written):
             found = Found(**found | {"values": np.array(found["values"], dtype=float), "history": history})
         return cls(Result(**content["result"]), setup and Asked.from_dict(setup), found)
 
-    def _drawings(self) -> Mapping[str, Drawing]:
-        return {"report.html": self._report}
-
-    def _report(self, path: Path) -> Path:
-        from tractexp.provenance import command
-        from tractexp.report import identify
-
-        judged, about = self.judged, {p.name: p.about for p in self.model.model.parameters}
-        made = identify.page(
-            self.result, judged.fits, judged.estimated, judged.known, judged.together, judged.adequacy, self.structures,
-            self.advice, self.ended.history, about, self.search_told(), command(),
-        )  # fmt: skip
-        return made.write(path)
-
-    def _results(self, folder: Path) -> list[Path]:
+    def write_results(self, folder: Path) -> list[Path]:
         from tractexp.identification.result import write_history
 
         return [
@@ -380,7 +357,9 @@ def identify(
 
 def _judge(setup: Asked, found: "Found") -> tuple[Result, Judged]:
     """The estimate that a search led to, and what stands behind it."""
+    from tractexp.choices import set_holding
     from tractexp.identification.adequacy import graded
+    from tractexp.identification.advice import advise
     from tractexp.identification.estimate import estimate
     from tractexp.identification.profile import checked
     from tractexp.identification.result import active_bounds, conclude, errors_of, refuse_nothing_found
@@ -403,5 +382,53 @@ def _judge(setup: Asked, found: "Found") -> tuple[Result, Judged]:
     fields["uncertainty"]["notes"] += together.notes if together else []
     starts = [s.told(problem.space.names) for s in estimated.starts]
     structures = [rival.to_dict() for rival in known.rivals]
-    result = replace(result, **fields, adequacy=adequacy.told(), starts=starts, rival_structures=structures)
+    data = set_holding(tuple(event.record.where for event in problem.events))
+    advice = advise(known, adequacy, together.odd if together else (), data=data)
+    result = replace(
+        result, **fields, adequacy=adequacy.told(), starts=starts, rival_structures=structures, advice=advice
+    )
     return result, Judged(fits, estimated, known, together, adequacy)
+
+
+@plugin
+class Identify(Task, call=identify):
+    """Fit free parameters to the training events, judge on all, show and log the outcome."""
+
+    figures: bool | None = None  # write the page; null: in single runs, not in sweeps
+    predictor: bool | None = None  # log the model for mlflow.pyfunc; null: in single runs, not in sweeps
+
+    def draws(self, job: Job) -> bool:
+        return not job.in_sweep if self.figures is None else self.figures
+
+    def logged(self, job: Job, result: Identification) -> dict[str, Any]:
+        predictor = not job.in_sweep if self.predictor is None else self.predictor
+        return logged(job, result, predictor)
+
+
+def logged(job: Job, fit: Identification, predictor: bool = False) -> dict[str, Any]:
+    """What is logged of an identification: metrics, the fitness curve and, as a predictor, the model."""
+    from tractexp.identification.search import REFUSED
+    from tractexp.tracking import at_common_steps
+
+    result, of_search = fit.result, ("objective", "epsilon_p", "epsilon_q", "simulations", "seconds")
+    metrics = {key: getattr(result, key) for key in of_search} | {f"search_{k}": result.search[k] for k in of_search}
+    metrics["model_error"] = result.model_error["value"]
+    if result.model_error["held_out"]:
+        metrics["model_error_held_out"] = result.model_error["held_out"]["value"]
+    for k, event in enumerate(result.events, start=1):
+        metrics |= {f"{event['role']}_{k}_{e}": event[e] for e in result.epsilons}
+    if "epsilon_i" in result.epsilons:
+        metrics["epsilon_i"] = max(e["epsilon_i"] for e in result.events if e["role"] == "train")
+    history = fit.ended.history
+    valid = history.objective < REFUSED
+    best = history.objective[valid]
+    curves = {
+        "fitness": (np.flatnonzero(valid), best),
+        "fitness_by_simulations": at_common_steps(history.simulations[valid], best),
+    }
+    return {
+        "name": f"{job.variant}, {' and '.join(e.record.name for e in job.events.train)}, seed {job.seed}",
+        "values": result.parameters | {f"given_base.{n}": v for n, v in result.parameters_on_given_base.items()},
+        "metrics": metrics, "curves": curves, "seconds": result.seconds, "description": fit.headline,
+        "records": result.records, "model": job.folder / "result.json" if predictor else None,
+    }  # fmt: skip

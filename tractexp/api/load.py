@@ -43,6 +43,6 @@ def known_kinds() -> dict[str, type[Outcome]]:
     from tractexp import PUBLIC
 
     for module in dict.fromkeys(PUBLIC.values()):
-        if module.startswith("tractexp.api.") and importlib.util.find_spec(module):
+        if ".api." in module and importlib.util.find_spec(module):
             importlib.import_module(module)
     return Outcome.kinds

@@ -10,16 +10,15 @@ import numpy as np
 
 from tractexp import files, plugin
 from tractexp.api.arguments import public
-from tractexp.api.pages import Drawing, Written
 from tractexp.api.read import kept_record, node_of, record_again, table
+from tractexp.blocks import Report, Table
 from tractexp.errors import UserError
-from tractexp.outcome import Table, Tabulated
+from tractexp.outcome import Tabulated, Written
 from tractexp.overrides import typed
 from tractexp.progress import Progress, staged
 from tractexp.record import Event, Record
 from tractexp.record.wave_event import COARSEST, smeared
 from tractexp.recording.overview import Seen, Sight, View, sight_of, view_of
-from tractexp.wording import change, degrees, share
 
 EARLIER = 3.0  # cycles that a fit of samples needs before the dip, and one that the estimator of phasors leaves out
 
@@ -55,15 +54,17 @@ class Look(Written):
     """What files hold. `content` is that of `look.json`; arrays are read again where a look was loaded."""
 
     kind = "look"
+    page = "look.html"
 
     sources: Sequence[str | Record]
     settings: Mapping[str, Any]
     content: Mapping[str, Any]
+    behind: Sequence[View] = ()  # none where it was loaded
 
     @functools.cached_property
     def views(self) -> list[View]:
         """What stands behind the tables: recordings, phasors, events."""
-        return [_view(source, self.settings) for source in self.sources]
+        return [*self.behind] or [_view(source, self.settings) for source in self.sources]
 
     @property
     def files(self) -> Listed:
@@ -126,17 +127,27 @@ class Look(Written):
         return pandas.DataFrame({"t": t, **columns})
 
     def table(self) -> Table:
-        columns = ["event", "load", "kind", "starts [s]", "lasts [ms]", "depth", "jump [deg]", "U2", "P [MW]",
-                   "Q [Mvar]", "fit"]  # fmt: skip
+        """Every event of every load."""
+        from tractexp.report.look import event_row
+
+        columns = ["load", "dip", "kind", "starts [s]", "lasts [ms]", "depth", "jump [°]", "U2", "P", "Q", "fit it?"]
         several = len(self.content["files"]) > 1
-        rows, said = [], []
-        for f in self.content["files"]:
-            for feeder in f["feeders"]:
-                where = f"{f['file']} {feeder['name']}" if several else feeder["name"]
-                rows += [_told(where, event) for event in feeder["events"]]
-                said += [f"fit {where}: {feeder['command']}"] if feeder["command"] else []
+        rows = [
+            [f"{f['file']} {feeder['name']}" if several else feeder["name"], *event_row(event)]
+            for f in self.content["files"] for feeder in f["feeders"] for event in feeder["events"]
+        ]  # fmt: skip
         title = f"{len(rows)} event{'s' * (len(rows) != 1)} in {', '.join(f['file'] for f in self.content['files'])}"
-        return Table(columns, rows, title, said)
+        return Table(columns, rows, title)
+
+    def summary(self) -> Report:
+        from tractexp.report import look
+
+        return look.summary(self.content)
+
+    def report(self) -> Report:
+        from tractexp.report import look
+
+        return look.report(self.views, self.content)
 
     def to_dict(self) -> dict[str, Any]:
         told = [s if isinstance(s, str) else kept_record(s) for s in self.sources]
@@ -147,13 +158,8 @@ class Look(Written):
         sources = [s if isinstance(s, str) else record_again(s) for s in content["sources"]]
         return cls(sources, content["settings"], content["content"])
 
-    def _results(self, folder: Path) -> list[Path]:
+    def write_results(self, folder: Path) -> list[Path]:
         return [files.write_json(folder / "look.json", self.content)]
-
-    def _drawings(self) -> Mapping[str, Drawing]:
-        from tractexp.report import look
-
-        return {"look.html": lambda path: look.page(path, self.views, self.content)}
 
 
 @public
@@ -178,9 +184,7 @@ def look(*sources: Any, progress: Progress = None, **settings: Any) -> Look:
             views.append(_view(source, settings))
         stage("measuring the quality of the channels")
         content = files.plain({"files": [_content(view) for view in views]})
-    made = Look(told, settings, content)
-    made.__dict__["views"] = views
-    return made
+    return Look(told, settings, content, views)
 
 
 def _source(given: Any) -> str | Record:
@@ -329,16 +333,6 @@ def _sums(shown: Sight) -> dict[str, Any]:
             value = float(np.abs(first.sum(axis=0)).mean()) / scale if scale > 0 else None
         made[f"sum_{key}"] = value
     return made
-
-
-def _told(where: str, event: Mapping[str, Any]) -> list[Any]:
-    """A row of the table that a person sees first."""
-    power = [change(event[f"{x}_before"], event[f"{x}_after"]) for x in "PQ"]
-    return [
-        "" if event["dip"] is None else event["dip"], where, event["kind"], round(event["start"], 4),
-        round(1000 * event["duration"]), f"{event['depth']:.1%}", degrees(event["jump"]), share(event["U2"]),
-        *power, "yes" if event["worth"] else f"no: {event['why']}",
-    ]  # fmt: skip
 
 
 def _picked(items: Sequence[Any], k: int, what: str) -> Any:

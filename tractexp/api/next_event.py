@@ -1,5 +1,6 @@
 """What to record next, so that explanations which fit equally well are told apart."""
 
+import functools
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from tractexp import files
-from tractexp.api.pages import Drawing, Written
 from tractexp.api.setup import Setup
+from tractexp.blocks import Report, Table
 from tractexp.errors import UserError
-from tractexp.outcome import Table
+from tractexp.outcome import Written
 from tractexp.progress import Progress, telling
 
 if TYPE_CHECKING:
@@ -22,10 +23,12 @@ class Recommended(Written):
     """The event that tells rivals apart. `content` is that of `plan.json`."""
 
     kind = "next_event"
+    page = "plan.html"
 
     setup: Setup
     rivals: Sequence[Sequence[str]]
     content: Mapping[str, Any]
+    behind: "NextEvent | None" = None  # None where it was loaded
 
     @property
     def sentence(self) -> str:
@@ -37,17 +40,25 @@ class Recommended(Written):
         """That the recommended event leaves one rival, the least over all as the truth."""
         return self.content["recommended"]["probability"]
 
-    @property
-    def found(self) -> "NextEvent":
-        """What stands behind the page; of a loaded result it is reckoned again."""
-        return self.__dict__.get("_found") or _found(self.setup, self.rivals, False)
+    @functools.cached_property
+    def event(self) -> "NextEvent":
+        """What stands behind the page; of a loaded result it is computed again."""
+        return self.behind or _event(self.setup, self.rivals, False)
 
     def table(self) -> Table:
         """Every event tried, the surest first."""
         ranked = sorted(self.content["tried"], key=lambda t: (-t["probability"], -t["by_noise_alone"]))
         rows = [[t["words"], f"{t['probability']:.0%}", f"{t['by_noise_alone']:.0%}"] for t in ranked[:10]]
         columns = ["event", "probability", "where formulas are exact"]
-        return Table(columns, rows, "the ten surest events", [self.sentence])
+        return Table(columns, rows, "the ten surest events")
+
+    def summary(self) -> Report:
+        return Report().add(self.table()).text(f"next: {self.sentence}")
+
+    def report(self) -> Report:
+        from tractexp.report import next_event
+
+        return next_event.report(self.event, ", ".join(e.record.name for e in self.setup.train))
 
     def to_dict(self) -> dict[str, Any]:
         rivals = [list(names) for names in self.rivals]
@@ -57,23 +68,15 @@ class Recommended(Written):
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         return cls(Setup.from_dict(content["setup"]), content["rivals"], content["content"])
 
-    def _results(self, folder: Path) -> list[Path]:
+    def write_results(self, folder: Path) -> list[Path]:
         return [files.write_json(folder / "plan.json", self.content)]
-
-    def _drawings(self) -> Mapping[str, Drawing]:
-        from tractexp.report import next_event
-
-        records = ", ".join(e.record.name for e in self.setup.train)
-        return {"plan.html": lambda path: next_event.page(path, self.found, records)}
 
 
 def recommended(setup: Setup, rivals: Any, progress: Progress = None) -> Recommended:
     """Choose the event that tells `rivals` apart. Raises `UserError` for rivals that cannot be planned for."""
     sets = sets_of(rivals)
-    found = _found(setup, sets, progress)
-    made = Recommended(setup, sets, files.plain(found.told()))
-    made.__dict__["_found"] = found
-    return made
+    event = _event(setup, sets, progress)
+    return Recommended(setup, sets, files.plain(event.told()), event)
 
 
 def sets_of(rivals: Any) -> list[list[str]]:
@@ -99,7 +102,7 @@ def sets_of(rivals: Any) -> list[list[str]]:
     return told["name_sets"]
 
 
-def _found(setup: Setup, rivals: Sequence[Sequence[str]], progress: Progress) -> "NextEvent":
+def _event(setup: Setup, rivals: Sequence[Sequence[str]], progress: Progress) -> "NextEvent":
     from tractexp.discrepancy.next_event.rivals import event_for
 
     m = setup.model

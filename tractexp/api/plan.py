@@ -12,10 +12,12 @@ from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.identify import Identification
 from tractexp.api.next_event import Recommended, recommended
-from tractexp.api.pages import Drawing, Written
 from tractexp.api.setup import Setup
+from tractexp.api.task import Job, Task
+from tractexp.blocks import Report, Table
 from tractexp.errors import UserError, check_range
-from tractexp.outcome import Table
+from tractexp.outcome import Written
+from tractexp.plugin import plugin
 from tractexp.record import Event
 from tractexp.report.plan import CURRENT_NOISE, DEPTH, DURATION, JUMP, NOISE, RATE, UNBALANCE
 
@@ -38,15 +40,17 @@ class Forecasts(Written):
     """A plan: what dips of other depths, lengths, rates and noises would tell. `content` is that of `plan.json`."""
 
     kind = "plan"
+    page = "plan.html"
 
     setup: Setup
     asked: Mapping[str, Any]  # parameter, within, what was given of the dip, values, least, events
     content: Mapping[str, Any]
+    behind: "Planned | None" = None  # None where it was loaded
 
     @functools.cached_property
     def planned(self) -> "Planned":
-        """What stands behind the page; of a loaded result it is reckoned again."""
-        return _planned(self.setup, **self.asked)
+        """What stands behind the page; of a loaded result it is computed again."""
+        return self.behind or _planned(self.setup, **self.asked)
 
     @property
     def depth_needed(self) -> float | None:
@@ -60,10 +64,19 @@ class Forecasts(Written):
 
     def table(self) -> Table:
         """Half of the 95 % interval over the value, by depth."""
-        names, rows = [*self.content["parameters"]], self.content["half_intervals"][DEPTH]
-        told = [[row["at"], *("" if row[n] is None else f"{row[n]:.2%}" for n in names)] for row in rows]
-        best = [f"best events: {', '.join(self.best_events)}"] if self.best_events else []
-        return Table([DEPTH, *names], told, "half of the 95 % interval, of the value", [self.content["answer"], *best])
+        from tractexp.report import plan
+
+        return plan.scan(self.content, DEPTH)
+
+    def summary(self) -> Report:
+        from tractexp.report import plan
+
+        return plan.summary(self.content)
+
+    def report(self) -> Report:
+        from tractexp.report import plan
+
+        return plan.report(self.planned, self.content)
 
     def to_dict(self) -> dict[str, Any]:
         return {"setup": self.setup.to_dict(), "asked": dict(self.asked), "content": dict(self.content)}
@@ -72,13 +85,8 @@ class Forecasts(Written):
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         return cls(Setup.from_dict(content["setup"]), content["asked"], content["content"])
 
-    def _results(self, folder: Path) -> list[Path]:
+    def write_results(self, folder: Path) -> list[Path]:
         return [files.write_json(folder / "plan.json", self.content)]
-
-    def _drawings(self) -> Mapping[str, Drawing]:
-        from tractexp.report import plan
-
-        return {"plan.html": lambda path: plan.page(path, self.planned)}
 
 
 @public
@@ -122,6 +130,7 @@ def plan(
 
     Raises `UserError` for wrong names or values, and for a model with `per_event`.
     """
+    rivals = rivals if isinstance(rivals, str) else [*rivals]
     if rivals:
         known = {"bounds": bounds, "fixed": fixed, "substeps": substeps, "domain": domain}
         return recommended(Setup.of(records, model, (), None, known), rivals, progress)
@@ -140,9 +149,7 @@ def plan(
         "jump": jump, "unbalance": unbalance, "values": values, "least": least, "events": events,
     }  # fmt: skip
     planned = _planned(setup, **asked)
-    made = Forecasts(setup, asked, files.plain(_content(planned)))
-    made.__dict__["planned"] = planned
-    return made
+    return Forecasts(setup, asked, files.plain(_content(planned)), planned)
 
 
 def _planned(setup: Setup, parameter: str, within: float, values: Any, least: float, events: int | None,
@@ -254,8 +261,12 @@ def _described(shape: "Shape") -> str:
 
 def _content(planned: "Planned") -> dict[str, Any]:
     """What `plan.json` holds; half intervals are shares of the value, null where there is none."""
+    from tractexp.report.plan import rest
+
     names = planned.problem.space.names
     return {
+        "dip": planned.dip,
+        "origin": planned.origin,
         "answer": str(planned.needed),
         "depth_needed": planned.needed.depth,
         "parameters": dict(zip(names, planned.values, strict=True)),
@@ -269,4 +280,23 @@ def _content(planned: "Planned") -> dict[str, Any]:
         "best_events": [
             {"name": c.name, "gain": c.gain, "half": dict(zip(names, c.half, strict=True))} for c in planned.chosen
         ],
+        "other_events": rest(planned),
     }
+
+
+@plugin
+class Plan(Task, call=plan):
+    """Forecast the intervals that a recording would give, without fitting it: plan.html and plan.json.
+
+    The dip is that of the deepest record in `data`, or as set here. The parameters and the noise are those of the
+    estimate that identify makes of it, or the model's defaults, or those of an earlier result.json.
+    """
+
+    def logged(self, job: Job, result: Forecasts | Recommended) -> dict[str, Any]:
+        if isinstance(result, Recommended):
+            name = f"plan to tell {len(result.rivals)} explanations apart"
+            return {"name": name, "metrics": {"probability": result.probability}}
+        metrics = {} if result.depth_needed is None else {"depth_needed": result.depth_needed}
+        values = dict(result.content["parameters"])
+        parameter = result.asked["parameter"]
+        return {"name": f"plan for {parameter}", "values": values, "metrics": metrics}

@@ -12,13 +12,15 @@ import numpy as np
 
 from tractexp import files
 from tractexp.api.arguments import public
-from tractexp.api.identify import Identification
-from tractexp.api.pages import Drawing, Written
+from tractexp.api.identify import Identification, logged
+from tractexp.api.task import Job, Task
+from tractexp.blocks import Report, Table
 from tractexp.errors import check_range
-from tractexp.outcome import Table
+from tractexp.outcome import Written
+from tractexp.plugin import plugin
 
 if TYPE_CHECKING:
-    from tractexp.identification.posterior import Posterior
+    from tractexp.identification.posterior import Posterior as Draws
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -26,17 +28,19 @@ class Sampled(Written):
     """A sample of the posterior under a flat prior within the bounds. `content` is that of `posterior.json`."""
 
     kind = "posterior"
+    page = "posterior.html"
 
     fit: Identification
     settings: Mapping[str, int]  # walkers, steps, seed
     content: Mapping[str, Any]
+    behind: "Draws | None" = None  # None where it was loaded
 
     @functools.cached_property
-    def drawn(self) -> "Posterior":
+    def drawn(self) -> "Draws":
         """The sample; of a loaded result it is drawn again, from the same seed."""
         from tractexp.identification.posterior import sample
 
-        return sample(self.fit.judged.known, **self.settings)
+        return self.behind or sample(self.fit.judged.known, **self.settings)
 
     @property
     def draws(self) -> dict[str, np.ndarray]:
@@ -49,10 +53,22 @@ class Sampled(Written):
             [name, f"{r.free[name]:.4g}", span(*r.intervals[name]), span(*interval)]
             for name, interval in self.content["intervals"].items()
         ]
-        said = f"autocorrelation time {self.content['autocorrelation']:.0f} of {self.settings['steps']} steps"
-        short = [] if self.content["converged"] else ["note: the chain is shorter than 50 of them; raise steps"]
         columns = ["parameter", "most likely", "by curvature", "by posterior"]
-        return Table(columns, rows, "95 % intervals", [said, *short])
+        return Table(columns, rows, "95 % intervals")
+
+    def summary(self) -> Report:
+        c, s = self.content, self.settings
+        made = (
+            f"{s['steps']} steps of {s['walkers']} walkers in {c['seconds']:.1f} s, acceptance {c['acceptance']:.2f},"
+            f" autocorrelation time {c['autocorrelation']:.0f} steps"
+        )
+        short = "note: the chain is shorter than 50 autocorrelation times; raise steps"
+        return self.fit.summary().add(self.table()).text(made, *[short] * (not c["converged"]))
+
+    def report(self) -> Report:
+        from tractexp.report import posterior
+
+        return posterior.report(self.fit.judged.known, self.drawn, self.fit.headline)
 
     def to_dict(self) -> dict[str, Any]:
         return {"fit": self.fit.to_dict(), "settings": dict(self.settings), "content": dict(self.content)}
@@ -61,20 +77,13 @@ class Sampled(Written):
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         return cls(Identification.from_dict(content["fit"]), content["settings"], content["content"])
 
-    def _results(self, folder: Path) -> list[Path]:
+    def write_results(self, folder: Path) -> list[Path]:
         packed = io.BytesIO()
         np.savez_compressed(packed, **self.draws)  # type: ignore[arg-type]
         path = files.write_json(folder / "posterior.json", self.content)
         draws = files.write(folder / "posterior.npz", packed.getvalue())
         result = replace(self.fit.result, **self.fit.judged.known.fields())
         return [path, draws, *replace(self.fit, result=result).write_results(folder)]
-
-    def _drawings(self) -> Mapping[str, Drawing]:
-        from tractexp.report import posterior
-
-        fit = self.fit
-        known = fit.judged.known
-        return {"posterior.html": lambda path: posterior.page(path, known, self.drawn, fit.headline)}
 
 
 @public
@@ -96,9 +105,16 @@ def posterior(fit: Identification, *, walkers: int = 48, steps: int = 2000, seed
     content = {
         "intervals": dict(zip(drawn.names, drawn.intervals.tolist(), strict=True)),
         "autocorrelation": drawn.autocorrelation,
+        "acceptance": drawn.acceptance,
         "converged": drawn.converged,
         "seconds": time.perf_counter() - started,
     }
-    made = Sampled(fit, settings, files.plain(content))
-    made.__dict__["drawn"] = drawn
-    return made
+    return Sampled(fit, settings, files.plain(content), drawn)
+
+
+@plugin
+class Posterior(Task, call=posterior):
+    """Identify, then sample the posterior under a flat prior within the bounds: posterior.html, .json and .npz."""
+
+    def logged(self, job: Job, result: Sampled) -> dict[str, Any]:
+        return logged(job, result.fit)

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any, Self
 
 from tractexp import files
 from tractexp.api.arguments import public
-from tractexp.api.identify import Identification
-from tractexp.api.pages import Drawing, Written
+from tractexp.api.identify import Identification, logged
+from tractexp.api.task import Job, Task
+from tractexp.blocks import Report, Table
 from tractexp.errors import check_range
 from tractexp.identification.result import Result
-from tractexp.outcome import Table
-from tractexp.wording import as_sentence
+from tractexp.outcome import Written
+from tractexp.plugin import plugin
 
 if TYPE_CHECKING:
     from tractexp.identification.profile import Profiles
@@ -25,26 +26,26 @@ class Profiled(Written):
     """Profiles of the free parameters of an identification. `content` is that of `profile.json`."""
 
     kind = "profile"
+    page = "profile.html"
 
     fit: Identification
     points: int
     content: Mapping[str, Any]
     result: Result  # of the identification, with the intervals and verdicts that the profiles give
     curvature: Mapping[str, tuple[float, float]]  # the intervals by curvature, about where the profiles start
+    behind: "Profiles | None" = None  # None where it was loaded
 
     @functools.cached_property
-    def made(self) -> "Profiles":
-        """What stands behind the page; of a loaded result it is reckoned again."""
+    def curves(self) -> "Profiles":
+        """What stands behind the page; of a loaded result it is computed again."""
         from tractexp.identification.profile import profiles
 
-        return profiles(self.fit.judged.known, self.points)
+        return self.behind or profiles(self.fit.judged.known, self.points)
 
     @property
     def identification(self) -> Identification:
         """The identification with the intervals and verdicts that the profiles give."""
-        made = replace(self.fit, result=self.result)
-        made.__dict__["judged"] = self.fit.judged
-        return made
+        return replace(self.fit, result=self.result)
 
     @property
     def profiles(self) -> Mapping[str, Mapping[str, Any]]:
@@ -58,10 +59,19 @@ class Profiled(Written):
             [name, f"{likely[name]:.4g}", span(*self.curvature[name]), span(*p["interval"])]
             for name, p in self.profiles.items()
         ]
-        fit = self.fit
-        said = [as_sentence(fit.headline)] if fit.headline else []
-        said += [f"{name}: {p['verdict']}" for name, p in self.profiles.items()]
-        return Table(["parameter", "most likely", "by curvature", "by profile"], rows, "95 % intervals", said)
+        return Table(["parameter", "most likely", "by curvature", "by profile"], rows, "95 % intervals")
+
+    def summary(self) -> Report:
+        c, notes = self.content, self.content["notes"]
+        effort = f"{len(self.profiles)} profiles: {c['simulations']} simulations in {c['seconds']:.2f} s"
+        verdicts = [f"{name}: {p['verdict']}" for name, p in self.profiles.items()]
+        report = self.fit.summary().add(self.table()).items([*verdicts, *(f"note: {note}" for note in notes)])
+        return report.text(effort)
+
+    def report(self) -> Report:
+        from tractexp.report import profile
+
+        return profile.report(self.curves, self.fit.headline)
 
     def to_dict(self) -> dict[str, Any]:
         plain = {"points": self.points, "content": dict(self.content), "curvature": dict(self.curvature)}
@@ -72,14 +82,9 @@ class Profiled(Written):
         fit, result = Identification.from_dict(content["fit"]), Result(**content["result"])
         return cls(fit, content["points"], content["content"], result, content["curvature"])
 
-    def _results(self, folder: Path) -> list[Path]:
+    def write_results(self, folder: Path) -> list[Path]:
         path = files.write_json(folder / "profile.json", self.content)
         return [path, *self.identification.write_results(folder)]
-
-    def _drawings(self) -> Mapping[str, Drawing]:
-        from tractexp.report import profile
-
-        return {"profile.html": lambda path: profile.page(path, self.made, self.fit.headline)}
 
 
 @public
@@ -102,9 +107,7 @@ def profile(fit: Identification, *, points: int = 24) -> Profiled:
     fields["uncertainty"]["notes"] += made.notes
     ends = zip(made.known.names, made.known.values, made.known.half, strict=True)
     curvature = {name: (float(value - half), float(value + half)) for name, value, half in ends}
-    done = Profiled(fit, points, content, replace(fit.result, **fields), curvature)
-    done.__dict__["made"] = made
-    return done
+    return Profiled(fit, points, content, replace(fit.result, **fields), curvature, made)
 
 
 def _content(made: "Profiles", seconds: float) -> dict[str, Any]:
@@ -115,6 +118,7 @@ def _content(made: "Profiles", seconds: float) -> dict[str, Any]:
             "simulations": made.simulations,
             "seconds": seconds,
             "restarts": made.restarts,
+            "notes": made.notes,
             "profiles": {
                 p.name: {
                     "values": p.values,
@@ -128,3 +132,11 @@ def _content(made: "Profiles", seconds: float) -> dict[str, Any]:
             },
         }
     )
+
+
+@plugin
+class Profile(Task, call=profile):
+    """Identify, then find the best fit for each value of each parameter in turn: profile.html and profile.json."""
+
+    def logged(self, job: Job, result: Profiled) -> dict[str, Any]:
+        return logged(job, result.identification)

@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 
 from tractexp import plugin
-from tractexp.api.arguments import Choice, check_kind, choices, public
+from tractexp.api.arguments import Choice, check_kind, public
+from tractexp.blocks import Report, Table
+from tractexp.composition import choices
 from tractexp.errors import UserError, among
-from tractexp.outcome import Table, Tabulated
+from tractexp.outcome import Tabulated
 from tractexp.record import Base, Event, Record, Waves, Window, describe, detect, on_own_base, reader_of
 
 REQUIRED, OPTIONAL = ("t", "U", "P", "Q"), ("f", "U2")
@@ -30,18 +32,21 @@ class Dips(Tabulated, list[Event]):
         return look(*self)
 
     def table(self) -> Table:
-        """One row for each event; below it what a reader or the detection found odd."""
+        """One row for each event."""
         rows = [
             [e.record.name, e.t_start, f"{e.depth:.0%}", round(1000 * e.duration), round(e.rate), e.P0, e.Q0,
              f"{e.noise_P / max(abs(e.P0), 1e-9):.2%}", " ".join(e.record.channels)]
             for e in self
         ]  # fmt: skip
-        odd = [said.partition(". Note: ") for said in map(describe, self)]
-        notes = [f"{e.record.name}: {o[2]}" for e, o in zip(self, odd, strict=True) if o[2]]
-        notes += [f"{e.record.name}: {note}" for e in self for note in e.record.notes]
         columns = ["event", "starts [s]", "depth", "lasts [ms]", "rate [Hz]", "P0 [pu]", "Q0 [pu]", "noise of P",
                    "channels"]  # fmt: skip
-        return Table(columns, rows, f"{len(self)} dip{'s' * (len(self) != 1)}", notes)
+        return Table(columns, rows, f"{len(self)} dip{'s' * (len(self) != 1)}", words=(8,))
+
+    def summary(self) -> Report:
+        """The table, and what a reader or the detection found odd."""
+        odd = [sentence.partition(". Note: ") for sentence in map(describe, self)]
+        notes = [f"{e.record.name}: {o[2]}" for e, o in zip(self, odd, strict=True) if o[2]]
+        return Report().add(self.table()).text(*notes, *(f"{e.record.name}: {n}" for e in self for n in e.record.notes))
 
 
 @public

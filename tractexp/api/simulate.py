@@ -1,5 +1,6 @@
 """Play a voltage through a load model with given parameters."""
 
+import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -10,11 +11,13 @@ import numpy as np
 from tractexp.api.arguments import public
 from tractexp.api.compose import LoadModel, model_of
 from tractexp.api.identify import Identification
-from tractexp.api.pages import Drawing, Written
 from tractexp.api.read import dips_of
 from tractexp.api.response import Response, respond_to
+from tractexp.api.task import LOAD, Job, Task
+from tractexp.blocks import Report, Table
 from tractexp.errors import UserError, among, check_range
-from tractexp.outcome import Table
+from tractexp.outcome import Drawing, Written
+from tractexp.plugin import plugin
 
 BEFORE = {"U0": 1.0, "P0": 1.0, "Q0": 0.5, "frequency": 50.0}  # a dip by hand, where nothing else is known
 
@@ -67,6 +70,19 @@ class Simulation(Written):
         columns += ["epsilon_i"] * any(one.epsilon_i is not None for one in self.responses)
         return Table(columns, [one.row for one in self.responses], self.model.model.title)
 
+    def summary(self) -> Report:
+        rows = [[p.name, f"{self.values[p.name]:.6g}", p.unit] for p in self.model.model.parameters]
+        return Report().add(Table(["parameter", "value", "unit"], rows), self.table())
+
+    def report(self) -> Report:
+        """The summary, and a figure of each response."""
+        report = Report(self.model.model.title)
+        report.blocks += self.summary().blocks
+        with tempfile.TemporaryDirectory() as folder:
+            for name, draw in self.drawings().items():
+                report.figure(draw(Path(folder) / name))
+        return report
+
     def to_dict(self) -> dict[str, Any]:
         return {
             "model": asdict(self.model),
@@ -88,11 +104,11 @@ class Simulation(Written):
         responses = tuple(map(response, content["responses"]))
         return cls(LoadModel(**content["model"]), content["values"], responses)
 
-    def _results(self, folder: Path) -> list[Path]:
+    def write_results(self, folder: Path) -> list[Path]:
         """response.csv, with a number from the second event on; of waveforms currents, too."""
         return [path for k, one in enumerate(self.responses, start=1) for path in one.write(folder / _stem(k))]
 
-    def _drawings(self) -> Mapping[str, Drawing]:
+    def drawings(self) -> Mapping[str, Drawing]:
         """response.svg, with a number from the second event on."""
         return {f"{_stem(k)}.svg": one.draw for k, one in enumerate(self.responses, start=1)}
 
@@ -180,3 +196,44 @@ def chosen(names: Sequence[str], found: Mapping[str, float], given: Mapping[str,
             f" or task.values={{{', '.join(f'{name}: ...' for name in missing)}}}"
         )
     return np.array([values[name] for name in names], dtype=float)
+
+
+@plugin
+class Simulate(Task, call=simulate):
+    """Simulate recorded events, or the dip that `depth`, `duration` ... describe.
+
+    The parameters are those of a `result.json`, with its model, or `values` for the model chosen; values also replace
+    single parameters of the result.
+    """
+
+    instead = {
+        "model": "with task.parameters the model is that of the result",
+        "data": "with task.depth no record is played",
+    }
+
+    # path of a result.json; of parameters that a model has, a task has none
+    parameters: str | None = None  # pyright: ignore[reportIncompatibleVariableOverride]
+
+    def needless(self) -> tuple[str, ...]:
+        return (*(LOAD if self.parameters else ()), *(("data",) if self.by_hand else ()))
+
+    @property
+    def by_hand(self) -> bool:
+        return getattr(self, "depth") is not None  # noqa: B009 # a setting that the call declares
+
+    def perform(self, job: Job, **instead: Any) -> Simulation:
+        from tractexp.identification.result import load
+
+        if self.parameters:
+            instead["model"] = Identification(load(Path(self.parameters)))
+        instead["records"] = () if self.by_hand else [*job.events.train, *job.events.validate]
+        return super().perform(job, **instead)
+
+    def logged(self, job: Job, result: Simulation) -> dict[str, Any]:
+        errors = {
+            f"event_{k}_epsilon_{c}": error
+            for k, one in enumerate(result.responses, start=1)
+            for c, error in zip("pqi", (*(one.epsilon or (None, None)), one.epsilon_i), strict=True)
+        }
+        metrics = {key: error for key, error in errors.items() if error is not None}
+        return {"name": "simulation", "values": dict(result.values), "metrics": metrics}

@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING, Any, Self
 from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.look import Listed
-from tractexp.api.pages import Drawing, Written
-from tractexp.api.surveying import QUIET, UNREAD, kept, looked, states, writing
+from tractexp.api.surveying import kept, looked, states, writing
+from tractexp.api.task import Job, Task
+from tractexp.blocks import Report, Table
 from tractexp.errors import UserError, check_range
-from tractexp.outcome import Table
+from tractexp.outcome import Written
 from tractexp.overrides import typed
-from tractexp.plugin import discover
+from tractexp.plugin import discover, get, plugin
 from tractexp.progress import Progress, counting, staged
 from tractexp.recording import archive
+from tractexp.report.survey import UNREAD
 
 if TYPE_CHECKING:
     from tractexp.identification.plan import Choice
@@ -33,10 +35,11 @@ ABOUT = {
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Survey(Written):
+class Surveyed(Written):
     """The table of an archive. `content` is that of `survey.json`."""
 
     kind = "survey"
+    page = "survey.html"
 
     content: Mapping[str, Any]
 
@@ -71,17 +74,19 @@ class Survey(Written):
         return self.rows.to_frame()
 
     def table(self) -> Table:
-        rows = self.content["rows"]
-        kinds = sorted({row["kind"] for row in rows}, key=lambda k: (k in (UNREAD, QUIET), k))
-        told = [
-            [kind, sum(r["kind"] == kind for r in rows), len({r["file"] for r in rows if r["kind"] == kind}),
-             sum(r["kind"] == kind and r["worth"] for r in rows)]
-            for kind in kinds
-        ]  # fmt: skip
-        said = [f"{self.content['files']} files in {self.folder}, {sum(r['worth'] for r in rows)} events worth fitting"]
-        if self.informative:
-            said += [f"most informative: {', '.join(self.informative)}", self.command]
-        return Table(["what", "rows", "files", "worth fitting"], told, f"survey of {self.folder}", said)
+        from tractexp.report import survey
+
+        return survey.kinds(self.content)
+
+    def summary(self) -> Report:
+        from tractexp.report import survey
+
+        return survey.summary(self.content)
+
+    def report(self) -> Report:
+        from tractexp.report import survey
+
+        return survey.report(self.content)
 
     def to_dict(self) -> dict[str, Any]:
         return {"content": dict(self.content)}
@@ -90,18 +95,13 @@ class Survey(Written):
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         return cls(content["content"])
 
-    def _results(self, folder: Path) -> list[Path]:
+    def write_results(self, folder: Path) -> list[Path]:
         frame = self.to_frame()
         return [
             files.write_json(folder / "survey.json", self.content),
             files.write(folder / "survey.csv", frame.to_csv(index=False)),
             files.write(folder / "survey.parquet", frame.to_parquet(index=False)),
         ]
-
-    def _drawings(self) -> Mapping[str, Drawing]:
-        from tractexp.report import survey
-
-        return {"survey.html": lambda path: survey.page(path, self.content)}
 
 
 @public
@@ -117,7 +117,7 @@ def survey(
     bounds: Mapping[str, Sequence[float]] | None = None,
     fixed: Mapping[str, float] | None = None,
     substeps: int | None = None,
-) -> Survey:
+) -> Surveyed:
     """Look at every file below a folder that can be read; what cannot be read is a row with the reason.
 
     `cores` (all) processes look; `keep` is a folder where the rows of each file are kept as they come, so that the
@@ -148,7 +148,7 @@ def survey(
         "rows": [row for name in names for row in rows[name]], "informative": [], "command": "",
     }  # fmt: skip
     if informative is None:
-        return Survey(content)
+        return Surveyed(content)
     worth = sorted((row for row in content["rows"] if row["worth"]), key=_promise, reverse=True)[:CANDIDATES]
     asked = {"bounds": bounds, "fixed": fixed, "substeps": substeps}
     with staged(progress) as stage:
@@ -157,7 +157,7 @@ def survey(
     content["informative"] = files.plain([{"event": c.name, "gain": c.gain, "half": c.half} for c in best])
     reader = next(cls.name for cls in discover()["data"].values() if getattr(cls, "folders", False))
     content["command"] = typed({"name": reader, "path": str(folder), "train": [c.name for c in best]})
-    return Survey(content)
+    return Surveyed(content)
 
 
 def _promise(row: Mapping[str, Any]) -> float:
@@ -183,3 +183,37 @@ def _best(
         raise UserError(f"no event in {folder} is worth fitting; the table says why")
     events = [detect(record) for record in archive.records(folder, list(names), "data.train")]
     return chosen_events(Setup.of(events, model, (), None, known), values, most)
+
+
+@plugin
+class Survey(Task, call=survey, given=("folder", "keep")):
+    """Look at every file of a folder, `data.path`: what happened in it, to which load, and what is worth fitting.
+
+    The rows of each file are kept as they come: a run that was stopped goes on where it was, and the next run looks
+    only at what is new or changed.
+    """
+
+    resumes = True
+    reads = ("data", "model")
+
+    def needless(self) -> tuple[str, ...]:
+        """The model matters only where events are chosen for it."""
+        return () if getattr(self, "informative") else ("model",)  # noqa: B009 # a setting that the call declares
+
+    def perform(self, job: Job, **instead: Any) -> Surveyed:
+        node = job.config["data"]
+        if not getattr(get("data", node["name"]), "folders", False):
+            raise UserError(f"data={job.choices['data']} is no folder; leave it out and give data.path=FOLDER")
+        if not node["path"]:
+            raise UserError("data.path is missing: give the folder of the recordings, e.g. data.path=recordings")
+        result = super().perform(job, folder=node["path"], keep=job.folder, **instead)
+        if not result.informative:
+            return result
+        model = [f"{key}={value}" for key, value in job.given.items() if key.partition(".")[0] == "model"]
+        data = {"name": node["name"], "path": node["path"], "train": result.informative}
+        return Surveyed({**result.content, "command": typed(data, *model)})
+
+    def logged(self, job: Job, result: Surveyed) -> dict[str, Any]:
+        rows = result.content["rows"]
+        metrics = {"files": result.content["files"], "rows": len(rows), "worth": sum(r["worth"] for r in rows)}
+        return {"name": f"survey of {Path(result.folder).name}", "metrics": metrics}

@@ -17,11 +17,11 @@ from tractexp.api.look import command, event_row, series
 from tractexp.errors import UserError
 from tractexp.recording import archive
 from tractexp.recording.overview import Seen, Sight, View
+from tractexp.report.survey import QUIET, UNREAD
 from tractexp.workers import processes
 
 Rows = list[dict[str, Any]]
 
-UNREAD, QUIET = "not read", "nothing"  # what stands as the kind of a file without events
 COLUMNS = (
     "event", "file", "station", "load", "kind", "when", "start", "duration", "depth", "U2", "jump", "P_before",
     "Q_before", "P_after", "Q_after", "unit", "noise", "rate", "worth", "why", "command", "U_picture", "P_picture",

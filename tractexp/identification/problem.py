@@ -123,6 +123,17 @@ class Step:
 class Problem:
     """Free parameters (columns of `values`) of a model, fitted to events. What the search loop works on."""
 
+    model: Model
+    parameters: tuple[Parameter, ...]
+    fixed: dict[str, float]
+    space: Box
+    lower: np.ndarray
+    upper: np.ndarray
+    per_event: tuple[str, ...]
+    loss: Loss
+    drive: Drive
+    step: Step
+
     def __init__(
         self,
         model: Model,

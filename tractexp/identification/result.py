@@ -151,6 +151,7 @@ class Result:
     # value, interval, of_S of the fitted events; held_out the same of those; events: name, role, value, interval, of_S
     model_error: dict[str, Any] = field(default_factory=dict)
     rival_structures: list[dict[str, Any]] = field(default_factory=list)  # name, model_error, parameters
+    advice: list[str] = field(default_factory=list)  # what to do next, the most pressing first
     notes: list[str] = field(default_factory=list)
     per_event: dict[str, list[float]] = field(default_factory=dict)  # of which `parameters` holds the mean
     standard_errors: dict[str, float | None] = field(default_factory=dict)  # None: not identifiable

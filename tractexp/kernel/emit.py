@@ -13,11 +13,10 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 
-from sympy import Symbol
-
 from tractexp.kernel import steady
 from tractexp.kernel.expressions import Expressions
 from tractexp.kernel.function import Function
+from tractexp.kernel.graph import Symbol
 from tractexp.kernel.layout import EVENT, INPUTS, SMOOTH
 from tractexp.kernel.lowered import Lowered, symbols
 from tractexp.kernel.numbers import Numbers

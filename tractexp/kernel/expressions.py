@@ -5,11 +5,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import sympy
-from sympy import Symbol
 from sympy.logic.boolalg import Boolean, BooleanFalse, BooleanTrue
 
 from tractexp.errors import UserError
 from tractexp.kernel import math as lanes
+from tractexp.kernel.graph import Symbol
 from tractexp.kernel.lowered import Phase
 
 RELATIONS = {

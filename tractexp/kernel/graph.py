@@ -7,7 +7,9 @@ graph and a tree of millions.
 from collections.abc import Iterator
 
 import sympy
-from sympy import Basic, Symbol
+
+Basic = sympy.Basic  # by name: type checkers take what is imported from an untyped package for unknown
+Symbol = sympy.Symbol
 
 
 def nodes(expression: Basic) -> Iterator[Basic]:

@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import sympy
-from sympy import Symbol
 
-from tractexp.kernel.graph import symbols_of
+from tractexp.kernel.graph import Symbol, symbols_of
 
 Assignments = tuple[tuple[Symbol, sympy.Expr], ...]
 

@@ -4,9 +4,9 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import sympy
-from sympy import Symbol
 
 from tractexp.errors import UserError
+from tractexp.kernel.graph import Symbol
 from tractexp.model.sites import Site
 
 if TYPE_CHECKING:

@@ -3,8 +3,9 @@
 from typing import TYPE_CHECKING, Any
 
 import sympy
-from sympy import I, Symbol, conjugate, im, re
+from sympy import I, conjugate, im, re
 
+from tractexp.kernel.graph import Symbol
 from tractexp.model import sites
 from tractexp.model.symbols import vector_symbol
 

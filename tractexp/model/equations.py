@@ -10,10 +10,10 @@ from collections.abc import Callable, Iterable
 from typing import Any, Literal, NoReturn
 
 import sympy
-from sympy import I, Symbol, conjugate, im, re
+from sympy import I, conjugate, im, re
 
 from tractexp.errors import Unknown, UserError, nearest
-from tractexp.kernel.graph import nodes, operations, symbols_of
+from tractexp.kernel.graph import Symbol, nodes, operations, symbols_of
 from tractexp.kernel.layout import EVENT, INPUTS
 from tractexp.model import sites
 from tractexp.model.apart import Apart
@@ -62,6 +62,26 @@ class Equations(Circuit):
 
     A flux is one complex symbol; its real and imaginary part become two real states of the kernel.
     """
+
+    waves: bool
+    v: Any
+    v_rate: Any
+    omega_s: Symbol
+    omega_n: Symbol
+    U_rate: Symbol
+    U2: Symbol
+    U20: Symbol
+    t: Symbol
+    step: Symbol
+    omega_s0: Symbol
+    v_zero: Symbol
+    v_zero_rate: Symbol
+    turn: Any
+    recorded_voltage: Any
+    P0: Symbol
+    Q0: Symbol
+    P_s0: Symbol
+    Q_s0: Symbol
 
     def __init__(self, domain: str = PHASORS) -> None:
         self.waves = domain == WAVES

@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import sympy
-from sympy import Basic, Symbol
+
+from tractexp.kernel.graph import Basic, Symbol
 
 
 def replaced(expression: sympy.Expr, known: Mapping[Symbol, sympy.Expr], plain: bool = False) -> sympy.Expr:

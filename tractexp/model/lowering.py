@@ -9,10 +9,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import sympy
-from sympy import Symbol
 
 from tractexp.errors import UserError
-from tractexp.kernel.graph import arguments, symbols_of
+from tractexp.kernel.graph import Symbol, arguments, symbols_of
 from tractexp.kernel.layout import EVENT, INPUTS
 from tractexp.kernel.lowered import Lowered, Phase, symbols
 from tractexp.model.equations import Equations, phasor_parts, start_symbol

@@ -19,6 +19,8 @@ from tractexp.model.signature import check_signature
 from tractexp.plugin import Plugin
 
 if TYPE_CHECKING:
+    from sympy import Expr, Symbol
+
     from tractexp.model.drive import Drive
     from tractexp.model.equations import Equations
 
@@ -78,7 +80,7 @@ class Static(Part):
     group: ClassVar[str] = "model/static"
 
     @abstractmethod
-    def law(self, u: Any, *_: Any, **parameters: Any) -> tuple[Any, Any] | None:
+    def law(self, u: "Symbol", *_: Any, **parameters: Any) -> "tuple[Expr | float, Expr | float] | None":
         """P/P_s0 and Q/Q_s0 at the voltage u = U/U_0, both 1 at u = 1; None: no static load.
 
         A law that names an argument `f` gets the frequency over that before the event.
@@ -90,7 +92,7 @@ class Static(Part):
 
         return DAMPING
 
-    def require(self, *_: Any, **parameters: Any) -> Iterable[tuple]:
+    def require(self, *_: Any, **parameters: Any) -> Iterable[tuple[Any, ...]]:
         """What must hold for a steady state: (slack, sentence) or (slack, sentence, shown), slack >= 0 where it does.
 
         `{value}` in the sentence prints `shown`, by default the slack. May ask for `P0`, `Q0` and `U0` by name.

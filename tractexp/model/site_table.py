@@ -2,10 +2,10 @@
 
 from typing import Any
 
+from tractexp.blocks import Table
 from tractexp.errors import UserError
 from tractexp.model.model import Model
 from tractexp.model.sites import SITES
-from tractexp.outcome import Table
 from tractexp.plugin import discover, get
 
 

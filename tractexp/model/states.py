@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import sympy
-from sympy import Symbol
+
+from tractexp.kernel.graph import Symbol
 
 UNSAID = Symbol("unsaid")  # where nothing has told yet how a state moves or what a memory becomes
 

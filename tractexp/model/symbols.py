@@ -1,9 +1,9 @@
 """Symbols of a model: real ones and complex ones, their parts, and what they start from."""
 
 import sympy
-from sympy import I, Symbol
+from sympy import I
 
-from tractexp.kernel.graph import symbols_of
+from tractexp.kernel.graph import Symbol, symbols_of
 
 
 def is_real(expression: sympy.Expr) -> bool:

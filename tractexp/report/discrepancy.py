@@ -1,10 +1,13 @@
 """The page of an investigation: the verdict, what one sees, what explains it, how large it is, and how it was found."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tractexp.blocks import Report, Table
+from tractexp.blocks.chart import Chart
 from tractexp.discrepancy.discrepancy_json import recommendation, use_of
 from tractexp.discrepancy.evidence import (
     CHOSEN,
@@ -26,12 +29,14 @@ from tractexp.discrepancy.recommended import adequacy, held
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.verdict import UNEXPLAINED, Nearest
 from tractexp.model.sites import KINDS
-from tractexp.report.chart import Chart
 from tractexp.report.next_event import section
 from tractexp.report.overlay import overlaid
-from tractexp.report.page import Page
 from tractexp.report.proposal import headlines, proposed
 from tractexp.wording import as_sentence, in_words, joined, percent, with_error
+
+if TYPE_CHECKING:
+    from tractexp.api.discrepancy import Investigation as Outcome
+    from tractexp.api.discrepancy import Misfit
 
 KIND = {"none": "good", "named": "good", "tied": "plain", "unexplained": "bad"}
 COLORS = {CHOSEN: "#009E73", KEPT: "#E69F00"}
@@ -51,24 +56,63 @@ CURRENTS = (
 )
 
 
-def page(path: Path, found: Investigation, title: str) -> Path:
-    """Tell the investigation to a reader who was not there."""
+def summary(found: "Outcome") -> Report:
+    """The verdict first, then how large the gap is and how much of it is closed, where, and what to do next."""
+    content, left = found.content, found.remainder.caption
+    report = Report().text(
+        "", f"verdict: {found.verdict.upper()} {' or '.join(map(joined, content['name_sets']))}".rstrip()
+    )
+    grade, which = content["adequacy"], "extended" if found.names else "base"
+    report.items([found.reason, *found.sizes, *[left] * bool(left), *found.proposed])
+    report.items([f"the {which} model is graded {grade['grade'].replace('_', ' ')}: {grade['sentence']}"])
+    report.add(gap(found))
+    if places := content["where"]:
+        loudest, others = places[0], len(places) - 1
+        span = f"{loudest['start']:.3f} to {loudest['end']:.3f} s"
+        more = f", and {others} more stretch{'es' * (others > 1)}" if others else ""
+        report.text(
+            f"where: {loudest['channel']} of {loudest['event']}, {span}, {loudest['share']:.0%} of the excess{more}"
+        )
+    if near := content["nearest"]:
+        held = near["explained_held_out"]
+        beyond = "" if held is None else f" and {percent(held)} on the held-out events"
+        share = f"{percent(near['explained'])} of what exceeds the noise{beyond}"
+        sizes = ", ".join(found.sizes_of_nearest)
+        report.text(f"nearest, not accepted: {joined(near['effects'])}, {share}; {sizes}")
+    return report.text(f"noise: {content['noise']}", f"next: {found.recommendation}")
+
+
+def gap(found: "Outcome") -> Table:
+    """How far off the base model is, and the extended one where an effect was named."""
+    gaps, waves, rows = found.gap, found.gap.train.before.epsilon_i is not None, []
+    for label, one in (("fitted", gaps.train), ("held out", gaps.validate)):
+        stages = (("base model", one.before), ("extended model", one.after)) if one else ()
+        for stage, c in stages if found.names else stages[:1]:
+            closed = f"{one.closed:.0%}" if one and c is one.after and one.closed is not None else ""
+            rows.append([label, stage, *_off(c), closed])
+    columns = ["events", "model", "epsilon_p", "epsilon_q", *["epsilon_i"] * waves, "chi2 per sample"]
+    caption = f"epsilon: relative error of P and Q, Eq. (20){CURRENTS * waves}."
+    caption += " chi2 per sample: 1 where only noise is left."
+    if found.names:
+        columns.append("gap closed")
+        caption += " Gap closed: the share of what an explanation could gain at all."
+    return Table(columns, [row[: len(columns)] for row in rows], "", caption, words=(1,))
+
+
+def report(outcome: "Outcome") -> Report:
+    """The investigation, for a reader who was not there."""
+    found = outcome.steps
+    title = ", ".join(e.record.name for e in outcome.question.train)
     events = len(found.bench.events)
     lead = f"{found.bench.model.title}, {events} event{'s' * (events > 1)} fitted, {len(found.withheld)} held out"
-    made = Page(f"Missing effect: {title}", lead)
+    made = Report(f"Missing effect: {title}", lead)
     spoken = [joined([found.catalogue.spoken(name) for name in names]) for names in found.verdict.sets]
     head = f"{found.verdict.word.upper()} {' or '.join(spoken)}".strip()
     left = [as_sentence(found.headline)] if found.headline else []
-    said = [
-        as_sentence(found.verdict.reason),
-        *left,
-        *headlines(found),
-        _graded(found),
-        f"Next: {recommendation(found)}.",
-    ]
-    made.verdict(head, *said, kind=KIND[found.verdict.word])
+    sentences = [as_sentence(found.verdict.reason), *left, *headlines(found), _graded(found)]
+    made.verdict(head, *sentences, f"Next: {recommendation(found)}.", kind=KIND[found.verdict.word])
     overlaid(made.heading("Measured, before, after" if found.names else "Measured and calculated"), found.overlays)
-    _smaller(made, found)
+    _smaller(made, outcome)
     if found.verdict.word == UNEXPLAINED:
         proposed(made, found)
         _left(made, found)
@@ -82,7 +126,7 @@ def page(path: Path, found: Investigation, title: str) -> Path:
         _equations(made, found)
     _disagreement(made, found)
     _noise(made, found)
-    return made.write(path)
+    return made
 
 
 def _graded(found: Investigation) -> str:
@@ -92,24 +136,12 @@ def _graded(found: Investigation) -> str:
     return f"The {which} model is graded {grade.grade.replace('_', ' ')}: {grade.sentence}."
 
 
-def _smaller(made: Page, found: Investigation) -> None:
+def _smaller(made: Report, outcome: "Outcome") -> None:
+    """The gap; of waveforms that nothing explains, that of the nearest candidates beside it."""
+    found = outcome.steps
     made.heading("How large the gap is" if not found.names else "How much smaller the gap is")
-    waves, near = found.bench.waves, found.verdict.nearest
-    rows = _with_nearest(near) if waves and near else []
-    for label, gap in () if rows else (("fitted", found.train), ("held out", found.validate)):
-        if gap is None:
-            continue
-        stages = [("base model", gap.before), ("extended model", gap.after)]
-        for stage, c in stages if found.names else stages[:1]:
-            closed = f"{gap.closed:.0%}" if c is gap.after and np.isfinite(gap.closed) else ""
-            rows.append([label, stage, *_off(c), closed])
-    columns = ["events", "model", "epsilon_p", "epsilon_q", *["epsilon_i"] * waves, "chi2 per sample"]
-    caption = f"epsilon: relative error of P and Q, Eq. (20){CURRENTS * waves}."
-    caption += " chi2 per sample: 1 where only noise is left."
-    if found.names:
-        columns.append("gap closed")
-        caption += " Gap closed: the share of what an explanation could gain at all."
-    made.table(columns, [row[: len(columns)] for row in rows], caption, words=(1,))
+    table, near = gap(outcome), found.verdict.nearest
+    made.add(replace(table, rows=_with_nearest(near)) if found.bench.waves and near else table)
     if found.fitted_to_both:
         made.text("The extended model was fitted to the held-out events, too: what they say of it is no test of it.")
 
@@ -118,16 +150,16 @@ def _with_nearest(near: Nearest) -> list[list[str]]:
     """The base model's gap and that of the candidates which come nearest."""
     told = (("fitted", near.curves), ("held out", near.carried))
     stages = ("base model", "nearest candidates")
-    return [[label, stage, *_off(c), ""] for label, both in told if both for stage, c in zip(stages, both, strict=True)]
+    return [[label, stage, *_off(c)] for label, both in told if both for stage, c in zip(stages, both, strict=True)]
 
 
-def _off(c: Curves) -> list[str]:
+def _off(c: "Curves | Misfit") -> list[str]:
     """How far off curves are, as a table tells it."""
     errors = [f"{e:.3%}" for e in (c.epsilon_p, c.epsilon_q, c.epsilon_i) if e is not None]
     return [*errors, f"{c.chi2_per_sample:.3f}"]
 
 
-def _left(made: Page, found: Investigation) -> None:
+def _left(made: Report, found: Investigation) -> None:
     """What nothing explains, in words."""
     made.heading("What is left")
     shapes, near = found.remainder, found.verdict.nearest
@@ -139,7 +171,7 @@ def _left(made: Page, found: Investigation) -> None:
         _nearest(made, found)
 
 
-def _shapes(made: Page, found: Investigation, shapes: Sequence[Remainder], whose: str) -> None:
+def _shapes(made: Report, found: Investigation, shapes: Sequence[Remainder], whose: str) -> None:
     """The shapes in what one model leaves."""
     if not shapes:
         made.text(f"Missed by {whose}: nothing of a simple shape, no ringing, decay, step or pulse.")
@@ -160,7 +192,7 @@ def _shapes(made: Page, found: Investigation, shapes: Sequence[Remainder], whose
     )  # fmt: skip
 
 
-def _nearest(made: Page, found: Investigation) -> None:
+def _nearest(made: Report, found: Investigation) -> None:
     """The candidates that come nearest, with their shares and sizes."""
     near = found.verdict.nearest
     assert near is not None
@@ -185,7 +217,7 @@ def _nearest(made: Page, found: Investigation) -> None:
         )  # fmt: skip
 
 
-def _forms(made: Page, found: Investigation) -> None:
+def _forms(made: Report, found: Investigation) -> None:
     """Where each effect named acts, what it does there and by which law; curves that were found."""
     if not found.names:
         return
@@ -222,7 +254,7 @@ def _curve(found: Found) -> Chart:
     return made.limits(0, float(shown.min()) - room, float(shown.max()) + room)
 
 
-def _candidates(made: Page, found: Investigation) -> None:
+def _candidates(made: Report, found: Investigation) -> None:
     rows = evidence(found)
     labels = _labels(rows)
     made.heading("Candidates by their evidence")
@@ -281,7 +313,7 @@ def _bars_caption(found: Investigation, rows: Sequence[Evidence]) -> str:
     )
 
 
-def _sets(made: Page, found: Investigation) -> None:
+def _sets(made: Report, found: Investigation) -> None:
     """How the refitted sets of the chosen size compare."""
     rows = [
         [joined(r.fit.names) or "the base model", f"{r.fit.deviance:.1f}", f"{r.behind:.1f}", f"{r.distance:.1f}",
@@ -297,7 +329,7 @@ def _sets(made: Page, found: Investigation) -> None:
         )  # fmt: skip
 
 
-def _further(made: Page, found: Investigation) -> None:
+def _further(made: Report, found: Investigation) -> None:
     """What the others would add once the chosen effects are in the model."""
     rows = []
     for j in judgements(found):
@@ -313,7 +345,7 @@ def _further(made: Page, found: Investigation) -> None:
         )  # fmt: skip
 
 
-def _parameters(made: Page, found: Investigation) -> None:
+def _parameters(made: Report, found: Investigation) -> None:
     """The base model's parameters before and after, and those that came in."""
     made.heading("Parameters before and after" if found.names else "Parameters of the base model")
     before = {e.parameter.name: e for e in found.before}
@@ -340,7 +372,7 @@ def _brief(verdict: str) -> str:
     return verdict.split("; ")[0] if ": " in verdict.split(" (")[0] else verdict
 
 
-def _equations(made: Page, found: Investigation) -> None:
+def _equations(made: Report, found: Investigation) -> None:
     """The equations that changed or came in, and how the extended model is used."""
     from tractexp.model.model import compose
     from tractexp.model.printed import changed
@@ -364,7 +396,7 @@ def _equations(made: Page, found: Investigation) -> None:
             made.equation(line)
 
 
-def _disagreement(made: Page, found: Investigation) -> None:
+def _disagreement(made: Report, found: Investigation) -> None:
     """Whether and where the base model disagrees with the records."""
     first = found.first
     made.heading("Is there a disagreement, and where?")
@@ -389,7 +421,7 @@ def _disagreement(made: Page, found: Investigation) -> None:
     )  # fmt: skip
 
 
-def _noise(made: Page, found: Investigation) -> None:
+def _noise(made: Report, found: Investigation) -> None:
     level, free = found.bench.describe(found.last.noise), joined(found.catalogue.of_measurement)
     if found.bench.waves:
         unjudged = found.last.noise.loudest_blur > found.bench.criteria.blurred

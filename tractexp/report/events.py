@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from tractexp.blocks import style
+from tractexp.blocks.chart import MOST, Chart
 from tractexp.record import Event
-from tractexp.report import style
-from tractexp.report.chart import MOST, Chart
 
 FOUND = "#E69F00"  # shades what stands out
 WITHIN = 2.0  # standard deviations of the noise band

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tractexp.blocks import style
 from tractexp.errors import UserError
-from tractexp.report import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 from contextlib import nullcontext
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tractexp.identification.adequacy import Adequacy
+from tractexp.blocks import Report, Table, style
+from tractexp.blocks.chart import Chart
 from tractexp.identification.estimate import Estimated
 from tractexp.identification.model_error import in_percent
 from tractexp.identification.residual_tests import LAGS, REJECTED, autocorrelation
@@ -15,14 +16,15 @@ from tractexp.identification.search import REFUSED, History
 from tractexp.identification.together import Together
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED, TRADES
+from tractexp.provenance import command
 from tractexp.provenance import in_words as identity_in_words
-from tractexp.report import style
-from tractexp.report.chart import Chart
 from tractexp.report.events import CAPTION, Curve, event_chart
-from tractexp.report.page import Page
 from tractexp.report.waves import CAPTION as WAVE_CAPTION
 from tractexp.report.waves import IN_WAVES, Drawn, prepared, spectrum_chart, wave_chart
 from tractexp.wording import as_sentence, in_words
+
+if TYPE_CHECKING:
+    from tractexp.api.identify import Identification
 
 ROLES = {"train": "fitted", "validate": "held out"}
 KIND = {"adequate": "good", "effect_missing": "plain", "wrong_model": "bad"}
@@ -47,55 +49,77 @@ def digits(value: float) -> str:
     return f"{value:.4g}"
 
 
-def page(
-    result: Any, fits: Sequence[Any], estimated: Estimated, known: Uncertainty, together: Together | None,
-    adequacy: Adequacy, structures: Sequence[str], advice: Sequence[str], history: History,
-    about: dict[str, str], search: str, command: str,
-) -> Page:  # fmt: skip
-    """The whole page. `about` {parameter: meaning}; `search` is where the optimizer ended, in words."""
+def summary(fit: "Identification") -> Report:
+    """What it is good for, the estimates, how well they fit, why some are not identified, and what to do next."""
+    result = fit.result
+    verdicts = result.verdicts.items()
+    poor = [f"{name}: {verdict}" for name, verdict in verdicts if not verdict.startswith(IDENTIFIED)]
+    notes = [f"note: {note}" for note in result.uncertainty.get("notes", ())]
+    start = [text for event in result.events if (text := starts_at_rest(event))]
+    report = Report().text(*[as_sentence(fit.headline)] * bool(fit.headline)).add(parameters(fit))
+    report.text(*fit.structures, *filter(None, [result.on_given_base()])).add(errors(fit))
+    return report.text(
+        *start, result.acceptance, *[headline(result)] * bool(verdicts), *(f"  {sentence}" for sentence in poor),
+        *notes, *filter(None, [fit.end_of_search]), *(f"next: {sentence}" for sentence in fit.advice),
+    )  # fmt: skip
+
+
+def starts_at_rest(event: dict[str, Any]) -> str:
+    """How well a simulation in waveforms begins at rest, in a sentence; "" in phasors, which do so exactly."""
+    if event.get("unsettled") is None:
+        return ""
+    change = f"the calculated currents still change by {event['unsettled']:.2g} of their size from cycle to cycle"
+    return f"periodic steady state before {event['name']}: {change}"
+
+
+def report(fit: "Identification") -> Report:
+    """The page: what the summary says, and what one sees of it."""
+    result, judged = fit.result, fit.judged
+    known, together = judged.known, judged.together
     names = ", ".join(e["name"] for e in result.events if e["role"] == "train")
-    made = Page(f"Identification of {names}", f"{result.optimizer}, seed {result.seed}.")
+    made = Report(f"Identification of {names}", f"{result.optimizer}, seed {result.seed}.")
     made.verdict(
-        as_sentence(adequacy.sentence),
+        as_sentence(fit.headline),
         f"{as_sentence(result.acceptance)}{_of_currents(result)}",
-        headline(known),
-        kind=KIND[adequacy.grade],
+        headline(result),
+        kind=KIND[fit.grade],
     )
     made.heading("Measured and calculated")
-    _curves(made, fits, known)
-    made.heading("Parameters")
-    _parameters(made, result, known, structures, about)
-    made.heading("How well it fits")
-    _errors(made, result)
-    made.heading("What to do next").items(advice)
+    _curves(made, judged.fits, known)
+    made.heading("Parameters").add(parameters(fit))
+    _parameters(made, fit, known)
+    made.heading("How well it fits").add(errors(fit))
+    made.heading("What to do next").items(fit.advice)
     if together is not None:
         _events(made, known, together)
-    made.heading("The search and the estimate").text(as_sentence(search))
-    made.chart(_fitness(history, result), "Best objective of the search; dashed: the estimate's.")
-    _starts(made, estimated, known)
+    made.heading("The search and the estimate").text(as_sentence(fit.end_of_search))
+    made.chart(_fitness(fit.ended.history, result), "Best objective of the search; dashed: the estimate's.")
+    _starts(made, judged.estimated, known)
     made.heading("What the fit leaves")
     _left(made, known)
     made.heading("How the estimates depend on each other")
     _correlation(made, known)
     made.heading("How this page was made")
-    made.table(["", ""], _origin(result, command), words=(1,))
-    return made
+    return made.table(["", ""], _origin(result, command()), words=(1,))
 
 
 def _of_currents(result: Any) -> str:
     """epsilon_i of each event, in a sentence; "" in phasors."""
-    told = [f"{e['epsilon_i']:.2%} ({e['name']}, {ROLES[e['role']]})" for e in result.events if "epsilon_i" in e]
-    return f" Of the currents themselves epsilon_i is {', '.join(told)}." if told else ""
+    values = [f"{e['epsilon_i']:.2%} ({e['name']}, {ROLES[e['role']]})" for e in result.events if "epsilon_i" in e]
+    return f" Of the currents themselves epsilon_i is {', '.join(values)}." if values else ""
 
 
-def headline(known: Uncertainty) -> str:
+def headline(result: Any) -> str:
     """How many of the parameters are identified, and which are not, in one sentence."""
-    poor = [f"{name} {v.word}" for name, v in known.verdicts.items() if v.word != IDENTIFIED]
-    good = len(known.verdicts) - len(poor)
-    return f"{good} of {len(known.verdicts)} parameters are identified" + (f"; {', '.join(poor)}" if poor else "") + "."
+    poor = [f"{n} {v.partition(':')[0].partition(' (')[0]}" for n, v in result.verdicts.items()
+            if not v.startswith(IDENTIFIED)]  # fmt: skip
+    good = len(result.verdicts) - len(poor)
+    return (
+        f"{good} of {len(result.verdicts)} parameters are identified" + (f"; {', '.join(poor)}" if poor else "") + "."
+    )
 
 
-def _curves(made: Page, fits: Sequence[Any], known: Uncertainty) -> None:
+def _curves(made: Report, fits: Sequence[Any], known: Uncertainty) -> None:
     """The charts of each event; of many the later ones are folded away."""
     likelihood = known.likelihood
     waves = likelihood.problem.model.waves
@@ -111,7 +135,7 @@ def _curves(made: Page, fits: Sequence[Any], known: Uncertainty) -> None:
         made.heading("What was done to the records", level=3).items(prepared(likelihood.problem, fits))
 
 
-def _event(made: Page, fit: Any, noise: np.ndarray | None) -> None:
+def _event(made: Report, fit: Any, noise: np.ndarray | None) -> None:
     """The currents of an event in waveforms and their spectra, then P and Q; `noise` (2, N) is that of phasors."""
     record, power = fit.event.record, np.stack((fit.P, fit.Q))
     about, notes = f"{record.name}, {ROLES[fit.role]}", [f"{note}." for note in record.notes]
@@ -126,51 +150,47 @@ def _event(made: Page, fit: Any, noise: np.ndarray | None) -> None:
     made.chart(chart, " ".join([f"{about}: epsilon_p {fit.epsilon_p:.3%}, epsilon_q {fit.epsilon_q:.3%}.", *notes]))
 
 
-def _parameters(
-    made: Page, result: Any, known: Uncertainty, structures: Sequence[str], about: dict[str, str]
-) -> None:  # fmt: skip
-    """Table and picture against the bounds; `structures` say what rivals make of the parameters."""
-    search = by_event(result.search["parameters"], result.search["per_event"])
-    values = result.free | {n: v for n, v in result.parameters.items() if n not in result.per_event}
+def parameters(fit: "Identification") -> Table:
+    """The estimates. Where the search ended is a detail, unless that lies outside an interval."""
     rows = [
-        [name, about.get(_base(name), ""), digits(value), result.units.get(_base(name), ""), *_sure(known, name),
-         "{:g} .. {:g}".format(*result.bounds[_base(name)]), digits(search[name])]
-        for name, value in values.items()
+        [e.name, e.about, e.value, e.unit, "{:.4g} .. {:.4g}".format(*e.interval) if e.interval else "",
+         "{:g} .. {:g}".format(*e.bounds), e.search, brief(e.verdict)]
+        for e in fit.parameters.values()
     ]  # fmt: skip
-    columns = ["parameter", "meaning", "value", "unit", "95 % interval", "verdict", "bounds", "search ended at"]
-    made.table(columns, rows, words=(1, 5), caption=EXACT if known.exact else SCATTERED)
-    if told := result.on_given_base():
-        made.text(f"{as_sentence(told)} Values and bounds in the table are on the record's own base of {result.base}.")
+    columns = ["parameter", "meaning", "value", "unit", "95 % interval", "bounds", "search ended at", "verdict"]
+    caption = EXACT if fit.adequate else SCATTERED
+    return Table(
+        columns, rows, fit.model.model.title, caption, words=(1, 3, 7), detail=(1, 5) if fit.astray else (1, 5, 6)
+    )
+
+
+def _parameters(made: Report, fit: "Identification", known: Uncertainty) -> None:
+    """The base of the values, a picture against the bounds, and what rivals make of the parameters."""
+    result = fit.result
+    if on_given_base := result.on_given_base():
+        base = f"Values and bounds in the table are on the record's own base of {result.base}."
+        made.text(f"{as_sentence(on_given_base)} {base}")
     made.chart(
-        _forest(known, search),
+        _forest(known, by_event(result.search["parameters"], result.search["per_event"])),
         "Estimates and 95 % intervals within the bounds of each parameter (0 is the lower, 1 the upper bound); cross:"
         " where the search ended.",
     )
     poor = [f"{name}: {v}." for name, v in known.verdicts.items() if v.word != IDENTIFIED]
-    made.items([*map(as_sentence, structures), *poor])
+    made.items([*map(as_sentence, fit.structures), *poor])
 
 
-def _errors(made: Page, result: Any) -> None:
+def errors(fit: "Identification") -> Table:
     """The model's error on each event, and the errors of Eq. (20)."""
-    columns = ["event", "", "model error", "95 % interval", "of S", *result.epsilons]
+    result = fit.result
+    columns = ["event", "role", "model error", "95 % interval", "of S", *result.epsilons]
+    unknown = {"value": None, "interval": (), "of_S": None}
+    of_events = result.model_error.get("events") or [unknown] * len(result.events)
     rows = [
         [e["name"], ROLES[e["role"]], in_percent(m["value"]), " .. ".join(map(in_percent, m["interval"])),
          in_percent(m["of_S"]), *(f"{e[key]:.3%}" for key in result.epsilons)]
-        for e, m in zip(result.events, result.model_error["events"], strict=True)
+        for e, m in zip(result.events, of_events, strict=True)
     ]  # fmt: skip
-    made.table(columns, rows, caption=MODEL_ERROR)
-
-
-def _base(name: str) -> str:
-    return name.partition("[")[0]
-
-
-def _sure(known: Uncertainty, name: str) -> list[str]:
-    """Interval and verdict of one parameter; of a fixed one that it is fixed."""
-    if name not in known.names:
-        return ["", "fixed"]
-    low, high = known.intervals[known.names.index(name)]
-    return [f"{digits(low)} .. {digits(high)}", brief(str(known.verdicts[name]))]
+    return Table(columns, rows, "", MODEL_ERROR, words=(1,), detail=(3, 4))
 
 
 def brief(verdict: str) -> str:
@@ -203,7 +223,7 @@ def _fitness(history: History, result: Any) -> Chart:
     return chart.level(max(result.objective, 1e-30), "estimate")
 
 
-def _starts(made: Page, estimated: Estimated, known: Uncertainty) -> None:
+def _starts(made: Report, estimated: Estimated, known: Uncertainty) -> None:
     """Where each descent to the estimate ended."""
     starts = estimated.starts
     above = np.maximum([s.above for s in starts], SMALLEST)
@@ -229,7 +249,7 @@ def _starts(made: Page, estimated: Estimated, known: Uncertainty) -> None:
                    [[s.origin, f"{s.above:.3g}", *map(digits, s.values)] for s in starts])  # fmt: skip
 
 
-def _left(made: Page, known: Uncertainty) -> None:
+def _left(made: Report, known: Uncertainty) -> None:
     """Whitened residuals, their autocorrelation, and what the tests of them say."""
     likelihood, tests = known.of_noise, known.tests
     drive, events = likelihood.problem.drive, likelihood.problem.events
@@ -278,7 +298,7 @@ def _conclusion(speaking: Sequence[dict[str, Any]], tests: int) -> str:
     return f"{len(speaking)} of {tests} tests find more than noise in what is left: {'; '.join(said)}."
 
 
-def _correlation(made: Page, known: Uncertainty) -> None:
+def _correlation(made: Report, known: Uncertainty) -> None:
     """The strongest correlations in words, all of them as a table."""
     names, matrix = known.names, known.information.correlation
     pairs = [(abs(matrix[i, j]), i, j) for i in range(len(names)) for j in range(i)]
@@ -303,7 +323,7 @@ def _origin(result: Any, command: str) -> list[list[str]]:
     return told
 
 
-def _events(made: Page, known: Uncertainty, together: Together) -> None:
+def _events(made: Report, known: Uncertainty, together: Together) -> None:
     """What each event of a joint fit adds, and which does not belong."""
     made.heading("What each event adds")
     if together.notes:

@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
+from tractexp.blocks import Report, Table
+from tractexp.blocks.chart import Chart
+from tractexp.blocks.style import ACTIVE, PALETTE, REACTIVE, VOLTAGE
 from tractexp.recording import Recording, Segment
 from tractexp.recording.measure import FeederWaves
 from tractexp.recording.overview import Sight, View
 from tractexp.recording.quality import spectrum
 from tractexp.recording.trace import half_cycle_rms
-from tractexp.report.chart import Chart
-from tractexp.report.page import Page
-from tractexp.report.style import ACTIVE, PALETTE, REACTIVE, VOLTAGE
-from tractexp.wording import change, degrees, figure, share
+from tractexp.wording import as_sentence, change, degrees, figure, share
 
 MOST = 400_000  # samples of waveforms that a page holds: a megabyte
 MOST_PHASORS = 200_000  # values of phasors that a page holds
@@ -28,16 +28,41 @@ PHASES = {3: ("a", "b", "c"), 1: ("u, i",)}
 LABEL = 0.12  # of the axis of time: room that an event's label takes on a phone
 BOUND = 0.1  # of the nominal frequency: what lies further off is that of a dead line
 SHADES = {"dip": PALETTE[5], "swell": PALETTE[4], "interruption": PALETTE[3]}
+NOTHING = "nothing happened: the voltage stays within the thresholds of IEC 61000-4-30"
 CAPTION = (
     "Waveforms, primary values; RMS of one cycle every half cycle (IEC 61000-4-30); symmetrical components and powers"
     " of one-cycle phasors, P [MW] and Q [Mvar] positive when consumed. Drag to zoom, double-click for the whole."
 )
 
 
-def page(path: Path, views: Sequence[View], content: Mapping[str, Any]) -> Path:
-    """Write the page; returns its path."""
+def summary(content: Mapping[str, Any]) -> Report:
+    """What files hold: channels, loads, events, commands."""
+    made = Report()
+    for known in content["files"]:
+        rates = ", ".join(f"{rate:g} Hz" for rate in dict.fromkeys(known["rates"]))
+        about = [known["station"], known["device"], str(known["start"] or ""), f"{known['seconds']:.3f} s at {rates}",
+                 _frequency(known)]  # fmt: skip
+        made.text(f"{known['file']}: {'; '.join(filter(None, about))}", *(f"  note: {n}" for n in known["notes"]))
+        made.add(*[channels(known)] * bool(known["channels"]))
+        for feeder in known["feeders"]:
+            numbers = ", ".join(map(str, (*feeder["voltages"], *feeder["currents"])))
+            wired = f" (channels {numbers}, {feeder['connection']})" if numbers else ""
+            made.text(f"load {feeder['name']}{wired}: {_size(feeder) or 'nothing measured'}")
+            made.items([*feeder["why"], *feeder["said"]])
+            made.add(*[events(feeder)] * bool(feeder["events"])).items([NOTHING] * (not feeder["events"]))
+            if feeder["command"]:
+                made.text("  to fit it:").code(feeder["command"])
+        if not known["feeders"]:
+            made.text(
+                "  no voltages and currents of one load were recognised; name them: voltages=[...] currents=[...]"
+            )
+    return made
+
+
+def report(views: Sequence[View], content: Mapping[str, Any]) -> Report:
+    """The page."""
     told = content["files"]
-    made = Page(f"A look at {', '.join(Path(f['file']).name for f in told)}", _lead(told))
+    made = Report(f"A look at {', '.join(Path(f['file']).name for f in told)}", _lead(told))
     for view, known in zip(views, told, strict=True):
         if len(told) > 1:
             made.heading(known["file"])
@@ -53,13 +78,30 @@ def page(path: Path, views: Sequence[View], content: Mapping[str, Any]) -> Path:
         for k, (shown, feeder) in enumerate(zip(view.sights, known["feeders"], strict=True)):
             _load(made, view, shown, feeder, folded=k >= OPEN)
         if known["channels"]:
-            made.heading("Channels").table(
-                ["number", "name", "phase", "unit", "primary RMS", "noise", "colour", "THD", "bits", "fit for what"],
-                [_channel(c) for c in known["channels"]], words=(1, 2, 3, 6, 9),
-                caption="Numbers count from 0, as data.voltages and data.currents do. RMS of the fundamental; noise"
-                " about fundamental and harmonics in the quietest ten cycles, as a share of it.",
-            )  # fmt: skip
-    return made.write(path)
+            made.heading("Channels").add(channels(known))
+    return made
+
+
+def channels(known: Mapping[str, Any]) -> Table:
+    """The channels of a file, with their quality in detail."""
+    caption = (
+        "Numbers count from 0, as data.voltages and data.currents do. RMS of the fundamental; noise about fundamental"
+        " and harmonics in the quietest ten cycles, as a share of it."
+    )
+    columns = ["number", "name", "phase", "unit", "primary RMS", "noise", "colour", "THD", "bits", "fit for what"]
+    rows = [_channel(c) for c in known["channels"]]
+    return Table(columns, rows, "", caption, words=(1, 2, 3, 6, 9), detail=(5, 6, 7, 8))
+
+
+def events(known: Mapping[str, Any]) -> Table:
+    """What happened to a load."""
+    _, P, Q = known["units"]
+    columns = ["dip", "kind", "starts [s]", "lasts [ms]", "depth", "jump [°]", "U2", f"P [{P}]", f"Q [{Q}]", "fit it?"]
+    caption = (
+        "Depth, U2 and jump against the voltage before. P and Q before and after. Dips are numbered as data.train and"
+        " data.validate take them."
+    )
+    return Table(columns, [event_row(e) for e in known["events"]], "", caption, words=(1, 9))
 
 
 def _lead(files: Sequence[Mapping[str, Any]]) -> str:
@@ -69,7 +111,7 @@ def _lead(files: Sequence[Mapping[str, Any]]) -> str:
     return f"{_count(loads, 'load')}, {_count(len(events), 'event')}, {worth} worth fitting."
 
 
-def _conclusion(made: Page, known: Mapping[str, Any]) -> None:
+def _conclusion(made: Report, known: Mapping[str, Any]) -> None:
     commands = [(f["name"], f["command"]) for f in known["feeders"] if f["command"]]
     if not known["feeders"]:
         made.verdict("No three voltages and currents of one load were recognised; the channels are listed below.")
@@ -85,12 +127,22 @@ def _conclusion(made: Page, known: Mapping[str, Any]) -> None:
 
 def _facts(known: Mapping[str, Any]) -> list[list[str]]:
     segments = [f"{s['samples']} samples at {s['rate']:g} Hz from {s['start']:.3f} s" for s in known["segments"]]
-    measured = known["measured_frequency"]
-    frequency = f"{known['frequency']:g} Hz nominal" + ("" if measured is None else f", {measured:.3f} Hz measured")
     rows = [["path", known["file"]], ["read by", known["reader"]], ["station", known["station"]],
             ["recorder", known["device"]], ["starts", str(known["start"] or "")], ["sampled", "; ".join(segments)],
-            ["lasts", f"{known['seconds']:.3f} s"], ["frequency", frequency]]  # fmt: skip
+            ["lasts", f"{known['seconds']:.3f} s"], ["frequency", _frequency(known)]]  # fmt: skip
     return [row for row in rows if row[1]]
+
+
+def _frequency(known: Mapping[str, Any]) -> str:
+    measured = known["measured_frequency"]
+    return f"{known['frequency']:g} Hz nominal" + ("" if measured is None else f", {measured:.3f} Hz measured")
+
+
+def _size(known: Mapping[str, Any]) -> str:
+    """U, P and Q of a load at the beginning; "" where they are not known."""
+    if known["U"] is None:
+        return ""
+    return ", ".join(figure(known[key], 4, unit) for key, unit in zip("UPQ", known["units"], strict=True))
 
 
 def _channel(c: Mapping[str, Any]) -> list[str]:
@@ -109,20 +161,14 @@ def _summary(known: Mapping[str, Any]) -> list[str]:
     return [known["name"], known["connection"], channels, *size, str(len(known["events"])), str(len(worth))]
 
 
-def _load(made: Page, view: View, shown: Sight, known: Mapping[str, Any], folded: bool) -> None:
+def _load(made: Report, view: View, shown: Sight, known: Mapping[str, Any], folded: bool) -> None:
     """One load: what it is, what happened, and charts to look into."""
     made.heading(known["name"])
     made.items([*_described(known), *known["why"], *known["said"]])
     if known["events"]:
-        _, P, Q = known["units"]
-        made.table(
-            ["dip", "kind", "starts [s]", "lasts [ms]", "depth", "jump [°]", "U2", f"P [{P}]", f"Q [{Q}]", "fit it?"],
-            [_event(e) for e in known["events"]], words=(1, 9),
-            caption="Depth, U2 and jump against the voltage before. P and Q before and after. Dips are numbered as"
-            " data.train and data.validate take them.",
-        )  # fmt: skip
+        made.add(events(known))
     else:
-        made.text("Nothing happened: the voltage stays within the thresholds of IEC 61000-4-30.")
+        made.text(as_sentence(NOTHING))
     if folded:
         with made.folded(f"Charts of {known['name']}"):
             _charts(made, view, shown)
@@ -130,7 +176,7 @@ def _load(made: Page, view: View, shown: Sight, known: Mapping[str, Any], folded
         _charts(made, view, shown)
 
 
-def _charts(made: Page, view: View, shown: Sight) -> None:
+def _charts(made: Report, view: View, shown: Sight) -> None:
     """Charts to look into."""
     if shown.record is not None:
         made.chart(_of_record(shown), "As recorded. Drag to zoom, double-click for the whole.")
@@ -150,17 +196,15 @@ def _described(known: Mapping[str, Any]) -> list[str]:
         named = ", ".join(f"{n} {c}" for n, c in zip(numbers, known["channels"], strict=True))
         reverse = ", current reversed" * known["reverse_current"]
         told.append(f"Channels: {named}; connected as {known['connection']}{reverse}.")
-    if known["U"] is not None:
-        told.append(
-            f"At first {', '.join(figure(known[k], 4, u) for k, u in zip('UPQ', known['units'], strict=True))}."
-        )
+    if size := _size(known):
+        told.append(f"At first {size}.")
     if known["sum_V"] is not None:
         current = "" if known["sum_I"] is None else f", the currents to {known['sum_I']:.2%}"
         told.append(f"The voltages of the three phases sum to {known['sum_V']:.2%} of one{current}.")
     return told
 
 
-def _event(e: Mapping[str, Any]) -> list[str]:
+def event_row(e: Mapping[str, Any]) -> list[str]:
     powers = [change(e[f"{x}_before"], e[f"{x}_after"]) for x in "PQ"]
     return [
         "" if e["dip"] is None else str(e["dip"]), e["kind"], f"{e['start']:.3f}", f"{1000 * e['duration']:.0f}",
@@ -297,7 +341,7 @@ def _spectrum(recording: Recording, shown: Sight) -> Chart:
     return chart
 
 
-def _details(made: Page, recording: Recording, shown: Sight) -> None:
+def _details(made: Report, recording: Recording, shown: Sight) -> None:
     """A chart with every sample for each event, where the chart of the whole has not all of them."""
     for seen in shown.seen[:DETAILED]:
         what = seen.what

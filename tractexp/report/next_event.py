@@ -1,30 +1,28 @@
 """What to record next, as a section of an investigation's page and as a page of its own."""
 
-from pathlib import Path
-
 import numpy as np
 
+from tractexp.blocks import Report
+from tractexp.blocks.chart import Chart
+from tractexp.blocks.style import PALETTE
 from tractexp.discrepancy.next_event.choose import NextEvent, Tried
 from tractexp.discrepancy.next_event.separation import Chances
-from tractexp.report.chart import Chart
-from tractexp.report.page import Page
-from tractexp.report.style import PALETTE
 from tractexp.wording import as_sentence
 
 LISTED = 2  # events of each kind that a table has
 KINDS = ("dip", "tap or capacitor bank", "dip with a phase jump and f", "unbalanced dip with U2", "dip sampled faster")
 
 
-def page(path: Path, found: NextEvent, title: str) -> Path:
-    """Write the page of a plan for rivals; returns its path."""
-    made = Page("What to record next", f"For {title}, to tell {' from '.join(found.rivals)}.")
+def report(found: NextEvent, title: str) -> Report:
+    """The page of a plan for rivals."""
+    made = Report("What to record next", f"For {title}, to tell {' from '.join(found.rivals)}.")
     sure = found.probability >= found.criteria.decided
     made.verdict(as_sentence(found.sentence()), kind="good" if sure else "bad" if found.same else "plain")
     section(made, found)
-    return made.write(path)
+    return made
 
 
-def section(made: Page, found: NextEvent) -> None:
+def section(made: Report, found: NextEvent) -> None:
     """The chances by dip as charts, the best events of each kind, and which pair each tells apart."""
     rule = f"the rule of this investigation, which trusts no formula to {found.criteria.alike:.0%} of what it explains"
     if not found.same or len(found.rivals) > 2:

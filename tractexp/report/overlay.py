@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from tractexp.blocks import Report
+from tractexp.blocks.chart import Chart
 from tractexp.discrepancy.overlay import Overlay
 from tractexp.identification.seen import seen_by_estimator
 from tractexp.record import WaveEvent, describe
-from tractexp.report.chart import Chart
 from tractexp.report.events import CAPTION, Curve, event_chart
-from tractexp.report.page import Page
 from tractexp.report.waves import CAPTION as WAVE_CAPTION
 from tractexp.report.waves import Drawn, wave_chart
 
@@ -21,7 +21,7 @@ IN_PHASORS = (
 SHOWN = 4  # events of each role that are not folded
 
 
-def overlaid(page: Page, overlays: Sequence[Overlay]) -> Page:
+def overlaid(page: Report, overlays: Sequence[Overlay]) -> Report:
     """A chart of each event, the fitted ones first; those beyond the first few are folded."""
     page.text(WAVE_CAPTION if any(isinstance(o.event, WaveEvent) for o in overlays) else CAPTION)
     for role, held_out in (("fitted", False), ("held out", True)):
@@ -35,7 +35,7 @@ def overlaid(page: Page, overlays: Sequence[Overlay]) -> Page:
     return page
 
 
-def _shown(page: Page, overlay: Overlay, role: str) -> None:
+def _shown(page: Report, overlay: Overlay, role: str) -> None:
     event = overlay.event
     page.heading(f"{event.record.name}, {role}", level=3)
     if not isinstance(event, WaveEvent):

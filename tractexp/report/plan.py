@@ -1,17 +1,18 @@
 """The page of a plan: what was asked, the answer, what each kind of dip would tell, and which events to fit."""
 
 import itertools
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from tractexp.blocks import Report, Table
+from tractexp.blocks.chart import Chart
+from tractexp.blocks.style import PALETTE
 from tractexp.identification.plan import EDGE, INERTIA, SUDDEN, Choice, Forecast, Needed, column
 from tractexp.identification.problem import Problem
-from tractexp.report.chart import Chart
-from tractexp.report.page import Page
-from tractexp.report.style import PALETTE
 from tractexp.wording import as_sentence
 
 DEPTH, DURATION, RATE, NOISE = "depth", "duration [s]", "samples per second", "noise, of P before the dip"
@@ -28,7 +29,7 @@ AXES = {  # of a scan: what its axis says, and what a value is multiplied by
 }
 LINES = [(color, dash) for dash in ("solid", "dash", "dot") for color in PALETTE]
 CEILING = 10.0  # times the value: wider intervals are not told
-ROWS = 20  # of a table, about: of a longer scan every other row
+ROWS, FEW = 20, 6  # of a table, about; of one on a terminal
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,12 +54,33 @@ def percent(relative: float) -> str:
     return f"{100 * relative:.0f}" if relative >= 0.0995 else f"{100 * relative:.2g}"
 
 
-def page(path: Path, planned: Planned) -> Path:
-    """Write the page; returns its path."""
+def summary(content: Mapping[str, Any]) -> Report:
+    """What is planned and at which values, the forecasts, the answer, and the best events."""
+    values = ", ".join(f"{name} {value:.4g}" for name, value in content["parameters"].items())
+    report = Report().text(content["dip"], f"parameters, {content['origin']}: {values}")
+    report.add(*(scan(content, label, FEW) for label in content["half_intervals"]))
+    report.text(f"how deep? {content['answer']}")
+    for k, event in enumerate(content["best_events"], start=1):
+        narrower = f", intervals narrower by {event['gain']:.0%}" if k > 1 else ""
+        report.text(f"event {k} of the best: {event['name']}{narrower}")
+    return report.text(*[content["other_events"]] * bool(content["other_events"]))
+
+
+def scan(content: Mapping[str, Any], label: str, rows: int = ROWS) -> Table:
+    """The forecasts over one property of the dip, about so many of them, in percent of the value."""
+    forecasts, names = content["half_intervals"][label], [*content["parameters"]]
+    picked = forecasts[:: max(1, round(len(forecasts) / rows))]
+    cells = [[f"{f['at']:.4g}", *(percent(math.nan if f[n] is None else f[n]) for n in names)] for f in picked]
+    title = f"half of the 95 % interval, % of the value, by {label}; a dash from ten times the value on"
+    return Table([label.partition(",")[0].partition(" ")[0], *names], cells, title)
+
+
+def report(planned: Planned, content: Mapping[str, Any]) -> Report:
+    """The page."""
     needed, waves = planned.needed, planned.problem.model.waves
     answer = str(needed)
     title = f"How deep a dip tells {needed.parameter}"
-    made = Page(title, f"A plan for {planned.problem.model.title}, before anything more is recorded.")
+    made = Report(title, f"A plan for {planned.problem.model.title}, before anything more is recorded.")
     made.verdict(as_sentence(answer), kind="bad" if needed.depth is None else "good")
     by_depth, *others = [_chart(planned, label, legend=label == DEPTH) for label in planned.scans]
     made.chart(by_depth, _caption(needed))
@@ -71,16 +93,7 @@ def page(path: Path, planned: Planned) -> Path:
     )
     made.charts(others)
     with made.folded("The same in numbers"):
-        for label, (x, forecasts) in planned.scans.items():
-            step = max(1, round(len(x) / ROWS))
-            rows = [
-                [f"{at:.4g}", *map(percent, f.relative)] for at, f in zip(x[::step], forecasts[::step], strict=True)
-            ]
-            made.table(
-                [label, *forecasts[0].names],
-                rows,
-                caption="Half of the 95 % interval in percent of the value; a dash from ten times the value on.",
-            )
+        made.add(*(scan(content, label) for label in planned.scans))
     _events(made, planned)
     made.heading("What it rests on").items(
         [
@@ -91,7 +104,7 @@ def page(path: Path, planned: Planned) -> Path:
             "Noise of the recorded voltage, and effects that the model lacks, are not in it.",
         ]
     )
-    return made.write(path)
+    return made
 
 
 def _caption(needed: Needed) -> str:
@@ -131,7 +144,7 @@ def marks(low: float, high: float) -> list[float]:
     return [float(f"{digit}e{power}") for power in powers for digit in digits]
 
 
-def _asked(made: Page, planned: Planned) -> None:
+def _asked(made: Report, planned: Planned) -> None:
     """The question, the dip and the parameters it is planned at."""
     needed, problem = planned.needed, planned.problem
     stands = ", which is known as well as M," * (needed.parameter == INERTIA)
@@ -169,7 +182,7 @@ def _symbols(planned: Planned) -> Iterator[list[str]]:
         ]  # fmt: skip
 
 
-def _events(made: Page, planned: Planned) -> None:
+def _events(made: Report, planned: Planned) -> None:
     """The best events of the archive, in the order in which they are worth fitting."""
     made.heading("Which events of the archive to fit")
     if not planned.chosen:

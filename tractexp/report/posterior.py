@@ -1,15 +1,13 @@
 """The page of a sample of the posterior: how likely each value is, beside what the fit says of it."""
 
-from pathlib import Path
-
 import numpy as np
 
+from tractexp.blocks import Report
+from tractexp.blocks.chart import Chart
+from tractexp.blocks.style import ACTIVE, FAINT, PALETTE
 from tractexp.identification.posterior import ENOUGH, Posterior
 from tractexp.identification.uncertainty import Uncertainty
-from tractexp.report.chart import Chart
-from tractexp.report.page import Page
 from tractexp.report.profile import ALIKE, SCATTER, axis, declared, span
-from tractexp.report.style import ACTIVE, FAINT, PALETTE
 from tractexp.wording import as_sentence
 
 BINS = 60  # of a histogram
@@ -20,10 +18,10 @@ CAPTION = (
 )
 
 
-def page(path: Path, known: Uncertainty, drawn: Posterior, grade: str = "") -> Path:
-    """Write the page; returns its path. `grade` as on the page of the profiles."""
+def report(known: Uncertainty, drawn: Posterior, grade: str = "") -> Report:
+    """The page. `grade` as on the page of the profiles."""
     names = ", ".join(e.record.name for e in known.likelihood.problem.events)
-    made = Page(
+    made = Report(
         f"Posterior: {names}",
         f"A flat prior within the bounds; {len(drawn.draws)} draws of {drawn.steps} steps of emcee's ensemble.",
     )
@@ -44,7 +42,7 @@ def page(path: Path, known: Uncertainty, drawn: Posterior, grade: str = "") -> P
     made.heading(f"{drawn.names[a]} and {drawn.names[b]} depend on each other most")
     r = np.corrcoef(drawn.draws[:, [a, b]].T)[0, 1]
     made.chart(_pair(known, drawn, a, b), f"{min(DOTS, len(drawn.draws))} of the draws; their correlation is {r:+.2f}.")
-    return made.write(path)
+    return made
 
 
 def _agreement(known: Uncertainty, drawn: Posterior) -> str:

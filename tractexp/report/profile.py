@@ -1,17 +1,16 @@
 """The page of the profiles: how the fit worsens when one parameter is held, and what that says about its interval."""
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from tractexp.blocks import Report
+from tractexp.blocks.chart import Chart
+from tractexp.blocks.style import ACTIVE, FAINT, PALETTE
 from tractexp.identification.profile import End, Profile, Profiles
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED, Verdict, shown
-from tractexp.report.chart import Chart
-from tractexp.report.page import Page
-from tractexp.report.style import ACTIVE, FAINT, PALETTE
 from tractexp.wording import as_sentence
 
 ALIKE = 0.2  # of the half interval by curvature: closer ends are the same interval
@@ -31,14 +30,14 @@ CAPTION = (
 )
 
 
-def page(path: Path, found: Profiles, grade: str = "") -> Path:
-    """Write the page; returns its path.
+def report(found: Profiles, grade: str = "") -> Report:
+    """The page.
 
     `grade` is the sentence that grades the identification.
     """
     known, verdicts = found.known, found.verdicts
     names = ", ".join(e.record.name for e in known.likelihood.problem.events)
-    made = Page(
+    made = Report(
         f"Profile likelihood: {names}",
         "One parameter is held at value after value, all others are fitted again each time.",
     )
@@ -63,7 +62,7 @@ def page(path: Path, found: Profiles, grade: str = "") -> Path:
             "An effect that the model lacks moves the estimates and is in neither interval.",
         ]
     )
-    return made.write(path)
+    return made
 
 
 def _row(found: Profiles, profile: Profile, says: str) -> list[str]:

@@ -4,14 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from tractexp.blocks import Report
+from tractexp.blocks.chart import Chart
 from tractexp.discrepancy.discrepancy_json import PLUGIN
 from tractexp.discrepancy.investigate import Investigation
 from tractexp.discrepancy.proposal.judge import Before, Weighed
 from tractexp.discrepancy.proposal.library import Term
 from tractexp.discrepancy.proposal.propose import Proposal, told
 from tractexp.discrepancy.proposal.wording import chance, proposed_in_words
-from tractexp.report.chart import Chart
-from tractexp.report.page import Page
 from tractexp.wording import as_sentence, in_words, joined, percent, with_error
 
 MISSED, TERM = "#9A9A9A", "#0072B2"
@@ -23,7 +23,7 @@ def headlines(found: Investigation) -> list[str]:
     return [as_sentence(s) for s in proposed_in_words(told(found.proposed, PLUGIN), None)[:2]]
 
 
-def proposed(made: Page, found: Investigation) -> None:
+def proposed(made: Report, found: Investigation) -> None:
     """The term, its size, where and when it acts, what it closes, and what looks like it."""
     made.heading("Proposal")
     proposal = found.proposed.proposal
@@ -46,7 +46,7 @@ def proposed(made: Page, found: Investigation) -> None:
     _tried(made, found.proposed.tried)
 
 
-def _numbers(made: Page, proposal: Proposal) -> None:
+def _numbers(made: Report, proposal: Proposal) -> None:
     rows = [
         [
             k.name,
@@ -70,7 +70,7 @@ def _numbers(made: Page, proposal: Proposal) -> None:
     )  # fmt: skip
 
 
-def _closed(made: Page, proposal: Proposal) -> None:
+def _closed(made: Report, proposal: Proposal) -> None:
     rows = [
         [role, f"{b.without.chi2_per_sample:.3f}", f"{b.left:.3f}", percent(b.closed)]
         for role, b in (("fitted", proposal.train), ("held out", proposal.validate))
@@ -82,7 +82,7 @@ def _closed(made: Page, proposal: Proposal) -> None:
     )  # fmt: skip
 
 
-def _drawn(made: Page, proposal: Proposal) -> None:
+def _drawn(made: Report, proposal: Proposal) -> None:
     """What the base model misses in each event, and what the term makes of it."""
     for role, before in (("fitted", proposal.train), ("held out", proposal.validate)):
         made.text(f"What the base model misses, and what the model with the term draws beyond it ({role}):")
@@ -103,7 +103,7 @@ def _missed(before: Before, e: int) -> Chart:
     return made
 
 
-def _rivals(made: Page, proposal: Proposal) -> None:
+def _rivals(made: Report, proposal: Proposal) -> None:
     if proposal.ties:
         made.table(
             ["also possible", "closed on the fitted events", "on the held-out events"],
@@ -120,7 +120,7 @@ def _rivals(made: Page, proposal: Proposal) -> None:
         made.text("No textbook effect of the catalogue could have made half of its change.")
 
 
-def _tried(made: Page, tried: Sequence[tuple[Term, Weighed]]) -> None:
+def _tried(made: Report, tried: Sequence[tuple[Term, Weighed]]) -> None:
     """The best of the library as held-out events judged them."""
     if not tried:
         return

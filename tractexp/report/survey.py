@@ -3,13 +3,14 @@
 import html
 import json
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
-from tractexp import files
-from tractexp.report.page import STYLE
-from tractexp.report.style import ACTIVE, VOLTAGE
+from tractexp.blocks import Report, Table
+from tractexp.blocks.block import Markup
+from tractexp.blocks.style import ACTIVE, VOLTAGE
 
+UNREAD, QUIET = "not read", "nothing"  # what stands as the kind of a file without events
+MOST = 10  # files that cannot be read, each with the reason
 AT_ONCE = 200  # rows that are drawn; more where they are asked for
 LOOKS = """
 .sieve { display: flex; flex-wrap: wrap; gap: .5rem .9rem; align-items: end; margin: 1rem 0 .5rem; font-size: .9rem; }
@@ -39,7 +40,7 @@ COLUMNS = (  # key, heading, kind of cell, digits
     ("load", "load", "words", 0), ("start", "starts [s]", "number", 3), ("when", "when", "time", 0),
     ("rate", "rate [Hz]", "figure", 5), ("why", "why", "why", 0),
 )  # fmt: skip
-KEPT = (
+FURTHER = (
     "file",
     "station",
     "P_before",
@@ -133,27 +134,49 @@ sift();
 """
 
 
-def page(path: Path, content: Mapping[str, Any]) -> Path:
-    """Write the page; returns its path."""
-    keys = [key for key in (*(c[0] for c in COLUMNS), *KEPT) if key not in ("P", "Q")]
+def summary(content: Mapping[str, Any]) -> Report:
+    """How many files, what is in them, what cannot be read, and the events that tell most where they were asked for."""
+    rows = content["rows"]
+    report = Report().text(f"{content['files']} files in {content['folder']}, {content['looked_at']} new or changed")
+    report.add(kinds(content))
+    unread = [row for row in rows if row["kind"] == UNREAD]
+    named = [row["why"] if row["file"] in row["why"] else f"{row['file']}: {row['why']}" for row in unread]
+    report.text(*(f"  not read: {sentence}" for sentence in named[:MOST]))
+    report.text(*[f"  and {len(unread) - MOST} more, in the table"] * (len(unread) > MOST))
+    return _best(report, content)
+
+
+def kinds(content: Mapping[str, Any]) -> Table:
+    """How often each kind of event is there."""
+    rows = content["rows"]
+    names = sorted({row["kind"] for row in rows}, key=lambda k: (k in (UNREAD, QUIET), k))
+    counts = [
+        [kind, sum(r["kind"] == kind for r in rows), len({r["file"] for r in rows if r["kind"] == kind}),
+         sum(r["kind"] == kind and r["worth"] for r in rows)]
+        for kind in names
+    ]  # fmt: skip
+    return Table(["what", "rows", "files", "worth fitting"], counts, f"survey of {content['folder']}")
+
+
+def report(content: Mapping[str, Any]) -> Report:
+    """The page."""
+    keys = [key for key in (*(c[0] for c in COLUMNS), *FURTHER) if key not in ("P", "Q")]
     rows = [{key: row[key] for key in keys} for row in content["rows"]]
     data = {
         "columns": COLUMNS, "rows": rows, "atOnce": AT_ONCE, "colors": {"U_picture": VOLTAGE, "P_picture": ACTIVE},
     }  # fmt: skip
-    told = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
-    title = html.escape(f"Survey of {content['folder']}")
+    packed = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
     worth = sum(row["worth"] for row in rows)
     lead = f"{content['files']} files, {len(rows)} rows, {worth} events worth fitting."
-    whole = (
-        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-        f'<meta name="viewport" content="width=device-width">'
-        f"<title>{title}</title><style>{STYLE}{LOOKS}</style></head>\n<body><h1>{title}</h1>"
-        f'<p class="lead">{lead}</p>{_best(content)}{SIEVE}<div class="wide"><table><thead><tr>{_heads()}</tr></thead>'
-        f'<tbody id="body"></tbody></table></div><p><button id="more">more rows</button></p>'
-        "<noscript><p>The table needs JavaScript; survey.csv holds the same rows.</p></noscript>"
-        f'<script type="application/json" id="rows">{told}</script><script>{WORK}</script></body></html>\n'
+    page = _best(Report(f"Survey of {content['folder']}", lead), content)
+    return page.add(
+        Markup(
+            f'<style>{LOOKS}</style>{SIEVE}<div class="wide"><table><thead><tr>{_heads()}</tr></thead>'
+            '<tbody id="body"></tbody></table></div><p><button id="more">more rows</button></p>'
+            "<noscript><p>The table needs JavaScript; survey.csv holds the same rows.</p></noscript>"
+            f'<script type="application/json" id="rows">{packed}</script><script>{WORK}</script>'
+        )
     )
-    return files.write(path, whole)
 
 
 SIEVE = (
@@ -172,18 +195,12 @@ def _heads() -> str:
     return "".join(made)
 
 
-def _best(content: Mapping[str, Any]) -> str:
-    """The events that tell most, and the command that fits them."""
-    if not content["informative"]:
-        return ""
-    narrower = [
-        f", intervals narrower by {each['gain']:.0%}" * bool(k) for k, each in enumerate(content["informative"])
-    ]
-    items = "".join(
-        f"<li>{html.escape(each['event'])}{more}</li>"
-        for each, more in zip(content["informative"], narrower, strict=True)
-    )
-    return (
-        f'<div class="verdict good"><p>These events tell most together, the best first:</p><ol>{items}</ol></div>'
-        f"<pre>{html.escape(content['command'])}</pre>"
-    )
+def _best(report: Report, content: Mapping[str, Any]) -> Report:
+    """The events that tell most, and the command that fits them; nothing where they were not asked for."""
+    best = content["informative"]
+    if not best:
+        return report
+    narrower = [f", which narrows the intervals by {each['gain']:.0%}" * bool(k) for k, each in enumerate(best)]
+    report.verdict("most informative together, the best first:", kind="good")
+    report.items([f"{each['event']}{more}" for each, more in zip(best, narrower, strict=True)])
+    return report.text("to fit them together:").code(content["command"])

@@ -5,11 +5,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from tractexp.blocks import style
+from tractexp.blocks.chart import Chart
 from tractexp.identification.problem import Problem
 from tractexp.identification.result import AFTER, Fit
 from tractexp.record import WaveEvent
-from tractexp.report import style
-from tractexp.report.chart import Chart
 from tractexp.report.events import FOUND, WITHIN
 
 PHASES = ("a", "b", "c")

@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from tractexp import files
+from tractexp.api.task import variant
+from tractexp.cli.chosen import given
 from tractexp.errors import UserError
 from tractexp.sweep import identity
 from tractexp.sweep.status import FAILED, FINISHED, RUNNING, Status
-from tractexp.tasks.given import given, variant
 from tractexp.tracking.swept import parent_of
 
 OUTPUT, TRACEBACK = "output.txt", "traceback.txt"
@@ -89,8 +90,8 @@ def run_job(config: Any) -> Status:
 
 def _run(job: SweepJob) -> str:
     """Run the task; returns what went wrong, in one line, or ""."""
-    from tractexp.tasks.run import perform
-    from tractexp.tasks.task import Job
+    from tractexp.api.task import Job
+    from tractexp.cli.run import perform
 
     try:
         perform(Job(job.config, job.choices, job.folder, parent_of(job.folder.parent), in_sweep=True, given=job.given))

@@ -147,7 +147,7 @@ def warm(jobs: Sequence[SweepJob]) -> None:
     """Compile the kernels of the jobs' models, once for each, so that the workers find them on disk."""
     import json
 
-    from tractexp.tasks.task import Job
+    from tractexp.api.task import Job
 
     seen = set()
     for job in jobs:

@@ -9,8 +9,8 @@ from typing import Any
 from tractexp import provenance
 from tractexp.errors import UserError
 from tractexp.files import write_json
+from tractexp.progress import say
 from tractexp.sweep.status import FAILED, FINISHED, INTERRUPTED, objective, read
-from tractexp.tasks.console import say
 from tractexp.tracking.swept import FILE, parent_of
 
 
@@ -86,7 +86,7 @@ def metrics(jobs: list[Any]) -> dict[str, float]:
 
 def _described(folder: Path, jobs: list[Any], overrides: list[str]) -> Any:
     from tractexp import tracking
-    from tractexp.tasks.task import Job
+    from tractexp.api.task import Job
 
     first = Job(jobs[0].config, jobs[0].choices, folder)
     shared = {key: value for key, value in tracking.flatten(jobs[0].config).items()

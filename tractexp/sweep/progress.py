@@ -5,15 +5,22 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+from tractexp.progress import FIRST_LINE, NEXT_LINES, console, say
 from tractexp.sweep.job import SweepJob, shared
 from tractexp.sweep.status import FAILED, Status, search_objective
-from tractexp.tasks.console import FIRST_LINE, NEXT_LINES, console, say
 
 SHOWN = 3  # variants named in a line of a log file
 
 
 class Tally:
     """Counts the ends of a sweep's jobs."""
+
+    total: int
+    done: int
+    failed: int
+    common: set[str]
+    started: float
+    first: float
 
     def __init__(self, jobs: Sequence[SweepJob]):
         self.total, self.done, self.failed = len(jobs), 0, 0

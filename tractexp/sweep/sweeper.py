@@ -18,18 +18,19 @@ from hydra.plugins.sweeper import Sweeper
 from omegaconf import OmegaConf
 
 from tractexp import files
+from tractexp.api.task import Job
+from tractexp.blocks import Table
+from tractexp.cli.chosen import refuse_unread
 from tractexp.doors.hydra_plugins import NAMESPACE
 from tractexp.errors import Stopped, UserError
 from tractexp.plugin import build, get
+from tractexp.progress import say
 from tractexp.sweep import status
 from tractexp.sweep.compose import Composer
 from tractexp.sweep.job import SweepJob, shared
 from tractexp.sweep.launcher import Cores
 from tractexp.sweep.parent import parent_run
 from tractexp.sweep.status import FAILED, FINISHED, INTERRUPTED, RUNNING
-from tractexp.tasks.console import say, table
-from tractexp.tasks.given import refuse_unread
-from tractexp.tasks.task import Job
 
 REPEAT = "repeat the command to go on with the jobs that are left"
 
@@ -225,8 +226,8 @@ def ended(jobs: Sequence[SweepJob]) -> None:
     if found:
         say()
         rows = sorted((sorted(values), name) for name, values in found.items())
-        cells = [[n, str(len(v)), *(f"{x:.4e}" for x in (v[0], median(v), v[-1])), ""] for v, n in rows]
-        table(["optimizer", "jobs", "best objective", "median", "worst", ""], cells)
+        cells = [[n, str(len(v)), *(f"{x:.4e}" for x in (v[0], median(v), v[-1]))] for v, n in rows]
+        say(str(Table(["optimizer", "jobs", "best objective", "median", "worst"], cells)))
         say("objectives in pu² at the end of the search, before the estimate is polished")
 
 

@@ -15,8 +15,9 @@ MOST_ITERATIONS = 25
 class Bowl:
     """sum((x - c)^2) over a box of unequal sides; the minimum lies off its center."""
 
-    lower, upper = np.array([-1.0, 0.0, 10.0]), np.array([2.0, 0.1, 30.0])
-    best = np.array([0.3, 0.07, 14.0])
+    lower: np.ndarray = np.array([-1.0, 0.0, 10.0])
+    upper: np.ndarray = np.array([2.0, 0.1, 30.0])
+    best: np.ndarray = np.array([0.3, 0.07, 14.0])
 
     def residuals(self, values: np.ndarray) -> np.ndarray:
         return (values - self.best) / (self.upper - self.lower)

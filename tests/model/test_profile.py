@@ -1,0 +1,207 @@
+"""Profiles: a parabola where theory says so, open sides, two minima, better optima, and the posterior beside them."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import uncertainty as study
+from pages import read, unpacked
+
+from tractexp.errors import UserError
+from tractexp.identification.posterior import Posterior
+from tractexp.identification.problem import Problem
+from tractexp.identification.profile import End, Profile, checked, profiles, revised
+from tractexp.identification.uncertainty import conclude, threshold
+from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, Verdict
+from tractexp.report import posterior
+from tractexp.report.profile import meaning, page
+
+
+def events(depths, deviation, seed=1, Q_s0=0.35):
+    rng, made = np.random.default_rng(seed), []
+    for depth in depths:
+        t, U = study.Shape(depth).voltage()
+        clean = study.printed(study.TYPICAL, t, U, Q_s0)
+        made.append(study.event(t, U, clean + study.noise(rng, len(t), deviation, 0.0)))
+    return made
+
+
+@pytest.fixture(scope="module")
+def quiet():
+    return study.judged(Problem(study.model(), events((0.5,), 0.001)), study.TYPICAL).known
+
+
+def test_the_threshold_is_chi_squared_of_one_degree():
+    assert threshold() == pytest.approx(1.959963985**2, rel=1e-6)
+
+
+def test_with_little_noise_a_profile_is_the_parabola_of_the_information_matrix(quiet):
+    found = profiles(quiet)
+    assert found.restarts == 0
+    for profile, value, half in zip(found.profiles, quiet.values, quiet.half, strict=True):
+        np.testing.assert_allclose(
+            profile.interval, (value - half, value + half), atol=0.06 * half, err_msg=profile.name
+        )
+        assert profile.ends == (End.CLOSED, End.CLOSED)
+        assert profile.minima == ()
+        parabola = found.threshold * ((profile.values - value) / half) ** 2
+        np.testing.assert_allclose(profile.deviance, parabola, atol=0.25 + 0.1 * parabola.max())
+    assert {v.word for v in found.verdicts.values()} == {IDENTIFIED}
+
+
+def test_a_point_of_a_profile_is_the_constrained_optimum(quiet):
+    """The deviance with M held, by SciPy on the same whitened residuals."""
+    from scipy.optimize import least_squares
+
+    found = profiles(quiet, names=["M"])
+    (profile,) = found.profiles
+    j, likelihood = quiet.names.index("M"), quiet.likelihood
+    held = (profile.values[-1] - quiet.lower[j]) / (quiet.upper[j] - quiet.lower[j])
+
+    def rows(x):
+        return likelihood.rows(np.insert(x, j, held)[None])[0]
+
+    solved = least_squares(rows, np.delete(quiet.unit, j), x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12)
+    assert profile.deviance[-1] == pytest.approx(2 * solved.cost - quiet.deviance, abs=0.02)
+
+
+def test_a_shallow_dip_leaves_c_open_on_both_sides_of_a_crest_and_the_verdict_says_so():
+    """At C = 0.75 the deviance is up by 16, at 0.3 by 0.3: a lane from the estimate alone ends at the crest."""
+    known = study.judged(Problem(study.model(), events((0.15,), 0.01)), study.TYPICAL).known
+    made = {p.name: p for p in profiles(known).profiles}
+    assert made["C"].ends == (End.BOUND, End.BOUND)
+    assert made["C"].interval == pytest.approx((0.3, 0.99))
+    assert made["C"].deviance.max() > 10
+    judged = checked(known)
+    assert judged.verdicts["C"].word == UNIDENTIFIED
+    assert "open upwards" in judged.verdicts["C"].detail
+    assert judged.profiled["C"] == pytest.approx(made["C"].interval, rel=1e-3)
+    assert set(judged.profiled) >= {"C", "X_prime", "q_v"}
+    narrow = {n for n, v, h in zip(known.names, known.values, known.half, strict=True) if h <= 0.05 * v}
+    assert narrow  # a parabola anyway
+    assert not narrow & set(judged.profiled)
+    assert judged.verdicts["T_m"].word == IDENTIFIED
+
+
+def test_a_better_optimum_restarts_the_profiles_and_is_said(quiet):
+    """Started from a point off the optimum, as a search may leave it."""
+    off = quiet.unit.copy()
+    off[quiet.names.index("M")] += 3 * quiet.half[3] / (quiet.upper[3] - quiet.lower[3])
+    found = profiles(conclude(quiet.likelihood, off))
+    assert found.restarts >= 1
+    assert "a better optimum turned up along a profile" in found.notes[0]
+    np.testing.assert_allclose(found.known.values, quiet.values, atol=0.1 * quiet.half.min())
+    assert found.known.deviance == pytest.approx(quiet.deviance, abs=0.05)
+
+
+def test_two_minima_and_open_sides_change_the_verdict():
+    good = Verdict(IDENTIFIED, "± 3 %")
+    base = Profile("C", np.array([0.4, 0.5, 0.6]), np.array([5.0, 0, 5.0]), (0.48, 0.52), (End.CLOSED, End.CLOSED), ())
+    assert revised(good, base, 0, 1).word == IDENTIFIED
+    twice = revised(good, replace(base, minima=(0.58,)), 0, 1)
+    assert (twice.word, "two minima, another at 0.58" in twice.detail) == (WEAK, True)
+    upwards = revised(good, replace(base, ends=(End.CLOSED, End.BOUND)), 0, 1)
+    assert (upwards.word, "open upwards" in upwards.detail) == (WEAK, True)
+    assert revised(good, replace(base, ends=(End.BOUND, End.BOUND)), 0, 1).word == UNIDENTIFIED
+    assert revised(good, replace(base, interval=(0.3, 0.7)), 0, 1).word == WEAK
+
+
+def test_the_posterior_confirms_the_intervals(quiet):
+    pytest.importorskip("emcee", reason="the optional extra [posterior] is not installed")
+    from tractexp.identification.posterior import sample
+
+    drawn = sample(quiet, walkers=40, steps=600, seed=1)
+    again = sample(quiet, walkers=40, steps=600, seed=1)
+    np.testing.assert_array_equal(drawn.draws, again.draws)
+    for (low, high), value, half in zip(drawn.intervals, quiet.values, quiet.half, strict=True):
+        assert (high - low) / 2 == pytest.approx(half, rel=0.3)
+        assert (high + low) / 2 == pytest.approx(value, abs=0.3 * half)
+
+
+def test_too_few_walkers_are_refused(quiet):
+    pytest.importorskip("emcee", reason="the optional extra [posterior] is not installed")
+    from tractexp.identification.posterior import sample
+
+    with pytest.raises(UserError, match=r"task.walkers=10 is too few: 9 coordinates need at least 18"):
+        sample(quiet, walkers=10, steps=100, seed=0)
+
+
+def drawn(path):
+    """The charts of a page, as they are drawn."""
+    told = re.findall(r'<script type="application/json">(.*?)</script>', path.read_text(encoding="utf-8"))
+    return [json.loads(chart) for chart in told]
+
+
+def test_the_page_draws_each_profile_with_its_parabola_threshold_and_interval(quiet, tmp_path):
+    found = profiles(quiet)
+    told, charts = read(page(tmp_path / "profile.html", found)), drawn(tmp_path / "profile.html")
+    for chart, profile, value, half in zip(charts, found.profiles, quiet.values, quiet.half, strict=True):
+        assert chart["layout"]["title"]["text"] == f"{profile.name}: identified"
+        curves = {trace["name"]: trace for trace in chart["data"] if trace["name"]}
+        x, y = (unpacked(curves["profile"][axis]) for axis in "xy")
+        np.testing.assert_allclose(np.interp(profile.values, x, y), profile.deviance, atol=1e-4)
+        for end in profile.interval:  # the interval is where the curve drawn crosses the threshold
+            assert np.interp(end, x, y) == pytest.approx(found.threshold, rel=0.02)
+        x, y = (unpacked(curves["curvature"][axis]) for axis in "xy")
+        assert np.interp(value + half, x, y) == pytest.approx(found.threshold, rel=0.02)
+        shaded, level = chart["layout"]["shapes"]
+        assert (shaded["x0"], shaded["x1"]) == profile.interval
+        assert level["y0"] == found.threshold
+    assert "For every parameter the curvature's interval is enough" in told.words
+    assert "Every parameter is identified." in told.words
+    for part in ("transient reactance on the record's base", "pu s²/rad", "is enough."):
+        assert part in told.words
+
+
+def test_the_page_of_a_model_that_lacks_something_says_what_its_intervals_hold(tmp_path):
+    (event,) = events((0.5,), 0.002)
+    step = 0.02 * (event.record.t > 0.85)  # a load that is switched on: nothing of the model can do that
+    spoiled = study.event(event.record.t, event.record.U, np.array([event.record.P + step, event.record.Q]))
+    known = study.judged(Problem(study.model(), [spoiled]), study.TYPICAL).known
+    assert not known.exact
+    found = profiles(known, names=["M", "p_v"])
+    told = read(page(tmp_path / "profile.html", found, "an effect is missing"))
+    assert "An effect is missing." in told.words
+    assert "More than noise is left, so these are intervals of least squares" in told.words
+    assert all(profile.interval[0] < value < profile.interval[1] for profile, value in zip(
+        found.profiles, (known.values[3], known.values[5]), strict=True))  # fmt: skip
+
+
+def test_the_page_of_a_posterior_shows_its_draws_beside_the_fit(quiet, tmp_path):
+    rng = np.random.default_rng(1)
+    error = quiet.information.standard_errors
+    draws = quiet.values + error * rng.standard_normal((20_000, len(error)))
+    draws[:, 1] += 1.5 * error[1]  # of one parameter they lie elsewhere
+    draws[:, 6] = quiet.values[6] + error[6] * (draws[:, 2] - quiet.values[2]) / error[2]  # as C does, so does q_v
+    path = posterior.page(tmp_path / "posterior.html", quiet, Posterior(quiet.names, draws, 2000, 50.0, 0.3, 1))
+    told, charts = read(path).words, drawn(path)
+    assert "but those of X_prime: take the posterior's." in told
+    assert "The chain lasts 40 autocorrelation times; 50 are asked for: raise steps." in told
+    assert "C and q_v depend on each other most" in told
+    assert len(charts) == len(quiet.names) + 1
+    first = charts[0]
+    edges, density = (unpacked(first["data"][-1][axis]).astype(float) for axis in "xy")
+    assert np.sum(np.diff(edges) * density[:-1]) == pytest.approx(1, rel=1e-4)
+    shaded, estimate = first["layout"]["shapes"]
+    assert (shaded["x0"], shaded["x1"]) == pytest.approx(np.quantile(draws[:, 0], [0.025, 0.975]))
+    assert estimate["x0"] == quiet.values[0]
+
+
+def test_the_page_says_where_curvature_misleads(quiet):
+    found = profiles(quiet, names=["M"])
+    (profile,), value, half = found.profiles, quiet.values[3], quiet.half[3]
+    bound, points = (End.CLOSED, End.BOUND), (End.POINTS, End.CLOSED)
+    for changes, sentence in (
+        ({}, "± .* is enough"),
+        ({"interval": (value - half, value + 3 * half)}, r"Lopsided: 3\.0 times as far up"),
+        ({"interval": (value - 2 * half, value + half)}, r"Lopsided: 2\.0 times as far down"),
+        ({"interval": (value - half / 2, value + half / 2)}, "Narrower than by curvature"),
+        ({"interval": (value - 2 * half, value + 2 * half)}, "Wider than by curvature"),
+        ({"ends": bound, "interval": (value - half, 0.03)}, r"No limit upwards but the bound 0\.03"),
+        ({"ends": (End.BOUND, End.BOUND)}, "No limit but the bounds: the record does not tell it"),
+        ({"ends": points}, "Not followed to its end downwards: raise points"),
+        ({"minima": (0.02,)}, r"0\.02 fits about as well as the estimate"),
+    ):
+        assert re.fullmatch(sentence + r"\.", meaning(found, replace(profile, **changes))), sentence

@@ -1,0 +1,61 @@
+"""Pages and charts read back."""
+
+import base64
+import html.parser
+import re
+
+import numpy as np
+
+from tractexp.blocks.chart import script
+
+VOID = {"meta", "br", "img", "path", "use", "rect", "line"}
+
+
+class Reader(html.parser.HTMLParser):
+    """Checks that elements nest, and collects ids, references and what would be loaded from elsewhere."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.tags, self.ids, self.references, self.words = [], [], [], [], ""
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+        if tag not in VOID:
+            self.open.append(tag)
+        for key, value in attributes:
+            if key == "id":
+                self.ids.append(value)
+            self.references += re.findall(r"url\((?:'|\")?([^)'\"]*)", value or "")
+            if key in ("src", "href", "xlink:href"):
+                self.references.append(value)
+
+    def handle_startendtag(self, tag, attributes):
+        self.handle_starttag(tag, attributes)
+        if tag not in VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag):
+        if tag not in VOID:
+            assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.words += data
+
+
+def read(path) -> Reader:
+    """A page read back, after checking that it is valid and self-contained."""
+    text = path.read_text(encoding="utf-8").replace(f"<script>{script()}</script>", "")  # our own, the only one
+    text = re.sub(r'<script type="application/json">[^<]*</script>', "", text)  # what charts draw: data, no program
+    reader = Reader(text)
+    assert len(set(reader.ids)) == len(reader.ids)
+    assert all(reference.startswith("#") and reference[1:] in reader.ids for reference in reader.references)
+    assert not re.search(r"https?://|//[a-z]|@import", text)
+    assert not {"script", "link", "iframe", "img", "object", "embed", "metadata"} & set(reader.tags)
+    return reader
+
+
+def unpacked(packed):
+    return np.frombuffer(base64.b64decode(packed["bdata"]), dtype=f"<{packed['dtype']}")

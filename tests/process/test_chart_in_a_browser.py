@@ -1,0 +1,71 @@
+"""Charts in a browser: drawn without a network, at every width, on paper; zoomed in and out."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from browser import BROWSER, Worked, drawn
+
+from tractexp.blocks import Report
+from tractexp.blocks.chart import Chart
+
+BLUE = "#0072B2"
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed here")
+@pytest.mark.parametrize("opened", [False, True])
+def test_a_folded_chart_is_drawn_when_it_is_opened(tmp_path, opened):
+    page, chart = Report("charts"), Chart("x", ["y"]).line("one", np.arange(3), np.arange(3), BLUE)
+    page.chart(chart, "shown")
+    with page.folded("more"):
+        page.chart(chart, "folded")
+    if opened:
+        page._add("<script>setTimeout(() => document.querySelector('details').open = true, 500)</script>")
+    dom, complaints = drawn(page, tmp_path, "--virtual-time-budget=3000")
+    assert complaints == []
+    assert dom.count('class="chart js-plotly-plot"') == 1 + opened
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed here")
+@pytest.mark.parametrize("width", [500, 1280])  # a headless browser is no narrower than 500
+def test_a_browser_draws_every_kind_and_complains_of_nothing(tmp_path, width):
+    x = np.linspace(0, 1, 50)
+    chart = Chart("t [s]", ["U", "P"]).line("U", x, x, BLUE).band("noise", x, x - 1, x + 1, BLUE, 1)
+    chart.shade(0.2, 0.3, BLUE, name="dip").edge(0.2).level(0.5, "half").limits(None, 0, 1)
+    bars = Chart("gain", [""]).bars("gain", ["a", "b"], [2, 1], BLUE, told=["two", "one"])
+    forest = Chart("value", [""]).points("est", [0.3], ["C"], BLUE, spans=np.array([[0.1, 0.4]]), told=["C"])
+    fitness = Chart("n", ["f"], log_x=True, log_y=True).line("f", x + 1, x + 1, BLUE, step=True).level(1.5, "floor")
+    page = Report("charts").chart(chart, "one").charts([bars, forest, fitness], "three")
+    dom, complaints = drawn(page, tmp_path, f"--window-size={width},900")
+    assert complaints == []
+    assert dom.count('class="chart js-plotly-plot"') == 4
+    widths = [float(w) for w in re.findall(r'class="main-svg"[^>]*?width="([\d.]+)"', dom)]
+    assert widths
+    assert max(widths) <= width
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no browser")
+def test_zoomed_in_every_sample_is_drawn_and_zoomed_out_no_spike_is_lost(tmp_path):
+    y = np.sin(np.arange(100_000) / 50)
+    y[[77_777, 20_000]] = 9, -9
+    chart = Chart("t", ["y"]).samples("y", 0.0, 1e-3, y, BLUE)
+    script = """
+    const told = [], tell = () => {
+      const {x, y} = charts[0].data[0];
+      told.push([x.length, Math.max(...y), Math.min(...y), x.filter(v => v >= 50 && v <= 50.5).length, x[0], x.at(-1)]);
+    };
+    tell();
+    Plotly.relayout(charts[0], {"xaxis.range": [50, 50.5]}).then(() => { tell();
+      Plotly.relayout(charts[0], {"xaxis.autorange": true}).then(() => { tell();
+        document.getElementById("told").textContent = JSON.stringify(told); }); });
+    """
+    dom, complaints = drawn(Worked(Report("zoom").chart(chart, "one"), script), tmp_path, "--virtual-time-budget=5000")
+    assert complaints == []
+    whole, near, again = json.loads(re.search(r'id="told">(.*?)</p>', dom)[1])
+    assert whole[0] < 2200
+    assert whole[1:3] == pytest.approx([9, -9], abs=1e-3)
+    assert near[3] == 501
+    assert near[0] < 520
+    assert near[4:] == [0, pytest.approx(99.999)]  # both ends keep the axis of the whole
+    assert again == whole

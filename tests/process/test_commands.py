@@ -1,0 +1,234 @@
+"""The commands that README, CONTRIBUTING and docs show: composed and built as they stand, and the quick ones run.
+
+Files that a reader has are stood in for by shipped and made ones of the same name. `test_ten_minutes.py` and
+`test_tutorial.py` run all of their pages.
+"""
+
+import re
+import shutil
+import subprocess
+import tomllib
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pandas
+import pytest
+import test_cev
+from command_line import run_command
+from made_recordings import constant, recording
+from test_settings import check, hydra  # noqa: F401  a fixture of this module, too
+
+import tractexp
+from site_pages import commands
+from tractexp.filetypes.comtrade_writer import write
+from tractexp.overrides import overrides
+from tractexp.plugin import build
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+TUTORIALS = ("start.md", "ten-minutes.md")  # followed by tests of their own
+SHOWN = [c for page in PAGES for c in commands.of(page)]
+ALL = SHOWN + [c for page in PAGES for c in commands.inline(page)]
+WORDS = ("ui", "look", "sync", "doctor", "list")  # subcommands
+JOBS = {
+    f"{c.page.stem}: {' '.join(c.arguments)}": c.arguments
+    for c in ALL
+    if c.page.name not in TUTORIALS
+    and c.arguments is not None
+    and not {*WORDS, "--help", "-sc", "--config-dir"} & {*c.arguments}
+}
+RUN = {
+    " ".join(c.arguments): c.arguments
+    for c in SHOWN
+    if c.page.name not in TUTORIALS
+    and c.arguments
+    and {"look", "sync", "doctor", "list", "--help", "--cfg"} & {*c.arguments}
+}
+TWO = ("UA", "UB", "UC", "Q1 IA", "Q1 IB", "Q1 IC", "Q2 IA", "Q2 IB", "Q2 IC")  # channels of two loads
+QUICK = ("task=export", "task=simulate", "task=convert", "task=survey")  # tasks that search nothing
+RUN |= {" ".join(a): a for a in JOBS.values() if {*QUICK} & {*a}}
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory):
+    """A folder with every file that the commands name."""
+    folder = tmp_path_factory.mktemp("desk")
+    shipped = Path(tractexp.__file__).parent / "data"
+    for name in ("dip1.csv", "a.csv"):
+        shutil.copy(shipped / "tibet_50pct.csv", folder / name)
+    for name in ("dip2.csv", "b.csv"):
+        shutil.copy(shipped / "tibet_30pct.csv", folder / name)
+    shutil.copy(shipped / "tibet_65pct.csv", folder / "dip3.csv")
+    frame = pandas.read_csv(shipped / "tibet_50pct.csv")
+    whole = pandas.concat([frame] * 8, ignore_index=True)
+    whole["t"] = np.arange(len(whole)) * 0.002
+    whole.to_csv(folder / "long.csv", index=False)
+    real = frame.assign(U=27.5 * frame["U"], P=20 * frame["P"], Q=20 * frame["Q"])
+    real.to_csv(folder / "kilovolts.csv", index=False)
+    real.rename(columns={"U": "Voltage (kV)", "P": "Total (MW)", "Q": "Q (Mvar)"}).to_excel(
+        folder / "scada.xlsx", index=False
+    )
+    waveforms(folder)
+    (folder / "report.cev").write_bytes("\r\n".join(test_cev.report()).encode("latin-1"))
+    quick = ("optimizer=multistart_least_squares", "optimizer.starts=2", "tracking.enabled=false", "hydra.run.dir=RUN")
+    done = run_command("data=csv", "data.train=[dip1.csv]", *quick, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def waveforms(folder):
+    """COMTRADE files and tables of samples."""
+    dips = np.concatenate([constant(depth=0.3, length=1.5), constant(depth=0.5, length=1.5)], axis=1)
+    V, I, nothing = dips[:3], dips[3:], np.zeros_like(dips[:1])
+    many = np.concatenate([nothing, nothing, nothing, nothing, V, nothing, I])
+    names = [f"X{k}" for k in range(4)] + ["UA", "UB", "UC", "X7", "IA", "IB", "IC"]
+    for name in ("station.cfg", "xtz.cfg"):
+        write(recording(many, names), folder / name, "BINARY", 1999)
+    write(recording(dips), folder / "grid.cfg", "BINARY", 1999)
+    write(recording(dips[[0, 3]], ("UA", "IA")), folder / "arm.cfg", "BINARY", 1999)
+    for name in ("day 1/e4.cfg", "day 3/e9.cfg"):
+        (folder / "recordings" / name).parent.mkdir(parents=True)
+        write(recording(np.concatenate([dips, I / 2]), TWO), folder / "recordings" / name, "BINARY", 1999)
+    t = np.arange(dips.shape[1]) / 3200
+    for name, of in (("rec.csv", dict(zip(("ua", "ub", "uc", "ia", "ib", "ic"), dips, strict=True))),
+                     ("feeder.csv", {"u": dips[0], "i": dips[3]})):  # fmt: skip
+        pandas.DataFrame({"t": t, **of}).to_csv(folder / name, index=False)
+
+
+def single(argument):
+    """The first of the values that a sweep goes through."""
+    from hydra.core.override_parser.overrides_parser import OverridesParser
+
+    (parsed,) = OverridesParser.create().parse_overrides([argument])
+    if not parsed.is_sweep_override():
+        return argument
+    return f"{parsed.key_or_group}={next(iter(parsed.sweep_string_iterator()))}"
+
+
+def composed(arguments):
+    """The configuration of a command and its plugins, checked as they are before anything runs."""
+    given = [a for a in arguments if not a.startswith("-") and a != "job" and not a.startswith("hydra")]
+    config = check(*map(single, overrides(given)))
+    from omegaconf import OmegaConf
+
+    plain = OmegaConf.to_container(config, resolve=False)
+    return {group: build(group, plain[group]) for group in ("data", "optimizer", "objective") if plain.get(group)}
+
+
+@pytest.mark.parametrize("arguments", JOBS.values(), ids=JOBS)
+def test_a_job_composes_and_its_records_are_read(arguments, desk, monkeypatch):
+    monkeypatch.chdir(desk)
+    built = composed(arguments)
+    words = " ".join(arguments)
+    if "task=survey" not in words and ("data=" in words or "data.path=" in words):
+        assert built["data"].read().train
+
+
+@pytest.mark.parametrize("arguments", RUN.values(), ids=RUN)
+def test_a_quick_command_runs(arguments, desk):
+    quiet = ["tracking.enabled=false"] * any(
+        "=" in word and word[0] != "-" for word in arguments if "look" not in arguments
+    )
+    done = run_command(*arguments, *quiet, cwd=desk)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout
+
+
+def test_the_command_of_the_extended_model_runs_as_a_page_tells_it(desk):
+    """--config-dir is Hydra's: the file lies where an investigation puts it."""
+    (told,) = [c.arguments for c in ALL if "--config-dir" in (c.arguments or [])]
+    (desk / "CONF" / "model").mkdir(parents=True)
+    (desk / "CONF" / "model" / "extended.yaml").write_text(
+        "defaults:\n  - third_order_exponential\n  - _self_\neffects: [stator_resistance]\n"
+    )
+    done = run_command(*told, "--cfg", "job", "--package", "model", cwd=desk)
+    assert done.returncode == 0, done.stderr
+    assert "stator_resistance" in done.stdout
+
+
+def test_completion_is_a_line_that_a_shell_takes(desk):
+    (told,) = [c.words for c in SHOWN if "-sc" in c.line]
+    inside = re.fullmatch(r"\$\(tractexp (.*)\)", told[1])[1].split()
+    done = run_command(*inside, cwd=desk)
+    assert subprocess.run(["bash", "-n"], input=done.stdout, text=True).returncode == 0
+    assert done.stdout.strip()
+
+
+def test_the_page_of_the_log_is_told_how_to_open():
+    for told in (c.arguments for c in ALL if "ui" in (c.arguments or [])):
+        options = {word for word in told if word.startswith("--")}
+        help_text = run_command("ui", "--help", cwd=ROOT).stdout
+        assert all(option in help_text for option in options)
+
+
+def test_no_command_holds_what_a_shell_takes_for_a_file():
+    """A placeholder in angle brackets reads from a file."""
+    for c in ALL:
+        bare = re.sub(r"'[^']*'|\"[^\"]*\"", "", c.line).partition(" #")[0]
+        assert not re.search(r"[<>]", bare), c.line
+
+
+def test_scripts_and_their_options_are_there():
+    """`python benchmarks/X.py --option`, from the top or from `benchmarks`."""
+    tried = 0
+    for c in ALL:
+        for before, word in pairwise(["", *c.words]):
+            if before.endswith("python") and word.endswith(".py") and c.page.name not in TUTORIALS:
+                path = ROOT / word if word.startswith("benchmarks") else ROOT / "benchmarks" / word
+                script = (path if path.is_file() else ROOT / "tests" / word).read_text(encoding="utf-8")
+                for option in (w for w in c.words if w.startswith("--")):
+                    assert f'"{option}"' in script, c.line
+                tried += 1
+    assert tried > 15
+
+
+def test_extras_files_and_modules_are_there():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    asked = [extra for c in ALL for w in c.words if "pip" in c.line for extra in re.findall(r"\[(\w+)\]$", w)]
+    assert {"test", "benchmark", "posterior", "slurm", "dask", "cmaes", "dev"} <= {*asked}
+    assert {*asked} <= project["optional-dependencies"].keys()
+    for name in (".ci/run", ".ci/constraints.txt", "tests/process/test_cli.py"):
+        assert any(name in c.line for c in ALL)
+        assert (ROOT / name).is_file()
+
+
+def test_every_command_is_seen_to():
+    """A new kind of line asks for a test of its own."""
+    kinds = [
+        "pip",
+        "pipx",
+        "pytest",
+        "venv",
+        "bash",
+        "cd",
+        "eval",
+        "sbatch",
+        "sphinx",
+        "-c",
+        "activate",
+        "ruff",
+        "pyright",
+    ]
+    for c in ALL:
+        seen = c.arguments is not None or any(kind in c.line for kind in kinds) or c.words[1].endswith(".py")
+        assert seen, f"{c.page.name}: {c.line}"
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/records.md", "docs/model.md"])
+def test_the_python_of_a_page_runs_and_has_what_its_comments_name(page, desk, monkeypatch):
+    """That of docs/python.md is run by `test_docs_run.py`, that of docs/plugins.md by `test_plugins.py`."""
+    monkeypatch.chdir(desk)
+    names = {}
+    for example in re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(encoding="utf-8"), flags=re.DOTALL):
+        exec(compile(example, page, "exec"), names)
+    if page == "README.md":
+        assert names["found"].names == ("stator_transients", "time_skew")
+        assert all(hasattr(names["found"], told) for told in ("verdict", "gap", "extended"))
+        assert names["fit"].parameters["X_prime"].interval
+    if page == "docs/records.md":
+        told = ("start", "end", "depth", "U0", "P0", "Q0", "f0", "noise_U", "noise_P", "noise_Q")
+        assert all(hasattr(names["event"], name) for name in told)
+        told = ("t", "U", "P", "Q", "f", "U2", "base", "window", "more", "notes")
+        assert all(hasattr(names["event"].record, name) for name in told)
+        assert all(hasattr(names["seen"], name) for name in ("feeders", "events", "commands", "report"))

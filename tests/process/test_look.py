@@ -1,0 +1,272 @@
+"""A look at files without naming channels: what is proposed, what happened, and commands that run as they stand."""
+
+import json
+import re
+import shlex
+
+import numpy as np
+import pandas
+import pytest
+from command_line import run_command
+from made_recordings import BASE, RATE, constant, recording, waves
+
+import tractexp
+import tractexp.progress
+from tractexp.errors import UserError
+from tractexp.filetypes.comtrade_writer import write
+from tractexp.overrides import assigned, override
+from tractexp.recording.quality import spectrum
+from tractexp.recording.trace import half_cycle_rms
+from tractexp.report.look import envelope
+
+
+def saved(path, values=None, **more):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write(recording(constant() if values is None else values, **more), path, "BINARY", 1999)
+    return path
+
+
+@pytest.fixture(scope="module")
+def station(tmp_path_factory):
+    """Two loads on one bus and a dip of 40 %; the second load is the first one's half, its current reversed."""
+    first = constant()
+    values = np.concatenate([first, -first[3:] / 2])
+    names = ("UA", "UB", "UC", "Q1 IA", "Q1 IB", "Q1 IC", "Q2 IA", "Q2 IB", "Q2 IC")
+    return saved(tmp_path_factory.mktemp("field") / "站北 (1).cfg", values, names=names)
+
+
+@pytest.fixture(scope="module")
+def looked(station):
+    return tractexp.look(station)
+
+
+def test_file_channels_loads_and_events_are_told_as_tables_and_frames(looked):
+    (file,) = looked.files
+    assert (file["station"], file["rates"], file["frequency"]) == ("North", [RATE], 50.0)
+    assert file["start"] == "2026-03-01T10:00:00"
+    assert file["measured_frequency"] == pytest.approx(50, abs=1e-3)
+    assert [c["name"] for c in looked.channels][:4] == ["UA", "UB", "UC", "Q1 IA"]
+    assert looked.channels.to_frame()["magnitude"][0] == pytest.approx(BASE[0] / np.sqrt(3), rel=1e-3)
+    assert len(looked.feeders) == 2
+    first = looked.feeders.rows[0]
+    assert (first["U"], first["P"], first["Q"]) == pytest.approx((BASE[0], 0.8 * BASE[1], 0.3 * BASE[1]), rel=1e-3)
+    assert first["sum_V"] < 1e-3
+    event = looked.events.rows[0]
+    assert (event["kind"], event["dip"], event["worth"]) == ("dip", 1, True)
+    assert event["depth"] == pytest.approx(0.4, abs=2e-3)
+    assert event["duration"] == pytest.approx(0.2, abs=0.03)
+    assert event["P_before"] == pytest.approx(0.8 * BASE[1], rel=2e-3)
+    assert "dip" in str(looked)
+
+
+def test_a_load_may_be_named_and_is_then_the_only_one(station):
+    made = tractexp.look(station, voltages=[0, 1, 2], currents=["Q1 IA", "Q1 IB", "Q1 IC"])
+    assert [f["currents"] for f in made.feeders] == [[3, 4, 5]]
+
+
+def test_every_command_runs_as_it_stands_and_reads_what_was_shown(looked, station, tmp_path):
+    """In a shell's words, from another folder, name of the file with a space, brackets and Chinese letters."""
+    for feeder in looked.feeders:
+        if feeder["P"] < 0:  # a source, or a load counted backwards: not told which, so not fitted
+            assert not feeder["command"]
+            assert any("P is negative before it" in e["why"] for e in looked.events)
+            continue
+        words = shlex.split(feeder["command"])
+        assert words[0] == "tractexp"
+        done = run_command(
+            *words[1:], "optimizer=random_search", "budget=50", "tracking.enabled=false", "hydra.run.dir=run",
+            cwd=tmp_path,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        (event,) = json.loads((tmp_path / "run" / "result.json").read_text())["events"]
+        assert event["name"] == f"{station.stem}_dip1"
+        assert "dip of 40 %" in done.stdout
+
+
+def test_dips_are_numbered_as_the_reader_numbers_them(tmp_path):
+    t = np.arange(round(2.5 * RATE)) / RATE
+    U = np.ones_like(t)
+    for start, end, size in ((0.5, 0.6, 0.7), (1.0, 1.15, 1.2), (1.6, 1.8, 0.6)):  # a dip, a swell, a dip
+        U[(t >= start) & (t < end)] = size
+    path = saved(tmp_path / "three.cfg", waves(t, U, 0.8 * U**2, 0.3 * U**2))
+    made = tractexp.look(path)
+    assert [(e["kind"], e["dip"]) for e in made.events] == [("dip", 1), ("swell", None), ("dip", 2)]
+    assert [e["worth"] for e in made.events] == [True, False, True]
+    assert "fitted to dips" in made.events.rows[1]["why"]
+    assert "'data.train=[1]' 'data.validate=[2]'" in made.commands[0]
+    starts = [e.t_start for e in tractexp.read(path)]
+    np.testing.assert_allclose([e["start"] for e in made.events if e["dip"]], starts, atol=0.02)
+
+
+def test_a_short_dip_is_to_be_fitted_in_waves_and_that_command_runs_too(tmp_path):
+    """A dip of three cycles is smeared by phasors; one of ten is not, nor one that begins with the record."""
+    short = saved(tmp_path / "short.cfg", constant(start=0.5, end=0.56))
+    (command,) = tractexp.look(short).commands
+    assert command.endswith(" domain=waves")
+    done = run_command(
+        *shlex.split(command)[1:], "model/motor=none", "model/static=branch", "optimizer=random_search", "budget=50",
+        "tracking.enabled=false", cwd=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "domain=waves" not in tractexp.look(saved(tmp_path / "long.cfg")).commands[0]
+    early = saved(tmp_path / "early.cfg", constant(start=0.05, end=0.11))
+    assert not any("domain=waves" in c for c in tractexp.look(early).commands)
+
+
+def test_a_file_without_events_or_loads_is_told_and_is_no_error(tmp_path):
+    quiet = tractexp.look(saved(tmp_path / "quiet.cfg", constant(depth=0.0)))
+    assert (len(quiet.feeders), len(quiet.events), quiet.commands) == (1, 0, [])
+    volts = recording(constant()[:3], names=("UA", "UB", "UC"))
+    write(volts, tmp_path / "volts.cfg", "BINARY", 1999)
+    alone = tractexp.look(tmp_path / "volts.cfg")
+    assert (len(alone.channels), len(alone.feeders)) == (3, 0)
+    for made in (quiet, alone):
+        assert [p.name for p in made.write(tmp_path / "page")] == ["look.json", "look.html"]
+
+
+def test_a_table_of_powers_is_looked_at_and_its_command_fits_it(resistive_dips, tmp_path):
+    made = tractexp.look(resistive_dips[0])
+    (event,) = made.events
+    assert (event["kind"], event["worth"]) == ("dip", True)
+    assert event["depth"] == pytest.approx(0.3, abs=0.01)
+    assert made.commands == [f"tractexp data=csv data.path={resistive_dips[0]} 'data.train=[1]' 'data.validate=[]'"]
+    assert list(made.phasors().columns)[:4] == ["t", "U", "P", "Q"]
+    with pytest.raises(UserError, match="without waveforms"):
+        made.waveforms()
+
+
+def test_a_long_table_is_one_load_whose_dips_are_numbered(resistive_dips, tmp_path):
+    """Three dips one after the other, and one more that the end of the table cuts short."""
+    parts = [pandas.read_csv(path) for path in resistive_dips]
+    tail = parts[0][parts[0]["t"] < parts[0]["t"].iloc[0] + 0.45]
+    frame = pandas.concat([*parts, tail], ignore_index=True)
+    frame["t"] = np.arange(len(frame)) / 200
+    frame.to_csv(tmp_path / "long.csv", index=False)
+    made = tractexp.look(tmp_path / "long.csv")
+    assert len(made.feeders) == 1
+    assert [e["dip"] for e in made.events if e["worth"]] == [1, 2, 3]
+    np.testing.assert_allclose([e["depth"] for e in made.events if e["worth"]], [0.3, 0.5, 0.4], atol=0.01)
+    words = shlex.split(made.commands[0])
+    assert words[-2:] == ["data.train=[1]", "data.validate=[2,3]"]
+    done = run_command(
+        *words[1:], "optimizer=random_search", "budget=50", "tracking.enabled=false", "hydra.run.dir=run", cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    roles = [e["role"] for e in json.loads((tmp_path / "run" / "result.json").read_text())["events"]]
+    assert roles == ["train", "validate", "validate"]
+
+
+def test_a_shipped_record_is_looked_at_by_its_name():
+    made = tractexp.look("tibet_50pct")
+    assert [e["kind"] for e in made.events if e["worth"]] == ["dip"]
+    assert "pkg://tractexp.data/tibet_50pct" in made.commands[0]
+
+
+def test_what_was_read_can_be_looked_at(station, resistive_dips):
+    dips = tractexp.read(station, voltages=[0, 1, 2], currents=[3, 4, 5])
+    assert len(dips.look().channels) == 9  # the file, not the record that was made of it
+    record = dips[0].record
+    alone = tractexp.look({"t": record.t, "U": record.U, "P": record.P, "Q": record.Q})
+    assert [e["kind"] for e in alone.events] == ["dip"]
+    assert alone.commands == []  # a frame has no command line
+
+
+def test_a_saved_look_shows_the_same_and_gives_its_arrays_again(looked, tmp_path):
+    again = tractexp.load(looked.save(tmp_path / "look.json"))
+    assert again.content == looked.content
+    np.testing.assert_array_equal(again.phasors(1)["P"], looked.phasors(1)["P"])
+    assert list(again.waveforms())[:2] == ["t", "UA"]
+    with pytest.raises(UserError, match="there is no load 2; there are 2"):
+        again.phasors(2)
+
+
+def test_the_page_holds_every_sample_and_marks_the_events(looked, tmp_path):
+    page = looked.write(tmp_path)[-1].read_text(encoding="utf-8")
+    charts = [json.loads(text) for text in re.findall(r'<script type="application/json">(.*?)</script>', page)]
+    whole = charts[0]
+    u = next(trace for trace in whole["data"] if trace.get("samples"))
+    held = np.frombuffer(__import__("base64").b64decode(u["samples"]["bdata"]), "<i2")
+    values = u["samples"]["offset"] + u["samples"]["scale"] * held
+    np.testing.assert_allclose(values, looked.waveforms()["UA"], atol=1e-4 * np.abs(values).max())
+    (shade,) = [shape for shape in whole["layout"]["shapes"] if shape["type"] == "rect"]
+    assert shade["x0"] == looked.events.rows[0]["start"]
+    assert {"u [kV]", "i [kA]", "P, Q [MW]", "f [Hz]"} <= {
+        axis["title"]["text"] for key, axis in whole["layout"].items() if key.startswith("yaxis")
+    }
+    for command in looked.commands:
+        assert shlex.split(command)[2] in page
+
+
+def test_a_page_of_ten_seconds_of_twenty_channels_is_small(tmp_path):
+    length, rate = 10, 4000.0
+    t = np.arange(length * 4000) / rate
+    U = np.where((t > 4) & (t < 4.2), 0.6, 1.0)
+    first = waves(t, U, 0.8 * U**2, 0.3 * U**2)
+    values = np.concatenate([first, *(first[3:] * k for k in (0.9, 0.8, 0.7)), first[:5] * 0.01])
+    names = ["UA", "UB", "UC", *(f"Q{k} I{p}" for k in range(4) for p in "ABC"), *(f"X{k}" for k in range(5))]
+    made = tractexp.look(saved(tmp_path / "long.cfg", values, names=names, rate=rate))
+    assert len(made.feeders) == 4
+    assert made.write(tmp_path / "page")[-1].stat().st_size < 7e6
+
+
+def test_the_command_line_prints_all_of_it_and_says_where(station, tmp_path):
+    done = run_command("look", str(station), cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    for part in ("North", "3200 Hz", "UA", "Q2", "dip", "worth fitting", "to fit it:", "data=comtrade", "look.html"):
+        assert part in done.stdout, part
+    (page,) = (tmp_path / "outputs" / "looks").rglob("look.html")
+    assert str(page.relative_to(tmp_path)) in done.stdout
+    named = run_command(
+        "look", str(station), "voltages=[0,1,2]", "data.currents=[3,4,5]", "--folder", "x", cwd=tmp_path
+    )
+    assert named.stdout.count("to fit it:") == 1
+    refused = run_command("look", "absent.cfg", cwd=tmp_path)
+    assert refused.returncode == 2
+    assert "Traceback" not in refused.stderr
+    assert "absent.cfg" in refused.stderr
+
+
+def test_stages_are_told_to_who_listens_and_to_a_log_after_two_seconds(station, capsys, monkeypatch):
+    told = []
+    tractexp.look(station, progress=told.append)
+    assert told == [f"reading {station}", "measuring the quality of the channels"]
+    tractexp.look(station)
+    assert capsys.readouterr().out == ""
+    monkeypatch.setattr(tractexp.progress, "FIRST_LINE", 0.0)
+    tractexp.look(station)
+    assert "measuring the quality" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", ["a b.csv", "站.csv", "x,y.csv", "it's.csv", "[1].csv", "5", "1e5", "d/e4_60.cfg#1.1"])
+def test_a_name_in_a_command_is_read_back(name):
+    from hydra.core.override_parser.overrides_parser import OverridesParser
+
+    told = override(assigned("data.train", [name, "other.csv"]))
+    assert OverridesParser.create().parse_override(told).value() == [name, "other.csv"]
+
+
+def test_the_rms_of_half_cycles_is_that_of_the_standard():
+    """IEC 61000-4-30: over one cycle, anew each half cycle; exact for a whole cycle of any phase and rate."""
+    t = np.arange(1000) / 1600
+    wave = np.sqrt(2) * np.cos(2 * np.pi * 50 * t + 0.3)[None]
+    times, rms = half_cycle_rms(wave, 1600, 50)
+    np.testing.assert_allclose(rms, 1, atol=1e-12)
+    np.testing.assert_allclose(np.diff(times), 0.01)
+    assert times[0] == pytest.approx(0.01 - 0.5 / 1600)
+
+
+def test_a_spectrum_is_right_at_a_harmonic():
+    t = np.arange(800) / 4000
+    f, rms = spectrum(np.sqrt(2) * (10 * np.cos(2 * np.pi * 50 * t) + 0.3 * np.sin(2 * np.pi * 250 * t)) + 5, 4000)
+    assert rms[f == 50] == pytest.approx(10, rel=1e-6)
+    assert rms[f == 250] == pytest.approx(0.3, rel=1e-6)
+
+
+def test_an_envelope_keeps_every_spike_in_its_place():
+    wave = np.zeros(1003)
+    wave[[500, 1002]] = 7, -3
+    made = envelope(wave, 5)
+    assert len(made) == 202
+    assert made.max() == 7
+    assert made.min() == -3
+    assert abs(int(np.argmax(made)) * 5 - 500) <= 10

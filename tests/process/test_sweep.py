@@ -1,0 +1,471 @@
+"""Sweeps: isolation of failures, killed workers, what is not run again, the parent run, and bit-identical results."""
+
+import importlib.util
+import json
+import os
+import re
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+QUICK = ("optimizer.population=20", "budget=200")
+TWO = "hydra.launcher.n_jobs=2"
+SILENT = ("budget=200", "tracking.enabled=false")
+HERE = "hydra.sweep.dir=sweep"
+
+needs_dask = pytest.mark.skipif(
+    importlib.util.find_spec("distributed") is None, reason="Dask is not installed: pip install 'tractexp[dask]'"
+)
+needs_submitit = pytest.mark.skipif(
+    importlib.util.find_spec("submitit") is None,
+    reason="hydra-submitit-launcher is not installed: pip install 'tractexp[slurm]'",
+)
+
+PLUGINS = {
+    "stumbles": """
+    def search(self, evaluate, box, rng):
+        if rng.random() < self.odds:
+            raise ZeroDivisionError("the third step divides by the width of nothing")
+        evaluate(box.uniform(rng, 20))
+        yield
+""",
+    "kills": """
+    def search(self, evaluate, box, rng):
+        os._exit(9)
+        yield
+""",
+    "dies": """
+    def search(self, evaluate, box, rng):
+        marker = pathlib.Path(self.marker)
+        if not marker.exists():
+            marker.touch()
+            os._exit(9)
+        evaluate(box.uniform(rng, 20))
+        yield
+""",
+}
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """A folder for PYTHONPATH with an installed package of optimizers that fail in their own ways."""
+    site = tmp_path_factory.mktemp("site")
+    package, info = site / "faulty", site / "faulty-1.0.dist-info"
+    package.mkdir()
+    info.mkdir()
+    (package / "__init__.py").write_text("")
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: faulty\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[tractexp.plugins]\nfaulty = faulty\n")
+    for name, body in PLUGINS.items():
+        head = "import os, pathlib\nfrom tractexp.identification.optimizer import Optimizer\n"
+        head += "from tractexp.plugin import plugin\n"
+        settings = "    odds: float = 0.5\n    marker: str = 'marker'\n"
+        text = (
+            f'{head}\n@plugin\nclass Faulty(Optimizer):\n    """Fails.\n\n    Source: none.\n    """\n{settings}{body}'
+        )
+        (package / f"{name}.py").write_text(text)
+    return site
+
+
+def tractexp(*arguments, cwd, site=None):
+    """Run `python -m tractexp` in a folder, with the package in `site` installed too."""
+    command = [sys.executable, "-m", "tractexp", *arguments]
+    paths = [str(site)] * (site is not None) + [p for p in (os.environ.get("PYTHONPATH"),) if p]
+    env = os.environ | {"COLUMNS": "200", "PYTHONPATH": os.pathsep.join(paths)}
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, env=env)
+
+
+def statuses(folder):
+    """{job number: content of status.json}"""
+    return {int(p.parent.name): json.loads(p.read_text()) for p in folder.glob("*/status.json")}
+
+
+def results(folder):
+    """{(optimizer, seed): what was found}, without the time it took."""
+    found = {}
+    for path in folder.glob("*/result.json"):
+        content = json.loads(path.read_text())
+        del content["seconds"], content["search"]["seconds"]
+        history = [line.split(",") for line in (path.parent / "history.csv").read_text().splitlines()]
+        content["history"] = [(row[0], row[1], row[3]) for row in history]
+        found[content["optimizer"], content["seed"]] = content
+    return found
+
+
+def ask(folder, text):
+    with sqlite3.connect(folder / "outputs" / "mlflow.db") as store:
+        return store.execute(text).fetchall()
+
+
+@pytest.fixture(scope="module")
+def logged(tmp_path_factory):
+    """A sweep of four jobs on two workers, logged, run once."""
+    folder = tmp_path_factory.mktemp("logged")
+    done = tractexp("-m", *QUICK, TWO, "optimizer=ssa,pso", "seed=range(0,2)", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    (sweep,) = (folder / "outputs" / "sweeps").iterdir()
+    return folder, sweep, done
+
+
+def test_each_job_leaves_its_status_and_what_it_printed(logged):
+    _, sweep, _ = logged
+    ends = statuses(sweep)
+    assert sorted(ends) == [0, 1, 2, 3]
+    for number, end in ends.items():
+        assert (end["status"], end["message"]) == ("finished", "")
+        assert end["choices"]["optimizer"] == ("ssa", "pso")[number // 2]
+        assert end["seed"] == number % 2
+        assert end["seconds"] > 0
+        names = {path.name for path in (sweep / str(number)).iterdir()}
+        assert names == {".hydra", "history.csv", "mlflow.json", "output.txt", "result.json", "status.json"}
+        assert f"seed {number % 2}" in (sweep / str(number) / "output.txt").read_text()
+    assert len({end["configuration"] for end in ends.values()}) == 4
+
+
+def test_workers_print_nothing_and_the_end_is_a_table_of_optimizers(logged):
+    _, _, done = logged
+    assert "Runge-Kutta" not in done.stdout + done.stderr
+    lines = [line.split() for line in done.stdout.splitlines()]
+    assert sorted(line[:2] for line in lines if line[:1] in (["ssa"], ["pso"])) == [["pso", "0"], ["ssa", "0"]]
+
+
+def test_a_sweep_of_several_variants_and_seeds_ends_with_their_comparison(logged, tmp_path):
+    folder, sweep, done = logged
+    assert "comparison.html" in done.stdout
+    told = json.loads((sweep / "comparison.json").read_text())
+    assert {(run["variant"], run["seed"]) for run in told["runs"]} == {(v, s) for v in ("ssa", "pso") for s in (0, 1)}
+    parent = json.loads((sweep / "sweep.json").read_text())["run"]
+    (uri,) = ask(folder, f"select artifact_uri from runs where run_uuid = '{parent}'")[0]
+    assert "comparison.html" in {path.name for path in Path(uri.removeprefix("file://")).iterdir()}
+    for quiet in (("seed=0",), ("seed=0,1", "hydra.sweeper.compare=false")):
+        done = tractexp("-m", *QUICK, *quiet, "optimizer=ssa,pso", "tracking.enabled=false", HERE, cwd=tmp_path)
+        assert "best objective" in done.stdout
+        assert not (tmp_path / "sweep" / "comparison.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("setting", "sentence"),
+    [("bob=3", "task 'compare' has no setting 'bob'"), ("bbob=-1", "task.bbob=-1 is out of range")],
+)
+def test_what_the_comparison_would_refuse_is_refused_before_the_jobs(setting, sentence, tmp_path):
+    asked = ("optimizer=ssa,pso", "seed=0,1", "tracking.enabled=false", f"hydra.sweeper.comparison.{setting}")
+    done = tractexp("-m", *QUICK, *asked, HERE, cwd=tmp_path)
+    assert done.returncode == 2
+    assert sentence in done.stderr
+    assert not (tmp_path / "sweep").exists()
+
+
+def test_the_sweep_is_a_finished_parent_run_with_its_jobs_as_children(logged):
+    folder, sweep, _ = logged
+    parent = json.loads((sweep / "sweep.json").read_text())["run"]
+    assert ask(folder, f"select status from runs where run_uuid = '{parent}'") == [("FINISHED",)]
+    children = ask(folder, f"select run_uuid from tags where key = 'mlflow.parentRunId' and value = '{parent}'")
+    assert len(children) == 4
+    assert ask(folder, "select distinct status from runs") == [("FINISHED",)]
+    metrics = dict(ask(folder, f"select key, value from latest_metrics where run_uuid = '{parent}'"))
+    best = min(content["objective"] for content in results(sweep).values())
+    assert (metrics["jobs"], metrics["jobs_finished"], metrics["best_objective"]) == (4, 4, best)
+
+
+def test_the_same_command_again_runs_nothing_and_more_seeds_run_only_those(logged, tmp_path):
+    folder, sweep, _ = logged
+    before = {path: path.stat().st_mtime_ns for path in sweep.glob("*/result.json")}
+    done = tractexp("-m", *QUICK, "optimizer=ssa,pso", "seed=range(0,2)", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert "4 of them are finished and kept" in done.stdout
+    assert {path: path.stat().st_mtime_ns for path in sweep.glob("*/result.json")} == before
+    assert len(ask(folder, "select run_uuid from runs")) == 5
+
+    shutil.copytree(sweep, tmp_path / "sweep")
+    done = tractexp("-m", *QUICK, "tracking.enabled=false", "optimizer=ssa,pso", "seed=range(0,3)", HERE, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "4 of them are finished and kept" in done.stdout
+    ends = statuses(tmp_path / "sweep")
+    assert [(ends[n]["choices"]["optimizer"], ends[n]["seed"]) for n in (4, 5)] == [("ssa", 2), ("pso", 2)]
+
+
+def test_other_data_of_the_same_name_are_computed_anew_in_the_same_folder(tmp_path):
+    import tractexp as package
+
+    shipped = os.path.join(os.path.dirname(package.__file__), "data", "tibet_{}pct.csv")
+    sweep = ("-m", *SILENT, "optimizer=ssa", "data=csv", "data.train=[dip.csv]", "seed=0,1", HERE)
+    found = []
+    for depth in (50, 30):
+        shutil.copy(shipped.format(depth), tmp_path / "dip.csv")
+        done = tractexp(*sweep, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        assert "finished and kept" not in done.stdout
+        assert sorted(statuses(tmp_path / "sweep")) == [0, 1]
+        found.append(results(tmp_path / "sweep")["ssa", 0]["objective"])
+    assert found[0] != found[1]
+
+
+def test_redo_runs_finished_jobs_again_under_a_new_parent(logged, tmp_path):
+    folder, sweep, _ = logged
+    old, before = (sweep / "sweep.json").read_text(), results(sweep)
+    times = {path: path.stat().st_mtime_ns for path in sweep.glob("*/result.json")}
+    done = tractexp("-m", *QUICK, "optimizer=ssa,pso", "seed=range(0,2)", "hydra.sweeper.redo=true", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert "kept" not in done.stdout
+    assert all(path.stat().st_mtime_ns > then for path, then in times.items())
+    assert results(sweep) == before
+    assert (sweep / "sweep.json").read_text() != old
+
+
+def test_failing_jobs_are_isolated_listed_and_change_the_exit_code(site, tmp_path):
+    sweep = ("-m", "budget=200", "optimizer=stumbles,pso", "seed=range(0,4)", HERE)
+    done = tractexp(*sweep, cwd=tmp_path, site=site)
+    ends = statuses(tmp_path / "sweep")
+    failed = {n for n, end in ends.items() if end["status"] == "failed"}
+    from numpy.random import default_rng
+
+    assert failed == {seed for seed in range(4) if default_rng(seed).random() < 0.5}
+    assert failed
+    assert len(results(tmp_path / "sweep")) == 8 - len(failed)
+    assert done.returncode != 0
+    assert f"{len(failed)} of 8 jobs failed" in done.stderr
+    assert "Traceback" not in done.stderr + done.stdout
+    message = "ZeroDivisionError: the third step divides by the width of nothing"
+    for number in failed:
+        assert ends[number]["message"] == message
+        assert f"optimizer=stumbles seed={number}" in done.stdout
+        assert "in search" in (tmp_path / "sweep" / str(number) / "traceback.txt").read_text()
+    assert done.stdout.count(message) == len(failed)
+    parent = json.loads((tmp_path / "sweep" / "sweep.json").read_text())["run"]
+    assert ask(tmp_path, f"select status from runs where run_uuid = '{parent}'") == [("FAILED",)]
+
+    again = tractexp(*sweep, cwd=tmp_path, site=site)
+    assert f"{8 - len(failed)} of them are finished and kept" in again.stdout
+    assert json.loads((tmp_path / "sweep" / "sweep.json").read_text())["run"] == parent
+    assert len(ask(tmp_path, "select run_uuid from runs")) == 1 + 8 - len(failed)
+
+
+def test_a_bad_value_fails_its_job_with_the_same_sentence_as_alone(tmp_path):
+    done = tractexp("-m", *SILENT, "optimizer=ssa", "optimizer.producers=0.2,3", "seed=0", HERE, cwd=tmp_path)
+    assert done.returncode != 0
+    sentence = "optimizer.producers=3.0 is out of range: it must be at least 0 and at most 1"
+    assert statuses(tmp_path / "sweep")[1]["message"] == sentence
+    assert sentence in done.stdout
+    assert not (tmp_path / "sweep" / "1" / "traceback.txt").exists()
+    assert len(results(tmp_path / "sweep")) == 1
+
+
+@pytest.mark.parametrize("backend", ["processes", pytest.param("dask", marks=needs_dask)])
+def test_the_job_of_a_killed_worker_is_run_again_and_its_neighbors_are_not_blamed(backend, site, tmp_path):
+    launcher = (TWO, f"hydra.launcher.backend={backend}")
+    done = tractexp("-m", *SILENT, *launcher, "optimizer=dies,pso", "seed=range(0,3)", HERE, cwd=tmp_path, site=site)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "marker").exists()
+    assert len(results(tmp_path / "sweep")) == 6
+
+
+def test_a_job_that_kills_its_worker_every_time_is_listed_and_the_others_finish(site, tmp_path):
+    sweep = (
+        "-m",
+        *SILENT,
+        TWO,
+        "hydra.launcher.tries=2",
+        "optimizer=kills,pso",
+        "seed=range(0,3)",
+    )
+    done = tractexp(*sweep, HERE, cwd=tmp_path, site=site)
+    ends = statuses(tmp_path / "sweep")
+    assert [ends[n]["status"] for n in range(6)] == ["failed"] * 3 + ["finished"] * 3
+    assert "its worker was killed each of the 2 times it was run" in ends[0]["message"]
+    assert done.stdout.count("its worker was killed each of the 2 times") == 3
+    assert "3 of 6 jobs failed" in done.stderr
+
+
+def test_results_are_the_same_bits_for_any_number_of_workers_and_backend(logged, tmp_path):
+    _, sweep, _ = logged
+    launchers = [("hydra.launcher.n_jobs=1",), ("hydra/launcher=basic",)]  # two processes ran `logged`
+    if importlib.util.find_spec("distributed") is not None:
+        launchers.append(("hydra/launcher=dask", TWO))
+    for k, launcher in enumerate(launchers):
+        command = (
+            "-m",
+            *QUICK,
+            "tracking.enabled=false",
+            *launcher,
+            "optimizer=ssa,pso",
+            "seed=range(0,2)",
+            f"hydra.sweep.dir=sweep{k}",
+        )
+        done = tractexp(*command, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        assert results(tmp_path / f"sweep{k}") == results(sweep)
+
+
+@needs_submitit
+def test_submitit_runs_a_sweep_isolates_a_failure_and_logs_below_the_parent(site, tmp_path):
+    launcher = ["hydra/launcher=submitit_local", "hydra.launcher.timeout_min=3"]
+    if shutil.which("sinfo") and subprocess.run(["sinfo", "-h"], capture_output=True).stdout:
+        launcher = ["hydra/launcher=submitit_slurm", "hydra.launcher.timeout_min=3", "hydra.launcher.cpus_per_task=1"]
+    sweep = ("-m", "budget=200", *launcher, "optimizer=stumbles", "seed=0,1,2", HERE)
+    done = tractexp(*sweep, cwd=tmp_path, site=site)
+    from numpy.random import default_rng
+
+    failed = sum(default_rng(seed).random() < 0.5 for seed in range(3))
+    assert f"{failed} of 3 jobs failed" in done.stderr, done.stderr
+    assert "the third step divides by the width of nothing" in done.stdout
+    assert len(results(tmp_path / "sweep")) == 3 - failed
+    parent = json.loads((tmp_path / "sweep" / "sweep.json").read_text())["run"]
+    children = ask(tmp_path, f"select 1 from tags where key = 'mlflow.parentRunId' and value = '{parent}'")
+    assert len(children) == 3 - failed
+
+
+@pytest.mark.parametrize("way", [signal.SIGTERM, signal.SIGINT])
+def test_a_sweep_that_is_ended_keeps_what_is_finished_and_closes_its_parent(way, tmp_path):
+    command = [sys.executable, "-m", "tractexp", "-m", "optimizer=pso", "seed=range(0,400)", "budget=20000", HERE]
+    process = subprocess.Popen(
+        [*command, "optimizer.iterations=4000"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(way, signal.SIG_DFL),  # a shell has what it runs behind ignore interrupts
+    )
+    while process.poll() is None and "finished" not in str(statuses(tmp_path / "sweep")):
+        time.sleep(0.2)
+    process.send_signal(way)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 128 + way
+    assert err.startswith("tractexp: the sweep is interrupted; repeat the command")
+    assert err.count("\n") == 1, err
+    ends = statuses(tmp_path / "sweep").values()
+    assert {end["status"] for end in ends} == {"finished", "interrupted"}
+    assert {end["message"] for end in ends} == {""}
+    parent = json.loads((tmp_path / "sweep" / "sweep.json").read_text())["run"]
+    assert ask(tmp_path, f"select status from runs where run_uuid = '{parent}'") == [("KILLED",)]
+    assert len(ask(tmp_path, "select 1 from runs where status = 'FINISHED'")) >= 1
+
+
+def test_workers_end_with_a_parent_that_is_killed():
+    script = """
+import os, time
+from tractexp.workers import processes
+with processes(1) as executor:
+    print(executor.submit(os.getpid).result(), flush=True)
+    executor.submit(time.sleep, 600).result()
+"""
+    process = subprocess.Popen(
+        [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout.readline()  # the worker is there, and busy for ten minutes
+    process.kill()
+    process.communicate(timeout=60)  # returns when nobody holds the output any more
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["seed=range(3,3)"], "the sweep has no jobs: seed=range(3,3) is empty; a range ends before its second number"),
+        (["optimizer.producers=interval(0,1)"], "optimizer.producers=interval(0,1): a sweep over a grid needs values"),
+        (["optimizer=glob(nothing*)"], "the sweep has no jobs: optimizer=glob(nothing*) is empty"),
+        (["hydra.launcher.backend=threads"], "hydra.launcher.backend=threads is not one of processes, dask"),
+        (["hydra.launcher.n_jobs=0"], "hydra.launcher.n_jobs=0 is out of range: it must be at least 1"),
+        (["optimizer=issa,isa"], "optimizer=isa: there is no such choice; did you mean 'issa'?"),
+        (["seed=1,abc"], "seed=abc is not a whole number"),
+        (["optimizer.populatoin=9,10"], "'optimizer' has no key 'populatoin'; did you mean 'population'?"),
+    ],
+)
+def test_a_sweep_that_cannot_be_is_refused_in_one_sentence_before_it_starts(arguments, sentence, tmp_path):
+    done = tractexp("-m", *arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert sentence in done.stderr
+    assert done.stderr.startswith("tractexp: ")
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert not (tmp_path / "outputs").exists()
+
+
+def test_an_unreachable_dask_scheduler_is_named(tmp_path):
+    address = ("hydra/launcher=dask", "hydra.launcher.address=tcp://127.0.0.1:9")
+    if importlib.util.find_spec("distributed") is None:
+        sentence = "hydra.launcher.backend=dask needs Dask, which is not installed: pip install 'tractexp[dask]'"
+    else:
+        sentence = "hydra.launcher.address=tcp://127.0.0.1:9: no Dask scheduler answers there"
+    done = tractexp("-m", *SILENT, *address, cwd=tmp_path)
+    assert done.returncode == 2
+    assert sentence in done.stderr
+
+
+def test_an_experiment_is_a_sweep_by_itself_of_thirty_seeds(tmp_path):
+    """No record is named, so that every job is composed, refused, and takes no time."""
+    asked = ("experiment=ablation", "tracking.enabled=false", "data=csv", "budget=1000", HERE)
+    done = tractexp(*asked, cwd=tmp_path)
+    assert done.returncode != 0
+    ends = statuses(tmp_path / "sweep").values()
+    seeds = {}
+    for end in ends:
+        seeds.setdefault(end["choices"]["optimizer"], set()).add(end["seed"])
+    assert {"issa", "ssa"} <= seeds.keys()
+    assert len(seeds) == 16
+    assert all(found == set(range(30)) for found in seeds.values())
+    assert all("data.train" in end["message"] for end in ends)
+
+
+def test_settings_of_one_optimizer_are_not_pooled_under_its_name(tmp_path):
+    sweep = ("-m", "optimizer=pso,random_search", "budget=100,200", "seed=0,1", "model.fixed.q_v=3", HERE)
+    done = tractexp(*sweep, "tracking.enabled=false", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    names = [line.strip().split("  ")[0] for line in done.stdout.splitlines() if re.match(r" *\w+ budget=\d+  ", line)]
+    assert sorted(names) == [f"{name} budget={n}" for name in ("pso", "random_search") for n in (100, 200)]
+
+
+@pytest.mark.parametrize(
+    ("chosen", "name"),
+    [
+        ({"optimizer": "issa", "seed": "3", "task": "identify", "tracking.uri": "sqlite:///x.db"}, "issa"),
+        ({"optimizer.levy": "false", "optimizer.gaussian": "true", "seed": "0"}, "issa gaussian=true levy=false"),
+        ({"model": "third_order_zip", "budget": "500", "data": "csv"}, "issa budget=500 model=third_order_zip"),
+        ({"data.train": "[/home/me/dip1.csv,b/dip2.csv]"}, "issa data.train=[dip1.csv,dip2.csv]"),
+    ],
+)
+def test_a_variant_is_named_after_what_was_chosen_but_the_seed(chosen, name):
+    from tractexp.api.task import variant
+
+    assert variant("issa", chosen) == name
+
+
+def test_jobs_that_were_interrupted_are_counted_apart_from_those_that_failed(tmp_path):
+    from tractexp.sweep.parent import metrics
+    from tractexp.sweep.status import Status
+
+    class Placed:
+        def __init__(self, folder):
+            self.folder = folder
+
+    jobs = [Placed(tmp_path / str(k)) for k in range(4)]
+    for job, status in zip(jobs, ("finished", "failed", "interrupted", "interrupted"), strict=True):
+        Status(status, "", "", "", 1.0, {}, 0).write(job.folder)
+    assert metrics(jobs) == {"jobs": 4, "jobs_finished": 1, "jobs_failed": 1, "jobs_interrupted": 2}
+
+
+def test_the_objective_of_a_job_is_told_from_that_of_its_search(tmp_path):
+    from tractexp.sweep.status import objective, search_objective
+
+    for told, ended in (({"objective": 1.0, "search": {"objective": 2.0}}, 2.0), ({"objective": 1.0}, 1.0)):
+        (tmp_path / "result.json").write_text(json.dumps(told))
+        assert (objective(tmp_path), search_objective(tmp_path)) == (1.0, ended)
+    assert search_objective(tmp_path / "nowhere") is None
+
+
+def test_a_folder_that_a_full_disk_left_empty_is_the_jobs_again_and_nobody_elses_is_touched(tmp_path):
+    from tractexp.sweep.job import SweepJob
+    from tractexp.sweep.sweeper import place
+
+    jobs = [SweepJob({"seed": k}, {}, (), f"job {k}", "", Path()) for k in range(4)]
+    (tmp_path / "0" / ".hydra").mkdir(parents=True)  # a kill before it said what it is
+    (tmp_path / "1").mkdir()
+    jobs[2].status.write(tmp_path / "1")  # another job of an earlier sweep
+    (tmp_path / "2").mkdir()
+    (tmp_path / "2" / "mine.txt").write_text("not a job")
+    (tmp_path / "4").write_text("nor is this")
+    assert [job.folder.name for job in place(jobs, tmp_path)] == ["0", "3", "1", "5"]
+    assert [job.folder.name for job in place(jobs, tmp_path / "new")] == ["0", "1", "2", "3"]

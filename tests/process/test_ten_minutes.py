@@ -1,0 +1,68 @@
+"""docs/ten-minutes.md done as it stands, in an empty folder: the files it shows are written, its commands are run."""
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PAGE = Path(__file__).parents[2] / "docs" / "ten-minutes.md"
+BLOCK = re.compile(r"```(\w+)\n(.*?)```", re.DOTALL)
+
+
+def command(line, site):
+    """A command of the page as this test runs it: this Python, and what is installed goes into a folder of its own."""
+    words = shlex.split(line)
+    if "pip" in words:
+        offline = ["--no-deps", "--no-build-isolation", "--no-index", "--target", str(site), "."]
+        assert words[-2:] == ["-e", "."]
+        return [sys.executable, "-m", "pip", "install", "-q", *offline]
+    return [sys.executable, *words[1:]] if words[0] == "python" else [sys.executable, "-m", *words]
+
+
+@pytest.fixture(scope="module")
+def followed(tmp_path_factory):
+    """What each command printed, by its line, after the page was followed from top to bottom."""
+    folder, site = tmp_path_factory.mktemp("empty"), tmp_path_factory.mktemp("installed")
+    told = {}
+    for language, block in BLOCK.findall(PAGE.read_text(encoding="utf-8")):
+        if language in ("toml", "python"):
+            path = folder / re.match(r"# (\S+)\n", block)[1]
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(block)
+        if language != "sh":
+            continue
+        for line in block.splitlines():
+            there = os.environ | {"PYTHONPATH": str(site), "PYTEST_ADDOPTS": "-p no:cacheprovider"}
+            done = subprocess.run(command(line, site), cwd=folder, capture_output=True, text=True, env=there)
+            assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
+            told[line] = done.stdout
+    return told
+
+
+def said(followed, word):
+    (text,) = (text for line, text in followed.items() if word in line)
+    return text
+
+
+def test_the_effect_is_listed_and_the_base_model_misses_it(followed):
+    assert "catch_up" in said(followed, "list effect")
+    (base,) = (text for line, text in followed.items() if line.startswith("tractexp data=csv"))
+    assert "an effect is missing" in base
+
+
+def test_it_is_named_and_its_values_are_found(followed):
+    assert "verdict: NAMED catch_up" in PAGE.read_text(encoding="utf-8")
+    assert "verdict: NAMED catch_up\n" in said(followed, "task=discrepancy")
+    fitted = said(followed, "model.effects")
+    assert "of S): noise alone leaves as much" in " ".join(fitted.split())
+    found = dict(re.findall(r"^\s*(hunger\w*)\s+([\d.]+)", fitted, re.MULTILINE))
+    assert float(found["hunger"]) == pytest.approx(0.6, rel=0.1)
+    assert float(found["hunger_time"]) == pytest.approx(0.25, rel=0.1)
+
+
+def test_its_contract_is_kept(followed):
+    assert re.search(r"\d+ passed", said(followed, "pytest"))

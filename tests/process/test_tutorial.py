@@ -1,0 +1,63 @@
+"""docs/start.md done as it stands, in an empty folder; what the page quotes is what is printed."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from command_line import start_command
+
+PAGE = Path(__file__).parents[2] / "docs" / "start.md"
+BLOCK = re.compile(r"```(\w*)\n(.*?)```", re.DOTALL)
+
+
+@pytest.fixture(scope="module")
+def followed(tmp_path_factory):
+    """The folder at the end, and of each command and quotation in order: (whether it is quoted, its words)."""
+    folder, told = tmp_path_factory.mktemp("empty"), []
+    for language, block in BLOCK.findall(PAGE.read_text(encoding="utf-8")):
+        if language != "sh":
+            told.append((True, block))
+            continue
+        for line in block.splitlines():
+            program, *arguments = shlex.split(line)
+            if program == "tractexp":
+                done = start_command(*arguments, cwd=folder)
+                assert done.returncode == 0, f"{line}\n{done.stderr}"
+                told.append((False, done.stdout))
+            else:  # what a new environment takes is tried by .ci/run
+                assert "venv" in line
+    return folder, told
+
+
+def test_what_is_quoted_is_printed(followed):
+    _, told = followed
+    printed, quotations = "", 0
+    for quoted, text in told:
+        words = " ".join(text.split())
+        if quoted:
+            assert words in printed
+            quotations += 1
+        else:
+            printed += " " + words
+    assert quotations == 2
+
+
+def test_the_look_prints_the_command_that_the_page_runs_next(followed):
+    _, told = followed
+    look = next(text for quoted, text in told if not quoted and "to fit it:" in text)
+    printed = look.partition("to fit it:")[2].strip().splitlines()[0]
+    assert f"\n{printed.strip()}\n" in PAGE.read_text(encoding="utf-8")
+
+
+def test_the_pages_it_speaks_of_are_written(followed):
+    folder, _ = followed
+    for name in ("look.html", "report.html", "survey.html", "discrepancy.html", "extended.yaml"):
+        assert list(folder.glob(f"outputs/**/{name}")), name
+    assert len(list((folder / "records").glob("*.cfg"))) == 3
+
+
+def test_all_events_of_the_archive_are_worth_fitting(followed):
+    folder, _ = followed
+    (table,) = folder.glob("outputs/surveys/*/survey.csv")
+    assert len(table.read_text(encoding="utf-8").splitlines()) == 4

@@ -1,0 +1,240 @@
+"""The page of an investigation: what one sees first, what explains it, and no sentence against another."""
+
+import base64
+import html
+import json
+import re
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from pages import read
+from test_discrepancy import FEW, base, events
+
+from tractexp.discrepancy import verdict
+from tractexp.discrepancy.discrepancy_json import content
+from tractexp.discrepancy.evidence import CHOSEN, beside, chance_level, evidence, why_not_the_most_helpful
+from tractexp.discrepancy.investigate import investigate
+from tractexp.discrepancy.recommended import adequacy
+from tractexp.report import discrepancy, overlay
+from tractexp.report.events import WITHIN
+from tractexp.wording import joined
+
+
+@pytest.fixture(scope="module")
+def named():
+    made = events("stator_resistance", size=2.0, count=3)
+    return investigate(base(), made[:2], made[2:], {}, {}, only=FEW)
+
+
+@pytest.fixture(scope="module")
+def silent():
+    return investigate(base(), events(count=2)[:1], events(count=2)[1:], {}, {}, only=FEW)
+
+
+@pytest.fixture(scope="module")
+def unexplained():
+    made = events("load_step", size=3.0, count=3)
+    return investigate(base(), made[:2], made[2:], {}, {}, only=FEW)
+
+
+def page(found, folder, **more):
+    """The words of the page, and what its charts draw."""
+    path = discrepancy.page(folder / "discrepancy.html", found, "event1, event2", **more)
+    drawn = re.findall(r'<script type="application/json">([^<]*)</script>', path.read_text(encoding="utf-8"))
+    return words_of(path), [json.loads(each) for each in drawn]
+
+
+def words_of(path):
+    """The words of a page that is valid and whole, one space between them."""
+    read(path)
+    bare = re.sub(r"<(script|style)[^>]*>.*?</\1>", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+    return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", bare)).split())
+
+
+def curve(chart, name, axis):
+    """One curve of a chart."""
+    (trace,) = (t for t in chart["data"] if (t["name"], t["yaxis"]) == (name, axis) and t.get("mode") == "lines")
+    return np.frombuffer(base64.b64decode(trace["y"]["bdata"]), dtype="<f4")
+
+
+def names(chart):
+    return {trace["name"] for trace in chart["data"]}
+
+
+def test_measured_before_and_after_of_every_event_come_first(named, tmp_path):
+    words, charts = page(named, tmp_path)
+    assert [e.record.name for e in named.bench.events] == ["event1", "event2"]
+    assert words.index("Measured, before, after") < words.index("event1, fitted") < words.index("event3, held out")
+    assert words.index("event3, held out") < words.index("How much smaller the gap is")
+    first, _, held, bars = charts
+    band = "± 2 σ of the noise"
+    assert names(first) == {"measured", "base model", "extended model", "more than chance leaves", band}
+    assert names(held) == {"measured", "base model", "extended model", band}
+    event = named.bench.records.recorded[0]
+    part = named.bench.drive.part(0)
+    calculated = named.train.after.calculated[:, part]
+    for c, (channel, axis, below) in enumerate((("P", "y2", "y3"), ("Q", "y4", "y5"))):
+        measured = getattr(event.record, channel)
+        np.testing.assert_allclose(curve(first, "measured", axis), measured, rtol=1e-6)
+        np.testing.assert_allclose(curve(first, "extended model", axis), calculated[c], rtol=1e-6)
+        np.testing.assert_allclose(curve(first, "extended model", below), measured - calculated[c], atol=1e-6)
+        assert np.std(curve(first, "base model", below)) > 1.5 * np.std(curve(first, "extended model", below))
+    edges = [s["x0"] for s in first["layout"]["shapes"] if s["type"] == "line"]
+    assert edges == [event.t_start, event.t_end]
+    shaded = sorted((s["x0"], s["x1"]) for s in first["layout"]["shapes"] if s["type"] == "rect")
+    here = [p for p in named.places if p.event == "event1"]
+    assert shaded == sorted(2 * [(p.start, p.end) for p in here])  # in the power's panel and in that below it
+    assert bars["data"][0]["type"] == "bar"
+
+
+def test_the_noise_band_holds_what_the_extended_model_leaves(named):
+    shown = named.overlays[0]
+    off = (shown.measured - shown.after) / shown.deviation
+    assert 0.93 < np.mean(np.abs(off) < WITHIN) < 0.98
+    assert [o.held_out for o in named.overlays] == [False, False, True]
+
+
+def test_many_events_are_folded_and_none_is_left_out(named, tmp_path):
+    from tractexp.blocks import Report
+
+    many = named.overlays[:2] * 3
+    path = overlay.overlaid(Report("many"), many).save(tmp_path / "many.html")
+    words = words_of(path)
+    assert len(re.findall(r"event[12], fitted event[12]: dip of", words)) == 6
+    assert "2 more events, fitted" in words
+    text = path.read_text(encoding="utf-8")
+    assert text.index("<details>") > [m.start() for m in re.finditer('class="chart"', text)][overlay.SHOWN - 1]
+
+
+def test_candidates_are_sorted_by_evidence_the_chosen_first(named, tmp_path):
+    rows = evidence(named)
+    assert rows[0].names == ("stator_resistance",)
+    assert rows[0].status == CHOSEN
+    assert rows[0].drop == pytest.approx(named.survivors.rivals[0].lowered)
+    (size,) = rows[0].sizes
+    assert size.name == "R_s"
+    assert size.error == pytest.approx(next(e for e in named.after if e.parameter.name == "R_s").error)
+    drops = [row.drop for row in rows[1:] if np.isfinite(row.drop)]
+    assert drops == sorted(drops, reverse=True)
+    assert {row.names[0] for row in rows} >= {*FEW, "time_skew", "measurement_window", "load_drift"}
+    words, charts = page(named, tmp_path)
+    bars = charts[-1]["data"][0]
+    assert bars["y"] == [row.names[0] for row in rows if np.isfinite(row.drop)]
+    assert bars["marker"]["color"][0] == discrepancy.COLORS[CHOSEN]
+    assert charts[-1]["layout"]["shapes"][0]["x0"] == chance_level(named)
+    assert beside(named) in words
+
+
+def test_where_a_linear_step_favours_another_effect_one_sentence_says_why(named):
+    assert why_not_the_most_helpful(named) == ""
+    other = next(s for s in named.first.scores if s.name == "speed_dependent_torque")
+    favoured = replace(other, drop=1e6, p=0.0)
+    first = replace(named.first, scores=[favoured, *named.first.scores])
+    told = why_not_the_most_helpful(replace(named, first=first))
+    assert told.startswith("speed_dependent_torque promises most in one linear step from the base model")
+    assert "yet the verdict is stator_resistance, which lowers the deviance by" in told
+    assert "speed_dependent_torque" in told
+    chance = replace(named.first, scores=[replace(favoured, drop=1.0), *named.first.scores])
+    assert why_not_the_most_helpful(replace(named, first=chance)) == ""
+
+
+def test_parameters_stand_before_and_after_with_meaning_unit_interval_and_verdict(named, tmp_path):
+    words, _ = page(named, tmp_path)
+    assert "parameter meaning unit before after 95 % interval verdict" in words
+    assert "R_s stator resistance on the record's base pu not in it" in words
+    before, after = ({e.parameter.name: e for e in group} for group in (named.before, named.after))
+    assert before.keys() == after.keys() - {"R_s"}
+    for e in after.values():
+        low, high = e.interval
+        assert low < e.value < high
+        assert e.verdict.split()[0].rstrip(":") in ("identified", "weakly", "not")
+        assert f"{low:.4g} to {high:.4g}" in words
+    told = content(named)["parameters"]
+    assert told == {n: {"value": e.value, "standard_error": e.error} for n, e in after.items()}
+
+
+def test_a_long_verdict_is_cut_in_the_table_and_whole_below():
+    weak = "weakly identified: ± 32 %; trades against q_v (correlation 0.99); C q_v^0.2 is known to ± 1.8 %"
+    assert discrepancy._brief(weak) == "weakly identified: ± 32 %"
+    assert discrepancy._brief("at its bound (0.3; widen model.bounds.C)") == "at its bound (0.3; widen model.bounds.C)"
+    assert discrepancy._brief("identified (± 5 %)") == "identified (± 5 %)"
+
+
+def test_the_model_recommended_is_graded_in_the_verdict(named, unexplained, tmp_path):
+    for found, whose in ((named, "The extended model is graded "), (unexplained, "The base model is graded ")):
+        words, _ = page(found, tmp_path)
+        grade = adequacy(found)
+        told = f"{whose}{grade.grade.replace('_', ' ')}: {grade.sentence}."
+        assert words.index(told) < words.index("Next: ")
+    assert adequacy(named).grade == "adequate" != adequacy(unexplained).grade
+
+
+def test_what_is_not_extended_is_not_called_so(silent, unexplained, tmp_path):
+    for found, word in ((silent, "none"), (unexplained, "unexplained")):
+        assert found.verdict.word == word
+        words, charts = page(found, tmp_path)
+        assert "extended" not in words.lower()
+        assert "Parameters of the base model" in words
+        assert "before after" not in words
+        assert [o.held_out for o in found.overlays].count(True) == 1
+        assert all("extended model" not in names(chart) for chart in charts)
+        shown = [names(chart) for chart in charts if "measured" in names(chart)]
+        assert len(shown) == len(found.overlays)
+        assert all("base model" in of_event for of_event in shown)
+        assert content(found)["extended"] is None
+
+
+def test_what_is_left_is_told_with_channel_start_and_size(unexplained, tmp_path):
+    words, _ = page(unexplained, tmp_path)
+    shapes = unexplained.remainder_of_base
+    assert {(s.channel, s.kind) for s in shapes} >= {("P", "step")}
+    assert unexplained.headline.startswith(("the base model misses this: ", "the nearest candidates miss this: "))
+    assert unexplained.headline[1:] in words[: words.index("Measured and calculated")]
+    assert "Missed by the base model" in words
+    made = content(unexplained)
+    assert made["remainder"]["of_base"][0]["channel"] in "PQ"
+    assert made["remainder"]["sentence"] == unexplained.headline
+
+
+@pytest.mark.parametrize(
+    ("names", "faults", "told"),
+    [
+        (
+            ("dc_link_lag", "inrush"),
+            ("load_drift",),
+            "dc_link_lag and inrush beside load_drift, the nearest, explain 66%",
+        ),
+        (("dc_link_lag",), ("load_drift",), "dc_link_lag beside load_drift, the nearest, explains 66%"),
+        ((), ("load_drift", "time_skew"), "load_drift and time_skew, the nearest, explain 66%"),
+        (("dc_link_lag",), (), "dc_link_lag, the nearest, explains 66%"),
+    ],
+)
+def test_faults_of_the_measurement_are_not_counted_among_the_effects_together(names, faults, told):
+    catalogue = SimpleNamespace(spoken=lambda name: name, candidates=range(19))
+    bench = SimpleNamespace(catalogue=catalogue)
+    tests = SimpleNamespace(bench=bench, p_left=0.001, loudest="pushes into the balances")
+    best = SimpleNamespace(fit=SimpleNamespace(names=names), tests=tests)
+    explained = SimpleNamespace(faults=faults, base=SimpleNamespace(bench=bench))
+    weighed = SimpleNamespace(survivors=SimpleNamespace(kept=[best], explanations=explained), faults=faults)
+    assert told in verdict._unexplained(weighed, SimpleNamespace(fitted=0.66))
+
+
+def test_an_unexplained_verdict_does_not_contradict_itself(unexplained, tmp_path):
+    """It says what was tested, not what the catalogue holds, and a probability that can be pictured."""
+    reason = unexplained.verdict.reason
+    tested = len(unexplained.catalogue.candidates)
+    assert tested == len(FEW) + 3
+    assert f"none of the {tested} effects tested" in reason
+    assert "catalogue" not in reason
+    assert "less than one in a million" in reason
+    assert not re.search(r"e-\d\d", reason)
+    near = unexplained.verdict.nearest
+    assert near is not None
+    assert re.search(rf"the nearest, explains? {near.fitted:.0%} of what exceeds the noise", reason)
+    assert joined(near.names) in reason, "the sentence and what is told of the nearest name the same effects"
+    told = content(unexplained)["nearest"]["parameters"]
+    assert {"value", "standard_error", "interval"} == next(iter(told.values())).keys()
+    words, _ = page(unexplained, tmp_path)
+    assert not re.search(r"\d\.\d+e-\d\d\d", words)

@@ -1,0 +1,394 @@
+"""Families of effects: another place or another law is named where the catalogue's leaves something, and only there."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+from test_discrepancy import LOUD, base, bench, events
+
+from tractexp.discrepancy import families, fitting, survivors
+from tractexp.discrepancy.catalogue import catalogue
+from tractexp.discrepancy.criteria import Criteria
+from tractexp.discrepancy.explanations import worth_another
+from tractexp.discrepancy.families import against_members, near, open_settings, starts, worth
+from tractexp.discrepancy.fitting import Refit, scattered
+from tractexp.discrepancy.forms import forms
+from tractexp.discrepancy.gap import Gap
+from tractexp.discrepancy.held_out import HeldOut, Judged, searched_again
+from tractexp.discrepancy.investigate import investigate
+from tractexp.discrepancy.tangent import tangent
+from tractexp.errors import UserError
+from tractexp.extend import Effect, Parameter, plugin
+from tractexp.plugin import discover, get
+
+pytestmark = pytest.mark.usefixtures("registry_as_it_was")
+
+TRIPS = ("undervoltage_trip", "exponential_recovery")
+CORE = ("magnetic_saturation", "stator_resistance")
+NODE = {"motor": {"name": "electromechanical"}, "static": {"name": "exponential"}, "bounds": {}, "fixed": {}}
+MEMBERS = sorted(name for name, cls in discover()["effect"].items() if cls.family)
+
+
+def found(effect, size, seed, only, **settings):
+    made = events(effect, size=size, seed=seed, count=3, **settings)
+    return investigate(base(), made[:2], made[2:], {}, {}, only=only)
+
+
+def test_the_catalogues_own_trip_keeps_its_name():
+    made = found("undervoltage_trip", 1.0, 800011, TRIPS)
+    assert made.names == ("undervoltage_trip",)
+    (form,) = forms(made)
+    assert form.law == "catalogue"
+    assert not any(set(names) & set(MEMBERS) for names in made.explanations.refits)
+
+
+def test_nothing_is_tried_where_nothing_is_missing(monkeypatch):
+    monkeypatch.setattr(families, "wide_refits", lambda *_: pytest.fail("a member was fitted"))
+    assert found(None, 1.0, 3, TRIPS).verdict.word == "none"
+
+
+def fit(deviance, parameters, *names):
+    return Refit(names, np.zeros(0), deviance, parameters)
+
+
+def test_a_member_pays_for_its_further_parameters():
+    """The same gain is worth one further parameter and not three; none where it is no better."""
+    textbook = fit(200.0, 1, "one")
+    assert worth(fit(178.0, 2, "other"), textbook, 1e-5)
+    assert not worth(fit(178.0, 4, "other"), textbook, 1e-5)
+    assert not worth(fit(201.0, 2, "other"), textbook, 1.0)
+
+
+def test_a_trip_of_the_static_load_alone_is_told_by_its_family_and_its_place():
+    """The relay's times have hardly a slope: a descent from the coarse grid alone ends far from what was hidden."""
+    made = found("static_part_trip", 2.0, 820001, TRIPS)
+    assert made.verdict.word == "named"
+    assert made.catalogue.textbook(made.names) == ("undervoltage_trip",)
+    (form,) = forms(made)
+    assert (form.effect.name, form.effect.differs) == ("static_trip", "of the static load only")
+    at = made.bench.coordinates
+    assert at.value("static_tripped", made.extended.unit) == pytest.approx(0.2, abs=0.01)
+    assert made.validate.closed > 0.9
+    there = tangent(made.bench, made.extended, made.held_out.noise)  # its instants are no parameters of each event:
+    assert len(there.split) == 2 * (len(at.base) - len(there.held) + 1)  # of the relay the share alone
+
+
+@pytest.mark.parametrize(
+    ("hidden", "size", "seed", "member"),
+    [
+        ("delayed_power_limit", 1.5, 820035, "power_limit_curve"),
+        ("ramped_return", 2.0, 820034, "ramped_current"),
+        ("rectified_power", 1.5, 820043, "rectifier"),
+        ("thermostat_recovery", 2.0, 820061, "thermostatic_load"),
+        ("switched_capacitors", 2.0, 820064, "switched_banks"),
+        ("staged_power_limit", 0.25, 820073, "staged_power_limit"),
+        ("link_voltage_control", 1.0, 820070, "limited_link"),
+    ],
+)
+def test_a_law_that_the_textbook_has_not_is_told_by_its_family(hidden, size, seed, member):
+    textbook = get("effect", member).family
+    made = found(hidden, size, seed, (textbook,))
+    assert made.verdict.word == "named"
+    (form,) = forms(made)
+    assert (form.name, form.effect.name) == (textbook, member)
+    assert made.validate.closed > 0.9
+
+
+@pytest.mark.parametrize(("seed", "least"), [(820081, 0.85), (820084, 0.97)])
+def test_a_bounded_flux_is_a_saturation_with_a_round_corner(seed, least):
+    """How well one held-out event is met by a curve drawn beyond the fitted ones is chance: 0.90 and 0.998 here."""
+    made = events("froelich_saturation", size=1.8, seed=seed, count=4, noise=LOUD)
+    told = investigate(base(), made[:3], made[3:], {}, {}, only=("magnetic_saturation",))
+    (form,) = forms(told)
+    assert form.effect.name == "saturation_curve"
+    assert told.bench.coordinates.value("saturation_rounding", told.extended.unit) > 0.1
+    assert told.validate.closed > least
+
+
+def test_members_of_other_families_that_come_near_are_tried_beside_a_name_that_suffices():
+    """A compensator may suffice where a saturation has another law: only families near it, and never its own."""
+    at = bench(base(), events(), ("magnetic_saturation", "static_var_compensator", "undervoltage_trip"))
+    refits = {
+        f.names: f
+        for f in (
+            fit(1000.0, 0),
+            fit(100.0, 4, "static_var_compensator"),
+            fit(500.0, 1, "magnetic_saturation"),
+            fit(680.0, 6, "undervoltage_trip"),
+        )
+    }
+    best = refits["static_var_compensator",]
+    assert {m.name for m in near(at, best, refits)} == {"saturation_curve"}  # 500 of 900, and 320 of 900
+    assert not near(at, fit(90.0, 5, "magnetic_saturation", "static_var_compensator"), refits)
+
+
+@pytest.mark.parametrize(("better", "named"), [(60.0, True), (99.0, False)])
+def test_a_name_that_suffices_gives_way_to_a_member_that_explains_more_and_leaves_nothing(monkeypatch, better, named):
+    """Where it does not, the member is held against it: both may explain what is there."""
+    at = bench(base(), events(), ("magnetic_saturation", "static_var_compensator"))
+    refits = {f.names: f for f in (fit(1000.0, 0), fit(100.0, 4, "static_var_compensator"))}
+    refits["magnetic_saturation",] = fit(400.0, 1, "magnetic_saturation")
+    told = SimpleNamespace(fit=refits["static_var_compensator",], noise=None, suffices=True)
+    member = fit(better, 4, "saturation_curve")
+    monkeypatch.setattr(families, "starts", lambda *_: [])
+    monkeypatch.setattr(families, "wide_refits", lambda *_: [member])
+    monkeypatch.setattr(families, "examined", lambda quiet, fit, *_: SimpleNamespace(fit=fit, suffices=True))
+    tests, held_against = against_members(SimpleNamespace(bench=at, quiet=None), told, refits, 0)
+    assert tests.fit is (member if named else told.fit)
+    assert held_against == [member]
+
+
+def test_where_neither_leaves_nothing_no_member_is_a_rival(monkeypatch):
+    at = bench(base(), events(), ("magnetic_saturation",))
+    refits = {f.names: f for f in (fit(1000.0, 0), fit(400.0, 1, "magnetic_saturation"))}
+    told = SimpleNamespace(fit=refits["magnetic_saturation",], noise=None, suffices=False)
+    monkeypatch.setattr(families, "starts", lambda *_: [])
+    monkeypatch.setattr(families, "wide_refits", lambda *_: [fit(60.0, 4, "saturation_curve")])
+    monkeypatch.setattr(families, "examined", lambda quiet, fit, *_: SimpleNamespace(fit=fit, suffices=False))
+    assert against_members(SimpleNamespace(bench=at, quiet=None), told, refits, 0) == (told, [])
+
+
+def test_the_chosen_set_comes_first_with_its_own_tests_though_another_fits_better(monkeypatch):
+    """Of two that fit alike the one that asks for no further effect is chosen, and its tests are not the other's."""
+    chosen, better, far = fit(104.0, 1, "chosen"), fit(100.0, 1, "better"), fit(300.0, 1, "far")
+    bare = fit(1000.0, 0)
+    rows = np.array([[0.0, 0.0], [2.0, 0.0], [14.0, 0.0]])
+    at = SimpleNamespace(
+        criteria=Criteria(), catalogue=SimpleNamespace(of_measurement=(), of_load=("chosen", "better", "far")),
+        coordinates=SimpleNamespace(parameters=lambda names: []), rows=lambda *_: rows,
+    )  # fmt: skip
+    monkeypatch.setattr(
+        survivors, "refit", lambda bench, noise, wanted: [bare] if wanted[0][0] == () else [better, chosen, far]
+    )
+    monkeypatch.setattr(survivors, "examined", lambda quiet, fit, *_, **__: SimpleNamespace(fit=fit, adequate=False))
+    last = SimpleNamespace(fit=chosen, noise=None, adequate=True)
+    explained = SimpleNamespace(
+        base=SimpleNamespace(bench=at, quiet=None), last=last, chosen=chosen, steps=[SimpleNamespace(fit=bare)],
+        refits={f.names: f for f in (bare, better, chosen, far)},
+    )  # fmt: skip
+    left = survivors.survivors(explained, 0)
+    assert [(r.fit.names, r.behind, r.tests.fit.names) for r in left.kept] == [
+        (("chosen",), 0.0, ("chosen",)),
+        (("better",), -4.0, ("better",)),
+    ]
+    assert [r.fit.names for r in left.adequate] == [("chosen",)]
+    assert [r.rejected for r in left.rivals] == [False, False, True]
+
+
+def test_a_saturation_with_a_knee_that_a_compensator_explains_as_well_is_tied_with_it():
+    """The compensator leaves nothing and fits a little better; a saturation by another law leaves nothing, either."""
+    made = events("knee_saturation", 0.46, 312360453, count=4, noise=LOUD)  # four times its detection limit
+    told = investigate(base(), made[:3], made[3:], {}, {}, only=("static_var_compensator", *CORE))
+    assert told.explanations.chosen.names == ("static_var_compensator",)
+    assert set(told.verdict.sets) == {("static_var_compensator",), ("saturation_curve",)}
+
+
+@pytest.mark.parametrize(
+    ("chosen", "rival", "kept"),
+    [
+        ((1.0, 0.9), (0.03, 0.95), ["chosen", "rival"]),  # too little for a name, enough for a rival
+        ((1.0, 0.9), (0.03, 0.7), ["chosen"]),  # it closes less than a true explanation does
+        ((1.0, 0.9), (0.001, 0.95), ["chosen"]),  # it leaves something
+        ((0.03, 0.9), (0.03, 0.95), []),  # no name
+    ],
+)
+def test_held_out_events_deny_a_rival_only_by_what_it_leaves(chosen, rival, kept):
+    at = SimpleNamespace(criteria=Criteria(), catalogue=SimpleNamespace(textbook=lambda names: names))
+    told = {("chosen",): chosen, ("rival",): rival}
+    judged = {
+        names: Judged(Gap(None, None, closed, 100.0, 100.0, 10.8, None), at, (), p)
+        for names, (p, closed) in told.items()
+    }
+    adequate = [SimpleNamespace(fit=fit(0.0, 1, *names)) for names in told]
+    surviving = SimpleNamespace(adequate=adequate, explanations=SimpleNamespace(base=SimpleNamespace(bench=at)))
+    made = HeldOut(surviving, None, (), None, {}, judged)
+    assert [r.fit.names[0] for r in made.kept] == kept
+
+
+@pytest.mark.parametrize(
+    ("names", "explained", "another"),
+    [
+        ((), 0.0, True),
+        (("a",), 0.1, True),
+        (("a", "b"), 0.79, False),
+        (("a", "b"), 0.81, True),
+        (("a", "b", "c"), 1.0, False),
+    ],
+)
+def test_a_third_effect_is_tried_where_two_explain_most(names, explained, another):
+    """Of 1,000 that exceed the noise of 600 samples."""
+    first = SimpleNamespace(fit=fit(1600.0, 0), bench=SimpleNamespace(samples=600))
+    last = SimpleNamespace(fit=fit(1600.0 - 1000 * explained, len(names), *names))
+    assert worth_another([first, last] if names else [first]) == another
+
+
+def test_a_larger_set_that_led_back_to_the_one_before_is_not_tried_again():
+    """Of the third, the names of the second are left: what follows would be the same search."""
+    first = SimpleNamespace(fit=fit(1600.0, 0), bench=SimpleNamespace(samples=600))
+    steps = [first, *(SimpleNamespace(fit=fit(deviance, 2, "a", "b")) for deviance in (700.0, 690.0))]
+    assert worth_another(steps[:2])
+    assert not worth_another(steps)
+
+
+def test_a_start_that_may_overtake_the_best_is_searched_on(monkeypatch):
+    """The best of them gains nothing; the other falls by 30 a turn, from 50 behind."""
+    at = SimpleNamespace(coordinates=None)
+    ways = {"still": [100.0] * 9, "falls": [150.0, 120.0, 90.0, 60.0, 60.0]}
+    turns = []
+
+    def descended(bench, noise, wanted, *_):
+        turns.append(len(wanted))
+        return [Refit(names, unit, ways[names[0]][len(turns) - 1], 0) for names, unit in wanted]
+
+    monkeypatch.setattr(fitting, "_descended", descended)
+    monkeypatch.setattr(fitting, "_begun", descended)
+    monkeypatch.setattr(fitting, "moved_across", lambda bench, noise, fit, faults: fit.unit)
+    ended = fitting._in_turns(at, None, [(("still",), np.zeros(1)), (("falls",), np.zeros(1))], None)
+    assert (ended[0].names, ended[0].deviance) == (("falls",), 60.0)
+    assert len(turns) == 1 + fitting.TURNS
+
+
+def test_a_second_stage_that_the_fitted_dips_do_not_show_is_found_in_all_events(monkeypatch):
+    """Among the members of every family: the fitted dips may have named another one's textbook effect."""
+    tried: list[str] = []
+
+    def noted(at, member, refits):
+        tried.extend([member.name] * (at.drive.events == 4))
+        return starts(at, member, refits)
+
+    monkeypatch.setattr(families, "starts", noted)
+    made = events("trip_in_two_stages", 1.5, 820023, count=4, noise=LOUD)
+    told = investigate(base(), made[:3], made[3:], {}, {}, only=(TRIPS[0], CORE[0]))
+    assert {"two_stage_trip", "saturation_curve"} <= set(tried)
+    assert told.explanations.chosen.names == ("undervoltage_trip",)  # which leaves nothing of the fitted ones
+    assert not told.held_out.judged["undervoltage_trip",].helps
+    assert told.names == ("two_stage_trip",)
+    assert told.fitted_to_both
+    at = told.bench.coordinates
+    shares = [at.value(f"stage_{k}_tripped", told.extended.unit) for k in (1, 2)]
+    assert shares == pytest.approx([0.075, 0.075], rel=0.05)
+
+
+def test_a_second_effect_that_the_fitted_dips_do_not_show_is_found_in_all_events():
+    """One of the two leaves nothing of the fitted dips; of all events it does, and only both do not."""
+    pair = ("negative_sequence_braking", "transformer_inrush")
+    made = events(pair, (0.048, 0.043), 652317836, count=4, noise=LOUD, negative=True)
+    told = investigate(base(), made[:3], made[3:], {}, {}, only=(*pair, "load_drift"))
+    assert told.explanations.chosen.names == pair[1:]
+    assert told.explanations.last.suffices
+    assert not told.held_out.judged[pair[1:]].helps
+    assert told.names == pair
+    assert told.verdict.sets == (pair,)
+    both, one, *_ = told.survivors.rivals
+    assert (both.fit.names, one.fit.names) == (pair, pair[1:])
+    assert 0 < both.lowered - one.lowered < 20  # on the fitted dips the second hardly shows
+    assert told.fitted_to_both
+    assert told.validate.closed > 0.9
+
+
+@pytest.mark.parametrize(("names", "deviance"), [(None, 0.0), ((), 0.0), (("denied",), 0.0), (("new",), np.inf)])
+def test_a_search_in_all_events_that_finds_nothing_new_changes_nothing(names, deviance):
+    """No explanation that leaves nothing, the base model itself, what was fitted to all events before; and none is
+    made where the base model cannot run before the held-out events."""
+    bases = SimpleNamespace(base=SimpleNamespace(valleys=()))
+    before = SimpleNamespace(survivors=SimpleNamespace(explanations=bases), judged={("denied",): None})
+    adequate = [] if names is None else [SimpleNamespace(fit=Refit(names, np.zeros(1), 0.0, 0))]
+    found = SimpleNamespace(adequate=adequate, explanations=SimpleNamespace(chosen=SimpleNamespace(names=names)))
+    plain = SimpleNamespace(deviance=deviance)
+    both = SimpleNamespace(fitted=SimpleNamespace(waves=False), plain=plain, searched=lambda valleys, seed: found)
+    assert searched_again(before, both, 0) is before
+
+
+def test_members_belong_to_the_effects_that_are_asked_for():
+    made = events(count=1)
+    names = lambda only: {m.name for m in catalogue(base().motor, base().static, (), made, only).members}  # noqa: E731
+    assert names(("magnetic_saturation",)) == {"saturation_curve"}
+    assert names(("stator_resistance",)) == set()
+    assert names(()) == set(MEMBERS)
+
+
+def test_a_member_is_no_candidate_of_the_first_search():
+    missing = catalogue(base().motor, base().static, (), events(count=1))
+    assert not {c.name for c in missing.candidates} & set(MEMBERS)
+    assert missing.textbook(("saturation_curve", "load_drift")) == ("magnetic_saturation", "load_drift")
+
+
+def test_a_member_that_nests_the_textbook_starts_from_its_fit():
+    """There it calculates what the textbook does, so that it can only fit better."""
+    at = bench(base(), events(), CORE)
+    unit = at.coordinates.null.copy()
+    unit[at.coordinates.column["saturation"]] = at.coordinates.to_unit("saturation", 0.5)
+    refits = {(): Refit((), at.coordinates.null, 0.0, 0), ("magnetic_saturation",): Refit(CORE[:1], unit, 0.0, 1)}
+    member = at.catalogue["saturation_curve"]
+    begun = [point for _, point in starts(at, member, refits)]
+    assert len(begun) == len(open_settings(member, ("curve_saturation",)))
+    textbook = at.residuals(unit[None], CORE[:1])[0]
+    apart = [np.abs(at.residuals(point[None], (member.name,))[0] - textbook).max() for point in begun]
+    assert min(apart) < 1e-12
+    assert max(apart) > 1e-4
+
+
+def two_stages(share):
+    """A bench with the trip in two stages, and the textbook's fit of such a share."""
+    at = bench(base(), events(), TRIPS[:1])
+    unit = at.coordinates.placed(at.coordinates.null, {"tripped_share": share, "trip_level": 0.8})
+    return at, {(): Refit((), at.coordinates.null, 0.0, 0), TRIPS[:1]: Refit(TRIPS[:1], unit, 0.0, 6)}
+
+
+def test_two_stages_begin_with_the_whole_of_one_or_with_halves():
+    at, refits = two_stages(0.2)
+    begun = [unit for _, unit in starts(at, at.catalogue["two_stage_trip"], refits)]
+    shares = {tuple(round(at.coordinates.value(f"stage_{k}_tripped", u), 6) for k in (1, 2)) for u in begun}
+    assert shares == {(0.2, 0.02), (0.1, 0.1)}
+
+
+def test_what_is_scattered_moves_all_times_and_no_size():
+    at, refits = two_stages(0.2)
+    ((names, unit), *_) = starts(at, at.catalogue["two_stage_trip"], refits)
+    points = np.array([point for _, point in scattered(at, Refit(names, unit, 0.0, 11))])
+    moved = np.abs(points - unit)
+    settings = at.coordinates.settings(names)
+    still = np.setdiff1d(np.arange(len(unit)), settings)
+    assert (moved[:, still] == 0).all()
+    assert (points >= 0).all()
+    assert (points <= 1).all()
+    assert len(settings) == 9
+    assert np.median((moved[:, settings] > 0).mean(axis=1)) == 1.0
+    assert ((moved[:, settings] > 0.001) & (moved[:, settings] < 0.02)).any(axis=0).all()
+    assert (moved[:, settings] > 0.1).any(axis=0).all()
+    assert len(np.unique(points.round(9), axis=0)) == len(points)
+
+
+def test_a_place_or_a_kind_that_there_is_not_is_refused_with_the_nearest():
+    about = {"__doc__": "a = b. Source: here.", "__module__": "elsewhere.stranger", "__annotations__": {}}
+    for told, sentence in (({"places": ("statc P",)}, "did you mean 'static P'"), ({"kind": "lags"}, "mean 'lag'")):
+        size = {"a": Parameter(0.0, (0.0, 1.0), "1", "size", "here", null=0.0)}
+        made = type("Stranger", (Effect,), about | size | {"edit": lambda self, eq, a: None} | told)
+        with pytest.raises(UserError, match=sentence):
+            plugin(made)
+
+
+@pytest.mark.parametrize(("rounding", "least", "most"), [((0.01, 0.6), 0.0, 0.001), ((0.03, 0.0301), 0.005, 0.01)])
+def test_a_well_rounded_corner_follows_a_bounded_flux(rounding, least, most):
+    """Froelich's psi = a i / (b + i) with 0.7 of a before the dip; a sharp corner is ten times as far from it."""
+    names = ("curve_saturation", "saturation_bend", "saturation_corner", "saturation_rounding")
+    effect = get("effect", "saturation_curve")()
+
+    def off(values):
+        law = effect.curve(flux_depth=1.0, **dict(zip(names, values, strict=True)))
+        return law.y - ((1 - 0.7) / (1 - 0.7 * np.sqrt(1 - law.x)) - 1)
+
+    bounds = np.array([*({p.name: p.bounds for p in effect.parameters}[n] for n in names[:3]), rounding]).T
+    found = least_squares(off, [1.0, -1.0, 0.2, np.mean(rounding)], bounds=bounds)
+    assert least < np.abs(found.fun).max() < most
+
+
+@pytest.mark.parametrize("name", [n for n in MEMBERS if get("effect", n)().curve(**{
+    p.name: p.default for p in get("effect", n)().parameters}) is not None])  # fmt: skip
+def test_every_curve_is_monotone_whatever_its_bends(name):
+    effect, rng = get("effect", name)(), np.random.default_rng(1)
+    for _ in range(20):
+        law = effect.curve(**{p.name: rng.uniform(*p.bounds) for p in effect.parameters})
+        slopes = np.diff(law.y)
+        assert (slopes <= 1e-9).all() or (slopes >= -1e-9).all()

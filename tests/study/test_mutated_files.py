@@ -1,0 +1,51 @@
+"""Damaged files of every format: a reading, or one sentence (a short run of `benchmarks/mutated_files.py`)."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mutated_files import LEAKS, damaged, originals, outcome
+
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory):
+    return originals(tmp_path_factory.mktemp("sound"))
+
+
+def test_every_sound_file_is_read(sound):
+    read = {name: outcome(paths[0]) for name, paths in sound.items()}
+    assert {name: words for name, (kind, words, _) in read.items() if kind != "read"} == {}
+    powers = [figures for _, _, figures in read.values()]
+    assert min(f[0] for f in powers) == 1
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_damaged_file_is_read_or_refused_with_a_sentence(sound, tmp_path, seed):
+    rng = np.random.default_rng(seed)
+    for k in range(150):
+        name = list(sound)[k % len(sound)]
+        path, done = damaged(sound[name], tmp_path, rng)
+        kind, words, _ = outcome(path)
+        assert kind in ("read", "refused"), f"{name}, {done}: {words}"
+        assert words.strip() or kind == "read"
+
+
+@pytest.mark.parametrize("words", ["invalid literal for int() with base 10: '7A'", "month must be in 1..12"])
+def test_words_of_python_are_found(words):
+    assert LEAKS.search(words)
+
+
+def test_the_page_tells_what_the_stored_run_of_ten_thousand_gave():
+    stored = json.loads((BENCHMARKS / "mutated_files.json").read_text(encoding="utf-8"))
+    told = {key: sum(c.get(key, 0) for c in stored["counts"].values()) for key in next(iter(stored["counts"].values()))}
+    page = " ".join((BENCHMARKS.parent / "docs" / "records.md").read_text(encoding="utf-8").split())
+    assert stored["files"] == sum(told.values()) == 10_000
+    assert stored["bad"] == []
+    assert (
+        f"{told['refused']:,} were refused with a sentence, {told['read as undamaged']:,} read as if undamaged and "
+        f"{told['read as it now stands']:,} as they then stood"
+    ) in page
+    assert f"the slowest took {stored['worst']['seconds']:.1f} s" in page

@@ -1,0 +1,25 @@
+"""The documentation holds together: links lead somewhere, every plugin that a person chooses is described."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tractexp.plugin import discover
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_every_link_leads_somewhere(page):
+    for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+        if "://" not in target and not target.startswith("generated/"):  # those the site makes and checks
+            assert (page.parent / target).exists(), target
+
+
+def test_every_optimizer_effect_and_part_is_described():
+    text = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
+    for group in ("optimizer", "effect", "model/motor", "model/static", "format", "data"):
+        for name in discover().get(group, {}):
+            assert f"`{name}`" in text or f"{group}={name}" in text, f"{group} {name}"

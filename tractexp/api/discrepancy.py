@@ -1,0 +1,417 @@
+"""Find where simulation and measurement disagree, name the missing effect, add it, show the gap shrink.
+
+The investigation itself is `tractexp.discrepancy`; everything this file asks of it stands in `_steps`, `_estimated`
+and `Investigation.write_results`.
+"""
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from tractexp import files
+from tractexp.api.arguments import public
+from tractexp.api.compose import LoadModel, model_of
+from tractexp.api.identify import Identification
+from tractexp.api.read import dips_together
+from tractexp.api.response import Response
+from tractexp.api.setup import Given, recorded
+from tractexp.api.task import Job, Task
+from tractexp.blocks import Report, Table
+from tractexp.blocks.terminal import show
+from tractexp.errors import UserError, check_range
+from tractexp.identification.result import Result
+from tractexp.outcome import Written
+from tractexp.plugin import plugin
+from tractexp.progress import Progress, console, say, telling
+from tractexp.wording import joined, with_error
+
+if TYPE_CHECKING:
+    from tractexp.discrepancy.criteria import Criteria
+    from tractexp.discrepancy.investigate import Investigation as Steps
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Question(Given):
+    """What an investigation was asked."""
+
+    effects: Sequence[str]  # none: the whole catalogue
+    false_alarms: float
+    criteria: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """How far a model is from some events: relative errors of Eq. (20), and chi-squared per sample.
+
+    `epsilon_i` is that of the currents, where those are compared.
+    """
+
+    epsilon_p: float
+    epsilon_q: float
+    chi2_per_sample: float
+    epsilon_i: float | None = None
+
+
+@dataclass(frozen=True)
+class Gap:
+    """The misfit of the base model and of the extended one; `closed` is the explainable share that went, or None."""
+
+    before: Misfit
+    after: Misfit
+    closed: float | None
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """On the fitted and on the held-out events, None without any."""
+
+    train: Gap
+    validate: Gap | None
+    fitted_to_both: bool
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Investigation(Written):
+    """What is missing in a model, how sure that is, and the model with it. `content` is that of `discrepancy.json`."""
+
+    kind = "investigation"
+    page = "discrepancy.html"
+
+    question: Question
+    content: Mapping[str, Any]
+    result: Result  # the extended model's parameters, as `result.json` holds them
+    behind: "Steps | None" = None  # None where it was loaded
+
+    @property
+    def verdict(self) -> str:
+        """`none`, `named`, `tied` or `unexplained`."""
+        return self.content["verdict"]
+
+    @property
+    def reason(self) -> str:
+        """Why, in one sentence."""
+        return self.content["reason"]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The effects added to the model, by the catalogue's names; `forms` says at which place and by which law."""
+        return tuple(self.content["effects"])
+
+    @property
+    def forms(self) -> Mapping[str, Mapping[str, Any]]:
+        """{name: {place, kind, law, differs, effect, curve}} of each effect added, as `discrepancy.json` holds it."""
+        return self.content["forms"]
+
+    @property
+    def members(self) -> tuple[str, ...]:
+        """The effects added as `model.effects` takes them: of another law or place, the family's member."""
+        return tuple(form["effect"] for form in self.forms.values())
+
+    @property
+    def recommendation(self) -> str:
+        """What to do next."""
+        return self.content["recommendation"]
+
+    @property
+    def where(self) -> Table:
+        """The intervals in which the base model disagrees with the records, the loudest first."""
+        places = self.content["where"]
+        return Table([*places[0]] if places else [], [[*place.values()] for place in places], "where they disagree")
+
+    @property
+    def candidates(self) -> Table:
+        """Every set of effects that was fitted and every single one that was tested, with what became of it."""
+        rows = [[" and ".join(c["effects"]), c["status"], c["likelihood_ratio"]] for c in self.content["candidates"]]
+        return Table(["effects", "status", "deviance lowered by"], rows, "candidates")
+
+    @property
+    def remainder(self) -> Table:
+        """Where nothing explains the disagreement: the shapes in what the base model leaves, the loudest first."""
+        told = self.content["remainder"]
+        shapes = told["of_base"] if told else []
+        columns = [*shapes[0]] if shapes else []
+        rows = [[shape[key] for key in columns] for shape in shapes]
+        return Table(columns, rows, "what is left", told["sentence"] if told else "")
+
+    @property
+    def proposal(self) -> Mapping[str, Any] | None:
+        """The term proposed for an unexplained disagreement, as `discrepancy.json` has it; None where there is none."""
+        return self.content["proposal"]
+
+    @property
+    def proposed(self) -> list[str]:
+        """The proposal as sentences; why there is none where nothing explains."""
+        from tractexp.discrepancy.proposal.wording import proposed_in_words
+
+        return proposed_in_words(self.proposal, self.content["no_proposal"])
+
+    @property
+    def sizes(self) -> list[str]:
+        """How large the effects named are, with standard errors, as text: their parameters that have a null."""
+        return self._sizes(self.members, self.content["parameters"])
+
+    @property
+    def sizes_of_nearest(self) -> list[str]:
+        """The same of the candidates that come nearest where nothing explains the disagreement."""
+        near = self.content["nearest"]
+        return self._sizes(near["effects"], near["parameters"]) if near else []
+
+    @staticmethod
+    def _sizes(effects: Sequence[str], known: Mapping[str, Mapping[str, Any]]) -> list[str]:
+        from tractexp.plugin import get
+
+        own = [p for name in effects for p in get("effect", name)().parameters if p.null is not None]
+        return [_size(p.name, known[p.name], p.unit) for p in own]
+
+    @property
+    def sets(self) -> list[Mapping[str, Any]]:
+        """The sets of effects that were refitted: `effects`, `status`, `likelihood_ratio`, `parameters`."""
+        return [row for row in self.content["candidates"] if "why" not in row]  # single tests say why
+
+    @property
+    def gap(self) -> Gaps:
+        """How far off the model is before and after."""
+
+        def gap(told: Mapping[str, Any]) -> Gap:
+            return Gap(Misfit(**told["before"]), Misfit(**told["after"]), told["closed"])
+
+        told = self.content["gap"]
+        held = told["validate"] and gap(told["validate"])
+        return Gaps(gap(told["train"]), held, told["fitted_to_both"])
+
+    @functools.cached_property
+    def extended(self) -> LoadModel:
+        """The model with the effects named: a model again, for any call. Raises `UserError` where none was named."""
+        model = self.question.model
+        if not self.names:
+            raise UserError(
+                f"there is no extended model: the verdict is '{self.verdict}', and nothing was added; go on with the"
+                " base model (.question.model), or give records that show more"
+            )
+        return model.with_(effects=sorted({*model.effects, *self.members}), fixed=self.content["held"])
+
+    @functools.cached_property
+    def fit(self) -> Identification:
+        """The extended model with the parameters that the investigation found; it predicts, simulates and exports.
+
+        The base model where no effect was named.
+        """
+        errors = {name: at["standard_error"] for name, at in self.content["parameters"].items()}
+        return Identification(replace(self.result, standard_errors=errors))
+
+    def predict(self, event: Any = None, **voltage: Any) -> Response:
+        """What the model of `fit` draws in an event, or from a voltage: see `Identification.predict`."""
+        return self.fit.predict(event, **voltage)
+
+    @functools.cached_property
+    def steps(self) -> "Steps":
+        """The chain of results, from the records to the verdict; of a loaded result it is investigated again."""
+        return self.behind or _steps(self.question, False)
+
+    def table(self) -> Table:
+        """How far off the models are, on the fitted and on the held-out events."""
+        from tractexp.report import discrepancy
+
+        return discrepancy.gap(self)
+
+    def summary(self) -> Report:
+        from tractexp.report import discrepancy
+
+        return discrepancy.summary(self)
+
+    def report(self) -> Report:
+        from tractexp.report import discrepancy
+
+        return discrepancy.report(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        return {"question": self.question.to_dict(), "content": dict(self.content), "result": asdict(self.result)}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        return cls(Question.from_dict(content["question"]), content["content"], Result(**content["result"]))
+
+    def write_results(self, folder: Path) -> list[Path]:
+        """discrepancy.json and result.json.
+
+        conf/model/extended.yaml where an effect was named, unexplained.csv where nothing explains, and the plugin of
+        a term where one is proposed.
+        """
+        from tractexp.discrepancy import discrepancy_json
+
+        base = {**self.question.model.node, "bounds": self.question.model.bounds, "fixed": self.question.model.fixed}
+        paths = [
+            files.write_json(folder / "discrepancy.json", self.content),
+            self.result.write(folder / "result.json"),
+        ]
+        if self.names:
+            paths.append(discrepancy_json.write_model(self.steps, base, folder / "conf" / "model" / "extended.yaml"))
+        if self.verdict == "unexplained":
+            paths.append(discrepancy_json.write_left(self.steps, folder / "unexplained.csv"))
+        if self.content["proposal"]:
+            paths.append(discrepancy_json.write_plugin(self.steps, folder / self.content["proposal"]["plugin"]))
+        return paths
+
+
+def _size(name: str, at: Mapping[str, Any], unit: str) -> str:
+    """A parameter of an effect as one line."""
+    error = float("nan") if at["standard_error"] is None else at["standard_error"]
+    return f"{name} = {with_error(at['value'], error)}{'' if unit == '1' else f' {unit}'}"
+
+
+@public
+def investigate(
+    records: Any,
+    model: Any = None,
+    *,
+    validate: Any = (),
+    effects: Sequence[str] = (),
+    false_alarms: float = 0.05,
+    criteria: Mapping[str, float] | None = None,
+    bounds: Mapping[str, Sequence[float]] | None = None,
+    fixed: Mapping[str, float] | None = None,
+    substeps: int | None = None,
+    domain: str | None = None,
+    seed: int = 0,
+    progress: Any = None,
+) -> Investigation:
+    """Find what a load model lacks: where it disagrees with the records, which effect explains that, and how sure.
+
+    `records` are events of `tractexp.read`, or what it reads; all are fitted together. What is found is judged on those
+    of `validate`. `model` is the base model, as in `tractexp.identify`, with `bounds`, `fixed`, `substeps` and
+    `domain`: with "waves" the sampled currents are investigated. Only `effects` are tested, by default all there are.
+    `false_alarms` (0.001 to 0.5) is the probability of naming anything where nothing is missing; `criteria`
+    {name: value} are the other thresholds of the decisions, listed in `tractexp.discrepancy.criteria`. The same `seed`
+    gives the same bits. `progress`: None shows the stage, False does not; a callable is told each stage.
+
+    Nothing is searched, so that there is no objective, optimizer or budget. Raises `UserError` for wrong names or
+    values, for events that do not belong together, and for a model with `per_event`: the events share its parameters.
+    """
+    check_range("seed", seed, 0)
+    chosen = {"false_alarms": false_alarms, **(criteria or {})}
+    _criteria(chosen)
+    base = model_of(model, domain).with_(bounds=bounds, fixed=fixed, substeps=substeps)
+    if base.per_event:
+        raise UserError(f"model.per_event={list(base.per_event)} has no meaning in an investigation; leave it out")
+    train, held = dips_together(records, validate)
+    question = Question(
+        train=train, validate=held, model=base, seed=seed, effects=tuple(effects),
+        false_alarms=chosen["false_alarms"], criteria=dict(criteria or {}),
+    )  # fmt: skip
+    return _concluded(question, _steps(question, progress))
+
+
+def _steps(question: Question, progress: Progress) -> "Steps":
+    """The investigation."""
+    from tractexp.discrepancy.investigate import investigate as found
+
+    q, base = question, question.model
+    with telling(progress) as tell:
+        return found(
+            base.model, q.train, q.validate, base.bounds, base.fixed, only=q.effects, substeps=base.substeps,
+            criteria=_criteria({"false_alarms": q.false_alarms, **q.criteria}), seed=q.seed, tell=tell,
+        )  # fmt: skip
+
+
+def _criteria(chosen: Mapping[str, float]) -> "Criteria":
+    """The thresholds. Raises `UserError`, as the command line names them, for an unknown one or one out of range."""
+    from tractexp.discrepancy.criteria import Criteria
+
+    try:
+        return Criteria.of(chosen)
+    except UserError as error:
+        whole = str(error).replace("criteria.false_alarms", "task.false_alarms")
+        raise UserError(whole if whole.startswith("task.") else f"task.{whole}") from None
+
+
+def _concluded(question: Question, steps: "Steps") -> Investigation:
+    from tractexp.discrepancy.discrepancy_json import content
+
+    return Investigation(question, files.plain(content(steps)), _estimated(question, steps), steps)
+
+
+def _estimated(question: Question, steps: "Steps") -> Result:
+    """The extended model's parameters as a result, which predicts and is logged as a model."""
+    from tractexp.discrepancy.recommended import adequacy
+    from tractexp.identification.problem import Problem
+    from tractexp.identification.result import conclude
+    from tractexp.identification.search import Found, History
+
+    base, bench, unit = question.model, steps.bench, steps.extended.unit
+    model = base.with_(effects=sorted({*base.effects, *steps.names}))
+    problem = Problem(model.model, question.train, base.bounds, base.fixed, int(bench.problem.step.substeps.max()))
+    values = np.array([bench.coordinates.value(name, unit) for name in problem.space.names])
+    objective = float(problem.objective(values[None])[0])
+    history = History(np.array([bench.effort.simulations]), np.array([objective]), values[None], np.zeros(1))
+    status = f"ended with the verdict {steps.verdict.word}"
+    found = Found(values, objective, bench.effort.simulations, 0, 0, 0.0, status, history)
+    result, _ = conclude(problem, found, question.validate, question.seed, model.node, "descent")
+    return replace(result, adequacy=adequacy(steps).told())
+
+
+@plugin
+class Discrepancy(Task, call=investigate):
+    """Investigate the training events and judge what is found on the held-out ones."""
+
+    resumes = True
+    instead = {"model.per_event": "its parameters are shared by all events, so leave it out"}
+
+    def perform(self, job: Job, **instead: Any) -> Investigation:
+        events = job.events_of_fit
+        for line in recorded(events.train, events.validate, "hold out"):
+            say(line)
+        job.prepare_log()
+        return super().perform(
+            job, records=events.train, validate=events.validate, progress=lambda line: say(f"  {line}"), **instead
+        )
+
+    def conclude(self, job: Job, result: Written) -> None:
+        """The page's path and the command that uses the extended model end what is printed."""
+        from tractexp.discrepancy.discrepancy_json import use_of
+
+        assert isinstance(result, Investigation)
+        paths = {path.name: path for path in (*result.write_results(job.folder), *result.write_drawings(job.folder))}
+        say()
+        show(result.summary(), console())
+        if page := paths.get(result.page):
+            say(f"page: {page}")
+        say(f"beside it: {', '.join(sorted(paths.keys() - {result.page}))}")
+        conf = job.folder / "conf"
+        if model := paths.get("extended.yaml"):
+            which = f", which has {joined(result.names)}" * (result.verdict == "tied")
+            say(f"use the extended model{which}: {use_of(result.question.model.domain, str(conf))}")
+        artifacts = [*(p for p in paths.values() if conf not in p.parents), *([conf] if model else [])]
+        content = {"values": {}, "artifacts": [*artifacts, job.folder / ".hydra"]}
+        job.log(**content | self.logged(job, result))
+
+    def logged(self, job: Job, result: Investigation) -> dict[str, Any]:
+        """Verdict, gap and page, and below this run one for every set of effects that was refitted."""
+        from tractexp import tracking
+
+        metrics = {}
+        for role in ("train", "validate"):
+            if (gap := getattr(result.gap, role)) is None:
+                continue
+            for stage in ("before", "after"):
+                off = {key: value for key, value in vars(getattr(gap, stage)).items() if value is not None}
+                metrics |= {f"{role}_{stage}_{key}": value for key, value in off.items()}
+            if gap.closed is not None:
+                metrics[f"{role}_gap_closed"] = gap.closed
+        children = [
+            tracking.Run(
+                experiment=job.experiment,
+                name=" and ".join(row["effects"]),
+                metrics={"deviance_lowered_by": row["likelihood_ratio"] or 0.0}
+                | {name: at["value"] for name, at in row["parameters"].items()},
+                tags={"candidate": row["status"], "task": "discrepancy"},
+            )
+            for row in result.sets
+        ]
+        return {
+            "name": f"{result.verdict} {' '.join(result.names)}".strip(), "metrics": metrics, "children": children,
+            "description": result.reason, "model": job.folder / "result.json",
+        }  # fmt: skip

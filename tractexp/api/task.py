@@ -1,0 +1,321 @@
+"""What a task is: a public call by its command; and what it is given: the configuration as records and a model."""
+
+import dataclasses
+import functools
+import inspect
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import UnionType
+from typing import Any, ClassVar, NamedTuple, TypeVar, Union, get_args, get_origin
+
+from tractexp import provenance
+from tractexp.blocks.terminal import show
+from tractexp.errors import UserError
+from tractexp.outcome import Written
+from tractexp.plugin import Plugin, build
+from tractexp.progress import console, say
+
+SEARCH = ("objective", "optimizer", "budget", "time_limit", "target")  # the settings of a search
+# The equations of a model, without what is known of its parameters
+LOAD = ("model.motor", "model.static", "model.effects", "model.integration")
+OF_MODEL = ("bounds", "fixed", "per_event", "substeps", "domain")  # arguments that the model's configuration holds
+ALWAYS = ("task", "experiment", "seed", "tracking", "hydra")  # open to every task
+NAMED = ("optimizer", "data")  # choices that a run is named after anyway
+OMITTED: Any = object()  # of an argument: its default stands
+R = TypeVar("R")
+
+
+def call(function: Callable[..., R], *arguments: Any, **keywords: Any) -> R:
+    """A public call past the door for people, whose sentences name arguments: here they name keys."""
+    return inspect.unwrap(function)(*arguments, **keywords)
+
+
+class Source(NamedTuple):
+    """Where a call's argument comes from on the command line: the parts of the configuration, and its value."""
+
+    reads: tuple[str, ...]
+    value: Callable[["Job"], Any]
+
+
+SOURCES = {
+    "records": Source(("data",), lambda job: job.events.train),
+    "validate": Source(("data",), lambda job: job.events.validate),
+    "model": Source(LOAD, lambda job: job.config["model"]),
+    "optimizer": Source(("optimizer",), lambda job: job.chosen),
+    "seed": Source((), lambda job: job.seed),
+    "fit": Source(("data", "model", *SEARCH), lambda job: job.identified()),
+    "check_intervals": Source((), lambda job: not job.in_sweep),  # of many jobs nobody reads each profile
+    "progress": Source((), lambda job: job.tell),
+} | {
+    key: Source((key,), lambda job, key=key: job.config[key]) for key in ("objective", "budget", "time_limit", "target")
+}
+
+
+class Task(Plugin):
+    """Base of the tasks, chosen by `task=NAME`. A task is a public call by its command.
+
+    Its settings are the arguments of `call` that the configuration does not hold elsewhere, with their defaults, and
+    what it declares itself; what it `reads` follows from the others.
+    """
+
+    group: ClassVar[str] = "task"
+    sourced: ClassVar[bool] = False
+    resumes: ClassVar[bool] = False  # whether the same command goes on where it was stopped
+    reads: ClassVar[tuple[str, ...]] = ("data", "model", *SEARCH)  # what is chosen beside these is refused
+    instead: ClassVar[Mapping[str, str]] = {}  # {setting it does not read: what to do, as the refusal's last words}
+    function: ClassVar[Callable[..., Any] | None] = None
+
+    def __init_subclass__(
+        cls, call: Callable[..., Any] | None = None, given: Sequence[str] = (), **settings: Any
+    ) -> None:
+        """`given` are arguments that the task itself gives to its call."""
+        super().__init_subclass__(**settings)
+        if call is None:
+            return
+        cls.function = staticmethod(call)
+        arguments = inspect.signature(call).parameters
+        sources = [name for name in arguments if name in SOURCES and name not in given]
+        of_model = [f"model.{name}" for name in OF_MODEL if name in arguments and "model" in arguments]
+        if "reads" not in vars(cls):
+            cls.reads = tuple(dict.fromkeys([*(part for name in sources for part in SOURCES[name].reads), *of_model]))
+        own, cls.__annotations__ = vars(cls).get("__annotations__", {}), {}
+        for parameter in arguments.values():
+            if parameter.name not in (*SOURCES, *OF_MODEL, *given, *own):
+                cls.__annotations__[parameter.name], default = setting_of(parameter)
+                setattr(cls, parameter.name, default)
+        cls.__annotations__ |= own
+
+    def needless(self) -> tuple[str, ...]:
+        """The parts of `reads` that are not read with the settings it has."""
+        return ()
+
+    def perform(self, job: "Job", **instead: Any) -> Any:
+        """Call with the job's configuration and the task's settings; `instead` replaces arguments."""
+        assert self.function is not None
+        arguments = dict.fromkeys(inspect.signature(self.function).parameters, OMITTED)
+        for name in arguments:
+            if name in instead:
+                arguments[name] = instead[name]
+            elif name in SOURCES:
+                arguments[name] = SOURCES[name].value(job)
+            elif hasattr(self, name):
+                arguments[name] = getattr(self, name)
+        return call(self.function, **{name: value for name, value in arguments.items() if value is not OMITTED})
+
+    def draws(self, job: "Job") -> bool:
+        """Whether pages and figures are made."""
+        return True
+
+    def run(self, job: "Job") -> None:
+        """Do the task. Raises `UserError` before anything is logged where the input is wrong."""
+        self.conclude(job, self.perform(job))
+
+    def conclude(self, job: "Job", result: Written) -> None:
+        """Write a result, show it, draw it, log it."""
+        paths = result.write_results(job.folder)
+        say()
+        show(result.summary(), console())
+        say()
+        if self.draws(job):
+            paths += result.write_drawings(job.folder)
+        listed(paths)
+        self.log(job, result, paths)
+
+    def log(self, job: "Job", result: Any, paths: list[Path]) -> None:
+        """Log a result with what was written."""
+        content = {"name": self.name, "values": {}, "artifacts": [*paths, job.folder / ".hydra"]}
+        job.log(**content | self.logged(job, result))
+
+    def logged(self, job: "Job", result: Any) -> dict[str, Any]:
+        """What is logged of a result: fields of `tractexp.tracking.Run`, and `values` of parameters."""
+        return {}
+
+
+def setting_of(parameter: inspect.Parameter) -> tuple[Any, Any]:
+    """Type and default of the setting that stands for an argument: of mappings and lists, plain and empty ones."""
+    kind, default = parameter.annotation, parameter.default
+    kinds = get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
+    for one in kinds:
+        origin, inner = get_origin(one), get_args(one)
+        if origin is not None and issubclass(origin, Mapping):
+            return dict[inner[0], _plain(inner[1])], field(default_factory=dict)
+        if origin is not None and issubclass(origin, Sequence) and str not in kinds:
+            return list[inner[0]], field(default_factory=list)
+    if isinstance(default, tuple):
+        return Any, field(default_factory=list)
+    return kind, dataclasses.MISSING if default is parameter.empty else default
+
+
+def _plain(kind: Any) -> Any:
+    """A list for a sequence, as the configuration's schema knows it."""
+    return list[get_args(kind)[0]] if get_origin(kind) is not None else kind
+
+
+def listed(paths: Iterable[Path]) -> None:
+    """Print what was written."""
+    for path in paths:
+        say(f"  {path}")
+
+
+def variant(optimizer: str, chosen: Mapping[str, str]) -> str:
+    """What an optimizer is called with the settings that were chosen beside it, whatever the seed: "issa levy=false".
+
+    Files go without their folders.
+    """
+    beside = {key: value for key, value in chosen.items() if key.partition(".")[0] not in ALWAYS}
+    parts = [f"{key.removeprefix('optimizer.')}={value}" for key, value in sorted(beside.items()) if key not in NAMED]
+    return " ".join([optimizer, *(re.sub(r"[^\s,\[=']*/", "", part) for part in parts)])
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run: its configuration as plain data, and the folder it writes to."""
+
+    config: Mapping[str, Any]
+    choices: Mapping[str, str]  # what was chosen in each group: {"optimizer": "issa_no_levy", ...}
+    folder: Path
+    sweep: str | None = None  # run id of the sweep this job belongs to, where that is logged
+    in_sweep: bool = False  # one of many: what only a person looks at may be left out
+    given: Mapping[str, str] = field(
+        default_factory=dict
+    )  # what the user chose, {"optimizer": "pso"}: not the defaults
+
+    @functools.cached_property
+    def events(self) -> Any:
+        """The recorded events, read and with their dips found (`Events` of `Event`)."""
+        from tractexp.record import Events, detect
+
+        records = build("data", self.config["data"]).read()
+        return Events([detect(r) for r in records.train], [detect(r) for r in records.validate])
+
+    @functools.cached_property
+    def events_of_fit(self) -> Any:
+        """The events as a fit takes them: on the base of the load in the first (`Events` of `Event`)."""
+        from tractexp.record import Events, on_own_base
+
+        train, validate = self.events.train, self.events.validate
+        moved = on_own_base([*train, *validate])
+        return Events(moved[: len(train)], moved[len(train) :])
+
+    def holding_out(self, siblings: Mapping[str, list[str]]) -> "Job":
+        """The job with those files held out that belong to its choice of data, where it names none itself."""
+        data: Mapping[str, Any] = self.config["data"]
+        if self.choices["data"] not in siblings or data.get("validate"):
+            return self
+        held = [path for path in siblings[self.choices["data"]] if path not in data["train"]]
+        return replace(self, config={**self.config, "data": {**data, "validate": held}})
+
+    @functools.cached_property
+    def optimizer(self) -> Any:
+        return build("optimizer", self.config["optimizer"])
+
+    @property
+    def chosen(self) -> Any:
+        """The optimizer and what it is called (a `Choice`)."""
+        from tractexp.api.arguments import Choice
+
+        return Choice(self.choices["optimizer"], self.config["optimizer"])
+
+    @functools.cached_property
+    def problem(self) -> Any:
+        """The identification problem (a `Problem`)."""
+        from tractexp.api.setup import Setup
+
+        return Setup.of(self.events.train, self.config["model"], (), self.config["objective"], {}).problem
+
+    def tell(self, line: str) -> None:
+        """Print a line of a call's progress. The first comes once the input is found right: then MLflow gets ready."""
+        self.prepare_log()
+        say(line)
+
+    def identified(self, **instead: Any) -> Any:
+        """The identification that model, objective, optimizer and limits describe (an `Identification`)."""
+        return build("task", {"name": "identify"}).perform(self, **instead)
+
+    @property
+    def seed(self) -> int:
+        return int(self.config["seed"])
+
+    @property
+    def variant(self) -> str:
+        """The optimizer and what else was chosen: runs of one variant differ in their seeds alone."""
+        return variant(self.choices["optimizer"], self.given)
+
+    @property
+    def experiment(self) -> str:
+        """The MLflow experiment: named by the configuration, or after task and data."""
+        return self.config["tracking"]["experiment"] or f"{self.choices['task']} {self.choices['data']}"
+
+    @property
+    def store(self) -> str:
+        """The address of the MLflow store."""
+        from tractexp import tracking
+
+        return tracking.address(self.config["tracking"]["uri"])
+
+    @functools.cached_property
+    def _logger(self) -> Any:
+        from tractexp.tracking.process import logger
+
+        return logger(self.store)
+
+    def prepare_log(self) -> None:
+        """Get MLflow ready beside the computation, in a process of its own; call it once the input is found right.
+
+        A job of a sweep leaves it: its worker has MLflow at hand, and the cores are busy.
+        """
+        if self.config["tracking"]["enabled"] and not self.in_sweep:
+            _ = self._logger
+
+    def log(self, name: str, values: Mapping[str, float], **content: Any) -> None:
+        """Log this job in MLflow with its configuration and tags, and say how to look at it.
+
+        `values` are identified parameters; `content` are further fields of `tractexp.tracking.Run`.
+        """
+        node = self.config["tracking"]
+        if not node["enabled"]:
+            return
+        from tractexp import tracking
+
+        parts = {group: self.choices[group] for group in ("task", "model", "optimizer", "data")}
+        parts |= {"variant": self.variant, "seed": str(self.seed)}
+        run = tracking.Run(
+            experiment=self.experiment,
+            name=name,
+            parameters={**tracking.flatten(self.config), **values},
+            tags={**parts, "git_commit": provenance.commit()},
+            parent=self.sweep,
+            **content,
+        )
+        self.send(run)
+
+    @property
+    def look(self) -> str:
+        """The command that shows what was logged."""
+        uri = self.config["tracking"]["uri"]
+        return f"tractexp ui --uri {uri}" if uri else "tractexp ui"
+
+    def send(self, run: Any) -> None:
+        """Log a run (`tracking.Run`), and say how to look at it.
+
+        It is kept in the folder first. Where the store cannot be used, that is a sentence: the results are there.
+        """
+        from tractexp import tracking
+        from tractexp.tracking import swept
+        from tractexp.tracking.kept import keep
+
+        kept = None
+        try:
+            kept = keep(self.folder, run, self.store)
+            if self.in_sweep and swept.waits(self.folder.parent):
+                return
+            run_id = self._logger.log(kept.run) if "_logger" in self.__dict__ else tracking.log(kept.run, self.store)
+            kept.logged(run_id)
+        except UserError as error:
+            say(f"not logged: {error}")
+            later = "; 'tractexp sync' logs them when that is mended" if kept else ""
+            say(f"  the results are in {self.folder}{later}")
+            return
+        say(f"logged in experiment '{run.experiment}'; to see it: {self.look}")

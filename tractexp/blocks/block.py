@@ -1,0 +1,272 @@
+"""What a report is made of: blocks of a few kinds, which a terminal, a page, a notebook, Markdown and JSON show."""
+
+import dataclasses
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tractexp import files
+from tractexp.errors import UserError, check_choice
+
+if TYPE_CHECKING:
+    from tractexp.blocks.chart import Chart as Drawing
+
+KINDS = ("plain", "good", "bad")
+
+
+@dataclass(frozen=True)
+class Heading:
+    """The head of a section; level 2 is the highest below the title."""
+
+    text: str
+    level: int = 2
+
+
+@dataclass(frozen=True)
+class Paragraphs:
+    """Sentences, each a paragraph on a page and a line on a terminal."""
+
+    texts: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the reader should take away: "plain", "good" or "bad"."""
+
+    texts: Sequence[str]
+    kind: str = "plain"
+
+
+@dataclass(frozen=True)
+class Items:
+    """A list of sentences."""
+
+    texts: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Code:
+    """A line to be copied."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Equation:
+    """A displayed equation in LaTeX."""
+
+    latex: str
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows under columns: cells are numbers, texts or None.
+
+    `words` counts the columns that hold words, beside the first; `detail` those that a page shows and a terminal,
+    a notebook and a frame's reader at a glance do not need. `caption` stands below, `title` above.
+    """
+
+    columns: Sequence[str]
+    rows: Sequence[Sequence[Any]]
+    title: str = ""
+    caption: str = ""
+    words: Collection[int] = ()
+    detail: Collection[int] = ()
+
+    def __post_init__(self) -> None:
+        if wrong := next((row for row in self.rows if len(row) != len(self.columns)), None):
+            raise ValueError(f"a row of {len(wrong)} cells in a table of {len(self.columns)} columns: {wrong}")
+
+    @property
+    def cells(self) -> list[list[str]]:
+        """The rows as they are read."""
+        return [[cell_text(cell) for cell in row] for row in self.rows]
+
+    @property
+    def brief(self) -> "Table":
+        """The table without its columns of detail."""
+        columns = [k for k in range(len(self.columns)) if k not in self.detail]
+        words = [at for at, k in enumerate(columns) if k in self.words]
+        rows = [[row[k] for k in columns] for row in self.rows]
+        return dataclasses.replace(self, columns=[self.columns[k] for k in columns], rows=rows, words=words, detail=())
+
+    def __str__(self) -> str:
+        return str(Report().add(self))
+
+    def _repr_html_(self) -> str:
+        return Report().add(self).fragment
+
+    def to_frame(self) -> Any:
+        """A pandas frame of the rows."""
+        import pandas
+
+        return pandas.DataFrame([list(row) for row in self.rows], columns=list(self.columns))
+
+
+def cell_text(cell: Any) -> str:
+    """A cell as it is read: nothing for None, five digits of a number."""
+    if cell is None:
+        return ""
+    return f"{cell:.5g}" if isinstance(cell, float) else str(cell)
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A chart to look into, and what it shows."""
+
+    chart: "Drawing"
+    caption: str = ""
+
+
+@dataclass(frozen=True)
+class Charts:
+    """Small charts side by side."""
+
+    charts: Sequence[Chart]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A drawing in SVG, and what it shows."""
+
+    svg: str
+    caption: str
+
+
+@dataclass(frozen=True)
+class Markup:
+    """HTML of our own, for what a page does and no other block can. What stands in it is escaped already."""
+
+    html: str
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Blocks that a page hides until the reader opens them."""
+
+    summary: str
+    blocks: Sequence["Block"]
+
+
+Block = Heading | Paragraphs | Verdict | Items | Code | Equation | Table | Chart | Charts | Figure | Markup | Fold
+
+
+class Report:
+    """Blocks in order, below a title and a lead. Every method that adds one returns the report.
+
+    A terminal shows what can be read there: no charts, figures and folded blocks, and no columns of detail.
+    """
+
+    def __init__(self, title: str = "", lead: str = ""):
+        self.title, self.lead = title, lead
+        self.blocks: list[Block] = []
+
+    def add(self, *blocks: Block) -> "Report":
+        self.blocks += blocks
+        return self
+
+    def heading(self, text: str, level: int = 2) -> "Report":
+        return self.add(Heading(text, level))
+
+    def text(self, *paragraphs: str) -> "Report":
+        return self.add(Paragraphs(paragraphs)) if paragraphs else self
+
+    def verdict(self, *paragraphs: str, kind: str = "plain") -> "Report":
+        check_choice("kind", kind, KINDS)
+        return self.add(Verdict(paragraphs, kind))
+
+    def items(self, texts: Sequence[str]) -> "Report":
+        return self.add(Items(texts)) if texts else self
+
+    def code(self, text: str) -> "Report":
+        return self.add(Code(text))
+
+    def equation(self, latex: str) -> "Report":
+        return self.add(Equation(latex))
+
+    def table(
+        self, columns: Sequence[str], rows: Sequence[Sequence[Any]], caption: str = "", words: Sequence[int] = (),
+        title: str = "", detail: Collection[int] = (),
+    ) -> "Report":  # fmt: skip
+        return self.add(Table(columns, rows, title, caption, words, detail))
+
+    def chart(self, chart: "Drawing", caption: str = "") -> "Report":
+        return self.add(Chart(chart, caption))
+
+    def charts(self, charts: Sequence["Drawing"], caption: str = "") -> "Report":
+        self.add(Charts([Chart(chart) for chart in charts]))
+        return self.text(*[caption] * bool(caption))
+
+    def figure(self, path: Path, caption: str = "") -> "Report":
+        """An SVG file. Raises `UserError` where it is not there or not SVG."""
+        path = Path(path)
+        try:
+            drawing = path.read_text(encoding="utf-8")
+        except OSError as error:
+            raise UserError(f"the figure {path} cannot be read: {error.strerror}") from error
+        if "<svg" not in drawing:
+            raise UserError(f"the figure {path} is not SVG, the only kind a page can hold")
+        return self.add(Figure(drawing, caption or path.stem))
+
+    @contextmanager
+    def folded(self, summary: str) -> Iterator[None]:
+        """What is added inside is hidden on a page until the reader opens it."""
+        outside, self.blocks = self.blocks, []
+        yield
+        self.blocks = [*outside, Fold(summary, self.blocks)]
+
+    @property
+    def html(self) -> str:
+        """A page in one file."""
+        from tractexp.blocks.html import page
+
+        return page(self)
+
+    @property
+    def fragment(self) -> str:
+        """The blocks without detail as a part of another page, as a notebook shows it."""
+        from tractexp.blocks.html import fragment
+
+        return fragment(self)
+
+    @property
+    def markdown(self) -> str:
+        from tractexp.blocks.markdown import markdown
+
+        return markdown(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Title, lead and blocks as plain data, each block with its kind; of charts and figures the captions."""
+        return {"title": self.title, "lead": self.lead, "blocks": [_plain(block) for block in self.blocks]}
+
+    def save(self, path: Path | str) -> Path:
+        """Write the page, whole or not at all. Raises `UserError` where that is impossible."""
+        return files.write(Path(path), self.html)
+
+    def __str__(self) -> str:
+        """What a terminal shows."""
+        from tractexp.blocks.terminal import plain
+
+        return plain(self)
+
+    def __repr__(self) -> str:
+        return f"a report of {len(self.blocks)} blocks; save(path) writes its page, print() shows what a terminal can"
+
+    def _repr_html_(self) -> str:
+        from tractexp.blocks.html import frame
+
+        return frame(self)
+
+
+def _plain(block: Block) -> dict[str, Any]:
+    fields = {
+        f.name: getattr(block, f.name) for f in dataclasses.fields(block) if f.name not in ("chart", "svg", "html")
+    }
+    for key in ("blocks", "charts"):
+        if key in fields:
+            fields[key] = [_plain(inner) for inner in fields[key]]
+    if isinstance(block, Table):
+        fields |= {"words": sorted(block.words), "detail": sorted(block.detail)}
+    return files.plain({"block": type(block).__name__.lower(), **fields})

@@ -1,0 +1,357 @@
+"""Charts that let one look: zoomed by dragging, told by hovering, saved as SVG from their corner, printed as drawn.
+
+A `Chart` is data and layout for Plotly.js (MIT), which the package plotly carries and a page that has a chart takes
+along. Nothing is drawn here and that package is not imported, so that a page costs milliseconds.
+"""
+
+import base64
+import functools
+import html
+import importlib.util
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tractexp.blocks import style
+from tractexp.errors import UserError
+
+MOST = 20_000  # points of a line that are kept: beyond, each stretch keeps its lowest and highest
+FONT = 'system-ui, "Segoe UI", "Liberation Sans", sans-serif'
+SETTINGS = {
+    "responsive": True,
+    "displaylogo": False,
+    "showSendToCloud": False,  # nothing leaves this computer
+    "plotlyServerURL": "",
+    "modeBarButtonsToRemove": ["select2d", "lasso2d", "autoScale2d"],
+    "toImageButtonOptions": {"format": "svg"},
+}
+PAPER = 680  # pixels, the width of a printed page
+PHONE, ENTRY, LETTER = 240, 45, 7  # pixels: a legend on a phone, one of its entries without the name, a letter
+GAP = 0.045  # of the height, between panels
+HOVER = "%{y:.5g}"
+DECADE = 20  # an axis that spans less has its ticks between powers of ten
+SHOWN = 2000  # points of a sampled line that are drawn at once: twice as many as a page is wide
+HELD = 32767  # the greatest of 16 bits; the least stands for a gap
+DRAW = """
+const charts = [...document.querySelectorAll(".chart")];
+const unpack = samples => {
+  const bytes = Uint8Array.from(atob(samples.bdata), letter => letter.charCodeAt(0));
+  samples.raw = new Int16Array(bytes.buffer);
+};
+// The lowest and the highest sample of each stretch between two times; the first and the last of all keep the axis.
+const seen = (samples, from, to) => {
+  const {raw, start, step, offset, scale} = samples, last = raw.length - 1, x = [], y = [];
+  const first = Math.max(0, Math.floor((from - start) / step)), end = Math.min(last, Math.ceil((to - start) / step));
+  const add = i => { x.push(start + i * step); y.push(raw[i] === -32768 ? null : offset + scale * raw[i]); };
+  const stretch = Math.max(1, Math.floor(2 * (end - first + 1) / SHOWN));
+  if (first > 0) add(0);
+  for (let i = first; i <= end; i += stretch) {
+    let low = i, high = i, gap = -1;
+    for (let k = i; k < Math.min(i + stretch, end + 1); k++) {
+      if (raw[k] === -32768) gap = k;
+      else if (raw[k] < raw[low] || raw[low] === -32768) low = k;
+      else if (raw[k] > raw[high]) high = k;
+    }
+    [...new Set(gap < 0 ? [low, high] : [low, gap, high])].sort((a, b) => a - b).forEach(add);
+  }
+  if (end < last) add(last);
+  return {x, y};
+};
+const zoomed = chart => {
+  const picked = chart.data.map((trace, k) => k).filter(k => chart.data[k].samples);
+  const [from, to] = chart.layout.xaxis.range.map(Number);
+  const made = picked.map(k => seen(chart.data[k].samples, from, to));
+  Plotly.restyle(chart, {x: made.map(m => m.x), y: made.map(m => m.y)}, picked);
+};
+const draw = chart => {
+  const {data, layout} = JSON.parse(chart.nextElementSibling.textContent);
+  const sampled = data.filter(trace => trace.samples);
+  const [from, to] = (layout.xaxis.range || [-Infinity, Infinity]).map(Number);
+  sampled.forEach(trace => { unpack(trace.samples); Object.assign(trace, seen(trace.samples, from, to)); });
+  Plotly.newPlot(chart, data, layout, SETTINGS);
+  const told = event => Object.keys(event).some(key => key.startsWith("xaxis"));
+  if (sampled.length) chart.on("plotly_relayout", event => told(event) && zoomed(chart));
+};
+const folded = chart => chart.closest("details:not([open])");  // drawn when first opened: many cost seconds
+charts.filter(chart => !folded(chart)).forEach(draw);
+const drawn = () => charts.filter(chart => chart.data && chart.offsetParent);
+const resize = () => {
+  charts.filter(chart => !chart.data && !folded(chart)).forEach(draw);
+  drawn().forEach(chart => Plotly.Plots.resize(chart));
+};
+const paper = chart => ({width: chart.closest(".charts") ? PAPER / 2 - 10 : PAPER});
+addEventListener("beforeprint", () => drawn().forEach(chart => Plotly.relayout(chart, paper(chart))));
+addEventListener("afterprint", () => drawn().forEach(chart => Plotly.relayout(chart, {width: null, autosize: true})));
+document.querySelectorAll("details").forEach(part => part.addEventListener("toggle", resize));
+// Once more: a legend that takes another line moves the panels only then.
+addEventListener("beforeprint", () => charts.forEach(chart => chart.data && Plotly.relayout(chart, paper(chart))));
+"""
+
+
+def library() -> Path:
+    """Plotly.js, where the package plotly is installed. Raises `UserError` where it is not."""
+    spec = importlib.util.find_spec("plotly")
+    for folder in (spec and spec.submodule_search_locations) or ():
+        if (path := Path(folder, "package_data", "plotly.min.js")).is_file():
+            return path
+    raise UserError("pages need the package plotly, which is not installed whole; install it by: pip install plotly")
+
+
+@functools.cache
+def script() -> str:
+    """What a page with charts needs once: the library, and what draws the charts."""
+    drawing = DRAW.replace("SETTINGS", json.dumps(SETTINGS)).replace("PAPER", str(PAPER)).replace("SHOWN", str(SHOWN))
+    return library().read_text(encoding="utf-8") + "\n" + drawing
+
+
+class Chart:
+    """Panels above each other that share the axis x. Colors are those of `style`; names may hold any character.
+
+    `panels` are the labels of the vertical axes from the top, `heights` their shares. `log_x` and `log_y` make axes
+    logarithmic. `pixels` is the height of the whole. Without a `legend` names are told by hovering only; where many
+    curves are drawn, `hover` "closest" tells of one.
+    """
+
+    def __init__(
+        self,
+        x: str,
+        panels: Sequence[str],
+        *,
+        heights: Sequence[float] = (),
+        log_x: bool = False,
+        log_y: bool = False,
+        pixels: int | None = None,
+        title: str = "",
+        legend: bool = True,
+        hover: str = "x unified",
+    ):
+        self._data: list[dict[str, Any]] = []
+        self._shapes: list[dict[str, Any]] = []
+        self._notes: list[dict[str, Any]] = []
+        self._told: set[str] = set()
+        self._axes = self._laid_out(panels, heights or [1.0] * len(panels), log_y)
+        self._x: dict[str, Any] = {"title": {"text": html.escape(x)}, "anchor": _axis("y", len(panels) - 1)}
+        self._x |= {"showgrid": True, "gridcolor": "#E4E4E4", "zeroline": False, "ticks": "outside", "automargin": True}
+        if log_x:
+            self._x |= {"type": "log", "dtick": 1, "exponentformat": "power"}
+        self._title, self._legend, self._hover = title, legend, hover
+        self._pixels = pixels or 130 + 170 * len(panels)
+
+    @staticmethod
+    def _laid_out(labels: Sequence[str], heights: Sequence[float], log: bool) -> dict[str, dict[str, Any]]:
+        room = (1 - GAP * (len(labels) - 1)) / sum(heights)
+        top, axes = 1.0, {}
+        for k, (label, share) in enumerate(zip(labels, heights, strict=True)):
+            low = max(top - share * room, 0.0)
+            axis: dict[str, Any] = {"title": {"text": html.escape(label)}, "domain": [low, top], "ticks": "outside"}
+            axis |= {"gridcolor": "#E4E4E4", "zeroline": False, "automargin": True, "linecolor": "#444"}
+            if log:
+                axis |= {"type": "log", "exponentformat": "power"}
+            axes["yaxis" + (str(k + 1) if k else "")] = axis
+            top = low - GAP
+        return axes
+
+    def line(
+        self, name: str, x: np.ndarray, y: np.ndarray, color: str, panel: int = 0, *, width: float = 1.6,
+        dash: str = "solid", step: bool = False, legend: bool = True,
+    ) -> "Chart":  # fmt: skip
+        """A curve; equal names are one entry of the legend. nan is a gap; `step` holds each value until the next.
+
+        Without `legend` it is named where it is pointed at only.
+        """
+        x, y = style.thin(np.asarray(x, dtype=float), np.asarray(y, dtype=float), MOST)
+        shape = {"shape": "hv"} if step else {}
+        line = {"color": color, "width": width, "dash": dash, **shape}
+        packed: dict[str, Any] = {"x": _packed(x, "f8"), "y": _packed(y, "f4")}
+        return self._add(name, panel, mode="lines", line=line, silent=not legend, **packed)
+
+    def samples(
+        self, name: str, start: float, step: float, y: np.ndarray, color: str, panel: int = 0, *,
+        width: float = 1.2, dash: str = "solid",
+    ) -> "Chart":  # fmt: skip
+        """A curve (n,) sampled every `step` from `start` on, all of it kept, in 16 bits; nan is a gap.
+
+        Of what is shown each stretch has its lowest and highest sample, and zoomed in every sample is drawn.
+        """
+        known = np.isfinite(y)
+        low, high = (float(y[known].min()), float(y[known].max())) if known.any() else (0.0, 0.0)
+        offset, scale = (low + high) / 2, max((high - low) / (2 * HELD), 1e-300)
+        held = np.where(known, np.round((np.where(known, y, offset) - offset) / scale), -HELD - 1).astype("<i2")
+        kept = {"bdata": base64.b64encode(held.tobytes()).decode(), "start": start, "step": step}
+        kept |= {"offset": offset, "scale": scale}
+        line = {"color": color, "width": width, "dash": dash}
+        return self._add(name, panel, mode="lines", line=line, samples=kept)
+
+    def points(
+        self, name: str, x: Sequence[Any] | np.ndarray, y: Sequence[Any] | np.ndarray, color: str, panel: int = 0, *,
+        size: float = 7, symbol: str = "circle", told: Sequence[str] = (), spans: np.ndarray | None = None,
+    ) -> "Chart":  # fmt: skip
+        """Marks; `told` is what each says when pointed at, `spans` (n, 2) are the ends of intervals along x."""
+        made: dict[str, Any] = {"marker": {"color": color, "size": size, "symbol": symbol}}
+        if spans is not None:
+            middle = np.asarray(x, dtype=float)
+            made["error_x"] = {
+                "type": "data", "symmetric": False, "color": color, "thickness": 2, "width": 5,
+                "array": (spans[:, 1] - middle).tolist(), "arrayminus": (middle - spans[:, 0]).tolist(),
+            }  # fmt: skip
+        if told:
+            made |= {"text": [html.escape(t) for t in told], "hovertemplate": "%{text}<extra></extra>"}
+        return self._add(name, panel, mode="markers", x=_listed(x), y=_listed(y), **made)
+
+    def bars(
+        self, name: str, labels: Sequence[str], values: Sequence[float], color: str | Sequence[str], panel: int = 0, *,
+        told: Sequence[str] = (),
+    ) -> "Chart":  # fmt: skip
+        """Horizontal bars, the first label on top."""
+        self._axes[_key(panel)] |= {"autorange": "reversed", "type": "category"}
+        made: dict[str, Any] = {"text": [html.escape(t) for t in told], "textposition": "auto"} if told else {}
+        return self._add(
+            name, panel, kind="bar", orientation="h", x=_listed(values), y=_listed(labels),
+            marker={"color": color if isinstance(color, str) else list(color)},
+            hovertemplate="%{y}: %{x:.4g}<extra></extra>", **made,
+        )  # fmt: skip
+
+    def band(
+        self, name: str, x: np.ndarray, lower: np.ndarray, upper: np.ndarray, color: str, panel: int = 0, *,
+        step: bool = False,
+    ) -> "Chart":  # fmt: skip
+        """What lies between two curves, lightly filled."""
+        line = {"width": 0, "color": color, **({"shape": "hv"} if step else {})}
+        quiet: dict[str, Any] = {"mode": "lines", "line": line, "hoverinfo": "skip"}
+        quiet["x"] = _packed(np.asarray(x, dtype=float), "f8")
+        self._add(name, panel, y=_packed(lower, "f4"), silent=True, **quiet)
+        return self._add(name, panel, y=_packed(upper, "f4"), fill="tonexty", fillcolor=_faint(color), **quiet)
+
+    def shade(
+        self, start: float, end: float, color: str, panel: int | None = None, name: str = "", opacity: float = 0.3,
+        text: str = "",
+    ) -> "Chart":  # fmt: skip
+        """A stretch of the axis x, in one panel or in all; `name` stands in the legend once, `text` at its top."""
+        self._shapes.append(
+            {"type": "rect", "xref": "x", "x0": start, "x1": end, **_height(panel), "fillcolor": color,
+             "opacity": opacity, "line": {"width": 0}, "layer": "below"}
+        )  # fmt: skip
+        if text:
+            self._notes.append(
+                {"text": html.escape(text), "xref": "x", "x": start, "xanchor": "left", "yref": _height(panel)["yref"],
+                 "y": 1, "yanchor": "top", "showarrow": False, "font": {"size": 11}, "bgcolor": "#ffffffcc"}
+            )  # fmt: skip
+        if name and name not in self._told:
+            square = {"color": color, "size": 11, "symbol": "square", "opacity": min(1.0, 2 * opacity)}
+            self._add(name, panel or 0, mode="markers", x=[None], y=[None], marker=square, hoverinfo="skip")
+        return self
+
+    def edge(self, x: float, color: str = style.FAINT, dash: str = "dot", panel: int | None = None) -> "Chart":
+        """A vertical line, in one panel or through all."""
+        line = {"color": color, "width": 1, "dash": dash}
+        self._shapes.append({"type": "line", "xref": "x", "x0": x, "x1": x, **_height(panel), "line": line})
+        return self
+
+    def level(self, y: float, text: str = "", panel: int = 0, color: str = style.FAINT, dash: str = "dash") -> "Chart":
+        """A horizontal line across a panel, with a word at its right end."""
+        axis, line = _axis("y", panel), {"color": color, "width": 1, "dash": dash}
+        self._shapes.append(
+            {"type": "line", "xref": "x domain", "x0": 0, "x1": 1, "yref": axis, "y0": y, "y1": y, "line": line}
+        )
+        if text:
+            log = self._axes[_key(panel)].get("type") == "log"
+            self._notes.append(
+                {"text": html.escape(text), "xref": "x domain", "x": 1, "xanchor": "right", "yref": axis,
+                 "y": float(np.log10(y)) if log else y, "yanchor": "bottom", "showarrow": False,
+                 "font": {"size": 11, "color": color}}
+            )  # fmt: skip
+        return self
+
+    def limits(self, panel: int | None, low: float, high: float) -> "Chart":
+        """What an axis shows at first: of a panel, or of x where `panel` is None."""
+        axis = self._x if panel is None else self._axes[_key(panel)]
+        axis["range"] = np.log10([low, high]).tolist() if axis.get("type") == "log" else [low, high]
+        if axis.get("type") == "log" and high < DECADE * low:
+            axis.pop("dtick", None)  # powers of ten alone would leave the axis bare
+        return self
+
+    def ticks(
+        self, panel: int | None, at: Sequence[float], labels: Sequence[str] = (), turned: bool = False
+    ) -> "Chart":  # fmt: skip
+        """Where an axis is marked, and with which words instead of numbers: of a panel, or of x where it is None."""
+        axis = self._x if panel is None else self._axes[_key(panel)]
+        words = [html.escape(label) for label in labels] or [f"{v:g}" for v in at]
+        axis |= {"tickmode": "array", "tickvals": list(at), "ticktext": words}
+        if labels:
+            axis |= {"tickfont": {"size": 9 if turned else 11}, **({"tickangle": -90} if turned else {})}
+        return self
+
+    def plain(self) -> dict[str, Any]:
+        """Data and layout as Plotly reads them."""
+        names = [trace["name"] for trace in self._data if trace["showlegend"]] if self._legend else []
+        above = 30 if not names else 66 if len(names) <= 6 else 86  # pixels; a narrow legend has three rows
+        layout = {
+            "height": self._pixels, "font": {"family": FONT, "size": 13, "color": "#1d1d1f"}, "hovermode": self._hover,
+            "hoversubplots": "axis", "paper_bgcolor": "#fff", "plot_bgcolor": "#fff", "bargap": 0.25,
+            "margin": {"l": 60, "r": 12, "t": above + 20 * bool(self._title), "b": 48},
+            "showlegend": self._legend,
+            "legend": {"orientation": "h", "x": 0, "y": 1.0, "yanchor": "bottom", "yref": "paper", **_above(names)},
+            "shapes": self._shapes, "annotations": self._notes, "xaxis": self._x, **self._axes,
+        }  # fmt: skip
+        kinds = {trace["type"] for trace in self._data} | {trace.get("mode", "") for trace in self._data}
+        if "lines" not in kinds:
+            layout |= {"hovermode": "closest"}
+        if self._title:
+            layout["title"] = {"text": html.escape(self._title), "x": 0, "xref": "paper", "font": {"size": 14}}
+            if not self._legend:  # just above the panels, below the buttons
+                layout["title"] |= {"yref": "paper", "y": 1, "yanchor": "bottom", "pad": {"b": 8}}
+        return {"data": self._data, "layout": layout}
+
+    def element(self, label: str) -> str:
+        """The chart as an element of a page."""
+        told = json.dumps(self.plain(), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+        return (
+            f'<div class="chart" role="img" aria-label="{html.escape(label)}" style="height:{self._pixels}px"></div>'
+            f'<script type="application/json">{told}</script>'
+        )
+
+    def _add(self, name: str, panel: int, kind: str = "scatter", silent: bool = False, **more: Any) -> "Chart":
+        shown = bool(name) and name not in self._told and not silent
+        if shown:
+            self._told.add(name)
+        trace = {"type": kind, "name": html.escape(name), "legendgroup": name, "showlegend": shown, "xaxis": "x",
+                 "yaxis": _axis("y", panel), "hovertemplate": HOVER}  # fmt: skip
+        self._data.append(trace | more)
+        return self
+
+
+def _above(names: Sequence[str]) -> dict[str, Any]:
+    """An empty line over a legend that takes several on a phone: the buttons stand there."""
+    several = sum(ENTRY + LETTER * len(name) for name in names) > PHONE
+    return {"title": {"text": "\u00a0", "side": "top"}} if several else {}
+
+
+def _axis(letter: str, panel: int) -> str:
+    return letter + (str(panel + 1) if panel else "")
+
+
+def _key(panel: int) -> str:
+    return "yaxis" + (str(panel + 1) if panel else "")
+
+
+def _height(panel: int | None) -> dict[str, Any]:
+    """All of a panel, or of the chart."""
+    return {"yref": "paper" if panel is None else f"{_axis('y', panel)} domain", "y0": 0, "y1": 1}
+
+
+def _packed(values: np.ndarray, kind: str) -> dict[str, str]:
+    """Numbers as Plotly's typed arrays: exact, and a third of the length of their digits."""
+    return {"dtype": kind, "bdata": base64.b64encode(np.asarray(values, dtype=f"<{kind}").tobytes()).decode()}
+
+
+def _listed(values: Sequence[Any] | np.ndarray) -> list[Any]:
+    plain = values.tolist() if isinstance(values, np.ndarray) else list(values)
+    return [html.escape(v) if isinstance(v, str) else None if v != v else v for v in plain]
+
+
+def _faint(color: str) -> str:
+    red, green, blue = (int(color[k : k + 2], 16) for k in (1, 3, 5))
+    return f"rgba({red},{green},{blue},0.18)"

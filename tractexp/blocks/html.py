@@ -1,0 +1,195 @@
+"""A report as a page in one file: readable offline and on paper.
+
+Everything given as text is escaped. Charts carry their data and the library that draws them, figures are inline SVG,
+equations are typeset into SVG; nothing is loaded from elsewhere.
+"""
+
+import functools
+import html
+import io
+import itertools
+import re
+from collections.abc import Sequence
+from typing import Any
+
+from tractexp.blocks.block import (
+    Block,
+    Chart,
+    Charts,
+    Code,
+    Equation,
+    Figure,
+    Fold,
+    Heading,
+    Items,
+    Markup,
+    Paragraphs,
+    Report,
+    Table,
+    Verdict,
+)  # fmt: skip
+from tractexp.blocks.chart import script
+
+STYLE = """
+:root { --ink: #1d1d1f; --faint: #666; --line: #dcdcdc; --good: #00664a; --bad: #a33b00; }
+* { box-sizing: border-box; }
+body { margin: 2rem auto; max-width: 62rem; padding: 0 1.2rem; color: var(--ink); background: #fff;
+  font: 16px/1.5 system-ui, "Segoe UI", "Liberation Sans", sans-serif; }
+h1 { font-size: 1.7rem; line-height: 1.2; margin: 0 0 .4rem; }
+h2 { font-size: 1.2rem; margin: 2.2rem 0 .5rem; border-bottom: 1px solid var(--line); padding-bottom: .2rem; }
+h3 { font-size: 1rem; margin: 1.4rem 0 .3rem; }
+h1, h2, h3 { break-after: avoid; }
+p { margin: .5rem 0; max-width: 46rem; }
+.lead { color: var(--faint); }
+.verdict { border-left: 4px solid var(--faint); background: #f6f6f6; padding: .6rem 1rem; margin: 1rem 0; }
+.verdict p { margin: .2rem 0; }
+.good { border-color: var(--good); } .bad { border-color: var(--bad); }
+.wide { overflow-x: auto; margin: .8rem 0; }
+table { border-collapse: collapse; font-size: .84rem; font-variant-numeric: tabular-nums; }
+figure.table .wide { margin: 0; } figure.table figcaption { font-size: .84rem; padding-top: .35rem; }
+caption { text-align: left; font-weight: 600; padding: .2rem 0; }
+th, td { padding: .22rem .6rem; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap; }
+th { vertical-align: bottom; white-space: normal; border-bottom-color: var(--faint); font-weight: 600; }
+th:first-child, td:first-child, .words { text-align: left; }
+td.words { white-space: normal; min-width: 8rem; } td.words:last-child { min-width: 14rem; }
+figure { margin: 1rem 0; } figure, tr { break-inside: avoid; }
+figure svg { max-width: 100%; height: auto; }
+figcaption { color: var(--faint); font-size: .88rem; max-width: 46rem; }
+.chart { width: 100%; } .charts { display: grid; gap: .4rem 1rem;
+  grid-template-columns: repeat(auto-fit, minmax(min(17rem, 100%), 1fr)); }
+.charts figure { margin: .3rem 0; min-width: 0; }
+.equation { margin: .7rem 0 .7rem 1.5rem; overflow-x: auto; } .equation svg { vertical-align: middle; }
+pre { margin: .5rem 0; padding: .5rem .7rem; background: #f6f6f6; font-size: .84rem; white-space: pre-wrap;
+  overflow-wrap: anywhere; user-select: all; }
+li { margin: .3rem 0; max-width: 46rem; }
+details { margin: .8rem 0; } summary { cursor: pointer; color: #0058a0; }
+@media print { body { margin: 0; max-width: none; font-size: 10.5pt; } .wide { overflow: visible; }
+  .modebar-container { display: none !important; } .charts { grid-template-columns: 1fr 1fr; } }
+"""
+
+
+def page(report: Report) -> str:
+    """A whole page that needs nothing else."""
+    figures = itertools.count(1)
+    title, lead = html.escape(report.title), html.escape(report.lead)
+    head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{title}</title>'
+    top = f"<h1>{title}</h1>" + (f'<p class="lead">{lead}</p>' if lead else "")
+    draws = f"<script>{script()}</script>" if any(map(_draws, report.blocks)) else ""
+    body = "\n".join([top, *(_element(block, figures) for block in report.blocks), draws])
+    return (
+        f'<!DOCTYPE html>\n<html lang="en"><head>{head}<style>{STYLE}</style></head>\n<body>\n{body}\n</body></html>\n'
+    )
+
+
+def frame(report: Report) -> str:
+    """The page within another one."""
+    return f'<iframe srcdoc="{html.escape(page(report))}" style="width:100%;height:40rem;border:0"></iframe>'
+
+
+def fragment(report: Report) -> str:
+    """The blocks that a terminal shows, and equations, as elements of a notebook's page."""
+    parts = [f"<p><b>{html.escape(report.title)}</b></p>"] * bool(report.title)
+    parts += [f"<p>{html.escape(report.lead)}</p>"] * bool(report.lead)
+    for block in report.blocks:
+        if isinstance(block, Table):
+            parts.append(_table(block.brief))
+        elif isinstance(block, Equation):
+            parts.append(f"<p>$${html.escape(block.latex)}$$</p>")
+        elif not isinstance(block, Chart | Charts | Figure | Markup | Fold):
+            parts.append(_element(block, itertools.count(1)))
+    return "\n".join(parts)
+
+
+def _draws(block: Block) -> bool:
+    """Whether a block holds a chart."""
+    return isinstance(block, Chart | Charts) or (isinstance(block, Fold) and any(map(_draws, block.blocks)))
+
+
+def _element(block: Block, figures: "itertools.count[int]") -> str:
+    """A block as HTML; `figures` counts the drawings of a page, whose ids differ by it."""
+    match block:
+        case Heading(text, level):
+            return f"<h{level}>{html.escape(text)}</h{level}>"
+        case Paragraphs(texts):
+            return "\n".join(f"<p>{html.escape(text)}</p>" for text in texts)
+        case Verdict(texts, kind):
+            return f'<div class="verdict {kind}">\n{_element(Paragraphs(texts), figures)}\n</div>'
+        case Items(texts):
+            return "\n".join(["<ul>", *(f"<li>{html.escape(text)}</li>" for text in texts), "</ul>"])
+        case Code(text):
+            return f"<pre>{html.escape(text)}</pre>"  # a click selects it whole
+        case Equation(latex):
+            drawing = _typeset(latex)
+            inside = _inline(drawing, f"f{next(figures)}-", latex) if drawing else f"<code>{html.escape(latex)}</code>"
+            return f'<div class="equation">{inside}</div>'
+        case Table():
+            return _table(block)
+        case Chart(chart, caption):
+            return f"<figure>{chart.element(caption)}{_below(caption)}</figure>"
+        case Charts(charts):
+            return "\n".join(['<div class="charts">', *(_element(chart, figures) for chart in charts), "</div>"])
+        case Figure(svg, caption):
+            return f"<figure>{_inline(svg, f'f{next(figures)}-', caption)}{_below(caption)}</figure>"
+        case Markup(markup):
+            return markup
+        case Fold(summary, blocks):
+            inside = (_element(inner, figures) for inner in blocks)
+            return "\n".join([f"<details><summary>{html.escape(summary)}</summary>", *inside, "</details>"])
+
+
+def _below(caption: str) -> str:
+    return f"<figcaption>{html.escape(caption)}</figcaption>" if caption else ""
+
+
+def _table(table: Table) -> str:
+    """A table; the first column is to the left, the others are figures but for those that hold words."""
+    marks = ['<{0} class="words">' if i in table.words else "<{0}>" for i in range(len(table.columns))]
+
+    def line(cells: Sequence[str], tag: str) -> str:
+        marked = zip(marks, cells, strict=True)
+        return f"<tr>{''.join(f'{m.format(tag)}{html.escape(str(c))}</{tag}>' for m, c in marked)}</tr>"
+
+    body = "\n".join(line(row, "td") for row in table.cells)
+    head = f"<thead>{line(table.columns, 'th')}</thead>" if table.columns else ""
+    above = f"<caption>{html.escape(table.title)}</caption>" if table.title else ""
+    grid = f'<div class="wide"><table>{above}{head}<tbody>\n{body}\n</tbody></table></div>'
+    return f'<figure class="table">{grid}{_below(table.caption)}</figure>'  # the caption stays where a table scrolls
+
+
+def _inline(drawing: str, prefix: str, label: str) -> str:
+    """An SVG document as an element of a page: without header and metadata, its ids unlike any other figure's."""
+    drawing = drawing[drawing.index("<svg") :].strip()
+    drawing = re.sub(r"<metadata>.*?</metadata>", "", drawing, flags=re.DOTALL)
+    drawing = re.sub(r'\sxmlns(:\w+)?="[^"]*"', "", drawing).replace("xlink:href=", "href=")
+    drawing = re.sub(r'(\sid="|url\(#|href="#)', rf"\g<1>{prefix}", drawing)
+    return drawing.replace("<svg", f'<svg role="img" aria-label="{html.escape(label)}"', 1)
+
+
+def _displayed(latex: str) -> str:
+    """Fractions that are inside nothing else in their full size, as LaTeX has them in a displayed equation."""
+    depth = itertools.accumulate((c == "{") - (c == "}") for c in latex)
+    outside = {m.start() for m in re.finditer(r"\\frac", latex)} & {i for i, d in enumerate(depth) if d == 0}
+    return "".join(r"\d" if i in outside else c for i, c in enumerate(latex))
+
+
+@functools.cache
+def _typeset(latex: str) -> str | None:
+    """SVG of an equation, or None for LaTeX beyond mathtext."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.mathtext import MathTextParser
+
+    latex = _displayed(latex)
+    settings: Any = {"svg.fonttype": "path", "mathtext.fontset": "cm", "svg.hashsalt": "tractexp"}
+    with rc_context(settings):
+        font = FontProperties(size=13)
+        try:
+            width, height, depth, *_ = MathTextParser("path").parse(f"${latex}$", dpi=72, prop=font)
+        except ValueError:
+            return None
+        figure = Figure(figsize=((width + 4) / 72, (height + 4) / 72))
+        figure.text(2 / (width + 4), (depth + 2) / (height + 4), f"${latex}$", fontproperties=font)
+        drawn = io.BytesIO()
+        figure.savefig(drawn, format="svg", transparent=True, metadata={"Date": None})
+    return drawn.getvalue().decode()

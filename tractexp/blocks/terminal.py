@@ -1,0 +1,59 @@
+"""A report as a terminal or a log file shows it: sentences and tables."""
+
+import io
+from collections.abc import Sequence
+from typing import Any
+
+from tractexp.blocks.block import Code, Heading, Items, Paragraphs, Report, Table, Verdict
+
+WIDTH = 200  # characters of a line of text that is no terminal's
+
+
+def show(report: Report, console: Any) -> None:
+    """Print a report on a console of rich."""
+    for text in (report.title, report.lead):
+        if text:
+            console.print(text, markup=False)
+    for block in report.blocks:
+        if isinstance(block, Table):
+            _table(block.brief, console)
+        else:
+            for line in _lines(block):
+                console.print(line, markup=False)
+
+
+def _lines(block: Any) -> Sequence[str]:
+    """The lines of a block; none of what only a page can show."""
+    if isinstance(block, Paragraphs | Verdict):
+        return block.texts
+    if isinstance(block, Items):
+        return [f"  {text}" for text in block.texts]
+    if isinstance(block, Heading | Code):
+        return [f"  {block.text}" if isinstance(block, Code) else block.text]
+    return ()
+
+
+def plain(report: Report) -> str:
+    """The same as text."""
+    from rich.console import Console
+
+    text = io.StringIO()
+    show(report, Console(file=text, highlight=False, soft_wrap=True, width=WIDTH, color_system=None))
+    return text.getvalue().rstrip("\n")
+
+
+def _table(table: Table, console: Any) -> None:
+    """The first column and those of words are to the left; the last is folded."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table as Grid
+
+    if not table.columns:
+        return
+    grid = Grid(title=table.title or None, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    last = len(table.columns) - 1
+    for i, column in enumerate(table.columns):
+        left = i == 0 or i in table.words
+        grid.add_column(str(column), justify="left" if left else "right", no_wrap=i < last)
+    for row in table.cells:
+        grid.add_row(*row)
+    console.print(grid, markup=False)

@@ -1,0 +1,46 @@
+"""What the user chose for a run, and the refusal of what the task would silently ignore."""
+
+import functools
+from collections.abc import Collection, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from tractexp.api.task import ALWAYS
+from tractexp.errors import UserError
+
+OF = {"domain": "model"}  # groups that choose for another
+
+
+def given(overrides: Iterable[str], choices: Mapping[str, Any]) -> dict[str, str]:
+    """{key: value} of what was chosen on the command line, by a sweep or by an experiment, and not by default."""
+    experiment = choices.get("experiment")
+    chosen = dict(_by_experiment(str(experiment))) if experiment else {}
+    for text in overrides:
+        key, _, value = text.lstrip("+~").partition("=")
+        chosen[key.partition("@")[0].replace("/", ".")] = value or "null"
+    return chosen
+
+
+def refuse_unread(task: Any, chosen: Mapping[str, str], needless: Collection[str] = ()) -> None:
+    """Raise `UserError` for the first setting chosen that a task (class or instance) does not read."""
+    read = [part for part in (*ALWAYS, *task.reads) if part not in needless]
+    for key, value in chosen.items():
+        if not any(_overlap(OF.get(key, key), part) for part in read):
+            instead = (task.instead[part] for part in task.instead if _overlap(OF.get(key, key), part))
+            raise UserError(f"{key}={value} is not read by task={task.name}; {next(instead, 'leave it out')}")
+
+
+def _overlap(a: str, b: str) -> bool:
+    """Whether one key is the other or a part of it: choosing `model` chooses `model.motor` too."""
+    return f"{a}.".startswith(f"{b}.") or f"{b}.".startswith(f"{a}.")
+
+
+@functools.cache
+def _by_experiment(experiment: str) -> Mapping[str, str]:
+    """What an experiment's file sets, wherever Hydra looks for it."""
+    from hydra.core.hydra_config import HydraConfig
+
+    from tractexp.composition import folders, set_by_experiment
+
+    sources = HydraConfig.get().runtime.config_sources if HydraConfig.initialized() else ()
+    return set_by_experiment(experiment, [*(Path(s.path) for s in sources if s.schema == "file"), *folders()])

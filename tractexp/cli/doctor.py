@@ -1,0 +1,193 @@
+"""`tractexp doctor`: whether everything a run stands on is sound; what can be healed without loss is."""
+
+import argparse
+import os
+import shutil
+import sqlite3
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+from tractexp import files
+from tractexp.cli.sync import FOLDER, brought
+from tractexp.errors import UserError
+from tractexp.progress import say
+
+DOES = "Check versions, cores, caches, disk, the MLflow store and its runs; heal what can be, say what is wrong."
+ROOM = 500e6  # bytes of a disk that is not nearly full
+BUSY = 2.0  # s to wait for a store that another process writes to
+
+Finding = tuple[str, str]
+SOUND, HEALED, WRONG = "well", "healed", "WRONG"
+
+
+def doctor(arguments: list[str]) -> int:
+    """Check and heal; returns the exit code, 2 where something is left that is wrong."""
+    parser = argparse.ArgumentParser(prog="tractexp doctor", description=DOES)
+    parser.add_argument("folder", nargs="?", type=Path, default=FOLDER, help=f"of runs; default: {FOLDER}")
+    parser.add_argument("--uri", help="the MLflow store; default: outputs/mlflow.db of the current folder")
+    chosen = parser.parse_args(arguments)
+    from tractexp import tracking
+
+    uri = tracking.address(chosen.uri)
+    wrong = sum(map(told, (versions(), cores(), disk(chosen.folder), caches(), leavings(chosen.folder))))
+    if told(store(uri)):
+        return 2
+    wrong += told(runs(uri))
+    if chosen.folder.is_dir():
+        wrong += brought(chosen.folder, chosen.uri)["not logged"]
+    return 2 if wrong else 0
+
+
+def told(findings: Iterable[Finding]) -> int:
+    """Print findings; how many of them are wrong."""
+    wrong = 0
+    for state, sentence in findings:
+        say(f"{state:>6}  {sentence}")
+        wrong += state == WRONG
+    return wrong
+
+
+def versions() -> Iterator[Finding]:
+    """Whether the packages installed are those that this one asks for."""
+    from importlib.metadata import PackageNotFoundError, requires, version
+
+    from packaging.requirements import Requirement
+
+    wrong = []
+    for needed in map(Requirement, requires("tractexp") or ()):
+        if needed.marker is not None and not needed.marker.evaluate({"extra": ""}):
+            continue
+        try:
+            if not needed.specifier.contains(found := version(needed.name), prereleases=True):
+                wrong.append(f"{needed.name} {found} is installed, and {needed} is needed")
+        except PackageNotFoundError:
+            wrong.append(f"{needed.name} is not installed, and {needed} is needed")
+    for sentence in wrong:
+        yield WRONG, f"{sentence}: pip install '{sentence.rpartition('and ')[2].removesuffix(' is needed')}'"
+    if not wrong:
+        yield SOUND, "every package is of a version that is known to work"
+
+
+def cores() -> Iterator[Finding]:
+    """How many cores a sweep may use, and whether a worker starts."""
+    from joblib import cpu_count
+
+    from tractexp.workers import processes
+
+    try:
+        with processes(1) as executor:
+            executor.submit(os.getpid).result(timeout=60)
+    except Exception as error:
+        yield WRONG, f"no worker process starts ({type(error).__name__}: {error}): sweeps and surveys cannot run"
+        return
+    yield SOUND, f"{cpu_count()} of {os.cpu_count()} cores may be used, and a worker starts"
+
+
+def disk(folder: Path) -> Iterator[Finding]:
+    """Whether there is room for results."""
+    place = next((p for p in (folder.absolute(), *folder.absolute().parents) if p.is_dir()), Path.cwd())
+    free = shutil.disk_usage(place).free
+    if not os.access(place, os.W_OK):
+        yield WRONG, f"{place} may not be written: results need another folder (hydra.run.dir=...)"
+    elif free < ROOM:
+        yield WRONG, f"only {free / 1e6:.0f} MB are free on the disk of {place}: make room before a sweep"
+    else:
+        yield SOUND, f"{free / 1e9:.1f} GB are free on the disk of {place}"
+
+
+def caches() -> Iterator[Finding]:
+    """Whether kernels and searches can be kept, and what is kept can be read."""
+    from tractexp.cache import cache_folder
+    from tractexp.identification.shelf import damaged
+
+    try:
+        folder = cache_folder()
+        files.write(folder / "doctor.txt", "written and removed by tractexp doctor\n", lasting=False).unlink()
+    except (OSError, UserError) as error:
+        yield WRONG, f"nothing can be kept of what is compiled: {error}"
+        return
+    gone = [*damaged(folder), *files.leftovers(folder)]
+    for path in gone:
+        path.unlink(missing_ok=True)
+    if gone:
+        yield HEALED, f"{len(gone)} damaged or unfinished files of the cache {folder} are removed"
+    yield SOUND, f"the cache {folder} holds {len(list(folder.glob('code_*.kept')))} kernels"
+
+
+def leavings(folder: Path) -> Iterator[Finding]:
+    """What processes left that were killed while they wrote."""
+    halves = files.leftovers(folder) if folder.is_dir() else []
+    for path in halves:
+        path.unlink(missing_ok=True)
+    if halves:
+        yield HEALED, f"{len(halves)} files of {folder} that were never finished are removed"
+
+
+def store(uri: str) -> Iterator[Finding]:
+    """Whether the store can be used; a damaged one is set aside, for the runs are kept beside their results."""
+    from tractexp import tracking
+    from tractexp.tracking.store import database_of
+
+    database = database_of(uri)
+    if database is not None and not database.exists():
+        yield SOUND, f"there is no MLflow store {database} yet: it is made when something is logged"
+        return
+    if database is not None and (problem := _unsound(database)):
+        if problem == "locked":
+            yield WRONG, f"the MLflow store {database} is locked by another process: runs are kept until it lets go"
+            return
+        aside = database.with_name(f"{database.name}.damaged-{time.strftime('%Y-%m-%d_%H-%M-%S')}")
+        files.move(database, aside)
+        yield HEALED, f"the MLflow store {database} is damaged ({problem}); it is set aside as {aside.name}"
+    try:
+        tracking.prepare(uri)
+    except UserError as error:
+        yield WRONG, str(error)
+        return
+    yield SOUND, f"the MLflow store {uri} can be used"
+
+
+def _unsound(database: Path) -> str:
+    """What is wrong with an SQLite file, in a few words; "locked" for one that is in use, "" for a sound one."""
+    try:
+        with closing(sqlite3.connect(database, timeout=BUSY)) as connection:
+            (told,) = connection.execute("PRAGMA quick_check(1)").fetchone()
+            if told != "ok":
+                return str(told).partition("\n")[0]
+            connection.execute("SELECT version_num FROM alembic_version")
+            if os.access(database, os.W_OK):
+                connection.execute("BEGIN IMMEDIATE")
+                connection.rollback()
+    except sqlite3.OperationalError as error:
+        return "locked" if "locked" in str(error) else "" if "unable to open" in str(error) else str(error)
+    except sqlite3.DatabaseError as error:
+        return str(error)
+    return ""
+
+
+def runs(uri: str) -> Iterator[Finding]:
+    """Whether runs that say they are running are; those whose process has ended are closed."""
+    from tractexp.tracking import owner
+    from tractexp.tracking.store import database_of, open_store, sentences
+
+    database = database_of(uri)
+    if database is not None and not database.exists():
+        return
+    client: Any = open_store(uri)
+    with sentences(uri):
+        closed = [*owner.closed, *owner.close_stale(client)]
+        left = owner.running(client)
+    if closed:
+        yield HEALED, f"{len(closed)} runs whose process had ended are closed as KILLED"
+    unknown = [run for run in left if owner.gone(run.data.tags.get(owner.TAG, "")) is None]
+    for run in unknown:
+        where = run.data.tags.get(owner.TAG, "").partition("/")[0] or "a process that is not known"
+        yield (
+            WRONG, f"run '{run.info.run_name}' ({run.info.run_id}) says it is running on {where}, which cannot be told"
+            " from here; where it is not, run tractexp doctor there, or delete the run in MLflow",
+        )  # fmt: skip
+    if not unknown:
+        yield SOUND, f"{len(left)} runs are running" if left else "no run says it is running that is not"

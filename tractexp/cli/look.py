@@ -1,0 +1,45 @@
+"""`tractexp look FILE...`: what files hold, which loads they show, what happened, and the command that fits it."""
+
+import argparse
+import re
+import time
+from pathlib import Path
+from typing import Any
+
+from tractexp.errors import UserError
+from tractexp.progress import console
+
+FOLDER = Path("outputs", "looks")
+DOES = "Look at files without saying which channels they have: loads, events, what is worth fitting, and the command."
+SETTING = re.compile(r"(?:data\.)?([a-z_]+)=(.*)", re.DOTALL)
+
+
+def look(arguments: list[str]) -> int:
+    """Print and write a look at files; returns the exit code. Raises `UserError` for what cannot be read."""
+    parser = argparse.ArgumentParser(prog="tractexp look", description=DOES)
+    parser.add_argument("file", nargs="+", metavar="FILE", help="any file that can be read")
+    parser.add_argument("--folder", type=Path, help=f"where the page is written; default: a new one in {FOLDER}")
+    parser.epilog = "Settings of the reader are given as KEY=VALUE, such as 'voltages=[4,5,6]' or encoding=gbk."
+    chosen = parser.parse_args(arguments)
+    settings = [s for each in chosen.file if not Path(each).exists() and (s := SETTING.fullmatch(each))]
+    paths = [each for each in chosen.file if Path(each).exists() or not SETTING.fullmatch(each)]
+    if not paths:
+        raise UserError("tractexp look: give a file beside the settings, e.g. tractexp look station.cfg")
+    from tractexp.api.look import look as looked
+    from tractexp.api.task import call, listed
+    from tractexp.blocks.terminal import show
+
+    made = call(looked, *paths, **{s[1]: _value(s[2]) for s in settings})
+    show(made.summary(), console())
+    listed(made.write(chosen.folder or FOLDER / f"{Path(paths[0]).stem}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"))
+    return 0
+
+
+def _value(text: str) -> Any:
+    """A setting's value as YAML reads it; what YAML does not read is a text."""
+    import yaml
+
+    try:
+        return yaml.safe_load(text)
+    except yaml.YAMLError:
+        return text

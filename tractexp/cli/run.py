@@ -1,0 +1,74 @@
+"""From a composed configuration to a task that runs."""
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+from tractexp.api.task import Job
+from tractexp.cli.chosen import given, refuse_unread
+from tractexp.errors import Stopped, UserError
+from tractexp.plugin import build
+
+TERMINATED = 143  # the exit code of a process that SIGTERM ended
+
+
+def run(config: Any) -> None:
+    """Run the task of a composed configuration by itself. A refused job leaves no folder behind."""
+    from hydra.core.hydra_config import HydraConfig
+    from omegaconf import OmegaConf
+
+    hydra = HydraConfig.get()
+    folder, choices = Path(hydra.runtime.output_dir), dict(hydra.runtime.choices)
+    try:
+        plain: Any = OmegaConf.to_container(config, resolve=True)
+        perform(Job(plain, choices, folder, given=given(hydra.overrides.task, choices)))
+    except UserError:
+        _cleared(folder)
+        raise
+    except KeyboardInterrupt as stop:
+        kept = so_far(stop, folder)
+        _cleared(folder)
+        raise Stopped(f"{_how(stop)}; {kept or again(config)}", getattr(stop, "code", 130)) from None
+
+
+def _cleared(folder: Path) -> None:
+    """Remove a folder that holds nothing but what was asked."""
+    if {p.name for p in folder.iterdir()} <= {".hydra"}:
+        shutil.rmtree(folder)
+
+
+def _how(stop: KeyboardInterrupt) -> str:
+    return "ended by SIGTERM" if getattr(stop, "code", 130) == TERMINATED else "interrupted"
+
+
+def so_far(stop: KeyboardInterrupt, folder: Path) -> str:
+    """Keep what a search had found when it was stopped; a sentence on it, "" where there is nothing."""
+    if (found := getattr(stop, "result", None)) is None:
+        return ""
+    from tractexp.identification.result import write_history
+
+    path = found.result.write(folder / "interrupted.json")
+    write_history(folder / "history.csv", found.ended.history)
+    return (
+        f"the best of {found.result.simulations} simulations so far, objective {found.result.objective:.4g} pu², is in"
+        f" {path}; it is neither polished nor judged, and not logged"
+    )
+
+
+def again(config: Any) -> str:
+    """What becomes of a task that was stopped and has kept nothing in its folder."""
+    from tractexp.plugin import get
+
+    if getattr(get("task", config["task"]["name"]), "resumes", False):
+        return "the same command goes on where it was"
+    return "nothing was logged for this run"
+
+
+def perform(job: Job) -> None:
+    """Check a job's configuration and run its task: the same for a single job and for one of a sweep."""
+    from tractexp.schema import check
+
+    check(job.config)
+    task = build("task", job.config["task"])
+    refuse_unread(task, job.given, task.needless())
+    task.run(job)

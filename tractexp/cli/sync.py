@@ -1,0 +1,33 @@
+"""`tractexp sync`: log what could not be logged when it was made, or what a lost store had."""
+
+import argparse
+from collections import Counter
+from pathlib import Path
+
+from tractexp.errors import UserError
+from tractexp.progress import say
+
+FOLDER = Path("outputs")
+DOES = "Log the runs whose results are in files but not in MLflow; what is there already is left as it is."
+
+
+def sync(arguments: list[str]) -> int:
+    """Send what folders keep to the stores it belongs to; returns the exit code, 2 where something could not be."""
+    parser = argparse.ArgumentParser(prog="tractexp sync", description=DOES)
+    parser.add_argument("folder", nargs="?", type=Path, default=FOLDER, help=f"of runs; default: {FOLDER}")
+    parser.add_argument("--uri", help="the MLflow store to send them to; default: the one each was to be logged in")
+    chosen = parser.parse_args(arguments)
+    if not chosen.folder.is_dir():
+        raise UserError(f"tractexp sync: there is no folder {chosen.folder}; name the folder of the runs")
+    counts = brought(chosen.folder, chosen.uri)
+    return 2 if counts["not logged"] else 0
+
+
+def brought(folder: Path, uri: str | None) -> Counter[str]:
+    """Send what is kept below a folder and say what became of it."""
+    from tractexp.tracking.sync import sync
+
+    counts = sync(folder.absolute(), uri, tell=lambda line: say(f"  {line}"))
+    told = ", ".join(f"{count} {what}" for what, count in counts.items()) or "none are kept there"
+    say(f"runs in {folder}: {told}")
+    return counts

@@ -1,0 +1,89 @@
+"""Configuration files read without Hydra, which takes half a second: a choice of a group, and what an experiment sets.
+
+A file's `defaults` name other choices, of the same group, of a group below it, or overrides of any group; what the
+file says itself comes last.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from tractexp import plugin
+from tractexp.errors import UserError, among
+
+
+def read_choice(group: str, name: str) -> dict[str, Any]:
+    """The content of a choice of a group: of `conf/GROUP/NAME.yaml`, ours or a plugin package's, else of a plugin.
+
+    Raises `UserError` for a name that is none, and for a file that cannot be read.
+    """
+    file = Path(name) if name.endswith((".yaml", ".yml")) else _file(group, name, folders())
+    if file is None:
+        if name in plugin.discover().get(group, {}):
+            return {"name": name}
+        raise UserError(f"{group}={name}: there is no such choice{among(name, choices(group))}")
+    content = _content(group, file)
+    composed: dict[str, Any] = {}
+    for item in content.pop("defaults", []):
+        if isinstance(item, dict):
+            ((part, chosen),) = item.items()
+            composed[part] = read_choice(f"{group}/{part}", chosen)
+        elif item != "_self_":
+            place, _, chosen = item.partition("@")[0].rpartition("/")
+            composed |= read_choice(place.removeprefix("/").removeprefix("schema/") or group, chosen)
+    for key, value in content.items():
+        nested = isinstance(value, dict) and isinstance(composed.get(key), dict)
+        composed[key] = {**composed[key], **value} if nested else value
+    return composed
+
+
+def set_by_experiment(name: str, places: Sequence[Path]) -> dict[str, str]:
+    """{"task": "paper", "task.parts": "['table1']"}: what an experiment's file and those that it builds on set."""
+    file = _file("experiment", name, places)
+    if file is None:
+        return {}
+    content = _content("experiment", file)
+    values: dict[str, str] = {}
+    for item in content.pop("defaults", []):
+        if isinstance(item, dict):
+            values |= {key.removeprefix("override ").strip("/").replace("/", "."): str(v) for key, v in item.items()}
+        elif item != "_self_":
+            values |= set_by_experiment(item.rpartition("/")[2], places)
+    content.pop("hydra", None)  # of the run, not of the task
+    return values | {key: str(value) for key, value in leaves(content)}
+
+
+def leaves(node: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """The values of a configuration by their keys: ("model.per_event", [])."""
+    for key, value in node.items():
+        if isinstance(value, dict) and value:
+            yield from leaves(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def choices(group: str, *, files: bool = False) -> list[str]:
+    """The names one may choose in a group, or those among them that have a file."""
+    named = {file.stem for folder in folders() for file in (folder / group).glob("*.yaml")}
+    return sorted(named if files else {*named, *plugin.discover().get(group, {})})
+
+
+def folders() -> list[Path]:
+    """The folders of configurations: of plugin packages first, whose files replace ours."""
+    return [*plugin.configuration_folders(), plugin.CONF]
+
+
+def _file(group: str, name: str, places: Iterable[Path]) -> Path | None:
+    return next((f for folder in places if (f := folder / group / f"{name}.yaml").is_file()), None)
+
+
+def _content(group: str, file: Path) -> dict[str, Any]:
+    import yaml
+
+    try:
+        content = yaml.safe_load(file.read_text(encoding="utf-8")) or {}
+    except (OSError, yaml.YAMLError) as error:
+        raise UserError(f"{group}={file} cannot be read: {error}") from error
+    if not isinstance(content, dict):
+        raise UserError(f"{group}={file} must hold keys and values")
+    return content

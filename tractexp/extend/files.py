@@ -1,0 +1,37 @@
+"""Parts of readers and writers: the parsers of the package, tables and their sidecars, dips within a record."""
+
+from tractexp.files import PACKAGE, located
+from tractexp.filetypes import cev, comtrade, tidy
+from tractexp.filetypes.sidecar import Sidecar, beside
+from tractexp.filetypes.tabulated import Powers, Tabular, kind_of, powers, recording
+from tractexp.filetypes.tidy import restored
+from tractexp.record.dips import Dip, check_numbers, chosen, level, numbered
+from tractexp.record.record import GIVEN, LOAD, SIZES
+from tractexp.recording.archive import records
+from tractexp.wording import counted
+
+__all__ = [
+    "GIVEN",
+    "LOAD",
+    "PACKAGE",
+    "SIZES",
+    "Dip",
+    "Powers",
+    "Sidecar",
+    "Tabular",
+    "beside",
+    "cev",
+    "check_numbers",
+    "chosen",
+    "comtrade",
+    "counted",
+    "kind_of",
+    "level",
+    "located",
+    "numbered",
+    "powers",
+    "recording",
+    "records",
+    "restored",
+    "tidy",
+]

@@ -1,0 +1,1 @@
+"""One study in one file: its call, its result, and its task for the command line."""

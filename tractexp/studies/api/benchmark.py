@@ -1,0 +1,209 @@
+"""Optimizers on the functions of BBOB, whose optima are known."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from tractexp import files, provenance
+from tractexp.api.arguments import Choice, public
+from tractexp.api.task import Job, Task
+from tractexp.blocks import Report, Table
+from tractexp.errors import UserError, check_distinct, check_range
+from tractexp.outcome import Written
+from tractexp.plugin import build, get, plugin
+from tractexp.progress import counting
+
+if TYPE_CHECKING:
+    from tractexp.studies.bbob.runs import BbobRuns
+
+FUNCTIONS, INSTANCES, DIMENSIONS = tuple(range(1, 25)), (1, 2, 3), (5,)
+MULTIPLIER = 3000
+TARGETS = tuple(10.0**k for k in range(2, -9, -1))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BenchmarkResult(Written):
+    """All runs on BBOB, and what they come to. `optimizers` holds the settings of each, by its name."""
+
+    kind = "benchmark"
+    page = "benchmark.html"
+
+    bbob: "BbobRuns"
+    optimizers: Mapping[str, Mapping[str, Any]]
+
+    @property
+    def sentences(self) -> list[str]:
+        """What may be quoted."""
+        from tractexp.studies.bbob.page import sentences
+
+        return sentences(self.bbob)
+
+    def table(self) -> Table:
+        from tractexp.studies.bbob.page import scale
+
+        bbob = self.bbob
+        rows = [
+            [name, d, *(bbob.share(name, d, fs) for fs in (bbob.plan.functions, *bbob.groups().values())),
+             bbob.solved(name, d)]
+            for d in bbob.plan.dimensions for name in bbob.optimizers
+        ]  # fmt: skip
+        columns = ["optimizer", "dimension", "all", *bbob.groups(), "solved"]
+        return Table(columns, rows, f"share of targets met, functions solved: {scale(bbob)}")
+
+    def summary(self) -> Report:
+        from tractexp.studies.bbob import page
+
+        return page.summary(self.bbob)
+
+    def report(self) -> Report:
+        from tractexp.studies.bbob import page
+
+        return page.report(self.bbob)
+
+    def write_results(self, folder: Path) -> list[Path]:
+        from tractexp.studies.bbob.page import content
+
+        return [files.write_json(folder / "benchmark.json", content(self.bbob, self.optimizers))]
+
+    def to_dict(self) -> dict[str, Any]:
+        from tractexp.studies.bbob.page import content
+
+        return {**content(self.bbob, self.optimizers), "titles": self.bbob.titles}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        from tractexp.studies.bbob.runs import BbobRuns, Plan, Run
+
+        def run(row: Mapping[str, Any]) -> Run:
+            return Run(**{**row, "hits": tuple(np.inf if n is None else n for n in row["hits"])})
+
+        plan = Plan(*(_tuple(content[item.name]) for item in dataclasses.fields(Plan)))
+        titles = {int(function): title for function, title in content["titles"].items()}
+        bbob = BbobRuns(plan, tuple(content["optimizers"]), titles, [run(row) for row in content["runs"]])
+        return cls(bbob, content["optimizers"])
+
+
+@public
+def benchmark(
+    optimizers: Any = None,
+    *,
+    functions: Sequence[int] = FUNCTIONS,
+    instances: Sequence[int] = INSTANCES,
+    dimensions: Sequence[int] = DIMENSIONS,
+    multiplier: int = MULTIPLIER,
+    targets: Sequence[float] = TARGETS,
+    seed: int = 0,
+    cores: int | None = None,
+    progress: Any = None,
+) -> BenchmarkResult:
+    """Run optimizers on the noiseless functions of BBOB; the same seed gives the same runs on any number of cores.
+
+    `optimizers` is one as `tractexp.identify` takes it, a list of such, or a mapping of the names to call them by to
+    such. Each run may make `multiplier` evaluations per dimension; `targets` are distances to the optimum; `cores` None
+    means all. `progress`: None shows how many runs have ended, False does not; a callable is told of each.
+
+    Raises `UserError` for wrong names or values, an optimizer that needs residuals, and without the extra [benchmark].
+    """
+    from tractexp.studies.bbob.runs import Plan, package, perform
+
+    check(functions, instances, dimensions, multiplier, targets, cores)
+    check_range("seed", seed, 0)
+    chosen = Choice.several("optimizer", optimizers)
+    built = {one.name: one.build("optimizer") for one in chosen}
+    for name, optimizer in built.items():
+        if optimizer.polish:
+            raise UserError(
+                f"optimizer {name} polishes by least squares, which need residuals that a BBOB function does not"
+                " have; set optimizer.polish=false"
+            )
+    package()
+    ordered = tuple(sorted(targets, reverse=True))
+    plan = Plan(tuple(functions), tuple(dimensions), tuple(instances), multiplier, ordered, seed)
+    with counting("runs", len(plan.cases) * len(built), progress) as count:
+        bbob = perform(built, plan, cores, count)
+    return BenchmarkResult(bbob, {one.name: one.node for one in chosen})
+
+
+def check(
+    functions: Sequence[int], instances: Sequence[int], dimensions: Sequence[int], multiplier: int,
+    targets: Sequence[float], cores: int | None,
+) -> None:  # fmt: skip
+    """Raise `UserError` for settings out of range."""
+    numbers = {
+        "functions": (functions, 1, 24), "instances": (instances, 1, 10_000), "dimensions": (dimensions, 2, 100),
+        "targets": (targets, 1e-12, 1e12),
+    }  # fmt: skip
+    for name, (values, low, high) in numbers.items():
+        check_distinct(f"task.{name}", values)
+        for value in values:
+            check_range(f"task.{name}", value, low, high)
+    check_range("task.multiplier", multiplier, 1)
+    if cores is not None:
+        check_range("task.cores", cores, 1)
+
+
+def _tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+@plugin
+class Benchmark(Task, call=benchmark, given=("optimizers",)):
+    """Run the optimizer and those it is set against on BBOB: ERT and ECDF, one page, JSON."""
+
+    reads = ("optimizer",)
+    instead = {
+        "budget": "set task.multiplier instead",
+        "time_limit": "set task.multiplier instead",
+        "target": "set task.targets instead",
+    }
+
+    functions: list[int] = field(default_factory=lambda: list(FUNCTIONS))
+    instances: list[int] = field(default_factory=lambda: list(INSTANCES))
+    dimensions: list[int] = field(default_factory=lambda: list(DIMENSIONS))
+    multiplier: int = MULTIPLIER  # evaluations per dimension in each run
+    targets: list[float] = field(default_factory=lambda: list(TARGETS))  # f - f_opt
+    against: list[str] = field(default_factory=list)  # optimizers with their own defaults
+    cores: int | None = None  # processes; null: all cores, one for a job of a sweep
+
+    def check(self) -> None:
+        check(self.functions, self.instances, self.dimensions, self.multiplier, self.targets, self.cores)
+        if self.against:
+            check_distinct("task.against", self.against)
+        for name in self.against:
+            get("optimizer", name)
+
+    def perform(self, job: Job, **instead: Any) -> BenchmarkResult:
+        chosen = job.choices["optimizer"]
+        optimizers = {chosen: job.chosen}
+        for name in self.against:
+            if build("optimizer", {"name": name}) != job.optimizer:
+                optimizers[f"{name} by default" if name == chosen else name] = {"name": name}
+        cores = self.cores or (1 if job.in_sweep else None)
+        return super().perform(job, optimizers=optimizers, cores=cores, progress=None, **instead)
+
+    def log(self, job: Job, result: BenchmarkResult, paths: list[Path]) -> None:
+        """The experiment is named after the benchmark: it has no data of the user's."""
+        node = job.config["tracking"]
+        if not node["enabled"]:
+            return
+        from tractexp import tracking
+
+        metrics = {
+            tracking.metric_name(f"share {name} {d}d"): result.bbob.share(name, d, result.bbob.plan.functions)
+            for name in result.bbob.optimizers for d in result.bbob.plan.dimensions
+        }  # fmt: skip
+        optimizer, seed = job.choices["optimizer"], str(job.seed)
+        run = tracking.Run(
+            experiment=node["experiment"] or "benchmark bbob",
+            name=f"{optimizer} on BBOB",
+            parameters=tracking.flatten({key: job.config[key] for key in ("task", "optimizer", "seed")}),
+            metrics=metrics,
+            tags={"task": "benchmark", "optimizer": optimizer, "seed": seed, "git_commit": provenance.commit()},
+            artifacts=paths,
+            parent=job.sweep,
+        )
+        job.send(run)

@@ -1,0 +1,309 @@
+"""Which optimizer is better: the runs of a sweep, or of any filter over MLflow, compared."""
+
+import functools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import inf
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+from tractexp import files
+from tractexp.api.arguments import public
+from tractexp.api.task import Job, Task, listed
+from tractexp.blocks import Report, Table
+from tractexp.errors import UserError, check_choice, check_range
+from tractexp.outcome import Written
+from tractexp.plugin import plugin
+from tractexp.progress import say
+
+if TYPE_CHECKING:
+    from tractexp.studies.comparison.comparison import Comparison
+    from tractexp.studies.comparison.overall import Several
+    from tractexp.studies.comparison.runs import Run
+
+SWEEPS = Path("outputs", "sweeps")
+TARGETS = (10.0, 2.0, 1.01)
+APART = ("budget", "time_limit", "target")
+QUOTED = 8  # sentences on the terminal; the page has all
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ComparisonResult(Written):
+    """A comparison. `content` is that of `comparison.json`; from `call`, the arguments, a loaded result is drawn."""
+
+    kind = "comparison"
+    page = "comparison.html"
+
+    call: Mapping[str, Any]
+    source: str  # where the runs are from, in words
+    content: Mapping[str, Any]
+    judged: "Comparison | Several | None" = None  # None in a loaded result
+
+    @functools.cached_property
+    def comparison(self) -> "Comparison | Several":
+        """What stands behind the page. A loaded result reads the runs again."""
+        return self.judged or _compared(**self.call)[1]
+
+    @property
+    def comparisons(self) -> "Mapping[str, Comparison]":
+        """The comparison on each problem, by the problem's name; that of one problem alone is called ""."""
+        return getattr(self.comparison, "comparisons", {"": self.comparison})
+
+    @property
+    def folder(self) -> Path | None:
+        """The sweep's folder; None where the runs are from MLflow."""
+        return Path(self.call["sweep"]) if self.call["filter"] is None else None
+
+    @property
+    def answer(self) -> str:
+        """Which variant to take, as far as these runs say."""
+        return self.content["answer"]
+
+    @property
+    def sentences(self) -> list[str]:
+        """What may be quoted."""
+        return self.content["sentences"]
+
+    def table(self) -> Table:
+        several = self.content.get("problems")
+        each = several or {self.content["problem"]: self.content}
+        rows = [
+            [*([problem] if several else []), v["name"], v["failures"], v["objective"]["median"],
+             v["objective"]["worst"], v["at_floor"], v["ert"]["simulations"][_hardest(content["targets"])]]
+            for problem, content in each.items() for v in content["variants"]
+        ]  # fmt: skip
+        columns = ["variant", "failed", "median [pu²]", "worst [pu²]", "share at floor", "ERT [simulations]"]
+        return Table(["problem", *columns] if several else columns, rows, f"{self.source}: {', '.join(each)}")
+
+    def summary(self) -> Report:
+        report, several = Report(), "problems" in self.content
+        if several:
+            report.text(f"{self.source}: {', '.join(self.content['problems'])}").add(*self._over_all())
+        else:
+            report.add(self._of_one())
+            target = min(self.content["targets"])
+            terms = "objectives in pu² at the end of the search; at floor: within 1 %; ERT: simulations to"
+            report.text(f"{terms} {target:g} x floor", self.answer)
+        shown = self.sentences if several else self.sentences[:QUOTED]
+        report.text(*(f"- {sentence}" for sentence in [*shown, *self.content["notes"]]))
+        if (more := len(self.sentences) - len(shown)) > 0:
+            report.text(f"- and {more} more sentences in {self.page}")
+        return report
+
+    def _of_one(self) -> Table:
+        """The table of one problem, as a person reads it."""
+        from tractexp.studies.comparison.claims import number
+
+        rows = [
+            [
+                name,
+                str(failures),
+                number(median),
+                number(worst),
+                f"{at_floor:.0%}",
+                number(inf if ert is None else ert),
+            ]
+            for name, failures, median, worst, at_floor, ert in self.table().rows
+        ]
+        columns = ["variant", "failed", "median", "worst", "at floor", "ERT"]
+        return Table(columns, rows, f"{self.source}: {self.content['problem']}")
+
+    def _over_all(self) -> Iterator[Table]:
+        """What several problems come to under each of the terms, the best variants first."""
+        for overall in getattr(self.comparison, "overall", ()):
+            best = list(overall.figures.items())[:QUOTED]
+            cells = [[name, *(f"{x:.0%}" if overall.share else f"{x:.3g}" for x in values)] for name, values in best]
+            yield Table(["variant", *overall.columns], cells, f"{overall.terms}, {overall.where}: {overall.measure}")
+
+    def report(self) -> Report:
+        return _report(self.comparison).report(self.comparison, self.source)
+
+    def write_results(self, folder: Path) -> list[Path]:
+        return [files.write_json(folder / "comparison.json", self.content)]
+
+    def to_dict(self) -> dict[str, Any]:
+        return {"call": dict(self.call), **self.content}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        own = {key: value for key, value in content.items() if key not in ("call", "kind", "tractexp")}
+        return cls(content["call"], content["source"], own)
+
+
+@public
+def compare(
+    sweep: Path | str | None = None,
+    *,
+    filter: str | None = None,
+    uri: str | None = None,
+    experiment: str | None = None,
+    data: str | None = None,
+    targets: Sequence[float] = TARGETS,
+    ties: float = 1e-3,
+    floor: float | None = None,
+    reference: str | None = None,
+    apart: Sequence[str] = (),
+    bbob: int = 0,
+    cores: int | None = None,
+    progress: Any = None,
+) -> ComparisonResult:
+    """Compare the variants in a sweep's folder (None: the newest under outputs/sweeps), or what a `filter` finds.
+
+    The filter is MLflow's, over the store at `uri` (None: the current folder's) and one `experiment` (None: all).
+    `data` keeps the runs on one choice of data; runs on several are compared on each, and over all. So are those that
+    differ in the limits of a search named in `apart`, such as "budget". With `bbob` the variants are run on so many
+    instances of the functions of BBOB as well, on `cores` processes (None: all). `targets` are those of running times,
+    in multiples of the floor; objectives within the share `ties` of it count as equal; `floor` [pu²] is what the noise
+    leaves (None: what least squares reach from the ends of the runs and from many starts, or the best of all runs where
+    their records cannot be read any more). With a `reference` only its pairs are tested. `progress`: None shows how far
+    that is, False does not; a callable is told. Raises `UserError` where no runs are found, or their models differ.
+    """
+    check(sweep, filter, targets, ties, floor, apart, bbob)
+    if filter is None:
+        from tractexp.studies.comparison import load
+
+        sweep = str(sweep if sweep is not None else load.newest_sweep(SWEEPS))
+    call = {
+        "sweep": sweep, "filter": filter, "uri": uri, "experiment": experiment, "data": data,
+        "targets": list(targets), "ties": ties, "floor": floor, "reference": reference, "apart": list(apart),
+        "bbob": bbob,
+    }  # fmt: skip
+    source, comparison = _compared(**call, cores=cores, progress=progress)
+    return ComparisonResult(call, source, _report(comparison).content(comparison, source), comparison)
+
+
+def check(
+    sweep: Any, filter: str | None, targets: Sequence[float], ties: float, floor: float | None,
+    apart: Sequence[str] = (), bbob: int = 0,
+) -> None:  # fmt: skip
+    """Raise `UserError` for settings out of range."""
+    if sweep is not None and filter is not None:
+        raise UserError("task.sweep and task.filter are both given; the runs come from one or the other")
+    if floor is not None and not 0 < floor < float("inf"):
+        raise UserError(f"task.floor={floor:g} must be an objective above 0, in pu²")
+    if not targets:
+        raise UserError("task.targets is empty; it lists multiples of the floor, such as [10,2,1.01]")
+    for target in targets:
+        check_range("task.targets", target, 1.0)
+    check_range("task.ties", ties, 0.0, 1.0)
+    for key in apart:
+        check_choice("task.apart", key, APART)
+    check_range("task.bbob", bbob, 0, 1000)
+
+
+def _report(comparison: "Comparison | Several") -> Any:
+    """The module that reports one problem, or several."""
+    from tractexp.studies.comparison import overall_page, page
+    from tractexp.studies.comparison.overall import Several
+
+    return overall_page if isinstance(comparison, Several) else page
+
+
+def _hardest(targets: Sequence[float]) -> int:
+    return targets.index(min(targets))
+
+
+def _compared(
+    *, sweep: str | None, filter: str | None, uri: str | None, experiment: str | None, data: str | None,
+    apart: Sequence[str] = (), bbob: int = 0, cores: int | None = None, progress: Any = False, **judging: Any,
+) -> "tuple[str, Comparison | Several]":  # fmt: skip
+    """Where the runs are from, and their comparison: of several problems each by itself and all together."""
+    from tractexp.studies.comparison import runs as gathering
+    from tractexp.studies.comparison.judging import judged, several
+
+    runs, source = _runs(sweep, filter, uri, experiment)
+    if data is not None:
+        runs = gathering.on(runs, source, data)
+    groups = gathering.parted(runs, apart)
+    if len(groups) == 1 and not bbob:
+        return source, judged(gathering.gather(runs, source), progress, judging)
+    if judging["floor"] is not None and len(groups) > 1:
+        raise UserError(
+            f"task.floor={judging['floor']:g} is the floor of one problem, and {source} has {len(groups)}; leave it"
+            " out, or choose one by task.data"
+        )
+    return source, several(groups, source, judging, Path(sweep) if sweep else None, bbob, cores, progress)
+
+
+def _runs(
+    sweep: str | None, filter: str | None, uri: str | None, experiment: str | None
+) -> "tuple[list[Run], str]":  # fmt: skip
+    """The runs, and where they are from in words."""
+    from tractexp.studies.comparison import load
+
+    if filter is None:
+        assert sweep is not None
+        return load.from_sweep(Path(sweep)), f"the sweep {Path(sweep)}"
+    from tractexp import tracking
+    from tractexp.tracking.find import find
+
+    source = f"the filter {filter}"
+    return load.from_logged(find(tracking.address(uri), filter, experiment), source), source
+
+
+@plugin
+class Compare(Task, call=compare, given=("uri", "experiment")):
+    """Settle which optimizer is better: tables, tests over paired seeds, charts, one page, sentences to quote."""
+
+    reads = ()
+    instead = {"data": "choose among the runs by task.data"}
+
+    sweep: str | None = None  # folder of a sweep; null: the newest under outputs/sweeps
+    filter: str | None = None  # instead: a filter over MLflow, "tags.data = 'tibet_50pct'"
+    data: str | None = None  # compare the runs on this choice of data only
+    targets: list[float] = field(default_factory=lambda: list(TARGETS))  # of running times, times the floor
+    ties: float = 1e-3  # objectives within this share of the floor count as equal in the tests
+    floor: float | None = None  # objective that the noise leaves; null: polished from the runs and many starts
+    reference: str | None = None  # test only against this variant; null: every pair
+    apart: list[str] = field(default_factory=list)  # limits that make comparisons of their own: [budget]
+    bbob: int = 0  # instances of each function of BBOB on which the variants are run as well
+    cores: int | None = None  # processes for these; null: all cores
+
+    def check(self) -> None:
+        check(self.sweep, self.filter, self.targets, self.ties, self.floor, self.apart, self.bbob)
+
+    def perform(self, job: Job, **instead: Any) -> ComparisonResult:
+        node = job.config["tracking"]
+        return super().perform(job, uri=node["uri"], experiment=node["experiment"], progress=None, **instead)
+
+    def log(self, job: Job, result: ComparisonResult, paths: list[Path]) -> None:
+        """Put what was written into the sweep's folder, too, and the page on the sweep's run, where there is one."""
+        if result.folder is not None and result.folder != job.folder:
+            listed(files.copy(path, result.folder / path.name) for path in paths)
+        if job.config["tracking"]["enabled"]:
+            _track(job, result, paths)
+
+
+def _track(job: Job, result: ComparisonResult, paths: list[Path]) -> None:
+    """Add the page to the sweep's run, or log a run of its own where there is no such run."""
+    from tractexp import tracking
+    from tractexp.tracking.attach import attach
+    from tractexp.tracking.swept import parent_of, waits
+
+    if result.folder is not None and waits(result.folder):
+        return  # the page is sent with the run of the sweep
+    parent = parent_of(result.folder) if result.folder is not None else None
+    comparisons = result.comparisons
+    records = {run.data for c in comparisons.values() for variant in c.gathered.variants for run in variant.runs}
+    data = records.pop() if len(records) == 1 else f"{len(records)} records"
+    try:
+        if parent is not None and attach(parent, job.store, paths):
+            say(f"logged on the run of the sweep; to see it: {job.look}")
+            return
+    except UserError as error:
+        say(f"not logged: {error}")
+        return
+    run = tracking.Run(
+        experiment=job.config["tracking"]["experiment"] or f"compare {data}",
+        name=f"comparison of {len(next(iter(comparisons.values())).summaries)} variants",
+        parameters=tracking.flatten({"task": job.config["task"]}),
+        metrics={
+            tracking.metric_name(f"median {s.name} {label}".strip()): s.objective.median
+            for label, comparison in comparisons.items()
+            for s in comparison.summaries
+            if s.runs > s.failures
+        },
+        tags={"task": "compare", "data": data},
+        artifacts=paths,
+    )
+    job.send(run)

@@ -1,0 +1,207 @@
+"""The paper's tables and figures, measured again: one page, one verdict for each claim."""
+
+import functools
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+from tractexp import files
+from tractexp.api.arguments import public
+from tractexp.api.setup import Setup, recorded
+from tractexp.api.task import Job, Task, listed
+from tractexp.blocks import Report, Table
+from tractexp.errors import check_choice, check_range
+from tractexp.outcome import Drawing, Written
+from tractexp.plugin import plugin
+from tractexp.progress import NEXT_LINES, say, telling
+
+if TYPE_CHECKING:
+    from tractexp.studies.paper.claims import Claim
+    from tractexp.studies.paper.study import Study
+
+PARTS = (
+    "table1", "table2", "table3", "table4", "table5", "figure3", "figure4", "figure6", "figure8", "figure9", "figure10",
+    "figure11", "equations", "readings",
+)  # fmt: skip
+HELD_OUT = {"interpolation": {"table4", "figure10"}, "extrapolation": {"table5", "figure11"}}  # what needs which dip
+SEEDS = 30
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PaperResult(Written):
+    """The paper's claims with their verdicts. A loaded result measures its page again, from the records it holds."""
+
+    kind = "paper"
+    page = "paper.html"
+
+    setup: Setup
+    settings: Mapping[str, Any]  # seeds, workers
+    parts: Sequence[str]
+    claims: "Sequence[Claim]"
+    measured: "Study | None" = None  # None in a loaded result
+    seconds: float = 0.0  # that it took
+
+    @functools.cached_property
+    def study(self) -> "Study":
+        """What stands behind the page; each part is measured at its first use."""
+        return self.measured or _study(self.setup, **self.settings)
+
+    @property
+    def counts(self) -> Counter[str]:
+        """How many claims got which verdict."""
+        return Counter(claim.word for claim in self.claims)
+
+    def table(self) -> Table:
+        from tractexp.studies.paper.claims import counted
+
+        rows = [[claim.part, claim.text, claim.verdict, claim.measured] for claim in self.claims]
+        return Table(["where", "the paper's claim", "verdict", "measured"], rows, counted(self.claims))
+
+    def summary(self) -> Report:
+        from tractexp.studies.paper.claims import counted
+
+        report = Report()
+        for claim in self.claims:
+            report.text(f"  {claim.verdict}: {claim.text}", f"    {claim.measured}")
+        report.text(*[counted(self.claims)] * bool(self.claims))
+        return report.text(*[f"in {self.seconds:.0f} s"] * bool(self.seconds))
+
+    def report(self) -> Report:
+        return self._report
+
+    @functools.cached_property
+    def _report(self) -> Report:
+        from tractexp.studies.paper.page import report
+
+        return report(self.study, self.parts, self.claims)
+
+    def write_results(self, folder: Path) -> list[Path]:
+        """paper.json: the claims and what was measured."""
+        content = {key: value for key, value in self.to_dict().items() if key != "setup"}
+        return [files.write_json(folder / "paper.json", content)]
+
+    def drawings(self) -> Mapping[str, Drawing]:
+        return {**super().drawings(), "paper.md": lambda path: files.write(path, self._report.markdown)}
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "claims": [asdict(claim) for claim in self.claims], "settings": dict(self.settings),
+            "parts": list(self.parts), "setup": self.setup.to_dict(),
+        }  # fmt: skip
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        from tractexp.studies.paper.claims import Claim
+
+        claims = [Claim(**claim) for claim in content["claims"]]
+        return cls(Setup.from_dict(content["setup"]), content["settings"], content["parts"], claims)
+
+
+@public
+def paper(
+    records: Any,
+    model: Any = None,
+    *,
+    validate: Any = (),
+    parts: Sequence[str] = (),
+    seeds: int = SEEDS,
+    workers: int | None = None,
+    bounds: Mapping[str, Sequence[float]] | None = None,
+    fixed: Mapping[str, float] | None = None,
+    per_event: Sequence[str] | None = None,
+    substeps: int | None = None,
+    objective: Any = None,
+    budget: int | None = None,
+    time_limit: float | None = None,
+    target: float | None = None,
+    seed: int = 0,
+    progress: Any = None,
+) -> PaperResult:
+    """Measure what the paper claims, on `records` fitted and on those of `validate`.
+
+    `parts` are tables and figures ("table2", "figure9", "equations"; none: all). Each of the paper's optimizers
+    searches under `seeds` seeds, on `workers` processes (None: one for each core). Everything else is as in
+    `tractexp.identify`. `progress`: None shows the stage, False does not; a callable is told each stage.
+
+    Raises `UserError` for wrong names or values, and where a part needs a held-out dip that is not there.
+    """
+    started = time.perf_counter()
+    check(parts, seeds, workers)
+    model_settings = {"bounds": bounds, "fixed": fixed, "per_event": per_event, "substeps": substeps}
+    limits = {"budget": budget, "time_limit": time_limit, "target": target}
+    setup = Setup.of(records, model, validate, objective, model_settings, seed=seed, **limits)
+    settings, chosen = {"seeds": seeds, "workers": workers}, [p for p in PARTS if p in parts or not parts]
+    with telling(progress) as tell:
+        study = _study(setup, **settings, tell=tell, count=_counted(tell))
+        from tractexp.studies.paper.claims import claims
+
+        for kind, needing in HELD_OUT.items():
+            if needing & set(chosen):
+                study.held(kind)
+        study.prepare(chosen)
+        return PaperResult(setup, settings, chosen, claims(study, chosen), study, time.perf_counter() - started)
+
+
+def check(parts: Sequence[str], seeds: int, workers: int | None) -> None:
+    """Raise `UserError` for settings out of range."""
+    for part in parts:
+        check_choice("task.parts", part, PARTS)
+    check_range("task.seeds", seeds, 1)
+    if workers is not None:
+        check_range("task.workers", workers, 1)
+
+
+def _study(setup: Setup, seeds: int, workers: int | None, **listeners: Any) -> "Study":
+    from tractexp.studies.paper.study import Study
+
+    literal = replace(setup, model=setup.model.with_(integration="printed"))
+    return Study(
+        recipe=setup.problem_of, literal=literal.problem_of,
+        node=asdict(setup.model), train=setup.train, held_out=setup.validate, seeds=seeds,
+        seed=setup.seed, workers=workers, limits=setup.limits, **listeners,
+    )  # fmt: skip
+
+
+def _counted(tell: Callable[[str], None]) -> Callable[[int, int], None]:
+    """A counter of the searches that have ended, which reports now and then."""
+    last = time.perf_counter()
+
+    def count(done: int, total: int) -> None:
+        nonlocal last
+        now = time.perf_counter()
+        if done == total or now - last > NEXT_LINES:
+            last = now
+            tell(f"  {done} of {total} searches")
+
+    return count
+
+
+@plugin
+class Paper(Task, call=paper):
+    """Measure what the paper claims, on the shipped stand-ins or on records of your own: paper.json, .html and .md."""
+
+    resumes = True
+    reads = ("data", "model", "objective", "budget", "time_limit", "target")
+    instead = {"optimizer": "it compares the paper's three; task=generalise takes any"}
+
+    parts: list[str] = field(default_factory=list)  # such as [table1,figure9]; empty: all
+    held_out: dict[str, list[str]] = field(default_factory=dict)  # {choice of data: files}; without data.validate
+    docs: str | None = None  # write paper.md to this file too
+
+    def check(self) -> None:
+        check(self.parts, getattr(self, "seeds"), getattr(self, "workers"))  # noqa: B009 # settings of the call
+
+    def perform(self, job: Job, **instead: Any) -> PaperResult:
+        job = job.holding_out(self.held_out)
+        for line in recorded(job.events_of_fit.train, job.events_of_fit.validate, "hold out"):
+            say(line)
+        return super().perform(job, progress=lambda line: say(f"  {line}"), **instead)
+
+    def log(self, job: Job, result: PaperResult, paths: list[Path]) -> None:
+        if self.docs is not None:
+            listed(files.copy(path, Path(self.docs)) for path in paths if path.suffix == ".md")
+        metrics = {verdict.replace(" ", "_"): float(n) for verdict, n in result.counts.items()}
+        job.log(name="the paper", values={}, metrics=metrics, artifacts=paths)

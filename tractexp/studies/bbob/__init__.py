@@ -1,0 +1,1 @@
+"""Optimizers on BBOB, the functions of the COCO platform."""

@@ -1,0 +1,174 @@
+"""What each switch of an optimizer does, alone and with the others, from whichever variants were run.
+
+Effects are contrasts within a block, of runs with the same seed or on the same function, in log10 of the objective:
+variants that differ in one switch give its main effect, four that differ in two give an interaction. No model is
+fitted, so what no contrast shows is said to be unknown rather than guessed.
+"""
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from tractexp.studies.comparison.runs import Variant
+from tractexp.studies.comparison.statistics import bootstrap
+
+On = frozenset[str]  # the switches that are on
+
+
+@dataclass(frozen=True)
+class Effect:
+    """By what factor switching on multiplies the objective; below 1 it helps. With a 95 % bootstrap interval.
+
+    For an interaction, the factor by which one switch's factor changes when the other is on.
+    """
+
+    switches: tuple[str, ...]
+    factor: float
+    low: float
+    high: float
+    contrasts: tuple[tuple[str, ...], ...]  # the variants behind it: (with, without) or (both, first, second, neither)
+    seeds: int  # or other blocks
+    better: tuple[float, float, float] | None = None  # of a main effect: share of pairs in which it helps, interval
+
+    @property
+    def shown(self) -> bool:
+        """Whether the interval leaves out 1, which is no effect."""
+        return not self.low <= 1.0 <= self.high
+
+
+@dataclass(frozen=True)
+class Ablation:
+    """The effects of the switches of one optimizer."""
+
+    switches: tuple[str, ...]
+    variants: tuple[str, ...]
+    effects: tuple[Effect, ...]
+    company: tuple[Effect, ...]  # of each switch with most others on, against with fewest
+    interactions: tuple[Effect, ...]
+    unknown: tuple[tuple[str, ...], ...]  # switches, or pairs, that these variants cannot tell
+
+
+@dataclass(frozen=True)
+class Family:
+    """Variants of one optimizer that share all settings but switches, by the switches that are on."""
+
+    switches: tuple[str, ...]
+    members: Mapping[On, str]  # names of variants
+
+    def ablation(self, values: Mapping[str, np.ndarray]) -> Ablation | None:
+        """Effects from log10 of the objectives of each variant, (blocks,); None where no contrast can be made."""
+        found = _Contrasts(dict(self.members), {on: values[name] for on, name in self.members.items()}, self.switches)
+        made = found.ablation()
+        return made if made.effects else None
+
+    def cost(self, spent: Mapping[str, float]) -> dict[str, float]:
+        """What each switch adds, on average over its pairs, to what the variants spend."""
+        pairs = {s: [(on | {s}, on) for on in self.members if s not in on and on | {s} in self.members]
+                 for s in self.switches}  # fmt: skip
+        name = self.members
+        return {
+            s: float(np.mean([spent[name[with_]] - spent[name[without]] for with_, without in rows]))
+            for s, rows in pairs.items() if rows
+        }  # fmt: skip
+
+
+def family(variants: Sequence[Variant], plain: Mapping[str, str]) -> Family | None:
+    """The largest family among the variants; None where there is none.
+
+    `plain` says which optimizer another one is with all its switches off.
+    """
+    found = [members for optimizer, without in plain.items() for members in _families(variants, optimizer, without)]
+    largest = max(found, key=len, default={})
+    if len(largest) < 2:
+        return None
+    switches = tuple(sorted({switch for on in largest for switch in on}))
+    return Family(switches, {on: v.name for on, v in largest.items()})
+
+
+def ablate(variants: Sequence[Variant], plain: Mapping[str, str], least: float) -> Ablation | None:
+    """Effects from the variants of one optimizer that share all settings but switches; None where there are none.
+
+    Objectives count from `least` upwards. Seeds that not all of the variants finished are left out.
+    """
+    chosen = family(variants, plain)
+    if chosen is None:
+        return None
+    members = [v for v in variants if v.name in chosen.members.values()]
+    seeds = sorted(set.intersection(*({run.seed for run in v.finished} for v in members)))
+    if not seeds:
+        return None
+    return chosen.ablation({v.name: np.log10([max(v.objectives[s], least) for s in seeds]) for v in members})
+
+
+def _families(variants: Sequence[Variant], optimizer: str, plain: str) -> list[dict[On, Variant]]:
+    """Variants of `optimizer` by the switches that are on, one dictionary for each set of other settings."""
+    own = sorted((v for v in variants if v.settings.get("name") == optimizer), key=lambda v: v.name)
+    without = [v for v in variants if plain and v.settings.get("name") == plain]
+    flags = {k for v in own for k, value in v.settings.items() if isinstance(value, bool)}
+    switches = {k for k in flags if len({v.settings.get(k) for v in own}) > 1}
+    if without:
+        switches |= flags - {k for v in without for k in v.settings}
+
+    def on(v: Variant) -> On:
+        return frozenset(k for k in switches if v.settings.get(k))
+
+    def rest(v: Variant) -> set[tuple[str, str]]:
+        return {(k, repr(x)) for k, x in v.settings.items() if k not in switches and k != "name"}
+
+    made: dict[frozenset[tuple[str, str]], dict[On, Variant]] = defaultdict(dict)
+    for v in own:
+        made[frozenset(rest(v))].setdefault(on(v), v)
+    for v in without:
+        for settings, family in made.items():
+            if rest(v) <= settings:
+                family.setdefault(on(v), v)
+    return list(made.values())
+
+
+@dataclass(frozen=True)
+class _Contrasts:
+    names: dict[On, str]
+    logs: dict[On, np.ndarray]  # log10 of the objective, by seed
+    switches: tuple[str, ...]
+
+    def ablation(self) -> Ablation:
+        single = {(s,): self._pairs(s) for s in self.switches}
+        double = {pair: self._squares(*pair) for pair in combinations(self.switches, 2)}
+        company = {(s,): self._ends(s) for s in self.switches}
+        effects, changes, interactions = (
+            tuple(self._effect(key, rows) for key, rows in contrasts.items() if rows)
+            for contrasts in (single, company, double)
+        )
+        unknown = tuple(key for key, rows in (single | double).items() if not rows)
+        return Ablation(self.switches, tuple(self.names.values()), effects, changes, interactions, unknown)
+
+    def _effect(self, switches: tuple[str, ...], contrasts: list[tuple[On, ...]]) -> Effect:
+        """Signs alternate as in a factorial design: with - without, or both - first - second + neither."""
+        simple = len(contrasts[0]) == 2
+        signs = np.array((1.0, -1.0) if simple else (1.0, -1.0, -1.0, 1.0))
+        shifts = np.array([signs @ [self.logs[on] for on in row] for row in contrasts])
+        logs = shifts.mean(axis=0)
+        low, high = bootstrap(logs)
+        names = tuple(tuple(self.names[on] for on in row) for row in contrasts)
+        effect = Effect(switches, 10.0 ** float(logs.mean()), 10.0**low, 10.0**high, names, len(logs))
+        if not simple:
+            return effect
+        wins = np.mean((shifts < 0) + 0.5 * (shifts == 0), axis=0)
+        return replace(effect, better=(float(wins.mean()), *bootstrap(wins)))
+
+    def _pairs(self, switch: str) -> list[tuple[On, ...]]:
+        return self._existing([(on | {switch}, on) for on in self.logs if switch not in on])
+
+    def _squares(self, a: str, b: str) -> list[tuple[On, ...]]:
+        return self._existing([(on | {a, b}, on | {a}, on | {b}, on) for on in self.logs if not {a, b} & on])
+
+    def _ends(self, switch: str) -> list[tuple[On, ...]]:
+        """The pair with most other switches on, then the pair with fewest; nothing where there is one company only."""
+        pairs = sorted(self._pairs(switch), key=lambda pair: (len(pair[1]), sorted(pair[1])))
+        return [(*pairs[-1], *pairs[0])] if pairs and len(pairs[-1][1]) > len(pairs[0][1]) else []
+
+    def _existing(self, rows: list[tuple[On, ...]]) -> list[tuple[On, ...]]:
+        return [row for row in rows if all(on in self.logs for on in row)]

@@ -1,0 +1,230 @@
+"""Sentences to quote, each with its numbers and no more than the tests allow."""
+
+import numpy as np
+
+from tractexp.studies.comparison.ablation import Ablation, Effect
+from tractexp.studies.comparison.comparison import Comparison, Pair, seeds_needed
+from tractexp.studies.comparison.floor import AT_FLOOR
+from tractexp.studies.comparison.statistics import ALPHA
+from tractexp.studies.comparison.summary import Spread
+
+MORE = 1.2  # times the simulations of another variant are worth a word
+
+
+def number(value: float, digits: int = 3) -> str:
+    """0.0000081 as 8.1e-06, 15000 as 15,000, inf as never."""
+    if np.isnan(value):
+        return "-"
+    if np.isinf(value):
+        return "never"
+    if (abs(value) >= 1000 and value == round(value)) or abs(value) >= 10**digits:
+        return f"{value:,.0f}"
+    return f"{value:.{digits}g}"
+
+
+def p_value(p: float) -> str:
+    return f"{p:.2g}" if p >= 1e-4 else f"{p:.1e}"
+
+
+def answer(comparison: Comparison) -> str:
+    """Which variant to take, as far as these runs say."""
+    best, *others = comparison.leaders
+    if len(comparison.summaries) < 2:
+        return f"There is one variant only, {best}: nothing to choose from."
+    if max((pair.seeds for pair in comparison.pairs), default=0) < seeds_needed(len(comparison.pairs)):
+        lowest = f"{_listed([best, *others])} have" if others else f"{best} has"
+        return f"Not settled: there are too few seeds to test. {lowest} the lowest median objective so far."
+    if (tested := _best_tested(comparison)) != best:
+        advice = _advice(comparison, tested, [])
+        return f"{best} has the lowest median objective, but too few seeds to test. Of the others: {advice}"
+    return _advice(comparison, best, others)
+
+
+def _best_tested(comparison: Comparison) -> str:
+    """The best of the variants that had seeds enough for a test; of all where none had."""
+    tested = {name for pair in comparison.pairs for name in (pair.first, pair.second)}
+    return next((s.name for s in comparison.summaries if s.name in tested), comparison.summaries[0].name)
+
+
+def _advice(comparison: Comparison, best: str, others: list[str]) -> str:
+    """Whether to take the variant whose median is lowest, or as low as those of others and reached sooner."""
+    beaten, worse, alike = _verdicts(comparison, best)
+    if worse:
+        return f"Not settled: {best} has the lowest median objective, but {_listed(worse)} did better seed by seed."
+    rivals = [name for name in alike if name not in others]
+    if rivals:
+        return (
+            f"Take {best}, or as well {_listed(rivals)}: these runs do not tell them apart.{_spent(comparison, best)}"
+        )
+    why = [f"it ends as low as {_listed(others)}, sooner"] if others else []
+    why += [f"it ends lower than {_listed(beaten)}"] if beaten else []
+    return f"Take {best}: {', and '.join(why)}.{_spent(comparison, best)}"
+
+
+def _spent(comparison: Comparison, best: str) -> str:
+    """What the best variant spent, where that is more than another did."""
+    (first,) = (summary for summary in comparison.summaries if summary.name == best)
+    least = min(comparison.summaries, key=lambda summary: summary.simulations.median)
+    if not first.simulations.median > MORE * least.simulations.median:
+        return ""
+    spent = (f"{number(float(round(s.simulations.median)))} simulations" for s in (first, least))
+    return f" It spent {next(spent)}, where {least.name} spent {next(spent)}."
+
+
+def _verdicts(comparison: Comparison, name: str) -> tuple[list[str], list[str], list[str]]:
+    """The variants that one is significantly better than, those it is worse than, and those it is not told from."""
+    own = [pair for pair in comparison.pairs if name in (pair.first, pair.second)]
+    beaten = [pair.second for pair in own if pair.significant and pair.first == name]
+    worse = [pair.first for pair in own if pair.significant and pair.second == name]
+    alike = [pair.second if pair.first == name else pair.first for pair in own if not pair.significant]
+    return beaten, worse, alike
+
+
+def headline(comparison: Comparison) -> str:
+    """How the best variant stands to the others."""
+    if not comparison.pairs:
+        return "No difference between variants was tested."
+    best, *others = comparison.leaders
+    if others:
+        within = f"equal within {comparison.ties:.2%} of the floor"
+        said = f"{_listed([best, *others])} reach the lowest median objective ({within}); {best}, the fastest of them,"
+    else:
+        said = f"{best} has the lowest median objective; it"
+    beaten, worse, alike = _verdicts(comparison, best)
+    verdicts = [f"is significantly better than {_listed(beaten)}"] if beaten else []
+    verdicts += [f"is significantly worse than {_listed(worse)} over paired seeds"] if worse else []
+    verdicts += [f"shows no significant difference to {_listed(alike)}"] if alike else []
+    return f"{said} {' and '.join(verdicts) or 'was not tested'}."
+
+
+def near_and_far(comparison: Comparison) -> tuple[list[Pair], list[Pair]]:
+    """The pairs with the reference, or with the best variant tested where there is none; and the others."""
+    chosen = comparison.reference or _best_tested(comparison)
+    near = [pair for pair in comparison.pairs if chosen in (pair.first, pair.second)]
+    return near, [pair for pair in comparison.pairs if pair not in near]
+
+
+def _listed(names: list[str]) -> str:
+    names = sorted(names)
+    if len(names) > 6:
+        return f"{len(names)} other variants"
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def of_pair(comparison: Comparison, pair: Pair) -> str:
+    """One pair of variants, as it may be quoted."""
+    one, two = (comparison.gathered[name] for name in (pair.first, pair.second))
+    spent = [Spread.of([run.simulations[-1] for run in v.finished]) for v in (one, two)]
+    first, second = (f"{number(median)} pu²" if np.isfinite(median) else "no result" for median in pair.medians)
+    if len({x for s in spent for x in (s.best, s.worst)}) == 1:
+        start = f"On {pair.seeds} seeds and {number(spent[0].median)} simulations, "
+        reached = f"{pair.first} reaches a median objective of {first} against {second} for {pair.second}"
+    else:
+        start = f"On {pair.seeds} seeds, "
+        reached = (
+            f"{pair.first} reaches a median objective of {first} with {number(spent[0].median)} simulations "
+            f"(median) against {second} with {number(spent[1].median)} for {pair.second}"
+        )
+    verdict = "is significant" if pair.significant else "is not significant"
+    tests = len(comparison.pairs)
+    return (
+        f"{start}{reached}; the difference {verdict} (Wilcoxon signed-rank, Holm-corrected over {tests} "
+        f"{'pair' if tests == 1 else 'pairs'}, p = {p_value(pair.corrected)}; Vargha-Delaney A = {pair.effect:.2f})."
+    )
+
+
+def of_ranks(comparison: Comparison) -> str:
+    """Friedman's test, or "" where it was not made."""
+    ranks = comparison.ranks
+    if ranks is None:
+        return ""
+    order = np.argsort(ranks.mean, kind="stable")
+    listed = ", ".join(f"{ranks.names[i]} {ranks.mean[i]:.2f}" for i in order[:5])
+    more = f" and {len(order) - 5} more up to {max(ranks.mean):.2f}" if len(order) > 5 else ""
+    differ = "differ" if ranks.p < ALPHA else "do not differ significantly"
+    text = (
+        f"Over {ranks.seeds} seeds the mean ranks {differ} (Friedman chi-square = {ranks.chi2:.2f}, {len(order) - 1} "
+        f"degrees of freedom, p = {p_value(ranks.p)}): {listed}{more}"
+    )
+    if ranks.p < ALPHA:
+        text += f"; two ranks differ significantly at {ALPHA:.0%} when {ranks.critical_difference:.2f} or more apart"
+        text += " (Nemenyi)"
+    return text + "."
+
+
+def of_speed(comparison: Comparison) -> str:
+    """Who needs fewest simulations to the hardest target."""
+    target, index = min((target, i) for i, target in enumerate(comparison.targets))
+    rows = sorted((s.ert["simulations"][index], s.name) for s in comparison.summaries)
+    goal = f"{target:g} times the floor of {number(comparison.floor.value)} pu²"
+    if np.isinf(rows[0][0]):
+        return f"No variant ever reached {goal}."
+    said = [f"{name} needs {number(float(round(ert)))}" for ert, name in rows[:4] if np.isfinite(ert)]
+    text = f"To reach {goal}, {', '.join(said)} simulations in expectation (ERT)"
+    never = [name for ert, name in rows if np.isinf(ert)]
+    return text + (f"; {_listed(never)} never did." if never else ".")
+
+
+def of_floor(comparison: Comparison) -> str:
+    """How often the noise floor was reached."""
+    told = _ranked([(s.at_floor, s.runs, s.name) for s in comparison.summaries])
+    value, source = number(comparison.floor.value, 5), comparison.floor.source
+    return f"Runs within {AT_FLOOR:.0%} of the floor of {value} pu² ({source}): {told}."
+
+
+def of_valley(comparison: Comparison) -> str:
+    """How often a search ended where the floor's values are only a descent away; "" where that is not known."""
+    rows = [(s.in_valley, s.runs - s.failures, s.name) for s in comparison.summaries if s.in_valley is not None]
+    if not rows:
+        return ""
+    return f"Runs that ended in the floor's valley, from where least squares reach it: {_ranked(rows)}."
+
+
+def _ranked(rows: list[tuple[float, int, str]]) -> str:
+    """Shares of runs in words, the largest first: (share, runs, variant)."""
+    rows = sorted(rows, key=lambda row: (-row[0], row[2]))
+    more = f" (the best six of {len(rows)})" if len(rows) > 6 else ""
+    return ", ".join(f"{name} {round(share * n)} of {n}" for share, n, name in rows[:6]) + more
+
+
+def of_effect(effect: Effect) -> str:
+    """A switch's own effect."""
+    (switch,) = effect.switches
+    verdict = "no effect is shown" if not effect.shown else "it helps" if effect.factor < 1 else "it harms"
+    return (
+        f"Switching on {switch} multiplies the objective by {number(effect.factor)} (geometric mean over "
+        f"{effect.seeds} seeds, 95 % bootstrap interval {number(effect.low)} to {number(effect.high)}, from "
+        f"{_listed_contrasts(effect)}): {verdict}."
+    )
+
+
+def _listed_contrasts(effect: Effect) -> str:
+    told = [f"{with_} against {without}" for with_, without in effect.contrasts]
+    return " and ".join(told) if len(told) < 3 else f"{len(told)} pairs of variants that differ in it alone"
+
+
+def of_unknown(ablation: Ablation) -> str:
+    """What these variants cannot tell, and which would; "" where nothing is missing."""
+    if not ablation.unknown:
+        return ""
+    names = "; ".join(" with ".join(key) for key in ablation.unknown)
+    return (
+        f"Not to be had from these {len(ablation.variants)} variants: {names}. A main effect takes two variants that "
+        "differ in that switch alone, an interaction of two switches takes four that differ in those alone."
+    )
+
+
+def sentences(comparison: Comparison) -> list[str]:
+    """All claims, the most general first."""
+    told = [
+        headline(comparison),
+        of_floor(comparison),
+        of_valley(comparison),
+        of_speed(comparison),
+        of_ranks(comparison),
+    ]
+    told += [of_pair(comparison, pair) for group in near_and_far(comparison) for pair in group]
+    if comparison.ablation:
+        told += [of_effect(effect) for effect in comparison.ablation.effects]
+        told.append(of_unknown(comparison.ablation))
+    return [text for text in told if text]

@@ -1,0 +1,124 @@
+"""The floor of a comparison: the lowest objective that least squares reach, from the runs' ends and all over the box.
+
+The best of the runs is no floor: where all searches stop short of the bottom, or in the wrong valley, it is too high.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.identification.descent import descend
+from tractexp.identification.problem import Problem
+from tractexp.identification.search import REFUSED
+from tractexp.identification.starts import best_distinct, even
+from tractexp.studies.comparison.runs import Run
+
+AT_FLOOR = 0.01  # what ends within this share of the floor has reached it
+SCATTER, STARTS, APART = 400, 60, 0.3  # starts: the best of a scatter that differ by so much of a range somewhere
+BRIEF, ROUGH = 60, 1e-3  # iterations of a descent, and the share of the objective that a step must gain
+WHOLE, FINE = 200, 1e-9  # of the last descent, from the lowest
+TOGETHER, MOST_NUMBERS = 64, 8_000_000  # descents at once, and the most residuals they may hold
+TINY = 1e-300  # pu²: a fit without any error is scaled by it
+SAME = 1e-2  # relative: objectives this close are those of the same problem
+
+
+@dataclass(frozen=True)
+class Floor:
+    """The objective that the noise leaves, and where that number comes from."""
+
+    value: float
+    source: str
+
+
+@dataclass(frozen=True, eq=False)
+class Polished:
+    """The lowest point found, and for each run whose parameters are known what least squares reach from its end."""
+
+    objective: float  # pu²
+    parameters: dict[str, float]
+    bounds: dict[str, tuple[float, float]]
+    units: dict[str, str]
+    starts: int  # spread over the box
+    reached: dict[Run, float]  # pu²
+
+    def in_valley(self, run: Run) -> bool | None:
+        """Whether the run ended in the valley of the lowest point; None where that is not known."""
+        return self.reached[run] <= (1 + AT_FLOOR) * self.objective if run in self.reached else None
+
+
+def polish(problem: Problem, runs: Sequence[Run], counting: Callable[[int], Callable[[], None]]) -> Polished | None:
+    """Descend on the objective of Eq. (8) from the end of every run, and from starts that fill the box evenly.
+
+    `counting(n)` is told how many groups of descents there are, and returns what is called at the end of each. None
+    where the objectives of the runs are not those of this problem: the records have changed since.
+    """
+    space = problem.space
+    known = [run for run in runs if run.finished and set(space.names) <= set(run.parameters)]
+    ends = np.array([[run.parameters[name] for name in space.names] for run in known]).reshape(-1, space.dimension)
+    if not problem.per_event and not _same(problem, ends, known):
+        return None
+    units = np.concatenate([space.to_unit(ends), _spread(problem)])
+    best = max(min(run.objective for run in runs if run.finished), TINY)
+    groups = np.array_split(units, -(-len(units) // _together(problem)))
+    ended, values, count = [], [], counting(len(groups))
+    for group in groups:
+        unit, objectives = _descend(problem, group, best, BRIEF, ROUGH)
+        ended.append(unit)
+        values.append(objectives)
+        count()
+    unit, objectives = np.concatenate(ended), np.concatenate(values)
+    lowest, (least,) = _descend(problem, unit[[objectives.argmin()]], max(objectives.min(), TINY), WHOLE, FINE)
+    units_of = {p.name: p.unit for p in problem.parameters}
+    parameters = dict(zip(space.names, map(float, space.from_unit(lowest)[0]), strict=True))
+    limits = np.column_stack((space.lower, space.upper)).tolist()
+    bounds = {name: (low, high) for name, (low, high) in zip(space.names, limits, strict=True)}
+    return Polished(
+        float(least), parameters, bounds,
+        {n: units_of[n.partition("[")[0]] for n in space.names}, len(units) - len(known),
+        dict(zip(known, map(float, objectives[: len(known)]), strict=True)),
+    )  # fmt: skip
+
+
+def floor_of(runs: Sequence[Run], given: float | None, polished: Polished | None, why_not: str = "") -> Floor:
+    """The floor as `given`, or what polishing found, or the best of all runs where there was no polishing, and why."""
+    if given is not None:
+        return Floor(given, "as given by task.floor")
+    best = min((run for run in runs if run.finished), key=lambda run: run.objective)
+    if polished is not None:
+        n = len(polished.reached)
+        ends = f"where {n} run{'s' * (n > 1)} ended and from " if n else ""
+        source = f"the lowest that least squares reach from {ends}{polished.starts} starts all over the bounds"
+        return Floor(min(polished.objective, best.objective), source)
+    because = f"; nothing lower was looked for, because {why_not}" if why_not else ""
+    return Floor(best.objective, f"the best of all runs compared, by {best.optimizer}{because}")
+
+
+def _same(problem: Problem, ends: np.ndarray, runs: Sequence[Run]) -> bool:
+    recorded = np.array([run.objective for run in runs])
+    return bool(np.allclose(problem.objective(ends), recorded, rtol=SAME, atol=0)) if len(runs) else True
+
+
+def _spread(problem: Problem) -> np.ndarray:
+    """The best of points that fill the unit cube evenly, but denser near its walls, where times are short; (k, d)."""
+    unit = np.sin(np.pi * even(SCATTER, problem.space.dimension) / 2) ** 2
+    objectives = problem.objective(problem.space.from_unit(unit))
+    able = objectives < REFUSED
+    return unit[able][best_distinct(unit[able], objectives[able], APART, STARTS)]
+
+
+def _together(problem: Problem) -> int:
+    """How many descents are held at once: each tries several steps, with a residual for P and Q of every sample."""
+    return int(np.clip(MOST_NUMBERS // (8 * problem.drive.samples), 1, TOGETHER))
+
+
+def _descend(
+    problem: Problem, start: np.ndarray, scale: float, iterations: int, tolerance: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where descents from unit points (n, d) end, and their objectives (n,); `tolerance` is a share of `scale`."""
+
+    def rows(unit: np.ndarray, lanes: np.ndarray) -> np.ndarray:
+        return problem.residuals(problem.space.from_unit(unit)) / np.sqrt(scale)
+
+    ended = descend(rows, start, iterations=iterations, tolerance=tolerance)
+    return ended.unit, ended.deviance * scale

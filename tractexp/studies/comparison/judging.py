@@ -1,0 +1,140 @@
+"""Runs judged: those of one problem, those of several, and the same variants on BBOB."""
+
+import contextlib
+import json
+from collections.abc import Mapping, Sequence
+from inspect import unwrap
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tractexp import files
+from tractexp.errors import UserError
+from tractexp.progress import counting
+from tractexp.wording import joined
+
+if TYPE_CHECKING:
+    from tractexp.identification.problem import Problem
+    from tractexp.studies.api.benchmark import BenchmarkResult
+    from tractexp.studies.comparison.comparison import Comparison
+    from tractexp.studies.comparison.floor import Polished
+    from tractexp.studies.comparison.overall import Overall, Several
+    from tractexp.studies.comparison.runs import Gathered, Run
+
+DIMENSION, EVALUATIONS = 5, 15_000  # on BBOB; the evaluations where the searches had no budget in common
+BBOB = "bbob.json"
+
+
+def judged(gathered: "Gathered", progress: Any, judging: Mapping[str, Any]) -> "Comparison":
+    """The runs of one problem compared; `judging` are the arguments of `comparison.compare` that a user chooses."""
+    from tractexp.studies.comparison.comparison import compare
+
+    polished, why_not = _polished(gathered, progress)
+    return compare(gathered, plain=plain(), polished=polished, why_not=why_not, **judging)
+
+
+def several(
+    groups: Mapping[tuple[str, ...], "Sequence[Run]"], source: str, judging: Mapping[str, Any], folder: Path | None,
+    bbob: int, cores: int | None, progress: Any,
+) -> "Several":  # fmt: skip
+    """Each problem by itself, what they come to under the same terms, and the variants on BBOB."""
+    from tractexp.studies.comparison.overall import Several, on_records, terms_of
+    from tractexp.studies.comparison.runs import gather
+
+    made: dict[str, Comparison] = {}
+    by_terms: dict[str, dict[str, Comparison]] = {}
+    for (data, *_), runs in groups.items():
+        terms = terms_of(runs)
+        label = f"{data}, {terms}" if terms else data
+        made[label] = judged(gather(runs, f"{source} on {label}"), progress, judging)
+        by_terms.setdefault(terms, {})[label] = made[label]
+    without = plain()
+    overall = [on_records(terms, comparisons, without) for terms, comparisons in by_terms.items()]
+    notes = _noted(made)
+    if bbob:
+        try:
+            overall.append(_on_bbob(next(iter(made.values())), bbob, folder, cores, progress))
+        except UserError as error:  # the records have been searched: what they say is told all the same
+            notes.append(f"BBOB was left out: {str(error).rstrip('.')}.")
+    return Several(made, tuple(overall), tuple(notes))
+
+
+def _noted(comparisons: Mapping[str, "Comparison"]) -> list[str]:
+    """What a reader must know, once, with the problems that it is true of unless that is all of them."""
+    of: dict[str, list[str]] = {}
+    for label, comparison in comparisons.items():
+        for note in comparison.notes:
+            of.setdefault(note, []).append(label)
+    return [n if len(found) == len(comparisons) else f"{joined(found)}: {n}" for n, found in of.items()]
+
+
+def _on_bbob(
+    comparison: "Comparison", instances: int, folder: Path | None, cores: int | None, progress: Any
+) -> "Overall":
+    """The variants of a comparison on BBOB; the runs are kept beside those of the sweep, under what they depend on."""
+    from tractexp import provenance
+    from tractexp.studies.api.benchmark import benchmark
+    from tractexp.studies.comparison.ablation import family
+    from tractexp.studies.comparison.load import nested
+    from tractexp.studies.comparison.overall import on_functions
+
+    variants = [v for v in comparison.gathered.variants if not v.settings.get("polish")]
+    optimizers = {v.name: nested(v.runs[0].config)["optimizer"] for v in variants}
+    budgets = {budget for v in variants for run in v.runs if (budget := run.config.get("budget")) is not None}
+    multiplier = -(-int(budgets.pop() if len(budgets) == 1 else EVALUATIONS) // DIMENSION)
+    told = {"optimizers": optimizers, "instances": instances, "multiplier": multiplier, "code": provenance.code()}
+    made = _kept(folder, told) if folder else None
+    if made is None:
+        chosen = {"instances": range(1, instances + 1), "dimensions": [DIMENSION], "multiplier": multiplier}
+        made = unwrap(benchmark)(optimizers, **chosen, cores=cores, progress=progress)
+        if folder:
+            files.write_json(folder / BBOB, {"of": told, "made": made.to_dict()})
+    return on_functions(made.bbob, family(variants, plain()))
+
+
+def _kept(folder: Path, told: Mapping[str, Any]) -> "BenchmarkResult | None":
+    """The runs on BBOB that were made before with the same code and settings."""
+    from tractexp.studies.api.benchmark import BenchmarkResult
+
+    with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
+        kept = json.loads((folder / BBOB).read_text(encoding="utf-8"))
+        if kept["of"] == files.plain(told):
+            return BenchmarkResult.from_dict(kept["made"])
+    return None
+
+
+def _polished(gathered: "Gathered", progress: Any) -> "tuple[Polished | None, str]":
+    """What polishing found on the problem that the runs' configuration describes; None, and why, where it cannot."""
+    from tractexp.studies.comparison.floor import polish
+
+    runs = [run for variant in gathered.variants for run in variant.runs]
+    try:
+        problem = _problem(next(run for run in runs if run.finished))
+    except UserError as error:
+        return None, f"the problem cannot be put again ({str(error).rstrip('.')})"
+    except (KeyError, TypeError, ValueError) as error:
+        return None, f"the configuration of the runs is not understood any more ({type(error).__name__}: {error})"
+    with contextlib.ExitStack() as stack:
+        found = polish(problem, runs, lambda n: stack.enter_context(counting("groups of descents", n, progress)))
+    return found, "" if found else "the records or the model have changed since: these parameters fit otherwise now"
+
+
+def _problem(run: "Run") -> "Problem":
+    """The problem that a run's configuration describes. Raises `UserError` where its records are not there any more."""
+    from tractexp.api.setup import Setup
+    from tractexp.plugin import build
+    from tractexp.record import detect
+    from tractexp.studies.comparison.load import nested
+
+    config = nested(run.config)
+    home = Path(run.folder) if run.folder else Path()  # relative paths count from where the run was started
+    with contextlib.chdir(home) if home.is_dir() else contextlib.nullcontext():
+        records = build("data", config["data"]).read()
+    train = [detect(record) for record in records.train]
+    return Setup.of(train, config["model"], (), config.get("objective"), {}).problem
+
+
+def plain() -> dict[str, str]:
+    """For each optimizer the one that it is with all its switches off, "" where there is none."""
+    from tractexp.plugin import discover, get
+
+    return {name: get("optimizer", name).plain for name in discover()["optimizer"]}

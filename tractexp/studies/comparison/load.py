@@ -1,0 +1,203 @@
+"""Where the runs of a comparison come from: the folders of a sweep, or runs found in MLflow."""
+
+import json
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.identification.result import by_event
+from tractexp.studies.comparison.runs import Run
+
+TASK = "identify"  # the task whose runs are compared
+FINISHED, RUNNING, INTERRUPTED = "finished", "running", "interrupted"  # what a job's status.json says
+UNDER_WAY = ("RUNNING", "SCHEDULED", "KILLED")  # what MLflow says of a run that neither finished nor failed
+ENDED = ("objective", "epsilon_p", "epsilon_q")
+
+
+def newest_sweep(folder: Path) -> Path:
+    """The sweep under `folder` begun last. Raises `UserError` where there is none."""
+    sweeps = [path for path in folder.iterdir() if _jobs(path)] if folder.is_dir() else []
+    if not sweeps:
+        raise UserError(
+            f"there is no sweep under {folder} to compare; make one, such as "
+            "tractexp -m optimizer=issa,ssa,pso 'seed=range(0,30)', or name one by task.sweep=FOLDER"
+        )
+    return max(sweeps, key=lambda path: (max(job.stat().st_mtime for job in _jobs(path)), path.name))
+
+
+def from_sweep(folder: Path) -> list[Run]:
+    """The runs of a sweep's job folders. Raises `UserError` where there is none."""
+    if not folder.is_dir():
+        raise UserError(f"task.sweep={folder} is not a folder; a sweep writes one under outputs/sweeps")
+    jobs = _jobs(folder)
+    if not jobs:
+        raise UserError(f"the sweep {folder} is empty: none of its folders holds a job (.hydra/config.yaml)")
+    runs = [run for run in map(_job, jobs) if run is not None]
+    if not runs:
+        raise UserError(f"the sweep {folder} has no job of task={TASK}, the only one whose runs can be compared")
+    return runs
+
+
+def _jobs(folder: Path) -> list[Path]:
+    """Job folders, numbered ones in order of their number."""
+    jobs = [config.parents[1] for config in folder.glob("*/.hydra/config.yaml")]
+    return sorted(jobs, key=lambda job: (int(job.name) if job.name.isdigit() else np.inf, job.name))
+
+
+def _job(folder: Path) -> Run | None:
+    config = _yaml(folder / ".hydra" / "config.yaml")
+    if config["task"]["name"] != TASK:
+        return None
+    status = _status(folder)
+    unfinished = _unfinished(folder, status)
+    runtime: Mapping[str, Any] = {"choices": status.get("choices")}
+    if (folder / ".hydra" / "hydra.yaml").is_file() or not (unfinished and runtime["choices"]):
+        runtime = _yaml(folder / ".hydra" / "hydra.yaml")["hydra"]["runtime"]  # of a job ended at once it is missing
+    choices = runtime["choices"]
+    told: dict[str, Any] = {
+        "optimizer": choices["optimizer"], "data": choices["data"], "seed": int(config["seed"]),
+        "config": flat(config), "where": folder.name, "folder": runtime.get("cwd", ""),
+    }  # fmt: skip
+    if unfinished:
+        return Run(**told, **unfinished)
+    with _readable(folder / "result.json") as path:
+        result = json.loads(path.read_text(encoding="utf-8"))
+        ended = ended_search(result)
+        told |= {key: float(ended[key]) for key in ENDED} | {"parameters": parameters_of(ended)}
+        told["code"] = code_of(result)
+    with _readable(folder / "history.csv") as path:
+        return Run(**told, **_history(path.read_text(encoding="utf-8")))
+
+
+def _history(text: str) -> dict[str, Any]:
+    """The search by iteration, of a `history.csv`."""
+    _, simulations, seconds, history = np.loadtxt(text.splitlines(), delimiter=",", skiprows=1, ndmin=2).T
+    return {"simulations": simulations, "seconds": seconds, "history": history}
+
+
+def ended_search(result: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Where the optimizer itself ended, of a `result.json`: in early ones, that was the whole of it."""
+    return result.get("search") or result
+
+
+def code_of(result: Mapping[str, Any]) -> str:
+    """The version and commit of the package, of a `result.json`: "0.4.0 at 1c2d3e4f"; "" in early ones."""
+    version, commit = result.get("tractexp_version", ""), result.get("commit", "")
+    dirty = "-dirty" * commit.endswith("-dirty")
+    return f"{version} at {commit[:8]}{dirty}" if version and commit else version
+
+
+def parameters_of(ended: Mapping[str, Any]) -> dict[str, float]:
+    """{name: value}, where it differs by event {"T_m[1]": value, ...} as well."""
+    return by_event(ended.get("parameters", {}), ended.get("per_event", {}))
+
+
+@contextmanager
+def _readable(path: Path) -> Iterator[Path]:
+    """Turn what goes wrong with a job's file into a sentence."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # NumPy's about a file without a row, which raises next
+            yield path
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        reason = str(error).strip().partition("\n")[0] or type(error).__name__
+        raise UserError(f"{path} cannot be read: {reason}; run this job again, or remove its folder") from error
+
+
+def _status(folder: Path) -> Mapping[str, Any]:
+    """The content of `status.json`; {} where the job was none of a sweep of ours, or has not begun."""
+    if not (folder / "status.json").is_file():
+        return {}
+    with _readable(folder / "status.json") as path:
+        told = json.loads(path.read_text(encoding="utf-8"))
+        return {"message": "", **told, "status": str(told["status"])}
+
+
+def _unfinished(folder: Path, told: Mapping[str, Any]) -> dict[str, Any]:
+    """Why a job has no result: {"failure": ...} or {"interruption": ...}; {} where it has one."""
+    if INTERRUPTED in (told.get("status"), told.get("message")):  # early sweeps: "failed", with this message
+        return {"interruption": "its sweep was interrupted"}
+    if told and told["status"] not in (FINISHED, RUNNING):
+        return {"failure": told["message"] or f"its status is {told['status']}"}
+    if (folder / "result.json").is_file() and (folder / "history.csv").is_file():
+        return {}
+    return {"interruption": "it left no result: it was ended, or still runs"}
+
+
+def _yaml(path: Path) -> Any:
+    import yaml
+
+    with _readable(path):
+        try:
+            return yaml.load(path.read_text(encoding="utf-8"), getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+        except yaml.YAMLError as error:
+            raise ValueError(str(error)) from error
+
+
+def flat(node: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """A nested configuration as {"optimizer.population": 50}."""
+    made: dict[str, Any] = {}
+    for key, value in node.items():
+        made |= flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
+    return made
+
+
+def nested(flattened: Mapping[str, Any]) -> dict[str, Any]:
+    """The reverse of `flat`; a mapping that was empty is not there."""
+    made: dict[str, Any] = {}
+    for key, value in flattened.items():
+        *path, last = key.split(".")
+        node = made
+        for part in path:
+            node = node.setdefault(part, {})
+        node[last] = value
+    return made
+
+
+def from_logged(logged: Iterable[Any], source: str) -> list[Run]:
+    """Runs from what `tractexp.tracking.find` returns, oldest first; only identifications count, no parent runs.
+
+    Where the artifacts of a run are missing, its search is known by the curve in MLflow alone, which has fewer points
+    and no seconds: what the search took is divided evenly over its simulations. Raises `UserError` where there is none.
+    """
+    runs = [_logged(one) for one in logged if one.tags.get("task") == TASK and "optimizer" in one.tags]
+    if not runs:
+        raise UserError(
+            f"{source} matches no run of task={TASK}; the tags to filter by are task, model, optimizer, data and seed, "
+            "as in task.filter=\"tags.data = 'tibet_50pct'\""
+        )
+    return runs
+
+
+def _logged(one: Any) -> Run:
+    told: dict[str, Any] = {
+        "optimizer": one.tags["optimizer"], "data": one.tags["data"], "seed": int(one.tags["seed"]),
+        "config": {key: _value(text) for key, text in one.parameters.items()}, "where": one.name,
+    }  # fmt: skip
+    curve, ended = one.curves.get("fitness_by_simulations"), {}
+    if one.status in UNDER_WAY:
+        return Run(**told, interruption=f"its status in MLflow is {one.status}")
+    if one.status != "FINISHED" or "objective" not in one.metrics or curve is None:
+        return Run(**told, failure=f"its status in MLflow is {one.status}")
+    for key in (*ENDED, "simulations", "seconds"):  # early runs have one value of each, the search's
+        ended[key] = one.metrics.get(f"search_{key}", one.metrics.get(key, np.nan))
+    result = json.loads(one.files.get("result.json", "{}"))
+    known = {"parameters": parameters_of(ended_search(result)), "code": code_of(result)}
+    total, seconds = ended.pop("simulations"), ended.pop("seconds")
+    if "history.csv" in one.files:
+        return Run(**told, **ended, **_history(one.files["history.csv"]), **known)
+    simulations = np.fmin(curve[0], total)
+    spent = seconds * simulations / simulations[-1]
+    return Run(**told, **ended, simulations=simulations, seconds=spent, history=curve[1], **known)
+
+
+def _value(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError:
+        return text

@@ -1,0 +1,141 @@
+"""Several problems at once: what comparisons under the same terms come to together, on records or on BBOB."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tractexp.studies.comparison.ablation import Ablation, Family, family
+from tractexp.studies.comparison.comparison import Comparison
+from tractexp.studies.comparison.runs import Run
+from tractexp.studies.comparison.statistics import LEAST_SEEDS, Ranks, friedman
+
+if TYPE_CHECKING:
+    from tractexp.studies.bbob.runs import BbobRuns
+
+SOLVED = 1e-8  # a distance to the optimum of a BBOB function below which it counts as met
+
+
+@dataclass(frozen=True, eq=False)
+class Overall:
+    """What variants come to on several problems under the same terms. Lower figures are better unless `share`."""
+
+    terms: str  # "15,000 simulations"
+    where: str  # "3 records, 30 seeds each"
+    block: str  # within which variants are ranked: "record and seed" or "function"
+    columns: tuple[str, ...]  # the problems, or groups of them
+    measure: str  # what the figures are
+    figures: Mapping[str, tuple[float, ...]]  # {variant: one for each column}, the best ranked first
+    ranks: Ranks | None
+    each: Mapping[str, Ablation]  # {problem: effects of the switches on it alone}
+    ablation: Ablation | None  # on all of them
+    cost: Mapping[str, float]  # simulations that each switch adds to an iteration
+    share: bool = False  # whether the figures are shares
+
+
+@dataclass(frozen=True, eq=False)
+class Several:
+    """Comparisons on several problems: each by itself, {name: ...}, and what they come to by terms."""
+
+    comparisons: Mapping[str, Comparison]
+    overall: tuple[Overall, ...]
+    notes: tuple[str, ...]
+
+
+def terms_of(runs: Sequence[Run]) -> str:
+    """What ended the searches: "15,000 simulations", "300 iterations", or "" where they had no end in common."""
+    budgets = {run.config.get("budget") for run in runs}
+    if len(budgets) == 1 and (budget := budgets.pop()) is not None:
+        return f"{int(budget):,} simulations"
+    counts = {len(run.history) - 1 for run in runs if run.finished}
+    return f"{int(*counts)} iterations" if len(counts) == 1 else ""
+
+
+def on_records(terms: str, comparisons: Mapping[str, Comparison], plain: Mapping[str, str]) -> Overall:
+    """The variants that were run on all of these problems, {name: comparison}; `plain` as in `ablation.family`."""
+    first, *others = comparisons.values()
+    variants = [v for v in first.gathered.variants if all(_has(other, v.name) for other in others)]
+    names = [v.name for v in variants]
+    logs = {label: _logs(comparison, names) for label, comparison in comparisons.items()}
+    seeds = sorted(set.intersection(*(set(by_seed) for by_seed in logs.values())))
+    table = np.array([by_seed[seed] for by_seed in logs.values() for seed in sorted(by_seed)])
+    ranks = _ranked(names, table)
+    chosen = family(variants, plain)
+    whole = None
+    if chosen and seeds:
+        mean = np.mean([[by_seed[seed] for seed in seeds] for by_seed in logs.values()], axis=0)
+        whole = chosen.ablation(dict(zip(names, mean.T, strict=True)))
+    medians = {
+        name: tuple(float(np.median([run.objective for run in c.gathered[name].runs]) / c.floor.value)
+                    for c in comparisons.values())
+        for name in _ordered(names, ranks)
+    }  # fmt: skip
+    several = f"{len(comparisons)} records, " if len(comparisons) > 1 else ""
+    data = [comparison.gathered.variants[0].runs[0].data for comparison in comparisons.values()]
+    names_of = dict(zip(comparisons, data, strict=True)) if len({*data}) == len(data) else {c: c for c in comparisons}
+    return Overall(
+        terms, f"{several}{len(seeds)} seeds{' each' * bool(several)}", "record and seed", tuple(names_of.values()),
+        "median objective over the floor", medians, ranks,
+        {names_of[label]: c.ablation for label, c in comparisons.items() if c.ablation}, whole,
+        _cost(chosen, comparisons.values()),
+    )  # fmt: skip
+
+
+def on_functions(benchmark: "BbobRuns", chosen: Family | None) -> Overall:
+    """The variants on BBOB: distances to the optimum, a function being one block; the family's effects on them."""
+    (dimension,), plan = benchmark.plan.dimensions, benchmark.plan
+    names = list(benchmark.optimizers)
+    table = np.array([
+        [np.mean([np.log10(max(run.distance, SOLVED)) for run in benchmark.of(name, dimension, [f])]) for name in names]
+        for f in plan.functions
+    ])  # fmt: skip
+    ranks = _ranked(names, table)
+    groups = {"all": plan.functions, **benchmark.groups()}
+    shares = {
+        name: tuple(benchmark.share(name, dimension, functions) for functions in groups.values())
+        for name in _ordered(names, ranks)
+    }
+    whole = chosen.ablation(dict(zip(names, table.T, strict=True))) if chosen else None
+    return Overall(
+        f"{plan.multiplier * dimension:,} evaluations",
+        f"BBOB: {len(plan.functions)} functions in dimension {dimension}, {len(plan.instances)} instances each",
+        "function", tuple(groups), "share of the targets met", shares, ranks, {}, whole, {}, share=True,
+    )  # fmt: skip
+
+
+def _has(comparison: Comparison, name: str) -> bool:
+    return name in (variant.name for variant in comparison.gathered.variants)
+
+
+def _logs(comparison: Comparison, names: Sequence[str]) -> dict[int, list[float]]:
+    """{seed: log10 of each variant's objective over the floor}, of the seeds that all finished."""
+    least = (1 + comparison.ties) * comparison.floor.value
+    variants = [comparison.gathered[name] for name in names]
+    seeds = set.intersection(*({run.seed for run in v.finished} for v in variants)) if variants else set()
+    return {
+        s: [float(np.log10(max(v.objectives[s], least) / comparison.floor.value)) for v in variants]
+        for s in sorted(seeds)
+    }
+
+
+def _ranked(names: Sequence[str], table: np.ndarray) -> Ranks | None:
+    return friedman(names, table) if len(names) > 2 and len(table) >= LEAST_SEEDS else None
+
+
+def _ordered(names: Sequence[str], ranks: Ranks | None) -> list[str]:
+    return sorted(names, key=dict(zip(ranks.names, ranks.mean, strict=True)).__getitem__) if ranks else list(names)
+
+
+def _cost(chosen: Family | None, comparisons: Iterable[Comparison]) -> dict[str, float]:
+    """What each switch adds to the simulations of an iteration."""
+    if chosen is None:
+        return {}
+    each: dict[str, list[float]] = {name: [] for name in chosen.members.values()}
+    for comparison in comparisons:
+        for name, rates in each.items():
+            rates += [
+                float((run.simulations[-1] - run.simulations[0]) / (len(run.history) - 1))
+                for run in comparison.gathered[name].finished if len(run.history) > 1
+            ]  # fmt: skip
+    return chosen.cost({name: float(np.mean(rates)) for name, rates in each.items()})

@@ -1,0 +1,84 @@
+"""Sentences on several problems at once, each with its numbers and no more than the tests allow."""
+
+import numpy as np
+
+from tractexp.studies.comparison.ablation import Effect
+from tractexp.studies.comparison.claims import number
+from tractexp.studies.comparison.overall import Overall, Several
+from tractexp.studies.comparison.statistics import ALPHA
+from tractexp.wording import in_words, joined, percent
+
+
+def answer(several: Several) -> str:
+    """What is ranked first under each of the terms."""
+    return " ".join(of_ranks(overall) for overall in several.overall)
+
+
+def of_ranks(overall: Overall) -> str:
+    """Which variant has the best mean rank, and which are not told from it."""
+    where = f"{overall.terms}, {overall.where}" if overall.terms else overall.where
+    if overall.ranks is None:
+        return f"{where}: too few variants or seeds to rank."
+    ranks = overall.ranks
+    best, *others = sorted(zip(ranks.mean, ranks.names, strict=True))
+    alike = [name for mean, name in others if mean - best[0] < ranks.critical_difference]
+    said = f"{where}: {best[1]} has the best mean rank, {best[0]:.2f} of {len(ranks.names)}"
+    if ranks.p >= ALPHA:
+        return f"{said}, but the variants do not differ significantly (Friedman, p = {in_words(ranks.p)})."
+    close = joined(alike) if len(alike) < 6 else f"{len(alike)} others"
+    told = f"; not told from it: {close}" if alike else ", significantly before all others"
+    return f"{said}{told} (critical difference {ranks.critical_difference:.2f})."
+
+
+def of_switches(overall: Overall) -> str:
+    """Which switches help and which harm, over all problems under the same terms; "" without an ablation."""
+    if overall.ablation is None:
+        return ""
+    told = [of_effect(effect) for effect in overall.ablation.effects]
+    where = [overall.terms] * bool(overall.terms) + ["BBOB"] * overall.share
+    return ", ".join(where) + ": " * bool(where) + "; ".join(told) + "."
+
+
+def of_effect(effect: Effect) -> str:
+    """ "levy helps (x 0.81, 0.76 to 0.87; in 64 % of the pairs)"."""
+    verdict = "has no effect that is shown" if not effect.shown else "helps" if effect.factor < 1 else "harms"
+    pairs = f"; better in {percent(effect.better[0])} of the pairs" if effect.better else ""
+    interval = f"{number(effect.low)} to {number(effect.high)}"
+    return f"{effect.switches[0]} {verdict} (× {number(effect.factor)}, {interval}{pairs})"
+
+
+def of_cost(overall: Overall) -> str:
+    """What each switch costs; "" where that is not known."""
+    if not overall.cost:
+        return ""
+    told = [f"{switch} {cost:+.1f}" for switch, cost in overall.cost.items()]
+    return f"{overall.terms}: simulations that switching on adds to an iteration: {', '.join(told)}."
+
+
+def of_agreement(several: Several) -> str:
+    """Whether the switches do the same under all terms; "" without ablations."""
+    made = [overall.ablation for overall in several.overall if overall.ablation]
+    if len(made) < 2:
+        return ""
+    signs: dict[str, list[int]] = {}
+    for ablation in made:
+        for effect in ablation.effects:
+            signs.setdefault(effect.switches[0], []).append(int(np.sign(1 - effect.factor)) * effect.shown)
+    always = [s for s, found in signs.items() if len(found) == len(made) and all(sign > 0 for sign in found)]
+    never = [s for s, found in signs.items() if all(sign <= 0 for sign in found)]
+    told = [f"{_help(always)} everywhere" if always else "no ingredient helps everywhere"]
+    told += [f"{_help(never)} nowhere"] if never else []
+    return f"Over all terms together, {' and '.join(told)}."
+
+
+def _help(names: list[str]) -> str:
+    return f"{joined(names)} help{'s' * (len(names) == 1)}"
+
+
+def sentences(several: Several) -> list[str]:
+    """All claims, the most general first."""
+    told = [of_agreement(several)]
+    for overall in several.overall:
+        told += [of_ranks(overall), of_switches(overall)]
+    told += [of_cost(overall) for overall in several.overall]
+    return [text for text in told if text]

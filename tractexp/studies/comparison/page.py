@@ -1,0 +1,278 @@
+"""A comparison as one self-contained page for people, and as one JSON file for machines."""
+
+import math
+from dataclasses import asdict, is_dataclass
+from typing import Any
+
+from tractexp import files
+from tractexp.blocks import Report
+from tractexp.blocks.chart import Chart
+from tractexp.studies.comparison import charts, claims
+from tractexp.studies.comparison.ablation import Ablation
+from tractexp.studies.comparison.claims import number, p_value
+from tractexp.studies.comparison.comparison import Comparison, Pair
+from tractexp.studies.comparison.floor import AT_FLOOR
+from tractexp.studies.comparison.runs import Run, Variant
+from tractexp.studies.comparison.statistics import ALPHA, size_of
+from tractexp.studies.comparison.summary import Spread
+
+AT_END = "at the end of the search"
+COMPANY = "With most other switches on against with fewest: the factor by which the effect changes."
+INTERACTIONS = "Interactions: the factor by which one switch's effect changes when the other is on."
+QUOTED = 12  # more sentences than these about pairs are folded away
+
+
+def report(comparison: Comparison, source: str) -> Report:
+    """The page; `source` says where the runs are from."""
+    runs = sum(summary.runs for summary in comparison.summaries)
+    title = f"Comparison of {len(comparison.summaries)} optimizers on {comparison.gathered.problem}"
+    page = Report(title, f"{runs} runs of {source}. Objectives, errors and parameters are those {AT_END}.")
+    told = (claims.headline, claims.of_floor, claims.of_valley, claims.of_speed)
+    page.verdict(claims.answer(comparison), *(text for claim in told if (text := claim(comparison))))
+    if comparison.notes:
+        page.heading("Mind").items(comparison.notes)
+    quality(page, comparison)
+    _parameters(page, comparison)
+    _speed(page, comparison)
+    _differences(page, comparison)
+    if comparison.ablation:
+        switches(page, comparison.ablation)
+    _not_judged(page, comparison)
+    _reading(page, comparison)
+    return page
+
+
+def _spread(spread: Spread, scale: float = 1.0) -> list[str]:
+    """Best, lower quartile, median, upper quartile, worst."""
+    return [number(x * scale, 4) for x in (spread.best, spread.lower, spread.median, spread.upper, spread.worst)]
+
+
+def quality(page: Report, comparison: Comparison) -> None:
+    """Where the runs ended: every run, and quartiles."""
+    page.heading("Where the runs ended")
+    drawn = charts.spread(comparison.variants, comparison.floor)
+    page.chart(drawn, f"Objective {AT_END} of every run that finished. Dashed: the floor.")
+    columns = ["variant", "runs", "failed", "best", "lower quartile", "median", "upper quartile", "worst", "at floor"]
+    rows = [
+        [s.name, str(s.runs), str(s.failures), *_spread(s.objective), f"{s.at_floor:.0%}", _share(s.in_valley)]
+        for s in comparison.summaries
+    ]
+    floor = f"the floor, {number(comparison.floor.value, 5)} pu² ({comparison.floor.source})"
+    page.table(
+        [*columns, "in its valley"],
+        rows,
+        f"Objective of Eq. (8) [pu²] {AT_END}. At floor: share of runs within {AT_FLOOR:.0%} of {floor}. In its "
+        "valley: share of the finished runs from whose end least squares reach it.",
+    )
+    for name in ("epsilon_p", "epsilon_q"):
+        rows = [[s.name, *_spread(getattr(s, name), 100.0)] for s in comparison.summaries]
+        with page.folded(f"{name} of Eq. (20)"):
+            page.table(["variant", *columns[3:-1]], rows, f"{name} {AT_END}, in percent.")
+
+
+def _share(value: float | None) -> str:
+    return "-" if value is None else f"{value:.0%}"
+
+
+def _parameters(page: Report, comparison: Comparison) -> None:
+    """Every run's parameters against the floor's; nothing where the problem could not be put again."""
+    polished = comparison.polished
+    if polished is None or not polished.reached:
+        return
+    page.heading("The parameters of every run")
+    drawn = charts.parameters(comparison.variants, polished)
+    inside = sum(polished.in_valley(run) is True for run in polished.reached)
+    page.chart(
+        drawn,
+        f"Parameters {AT_END}, over the bounds of each; dashed: those of the lowest objective, "
+        f"{number(polished.objective, 5)} pu². Least squares from where they ended lead {inside} of "
+        f"{len(polished.reached)} runs there, and the others to higher valleys.",
+    )
+    rows = [
+        [name, polished.units[name], number(value, 4), *(number(bound, 4) for bound in polished.bounds[name])]
+        for name, value in polished.parameters.items()
+    ]
+    with page.folded("the values of the lowest objective"):
+        page.table(["parameter", "unit", "value", "lower bound", "upper bound"], rows)
+
+
+def _speed(page: Report, comparison: Comparison) -> None:
+    page.heading("How fast")
+    goals = [f"{target:g} x floor" for target in comparison.targets]
+    columns = ["variant", "simulations", *(f"{g} [simulations]" for g in goals), *(f"{g} [s]" for g in goals)]
+    rows = [
+        [s.name, number(s.simulations.median)]
+        + [number(float(round(x)) if math.isfinite(x) else x) for x in s.ert["simulations"]]
+        + [number(x) for x in s.ert["seconds"]]
+        for s in comparison.summaries
+    ]
+    for by in ("simulations", "iterations"):
+        told = f"Best objective by {by}: the median" + (" and the quartiles." if _few(comparison) else ".")
+        costs = " An iteration may cost several populations." if by == "iterations" else ""
+        _curves(page, comparison, charts.fitness(comparison.variants, by, comparison.floor), told + costs)
+    told = f"Runtimes: the share of {charts.targets_told()} reached by all runs, by simulations."
+    _curves(page, comparison, charts.ecdf(comparison.variants, comparison.floor), told)
+    page.table(
+        columns,
+        rows,
+        "Median of all simulations made, and expected running time (ERT) to each target: what all runs spent until "
+        "they reached it, those that did not all they had, per run that did.",
+    )
+
+
+def _few(comparison: Comparison) -> bool:
+    return len(comparison.summaries) <= charts.TOGETHER
+
+
+def _curves(page: Report, comparison: Comparison, drawn: tuple[Chart, list[Chart]], told: str) -> None:
+    """A chart of all variants; where there are many, one of each folded away."""
+    whole, each = drawn
+    many = f" In color the first {charts.TOGETHER}; gray ones are named when pointed at." if each else ""
+    page.chart(whole, told + many)
+    if each:
+        with page.folded("each variant in a chart of its own"):
+            page.charts(each, f"In gray: {comparison.summaries[0].name}.")
+
+
+def _differences(page: Report, comparison: Comparison) -> None:
+    page.heading("Is the difference more than chance?")
+    if comparison.ranks:
+        page.text(claims.of_ranks(comparison))
+        page.chart(
+            charts.mean_ranks(comparison.ranks),
+            f"Mean ranks over seeds, with half of Nemenyi's critical difference to either side: variants whose bars "
+            f"do not overlap differ significantly at {ALPHA:.0%}.",
+        )
+    if not comparison.pairs:
+        return
+    main, rest = claims.near_and_far(comparison)
+    _pairs(page, main, "")
+    if rest:
+        with page.folded(f"the other {len(rest)} pairs" if len(rest) > 1 else "the other pair"):
+            _pairs(page, rest, "")
+    told = [claims.of_pair(comparison, pair) for pair in (*main, *rest)]
+    page.heading("To quote", 3).items(told[:QUOTED])
+    if told[QUOTED:]:
+        with page.folded(f"{len(told) - QUOTED} more sentences"):
+            page.items(told[QUOTED:])
+
+
+def _pairs(page: Report, pairs: list[Pair], caption: str) -> None:
+    columns = ["lower", "higher", "seeds", "median", "median", "p", "p (Holm)", "A", "effect", "significant"]
+    rows = [
+        [
+            *(
+                pair.first,
+                pair.second,
+                str(pair.seeds),
+                *map(number, pair.medians),
+                *map(p_value, (pair.p, pair.corrected)),
+            ),
+            *(f"{pair.effect:.2f}", size_of(pair.effect), "yes" if pair.significant else "no"),
+        ]
+        for pair in pairs
+    ]
+    said = (
+        "p: Wilcoxon signed-rank test over paired seeds, two-sided, as it is and after Holm's correction. A: "
+        "probability that a run of the first ends lower than one of the second (Vargha-Delaney)."
+    )
+    page.table(columns, rows, f"{caption} {said}".strip(), words=(1, 8))
+
+
+def switches(page: Report, ablation: Ablation) -> None:
+    """The effects of the switches on one problem."""
+    page.heading("What each ingredient does")
+    page.items([claims.of_effect(effect) for effect in ablation.effects])
+    columns = ["switched on", "factor", "from", "to", "seeds", "shown", "contrasts"]
+    groups = (
+        (ablation.effects, "Main effects: the factor by which the objective is multiplied; below 1 it is lowered."),
+        (ablation.company, COMPANY),
+        (ablation.interactions, INTERACTIONS),
+    )
+    for effects, caption in groups:
+        rows = [
+            [
+                *(" with ".join(e.switches), number(e.factor), number(e.low), number(e.high)),
+                *(str(e.seeds), "yes" if e.shown else "no", str(len(e.contrasts))),
+            ]
+            for e in effects
+        ]
+        if rows:
+            page.table(columns, rows, f"{caption} 95 % bootstrap intervals over seeds.")
+    if unknown := claims.of_unknown(ablation):
+        page.text(unknown)
+
+
+def _not_judged(page: Report, comparison: Comparison) -> None:
+    """The runs without a result: those that failed, and those that were interrupted."""
+    failed = _failed(comparison)
+    interrupted = [(name, run.seed, run.where, run.interruption) for name, run in comparison.gathered.interrupted]
+    for title, rows in (("Failures", failed), ("Interrupted: not judged", interrupted)):
+        if rows:
+            page.heading(f"{title}: {len(rows)}")
+            page.table(["variant", "seed", "job", "because"], [list(map(str, row)) for row in rows], words=(2, 3))
+
+
+def _failed(comparison: Comparison) -> list[tuple[str, int, str, str]]:
+    return [(v.name, run.seed, run.where, run.failure) for v in comparison.variants for run in v.runs if run.failure]
+
+
+def _reading(page: Report, comparison: Comparison) -> None:
+    page.heading("How to read this page").items(
+        [
+            f"Objectives within {comparison.ties:g} of the floor count as equal in the tests: what is left there is "
+            "rounding, not quality. The tables show them as they are.",
+            "A failed run counts as worse than any other in the tests; its budget counts as spent in the ERT; "
+            "quartiles and curves are those of the finished runs. An interrupted run counts as nothing.",
+            "The optimizer is judged by where its own search ended. An identification goes on from there: its estimate "
+            "is polished by least squares from several starts, and mostly the same whichever optimizer is taken.",
+            "A target counts as reached at the end of the iteration in which it was, so running times are at most "
+            "one iteration too long.",
+            "Not significant means that these runs do not show a difference, not that there is none.",
+            "Wilcoxon 1945; Holm 1979; Vargha and Delaney 2000; Friedman 1937 and Nemenyi 1963 after Demsar 2006; ERT "
+            "after Hansen et al. 2021 (COCO); bootstrap intervals after Efron 1979.",
+        ]
+    )
+
+
+def content(comparison: Comparison, source: str) -> dict[str, Any]:
+    """What `comparison.json` holds: every number of the page. What is not finite is None."""
+    failed = _failed(comparison)
+    interrupted = [(name, run.seed, run.where, run.interruption) for name, run in comparison.gathered.interrupted]
+    keys = ("variant", "seed", "job", "message")
+    polished = comparison.polished
+    told = {
+        "source": source,
+        "problem": comparison.gathered.problem,
+        "values": f"objectives, errors and parameters are those {AT_END}",
+        "answer": claims.answer(comparison),
+        "floor": {**asdict(comparison.floor), "parameters": polished.parameters if polished else None},
+        "targets": comparison.targets,
+        "ties": comparison.ties,
+        "variants": comparison.summaries,
+        "runs": [_told(variant, run, comparison) for variant in comparison.variants for run in variant.finished],
+        "pairs": [asdict(pair) | {"significant": pair.significant} for pair in comparison.pairs],
+        "ranks": comparison.ranks,
+        "ablation": comparison.ablation,
+        "sentences": claims.sentences(comparison),
+        "notes": comparison.notes,
+        "failures": [dict(zip(keys, row, strict=True)) for row in failed],
+        "interrupted": [dict(zip(keys, row, strict=True)) for row in interrupted],
+    }
+    return files.plain(as_dicts(told))
+
+
+def _told(variant: Variant, run: Run, comparison: Comparison) -> dict[str, Any]:
+    """One run, as `comparison.json` holds it."""
+    inside = comparison.polished.in_valley(run) if comparison.polished else None
+    kept = {key: getattr(run, key) for key in ("seed", "objective", "epsilon_p", "epsilon_q", "parameters")}
+    return {"variant": variant.name, **kept, "simulations": run.simulations[-1], "in_valley": inside}
+
+
+def as_dicts(value: Any) -> Any:
+    """Data classes within as dictionaries."""
+    if is_dataclass(value) and not isinstance(value, type):
+        value = asdict(value)
+    if isinstance(value, dict):
+        return {key: as_dicts(item) for key, item in value.items()}
+    return [as_dicts(item) for item in value] if isinstance(value, list | tuple) else value

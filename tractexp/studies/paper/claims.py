@@ -1,0 +1,375 @@
+"""The paper's claims, each with a verdict that the measurements of a `Study` decide."""
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.identification.result import ACCEPTED
+from tractexp.studies.comparison.statistics import ALPHA, LEAST_SEEDS, holm, vargha_delaney, wilcoxon
+from tractexp.studies.paper import equations, maps, printed, why
+from tractexp.studies.paper.printed import LABELS
+from tractexp.studies.paper.study import BUDGETS, TARGETS, Study
+from tractexp.wording import joined
+
+CONFIRMED, REFUTED = "confirmed", "not confirmed"
+IMPOSSIBLE = "cannot be reproduced"
+OPEN = f"not settled: a test needs {LEAST_SEEDS} seeds or more"
+DEPENDS = "depends on the reading"
+PAIRS = (("issa", "ssa"), ("issa", "pso"), ("ssa", "pso"))
+BOTH = ("issa", "issa_10_perceivers", "issa_raw", "issa_raw_scalar", "issa_to_the_letter")  # with an SSA read alike
+LARGER = 2  # times the operations of the others make a large one of Table 1
+DIFFERENT = 1.1  # accuracies within a tenth of each other count as equal in Table 1
+
+
+@dataclass(frozen=True)
+class Claim:
+    """What the paper says and where, what we measured, and the verdict."""
+
+    part: str  # the table or figure it belongs to
+    text: str
+    measured: str
+    verdict: str
+
+    @property
+    def word(self) -> str:
+        """The verdict without its reason."""
+        return self.verdict.partition(":")[0]
+
+
+def counted(judged: Sequence[Claim]) -> str:
+    """How many there are and how many got which verdict: "38 claims: 7 confirmed, 31 not confirmed"."""
+    counts = Counter(claim.word for claim in judged)
+    told = {CONFIRMED: CONFIRMED, DEPENDS: "depending on the reading", REFUTED: REFUTED, IMPOSSIBLE: IMPOSSIBLE}
+    told |= {word: word for word in counts if word not in told}
+    return f"{len(judged)} claims: " + ", ".join(
+        f"{counts[word]} {said}" for word, said in told.items() if counts[word]
+    )
+
+
+def number(value: float) -> str:
+    """Three digits, all of a large number's, or a word where there is none."""
+    if not np.isfinite(value):
+        return "never"
+    if abs(value) >= 1000:
+        return f"{value:,.0f}"
+    return f"{value:.3g}" if abs(value) >= 1e-3 or value == 0 else f"{value:.2e}"
+
+
+def percent(value: float) -> str:
+    return f"{100 * value:.2f} %"
+
+
+def ranked(study: Study, first: str, second: str, by: str) -> tuple[str, str]:
+    """Whether `first` ends lower than `second`, by every reading of both: the verdict and the numbers behind it."""
+    verdicts, told = {}, []
+    for how, names in readings_of(first, second).items():
+        verdicts[how], numbers = better(study, names, (first, second), by)
+        told.append(f"{how} {numbers}")
+    return together(verdicts), "; ".join(told)
+
+
+def readings_of(first: str, second: str) -> dict[str, dict[str, str]]:
+    """How the paper can be read where it matters to these two: {how: {optimizer: reading}}."""
+    own = {name: name for name in printed.COMPARED}
+    made = {"with SD = 20 (section 4.3)": own}
+    if {first, second} & printed.TEN.keys():
+        made["with the 10 perceivers of section 4.2"] = own | printed.TEN
+    if "pso" in (first, second):
+        made["with PSO's velocity limited to 0.2"] = own | {"pso": "pso_limited"}
+    return made
+
+
+def together(verdicts: Mapping[str, str]) -> str:
+    """One verdict for all readings, or that it depends on them and which confirm it."""
+    different = set(verdicts.values())
+    if len(different) == 1 or OPEN in different:
+        return OPEN if OPEN in different else different.pop()
+    return f"{DEPENDS}: {CONFIRMED} only {joined([how for how, v in verdicts.items() if v == CONFIRMED])}"
+
+
+def better(study: Study, names: Mapping[str, str], pair: tuple[str, str], by: str) -> tuple[str, str]:
+    """Whether the first of a pair ends lower, the three optimizers read as `names` says."""
+    three = [study.pair(names[a], names[b], by) for a, b in PAIRS]
+    corrected = dict(zip(PAIRS, holm([each.p for each in three]), strict=True))
+    p, A = corrected[pair], three[PAIRS.index(pair)].A
+    medians = [float(np.median(study.objectives(names[name], by))) for name in pair]
+    told = f"medians {number(medians[0])} and {number(medians[1])} pu², p = {p:.2g}, A = {A:.2f}"
+    return _sure(study, p < ALPHA and A > 0.5), told
+
+
+def table1(study: Study) -> list[Claim]:
+    """Accuracy, identifiability and size of the three motor orders."""
+    third, first, second = (study.orders[m] for m in ("electromechanical", "mechanical", "voltage"))
+    P, Q = ([o.spread("train")[c] for o in (third, first, second)] for c in (0, 1))
+    said = "electromechanical {}, mechanical {}, voltage {}"
+    ranked_P = P[0] * DIFFERENT < P[1] and P[1] * DIFFERENT < P[2]
+    ranked_Q = Q[0] * DIFFERENT < Q[2] and Q[2] * DIFFERENT < Q[1]
+    identified = [f"{o.identified} of {o.free}" for o in (third, first, second)]
+    alone = third.identified == third.free and first.identified < first.free and second.identified < second.free
+    steps, sizes = ([getattr(o, each).total for o in (third, first, second)] for each in ("step", "per_sample"))
+    times = [f"{o.nanoseconds:.2g}" for o in (third, first, second)]
+    return [
+        Claim("table1", "P: the electromechanical model is better, the mechanical good, the voltage model bad",
+              "epsilon_p " + said.format(*map(percent, P)), CONFIRMED if ranked_P else REFUTED),
+        Claim("table1", "Q: the electromechanical model is better, the voltage model good, the mechanical bad",
+              "epsilon_q " + said.format(*map(percent, Q)), CONFIRMED if ranked_Q else REFUTED),
+        Claim("table1", "stability accuracy: better, better, good",
+              "the paper neither defines this column nor says how it was found", IMPOSSIBLE),
+        Claim("table1", "only the electromechanical model is identifiable",
+              "parameters identified: " + said.format(*identified), CONFIRMED if alone else REFUTED),
+        Claim("table1", "the electromechanical model is large to compute, the others small",
+              "operations of the compiled equations in a Runge-Kutta step: " + said.format(*(f"{n:.0f}" for n in steps))
+              + "; in a sample with all its steps: " + said.format(*(f"{n:.0f}" for n in sizes))
+              + "; measured beside it, ns: " + said.format(*times),
+              CONFIRMED if sizes[0] > LARGER * max(sizes[1:]) else REFUTED),
+    ]  # fmt: skip
+
+
+def table2(study: Study) -> list[Claim]:
+    """The values ISSA identifies and their errors."""
+    told, worst = [], {}
+    for name in ("issa", printed.TEN["issa"], printed.LITERAL["issa"]):
+        fits = [several[0] for several in study.fits(name)]
+        P, Q = (np.array([getattr(f, e) for f in fits]) for e in ("epsilon_p", "epsilon_q"))
+        worst[how_read(name)] = max(P.max(), Q.max())
+        told.append(f"{how_read(name)} medians {percent(np.median(P))} and {percent(np.median(Q))}, worst"
+                    f" {percent(worst[how_read(name)])}")  # fmt: skip
+    sine = equations.steady_state_sine(printed.TABLE_3["issa"])
+    accepted = {how: CONFIRMED if error < ACCEPTED else REFUTED for how, error in worst.items()}
+    return [
+        Claim("table2", "the identified values", f"with them Eq. (3) asks for the arcsine of {sine:.2f}, and C ="
+              " (X - X')/X = -2.62 is no ratio of reactances; the record is not public", IMPOSSIBLE),
+        Claim("table2", "all identified parameters are within reasonable ranges",
+              "C lies outside (0, 1), where its definition puts it", REFUTED),
+        Claim("table2", "the errors of P and Q are below 5 %: the model is acceptable",
+              f"epsilon_p and epsilon_q: {'; '.join(told)}", together(accepted)),
+    ]  # fmt: skip
+
+
+def how_read(name: str) -> str:
+    """A reading as a sentence has it."""
+    return {"issa": "with SD = 20", printed.TEN["issa"]: "with 10 perceivers"}.get(name, printed.READINGS[name].told)
+
+
+def table3(study: Study) -> list[Claim]:
+    """Which of the three ends lowest."""
+    claims = []
+    for first, second in PAIRS:
+        for by in BUDGETS:
+            verdict, told = ranked(study, first, second, by)
+            at = "300 iterations" if by == "iterations" else f"{study.equal:,} simulations each"
+            text = f"{LABELS[first]} is more accurate than {LABELS[second]}, after {at}"
+            claims.append(Claim("table3", text, told, verdict))
+    letter = [better(study, printed.LITERAL, pair, "iterations") for pair in PAIRS[:2]]
+    told = "; ".join(f"{LABELS[a]} and {LABELS[b]}: {said}" for (a, b), (_, said) in zip(PAIRS, letter, strict=False))
+    won = all(verdict == CONFIRMED for verdict, _ in letter)
+    claims.append(Claim("table3", "to the letter, ISSA is more accurate than SSA and PSO, after 300 iterations", told,
+                        _sure(study, won)))  # fmt: skip
+    P, Q = ({n: np.median([getattr(s[0], e) for s in study.fits(n)]) for n in printed.COMPARED}
+            for e in ("epsilon_p", "epsilon_q"))  # fmt: skip
+    said = "; ".join(f"{LABELS[n]} {percent(P[n])}, {percent(Q[n])}" for n in P)
+    claims.append(
+        Claim("table3", "Q is described more accurately than P", f"median epsilon_p, epsilon_q: {said}",
+              CONFIRMED if all(Q[n] < P[n] for n in P) else REFUTED)
+    )  # fmt: skip
+    gap = equations.consistency()
+    worst = max(gap.misses, key=lambda n: abs(gap.misses[n]))
+    claims.append(
+        Claim("table3", "the three columns are fits to one record",
+              "errors and objective of a column give mean P² and Q²; ISSA's and SSA's give a mean Q² of"
+              f" {gap.pairs['issa and ssa'][1]:.2f}, and the best common pair misses {LABELS[worst]}'s objective by"
+              f" {100 * abs(gap.misses[worst]):.0f} %", IMPOSSIBLE)
+    )  # fmt: skip
+    return claims
+
+
+def figure9(study: Study) -> list[Claim]:
+    """Speed, and local optima."""
+    claims = []
+    targets = " and ".join(f"{t:g}" for t in TARGETS)
+    for first, second in PAIRS:
+        for by in BUDGETS:
+            verdicts, told = {}, []
+            for how, names in readings_of(first, second).items():
+                verdicts[how], numbers = faster(study, names[first], names[second], by)
+                told.append(f"{how} {LABELS[first]} {numbers[0]}, {LABELS[second]} {numbers[1]}")
+            text = f"{LABELS[first]} converges faster than {LABELS[second]}, by {by}"
+            measured = f"expected {by} to {targets} times the floor: {'; '.join(told)}"
+            claims.append(Claim("figure9", text, measured, together(verdicts)))
+    claims.append(_jumps(study))
+    return claims
+
+
+def faster(study: Study, first: str, second: str, by: str) -> tuple[str, list[str]]:
+    """Whether `first` reaches every target with less, over paired seeds, and the expected running times of both."""
+    p, A = [], []
+    for target in TARGETS:
+        a, b = (np.where(*_reached(study.spent(name, target, by))) for name in (first, second))
+        p.append(wilcoxon(a, b)[0])
+        A.append(vargha_delaney(a, b))
+    told = [", ".join(number(study.running_time(name, t, by)) for t in TARGETS) for name in (first, second)]
+    return _sure(study, max(holm(p)) < ALPHA and min(A) > 0.5), told
+
+
+def _reached(spent: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray, float]:
+    """What `numpy.where` takes: the cost where the target was reached, else without end."""
+    return spent[1], spent[0], np.inf
+
+
+def _jumps(study: Study) -> Claim:
+    """Whether ISSA ends in the valley of the lowest objective more often than the two others do."""
+    verdicts, told = {}, []
+    for how, names in readings_of("issa", "ssa").items():
+        shares = {name: study.shares(names[name]) for name in printed.COMPARED}
+        tests = [why.fisher(shares["issa"], shares[name], "valley") for name in ("ssa", "pso")]
+        more = all(shares["issa"].valley > shares[name].valley for name in ("ssa", "pso"))
+        verdicts[how] = _sure(study, more and max(holm(tests)) < ALPHA)
+        told.append(f"{how} " + ", ".join(f"{LABELS[n]} {s.valley} of {s.n} (at its floor {s.floor})"
+                                          for n, s in shares.items()))  # fmt: skip
+    control = study.control_shares
+    told.append(f"of random points {control.valley} of {control.n} descend there")
+    return Claim(
+        "figure9", "SSA and PSO are caught in local optima, ISSA jumps out of them",
+        f"searches that end in the valley of the lowest objective: {'; '.join(told)}", together(verdicts),
+    )  # fmt: skip
+
+
+def _sure(study: Study, holds: bool) -> str:
+    return OPEN if study.seeds < LEAST_SEEDS else CONFIRMED if holds else REFUTED
+
+
+def generalized(part: str, kind: str, table: dict[str, tuple[float, float]]) -> Callable[[Study], list[Claim]]:
+    """The claims of Table 4 or 5."""
+
+    def claims(study: Study) -> list[Claim]:
+        residuals = study.residuals(kind)
+        own = [min(table, key=lambda n, c=c: table[n][c]) for c in (0, 1)]
+        verdicts, told, good, worst = {}, [], {}, []
+        for how, names in readings_of("issa", "ssa").items():
+            errors = [getattr(fits[e], name) for fits in study.fits(names["issa"]) for e in study.held(kind)
+                      for name in ("epsilon_p", "epsilon_q")]  # fmt: skip
+            good[how] = CONFIRMED if max(errors) < ACCEPTED else REFUTED
+            worst.append(f"{how} {percent(max(errors))}")
+            verdicts[how] = _lowest(study, {n: residuals[names[n]] for n in names})
+            middle = {n: np.median(residuals[names[n]], axis=0) for n in names}
+            told.append(f"{how} " + ", ".join(f"{LABELS[n]} {number(r[0])}, {number(r[1])}" for n, r in middle.items()))
+        return [
+            Claim(part, f"ISSA's model has good {kind} ability",
+                  f"epsilon_p and epsilon_q of the held-out dip, worst of all seeds: {'; '.join(worst)}",
+                  together(good)),
+            Claim(part, f"ISSA's model has the best {kind} overall",
+                  f"median residuals of P, Q [pu]: {'; '.join(told)}. The paper's own table has {LABELS[own[0]]} lowest"
+                  " in P", together(verdicts)),
+        ]  # fmt: skip
+
+    return claims
+
+
+def _lowest(study: Study, residuals: Mapping[str, np.ndarray]) -> str:
+    """Whether ISSA's residuals (seeds, 2), of P and of Q, are lower than those of both others."""
+    rivals = [(residuals["issa"][:, c], residuals[name][:, c]) for name in ("ssa", "pso") for c in (0, 1)]
+    return _sure(study, all(lower(rivals)))
+
+
+def figure3(study: Study) -> list[Claim]:
+    """How even the maps are."""
+    flock, *_ = study.uniformity.values()
+    middle = {name: float(np.median(values)) for name, values in flock.items()}
+    tent = {name: value for name, value in middle.items() if name.startswith("tent")}
+    own = f"tent, alpha = {printed.ALPHA:g}"
+    best = min(tent, key=lambda name: tent[name])
+    told = f"median centered discrepancy of {next(iter(study.uniformity))}: "
+    far = np.median(flock[own]) / np.median(flock["uniform"])
+    return [
+        Claim("figure3", "the tent map is more uniform than the logistic map",
+              f"{told}tent {number(middle[own])}, logistic {number(middle['logistic'])}",
+              CONFIRMED if middle[own] < middle["logistic"] else REFUTED),
+        Claim("figure3", "with alpha = 0.3 it is relatively uniform",
+              f"lowest of the alphas tried: {best.partition(', ')[2]} with {number(tent[best])}; 0.3 has"
+              f" {number(tent[own])}", CONFIRMED if tent[own] < DIFFERENT * tent[best] else REFUTED),
+        Claim("figure3", "initializing by the tent map makes the flock more even",
+              f"{far:.2f} times the discrepancy of plain random numbers, {middle[own] / middle['Sobol']:.1f} times"
+              " that of Sobol points", CONFIRMED if far < 1 / DIFFERENT else REFUTED),
+    ]  # fmt: skip
+
+
+def figure4(study: Study) -> list[Claim]:
+    """What the Lévy flight is."""
+    slopes = {formula: maps.tail_exponent(steps) for formula, steps in study.tails.items()}
+    even = {formula: float(np.mean(steps > 0)) for formula, steps in study.tails.items()}
+    return [
+        Claim("figure4", "Lévy steps have good randomness in size and direction",
+              f"Mantegna's: {even['mantegna']:.1%} of the steps positive, tail exponent {slopes['mantegna']:.2f}",
+              CONFIRMED if abs(even["mantegna"] - 0.5) < 0.01 and slopes["mantegna"] < 2 else REFUTED),
+        Claim("figure4", "Eq. (15) gives Lévy steps with beta = 3/2",
+              f"as printed the tail exponent is {slopes['printed']:.2f} (2/3 in theory), which a Lévy flight of"
+              f" exponent 3/2 has not; Mantegna's |nu|^(1/beta) has {slopes['mantegna']:.2f}",
+              CONFIRMED if abs(slopes["printed"] - 1.5) < 0.2 else REFUTED),
+    ]  # fmt: skip
+
+
+def lower(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[bool]:
+    """Whether the first values (seeds,) of each pair are lower than the second, corrected for all pairs."""
+    corrected = holm([wilcoxon(a, b)[0] for a, b in pairs])
+    return [p < ALPHA and vargha_delaney(a, b) > 0.5 for p, (a, b) in zip(corrected, pairs, strict=True)]
+
+
+def readings(study: Study) -> list[Claim]:
+    """Whether the ranking survives the readings, and whether the ingredients help."""
+    both = [(study.objectives(name), study.objectives(name.replace("issa", "ssa", 1))) for name in BOTH]
+    issa, ssa = lower(both), lower([(b, a) for a, b in both])
+    whole = study.objectives("issa")
+    without = {told: study.objectives(f"issa_no_{name}") for name, (_, told) in printed.INGREDIENTS.items()}
+    helps = lower([(whole, ends) for ends in without.values()])
+    told = ", ".join(
+        f"{what} × {np.median(ends) / np.median(whole):.2f} (A = {vargha_delaney(whole, ends):.2f}"
+        + (")" if helped else ", not significant)")
+        for (what, ends), helped in zip(without.items(), helps, strict=True)
+    )
+    zero = {n: far / max(near, 1e-300) for n, (near, far) in study.bias.items()}
+    return [
+        Claim("readings", "ISSA is better than SSA, whatever the reading of Eqs. (11) to (13)",
+              f"of {len(both)} readings, at 300 iterations, ISSA ends significantly lower in {sum(issa)}, SSA in"
+              f" {sum(ssa)}", _sure(study, all(issa))),
+        Claim("readings", "each of the four ingredients improves the search",
+              f"with SD = 20, median objective without it over that of ISSA, both after 300 iterations: {told}",
+              _sure(study, all(helps))),
+        Claim("readings", "SSA searches the space without preference",
+              f"error on the sphere with the optimum one unit off zero over that at zero: SSA {zero['ssa']:.0e},"
+              f" ISSA {zero['issa']:.0e}, PSO {zero['pso']:.1g}", CONFIRMED if zero["ssa"] < 100 else REFUTED),
+    ]  # fmt: skip
+
+
+def agreement(study: Study) -> list[Claim]:
+    """What is printed against the printed equations."""
+    checks = equations.checks()
+    failed = [check for check in checks if not check.holds]
+    wrong, right = equations.order(equations.as_printed), equations.order(equations.classical)
+    return [
+        Claim("equations", "what is printed agrees with the printed equations",
+              f"{len(failed)} of {len(checks)} checks fail", REFUTED if failed else CONFIRMED),
+        Claim("equations", "Eq. (4) is the fourth-order Runge-Kutta method",
+              f"measured order {wrong:.2f} as printed, {right:.2f} of the classical method",
+              CONFIRMED if wrong > 3.5 else REFUTED),
+    ]  # fmt: skip
+
+
+BY_PART: dict[str, Callable[[Study], Sequence[Claim]]] = {
+    "table1": table1,
+    "table2": table2,
+    "table3": table3,
+    "table4": generalized("table4", "interpolation", printed.INTERPOLATION),
+    "table5": generalized("table5", "extrapolation", printed.EXTRAPOLATION),
+    "figure3": figure3,
+    "figure4": figure4,
+    "figure9": figure9,
+    "equations": agreement,
+    "readings": readings,
+}
+
+
+def claims(study: Study, parts: Sequence[str]) -> list[Claim]:
+    """The claims of these parts, judged."""
+    return [claim for part in parts if part in BY_PART for claim in BY_PART[part](study)]

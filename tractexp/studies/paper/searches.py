@@ -1,0 +1,62 @@
+"""Many searches on the cores of this computer, without composing a configuration for each."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from tractexp.identification.problem import Problem
+from tractexp.identification.search import Found, Limits, search
+from tractexp.plugin import build
+from tractexp.studies.paper.remembered import Remembered
+from tractexp.workers import replaced
+
+CHUNK = 5  # searches that share the composition of a model
+Recipe = Callable[[], Problem]  # what a worker builds its problem from: a `Problem` holds compiled code
+Variant = Mapping[str, Any]  # settings of an optimizer: {"name": "issa", "levy": False}
+
+
+def run(
+    recipe: Recipe,
+    variants: Mapping[str, Variant],
+    seeds: int,
+    limits: Limits | None = None,
+    workers: int | None = None,
+    tell: Callable[[int, int], None] = lambda done, total: None,
+    remember: bool = True,
+    note: Callable[[str], None] = lambda line: None,
+) -> dict[str, list[Found]]:
+    """Search with every variant under seeds 0, 1, ...; `tell(done, total)` counts the searches done.
+
+    One seed gives one history, whatever the number of workers (None: one for each core). What was searched before by
+    the same code on the same problem is read back where it is to `remember`, and `note` is told; its seconds are those
+    of then.
+    """
+    from joblib import Parallel, cpu_count, delayed
+
+    problem, limits = recipe(), limits or Limits()
+    known = Remembered(problem, limits, remember)
+    found = {label: [known.get(settings, seed) for seed in range(seeds)] for label, settings in variants.items()}
+    missing = {label: [seed for seed in range(seeds) if several[seed] is None] for label, several in found.items()}
+    done, total = 0, sum(map(len, missing.values()))
+    if known_before := seeds * len(variants) - total:
+        note(f"  {known_before} of them were made before by the same code on the same records, and are read back")
+    chunks = [(label, left[k : k + CHUNK]) for label, left in missing.items() for k in range(0, len(left), CHUNK)]
+    if not chunks:
+        return found  # type: ignore[return-value]
+    problem.objective(problem.space.from_unit(np.full((1, problem.space.dimension), 0.5)))  # compiled once, for all
+    parallel: Any = Parallel(n_jobs=min(workers or cpu_count(), len(chunks)), return_as="generator")
+    jobs = (delayed(_chunk)(recipe, dict(variants[label]), part, limits) for label, part in chunks)
+    with replaced():
+        for (label, part), outcome in zip(chunks, parallel(jobs), strict=True):
+            for seed, one in zip(part, outcome, strict=True):
+                found[label][seed] = one
+                known.put(variants[label], seed, one)
+            done += len(part)
+            tell(done, total)
+    return found  # type: ignore[return-value]
+
+
+def _chunk(recipe: Recipe, settings: dict[str, Any], seeds: Sequence[int], limits: Limits) -> list[Found]:
+    problem, optimizer = recipe(), build("optimizer", settings)
+    return [search(problem, optimizer, seed, limits) for seed in seeds]

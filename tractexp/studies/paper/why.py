@@ -1,0 +1,82 @@
+"""Why the searches rank as they do: do they miss the right valley, or do they not get to the bottom of theirs?"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from tractexp.studies.comparison.statistics import ALPHA, holm, vargha_delaney, wilcoxon
+from tractexp.studies.paper.study import Pair, Shares, Study
+
+SPARROWS, RIVAL = ("issa", "ssa"), "pso"
+
+
+def fisher(a: Shares, b: Shares, of: str) -> float:
+    """Two-sided p of Fisher's exact test: as many searches of both reach the "valley" or the "floor"."""
+    from scipy.stats import fisher_exact
+
+    rows = [[getattr(s, of), s.n - getattr(s, of)] for s in (a, b)]
+    return float(fisher_exact(rows)[1])  # type: ignore[arg-type]
+
+
+def significant(pairs: Sequence[Pair], k: int) -> bool:
+    """Whether the first of pair k ends lower, corrected for all pairs."""
+    return bool(holm([pair.p for pair in pairs])[k] < ALPHA and pairs[k].A > 0.5)
+
+
+@dataclass(frozen=True)
+class Test:
+    """p of no difference, corrected, and whether what is tested has less than what it is compared with."""
+
+    p: float
+    less: bool
+
+    @property
+    def lacks(self) -> bool:
+        return self.less and self.p < ALPHA
+
+
+@dataclass(frozen=True)
+class Lack:
+    """What a sparrow search lacks beside PSO and beside random points."""
+
+    name: str
+    convergence: Test  # depth in its own valley, paired with PSO's: the objective over that of the bottom
+    valley: Test  # searches in the right valley, beside PSO's
+    random: Test  # searches in the right valley, beside random points that descend there
+    best: Test  # the same, beside searches for the best of as many random points
+    polished: Test  # objectives paired with PSO's, once least squares have ended both
+
+    @property
+    def exploration(self) -> bool:
+        return self.valley.lacks or self.random.lacks or self.best.lacks
+
+
+def lacks(study: Study) -> list[Lack]:
+    """ISSA's and SSA's; the p-values are corrected over the tests of both."""
+    tests = [test for name in SPARROWS for test in _tests(study, name)]
+    corrected = holm([test.p for test in tests]).tolist()
+    judged = [Test(p, test.less) for p, test in zip(corrected, tests, strict=True)]
+    each = len(judged) // len(SPARROWS)
+    return [Lack(name, *judged[each * k : each * (k + 1)]) for k, name in enumerate(SPARROWS)]
+
+
+def _tests(study: Study, name: str) -> list[Test]:
+    """Not yet corrected."""
+    own, control = study.shares(name), study.control_shares
+    rival, best = (study.shares(other) for other in (RIVAL, "random_search"))
+    above, beside = study.above_bottom(name), study.above_bottom(RIVAL)
+    ended, other = study.ends[name].objective, study.ends[RIVAL].objective
+    return [
+        Test(wilcoxon(above, beside)[0], vargha_delaney(above, beside) < 0.5),
+        Test(fisher(own, rival, "valley"), own.valley < rival.valley),
+        Test(fisher(own, control, "valley"), own.valley * control.n < control.valley * own.n),
+        Test(fisher(own, best, "valley"), own.valley < best.valley),
+        Test(wilcoxon(ended, other)[0], vargha_delaney(ended, other) < 0.5),
+    ]
+
+
+def answer(found: Sequence[Lack]) -> str:
+    """Whether "convergence at the end, not exploration, is what the sparrows lack" holds."""
+    converging, exploring = all(lack.convergence.lacks for lack in found), any(lack.exploration for lack in found)
+    if converging:
+        return "holds only in half, for they lack both" if exploring else "holds"
+    return "does not hold: it is exploration" if exploring else "is not shown: neither test is significant"
