@@ -245,8 +245,8 @@ def jobs(work: Path, chance: random.Random) -> Iterator[Fault]:
 def logging(work: Path, chance: random.Random) -> Iterator[Fault]:
     """A process killed while it writes a run into the store, at one of the statements that do so."""
     from tractexp import tracking
-    from tractexp.tracking.kept import keep
     from tractexp.tracking.run import Run
+    from tractexp.tracking.runfile import save
 
     empty = made(work / "empty")
     forked(lambda: tracking.prepare(tracking.default_uri(empty)))
@@ -259,7 +259,7 @@ def logging(work: Path, chance: random.Random) -> Iterator[Fault]:
             steps = list(range(1, 400))
             run = Run("e", "job", {"a": 1}, {"x": 1.0}, {"c": (steps, steps)}, artifacts=[folder / "result.json"],
                       children=[child])  # fmt: skip
-            kept = keep(folder / "job", run, uri)
+            kept = save(folder / "job", run, uri)
             tracking.prepare(uri)
             count = counting_statements(n)
             kept.logged(tracking.log(kept.run, uri))

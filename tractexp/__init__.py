@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # for editors and type checkers; a test holds it to PUBLIC
     from tractexp.api.compose import compose as compose
     from tractexp.api.convert import convert as convert
+    from tractexp.api.discrepancy import investigate as investigate
     from tractexp.api.export import export as export
     from tractexp.api.generalise import generalise as generalise
     from tractexp.api.identify import identify as identify
-    from tractexp.api.investigate import investigate as investigate
     from tractexp.api.load import load as load
     from tractexp.api.look import look as look
     from tractexp.api.plan import plan as plan

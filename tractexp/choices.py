@@ -22,7 +22,7 @@ CONF = next(p for p in (HERE / "conf", HERE.parent / "conf") if (p / "config.yam
 
 
 @dataclass(frozen=True)
-class Choice:
+class Option:
     """A name that a group offers: what it is, in a sentence, and the module of its class ("" for a configuration)."""
 
     name: str
@@ -30,20 +30,20 @@ class Choice:
     module: str = ""
 
 
-def choices() -> dict[str, dict[str, Choice]]:
-    """{group: {name: choice}}. A plugin is told by its docstring, a configuration by its leading comment."""
-    found: dict[str, dict[str, Choice]] = defaultdict(dict)
+def choices() -> dict[str, dict[str, Option]]:
+    """{group: {name: option}}. Its sentence is a plugin's docstring, or a configuration's leading comment."""
+    options: dict[str, dict[str, Option]] = defaultdict(dict)
     for folder in (CONF, *configuration_folders()):
         for file in folder.rglob("*.yaml"):
             place = file.relative_to(folder).with_suffix("")
             if len(place.parts) > 1 and not any(part.startswith("_") for part in place.parts):
-                found[place.parent.as_posix()][place.name] = Choice(place.name, _comment(file))
+                options[place.parent.as_posix()][place.name] = Option(place.name, _comment(file))
     for package, folder in plugin_folders():
         for module in modules(package, [str(folder)]):
             for group, about in _declared(module):
                 name = module.rpartition(".")[2]
-                found[group][name] = Choice(name, about, module)
-    return found
+                options[group][name] = Option(name, about, module)
+    return options
 
 
 @functools.cache
@@ -116,9 +116,9 @@ def _comment(file: Path) -> str:
     for line in file.read_text(encoding="utf-8").splitlines():
         if not line.startswith("#"):
             break
-        told = line.lstrip("# ")
-        if not told.startswith(("@package", "python -m", "tractexp ")):
-            lines.append(told)
+        text = line.lstrip("# ")
+        if not text.startswith(("@package", "python -m", "tractexp ")):
+            lines.append(text)
     return sentence("\n".join(lines))
 
 
@@ -145,8 +145,8 @@ def _group(node: ast.ClassDef, module: str, passed: tuple[ast.ClassDef, ...]) ->
     return ""
 
 
-def _class(name: str, module: str, seen: set[str]) -> tuple[ast.ClassDef | None, str]:
-    """Where a class is that a module calls by this name: followed through `from ... import`, as Python would."""
+def _class(name: str, module: str, visited: set[str]) -> tuple[ast.ClassDef | None, str]:
+    """The class that a module calls by this name, and its module: followed through `from ... import`, as by Python."""
     for node in _tree(module).body:
         if isinstance(node, ast.ClassDef) and node.name == name:
             return node, module
@@ -154,8 +154,8 @@ def _class(name: str, module: str, seen: set[str]) -> tuple[ast.ClassDef | None,
             package = module.split(".")[: -node.level + _is_package(module) or None] if node.level else []
             there = ".".join([*package, *([node.module] if node.module else [])])
             for alias in node.names:
-                if (alias.asname or alias.name) == name and there not in seen:
-                    return _class(alias.name, there, seen | {there})
+                if (alias.asname or alias.name) == name and there not in visited:
+                    return _class(alias.name, there, visited | {there})
     return None, module
 
 
@@ -194,5 +194,5 @@ def _folders(package: str) -> tuple[Path, ...]:
         spec = importlib.util.find_spec(top) if top else None
     except (ImportError, ValueError):
         return ()
-    found = (Path(p, *rest.split(".")) if rest else Path(p) for p in (spec and spec.submodule_search_locations) or ())
-    return tuple(folder for folder in found if folder.is_dir())
+    paths = (Path(p, *rest.split(".")) if rest else Path(p) for p in (spec and spec.submodule_search_locations) or ())
+    return tuple(folder for folder in paths if folder.is_dir())

@@ -10,7 +10,7 @@ from hydra.plugins.search_path_plugin import SearchPathPlugin
 from omegaconf import OmegaConf
 
 from tractexp import plugin
-from tractexp.doors import hydra_config_store, hydra_plugins
+from tractexp.compat import hydra_config_store, hydra_plugins
 from tractexp.schema import Config
 
 

@@ -1,4 +1,4 @@
-"""What a user may meet: a sentence that says what, where, the value, what is allowed, how to mend it; and an end."""
+"""Errors for users: a sentence that says what, where, the value, what is allowed and how to mend it; and a stop."""
 
 import difflib
 import math
@@ -7,28 +7,28 @@ from typing import Any
 
 
 class UserError(Exception):
-    """Wrong input. The message is a complete sentence for the person who gave it; no traceback is shown."""
+    """Wrong input. The message is a complete sentence for the user; no traceback is shown."""
 
 
 class Stopped(KeyboardInterrupt):
-    """The user or the system ends what runs. `code` is the exit code, `result` what had been found by then, or None.
+    """The user or the system ends what runs. `code` is the exit code, `result` the result so far, or None.
 
-    `found` is where a search was, as the search loop knows it.
+    `state` is that of the search loop at its end, or None.
     """
 
-    def __init__(self, message: str = "", code: int = 130, found: Any = None, result: Any = None):
+    def __init__(self, message: str = "", code: int = 130, state: Any = None, result: Any = None):
         super().__init__(message)
-        self.code, self.found, self.result = code, found, result
+        self.code, self.state, self.result = code, state, result
 
     @classmethod
     def of(cls, stop: KeyboardInterrupt, **more: Any) -> "Stopped":
-        """The same end with more known of it."""
-        known = {name: getattr(stop, name, None) for name in ("found", "result")}
-        return cls(str(stop), getattr(stop, "code", 130), **{**known, **more})
+        """The same end with more of its fields."""
+        fields = {name: getattr(stop, name, None) for name in ("state", "result")}
+        return cls(str(stop), getattr(stop, "code", 130), **{**fields, **more})
 
 
 class Unknown(UserError, AttributeError):
-    """A plugin asked for a word that it is not offered, or assigned one."""
+    """A plugin reads or assigns a word that the equations do not offer."""
 
 
 def nearest(name: str, allowed: Iterable[str]) -> str:

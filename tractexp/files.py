@@ -1,4 +1,4 @@
-"""Where files are, and the one door through which they are written: whole, or not at all.
+"""Paths of files, and the only way in which the package writes them: whole, or not at all.
 
 Nothing else in the package opens a file to write. What grows, a journal and what a job prints, has its own way in.
 """
@@ -37,13 +37,13 @@ def located(path: str) -> Path:
 def write(path: Path | str, content: str | bytes, *, lasting: bool = True, modified: float | None = None) -> Path:
     """Write a file in one move and return its path: a reader never sees half of it, a full disk leaves none.
 
-    What is `lasting` has reached the disk when this returns, and outlives a loss of power; what can be made again
-    (a cache, what a program was told) need not wait for that. `modified` [s since 1970] is a time stamp to give it.
+    What is `lasting` has reached the disk when this returns, and outlives a loss of power; a cache or a log need not
+    wait for that. `modified` [s since 1970] is a time stamp to give it.
     Raises `UserError` where the folder or the file cannot be written.
     """
     path = Path(path)
     data = content.encode() if isinstance(content, str) else content
-    with _told(path), _beside(path) as temporary:
+    with _as_user_error(path), _beside(path) as temporary:
         _fill(temporary, data, lasting)
         if modified is not None:
             os.utime(temporary, (modified, modified))
@@ -57,7 +57,7 @@ def offer(path: Path | str, content: str | bytes) -> None:
     """As `write`, but a file that is there already stays: of several processes the first one's stands."""
     path = Path(path)
     data = content.encode() if isinstance(content, str) else content
-    with _told(path), _beside(path) as temporary:
+    with _as_user_error(path), _beside(path) as temporary:
         _fill(temporary, data, lasting=False)
         try:
             os.link(temporary, path)  # fails where the file exists, unlike os.replace
@@ -70,7 +70,7 @@ def offer(path: Path | str, content: str | bytes) -> None:
 
 def copy(source: Path | str, target: Path | str) -> Path:
     """Copy a file, whole or not at all. Raises `UserError` where it cannot be read or written."""
-    with _told(Path(target)):
+    with _as_user_error(Path(target)):
         content = Path(source).read_bytes()
     return write(target, content)
 
@@ -78,7 +78,7 @@ def copy(source: Path | str, target: Path | str) -> Path:
 def move(source: Path | str, target: Path | str) -> Path:
     """Give a file that is whole its place, in one move within a disk. Raises `UserError` where that is impossible."""
     target = Path(target)
-    with _told(target):
+    with _as_user_error(target):
         os.replace(source, target)
         _settle(target.parent)
     return target
@@ -89,7 +89,7 @@ class Growing:
 
     def __init__(self, path: Path):
         self.path, self._synced = path, time.monotonic()
-        with _told(path):
+        with _as_user_error(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = path.open("ab+")
             self._mend()
@@ -104,7 +104,7 @@ class Growing:
 
     def add(self, line: str) -> None:
         """Add a line. It outlives the death of the process at once, a loss of power after `SYNCED` seconds."""
-        with _told(self.path):
+        with _as_user_error(self.path):
             self._file.write(line.encode() + b"\n")
             self._file.flush()
             if time.monotonic() > self._synced + SYNCED:
@@ -115,12 +115,12 @@ class Growing:
         return self
 
     def __exit__(self, *_: object) -> None:
-        with contextlib.suppress(OSError):  # what could not be written was told when it was added
+        with contextlib.suppress(OSError):  # `add` has raised already
             self._file.close()
 
 
-class Said(io.TextIOBase):
-    """What a program prints, into a file: where that cannot be kept, as on a full disk, it is lost and nothing else."""
+class Transcript(io.TextIOBase):
+    """A program's output, into a file: where that cannot be written, as on a full disk, only the output is lost."""
 
     def __init__(self, path: Path):
         super().__init__()
@@ -182,18 +182,18 @@ def _locked(file: IO[bytes]) -> bool:
 
 
 def leftovers(folder: Path, older: float = 3600.0) -> list[Path]:
-    """Halves of files in `folder` and below that a process left which was killed, `older` seconds at least."""
+    """Partial files of killed processes in `folder` and below, at least `older` seconds old."""
     now = time.time()
-    found = []
+    halves = []
     for path in folder.rglob(f"*{PART}"):
         with contextlib.suppress(OSError):
             if path.is_file() and now - path.stat().st_mtime > older:
-                found.append(path)
-    return found
+                halves.append(path)
+    return halves
 
 
 @contextlib.contextmanager
-def _told(path: Path) -> Iterator[None]:
+def _as_user_error(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
@@ -202,7 +202,7 @@ def _told(path: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _beside(path: Path) -> Iterator[Path]:
-    """A new file in the folder of `path`, which is made where it is not there; gone at the end."""
+    """A new file in the folder of `path`, which is created if need be; the file is removed at the end."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name[:100]}.", suffix=PART)
     os.close(handle)

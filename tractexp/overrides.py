@@ -1,4 +1,4 @@
-"""Arguments as people write them, made into overrides that Hydra reads."""
+"""Arguments as people write them, converted to overrides that Hydra reads."""
 
 import functools
 import itertools
@@ -29,15 +29,15 @@ def overrides(arguments: Iterable[str]) -> list[str]:
 
     `model/motor=[a,b]` is several motors, for which Hydra would merge the settings of both.
     """
-    made = []
+    result = []
     for argument in arguments:
         group, _, value = argument.partition("=")
         if group == "model/motor" and "[" in value:
-            made += _several(group, value)
+            result += _several(group, value)
         else:
             _check(argument, group, value)
-            made.append(override(argument))
-    return made
+            result.append(override(argument))
+    return result
 
 
 def _check(argument: str, key: str, value: str) -> None:
@@ -95,8 +95,8 @@ def override(argument: str) -> str:
 def typed(data: Mapping[str, object], *more: str) -> str:
     """The command, as a shell takes it, that reads records by these settings (`name` and the reader's own)."""
     settings = dict(data)
-    told = [f"data={settings.pop('name')}", *(assigned(f"data.{key}", value) for key, value in settings.items())]
-    return shlex.join(["tractexp", *more, *told])
+    words = [f"data={settings.pop('name')}", *(assigned(f"data.{key}", value) for key, value in settings.items())]
+    return shlex.join(["tractexp", *more, *words])
 
 
 def assigned(key: str, value: object) -> str:

@@ -11,7 +11,7 @@ from tractexp.errors import UserError, among
 class Parameter:
     """One number to identify: its default, bounds, unit, meaning and source.
 
-    The attribute a plugin assigns it to is its name. `null`, where given, is the value at which the
+    The attribute a plugin assigns it to is its name. `null`, if any, is the value at which the
     equations are as if the term were absent. `symbol` is LaTeX. `power_exponent` says how the value goes with
     the base of power, whatever its unit: on a base of a k-th of the MVA the same load has k^power_exponent times the
     value. A power, a torque, an inertia or an admittance has 1, an impedance -1; shares, times and voltages have 0.
@@ -39,7 +39,7 @@ class Parameter:
             object.__setattr__(self, "symbol", self.symbol or name)
 
     def check(self, where: str) -> None:
-        """Raise `UserError` unless low <= default, null <= high, low < high, all finite, and everything is told."""
+        """Raise `UserError` unless low <= default, null <= high, low < high, all finite, and no text is empty."""
         for what in ("unit", "about", "source"):
             if not getattr(self, what).strip():
                 raise UserError(f"{where}: the parameter has no {what}; say it ('1' where a number has no unit)")

@@ -1,4 +1,4 @@
-"""What a person sees while a call runs: lines, and one progress line, on a terminal, in a notebook or in a log file.
+"""Progress of a call: lines, and one live line, on a terminal, in a notebook or in a log file.
 
 All by rich. In a notebook its own live display asks for ipywidgets; the same bar is shown by IPython's display
 instead, which every notebook has.
@@ -16,15 +16,17 @@ LOG_WIDTH = 120  # characters a table may take in a log file
 FIRST_LINE, NEXT_LINES = 2.0, 10.0  # s: a log file gets a progress line after so long, then every so often
 BLINK = 0.15  # s between two pictures of a bar in a notebook
 
-Progress = Callable[[str], None] | bool | None  # of a call: None shows it, False does not, a callable is told each line
+Progress = Callable[[str], None] | bool | None  # of a call: None shows it, False does not, a callable gets each line
 
 
 @functools.cache
 def console() -> Any:
     from rich.console import Console
 
-    made = Console(highlight=False, soft_wrap=True)
-    return made if made.is_terminal or made.is_jupyter else Console(highlight=False, soft_wrap=True, width=LOG_WIDTH)
+    lively = Console(highlight=False, soft_wrap=True)
+    if lively.is_terminal or lively.is_jupyter:
+        return lively
+    return Console(highlight=False, soft_wrap=True, width=LOG_WIDTH)
 
 
 def say(text: str = "") -> None:
@@ -53,7 +55,7 @@ def searching(iterations: int | None, budget: int | None, progress: Progress = N
 
         def callback(iteration: int, best: float, simulations: int) -> None:
             done = share(iteration, simulations, iterations, budget)
-            rest = left(time.perf_counter() - started, done)
+            rest = remaining(time.perf_counter() - started, done)
             update(completed=done or 0.0, simulations=simulations, best=best, rest=rest)
 
         yield callback
@@ -61,9 +63,9 @@ def searching(iterations: int | None, budget: int | None, progress: Progress = N
 
 @contextmanager
 def counting(what: str, total: int, progress: Progress = None) -> Iterator[Callable[[], None]]:
-    """Yield what is to be called at the end of each of `total` parts: a bar, or a line now and then in a log file.
+    """Yield a function to call at the end of each of `total` parts: a bar, or a line now and then in a log file.
 
-    A callable is told of each.
+    A callable gets a line for each.
     """
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
@@ -95,7 +97,7 @@ def counting(what: str, total: int, progress: Progress = None) -> Iterator[Calla
 
 @contextmanager
 def telling(progress: Progress) -> Iterator[Callable[[str], None]]:
-    """Yield what is to be told each stage: the newest stands on a live line; in a log file each has its own."""
+    """Yield a function for the lines of the stages: the newest stands on a live line; a log file has each."""
     from rich.progress import TextColumn, TimeElapsedColumn
 
     if callable(progress) or progress is False:
@@ -109,22 +111,22 @@ def telling(progress: Progress) -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def staged(progress: Progress = None) -> Iterator[Callable[[str], None]]:
-    """As `telling`, but a log file is told of a stage only where the call has taken `FIRST_LINE` seconds already."""
+    """As `telling`, but a log file has a stage only once the call has taken `FIRST_LINE` seconds."""
     started = time.perf_counter()
-    with telling(progress) as told:
+    with telling(progress) as show:
         quick = not _lively() and not callable(progress)
-        yield lambda line: None if quick and time.perf_counter() - started < FIRST_LINE else told(line)
+        yield lambda line: None if quick and time.perf_counter() - started < FIRST_LINE else show(line)
 
 
 def tell(progress: Progress, lines: Iterable[str]) -> None:
-    """Tell a callable each line; else only how far a call is shown."""
+    """Pass each line to a callable; any other progress shows the share alone."""
     if callable(progress):
         for line in lines:
             progress(line)
 
 
 def share(iteration: int, simulations: int, iterations: int | None, budget: int | None) -> float | None:
-    """How much of the search is done, in [0, 1], by whichever end comes first; None where neither is known.
+    """How much of the search is done, in [0, 1], by whichever end comes first; None where neither is set.
 
     An end that the search has passed, as an optimizer may pass its own `iterations`, was none.
     """
@@ -132,8 +134,8 @@ def share(iteration: int, simulations: int, iterations: int | None, budget: int 
     return max(parts, default=None)
 
 
-def left(spent: float, done: float | None) -> str:
-    """The end of a progress line: how long the rest takes [s], where that can be told."""
+def remaining(spent: float, done: float | None) -> str:
+    """The end of a progress line: the time [s] that the rest takes; "" before the first part."""
     return f", about {spent / done - spent:.0f} s left" if done and done < 1 else ""
 
 
@@ -148,7 +150,7 @@ class _Lines:
         if spent < self.due:
             return
         self.due = spent + NEXT_LINES
-        rest = left(spent, share(iteration, simulations, self.iterations, self.budget))
+        rest = remaining(spent, share(iteration, simulations, self.iterations, self.budget))
         say(f"  iteration {iteration}: {simulations} simulations, best objective {best:.4g}{rest}")
         sys.stdout.flush()
 
@@ -184,5 +186,5 @@ def _live(columns: list[Any], total: float | None, **fields: Any) -> Iterator[Ca
     try:
         yield update
     finally:
-        due = float("inf")  # what is told later is not shown
+        due = float("inf")  # later lines are not shown
         shown.update(HTML(""))

@@ -45,10 +45,10 @@ def _git(folder: Path, *command: str) -> str:
 @functools.cache
 def code() -> str:
     """SHA-256 of the installed code, plugins of all packages included: what is computed by the same is the same."""
-    made = hashlib.sha256()
+    total = hashlib.sha256()
     for file in sorted({file for folder in folders() for file in folder.rglob("*.py")}):
-        made.update(hashlib.sha256(file.read_bytes()).digest())
-    return made.hexdigest()
+        total.update(hashlib.sha256(file.read_bytes()).digest())
+    return total.hexdigest()
 
 
 def folders() -> set[Path]:
@@ -58,31 +58,31 @@ def folders() -> set[Path]:
     return {PACKAGE, *(Path(path) for package in plugin.packages() for path in package.__path__)}
 
 
-def told(record: Any) -> dict[str, Any]:
+def identity(record: Any) -> dict[str, Any]:
     """The identity of a `Record`: sha256, source, base and, where another one, that of its file.
 
     Kilovolts and MVA are null where nobody said what one per unit is.
     """
-    known = record.file_base.known
+    in_mva = record.file_base.in_mva
     source = {"file": record.source, **record.identity}
-    made = {"sha256": digest(record), "source": source, "base": _base(record.base, known)}
-    return made | ({} if record.given_base is None else {"given_base": _base(record.given_base, known)})
+    content = {"sha256": digest(record), "source": source, "base": _base(record.base, in_mva)}
+    return content | ({} if record.original_base is None else {"given_base": _base(record.original_base, in_mva)})
 
 
-def in_words(told: Mapping[str, Any]) -> str:
-    """The identity of a record as `told` gives it: where it is from and what one per unit is; "" in early results."""
-    source, said = told.get("source", {}), []
+def in_words(content: Mapping[str, Any]) -> str:
+    """The `identity` of a record as text: where it is from and what one per unit is; "" in early results."""
+    source, said = content.get("source", {}), []
     said += [f"{key} {text}" * (key != "file") or text for key, text in source.items() if text]
     for key, name in (("base", "per unit of"), ("given_base", "in the file of")):
-        base = told.get(key, {})
+        base = content.get(key, {})
         sizes = [f"{base[size]:.6g} {size.partition('_')[2]}" for size in ("voltage_kV", "power_MVA") if base.get(size)]
         said += [f"{name} {' and '.join(sizes)}"] if sizes else []
     return "; ".join(said)
 
 
-def _base(base: Any, known: bool) -> dict[str, Any]:
+def _base(base: Any, in_mva: bool) -> dict[str, Any]:
     voltage = None if base.voltage == 1.0 else base.voltage
-    power = base.power if known else None
+    power = base.power if in_mva else None
     return {"voltage_kV": voltage, "power_MVA": power, "frequency_Hz": base.frequency, "origin": base.origin}
 
 
@@ -93,13 +93,13 @@ def digest(record: Any) -> str:
 
     import numpy as np
 
-    made = hashlib.sha256()
+    total = hashlib.sha256()
     for name in ("t", "U", "P", "Q", "f", "U2"):
         values = getattr(record, name)
         if values is not None:
-            made.update(name.encode())
-            made.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
-    return made.hexdigest()
+            total.update(name.encode())
+            total.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
+    return total.hexdigest()
 
 
 _started: list[str] = []

@@ -1,4 +1,4 @@
-"""Hydra's refusals of a configuration, told as one sentence with the nearest name."""
+"""Hydra's refusals of a configuration, as one sentence with the nearest name."""
 
 import re
 import sysconfig
@@ -18,7 +18,7 @@ LONGEST = 80  # characters of a value that are repeated
 
 @contextmanager
 def explained() -> Iterator[None]:
-    """Turn Hydra's and OmegaConf's exceptions into `UserError`, and those that they forgot to foresee."""
+    """Turn Hydra's and OmegaConf's exceptions into `UserError`, unforeseen ones from their code too."""
     from hydra.errors import HydraException, MissingConfigException
     from omegaconf.errors import OmegaConfBaseException
 
@@ -27,12 +27,12 @@ def explained() -> Iterator[None]:
     except MissingConfigException as error:
         raise UserError(_missing(error)) from error
     except (HydraException, OmegaConfBaseException) as error:
-        raise UserError(_told(error)) from error
+        raise UserError(_sentence(error)) from error
     except OSError as error:
         if not _of_hydra(error):
             raise
         raise UserError(
-            f"{error.filename} cannot be made ({error.strerror}); choose another folder for hydra.run.dir"
+            f"{error.filename} cannot be created ({error.strerror}); choose another folder for hydra.run.dir"
         ) from error
     except Exception as error:
         if not _of_hydra(error):
@@ -81,7 +81,7 @@ def _missing(error: Any) -> str:
     return f"{group}={choice}: there is no such choice{among(choice, options)}"
 
 
-def _told(error: BaseException) -> str:
+def _sentence(error: BaseException) -> str:
     chain = [error]
     while (cause := chain[-1].__cause__ or chain[-1].__context__) is not None and cause not in chain:
         chain.append(cause)
@@ -90,8 +90,8 @@ def _told(error: BaseException) -> str:
         text = _first_line(link)
         if key and ("not in" in text or "is not in struct" in text):
             return _unknown_key(key, link)
-        if told := _wrong_value(key or _key_of(error), text):
-            return told
+        if sentence := _wrong_value(key or _key_of(error), text):
+            return sentence
     group = re.search(r"Could not override '([^']*)'", _first_line(error))
     if group and "No match in the defaults list" in str(error):
         groups = _groups()
@@ -105,8 +105,8 @@ def _key_of(error: BaseException) -> str:
 
 def _wrong_value(key: str, text: str) -> str:
     """The sentence about a value of another kind than its setting; "" for another exception."""
-    if found := re.search(r"[Vv]alue '(.*)' of type '.*' could not be converted to (\w+)", text, re.DOTALL):
-        return f"{key}={_short(found[1])} is not {KINDS.get(found[2], 'what this setting takes')}"
+    if match := re.search(r"[Vv]alue '(.*)' of type '.*' could not be converted to (\w+)", text, re.DOTALL):
+        return f"{key}={_short(match[1])} is not {KINDS.get(match[2], 'what this setting takes')}"
     if "is not a ListConfig" in text:
         return f"{key} takes a list, such as {key}=[a,b]"
     return ""
@@ -115,24 +115,24 @@ def _wrong_value(key: str, text: str) -> str:
 def _plain(error: BaseException) -> str:
     """The first line of an exception where it is in plain words, else what can be said in its place."""
     text = _first_line(error)
-    if found := re.match(r"LexerNoViableAltException: (.*)", text, re.DOTALL):
+    if match := re.match(r"LexerNoViableAltException: (.*)", text, re.DOTALL):
         return (
-            f"{_short(found[1])} cannot be read; an argument is KEY=VALUE, and other signs go in quotes: KEY='a \"b\"'"
+            f"{_short(match[1])} cannot be read; an argument is KEY=VALUE, and other signs go in quotes: KEY='a \"b\"'"
         )
-    if found := re.match(r"Error merging override (.*)", text, re.DOTALL):
-        return f"{_short(found[1])} cannot be applied: every run may need that setting, or it holds no such value"
+    if match := re.match(r"Error merging override (.*)", text, re.DOTALL):
+        return f"{_short(match[1])} cannot be applied: every run may need that setting, or it holds no such value"
     return text if not PYTHON.search(text) else _unforeseen(error)
 
 
 def _unknown_key(key: str, error: Any) -> str:
     parent = getattr(error, "parent_node", None)
     try:
-        known = sorted(map(str, parent.keys())) if parent is not None else []
+        keys = sorted(map(str, parent.keys())) if parent is not None else []
     except Exception:
-        known = []
+        keys = []
     section, _, last = key.rpartition(".")
     where = f"'{section}' has" if section else "the configuration has"
-    return f"{key}: {where} no key '{last}'{among(last, known, 'Keys')}"
+    return f"{key}: {where} no key '{last}'{among(last, keys, 'Keys')}"
 
 
 def _groups() -> list[str]:

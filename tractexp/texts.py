@@ -1,4 +1,4 @@
-"""Texts derived from plugins, such as kernels: remembered on disk while code and settings are unchanged.
+"""Texts derived from plugins, such as kernels: cached on disk while code and settings are unchanged.
 
 Deriving a large model takes half a second, reading it back milliseconds.
 """
@@ -23,7 +23,7 @@ def text_of(parts: Iterable[object], generate: Callable[[], str], what: str) -> 
 
     What a text depends on is the settings of its parts (their `repr`), every file beside their plugins, the code that
     makes texts, and SymPy's version. Of a part that stands in no file, such as one typed into a notebook, or whose
-    `repr` tells an address instead of its settings, nothing is remembered: another object may stand at that address
+    `repr` shows an address instead of its settings, nothing is remembered: another object may stand at that address
     later.
     """
     return _remembered(_place_of(parts, what), generate)

@@ -1,4 +1,4 @@
-"""`tractexp --help` and `tractexp list`: what can be chosen, told without composing a configuration."""
+"""`tractexp --help` and `tractexp list`: what can be chosen, without composing a configuration."""
 
 import argparse
 import re
@@ -6,7 +6,7 @@ import shutil
 import textwrap
 from collections.abc import Collection, Mapping
 
-from tractexp.choices import Choice, choices, defaults, sentence
+from tractexp.choices import Option, choices, defaults, sentence
 from tractexp.errors import UserError, among
 
 WIDTH = 100  # columns
@@ -23,13 +23,13 @@ GROUPS = {
     "objective": "what the search makes small",
     "data": "the records",
     "connection": "how the channels of a recording are connected, chosen by data.connection=NAME",
-    "estimator": "how phasors are made of waveforms, chosen by data.estimator=NAME",
+    "estimator": "how phasors are measured from waveforms, chosen by data.estimator=NAME",
     "format": "what task=export writes, chosen by task.format=NAME",
     "writer": "what task=convert writes, chosen by task.to=NAME",
     "experiment": "a task with its settings, such as a table of the paper",
     "hydra/launcher": "where the jobs of a sweep run; by default on the cores of this computer",
 }
-# groups that the help has told, or leaves to `tractexp list`
+# groups that the help shows elsewhere, or leaves to `tractexp list`
 LATER = ("task", "connection", "estimator", "format", "writer", "hydra/launcher")
 
 TEXT = """\
@@ -68,9 +68,9 @@ Values are changed by KEY=VALUE
 
 def usage() -> str:
     """The text of `--help`."""
-    found = choices()
-    tasks = {name: re.split("[:;] ", found["task"][name].about)[0] for name in _sorted("task", found["task"])}
-    groups = {group: _summary(group, found[group]) for group in _ordered(found) if group not in LATER}
+    options = choices()
+    tasks = {name: re.split("[:;] ", options["task"][name].about)[0] for name in _sorted("task", options["task"])}
+    groups = {group: _summary(group, options[group]) for group in _ordered(options) if group not in LATER}
     return TEXT.format(task=defaults()["task"], tasks=_columns(tasks), groups=_columns(groups))
 
 
@@ -79,45 +79,45 @@ def listed(arguments: list[str]) -> int:
 
     Raises `UserError` for a group that is none.
     """
-    about = "Tell what can be chosen: every name of a group with a line on each; without GROUP, of all groups."
+    about = "Show what can be chosen: every name of a group with a line on each; without GROUP, of all groups."
     parser = argparse.ArgumentParser(prog="tractexp list", description=about)
     parser.add_argument("group", nargs="*", metavar="GROUP")
-    asked = [group.rstrip("/=") for group in parser.parse_args(arguments).group]
-    found = choices()
-    for group in asked:
-        if group not in found:
-            holders = [f"'tractexp list {holder}'" for holder in _ordered(found) if group in found[holder]]
-            told = (
-                f", but there is such a name in {' and '.join(holders)}" if holders else among(group, found, "Groups")
+    chosen = [group.rstrip("/=") for group in parser.parse_args(arguments).group]
+    options = choices()
+    for group in chosen:
+        if group not in options:
+            holders = [f"'tractexp list {holder}'" for holder in _ordered(options) if group in options[holder]]
+            hint = (
+                f", but there is such a name in {' and '.join(holders)}" if holders else among(group, options, "Groups")
             )
-            raise UserError(f"there is no group '{group}'{told}")
-    found, refused = _tried(found)
+            raise UserError(f"there is no group '{group}'{hint}")
+    options, refused = _imported(options)
     width = min(WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns)
-    print("\n\n".join(_told(group, found[group], width) for group in asked or _ordered(found)))
+    print("\n\n".join(_described(group, options[group], width) for group in chosen or _ordered(options)))
     for why in refused:
         print(f"\nleft out: {why}")
     return 0
 
 
-def _tried(found: Mapping[str, Mapping[str, Choice]]) -> tuple[dict[str, dict[str, Choice]], list[str]]:
+def _imported(options: Mapping[str, Mapping[str, Option]]) -> tuple[dict[str, dict[str, Option]], list[str]]:
     """The choices as they are once every plugin is imported, and why those that fit no group cannot be."""
     from tractexp.plugin import registered
 
-    known, refused = registered()
-    made = {group: dict(names) for group, names in found.items()}
-    for group, classes in known.items():
-        for name, cls in classes.items():  # made by a program, too, which the files do not tell
-            made.setdefault(group, {})[name] = Choice(name, sentence(cls.__doc__ or ""), cls.__module__)
+    classes_of, refused = registered()
+    result = {group: dict(names) for group, names in options.items()}
+    for group, classes in classes_of.items():
+        for name, cls in classes.items():  # also those registered by a program, which are in no file
+            result.setdefault(group, {})[name] = Option(name, sentence(cls.__doc__ or ""), cls.__module__)
     placed = set()
-    for names in made.values():
+    for names in result.values():
         for name, choice in names.items():
             if choice.module in refused:
-                names[name] = Choice(name, f"cannot be used: {refused[choice.module]}")
+                names[name] = Option(name, f"cannot be used: {refused[choice.module]}")
                 placed.add(choice.module)
-    return made, [why for module, why in refused.items() if module not in placed]
+    return result, [why for module, why in refused.items() if module not in placed]
 
 
-def _told(group: str, names: Mapping[str, Choice], width: int) -> str:
+def _described(group: str, names: Mapping[str, Option], width: int) -> str:
     """A group and its names, each with its sentence."""
     head = f"{group}: {GROUPS[group]}" if group in GROUPS else group
     if chosen := defaults().get(group):
@@ -125,15 +125,16 @@ def _told(group: str, names: Mapping[str, Choice], width: int) -> str:
     return f"{head}\n{_columns({name: names[name].about for name in _sorted(group, names)}, width)}"
 
 
-def _summary(group: str, names: Mapping[str, Choice]) -> str:
+def _summary(group: str, names: Mapping[str, Option]) -> str:
     """The names of a group, variants counted beside what they vary; of many, how many."""
     plugins = {name for name, choice in names.items() if choice.module}
     families: dict[str, list[str]] = {name: [] for name in _sorted(group, names) if _of(name, plugins) == name}
     for name in _sorted(group, names):
         families[_of(name, plugins)].append(name)
-    told = [f"{name} and {len(own) - 1} variants" if len(own) > 2 else ", ".join(own) for name, own in families.items()]
-    more = f" and {len(told) - FEW + 1} others" if len(told) > FEW else ""
-    return ", ".join(told[: FEW - 1] if more else told) + more
+    parts = [f"{name} and {len(own) - 1} variants" if len(own) > 2 else ", ".join(own)
+             for name, own in families.items()]  # fmt: skip
+    more = f" and {len(parts) - FEW + 1} others" if len(parts) > FEW else ""
+    return ", ".join(parts[: FEW - 1] if more else parts) + more
 
 
 def _of(name: str, plugins: Collection[str]) -> str:
@@ -142,8 +143,8 @@ def _of(name: str, plugins: Collection[str]) -> str:
     return name if name in plugins or not stems else max(stems, key=len)
 
 
-def _ordered(found: Mapping[str, object]) -> list[str]:
-    return [*(group for group in GROUPS if group in found), *sorted(found.keys() - GROUPS)]
+def _ordered(options: Mapping[str, object]) -> list[str]:
+    return [*(group for group in GROUPS if group in options), *sorted(options.keys() - GROUPS)]
 
 
 def _sorted(group: str, names: Collection[str]) -> list[str]:

@@ -1,15 +1,15 @@
-"""Numbers as a person reads them: the one way in which pages and the console tell a probability and an error."""
+"""Numbers as a person reads them: the one format of probabilities and errors on pages and the console."""
 
 import math
 from collections.abc import Sequence
 
-SEEN_AS_NEVER = 1e-6  # nobody tells one in ten million from one in a billion, and no model of the noise is that good
-MOST_DIGITS = 7  # after the point: smaller errors are told by powers of ten
+NEGLIGIBLE = 1e-6  # no model of the noise separates one in ten million from one in a billion
+MOST_DIGITS = 7  # after the point: smaller errors are written with powers of ten
 
 
 def in_words(p: float) -> str:
     """A probability for a sentence or a cell: '0.45', '0.00012', 'less than one in a million'."""
-    if p < SEEN_AS_NEVER:
+    if p < NEGLIGIBLE:
         return "less than one in a million"
     return f"{p:.2g}" if p >= 1e-4 else _powers(p, 2)
 
@@ -50,7 +50,7 @@ def figure(value: float | None, digits: int = 4, unit: str = "") -> str:
 
 
 def change(before: float | None, after: float | None) -> str:
-    """What a number was and what it became; a question mark where it is not known."""
+    """A number before and after; a question mark where it is missing."""
     return f"{figure(before) or '?'} to {figure(after) or '?'}"
 
 

@@ -6,6 +6,7 @@ import inspect
 import re
 import textwrap
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 SPECIAL = re.compile(r"([\\*\[\]<>|$])")
 
@@ -29,9 +30,9 @@ def folded(summary: str, inside: str) -> str:
     return f"<details><summary>{summary}</summary>\n\n{inside}\n\n</details>\n"
 
 
-def docstring(cls: type) -> str:
-    """A docstring: paragraphs, indented lines as they stand, `Source:` and `Departures:` with their words marked."""
-    blocks = re.split(r"\n\s*\n", inspect.cleandoc(cls.__doc__ or ""))
+def docstring(what: Any) -> str:
+    """The docstring of a class or a call: paragraphs, indented lines, and `Source:` and `Departures:` marked."""
+    blocks = re.split(r"\n\s*\n", inspect.cleandoc(what.__doc__ or ""))
     return "\n\n".join(filter(None, map(_block, blocks)))
 
 

@@ -7,6 +7,7 @@ from site_pages import commands, markdown
 from site_pages.commands import Command
 from site_pages.markdown import plain, table
 from tractexp import files
+from tractexp.api.task import Task
 from tractexp.choices import defaults, sentence
 from tractexp.plugin import discover
 
@@ -29,11 +30,13 @@ def write(folder: Path) -> list[Path]:
     return [listed, *pages]
 
 
-def _page(cls: type, shown: Iterable[Command]) -> str:
+def _page(cls: type[Task], shown: Iterable[Command]) -> str:
     parts = [f"# task={cls.name}", markdown.docstring(cls)]
     if rows := markdown.settings(cls):
         rows = [[f"`task.{name[1:]}", *rest] for name, *rest in rows]
         parts += ["## Settings", table(["setting", "default", "meaning"], rows)]
+    if cls.function is not None:  # settings without a comment of their own are arguments of the call
+        parts += [f"## The call `tractexp.{cls.function.__name__}`", markdown.docstring(cls.function)]
     used = {(c.page, c.heading): c for c in shown if _task(c) == cls.name}  # the last of a section
     if used:
         parts += ["## Shown in", "\n\n".join(map(_example, [*used.values()][:MOST]))]

@@ -41,7 +41,7 @@ class Andes(Format):
     def notes(self, load):
         slip = -load.before.get("omega_before", 0.0) / load.omega_n
         start = "ANDES starts its power flow at standstill; where it does not converge, start the motor"
-        return [*([f"{start} at the slip {slip:.5g}"] if slip else []), *self.left_out(load)]
+        return [*([f"{start} at the slip {slip:.5g}"] if slip else []), *self.omissions(load)]
 
     def _motor(self, load):
         c = load.circuit

@@ -44,7 +44,7 @@ class PsseDyr(Format):
         return "".join(records)
 
     def notes(self, load):
-        lines = self.left_out(load)
+        lines = self.omissions(load)
         for identifier, part in (("M", "motor"), ("S", "static")):
             if f"P_{part}" in load.before:
                 P, Q = (load.power * load.before[f"{power}_{part}"] for power in "PQ")

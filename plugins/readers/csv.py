@@ -6,11 +6,11 @@ from typing import Any
 
 from tractexp.extend import Base, Events, Reader, Record, UserError, check_range, plugin
 from tractexp.extend.files import (
-    GIVEN,
+    DECLARATION,
     LOAD,
     PACKAGE,
     SIZES,
-    Dip,
+    FileDip,
     Powers,
     Sidecar,
     Tabular,
@@ -96,18 +96,18 @@ class CSV(Tabular, Reader):
     def _numbered(self) -> Events:
         """The dips of one table: the whole of it where there is one."""
         whole, dips = self._dips()
-        notes = () if dips and dips[0].made is whole else (*whole.notes, f"{counted(len(dips), 'dip')} found")
+        notes = () if dips and dips[0].result is whole else (*whole.notes, counted(len(dips), "dip"))
         return chosen(self.path, dips, self.train or None, self.validate, notes)
 
-    def table(self) -> tuple[Record, list[Dip]] | None:
+    def table(self) -> tuple[Record, list[FileDip]] | None:
         return self._dips() if self.path else None
 
-    def _dips(self) -> tuple[Record, list[Dip]]:
+    def _dips(self) -> tuple[Record, list[FileDip]]:
         whole = self._record(self.path)
         pre, post = (usual if given is None else given for given, usual in ((self.pre, PRE), (self.post, POST)))
         dips = numbered([replace(whole, notes=())], self.path, pre, post)
         if len(dips) < 2 and self.pre is None and self.post is None:
-            return whole, [Dip(1, float(whole.t[0]), float(whole.t[-1]), whole)]
+            return whole, [FileDip(1, float(whole.t[0]), float(whole.t[-1]), whole)]
         return whole, dips
 
     def _record(self, path: str, base: Base | None = None) -> Record:
@@ -145,7 +145,7 @@ class CSV(Tabular, Reader):
                 "or data.units={P: pu, Q: pu}, or the base, data.base_voltage and data.base_power"
             )
         chosen_by = None if self.base_power else told.base or same
-        origin = chosen_by.origin if chosen_by else GIVEN
+        origin = chosen_by.origin if chosen_by else DECLARATION
         told_by = []
         if (voltage is None and made.absolute["U"]) or (power is None and made.absolute["P"]):
             U, S = level(record)

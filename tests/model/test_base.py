@@ -95,7 +95,7 @@ def test_all_events_of_a_call_are_put_on_one_base(records):
     assert np.array_equal(one.record.P, first.record.P / S)
     assert np.array_equal(other.record.Q, second.record.Q / S)
     assert pytest.approx(second.P0 / S, rel=1e-12) == other.P0
-    assert (one.record.given_base, one.record.base.power) == (Base(), S)
+    assert (one.record.original_base, one.record.base.power) == (Base(), S)
     assert other.record.notes[-1] == (
         f"put on a base of {S:.4g} pu of the file, the apparent power before the first dip that is fitted: on the"
         f" file's base powers, torque and inertia are {S:.5g} times, impedances {1 / S:.5g} times the values on this"
@@ -220,7 +220,7 @@ def test_what_is_saved_comes_back_on_its_bases(fits, records, tmp_path):
     fit, held = fits[5.04], scaled(records[1], 5.04)
     again = tractexp.load(fit.save(tmp_path / "fit.json"))
     assert again.result == fit.result
-    assert again.setup.train[0].record.given_base == Base()
+    assert again.setup.train[0].record.original_base == Base()
     assert again.result.records[0]["sha256"] == digest(scaled(records[0], 5.04))  # as it was read
     assert digest(again.setup.train[0].record) == again.result.records[0]["sha256"]
     assert again.setup.train[0].record.base == fit.setup.train[0].record.base

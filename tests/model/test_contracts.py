@@ -105,7 +105,7 @@ def missing(self):
          "confused with 'load_drfit', no other effect; did you mean 'load_drift'"),
         (Static, {"law": lambda self, u: (u, u), "__doc__": "A load. Source: here."}, loads.says_what_it_is,
          "has no equation: no line with '=' or '->'"),
-        (Effect, {"edit": unmoved}, loads.is_seen_in_a_dip, "shows nothing"),
+        (Effect, {"edit": unmoved}, loads.shows_in_a_dip, "shows nothing"),
         (Effect, {"edit": growing}, loads.rests, "under a steady voltage"),
         (Effect, {"edit": growing}, loads.says_what_it_is, "has no line 'Departures:'"),
         (Optimizer, {"search": proposed}, searches.gives_the_same_bits_for_the_same_seed, "another history"),

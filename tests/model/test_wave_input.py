@@ -107,7 +107,7 @@ def test_a_single_phase_feeder_is_read_and_fitted(tmp_path):
     (dip,) = tractexp.read(path, connection="single_phase")
     event = in_waves(dip)
     assert event.phases == 1
-    assert event.known == (True, False, False)
+    assert event.compared == (True, False, False)
     np.testing.assert_allclose(np.abs(event.v[event.steady]), event.U0, rtol=2e-3)
     fit = tractexp.identify(
         dip, tractexp.compose(motor="none", static="branch", domain="waves"), progress=False, **QUICK

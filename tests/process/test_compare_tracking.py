@@ -22,8 +22,8 @@ from test_compare import samples, write_sweep
 from tractexp import tracking
 from tractexp.errors import UserError
 from tractexp.studies.comparison import load
-from tractexp.tracking.attach import attach
 from tractexp.tracking.find import find
+from tractexp.tracking.run import attach
 from tractexp.tracking.view import TAG, comparison_view
 
 EXPERIMENT = "identify tibet_50pct"
@@ -99,7 +99,7 @@ def test_a_filter_takes_a_part_of_the_runs(filled):
 def test_more_runs_than_a_page_holds_come_all_and_oldest_first(filled, monkeypatch):
     _, uri, _, runs = filled
     whole = [run.run_id for run in find(uri, "tags.data = 'tibet_50pct'", curves=())]
-    monkeypatch.setattr("tractexp.tracking.find.PAGE", 3)
+    monkeypatch.setattr("tractexp.tracking.owner.PAGE", 3)
     assert [run.run_id for run in find(uri, "tags.data = 'tibet_50pct'", curves=())] == whole
     assert len(set(whole)) == len(runs) > 2 * 3
 

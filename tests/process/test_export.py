@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import Akima1DInterpolator
 
 from tractexp.errors import UserError
-from tractexp.exchange.circuit import Circuit
+from tractexp.exchange.circuit import TCircuit
 from tractexp.exchange.format import Identified
 from tractexp.model.drive import Drive, Excitation
 from tractexp.plugin import build, discover
@@ -45,7 +45,7 @@ def write(name, load):
 def test_the_circuit_of_one_cage_gives_back_what_was_identified(seed):
     rng = np.random.default_rng(seed)
     T, X, C = rng.uniform(0.01, 0.5), rng.uniform(0.05, 1.5), rng.uniform(0.3, 0.99)
-    c = Circuit.single(T, X, C, OMEGA, 0.01)
+    c = TCircuit.single(T, X, C, OMEGA, 0.01)
     assert c.X_prime == pytest.approx(X, rel=1e-12)
     assert pytest.approx(X / (1 - C), rel=1e-12) == c.X
     assert c.T0_prime == pytest.approx(T / (1 - C), rel=1e-12)
@@ -58,7 +58,7 @@ def test_the_circuit_of_two_cages_gives_back_what_was_identified(seed):
     rng = np.random.default_rng(seed)
     T, X, C = rng.uniform(0.01, 0.5), rng.uniform(0.05, 1.5), rng.uniform(0.3, 0.99)
     T2, X2 = rng.uniform(0.001, 0.05), X * rng.uniform(0.05, 0.98)
-    c = Circuit.double(T, X, C, T2, X2, OMEGA)
+    c = TCircuit.double(T, X, C, T2, X2, OMEGA)
     assert pytest.approx(X / (1 - C), rel=1e-9) == c.X
     assert c.X_prime == pytest.approx(X, rel=1e-9)
     assert c.X_second == pytest.approx(X2, rel=1e-9)
@@ -106,7 +106,7 @@ def dyr(text):
 def test_the_dyr_motor_gives_back_what_was_identified(motor):
     bus, load, c = dyr(write("psse_dyr", identified(motor, bus=12)))["CIM5BL"]
     assert (bus, load, len(c), c[0]) == (12, "M", 20, 1)
-    circuit = Circuit(OMEGA, *c[1:6], *([None, None] if motor == "electromechanical" else c[6:8]))
+    circuit = TCircuit(OMEGA, *c[1:6], *([None, None] if motor == "electromechanical" else c[6:8]))
     assert circuit.X_prime == pytest.approx(VALUES["X_prime"], rel=1e-6)
     assert circuit.T0_prime == pytest.approx(VALUES["T_prime"] / (1 - VALUES["C"]), rel=1e-6)
     if motor == "double_cage":

@@ -138,7 +138,7 @@ def test_a_full_disk_is_a_sentence_for_a_journal_and_nothing_for_what_is_printed
     if not full.exists():
         pytest.skip("there is no /dev/full here")
     (tmp_path / "said").symlink_to(full)
-    with files.Said(tmp_path / "said") as said:
+    with files.Transcript(tmp_path / "said") as said:
         assert said.write("words\n") == 6
         said.flush()
     with files.Growing(tmp_path / "said") as rows, pytest.raises(UserError, match="cannot be written: No space left"):

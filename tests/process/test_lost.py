@@ -21,7 +21,7 @@ import pytest
 from tractexp import tracking
 from tractexp.errors import UserError
 from tractexp.tracking import Run, owner
-from tractexp.tracking.kept import FILE, keep, read
+from tractexp.tracking.runfile import FILE, read, save
 from tractexp.tracking.store import open_store
 from tractexp.tracking.sync import BROUGHT, DELETED, NOT, THERE, sync
 
@@ -99,7 +99,7 @@ def test_what_is_kept_is_the_run_again_wherever_the_folder_is(tmp_path):
     (folder / "result.json").write_text("{}")
     child = Run("e", "child", metrics={"y": float("inf")})
     told = run(artifacts=[folder / "result.json", tmp_path], model=folder / "result.json", children=[child])
-    kept = keep(folder, told, "sqlite:////x.db")
+    kept = save(folder, told, "sqlite:////x.db")
     after = folder.rename(tmp_path / "after")
     back = read(after)
     assert back.run.artifacts == [after / "result.json", tmp_path]
@@ -115,10 +115,10 @@ def test_what_is_kept_is_the_run_again_wherever_the_folder_is(tmp_path):
 def test_runs_that_wait_are_brought_in_once_under_the_run_of_their_sweep(tmp_path, uri):
     sweep = tmp_path / "sweep"
     ended = time.time() - 86_400
-    keep(sweep, Run("e", "the sweep", ended=ended), uri, sweep=True)
+    save(sweep, Run("e", "the sweep", ended=ended), uri, sweep=True)
     (sweep / "sweep.json").write_text('{"run": null}')
     for k in range(2):
-        keep(sweep / str(k), run(f"job {k}", ended=ended, seconds=2.0, children=[run("below")]), uri)
+        save(sweep / str(k), run(f"job {k}", ended=ended, seconds=2.0, children=[run("below")]), uri)
     assert sync(tmp_path) == {BROUGHT: 3}
     assert sync(tmp_path) == {THERE: 3}
     found = {r.info.run_name: r for r in runs(uri)}
@@ -134,20 +134,20 @@ def test_runs_that_wait_are_brought_in_once_under_the_run_of_their_sweep(tmp_pat
 
 
 def test_what_an_attempt_left_half_done_goes_when_the_run_is_brought_in(tmp_path, uri):
-    one = keep(tmp_path / "job", run(), uri)
+    one = save(tmp_path / "job", run(), uri)
     half = tracking.start_parent(Run("e", "half", key=one.run.key), uri)
     tracking.log(Run("e", "its child", parent=half), uri)
     assert sync(tmp_path) == {BROUGHT: 1}
     assert [r.info.run_name for r in runs(uri)] == ["one"]
     whole = read(tmp_path / "job")
-    keep(tmp_path / "job", whole.run, uri)  # as where the process was killed after the store had it
+    save(tmp_path / "job", whole.run, uri)  # as where the process was killed after the store had it
     assert sync(tmp_path) == {BROUGHT: 1}
     assert [r.info.run_id for r in runs(uri)] == [whole.run_id]
 
 
 def test_a_run_deleted_in_mlflow_stays_so_and_a_damaged_file_hides_no_other(tmp_path, uri):
     for name in ("a", "b"):
-        keep(tmp_path / name, run(name), uri)
+        save(tmp_path / name, run(name), uri)
     sync(tmp_path)
     open_store(uri).delete_run(read(tmp_path / "a").run_id)
     (tmp_path / "0").mkdir()
@@ -162,7 +162,7 @@ def test_a_store_that_is_away_is_asked_once_and_named_once(tmp_path):
         taken.bind(("127.0.0.1", 0))
         address = f"http://127.0.0.1:{taken.getsockname()[1]}"
         for k in range(3):
-            keep(tmp_path / str(k), run(), address)
+            save(tmp_path / str(k), run(), address)
         told = []
         assert sync(tmp_path, tell=told.append) == {NOT: 3}
     assert len(told) == 1
@@ -239,7 +239,7 @@ def doctor(folder, *arguments, capsys):
 
 def test_the_doctor_closes_stale_runs_sets_a_damaged_store_aside_and_makes_it_anew(tmp_path, uri, capsys, monkeypatch):
     monkeypatch.setattr(owner, "closed", [])  # of this process, whose other tests close runs, too
-    keep(tmp_path / "outputs" / "job", run(), uri)
+    save(tmp_path / "outputs" / "job", run(), uri)
     sync(tmp_path)
     database = Path(uri.removeprefix("sqlite:///"))
     stale = tracking.start_parent(Run("e", "stale"), uri)
@@ -282,7 +282,7 @@ def test_the_doctor_says_what_it_cannot_heal(tmp_path, uri, capsys, monkeypatch)
         newer.commit()
     code, told = doctor(tmp_path / "none", "--uri", f"sqlite:///{tmp_path / 'newer.db'}", capsys=capsys)
     assert code == 2
-    assert "was made by another version of MLflow" in told
+    assert "comes from another version of MLflow" in told
 
 
 # Signals
@@ -445,7 +445,7 @@ def mlflow_server(store: str, folder: Path, port: int):
 def test_a_run_reaches_a_server_on_postgresql_also_one_made_while_that_was_away(postgres, tmp_path):
     port = free_port()
     address = f"http://127.0.0.1:{port}"
-    keep(tmp_path / "a", run("while away"), address)
+    save(tmp_path / "a", run("while away"), address)
     assert sync(tmp_path) == {NOT: 1}
     (tmp_path / "result.json").write_text("{}")
     with mlflow_server(postgres, tmp_path, port) as address:

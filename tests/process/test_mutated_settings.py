@@ -100,7 +100,7 @@ REFUSED = [
     (["model.effects=" + "[" * 99 + "]" * 99], "model.effects has brackets 99 deep within one another"),
     (["tracking.uri=a\nb"], "tracking.uri=a b has a line break"),
     (["optimizer.population=99999999999"], "optimizer.population=99999999999 is out of range"),
-    (["hydra.run.dir=/dev/null/x"], "/dev/null/x cannot be made (Not a directory); choose another folder"),
+    (["hydra.run.dir=/dev/null/x"], "/dev/null/x cannot be created (Not a directory); choose another folder"),
     (["-m", "hydra.sweep.dir=/dev/null/x", "seed=1,2"], "/dev/null/x/multirun.yaml cannot be written"),
 ]
 # one process for all: what takes time is to start

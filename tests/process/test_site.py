@@ -112,7 +112,9 @@ def test_changed_equations_are_those_that_differ_or_came_in():
 def test_every_task_has_a_page_with_its_settings_and_the_commands_that_pages_show(tmp_path):
     made = {path.stem: path.read_text(encoding="utf-8") for path in tasks.write(tmp_path)}
     assert made.keys() == {"index", *discover()["task"]}
-    assert "| `task.within` | `0.05` | half of the 95 % interval, as a share of the value |" in made["plan"]
+    assert "| `task.within` | `0.05` |" in made["plan"]
+    assert "with half of its 95 % interval `within` a share of the value" in " ".join(made["plan"].split())
+    assert "null: in single runs, not in sweeps" in made["identify"]
     assert "task=discrepancy data=contactors" in made["discrepancy"]
     assert "[The missing effect: The order of the model](" in made["discrepancy"]
     assert "](../../missing-effects.md#the-order-of-the-model)" in made["discrepancy"]

@@ -13,7 +13,7 @@ from tractexp.filetypes import comtrade
 from tractexp.identification.problem import Problem
 from tractexp.identification.result import respond
 from tractexp.model.window import mean
-from tractexp.record.through import sharpened
+from tractexp.record.deconvolution import sharpened
 
 DATA = Path(tractexp.__file__).parent / "data"
 NAMES = ("tibet_30pct", "tibet_50pct", "tibet_65pct")

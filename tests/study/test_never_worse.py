@@ -43,7 +43,7 @@ def test_on_records_at_hand(name, shared_data):
     except FileNotFoundError as error:
         pytest.skip(str(error))
     except tractexp.UserError as error:
-        if "no dip found" not in str(error):
+        if "there is no dip" not in str(error):
             raise
         pytest.skip(f"there is nothing to fit: {error}")
     hold(task, data)

@@ -108,7 +108,7 @@ def test_an_end_that_the_search_has_passed_is_none(capsys, monkeypatch):
     assert progress.share(3, 30, 4, None) == 0.75
     assert progress.share(5, 30, 4, None) is None
     assert progress.share(5, 30, 4, 60) == 0.5
-    assert [progress.left(6.0, done) for done in (0.75, 1.0, 0.0, None)] == [", about 2 s left", "", "", ""]
+    assert [progress.remaining(6.0, done) for done in (0.75, 1.0, 0.0, None)] == [", about 2 s left", "", "", ""]
     monkeypatch.setattr(progress, "FIRST_LINE", 0.0)
     monkeypatch.setattr(progress, "_lively", lambda: False)
     with progress.searching(4, None) as tell:

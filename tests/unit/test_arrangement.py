@@ -183,7 +183,7 @@ class TestDirection:
 
     def test_constant_current_at_unity_is_left_open(self):
         found = arranged(made(phases(dip(T)), load(dip(T), lag=np.pi, exponent=1.0)), GIVEN)
-        assert "tells no reversed current" in found.why[-1]
+        assert "cannot separate a reversed current" in found.why[-1]
 
     def test_a_train_that_brakes_and_motors_has_both_signs(self):
         sign = np.where((T > 0.8) & (T < 1.1), 1.0, -1.0)

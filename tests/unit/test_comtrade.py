@@ -182,9 +182,9 @@ MENDED = {
     "lower case and spaces": ([("8,6A,2D", " 8 , 6a , 2 d ")], None),
     "counts swapped": ([("8,6A,2D", "8,2D,6A")], None),
     "padding": ([("\n1\n4000,40", "\n3\n4000,40\n4000,40\n4000,40")], "lines 14, 15: a sampling rate without samples"),
-    "count of rates": ([("\n1\n4000,40", "\n2\n4000,40")], "line 12: 2 sampling rates announced, 1 found"),
+    "count of rates": ([("\n1\n4000,40", "\n2\n4000,40")], "line 12: 2 sampling rates announced, 1 present"),
     "no count of rates": ([("\n1\n4000,40", "\n4000,40")], "line 12: the number of sampling rates is missing"),
-    "no frequency": ([("\n50\n", "\n0\n")], "line 11: the nominal frequency is not told: 50 Hz, unless"),
+    "no frequency": ([("\n50\n", "\n0\n")], "line 11: the nominal frequency is missing: 50 Hz, unless"),
     "no such day": (
         [("01/02/2024,10:00:00.000000", "00/00/2024,10:00:00")],
         "line 14: .* is not a day of the calendar",
@@ -197,11 +197,14 @@ MENDED = {
     "year first": ([("01/02/2024", "2024/02/01")], "line 14: date '2024/02/01,10:00:00.000000' read as 2024-02-01"),
     "month first": ([("01/02/2024", "02/28/2024")], "line 14: date .* read as 2024-02-28"),
     "clock not set": ([("01/02/2024", "01/01/1970"), ("01/02/2024", "01/01/1970")], "line 14: the clock was not set"),
-    "no multiplier": ([("ASCII\n1\n", "ASCII\n")], "no time multiplier given, 1 taken"),
+    "no multiplier": ([("ASCII\n1\n", "ASCII\n")], "no time multiplier, 1 taken"),
     "Ctrl-Z": ([("ASCII\n1\n", "ASCII\n1\n\x1a\x1a")], None),
     "kind in lower case": ([("ASCII", " ascii ")], None),
-    "no side": ([(",600,5,P\n5,", ",600,5,\n5,")], "line 6: neither P nor S given, primary values taken"),
-    "no side, no comma": ([(",600,5,P\n5,", ",600,5\n5,")], "line 6: neither P nor S given, primary values taken"),
+    "no side": ([(",600,5,P\n5,", ",600,5,\n5,")], "line 6: neither P nor S stands there, primary"),
+    "no side, no comma": (
+        [(",600,5,P\n5,", ",600,5\n5,")],
+        "line 6: neither P nor S stands there, primary",
+    ),
     "no skew, no limits": ([("0.5,12.5,-32767,32767", "0.5,,,")], None),
     "Fortran's exponent": ([("kV,0.01,", "kV,1.0D-02,")], None),
     "announced binary": ([("ASCII", "BINARY")], "BINARY announced, but a.dat is text and read as ASCII"),
@@ -366,7 +369,7 @@ def test_either_file_of_the_pair_names_the_record(pair, tmp_path):
     pair()
     (tmp_path / "a.dat").rename(tmp_path / "A.Dat")
     made = comtrade.load(tmp_path / "A.Dat")
-    assert made.notes == (f"{tmp_path / 'a.cfg'}: found beside the A.Dat that was given",)
+    assert made.notes == (f"{tmp_path / 'a.cfg'}: it lies beside A.Dat",)
     (tmp_path / "a.cfg").unlink()
     with pytest.raises(UserError, match=r"the configuration A.cfg is not beside it"):
         comtrade.load(tmp_path / "A.Dat")

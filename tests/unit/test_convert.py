@@ -144,7 +144,7 @@ def test_a_sidecar_of_another_table_is_refused(tmp_path):
     told = json.loads(sidecar.read_text())
     told["recording"]["channels"].pop()
     sidecar.write_text(json.dumps(told))
-    with pytest.raises(UserError, match=r"has 7 columns where its sidecar tells of t, 3 channels and 2 status"):
+    with pytest.raises(UserError, match=r"has 7 columns where its sidecar names t, 3 channels and 2 status"):
         build("data", {"name": "waveforms", "path": str(table)}).recording()
     sidecar.write_text(json.dumps({"recording": {"channels": 3}}))
     with pytest.raises(UserError, match="its sidecar is not as task=convert writes it"):

@@ -1,4 +1,4 @@
-"""The doors to what others do not promise to keep: each is needed still, works, and is the only one of its kind."""
+"""Our uses of private parts of other packages: each is still needed, works, and is the only one of its kind."""
 
 import ast
 import copy
@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 
 import tractexp
-from tractexp.doors import hydra_config_store, hydra_plugins
-from tractexp.doors.scipy_differential_evolution import generations
+from tractexp.compat import hydra_config_store, hydra_plugins
+from tractexp.compat.scipy_differential_evolution import generations
 
 HERE = Path(tractexp.__file__).parent
 OURS = {"tractexp", "tractexp_plugins"}
-MENDED = "{} is mended in the version installed: do what tractexp/doors/{}.py says at its end"
-CHANGED = "the version installed has changed what tractexp/doors/{}.py relies on: {}"
+MENDED = "{} is mended in the version installed: do what tractexp/compat/{}.py says at its end"
+CHANGED = "the version installed has changed what tractexp/compat/{}.py relies on: {}"
 
 
 @pytest.fixture
@@ -83,11 +83,11 @@ def test_what_the_store_hands_out_is_a_copy():
     from hydra.core.config_store import ConfigStore
 
     store = ConfigStore.instance()
-    store.store(group="doors_test", name="made", node={"value": 1})
-    handed = store.load("doors_test/made.yaml").node
+    store.store(group="compat_test", name="made", node={"value": 1})
+    handed = store.load("compat_test/made.yaml").node
     handed.value = 2
-    again = store.load("doors_test/made.yaml").node.value
-    store.repo.pop("doors_test")
+    again = store.load("compat_test/made.yaml").node.value
+    store.repo.pop("compat_test")
     assert again == 1, CHANGED.format("hydra_config_store", "ConfigStore.load hands out the schema itself")
 
 
@@ -153,9 +153,9 @@ def test_private_parts_are_recognized(text, found):
     assert [path for _, path in reached(ast.parse(text))] == found
 
 
-def test_private_parts_of_others_are_used_in_the_doors_only():
+def test_private_parts_of_others_are_used_in_compat_only():
     meant = {"os._exit"}  # documented, whatever its name
     folders = [HERE, HERE.parent / "plugins"]
-    files = [p for folder in folders for p in folder.rglob("*.py") if p.parent != HERE / "doors"]
+    files = [p for folder in folders for p in folder.rglob("*.py") if p.parent != HERE / "compat"]
     found = [f"{p}:{k}: {path}" for p in files for k, path in reached(ast.parse(p.read_text())) if path not in meant]
-    assert not found, "give each a module in tractexp/doors:\n" + "\n".join(found)
+    assert not found, "give each a module in tractexp/compat:\n" + "\n".join(found)

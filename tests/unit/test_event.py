@@ -128,7 +128,7 @@ def test_any_noisy_dip_is_found_once_to_two_samples(depth, start, duration, scal
 
 
 def test_no_dip_is_refused_with_the_largest_deviation():
-    with pytest.raises(UserError, match=r"dip.csv: no dip found: .* falls at most 2 % below it .* must exceed 3 %"):
+    with pytest.raises(UserError, match=r"dip.csv: there is no dip: .* falls at most 2 % below it .* must exceed 3 %"):
         detect(dip(depth=0.02, sigma=0.0))
 
 

@@ -147,7 +147,7 @@ class TestWhatIsRefused:
 
     def test_text_that_is_not_of_the_encoding_asked_for_is_refused(self, here):
         (here / "dip.csv").write_bytes("t,U,P,Q,Störung\n".encode("latin-1"))
-        with pytest.raises(UserError, match=r"dip.csv: not utf-8 text; leave data.encoding out to have it found"):
+        with pytest.raises(UserError, match=r"dip.csv: not utf-8 text; leave data.encoding out to have it detected"):
             build("data", {"name": "csv", "train": ["dip.csv"], "encoding": "utf-8"}).read()
 
     def test_a_broken_sidecar_is_refused(self, here):

@@ -36,10 +36,10 @@ def test_the_dips_of_one_record_are_numbered_from_one():
     U = np.where(((t > 0.5) & (t < 0.6)) | ((t > 2.0) & (t < 2.2)), 0.7, 1.0)
     whole = Record("whole", t, U, np.ones(3000), np.full(3000, 0.5), source="made")
     first, second = numbered([whole], "made", 0.3, 0.8)
-    assert [(d.number, d.made.name, d.made.source) for d in (first, second)] == [
+    assert [(d.number, d.result.name, d.result.source) for d in (first, second)] == [
         (1, "whole_dip1", "made dip 1"), (2, "whole_dip2", "made dip 2"),
     ]  # fmt: skip
-    assert (first.made.t[0], second.made.t[0]) == pytest.approx((0.2, 1.7), abs=2e-3)
+    assert (first.result.t[0], second.result.t[0]) == pytest.approx((0.2, 1.7), abs=2e-3)
 
 
 def test_too_few_samples_of_low_voltage_tell_no_direction():

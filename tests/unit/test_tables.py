@@ -194,11 +194,11 @@ class TestNamesAndUnits:
             ({"columns": {"W": "x"}}, "data.columns names 'W'"),
             ({"columns": {"U": "Vlt"}}, "data.columns: U=Vlt: dip.csv has no such column; did you mean 'V'|Columns"),
             ({"columns": {"U": 9}}, "dip.csv has 4 columns, counted from 0"),
-            ({"units": {"U": "parsec"}}, "data.units: U=parsec is no unit that is known"),
+            ({"units": {"U": "parsec"}}, "data.units: U=parsec is not a unit"),
             ({"units": {"X": "kV"}}, "data.units names 'X'"),
             ({"decimal": ";"}, "data.decimal=; is not one of"),
             ({"header": 0}, "data.header=0 is no line"),
-            ({"header": 300}, "no rows of numbers are found below the header line|column t"),
+            ({"header": 300}, "there are no rows of numbers below the header line|column t"),
             ({"pre": 0.0}, "data.pre=0.0 is out of range"),
             ({"encoding": "klingon"}, "data.encoding=klingon: there is no such text encoding"),
         ],
@@ -232,7 +232,7 @@ class TestText:
             (text(header="t,U,P,Q,") .replace("\n", ",\n").replace("Q,,", "Q,"), ""),
             ("Station North\nRecorder: 7; 12.5 kHz\nDate, 2024-01-31, 12:00:00\n\n" + text(), ""),
             ("# remark\n" + text().replace("0.1,1", "# in between\n0.1,1") + "# the end\n", ""),
-            (text()[: text().rindex("0.8")], "line 401, the last one, is cut short and left out"),
+            (text()[: text().rindex("0.8")], "line 401, the last one, is cut short and not used"),
         ],
         ids=["semicolons and decimal commas", "tabs and decimal commas", "spaces", "aligned", "after a percent sign",
              "bars", "quoted", "all quoted", "dos", "old mac", "blank lines", "marked utf-8", "utf-16",
@@ -274,8 +274,8 @@ class TestText:
             (b"PAR1 and nothing", "not a whole Parquet file"),
             (b"PK\x03\x04 and nothing", "not a workbook that can be read"),
             (b"%PDF-1.7", "this is no table but a PDF file"),
-            ("title\n" * 300, "no rows of numbers are found"),
-            (text().replace("0.5,0.6", '"0.5,0.6'), "line 401: the cells cannot be told apart; is a quote left open"),
+            ("title\n" * 300, "there are no rows of numbers"),
+            (text().replace("0.5,0.6", '"0.5,0.6'), "line 401: the cells cannot be separated; is a quote not closed"),
             (text().replace("0.5,0.6", "0.5,0,6"), "line 102 has 5 cells where the others have 4"),
         ],
     )
@@ -509,9 +509,9 @@ class TestPhasors:
         t, V1, _, I1 = self.stream()
         table = np.column_stack([t, np.abs(V1) / 1e3, np.full(400, 0.1), np.abs(I1), np.full(400, -0.2)])
         content = text(table, "t,V1,V1_angle,I1,I1_angle")
-        with pytest.raises(UserError, match=r"the unit of 'V1' is not told, .*say the units, e.g. data.units=\{U: kV"):
+        with pytest.raises(UserError, match=r"'V1' has no unit, .*say the units, e.g. data.units=\{U: kV"):
             read(content)
-        with pytest.raises(UserError, match=r"'V1_angle' is not told, .*data.units=\{angle: deg\}"):
+        with pytest.raises(UserError, match=r"'V1_angle' has no unit, .*data.units=\{angle: deg\}"):
             read(content, units={"U": "kV", "I": "A"})
 
     def test_magnitudes_without_angles_are_no_power(self):
@@ -541,7 +541,7 @@ class TestWaveforms:
         assert [c.phase for c in recording.channels] == [*"ABC", *"ABC"]
         assert recording.segments[0].rate == pytest.approx(4000)
         np.testing.assert_allclose(recording.channels[0].values(), self.waves()[:, 1] * 1e-3, rtol=1e-6, atol=1e-4)
-        assert any("unit of ua, ub, uc, ia, ib, ic is not told: taken as V and A" in n for n in recording.notes)
+        assert any("no unit of ua, ub, uc, ia, ib, ic: taken as V and A" in n for n in recording.notes)
 
     @pytest.mark.parametrize(
         "header",
@@ -601,7 +601,7 @@ class TestManyDips:
         events = self.events()
         assert [r.name for r in (*events.train, *events.validate)] == [f"long_dip{k}" for k in range(1, 6)]
         assert [r.source for r in events.train] == ["long.csv dip 1"]
-        assert noted(events.train[0], "5 dips found")
+        assert noted(events.train[0], "5 dips")
         record = events.validate[2]
         assert (record.t[0], record.t[-1]) == pytest.approx((67.0, 77.99))
         assert detect(record).depth == pytest.approx(0.11)
@@ -611,7 +611,7 @@ class TestManyDips:
         assert [detect(r).t_start for r in (*events.train, *events.validate)] == pytest.approx([48, 88, 8])
         assert events.train[0].t[-1] - events.train[0].t[0] == pytest.approx(2.49)
         assert self.events(validate=[]).validate == []
-        with pytest.raises(UserError, match="there is no dip 9; 5 are found; dips that can be used: 1 at"):
+        with pytest.raises(UserError, match="there is no dip 9; the file has 5; dips that can be used: 1 at"):
             self.events(train=[9])
 
     def test_tractexp_read_gives_them_all(self):

@@ -72,7 +72,7 @@ def export(
             check_range(f"task.{name}", value, least)
     check_choice("task.base", base, BASES)
     own, told = fit.result.base, fit.result.records[0].get("base", {}) if fit.result.records else {}
-    file_power = power or (own.file_power if own.known else POWER)
+    file_power = power or (own.file_power if own.in_mva else POWER)
     on_file = base == FILE
     identified = Identified(
         fit.result, bus, file_power * (1.0 if on_file else own.ratio), voltage or told.get("voltage_kV") or VOLTAGE,
@@ -81,7 +81,7 @@ def export(
     form = build("format", {"name": format})
     form.check_parts(identified)
     text = form.text(identified)
-    notes = [_told(identified, base, own.ratio, guessed=power is None and not own.known), *form.notes(identified)]
+    notes = [_told(identified, base, own.ratio, guessed=power is None and not own.in_mva), *form.notes(identified)]
     return Exported(format, form.suffix, identified.model.title, text, tuple(notes))
 
 

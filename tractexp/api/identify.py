@@ -352,7 +352,7 @@ def identify(
         found = setup.found(progress)
         return Identification.of(setup, found)
     except KeyboardInterrupt as stop:
-        raise Stopped.of(stop, result=setup.so_far(found or getattr(stop, "found", None))) from None
+        raise Stopped.of(stop, result=setup.so_far(found or getattr(stop, "state", None))) from None
 
 
 def _judge(setup: Asked, found: "Found") -> tuple[Result, Judged]:

@@ -18,7 +18,7 @@ from tractexp.overrides import typed
 from tractexp.progress import Progress, staged
 from tractexp.record import Event, Record
 from tractexp.record.wave_event import COARSEST, smeared
-from tractexp.recording.overview import Seen, Sight, View, sight_of, view_of
+from tractexp.recording.overview import LoadEvent, Sight, View, sight_of, view_of
 
 EARLIER = 3.0  # cycles that a fit of samples needs before the dip, and one that the estimator of phasors leaves out
 
@@ -221,7 +221,7 @@ def series(shown: Sight) -> dict[str, np.ndarray]:
     return {name: np.concatenate([part[name] for part in parts]) for name in (parts[0] if parts else ())}
 
 
-def event_row(seen: Seen) -> dict[str, Any]:
+def event_row(seen: LoadEvent) -> dict[str, Any]:
     """An event as plain data: times in s, powers in MW and Mvar, voltages as shares of that before."""
     what = seen.what
     return {
@@ -287,7 +287,7 @@ def _feeder(view: View, shown: Sight) -> dict[str, Any]:
     return made | {
         "U": U, "P": P, "Q": Q, "units": units, **_sums(shown),
         "said": list(shown.said), "command": command(view, shown),
-        "events": [event_row(seen) for seen in shown.seen],
+        "events": [event_row(seen) for seen in shown.events],
     }  # fmt: skip
 
 
@@ -308,7 +308,7 @@ def command(view: View, shown: Sight) -> str:
 
 def waves_serve(view: View, shown: Sight) -> bool:
     """Whether the samples of the dip that is fitted first tell more than its phasors, and can be fitted."""
-    first = next((seen.what for seen in shown.seen if seen.worth and seen.dip is not None), None)
+    first = next((seen.what for seen in shown.events if seen.worth and seen.dip is not None), None)
     if view.recording is None or first is None:
         return False
     f = view.recording.frequency

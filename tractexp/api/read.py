@@ -184,7 +184,7 @@ def kept_record(record: Record) -> dict[str, Any]:
     """A record as plain data."""
     plain = {"base": asdict(record.base), "window": record.window and record.window.to_dict(), "more": {**record.more},
              "waves": record.waves and record.waves.to_dict(), "identity": {**record.identity},
-             "given_base": record.given_base and asdict(record.given_base)}  # fmt: skip
+             "given_base": record.original_base and asdict(record.original_base)}  # fmt: skip
     return {f.name: getattr(record, f.name) for f in fields(Record)} | plain
 
 
@@ -203,5 +203,5 @@ def record_again(content: Mapping[str, Any]) -> Record:
     waves = Waves.of(content["waves"]) if content.get("waves") else None
     return Record(
         content["name"], base=base, source=content["source"], notes=notes, window=window, more=more, waves=waves,
-        given_base=given, identity=content.get("identity", {}), digest=content.get("digest", ""), **arrays,
+        original_base=given, identity=content.get("identity", {}), digest=content.get("digest", ""), **arrays,
     )  # fmt: skip

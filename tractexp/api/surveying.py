@@ -16,7 +16,7 @@ from tractexp import files
 from tractexp.api.look import command, event_row, series
 from tractexp.errors import UserError
 from tractexp.recording import archive
-from tractexp.recording.overview import Seen, Sight, View
+from tractexp.recording.overview import LoadEvent, Sight, View
 from tractexp.report.survey import QUIET, UNREAD
 from tractexp.workers import processes
 
@@ -40,7 +40,7 @@ def rows_of(folder: str, file: str) -> Rows:
         made = [
             row | _event(view, file, number, shown, seen)
             for number, shown in enumerate(view.sights, 1)
-            for seen in shown.seen
+            for seen in shown.events
         ]
         return files.plain(made or [row | _common(view) | {"kind": QUIET, "why": _quiet(view)}])
     except UserError as error:
@@ -63,7 +63,7 @@ def _common(view: View) -> dict[str, Any]:
     return {"station": recording.station, "rate": max(s.rate for s in recording.segments)}
 
 
-def _event(view: View, file: str, number: int, shown: Sight, seen: Seen) -> dict[str, Any]:
+def _event(view: View, file: str, number: int, shown: Sight, seen: LoadEvent) -> dict[str, Any]:
     """The row of one event."""
     told = event_row(seen)
     begun = view.recording.start if view.recording else None
@@ -77,7 +77,7 @@ def _event(view: View, file: str, number: int, shown: Sight, seen: Seen) -> dict
     }  # fmt: skip
 
 
-def _pictures(shown: Sight, seen: Seen) -> dict[str, list[float | None]]:
+def _pictures(shown: Sight, seen: LoadEvent) -> dict[str, list[float | None]]:
     """U and P about an event, as shares of the greatest in the picture, few points each."""
     columns = series(shown)
     t, what = columns["t"], seen.what

@@ -303,19 +303,19 @@ class Job:
         It is kept in the folder first. Where the store cannot be used, that is a sentence: the results are there.
         """
         from tractexp import tracking
-        from tractexp.tracking import swept
-        from tractexp.tracking.kept import keep
+        from tractexp.tracking import sweepfile
+        from tractexp.tracking.runfile import save
 
-        kept = None
+        entry = None
         try:
-            kept = keep(self.folder, run, self.store)
-            if self.in_sweep and swept.waits(self.folder.parent):
+            entry = save(self.folder, run, self.store)
+            if self.in_sweep and sweepfile.waits(self.folder.parent):
                 return
-            run_id = self._logger.log(kept.run) if "_logger" in self.__dict__ else tracking.log(kept.run, self.store)
-            kept.logged(run_id)
+            run_id = self._logger.log(entry.run) if "_logger" in self.__dict__ else tracking.log(entry.run, self.store)
+            entry.logged(run_id)
         except UserError as error:
             say(f"not logged: {error}")
-            later = "; 'tractexp sync' logs them when that is mended" if kept else ""
+            later = "; 'tractexp sync' logs them when that is mended" if entry else ""
             say(f"  the results are in {self.folder}{later}")
             return
         say(f"logged in experiment '{run.experiment}'; to see it: {self.look}")

@@ -1,4 +1,4 @@
-"""A recorder's own window as an investigation looks for it; what one does is told in `tractexp.record.through`."""
+"""A recorder's own window as an investigation looks for it; see `tractexp.record.deconvolution`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from tractexp.model.drive import Drive
 from tractexp.model.parts import Measurement
 from tractexp.model.window import mean, seen
 from tractexp.record import Event, Window
-from tractexp.record.through import sharpened
+from tractexp.record.deconvolution import sharpened
 
 CYCLES = (1, 2, 3, 4, 5, 6)
 

@@ -13,7 +13,7 @@ from math import sqrt
 
 
 @dataclass(frozen=True)
-class Circuit:
+class TCircuit:
     """Elements [pu of the record's base] at the nominal speed omega_n [rad/s]; `R_2`, `X_2` are None in one cage."""
 
     omega_n: float
@@ -26,7 +26,7 @@ class Circuit:
     X_2: float | None = None
 
     @classmethod
-    def single(cls, T_prime: float, X_prime: float, C: float, omega_n: float, R_s: float = 0.0) -> "Circuit":
+    def single(cls, T_prime: float, X_prime: float, C: float, omega_n: float, R_s: float = 0.0) -> "TCircuit":
         """One cage, from T' [s], X' and C = (X - X')/X."""
         X = X_prime / (1 - C)
         X_s = X * (1 - sqrt(C))
@@ -42,7 +42,7 @@ class Circuit:
         X_second: float,
         omega_n: float,
         R_s: float = 0.0,
-    ) -> "Circuit":
+    ) -> "TCircuit":
         """Two cages in parallel, from those and T'' [s], X'' < X'."""
         X = X_prime / (1 - C)
         equal = X * (1 - sqrt(C))

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.exchange.circuit import Circuit
+from tractexp.exchange.circuit import TCircuit
 from tractexp.identification.result import Result, parts
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import Model, compose
@@ -40,8 +40,8 @@ class Identified:
     def values(self) -> dict[str, float]:
         """The parameters on the base of the export."""
         exponents = {p.name: p.power_exponent for p in self.model.parameters}
-        found = self.result.parameters
-        return {name: scaled(value, exponents.get(name, 0), self.ratio) for name, value in found.items()}
+        parameters = self.result.parameters
+        return {name: scaled(value, exponents.get(name, 0), self.ratio) for name, value in parameters.items()}
 
     @property
     def omega_n(self) -> float:
@@ -56,21 +56,21 @@ class Identified:
     @cached_property
     def before(self) -> dict[str, float]:
         """States and named quantities before the event. Raises `UserError` where there is no steady state."""
-        kept, flat = self.result.before, np.full(2, self.result.before["U0"])
-        P0, Q0 = self.ratio * kept["P0"], self.ratio * kept["Q0"]
-        event = Excitation(1e-3, flat, flat, flat, kept["U0"], P0, Q0, omega_n=self.omega_n)
+        stored, flat = self.result.before, np.full(2, self.result.before["U0"])
+        P0, Q0 = self.ratio * stored["P0"], self.ratio * stored["Q0"]
+        event = Excitation(1e-3, flat, flat, flat, stored["U0"], P0, Q0, omega_n=self.omega_n)
         drive, values = Drive.of([event]), np.array([self.values[name] for name in self.model.names])
         if refusal := self.model.refusal(values, drive):
             raise UserError(f"these parameters cannot be exported: {refusal}")
         return self.model.at_rest(values, drive)
 
     @property
-    def circuit(self) -> Circuit:
+    def circuit(self) -> TCircuit:
         """The motor's T-circuit: of two cages where a second one was identified."""
         names = ("T_prime", "X_prime", "C", "T_second", "X_second")
-        found = {name: self.values[name] for name in names if name in self.values}
-        build = Circuit.double if "T_second" in found else Circuit.single
-        return build(**found, omega_n=self.omega_n, R_s=self.values.get("R_s", 0.0))
+        circuit_values = {name: self.values[name] for name in names if name in self.values}
+        build = TCircuit.double if "T_second" in circuit_values else TCircuit.single
+        return build(**circuit_values, omega_n=self.omega_n, R_s=self.values.get("R_s", 0.0))
 
 
 class Format(Plugin):
@@ -91,11 +91,11 @@ class Format(Plugin):
         """What a user must know to use the file, one sentence each."""
         return []
 
-    def left_out(self, load: Identified) -> list[str]:
-        """What a simulator of phasors leaves out of the motor, in a sentence."""
+    def omissions(self, load: Identified) -> list[str]:
+        """What this format's machine lacks of the motor, a sentence each."""
         if not load.model.motor.within_a_cycle:
             return []
-        return ["the stator's transients are left out: the machine of this format has none"]
+        return ["the stator's transients are not exported: the machine of this format has none"]
 
     def check_parts(self, load: Identified) -> None:
         """Raise `UserError` for a part of the model that this format cannot represent."""

@@ -5,17 +5,17 @@ from tractexp.filetypes import cev, comtrade, tidy
 from tractexp.filetypes.sidecar import Sidecar, beside
 from tractexp.filetypes.tabulated import Powers, Tabular, kind_of, powers, recording
 from tractexp.filetypes.tidy import restored
-from tractexp.record.dips import Dip, check_numbers, chosen, level, numbered
-from tractexp.record.record import GIVEN, LOAD, SIZES
+from tractexp.record.dips import FileDip, check_numbers, chosen, level, numbered
+from tractexp.record.record import DECLARATION, LOAD, SIZES
 from tractexp.recording.archive import records
 from tractexp.wording import counted
 
 __all__ = [
-    "GIVEN",
+    "DECLARATION",
     "LOAD",
     "PACKAGE",
     "SIZES",
-    "Dip",
+    "FileDip",
     "Powers",
     "Sidecar",
     "Tabular",

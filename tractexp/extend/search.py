@@ -1,6 +1,6 @@
 """Parts of searches: starts that lie apart, least squares from several at once, SciPy's differential evolution."""
 
-from tractexp.doors.scipy_differential_evolution import generations
+from tractexp.compat.scipy_differential_evolution import generations
 from tractexp.identification.least_squares import APART, race
 from tractexp.identification.starts import best_distinct
 

@@ -61,18 +61,18 @@ def is_date(cell: Any) -> bool:
 
 def numbers(cells: Sequence[Any], decimal: str = ".", gaps: bool = False) -> np.ndarray:
     """The numbers (N,) of cells, nan for a gap where `gaps` are allowed; raises `BadCell` for what is neither."""
-    made = np.empty(len(cells))
+    values = np.empty(len(cells))
     for row, cell in enumerate(cells):
         try:
-            made[row] = _number(cell, decimal)
+            values[row] = _number(cell, decimal)
         except ValueError:
             if not is_gap(cell):
                 raise BadCell(row, f"'{cell:.40}' is not a number{_comma(str(cell), decimal)}") from None
             if not gaps:
-                told = f"'{cell}' stands for no value" if cell and str(cell).strip() else "the cell is empty"
-                raise BadCell(row, f"{told}; only P and Q may have gaps") from None
-            made[row] = np.nan
-    return made
+                what = f"'{cell}' stands for no value" if cell and str(cell).strip() else "the cell is empty"
+                raise BadCell(row, f"{what}; only P and Q may have gaps") from None
+            values[row] = np.nan
+    return values
 
 
 def _number(cell: Any, decimal: str) -> float:
@@ -97,27 +97,27 @@ def _comma(cell: str, decimal: str) -> str:
 
 
 def times(cells: Sequence[Any]) -> tuple[np.ndarray, dt.datetime | None]:
-    """Times (N,) [s] since the first cell, and when that was, where the cells tell the day.
+    """Times (N,) [s] since the first cell, and its date and time, where the cells name the day.
 
     Times of day run on past midnight, those without hours past the full hour. Raises `BadCell` for what is no time.
     """
-    made, start = np.empty(len(cells)), None
+    seconds_of_rows, start = np.empty(len(cells)), None
     if not len(cells):
-        return made, start
+        return seconds_of_rows, start
     first, begin = _moment(cells[0], 0)
     for row, cell in enumerate(cells):
         day, seconds = _moment(cell, row)
-        made[row] = seconds
+        seconds_of_rows[row] = seconds
         if (day is None) != (first is None):
             raise BadCell(row, f"'{cell}' {'lacks' if day is None else 'has'} a date, unlike the first row")
         if day is not None and first is not None:
-            made[row] += (day - first).days * DAY
+            seconds_of_rows[row] += (day - first).days * DAY
     if first is not None:
         start = dt.datetime.combine(first, dt.time()) + dt.timedelta(seconds=begin)
     else:
         turn = HOUR if isinstance(cells[0], str) and cells[0].count(":") == 1 else DAY
-        made += turn * np.cumsum(np.diff(made, prepend=made[0]) < -turn / 2)
-    return made - made[0], start
+        seconds_of_rows += turn * np.cumsum(np.diff(seconds_of_rows, prepend=seconds_of_rows[0]) < -turn / 2)
+    return seconds_of_rows - seconds_of_rows[0], start
 
 
 def _moment(cell: Any, row: int) -> tuple[dt.date | None, float]:
@@ -127,18 +127,18 @@ def _moment(cell: Any, row: int) -> tuple[dt.date | None, float]:
         return (cell.date() if isinstance(cell, dt.datetime) else None), seconds
     if isinstance(cell, dt.date):
         return cell, 0.0  # a sheet's midnight
-    found = CLOCK.fullmatch(cell) if isinstance(cell, str) else None
-    if found is None:
+    match = CLOCK.fullmatch(cell) if isinstance(cell, str) else None
+    if match is None:
         raise BadCell(row, f"'{cell}' is no time, such as 12:00:00.25 or 2024-03-31T12:00:00.25")
-    day = _day(found["day"]) if found["day"] else None
-    if found["day"] and day is None:
-        raise BadCell(row, f"'{found['day']}' is no date; write it as 2024-03-31")
-    hours, minutes, seconds = int(found["h"] or 0), int(found["m"]), float(found["s"].replace(",", "."))
+    day = _day(match["day"]) if match["day"] else None
+    if match["day"] and day is None:
+        raise BadCell(row, f"'{match['day']}' is no date; write it as 2024-03-31")
+    hours, minutes, seconds = int(match["h"] or 0), int(match["m"]), float(match["s"].replace(",", "."))
     if hours > 24 or minutes > 59 or seconds >= 61:
         raise BadCell(row, f"'{cell}' is no time of a day")
-    if found["half"]:
-        hours = hours % 12 + 12 * (found["half"] in "Pp")
-    return day, hours * 3600 + minutes * 60 + seconds - _offset(found["zone"])
+    if match["half"]:
+        hours = hours % 12 + 12 * (match["half"] in "Pp")
+    return day, hours * 3600 + minutes * 60 + seconds - _offset(match["zone"])
 
 
 def _offset(zone: str | None) -> float:

@@ -25,7 +25,7 @@ ROOT = float(np.sqrt(2))
 LARGEST = 32 * 2**20  # bytes: event reports last seconds
 HEAD = 2000  # lines: the names of the columns stand among them
 CLOSE = 0.1  # of a current: so well the summary's agrees with the columns
-SLOW = 10  # samples a cycle: fewer are a filtered report, of which nothing but magnitudes can be told
+SLOW = 10  # samples a cycle: fewer are a filtered report, which holds magnitudes only
 _COLUMN = re.compile(r"\s*([^(]*?)\s*(?:\(\s*([^)]*?)\s*\))?\s*")
 _WAVE = re.compile(r"[IV](?:([ABCNGQ]|AB|BC|CA)(\w?)|1MEM|S\d?|P)", re.ASCII)
 
@@ -77,7 +77,7 @@ def load(path: Path, encoding: str | None = None) -> Recording:
         start=_start(report, (marked or 0) / rate, remarks),
         trigger=None if marked is None else marked / rate,
         status=_states(report, words),
-        notes=remarks.told(),
+        notes=remarks.notes(),
         extra={"format": "SEL CEV", "encoding": encoding, "about": report.about, "settings": report.settings},
     )
 
@@ -89,50 +89,50 @@ def checksum(text: str) -> str:
 
 def _report(path: Path, text: str, remarks: Remarks) -> Report:
     body, _, rest = re.sub(r"[\x02\x03\x1a\0]", "", text).partition('"SETTINGS"')
-    made = Report(settings=rest.partition("\n")[2].strip())
+    report = Report(settings=rest.partition("\n")[2].strip())
     names: list[str] | None = None
     for line, row in _joined(body):
-        if line > HEAD and not made.columns:
+        if line > HEAD and not report.columns:
             break
         cells = _cells(row)
         if len(cells) > 1 and re.fullmatch(r"[0-9A-Fa-f]{4}", cells[-1].strip()):
             if checksum(row[: row.rindex(",") + 1]) != cells[-1].strip().upper():
                 remarks.add("the checksum does not fit: the line was altered, or damaged on its way", line)
             cells = cells[:-1]
-        if made.columns:
+        if report.columns:
             if not cells or cells[0].strip() == "FID":
                 remarks.add("a second report in the file is not read", line)
                 break
-            made.rows.append((line, cells))
+            report.rows.append((line, cells))
         elif any(cell.strip() == "TRIG" for cell in cells):
-            made.columns = [cell.strip() for cell in cells]
-        elif names is None and not made.about and "FID" not in [cell.strip() for cell in cells]:
+            report.columns = [cell.strip() for cell in cells]
+        elif names is None and not report.about and "FID" not in [cell.strip() for cell in cells]:
             remarks.add("text before the report is passed over", line)
         elif names is None:
             names = [cell.strip() for cell in cells]
         else:
-            made.about |= dict(zip(names, map(str.strip, cells), strict=False))
+            report.about |= dict(zip(names, map(str.strip, cells), strict=False))
             names = None
-    if not made.columns or not made.rows:
+    if not report.columns or not report.rows:
         raise UserError(
             f"{path}: no compressed event report: there is no row of column names with TRIG and samples below it; get "
             "it from the relay with the command CEV, or its COMTRADE file"
         )
-    return made
+    return report
 
 
 def _joined(body: str) -> list[tuple[int, str]]:
     """Rows with the number of their first line; one with an open quotation goes on in the next line."""
-    made: list[tuple[int, str]] = []
+    rows: list[tuple[int, str]] = []
     held, start = "", 0
     for line, text in enumerate(re.split(r"\r\n|\n|\r", body), 1):
         held, start = (held + text, start) if held else (text, line)
         if held.count('"') % 2 and len(held) < 100_000:
             continue
         if held.strip():
-            made.append((start, held.strip()))
+            rows.append((start, held.strip()))
         held = ""
-    return made if not held.strip() else [*made, (start, held.strip())]
+    return rows if not held.strip() else [*rows, (start, held.strip())]
 
 
 def _cells(row: str) -> list[str]:
@@ -163,20 +163,20 @@ def _samples(path: Path, report: Report, remarks: Remarks) -> tuple[np.ndarray, 
 
 
 def _value(path: Path, line: int, name: str, cell: str) -> float:
-    found = number(cell) if cell.strip() else float("nan")
-    if found is None and (name == "*" or not set(cell.strip()) - {"$", "*", "-"}):
-        return float("nan")  # so the relay writes what it does not know
-    if found is None or abs(found) > HUGE:
+    value = number(cell) if cell.strip() else float("nan")
+    if value is None and (name == "*" or not set(cell.strip()) - {"$", "*", "-"}):
+        return float("nan")  # so the relay writes a missing value
+    if value is None or abs(value) > HUGE:
         raise UserError(
             f"{path}: line {line}: {name or 'column'} {quoted(cell)} is not a number, up to 1e38; correct it"
         )
-    return found
+    return value
 
 
 def _rate(path: Path, report: Report) -> tuple[float, float]:
     """Samples a cycle and the frequency that the relay sampled by."""
-    found = {key: number(report.about.get(key, "")) for key in ("SAM/CYC_A", "FREQ")}
-    per_cycle, frequency = found["SAM/CYC_A"], found["FREQ"]
+    numbers = {key: number(report.about.get(key, "")) for key in ("SAM/CYC_A", "FREQ")}
+    per_cycle, frequency = numbers["SAM/CYC_A"], numbers["FREQ"]
     if per_cycle is None or not 1 <= per_cycle <= 10_000:
         raise UserError(
             f"{path}: SAM/CYC_A, the samples in a cycle, is {quoted(report.about.get('SAM/CYC_A', ''))}, not a number "
@@ -203,7 +203,7 @@ def _channel(report: Report, k: int, values: np.ndarray, gain: float, remarks: R
         if wave and name[0] in "IV":
             unit = "A" if name[0] == "I" else "kV"
             if unit == "kV":
-                remarks.add(f"no unit given for {name}, kV taken")
+                remarks.add(f"no unit of {name}, kV taken")
     quantity = "frequency" if name == "FREQ" else unit_of(unit)[0]
     ratio = _ratio(report, name, remarks) if wave else 1.0
     return Channel(
@@ -216,12 +216,13 @@ def _ratio(report: Report, name: str, remarks: Remarks) -> float:
     """One, unless the summary says that the values are secondary ones (SEL-751)."""
     if report.about.get("PRIM_VAL", "YES").upper() != "NO":
         return 1.0
-    told = ("CTR" if name[0] == "I" else "PTR") + "_" + name
-    found = next((r for key in (told, told[:-1] + "A", told[:3]) if (r := number(report.about.get(key, "")))), None)
-    if found is None or found <= 0:
-        remarks.add(f"secondary values (PRIM_VAL is NO), but no ratio {told} for {name}: they stay secondary")
+    column = ("CTR" if name[0] == "I" else "PTR") + "_" + name
+    keys = (column, column[:-1] + "A", column[:3])
+    ratio = next((r for key in keys if (r := number(report.about.get(key, "")))), None)
+    if ratio is None or ratio <= 0:
+        remarks.add(f"secondary values (PRIM_VAL is NO), but no ratio {column} for {name}: they stay secondary")
         return 1.0
-    return found
+    return ratio
 
 
 def _gain(report: Report, values: np.ndarray, marks: list[str], per_cycle: float, remarks: Remarks) -> float:
@@ -233,10 +234,10 @@ def _gain(report: Report, values: np.ndarray, marks: list[str], per_cycle: float
         return ROOT
     ratios = []
     for k, column in enumerate(report.columns[: values.shape[1]]):
-        told = number(report.about.get(column, ""))
+        rms = number(report.about.get(column, ""))
         here = float(np.hypot(values[row, k], values[row - quarter, k]))
-        if column in ("IA", "IB", "IC", "IA(A)", "IB(A)", "IC(A)") and told and here > 0:
-            ratios.append((told, here / told))
+        if column in ("IA", "IB", "IC", "IA(A)", "IB(A)", "IC(A)") and rms and here > 0:
+            ratios.append((rms, here / rms))
     if not ratios:
         return ROOT
     ratio = max(ratios)[1]  # of the greatest current
@@ -251,11 +252,11 @@ def _gain(report: Report, values: np.ndarray, marks: list[str], per_cycle: float
 def _start(report: Report, before: float, remarks: Remarks) -> datetime | None:
     """Of the first sample; the report's time is that of the trigger."""
     keys = ("YEAR", "MONTH", "DAY", "HOUR", "MIN", "SEC", "MSEC")
-    told = [number(report.about.get(key, "")) for key in keys]
+    parts = [number(report.about.get(key, "")) for key in keys]
     try:
-        year, month, day, hour, minute, second, milli = (int(part) for part in told if part is not None)
-        made = datetime(year + (2000 if year < 100 else 0), month, day, hour, minute, second, 1000 * milli)
-        return made - timedelta(seconds=before)
+        year, month, day, hour, minute, second, milli = (int(part) for part in parts if part is not None)
+        moment = datetime(year + (2000 if year < 100 else 0), month, day, hour, minute, second, 1000 * milli)
+        return moment - timedelta(seconds=before)
     except (ValueError, OverflowError):
         said = ", ".join(f"{key} {report.about.get(key, '')}" for key in keys)
         remarks.add(f"{quoted(said)} is not a date and time; not used")

@@ -1,4 +1,4 @@
-"""What the columns of a table are called, and what that means: quantity, phase, unit.
+"""The meaning of column names: quantity, phase, unit.
 
 t   Time [s]   Zeit in ms   时间     U   Voltage (kV)   Va   UA(kV)   V1   m:u1:bus in p.u.     P [MW]   Active power
 """
@@ -40,7 +40,7 @@ UNMISTAKABLE = frozenset((  # as units after a space or an underscore, where V a
     "kV", "kA", "MW", "kW", "Mvar", "MVAr", "MVar", "kvar", "kVAr", "Hz", "s", "ms", "us", "pu", "deg", "rad",
 ))  # fmt: skip
 
-# {word: quantity}; those of more than one letter are found within a name too, where letters do not part words
+# {word: quantity}; longer ones match within a name too, in scripts that do not part words
 WORDS: Mapping[str, str] = {
     **dict.fromkeys(("t", "time", "timestamp", "datetime", "zeit", "uhrzeit", "zeitstempel", "clock", "temps", "tiempo",
                      "tempo", "tnow", "utc", "время", "时间", "时刻"), "t"),
@@ -96,15 +96,15 @@ def split_unit(name: str) -> tuple[str, str]:
     """A header's name and its unit, "" where it has none: "Voltage [kV]", "U/kV", "Zeit in ms", "P_MW"."""
     name = name.strip().strip('"').strip("'").strip()
     for pattern in BRACKETED:
-        if (found := re.fullmatch(pattern, name)) and is_unit(found[2]):
-            return found[1].strip(), found[2]
-    found = re.fullmatch(r"(.+?)(?:\s*,\s*|\s+|_)(\S+)", name)
-    sure = found is not None and (found[2] in UNMISTAKABLE or (not found[2].isascii() and is_unit(found[2])))
-    return (found[1], found[2]) if found and sure else (name, "")
+        if (match := re.fullmatch(pattern, name)) and is_unit(match[2]):
+            return match[1].strip(), match[2]
+    match = re.fullmatch(r"(.+?)(?:\s*,\s*|\s+|_)(\S+)", name)
+    sure = match is not None and (match[2] in UNMISTAKABLE or (not match[2].isascii() and is_unit(match[2])))
+    return (match[1], match[2]) if match and sure else (name, "")
 
 
 def is_unit(text: str) -> bool:
-    """Whether a text is a unit that is known."""
+    """Whether a text is a unit of `UNITS`."""
     return text.strip().lower() in UNITS and not text.strip().isdigit()
 
 
@@ -117,14 +117,14 @@ def factor(unit: str) -> float:
 
 
 def role(name: str, unit: str = "") -> Role | None:
-    """What a column of that name and unit is; None for what cannot be told."""
+    """What a column of that name and unit is; None for anything else."""
     words = _words(name)
     if not words:
         return None
-    found = next((made for made in (_compound(words), _worded(words)) if made), None)
-    if found is None:
+    meaning = next((pair for pair in (_compound(words), _worded(words)) if pair), None)
+    if meaning is None:
         return None
-    key, phase = found
+    key, phase = meaning
     kind = UNITS.get(unit.strip().lower(), ("",))[0]
     if (key, kind) in (("U", "current"), ("I", "voltage")):  # "Voltage (A)": a phase, no unit
         return role(f"{name} {unit}")
@@ -141,7 +141,7 @@ def _tells_angle(words: Sequence[str]) -> bool:
 
 
 def _words(name: str) -> list[str]:
-    """The words of a name, in lower case; numbers of buses and the like are left out."""
+    """The words of a name, in lower case, without numbers of buses and the like."""
     text = re.sub(r"(?<=[a-z])(?=[A-Z][a-z])", " ", name)
     text = re.sub(r"[^\w]+|_", " ", text.lower().replace("d/dt", "dt").replace("df/dt", "dfdt"))
     text = re.sub(r"\b(bus|busbar|node|feeder|gen|substation|to|ckt)\s+\d+\b", " ", text)
@@ -153,8 +153,8 @@ def _words(name: str) -> list[str]:
 def _compound(words: Sequence[str]) -> tuple[str, str] | None:
     """Quantity and phase of a word such as ua, vl1, i_b, V1."""
     for word, after in zip(words, [*words[1:], ""], strict=True):
-        if found := COMPOUND.fullmatch(word):
-            return _letter(found[1]), PHASES[found[2]]
+        if match := COMPOUND.fullmatch(word):
+            return _letter(match[1]), PHASES[match[2]]
         if (key := WORDS.get(word)) in ("U", "I", "P", "Q") and after in PHASES and (after != "p"):
             return key, PHASES[after]
     return None
@@ -166,13 +166,15 @@ def _letter(letter: str) -> str:
 
 def _worded(words: Sequence[str]) -> tuple[str, str] | None:
     """Quantity and phase of words such as "active power", "phase A voltage", "正序电压"."""
-    found = next((WORDS[word] for word in ("dfdt", "rocof", "reactive", *words) if word in words and word in WORDS), "")
+    first = ("dfdt", "rocof", "reactive", *words)
+    quantity = next((WORDS[word] for word in first if word in words and word in WORDS), "")
     text = " ".join(words)
-    if not found:  # where no spaces part the words
-        found = next((key for word, key in WORDS.items() if len(word) > 1 and not word.isascii() and word in text), "")
-    if not found:
+    if not quantity:  # where no spaces part the words
+        within = (key for word, key in WORDS.items() if len(word) > 1 and not word.isascii() and word in text)
+        quantity = next(within, "")
+    if not quantity:
         return None
-    if found not in ("U", "I"):
-        return found, ""
+    if quantity not in ("U", "I"):
+        return quantity, ""
     spelled = (p for w in words if (p := PHASES.get(w)) and not (w.isascii() and len(w) == 1 and "phase" not in words))
-    return found, next(spelled, "1" if "正序" in text else "2" if "负序" in text else "")
+    return quantity, next(spelled, "1" if "正序" in text else "2" if "负序" in text else "")

@@ -1,7 +1,7 @@
 """COMTRADE records (IEEE C37.111-1991, -1999, -2013): .cfg with .dat, or both in one .cff, read and written.
 
 Read here and not by a library: the samples stay views of the file in the type they have there, no time is computed
-per sample, and what is wrong is told by file, line, channel and value.
+per sample, and errors name file, line, channel and value.
 """
 
 import re
@@ -13,7 +13,7 @@ import numpy as np
 from tractexp.errors import UserError, nearest
 from tractexp.filetypes import timeline
 from tractexp.filetypes.comtrade_header import Analog, Digital, Header, parse
-from tractexp.filetypes.comtrade_samples import NONE, Place, Samples, read
+from tractexp.filetypes.comtrade_samples import NONE, ByteRange, Samples, read
 from tractexp.filetypes.comtrade_writer import write as write
 from tractexp.filetypes.remarks import Remarks
 from tractexp.filetypes.text import decode, lines
@@ -31,7 +31,7 @@ _SECTION = re.compile(
 def load(path: Path, encoding: str | None = None) -> Recording:
     """Read a .cfg and the .dat beside it, or a .cff; raises `UserError` where they are missing, cut short or disagree.
 
-    `encoding` is that of the configuration; None: found from its letters.
+    `encoding` is that of the configuration; None: guessed from its letters.
     """
     path = Path(path)
     if path.is_dir():
@@ -47,8 +47,8 @@ def _paired(path: Path, encoding: str | None) -> Recording:
     remarks = Remarks(str(cfg))
     if note:
         remarks.add(note)
-    data = Place(dat, 0, dat.stat().st_size)
-    text, encoding = decode(_configuration(Place(cfg, 0, cfg.stat().st_size)), str(cfg), encoding)
+    data = ByteRange(dat, 0, dat.stat().st_size)
+    text, encoding = decode(_configuration(ByteRange(cfg, 0, cfg.stat().st_size)), str(cfg), encoding)
     return _recording(cfg, text, data, remarks, {"encoding": encoding})
 
 
@@ -70,26 +70,26 @@ def _combined(path: Path, encoding: str | None) -> Recording:
     return _recording(path, text, parts["DAT"], remarks, extra, parts["CFG"].line)
 
 
-def _sections(path: Path) -> dict[str, Place]:
+def _sections(path: Path) -> dict[str, ByteRange]:
     """Where the sections of a .cff lie; bytes of binary data are not searched for headings."""
     content = path.read_bytes()
-    made: dict[str, Place] = {}
+    sections: dict[str, ByteRange] = {}
     at = 0
-    while (found := _SECTION.search(content, at)) is not None:
-        name, length = found[1].decode().upper(), found[3]
-        begin = found.end()
-        if name == "DAT" and found[2].upper() != b"ASCII":
+    while (match := _SECTION.search(content, at)) is not None:
+        name, length = match[1].decode().upper(), match[3]
+        begin = match.end()
+        if name == "DAT" and match[2].upper() != b"ASCII":
             stop = min(len(content), begin + int(length[:15])) if length else len(content)
         else:
             following = _SECTION.search(content, begin)
             stop = following.start() if following else len(content)
-        made[name] = Place(path, begin, stop, content.count(b"\n", 0, begin) + 1)
+        sections[name] = ByteRange(path, begin, stop, content.count(b"\n", 0, begin) + 1)
         at = stop
-    return made
+    return sections
 
 
 def _recording(
-    path: Path, text: str, data: Place, remarks: Remarks, extra: dict[str, Any], first: int = 1
+    path: Path, text: str, data: ByteRange, remarks: Remarks, extra: dict[str, Any], first: int = 1
 ) -> Recording:
     header = parse(str(path), lines(text), remarks, first)
     samples = read(data, header, remarks)
@@ -106,59 +106,60 @@ def _recording(
         start=header.start,
         trigger=_trigger(header, stretches, remarks),
         status=[_status(header, k, samples, stretches) for k in range(len(header.digitals))],
-        notes=remarks.told(),
+        notes=remarks.notes(),
         extra={**extra, **_extra(header, samples, stretches)},
     )
 
 
 def _channel(header: Header, k: int, samples: Samples, stretches: list[Stretch]) -> Channel:
-    told, raw = header.analogs[k], samples.analogs[k]
-    raw, missing = _missing(header.kind, told, raw)
+    analog, raw = header.analogs[k], samples.analogs[k]
+    raw, missing = _missing(header.kind, analog, raw)
     return Channel(
-        told.name, timeline.evened(raw, stretches, missing), told.unit, unit_of(told.unit)[0],
-        told.phase, told.circuit, told.gain, told.offset, told.ratio, told.skew * 1e-6, told.limits, missing,
+        analog.name, timeline.evened(raw, stretches, missing), analog.unit, unit_of(analog.unit)[0],
+        analog.phase, analog.circuit, analog.gain, analog.offset, analog.ratio, analog.skew * 1e-6, analog.limits,
+        missing,
     )  # fmt: skip
 
 
-def _missing(kind: str, told: Analog, raw: np.ndarray) -> tuple[np.ndarray, float | None]:
+def _missing(kind: str, analog: Analog, raw: np.ndarray) -> tuple[np.ndarray, float | None]:
     """The raw values, and which of them stands for none: a value that the file declares possible does not."""
-    least, greatest = told.limits or (-np.inf, np.inf)
+    least, greatest = analog.limits or (-np.inf, np.inf)
     if kind == "BINARY" and least >= 0 and greatest > 32767:  # declared without sign
         return raw.view("<u2"), 65535.0 if greatest < 65535 else None
     if kind == "ASCII":
-        if told.limits is None or greatest < MISSING_TEXT[0]:
+        if analog.limits is None or greatest < MISSING_TEXT[0]:
             old = raw == MISSING_TEXT[1]
             raw = np.where(old, raw.dtype.type(MISSING_TEXT[0]), raw) if old.any() else raw
             return raw, MISSING_TEXT[0]
         return raw, MISSING_TEXT[1] if greatest < MISSING_TEXT[1] else None
     missing = MISSING.get(kind)
-    return raw, missing if missing is None or told.limits is None or least > missing else None
+    return raw, missing if missing is None or analog.limits is None or least > missing else None
 
 
 def _status(header: Header, k: int, samples: Samples, stretches: list[Stretch]) -> Status:
-    told: Digital = header.digitals[k]
+    digital: Digital = header.digitals[k]
     words = timeline.nearest(samples.words[:, k // 16], stretches)
-    return Status(told.name, words, told.phase, told.circuit, told.normal, bit=k % 16)
+    return Status(digital.name, words, digital.phase, digital.circuit, digital.normal, bit=k % 16)
 
 
-def _stretches(data: Place, header: Header, samples: Samples, remarks: Remarks) -> list[Stretch]:
+def _stretches(data: ByteRange, header: Header, samples: Samples, remarks: Remarks) -> list[Stretch]:
     """Segments from the rates; from the time stamps where there are none."""
     unit = header.timemult * (1e-9 if all(_digits(date) > 6 for date in header.dates) else 1e-6)
     if header.rates[0][0] > 0:
-        made = timeline.from_rates(header.rates, _stamped(header, samples.stamps, unit, remarks))
-        if any(s.t is not None for s in made):
+        result = timeline.from_rates(header.rates, _stamped(header, samples.stamps, unit, remarks))
+        if any(s.t is not None for s in result):
             remarks.add(
                 "sampling rates within 2 % of their neighbours are taken as one waveform", header.lines["rates"]
             )
-        return made
+        return result
     stamps = samples.stamps.astype(np.float64)
     if header.kind != "ASCII":
         stamps += 2.0**32 * np.cumsum(np.diff(stamps, prepend=stamps[0]) < -(2.0**31))  # the counter ran over
-    made = timeline.from_stamps((stamps - stamps[0]) * unit, unit, str(data.path))
-    if len(made) > 1:
-        gaps = ", ".join(f"{s.segment.start:.6g}" for s in made[1:6]) + (" ..." if len(made) > 6 else "")
+    result = timeline.from_stamps((stamps - stamps[0]) * unit, unit, str(data.path))
+    if len(result) > 1:
+        gaps = ", ".join(f"{s.segment.start:.6g}" for s in result[1:6]) + (" ..." if len(result) > 6 else "")
         remarks.add(f"the steps between time stamps change: a new segment begins at {gaps} s")
-    return made
+    return result
 
 
 def _digits(date: str) -> int:
@@ -174,9 +175,9 @@ def _stamped(header: Header, stamps: np.ndarray, unit: float, remarks: Remarks) 
         return None  # the counter ran over
     first = 0
     for rate, stop in header.rates:
-        told, stamped = (stop - first - 1) / rate, float(t[stop - 1] - t[first])
-        if abs(told - stamped) > 2 * unit + 0.01 * told:
-            at = f"samples {first + 1} to {stop} take {told:.6g} s at {rate:g} Hz"
+        duration, stamped = (stop - first - 1) / rate, float(t[stop - 1] - t[first])
+        if abs(duration - stamped) > 2 * unit + 0.01 * duration:
+            at = f"samples {first + 1} to {stop} take {duration:.6g} s at {rate:g} Hz"
             remarks.add(f"{at}, but {stamped:.6g} s by their time stamps; the rate is taken", header.lines["rates"])
             return None
         first = stop
@@ -196,31 +197,31 @@ def _trigger(header: Header, stretches: list[Stretch], remarks: Remarks) -> floa
 
 
 def _extra(header: Header, samples: Samples, stretches: list[Stretch]) -> dict[str, Any]:
-    """What a recording has no place for, for a round trip."""
-    made: dict[str, Any] = {
+    """Fields of the file that a recording has no attribute for, for a round trip."""
+    extra: dict[str, Any] = {
         "format": "COMTRADE", "revision": header.revision, "kind": header.kind, "dates": header.dates,
         "timemult": header.timemult, "time_code": header.time_code, "quality": header.quality,
-        "sides": [(told.primary, told.secondary, told.side) for told in header.analogs], "rates": header.rates,
+        "sides": [(analog.primary, analog.secondary, analog.side) for analog in header.analogs], "rates": header.rates,
     }  # fmt: skip
     if any(s.t is not None for s in stretches):
-        return made  # numbers and stamps of other samples
+        return extra  # numbers and stamps of other samples
     count = len(samples.numbers)
     if not np.array_equal(samples.numbers, np.arange(1, count + 1)):
-        made["numbers"] = samples.numbers
+        extra["numbers"] = samples.numbers
     if header.rates[0][0] == 0 or samples.stamps[0] != samples.stamps[-1]:
-        made["stamps"] = samples.stamps
-    return made
+        extra["stamps"] = samples.stamps
+    return extra
 
 
 def _existing(path: Path) -> Path:
     if not path.is_file():
-        found = [item.name for item in path.parent.iterdir()] if path.parent.is_dir() else []
-        raise UserError(f"{path}: there is no such file{nearest(path.name, found)}")
+        names = [item.name for item in path.parent.iterdir()] if path.parent.is_dir() else []
+        raise UserError(f"{path}: there is no such file{nearest(path.name, names)}")
     return path
 
 
 def _pair(path: Path) -> tuple[Path, Path, str]:
-    """The .cfg and .dat files, whatever the case of their endings, and what is to be said about it."""
+    """The .cfg and .dat files, whatever the case of their endings, and a remark on them."""
     ending = path.suffix.lower()
     if ending not in (".cfg", ".dat"):
         raise UserError(
@@ -233,7 +234,7 @@ def _pair(path: Path) -> tuple[Path, Path, str]:
             raise UserError(
                 f"{path}: the configuration {path.stem}.cfg is not beside it, and the data mean nothing without"
             )
-        return cfg, path, f"found beside the {path.name} that was given"
+        return cfg, path, f"it lies beside {path.name}"
     dat = _beside(path, ".dat")
     if dat is None:
         raise UserError(f"{path.with_suffix('.dat')}: there is no such file; the data must lie beside {path.name}")
@@ -250,7 +251,7 @@ def _beside(path: Path, ending: str) -> Path | None:
     )
 
 
-def _configuration(place: Place) -> bytes:
+def _configuration(place: ByteRange) -> bytes:
     if place.size > LARGEST_CFG:
         raise UserError(f"{place.path}: {place.size} bytes are no COMTRADE configuration; the limit is {LARGEST_CFG}")
     return place.content()

@@ -1,4 +1,4 @@
-"""The configuration (.cfg) of a COMTRADE record: what it says, line by line, checked before any data is touched.
+"""The configuration (.cfg) of a COMTRADE record, read line by line and checked before any data is read.
 
 Source: IEEE C37.111-1991, -1999 and -2013. Harmless departures are mended and noted with their line.
 """
@@ -79,24 +79,24 @@ class Header:
 
 
 class _Lines:
-    """The lines that are left, with their numbers."""
+    """The remaining lines, with their numbers."""
 
     def __init__(self, where: str, lines: list[str], remarks: Remarks, first: int) -> None:
         self.where, self.remarks = where, remarks
         lines = lines[: max((n for n, line in enumerate(lines, 1) if line), default=0)]
-        self.left = deque((n, line) for n, line in enumerate(lines, first) if line)
+        self.rest = deque((n, line) for n, line in enumerate(lines, first) if line)
         self.last = first + len(lines) - 1
         for n, line in enumerate(lines, first):
             if not line:
                 remarks.add("a blank line is passed over", n)
 
     def take(self, what: str) -> tuple[int, str]:
-        if not self.left:
+        if not self.rest:
             raise UserError(f"{self.where}: ends after line {self.last}, before {what}; the file is cut short")
-        return self.left.popleft()
+        return self.rest.popleft()
 
     def peek(self) -> str:
-        return self.left[0][1] if self.left else ""
+        return self.rest[0][1] if self.rest else ""
 
     def refuse(self, line: int, words: str) -> UserError:
         return UserError(f"{self.where}: line {line}: {words}")
@@ -107,17 +107,17 @@ def parse(where: str, lines: list[str], remarks: Remarks, first: int = 1) -> Hea
 
     Raises `UserError` naming line, channel, value, and what is allowed.
     """
-    left, header = _Lines(where, lines, remarks, first), Header()
-    _station(left, header)
-    analogs, digitals = _counts(left)
-    header.lines["analog"] = left.left[0][0] if left.left else 0
-    header.analogs = [_analog(left, k, analogs) for k in range(analogs)]
-    header.digitals = [_digital(left, k, digitals) for k in range(digitals)]
-    rows = _frequency(left, header)
-    _rates(left, header, rows)
-    _dates(left, header)
-    _kind(left, header)
-    _trailer(left, header)
+    rows, header = _Lines(where, lines, remarks, first), Header()
+    _station(rows, header)
+    analogs, digitals = _counts(rows)
+    header.lines["analog"] = rows.rest[0][0] if rows.rest else 0
+    header.analogs = [_analog(rows, k, analogs) for k in range(analogs)]
+    header.digitals = [_digital(rows, k, digitals) for k in range(digitals)]
+    count = _frequency(rows, header)
+    _rates(rows, header, count)
+    _dates(rows, header)
+    _kind(rows, header)
+    _trailer(rows, header)
     return header
 
 
@@ -135,45 +135,45 @@ def quoted(text: str) -> str:
     return f"'{text[:40]}…'" if len(text) > 40 else f"'{text}'"
 
 
-def _station(left: _Lines, header: Header) -> None:
-    if _COUNTS.fullmatch(left.peek()):
-        left.remarks.add("the line of station and device is missing", left.left[0][0])
+def _station(rows: _Lines, header: Header) -> None:
+    if _COUNTS.fullmatch(rows.peek()):
+        rows.remarks.add("the line of station and device is missing", rows.rest[0][0])
         return
-    line, text = left.take("the station's name")
+    line, text = rows.take("the station's name")
     fields = [part.strip() for part in text.split(",")]
     while len(fields) > 3 and not fields[-1]:
         fields.pop()
     if len(fields) > 1 and re.fullmatch(r"(19|20)\d\d", fields[-1], re.ASCII):
         header.revision = int(fields.pop())
     elif len(fields) > 2:
-        left.remarks.add(f"the standard's year {quoted(fields.pop())} is none of 1991, 1999, 2013; taken as 1999", line)
+        rows.remarks.add(f"the standard's year {quoted(fields.pop())} is none of 1991, 1999, 2013; taken as 1999", line)
         header.revision = 1999
     header.station, header.device = fields[0], ",".join(fields[1:])
 
 
-def _counts(left: _Lines) -> tuple[int, int]:
-    line, text = left.take("the numbers of channels")
+def _counts(rows: _Lines) -> tuple[int, int]:
+    line, text = rows.take("the numbers of channels")
     match = _COUNTS.fullmatch(text)
     if match is None or match[3].upper() == match[5].upper():
-        raise left.refuse(line, f"{quoted(text)} is not the numbers of channels, as in 8,6A,2D: all, analog, status")
+        raise rows.refuse(line, f"{quoted(text)} is not the numbers of channels, as in 8,6A,2D: all, analog, status")
     counts = {match[3].upper(): int(match[2]), match[5].upper(): int(match[4])}
     analogs, digitals = counts["A"], counts["D"]
     if int(match[1]) != analogs + digitals:
-        raise left.refuse(
+        raise rows.refuse(
             line, f"announces {match[1]} channels but {analogs} analog and {digitals} status ones; correct the numbers"
         )
-    if analogs + digitals > len(left.left):
-        raise left.refuse(
-            line, f"announces {analogs + digitals} channels, but only {len(left.left)} lines follow; correct the "
+    if analogs + digitals > len(rows.rest):
+        raise rows.refuse(
+            line, f"announces {analogs + digitals} channels, but only {len(rows.rest)} lines follow; correct the "
             "numbers, or the file is cut short",
         )  # fmt: skip
     if analogs == 0:
-        raise left.refuse(line, "announces no analog channel; a record of status channels alone has nothing to read")
+        raise rows.refuse(line, "announces no analog channel; a record of status channels alone has nothing to read")
     return analogs, digitals
 
 
-def _analog(left: _Lines, k: int, count: int) -> Analog:
-    line, text = left.take(f"analog channel {k + 1} of {count}")
+def _analog(rows: _Lines, k: int, count: int) -> Analog:
+    line, text = rows.take(f"analog channel {k + 1} of {count}")
     fields = [part.strip() for part in text.split(",")]
     if len(fields) > 13 and not any(fields[13:]):
         fields = fields[:13]
@@ -181,56 +181,56 @@ def _analog(left: _Lines, k: int, count: int) -> Analog:
     channel = f"analog channel {k + 1} of {count} {quoted(name)}"
     short = len(fields) == 12 and number(fields[4]) is None and number(fields[11]) is not None  # without P or S
     if len(fields) not in (10, 13) and not short:
-        raise left.refuse(
+        raise rows.refuse(
             line, f"{channel} has {_fields(fields)}, but an analog channel has 13, or 10 by the standard of 1991; "
             "correct the line, or the numbers of channels in line 2",
         )  # fmt: skip
 
     def value(i: int, what: str, default: float | None) -> float:
         if not fields[i] and default is not None:
-            left.remarks.add(f"no {what} given, {default:g} taken", line)
+            rows.remarks.add(f"no {what}, {default:g} taken", line)
             return default
-        found = number(fields[i])
-        if found is None or abs(found) > GREATEST:
-            raise left.refuse(
+        parsed = number(fields[i])
+        if parsed is None or abs(parsed) > GREATEST:
+            raise rows.refuse(
                 line, f"{channel}: {what} {quoted(fields[i])} is not a number between -1e12 and 1e12; correct it"
             )
-        return found
+        return parsed
 
     fields += [""] * (13 - len(fields))
     side = fields[12].upper()
-    told = side in ("P", "S")
-    if side and not told:
-        left.remarks.add(f"{quoted(fields[12])} is neither P nor S, primary values taken", line)
-    elif not told and any(fields[10:12]):
-        left.remarks.add("neither P nor S given, primary values taken", line)
-    made = Analog(
+    declared = side in ("P", "S")
+    if side and not declared:
+        rows.remarks.add(f"{quoted(fields[12])} is neither P nor S, primary values taken", line)
+    elif not declared and any(fields[10:12]):
+        rows.remarks.add("neither P nor S stands there, primary values taken", line)
+    analog = Analog(
         name, fields[2], fields[3], fields[4],
         value(5, "multiplier", None), value(6, "offset", 0.0), value(7, "time skew", 0.0) if fields[7] else 0.0,
         _limits(fields[8], fields[9]),
-        value(10, "primary ratio", 1.0) if told else number(fields[10]) or 1.0,
-        value(11, "secondary ratio", 1.0) if told else number(fields[11]) or 1.0,
-        side if told else "",
+        value(10, "primary ratio", 1.0) if declared else number(fields[10]) or 1.0,
+        value(11, "secondary ratio", 1.0) if declared else number(fields[11]) or 1.0,
+        side if declared else "",
     )  # fmt: skip
-    return _checked_ratio(left, line, channel, made)
+    return _checked_ratio(rows, line, channel, analog)
 
 
 def _fields(fields: list[str]) -> str:
     return f"{len(fields)} field{'s' * (len(fields) != 1)}"
 
 
-def _checked_ratio(left: _Lines, line: int, channel: str, made: Analog) -> Analog:
+def _checked_ratio(rows: _Lines, line: int, channel: str, analog: Analog) -> Analog:
     """Secondary values need a ratio; a channel that is neither voltage nor current may lack it."""
-    if made.side != "S" or (made.primary > 0 and made.secondary > 0):
-        return made
-    words = f"its ratio {made.primary:g}/{made.secondary:g} is not positive"
-    if unit_of(made.unit)[0]:
-        raise left.refuse(
+    if analog.side != "S" or (analog.primary > 0 and analog.secondary > 0):
+        return analog
+    words = f"its ratio {analog.primary:g}/{analog.secondary:g} is not positive"
+    if unit_of(analog.unit)[0]:
+        raise rows.refuse(
             line, f"{channel} is in secondary values, but {words}; write the ratio of its transformer there, or P for "
             "primary values",
         )  # fmt: skip
-    left.remarks.add(f"secondary values, but {words}; 1/1 taken", line)
-    return Analog(**{**vars(made), "primary": 1.0, "secondary": 1.0})
+    rows.remarks.add(f"secondary values, but {words}; 1/1 taken", line)
+    return Analog(**{**vars(analog), "primary": 1.0, "secondary": 1.0})
 
 
 def _limits(least: str, greatest: str) -> tuple[float, float] | None:
@@ -238,14 +238,14 @@ def _limits(least: str, greatest: str) -> tuple[float, float] | None:
     return (low, high) if low is not None and high is not None and low < high else None
 
 
-def _digital(left: _Lines, k: int, count: int) -> Digital:
-    line, text = left.take(f"status channel {k + 1} of {count}")
+def _digital(rows: _Lines, k: int, count: int) -> Digital:
+    line, text = rows.take(f"status channel {k + 1} of {count}")
     fields = [part.strip() for part in text.split(",")]
     while len(fields) > 5 and not fields[-1]:
         fields.pop()
     if not 2 <= len(fields) <= 5 or "/" in fields[0]:
         name = quoted(fields[1]) if len(fields) > 1 else quoted(fields[0])
-        raise left.refuse(
+        raise rows.refuse(
             line, f"status channel {k + 1} of {count} {name} has {_fields(fields)}, but a status channel has 5, or "
             "3 by the standard of 1991; correct the line, or the numbers of channels in line 2",
         )  # fmt: skip
@@ -255,68 +255,68 @@ def _digital(left: _Lines, k: int, count: int) -> Digital:
     return Digital(fields[1], "", "", int("1" in fields[2:]))
 
 
-def _frequency(left: _Lines, header: Header) -> int | None:
+def _frequency(rows: _Lines, header: Header) -> int | None:
     """The nominal frequency; returns the announced number of sampling rates."""
-    line, text = left.take("the nominal frequency")
+    line, text = rows.take("the nominal frequency")
     header.lines["frequency"] = line
-    found = number(text.strip(", "))
+    parsed = number(text.strip(", "))
     if "," in text.strip(", "):
-        raise left.refuse(
+        raise rows.refuse(
             line,
             f"{quoted(text)} where the nominal frequency should be; more lines of channels may be there than line 2 "
             "announces, or the frequency is missing",
         )
-    if found == 0 or not text.strip(", "):
-        left.remarks.add(
-            f"the nominal frequency is not told: {header.frequency:g} Hz, unless the voltage shows another", line
+    if parsed == 0 or not text.strip(", "):
+        rows.remarks.add(
+            f"the nominal frequency is missing: {header.frequency:g} Hz, unless the voltage shows another", line
         )
-        found = header.frequency
-    if found is None or not FREQUENCY[0] <= found <= FREQUENCY[1]:
+        parsed = header.frequency
+    if parsed is None or not FREQUENCY[0] <= parsed <= FREQUENCY[1]:
         low, high = FREQUENCY
-        raise left.refuse(
+        raise rows.refuse(
             line, f"nominal frequency {quoted(text)} is not a number between {low:g} and {high:g} Hz; write that of "
             "the network there, 50 or 60",
         )  # fmt: skip
-    header.frequency = found
-    if "," in left.peek().strip(", "):
-        left.remarks.add("the number of sampling rates is missing", left.left[0][0])
+    header.frequency = parsed
+    if "," in rows.peek().strip(", "):
+        rows.remarks.add("the number of sampling rates is missing", rows.rest[0][0])
         return None
-    line, text = left.take("the number of sampling rates")
-    found = number(text.strip(", "))
-    if found is None or found < 0 or found != int(found) or found > 1e6:
-        raise left.refuse(line, f"the number of sampling rates {quoted(text)} is not a whole number from 0 on")
-    return int(found)
+    line, text = rows.take("the number of sampling rates")
+    parsed = number(text.strip(", "))
+    if parsed is None or parsed < 0 or parsed != int(parsed) or parsed > 1e6:
+        raise rows.refuse(line, f"the number of sampling rates {quoted(text)} is not a whole number from 0 on")
+    return int(parsed)
 
 
-def _rates(left: _Lines, header: Header, count: int | None) -> None:
+def _rates(rows: _Lines, header: Header, count: int | None) -> None:
     """Rows of rate and last sample, as many as announced or as there are."""
-    header.lines["rates"] = left.left[0][0] if left.left else 0
+    header.lines["rates"] = rows.rest[0][0] if rows.rest else 0
     read = 0
-    while not header.rates or _is_rate(left.peek()):
-        line, text = left.take("the sampling rates")
+    while not header.rates or _is_rate(rows.peek()):
+        line, text = rows.take("the sampling rates")
         read += 1
         fields = [number(part) for part in text.strip(", ").split(",")]
         rate, end = (*fields, None, None)[:2]
         if len(fields) != 2 or rate is None or end is None or end != int(end) or abs(end) > 1e15:
-            raise left.refuse(line, f"{quoted(text)} is not a sampling rate [Hz] and its last sample, as in 4000,8000")
+            raise rows.refuse(line, f"{quoted(text)} is not a sampling rate [Hz] and its last sample, as in 4000,8000")
         last = header.rates[-1][1] if header.rates else 0
         if rate < 0 or rate > 1e9:
-            raise left.refuse(line, f"sampling rate {quoted(text.split(',')[0])} is not between 0 and 1e9 Hz")
+            raise rows.refuse(line, f"sampling rate {quoted(text.split(',')[0])} is not between 0 and 1e9 Hz")
         if end == last and last:
-            left.remarks.add("a sampling rate without samples of its own is passed over", line)
+            rows.remarks.add("a sampling rate without samples of its own is passed over", line)
             continue
         if end < last or end < 1:
-            raise left.refuse(
+            raise rows.refuse(
                 line, f"last sample {end:g} must be above zero, and above {last}, that of the line before"
             )
         header.rates.append((rate, int(end)))
     if count not in (None, 0, read) or (count == 0 and read > 1):
-        left.remarks.add(f"{count} sampling rates announced, {read} found", header.lines["rates"] - 1)
+        rows.remarks.add(f"{count} sampling rates announced, {read} present", header.lines["rates"] - 1)
     if len({rate > 0 for rate, _ in header.rates}) > 1:
-        told = ", ".join(f"{rate:g}" for rate, _ in header.rates)
-        raise left.refuse(
-            header.lines["rates"], f"sampling rates {told} Hz: a rate of 0 means that time stamps are valid, and must "
-            "be the only one",
+        listed = ", ".join(f"{rate:g}" for rate, _ in header.rates)
+        raise rows.refuse(
+            header.lines["rates"], f"sampling rates {listed} Hz: a rate of 0 means that time stamps are valid, and "
+            "must be the only one",
         )  # fmt: skip
 
 
@@ -325,25 +325,25 @@ def _is_rate(text: str) -> bool:
     return len(fields) == 2 and all(number(part) is not None for part in fields)
 
 
-def _dates(left: _Lines, header: Header) -> None:
-    told: list[tuple[int, str]] = []
-    while len(told) < 2 and left.left and _LIKE_DATE.search(left.peek()):
-        told.append(left.take("the date of the first sample"))
-    if not told:
-        left.remarks.add("no date of the first sample given")
+def _dates(rows: _Lines, header: Header) -> None:
+    entries: list[tuple[int, str]] = []
+    while len(entries) < 2 and rows.rest and _LIKE_DATE.search(rows.peek()):
+        entries.append(rows.take("the date of the first sample"))
+    if not entries:
+        rows.remarks.add("there is no date of the first sample")
         return
-    header.dates = told[0][1], told[1][1] if len(told) > 1 else ""
-    found = []
-    for line, text in told:
-        made, remark = date(text, header.revision < 1997)
-        found.append(made)
+    header.dates = entries[0][1], entries[1][1] if len(entries) > 1 else ""
+    moments = []
+    for line, text in entries:
+        moment, remark = date(text, header.revision < 1997)
+        moments.append(moment)
         if remark:
-            left.remarks.add(remark, line)
-    begin, at = (*found, None)[:2]
+            rows.remarks.add(remark, line)
+    begin, at = (*moments, None)[:2]
     unset = begin is not None and begin.date() == EPOCH.date()
     header.start = None if unset else begin
     if unset:
-        left.remarks.add("the clock was not set (1970); the time of the first sample is not known", told[0][0])
+        rows.remarks.add("the clock was not set (1970); the time of the first sample is missing", entries[0][0])
     if begin is not None and at is not None and at != EPOCH:
         header.trigger = (at - begin) / timedelta(seconds=1)
 
@@ -356,7 +356,7 @@ _DATE = re.compile(
 
 
 def date(text: str, american: bool) -> tuple[datetime | None, str]:
-    """A date in whichever order its numbers allow, and what is to be said about it; None where they allow none.
+    """A date in whichever order its numbers allow, and a remark on it; None where they allow none.
 
     `american`: the month is written first (1991).
     """
@@ -371,31 +371,31 @@ def date(text: str, american: bool) -> tuple[datetime | None, str]:
     for k, (year, month, day) in enumerate(orders):
         year += (1900 if year >= 70 else 2000) if year < 100 else 0
         try:
-            made = datetime(year, month, day, hour, minute, second, micro)
+            moment = datetime(year, month, day, hour, minute, second, micro)
         except ValueError:
             continue
-        return made, f"date {quoted(text)} read as {made:%Y-%m-%d}" if k or len(match[1]) > 2 else ""
+        return moment, f"date {quoted(text)} read as {moment:%Y-%m-%d}" if k or len(match[1]) > 2 else ""
     return None, f"{quoted(text)} is not a day of the calendar; not used"
 
 
-def _kind(left: _Lines, header: Header) -> None:
-    line, text = left.take("the type of the data file")
+def _kind(rows: _Lines, header: Header) -> None:
+    line, text = rows.take("the type of the data file")
     header.kind, header.lines["kind"] = text.strip(", ").upper(), line
     if header.kind not in VALUE:
-        raise left.refuse(line, f"data file type {quoted(text)} is not one of {', '.join(VALUE)}")
+        raise rows.refuse(line, f"data file type {quoted(text)} is not one of {', '.join(VALUE)}")
 
 
-def _trailer(left: _Lines, header: Header) -> None:
+def _trailer(rows: _Lines, header: Header) -> None:
     """Time multiplier (1999), time codes and clock quality (2013): missing ones have their defaults."""
-    if left.left and "," not in left.peek().strip(", "):
-        line, text = left.take("the time multiplier")
-        found = number(text.strip(", "))
-        if found is None or not 0 < found <= GREATEST:
-            left.remarks.add(f"time multiplier {quoted(text)} is not a number above zero, 1 taken", line)
-            found = 1.0
-        header.timemult = found
+    if rows.rest and "," not in rows.peek().strip(", "):
+        line, text = rows.take("the time multiplier")
+        parsed = number(text.strip(", "))
+        if parsed is None or not 0 < parsed <= GREATEST:
+            rows.remarks.add(f"time multiplier {quoted(text)} is not a number above zero, 1 taken", line)
+            parsed = 1.0
+        header.timemult = parsed
     elif header.revision >= 1999:
-        left.remarks.add("no time multiplier given, 1 taken")
-    header.time_code, header.quality = [left.take("")[1] if left.left else "" for _ in range(2)]
-    if left.left:
-        left.remarks.add("the rest of the file is not used", left.left[0][0])
+        rows.remarks.add("no time multiplier, 1 taken")
+    header.time_code, header.quality = [rows.take("")[1] if rows.rest else "" for _ in range(2)]
+    if rows.rest:
+        rows.remarks.add("the rest of the file is not used", rows.rest[0][0])

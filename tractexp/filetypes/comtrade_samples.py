@@ -19,11 +19,11 @@ LACKING = 0.01  # of the announced samples: so many may be missing at the end, w
 LARGE = 256 * 2**20  # bytes: a larger binary file stays on the disk and is mapped
 BLOCK = 8 * 2**20  # bytes of text parsed at once
 HUGE = 1e38  # of a value: FLOAT32 holds no greater
-NONE = 0xFFFFFFFF  # a time stamp that is not given
+NONE = 0xFFFFFFFF  # a missing time stamp
 
 
 @dataclass(frozen=True)
-class Place:
+class ByteRange:
     """Part of a file: bytes `first` to `stop`, of which the first is in line `line`."""
 
     path: Path
@@ -46,7 +46,7 @@ class Samples:
     """Columns of N samples as the file holds them."""
 
     numbers: np.ndarray  # (N,)
-    stamps: np.ndarray  # (N,) in units of the time multiplier; nan or NONE where not given
+    stamps: np.ndarray  # (N,) in units of the time multiplier; nan or NONE where missing
     analogs: list[np.ndarray]  # (N,) each
     words: np.ndarray  # (N, ceil(D/16)) 16 status channels each
 
@@ -57,7 +57,7 @@ def row(kind: str, analogs: int, digitals: int) -> np.dtype:
     return np.dtype([("n", "<u4"), ("t", "<u4"), ("a", VALUE[kind], (analogs,)), ("d", "<u2", (words,))])
 
 
-def read(place: Place, header: Header, remarks: Remarks) -> Samples:
+def read(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
     """The samples that the header announces; raises `UserError` where they are not there or not of that kind."""
     text = re.fullmatch(rb"[0-9+\-.,eE \t\r\n]*", place.content(4096)) is not None and place.size > 0
     if header.kind != "ASCII" and text:
@@ -73,11 +73,11 @@ def read(place: Place, header: Header, remarks: Remarks) -> Samples:
     return _binary(place, header, remarks)
 
 
-def _binary(place: Place, header: Header, remarks: Remarks) -> Samples:
+def _binary(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
     one = row(header.kind, len(header.analogs), len(header.digitals))
-    found = place.size // one.itemsize
-    _enough(place, header, remarks, found, header.samples * one.itemsize, place.size, "bytes")
-    over = place.size - found * one.itemsize
+    count_there = place.size // one.itemsize
+    _enough(place, header, remarks, count_there, header.samples * one.itemsize, place.size, "bytes")
+    over = place.size - count_there * one.itemsize
     if over > 2:  # a line end or Ctrl-Z behind the data says nothing
         remarks.add(f"{place.path.name} holds {over} bytes more than whole samples of {one.itemsize} bytes")
     count = header.samples
@@ -90,26 +90,26 @@ def _binary(place: Place, header: Header, remarks: Remarks) -> Samples:
 
 
 def _enough(
-    place: Place, header: Header, remarks: Remarks, found: int, wanted: int, there: int, unit: str
+    place: ByteRange, header: Header, remarks: Remarks, present: int, wanted: int, there: int, unit: str
 ) -> None:  # fmt: skip
-    """Compare the samples found with those announced: a few too few shorten the record."""
-    told = header.samples
-    if found > told:
-        remarks.add(f"{place.path.name} holds {found} samples, {told} are announced; those after them are not used")
-    if found >= told:
+    """Compare the samples present with those announced: a few too few shorten the record."""
+    announced = header.samples
+    if present > announced:
+        remarks.add(f"{place.path.name} holds {present} samples, {announced} are announced; the rest is not used")
+    if present >= announced:
         return
-    if found < 1 or told - found > max(1, LACKING * told):
+    if present < 1 or announced - present > max(1, LACKING * announced):
         raise UserError(
-            f"{place.path}: cut short: {told} samples of {len(header.analogs)} analog and {len(header.digitals)} "
-            f"status channels take {wanted} {unit}, found {there}; get the whole file, or correct the last sample in "
-            f"line {header.lines['rates']} of the configuration"
+            f"{place.path}: cut short: {announced} samples of {len(header.analogs)} analog and {len(header.digitals)} "
+            f"status channels take {wanted} {unit}, and the file has {there}; get the whole file, or correct the last "
+            f"sample in line {header.lines['rates']} of the configuration"
         )
-    remarks.add(f"{place.path.name} holds {found} of the {told} samples announced; those are read")
-    kept = [(rate, stop) for rate, stop in header.rates if stop < found]
-    header.rates = [*kept, (header.rates[len(kept)][0], found)]
+    remarks.add(f"{place.path.name} holds {present} of the {announced} samples announced; those are read")
+    rates = [(rate, stop) for rate, stop in header.rates if stop < present]
+    header.rates = [*rates, (header.rates[len(rates)][0], present)]
 
 
-def _counted(place: Place, header: Header, numbers: np.ndarray) -> None:
+def _counted(place: ByteRange, header: Header, numbers: np.ndarray) -> None:
     """Sample numbers that do not count up show that the rows are not where the header puts them."""
     steps = np.diff(numbers.astype(np.int64))
     if not len(steps):
@@ -127,7 +127,7 @@ def _counted(place: Place, header: Header, numbers: np.ndarray) -> None:
         )
 
 
-def _text(place: Place, header: Header, remarks: Remarks) -> Samples:
+def _text(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
     width = 2 + len(header.analogs) + len(header.digitals)
     wanted = header.samples
     if place.size < 2 * width - 1:
@@ -136,14 +136,14 @@ def _text(place: Place, header: Header, remarks: Remarks) -> Samples:
     head = np.empty((room, 2))
     table = np.empty((room, len(header.analogs)), order="F")
     words = np.zeros((room, -(-len(header.digitals) // 16)), np.uint16)
-    found = 0
+    filled = 0
     for cells in _blocks(place, width, remarks):
-        kept = cells[: room - found]
-        there = slice(found, found + len(kept))
-        head[there], table[there] = kept[:, :2], kept[:, 2 : 2 + len(header.analogs)]
-        words[there] = pack(np.nan_to_num(kept[:, 2 + len(header.analogs) :]) != 0)
-        found += len(cells)
-    _enough(place, header, remarks, found, wanted, found, "lines")
+        block = cells[: room - filled]
+        there = slice(filled, filled + len(block))
+        head[there], table[there] = block[:, :2], block[:, 2 : 2 + len(header.analogs)]
+        words[there] = pack(np.nan_to_num(block[:, 2 + len(header.analogs) :]) != 0)
+        filled += len(cells)
+    _enough(place, header, remarks, filled, wanted, filled, "lines")
     count = header.samples
     if np.isnan(table[:count]).any():
         remarks.add(f"{int(np.isnan(table[:count]).sum())} empty cells in {place.path.name}: no value there")
@@ -151,31 +151,31 @@ def _text(place: Place, header: Header, remarks: Remarks) -> Samples:
     return Samples(head[:count, 0], head[:count, 1], [_narrow(column[:count]) for column in table.T], words[:count])
 
 
-def _blocks(place: Place, width: int, remarks: Remarks) -> Iterator[np.ndarray]:
+def _blocks(place: ByteRange, width: int, remarks: Remarks) -> Iterator[np.ndarray]:
     """Cells (M, width) of one block of lines after the other; nan where a cell is empty."""
-    line, carried, left = place.line, b"", place.size
+    line, carried, remaining = place.line, b"", place.size
     with place.path.open("rb") as file:
         file.seek(place.first)
-        while left > 0:
-            block = file.read(min(BLOCK, left))
-            left = left - len(block) if block else 0
-            cut = len(block) if left == 0 else block.rfind(b"\n") + 1
+        while remaining > 0:
+            block = file.read(min(BLOCK, remaining))
+            remaining = remaining - len(block) if block else 0
+            cut = len(block) if remaining == 0 else block.rfind(b"\n") + 1
             lines = (carried + block[:cut]).replace(b"\0", b"").splitlines()
             carried = block[cut:]
-            yield _cells(place, width, lines, line, left == 0, remarks)
+            yield _cells(place, width, lines, line, remaining == 0, remarks)
             line += len(lines)
 
 
-def _cells(place: Place, width: int, lines: list[bytes], first: int, last: bool, remarks: Remarks) -> np.ndarray:
-    kept = [(n, text) for n, line in enumerate(lines, first) if (text := line.strip(b" \t\x1a"))]
-    if len(kept) < len(lines) - last:
+def _cells(place: ByteRange, width: int, lines: list[bytes], first: int, last: bool, remarks: Remarks) -> np.ndarray:
+    numbered = [(n, text) for n, line in enumerate(lines, first) if (text := line.strip(b" \t\x1a"))]
+    if len(numbered) < len(lines) - last:
         remarks.add(f"blank lines in {place.path.name} are passed over")
     rows = []
-    for n, text in kept:
+    for n, text in numbered:
         if text.count(b",") != width - 1:
             text = text.rstrip(b", \t")
         if text.count(b",") != width - 1:
-            if last and n == kept[-1][0] and rows:
+            if last and n == numbered[-1][0] and rows:
                 remarks.add(f"{place.path.name} ends within a line, which is not used", None)
                 break
             raise UserError(
@@ -188,7 +188,7 @@ def _cells(place: Place, width: int, lines: list[bytes], first: int, last: bool,
     flat = _numbers(b",".join(rows), len(rows) * width)
     if flat is None:  # empty cells, or something that is no number
         flat = np.array(
-            [_cell(place, n, k, cell) for n, text in kept for k, cell in enumerate(text.split(b",")[:width])]
+            [_cell(place, n, k, cell) for n, text in numbered for k, cell in enumerate(text.split(b",")[:width])]
         )
         flat = flat[: len(rows) * width]
     return flat.reshape(-1, width)
@@ -198,26 +198,26 @@ def _numbers(text: bytes, count: int) -> np.ndarray | None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            made = np.fromstring(text, sep=",")
+            values = np.fromstring(text, sep=",")
         except (DeprecationWarning, ValueError):
             return None
-    return made if len(made) == count and (np.abs(made) <= HUGE).all() else None
+    return values if len(values) == count and (np.abs(values) <= HUGE).all() else None
 
 
-def _cell(place: Place, line: int, k: int, cell: bytes) -> float:
+def _cell(place: ByteRange, line: int, k: int, cell: bytes) -> float:
     text = cell.decode("latin-1").strip()
-    made = np.nan if not text or text.lower() == "nan" else number(text)
-    if made is None or abs(made) > HUGE:
+    value = np.nan if not text or text.lower() == "nan" else number(text)
+    if value is None or abs(value) > HUGE:
         what = ("sample number", "time stamp")[k] if k < 2 else f"channel {k - 1}"
         raise UserError(
             f"{place.path}: line {line}: {what} {quoted(text)} is not a number, up to 1e38; correct it, or leave "
             "the cell empty for a missing value"
         )
-    return made
+    return value
 
 
-def _steps(place: Place, numbers: np.ndarray, remarks: Remarks) -> None:
-    """A sample left out or there twice moves all after it: said, not mended."""
+def _steps(place: ByteRange, numbers: np.ndarray, remarks: Remarks) -> None:
+    """Note a missing or double sample, which moves all after it; nothing is mended."""
     steps = np.diff(numbers)
     odd = np.flatnonzero(steps != np.median(steps)) if len(steps) else []
     if len(odd) and len(odd) < 0.5 * len(steps):

@@ -22,7 +22,7 @@ def write(recording: Recording, path: Path, kind: str = "BINARY", revision: int 
     """Write a .cfg and .dat, or one .cff where `path` ends so; returns the files, each written whole or not at all.
 
     `kind` is BINARY (16 bits), BINARY32, FLOAT32 or ASCII (1999: BINARY or ASCII). Raw values that do not fit go to the
-    next kind that holds them exactly; FLOAT32, when asked for, rounds to 24 bits. Commas in names become semicolons.
+    next kind that holds them exactly; FLOAT32, where chosen, rounds to 24 bits. Commas in names become semicolons.
     """
     path = Path(path)
     check_choice("the ending of a COMTRADE file", path.suffix.lower(), (".cfg", ".cff"))
@@ -46,11 +46,11 @@ def _even_stamps(segments: Sequence[Segment], timemult: float) -> np.ndarray:
     return np.concatenate([np.round(s.t / (1e-6 * timemult)) for s in segments])
 
 
-def _kind(recording: Recording, asked: str, revision: int) -> str:
-    """The first kind, from the one asked for on, that holds all values."""
-    if asked == "FLOAT32":
-        return asked
-    kinds = KINDS[revision][KINDS[revision].index(asked) :]
+def _kind(recording: Recording, first_kind: str, revision: int) -> str:
+    """The first kind, from `first_kind` on, that holds all values."""
+    if first_kind == "FLOAT32":
+        return first_kind
+    kinds = KINDS[revision][KINDS[revision].index(first_kind) :]
     return next((kind for kind in kinds if all(_fits(channel, kind) for channel in recording.channels)), "ASCII")
 
 
@@ -102,20 +102,20 @@ def _times(recording: Recording, kind: str) -> tuple[list[tuple[float, int]], np
     """Rates with last samples, time stamps (N,) and their multiplier: the file's own where it had some."""
     extra, segments = recording.extra, recording.segments
     own, timemult = extra.get("stamps"), float(extra.get("timemult", 1.0))
-    kept = own is not None and len(own) == recording.samples
+    usable = own is not None and len(own) == recording.samples
     edges = [0, *(s.stop for s in segments)]
     if [s.first for s in segments] != edges[:-1] or edges[-1] != recording.samples or _by_stamps(extra):
-        if not kept:
+        if not usable:
             raise UserError(
                 f"{recording.source}: its segments leave samples out, and it has no time stamps: it cannot be written "
                 "as COMTRADE; write it as a table"
             )
         return [(0.0, recording.samples)], np.asarray(own, float), timemult
-    if not kept or not np.isfinite(np.asarray(own, float)).all():
+    if not usable or not np.isfinite(np.asarray(own, float)).all():
         last = segments[-1].t[-1] if len(segments) else 0.0
-        while not kept and last > 4.29e3 * timemult:  # a counter of 32 bits
+        while not usable and last > 4.29e3 * timemult:  # a counter of 32 bits
             timemult *= 10
-        own = own if kept else _even_stamps(segments, timemult)
+        own = own if usable else _even_stamps(segments, timemult)
     return [(s.rate, s.stop) for s in segments], np.asarray(own, float), timemult
 
 
@@ -133,11 +133,11 @@ def _lines(
         sides = [(1.0, 1.0, "P" if channel.ratio == 1 else "") for channel in recording.channels]
     lines = [f"{_name(recording.station)},{_name(recording.device)},{revision}", f"{count + states},{count}A,{states}D"]
     for k, (channel, side) in enumerate(zip(recording.channels, sides, strict=True), 1):
-        primary, secondary, told = _side(channel, side)
+        primary, secondary, letter = _side(channel, side)
         low, high = _limits(channel, kind)
         fields = [k, *map(_name, (channel.name, channel.phase, channel.circuit, channel.unit))]
         numbers = (channel.gain, channel.offset, round(1e6 * channel.skew, 9), low, high, primary, secondary)
-        lines.append(",".join(map(str, [*fields, *map(_number, numbers), told])))
+        lines.append(",".join(map(str, [*fields, *map(_number, numbers), letter])))
     for k, status in enumerate(recording.status, 1):
         lines.append(f"{k},{_name(status.name)},{_name(status.phase)},{_name(status.circuit)},{status.normal}")
     lines += [_number(recording.frequency), "0" if rates[0][0] == 0 else str(len(rates))]
@@ -148,8 +148,8 @@ def _lines(
     return lines
 
 
-def _side(channel: Channel, told: tuple[float, float, str]) -> tuple[float, float, str]:
-    primary, secondary, side = told
+def _side(channel: Channel, original: tuple[float, float, str]) -> tuple[float, float, str]:
+    primary, secondary, side = original
     if channel.ratio == 1 and side != "S":
         return primary or 1.0, secondary or 1.0, "P"
     return (
@@ -228,5 +228,5 @@ def _combined(recording: Recording, text: str, kind: str, data: bytes) -> bytes:
     for name, key in (("INF", "information"), ("HDR", "header")):
         said = recording.extra.get(key, "")
         parts += [f"--- file type: {name} ---\r\n".encode(), (said + "\r\n").encode()]
-    told = "DAT ASCII" if kind == "ASCII" else f"DAT {kind}: {len(data)}"
-    return b"".join([*parts, f"--- file type: {told} ---\r\n".encode(), data])
+    heading = "DAT ASCII" if kind == "ASCII" else f"DAT {kind}: {len(data)}"
+    return b"".join([*parts, f"--- file type: {heading} ---\r\n".encode(), data])

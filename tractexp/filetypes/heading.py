@@ -1,4 +1,4 @@
-"""Where the rows of a table begin, and what stands above them: titles, names of columns, units."""
+"""The heading of a table, titles, names of columns and units, and the row at which its values begin."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ ALIKE = 3  # rows of numbers of one length make sure that a table has begun
 
 @dataclass(frozen=True)
 class Heading:
-    """The columns' names and units ("" where none is told), and the number of the first row of values, from 0."""
+    """The columns' names and units ("" where there is none), and the number of the first row of values, from 0."""
 
     names: tuple[str, ...]
     units: tuple[str, ...]
@@ -22,7 +22,7 @@ class Heading:
 
 
 def heading(rows: Sequence[Sequence[Any]], source: str, header: int | None = None, line: str = "line") -> Heading:
-    """The heading of a table's first rows; `header` is the row of the names, from 0, where it was given.
+    """The heading of a table's first rows; `header` is the row of the names, from 0, None to search for it.
 
     Raises `UserError` where there are no rows of numbers, or no names above them.
     """
@@ -31,7 +31,7 @@ def heading(rows: Sequence[Sequence[Any]], source: str, header: int | None = Non
     if first is None:
         above = "" if header is None else f" below the header line {header + 1}"
         raise UserError(f"{source}: there are no rows below the header line" if _names_only(rows) else
-                        f"{source}: no rows of numbers are found{above}; a table has a line that names its columns, "
+                        f"{source}: there are no rows of numbers{above}; a table has a line that names its columns, "
                         "such as t,U,P,Q, and rows of numbers below it")  # fmt: skip
     named = header if header is not None else _named(rows, first)
     if named is None:
@@ -40,8 +40,8 @@ def heading(rows: Sequence[Sequence[Any]], source: str, header: int | None = Non
     width = max(len(rows[first]), len(rows[named]))
     parted = [split_unit(_text(cell)) for cell in rows[named]]
     below = [_text(cell).strip("[]() ") for cell in rows[named + 1]] if named + 1 < first else []
-    told = below if _are_units(below) else []
-    units = [told[k] if k < len(told) and told[k] else unit for k, (_, unit) in enumerate(parted)]
+    unit_row = below if _are_units(below) else []
+    units = [unit_row[k] if k < len(unit_row) and unit_row[k] else unit for k, (_, unit) in enumerate(parted)]
     names = _joined(rows, named, [name for name, _ in parted])
     return Heading(_padded(names, width), _padded(units, width), first, named)
 
@@ -84,7 +84,7 @@ def _named(rows: Sequence[Sequence[Any]], first: int) -> int | None:
 
 
 def _are_units(texts: Sequence[str]) -> bool:
-    """Whether a row is one of units: most of what is written in it is a known unit, and no name of a column is."""
+    """Whether a row is one of units: most of its texts are units, and none is a column's name."""
     filled = [text for text in texts if text and text != "-"]
     return len(filled) >= 1 and 2 * sum(map(is_unit, filled)) > len(filled) and not _names_too(filled)
 

@@ -1,4 +1,4 @@
-"""What was mended while a file was read: said once for all its lines."""
+"""Remarks on what was mended in a file, one for all lines concerned."""
 
 
 class Remarks:
@@ -12,7 +12,8 @@ class Remarks:
         """Note something, about one line of the file (from 1) or about all of it."""
         self._lines.setdefault(words, []).extend([] if line is None else [line])
 
-    def told(self) -> tuple[str, ...]:
+    def notes(self) -> tuple[str, ...]:
+        """One sentence for each remark, with its lines."""
         return tuple(f"{self.where}{_places(lines)}: {words}" for words, lines in self._lines.items())
 
 

@@ -7,13 +7,13 @@ from typing import Any
 
 from tractexp.errors import UserError
 from tractexp.files import located
-from tractexp.record.record import GIVEN, LOAD, SIZES, Base
+from tractexp.record.record import DECLARATION, LOAD, SIZES, Base
 from tractexp.record.window import Window
 
 
 @dataclass(frozen=True)
 class Sidecar:
-    """What `name.json` beside `name.csv` says; everything may be left out, and other keys are the user's own."""
+    """What `name.json` beside `name.csv` says; each key is optional, and other keys are the user's own."""
 
     name: str | None = None
     notes: tuple[str, ...] = ()
@@ -33,7 +33,7 @@ def beside(path: str) -> Sidecar:
     if own.suffix.lower() == ".json" or not file.is_file():
         return Sidecar()
     try:
-        told = json.loads(file.read_bytes().decode("utf-8-sig"))
+        content = json.loads(file.read_bytes().decode("utf-8-sig"))
     except json.JSONDecodeError as error:
         raise UserError(f"{file}: line {error.lineno}: not valid JSON ({error.msg})") from error
     except UnicodeDecodeError as error:
@@ -42,50 +42,50 @@ def beside(path: str) -> Sidecar:
         raise UserError(f"{file}: its brackets lie deeper within one another than can be read") from error
     except ValueError as error:  # what Python's reader of whole numbers refuses
         raise UserError(f"{file}: a whole number in it has more digits than can be read") from error
-    if not isinstance(told, dict):
+    if not isinstance(content, dict):
         return Sidecar()
-    notes = [told["note"]] if isinstance(told.get("note"), str) else []
-    notes += [note for note in _list(told, "notes") if isinstance(note, str)]
+    notes = [content["note"]] if isinstance(content.get("note"), str) else []
+    notes += [note for note in _list(content, "notes") if isinstance(note, str)]
     return Sidecar(
-        str(told["name"]) if "name" in told else None,
+        str(content["name"]) if "name" in content else None,
         tuple(notes),
-        _base(file, told.get("base")),
-        _mapping(told, "columns"),
-        {key: str(unit) for key, unit in _mapping(told, "units").items()},
-        told.get("uniform") is True,
-        _window(file, told.get("window")),
-        tuple(str(name) for name in _list(told, "more")),
-        _mapping(told, "recording") or None,
+        _base(file, content.get("base")),
+        _mapping(content, "columns"),
+        {key: str(unit) for key, unit in _mapping(content, "units").items()},
+        content.get("uniform") is True,
+        _window(file, content.get("window")),
+        tuple(str(name) for name in _list(content, "more")),
+        _mapping(content, "recording") or None,
     )
 
 
-def _mapping(told: Mapping[str, Any], key: str) -> dict[str, Any]:
-    return dict(told[key]) if isinstance(told.get(key), dict) else {}
+def _mapping(content: Mapping[str, Any], key: str) -> dict[str, Any]:
+    return dict(content[key]) if isinstance(content.get(key), dict) else {}
 
 
-def _list(told: Mapping[str, Any], key: str) -> list[Any]:
-    return list(told[key]) if isinstance(told.get(key), list) else []
+def _list(content: Mapping[str, Any], key: str) -> list[Any]:
+    return list(content[key]) if isinstance(content.get(key), list) else []
 
 
-def _window(file: Any, told: Any) -> Window | None:
-    if not isinstance(told, dict):
+def _window(file: Any, content: Any) -> Window | None:
+    if not isinstance(content, dict):
         return None
     try:
-        return Window.of(told)
+        return Window.of(content)
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise UserError(f"{file}: window is not as task=convert writes it; leave it out") from error
 
 
-def _base(file: Any, told: Any) -> Base | None:
+def _base(file: Any, content: Any) -> Base | None:
     """What one per unit is, where the sidecar says it in numbers."""
-    if not isinstance(told, dict):
+    if not isinstance(content, dict):
         return None
-    numbers = {key: told[key] for key in ("voltage", "power", "frequency") if key in told}
+    numbers = {key: content[key] for key in ("voltage", "power", "frequency") if key in content}
     for key, value in numbers.items():
         low, high = SIZES[key]
         if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
             raise UserError(
                 f"{file}: base.{key} = {json.dumps(value):.60} must be a number from {low:g} to {high:g} (kV, MVA, Hz)"
             )
-    origin = LOAD if told.get("origin") == LOAD else GIVEN  # as task=convert writes it
+    origin = LOAD if content.get("origin") == LOAD else DECLARATION  # as task=convert writes it
     return Base(**{key: float(value) for key, value in numbers.items()}, origin=origin)

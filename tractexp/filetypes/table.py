@@ -25,8 +25,8 @@ FOREIGN = {  # how files begin that are no table, whatever they are called
 
 
 @dataclass(frozen=True)
-class Form:
-    """What the user said of how a table is written; the rest is found."""
+class TableForm:
+    """The user's settings of a table's format; what is not set is detected."""
 
     decimal: str = ""  # "." or ","
     header: int | None = None  # line of the names, from 1
@@ -40,16 +40,16 @@ class Form:
 
 
 @dataclass(frozen=True, eq=False)
-class Column:
-    """The values (N,) of one column; of times, s since the first and when that was, where the day is told."""
+class TableColumn:
+    """The values (N,) of one column; of times, s since the first, with its date where the cells have one."""
 
     values: np.ndarray
     start: datetime | None = None
     clock: bool = False  # times of day or dates, not seconds
 
 
-class Table(ABC):
-    """A file with columns, opened: its names and units are known, its numbers are read on demand."""
+class TableFile(ABC):
+    """An open file with columns: names and units are there, the numbers are read on demand."""
 
     source: str
     heading: Heading
@@ -57,7 +57,7 @@ class Table(ABC):
     notes: tuple[str, ...] = ()
 
     @abstractmethod
-    def read(self, wanted: Mapping[int, str]) -> dict[int, Column]:
+    def read(self, wanted: Mapping[int, str]) -> dict[int, TableColumn]:
         """Columns by number; `wanted` says of each "time", "number" or "gaps" (a number that may be missing).
 
         Raises `UserError` naming the place and the cell.
@@ -70,7 +70,7 @@ class Table(ABC):
     def numbers(self, names: Sequence[str]) -> dict[str, np.ndarray]:
         """The columns (N,) of some names; raises `UserError` for one that is not there."""
         if missing := [name for name in names if name not in self.heading.names]:
-            raise UserError(f"{self.source}: its sidecar tells of a column '{missing[0]}', which is not there")
+            raise UserError(f"{self.source}: its sidecar names a column '{missing[0]}', which is not there")
         wanted = {name: self.heading.names.index(name) for name in names}
         cells = self.read(dict.fromkeys(wanted.values(), "gaps")) if wanted else {}
         return {name: cells[number].values for name, number in wanted.items()}
@@ -84,7 +84,7 @@ class Table(ABC):
 
 
 @dataclass(eq=False)
-class Rows(Table):
+class Rows(TableFile):
     """A table whose cells are at hand as Python's objects: a sheet, or columns of a Parquet file."""
 
     source: str
@@ -98,26 +98,26 @@ class Rows(Table):
     def place(self, row: int) -> str:
         return f"{self.word} {self.first + row}"
 
-    def read(self, wanted: Mapping[int, str]) -> dict[int, Column]:
-        made = {}
+    def read(self, wanted: Mapping[int, str]) -> dict[int, TableColumn]:
+        columns = {}
         for number, kind in wanted.items():
             try:
-                made[number] = column(self.columns(number), kind, ".")
+                columns[number] = column(self.columns(number), kind, ".")
             except BadCell as bad:
                 raise self.refuse(bad.row, number, bad.why) from None
-        return made
+        return columns
 
 
-def column(cells: Sequence[Any], kind: str, decimal: str) -> Column:
+def column(cells: Sequence[Any], kind: str, decimal: str) -> TableColumn:
     """Cells as what is wanted of them; raises `BadCell`."""
     if isinstance(cells, np.ndarray) and cells.dtype.kind == "f":
-        return Column(cells)
+        return TableColumn(cells)
     if kind == "time" and any(is_time(cell) and not is_number(cell, decimal) for cell in cells[:1]):
-        return Column(*times(cells), clock=True)
-    return Column(numbers(cells, decimal, gaps=kind == "gaps"))
+        return TableColumn(*times(cells), clock=True)
+    return TableColumn(numbers(cells, decimal, gaps=kind == "gaps"))
 
 
-def open_table(path: str, form: Form, whole: bool = True) -> Table:
+def open_table(path: str, form: TableForm, whole: bool = True) -> TableFile:
     """Open a table by what the file holds, whatever its ending; raises `UserError` for what is no table.
 
     Of a text not `whole` only the beginning is read: enough to know its columns.
@@ -131,9 +131,9 @@ def open_table(path: str, form: Form, whole: bool = True) -> Table:
         return _parquet(path, data)
     if data.startswith(SPREADSHEETS):
         return _sheet(path, data, form)
-    for mark, told in FOREIGN.items():
+    for mark, kind in FOREIGN.items():
         if data.startswith(mark):
-            raise UserError(f"{path}: this is no table but {told}")
+            raise UserError(f"{path}: this is no table but {kind}")
     return open_text(path, data, form)
 
 
@@ -144,8 +144,8 @@ def content(path: str, limit: int | None = None) -> bytes:
     if not file.is_file():
         if file.is_dir():
             raise UserError(f"{path} is a folder, not a file; give a file in it, or task=survey data.path={path}")
-        found = [item.name for item in folder.iterdir() if not item.is_dir()] if folder.is_dir() else None
-        hint = "; that folder does not exist" if found is None else nearest(file.name, found)
+        names = [item.name for item in folder.iterdir() if not item.is_dir()] if folder.is_dir() else None
+        hint = "; that folder does not exist" if names is None else nearest(file.name, names)
         raise UserError(f"{path}: there is no such file in {folder}{hint}")
     try:
         if limit is None:
@@ -157,14 +157,14 @@ def content(path: str, limit: int | None = None) -> bytes:
         raise UserError(f"{path} cannot be read: {error.strerror or 'it is no ordinary file'}") from error
 
 
-def _parquet(path: str, data: bytes) -> Table:
+def _parquet(path: str, data: bytes) -> TableFile:
     import pyarrow
     from pyarrow import parquet
 
     try:
-        made = parquet.read_table(pyarrow.BufferReader(data))
-        names = [str(name) for name in made.column_names]
-        columns = [_arrow(made.column(k)) for k in range(len(names))]
+        parsed = parquet.read_table(pyarrow.BufferReader(data))
+        names = [str(name) for name in parsed.column_names]
+        columns = [_arrow(parsed.column(k)) for k in range(len(names))]
     except (pyarrow.ArrowException, OSError, ValueError) as error:
         raise UserError(f"{path}: not a whole Parquet file; write it again, or give the table as CSV") from error
     parted = [split_unit(name) for name in names]
@@ -194,8 +194,8 @@ def _utc(chunked: Any) -> Any:
     return chunked.cast(pyarrow.timestamp("us", tz=chunked.type.tz), safe=False)
 
 
-def _sheet(path: str, data: bytes, form: Form) -> Table:
-    """One sheet of a workbook: the one asked for, else the first with rows of numbers."""
+def _sheet(path: str, data: bytes, form: TableForm) -> TableFile:
+    """One sheet of a workbook: the chosen one, else the first with rows of numbers."""
     import python_calamine
 
     try:
@@ -204,21 +204,21 @@ def _sheet(path: str, data: bytes, form: Form) -> Table:
     except (python_calamine.CalamineError, OSError, ValueError) as error:
         raise UserError(f"{path}: not a workbook that can be read; save it as .xlsx, or the sheet as CSV") from error
     if form.sheet is not None:
-        return _rows_of(path, book, _asked(path, names, form.sheet), form)
+        return _rows_of(path, book, _sheet_name(path, names, form.sheet), form)
     refused: list[UserError] = []
     for name in names:
         try:
-            made = _rows_of(path, book, name, form)
+            rows = _rows_of(path, book, name, form)
         except UserError as error:
             refused.append(error)
             continue
         others = [other for other in names if other != name]
-        made.notes = (f"sheet '{name}' read, not {', '.join(others)} (data.sheet=NAME chooses)",) if others else ()
-        return made
+        rows.notes = (f"sheet '{name}' read, not {', '.join(others)} (data.sheet=NAME chooses)",) if others else ()
+        return rows
     raise refused[0] if refused else UserError(f"{path}: the workbook has no sheets")
 
 
-def _asked(path: str, names: Sequence[str], sheet: str | int) -> str:
+def _sheet_name(path: str, names: Sequence[str], sheet: str | int) -> str:
     if str(sheet) in names:
         return str(sheet)
     if str(sheet).isdigit() and 1 <= int(sheet) <= len(names):
@@ -226,7 +226,7 @@ def _asked(path: str, names: Sequence[str], sheet: str | int) -> str:
     raise UserError(f"data.sheet={sheet}: {path} has no such sheet{among(sheet, names, 'Sheets')}")
 
 
-def _rows_of(path: str, book: Any, name: str, form: Form) -> Rows:
+def _rows_of(path: str, book: Any, name: str, form: TableForm) -> Rows:
     import python_calamine
 
     try:
@@ -234,12 +234,12 @@ def _rows_of(path: str, book: Any, name: str, form: Form) -> Rows:
     except (python_calamine.CalamineError, OSError, ValueError) as error:
         raise UserError(f"{path}: sheet '{name}' cannot be read; save it as CSV") from error
     source = f"{path}: sheet '{name}'"
-    kept = [i for i, row in enumerate(rows) if any(cell not in ("", None) for cell in row)]
-    if not kept:
+    filled = [i for i, row in enumerate(rows) if any(cell not in ("", None) for cell in row)]
+    if not filled:
         raise UserError(f"{source} is empty; it must have a line naming the columns, such as t, U, P, Q")
-    given = None if form.header is None else int(np.searchsorted(kept, form.header - 1))
-    head = heading([_trimmed(rows[i]) for i in kept[:200]], source, given)
-    body = kept[head.first :]
+    header = None if form.header is None else int(np.searchsorted(filled, form.header - 1))
+    head = heading([_trimmed(rows[i]) for i in filled[:200]], source, header)
+    body = filled[head.first :]
     last = body[-1] + 1
     return Rows(
         source, head, lambda number: [rows[i][number] for i in range(body[0], last)],

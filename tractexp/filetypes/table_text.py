@@ -1,7 +1,7 @@
-"""Tables written as text: encoding, delimiter, decimal mark and heading are found; the numbers are read by NumPy.
+"""Tables written as text: encoding, delimiter, decimal mark and heading are detected; NumPy reads the numbers.
 
 Where NumPy's reader refuses (times of day, words for gaps, quoted cells, a bad cell), the same rows are read cell by
-cell, which is slower and tells the place.
+cell, which is slower and names the place.
 """
 
 import csv
@@ -16,7 +16,7 @@ from tractexp.errors import UserError
 from tractexp.filetypes.cells import BadCell, is_number, is_time
 from tractexp.filetypes.columns import split_unit
 from tractexp.filetypes.heading import Heading, heading
-from tractexp.filetypes.table import Column, Form, Table, column
+from tractexp.filetypes.table import TableColumn, TableFile, TableForm, column
 from tractexp.filetypes.text import MARKS, decode
 
 HEAD = 1 << 18  # bytes in which the heading is looked for
@@ -28,19 +28,19 @@ HEADER_MARK = re.compile(r"^\s*(%|//|!)+")  # before the names, as in a comment 
 REMARK = re.compile(r"(^|\s)#(?!(N/?A|NV|VALUE!|NUM!|DIV/0!|REF!)\b).*", re.IGNORECASE)
 
 
-class TextTable(Table):
+class TextTable(TableFile):
     """A text file with rows of cells."""
 
-    def __init__(self, source: str, data: bytes, form: Form, notes: Sequence[str] = ()) -> None:
-        """`data` is UTF-8. Raises `UserError` where no table is found in it."""
+    def __init__(self, source: str, data: bytes, form: TableForm, notes: Sequence[str] = ()) -> None:
+        """`data` is UTF-8. Raises `UserError` where it holds no table."""
         self.source, self.data = source, data
         lines = _lines(data[:HEAD], whole=len(data) <= HEAD)
         if not lines:
             raise UserError(f"{source}: the file is empty; it must start with a line naming the columns t,U,P,Q")
         self.delimiter = _delimiter([text for _, text in lines])
         rows = [_cells(text, self.delimiter) for _, text in lines]
-        given = None if form.header is None else next((k for k, (n, _) in enumerate(lines) if n >= form.header), 0)
-        self.heading = self._heading(rows, given)
+        header = None if form.header is None else next((k for k, (n, _) in enumerate(lines) if n >= form.header), 0)
+        self.heading = self._heading(rows, header)
         self.sample = rows[self.heading.first :]
         self.decimal = form.decimal or _decimal(self.sample, self.delimiter)
         self.line = lines[self.heading.first][0]  # of the first row of values, from 1
@@ -49,21 +49,21 @@ class TextTable(Table):
         self.notes = tuple(notes)
         self._check_width()
 
-    def _heading(self, rows: Sequence[Sequence[str]], given: int | None) -> Heading:
+    def _heading(self, rows: Sequence[Sequence[str]], header: int | None) -> Heading:
         """The heading; the last remark above the values where names stand in a comment, as NumPy writes them."""
-        made = heading(rows, self.source, given)
-        if made.line is not None or made.first:
-            return made
+        result = heading(rows, self.source, header)
+        if result.line is not None or result.first:
+            return result
         remarks = re.findall(rb"^\s*[#%]+[ \t]*(.*?)\r?$", self.data[:HEAD], re.MULTILINE)
         for remark in reversed(remarks):
             cells = _cells(remark.decode(errors="replace"), self.delimiter)
             if len(cells) == len(rows[0]) and not any(map(is_number, cells)):
                 names, units = zip(*map(split_unit, cells), strict=True)
                 return Heading(names, units, 0, 0)
-        return made
+        return result
 
     def _check_width(self) -> None:
-        """Refuse rows of more cells than there are names: which belongs to which is not told."""
+        """Refuse rows of more cells than names, for cells and names cannot be matched."""
         named = len([name for name in self.heading.names if name])
         spare = [cell for cell in self.sample[0][len(self.heading.names) :] if cell]
         if self.heading.line is not None and (spare or self._split_decimals(named)):
@@ -81,13 +81,13 @@ class TextTable(Table):
         if self._lines is not None and row < len(self._lines):
             return f"line {self._lines[row]}"
         body = ((n, text) for n, text in enumerate(io.BytesIO(self.data), 1) if n >= self.line)
-        kept = (n for n, text in body if text.partition(b"#")[0].strip())
-        return f"line {next((n for k, n in enumerate(kept) if k == row), row)}"
+        rows = (n for n, text in body if text.partition(b"#")[0].strip())
+        return f"line {next((n for k, n in enumerate(rows) if k == row), row)}"
 
-    def read(self, wanted: Mapping[int, str]) -> dict[int, Column]:
+    def read(self, wanted: Mapping[int, str]) -> dict[int, TableColumn]:
         texts = [n for n, kind in wanted.items() if kind == "time" and self._is_clock(n)]
-        made = None if texts else self._at_once(list(wanted))
-        return self._cell_by_cell(wanted) if made is None else made
+        columns = None if texts else self._at_once(list(wanted))
+        return self._cell_by_cell(wanted) if columns is None else columns
 
     def _is_clock(self, number: int) -> bool:
         cell = self.sample[0][number]
@@ -100,7 +100,7 @@ class TextTable(Table):
             begin = self.data.index(b"\n", begin) + 1
         return self.data[begin:]
 
-    def _at_once(self, wanted: Sequence[int]) -> dict[int, Column] | None:
+    def _at_once(self, wanted: Sequence[int]) -> dict[int, TableColumn] | None:
         """The columns, by NumPy's reader; None where it refuses, or rows differ in length."""
         if max(wanted) >= self.width:
             return None
@@ -110,7 +110,7 @@ class TextTable(Table):
             body = body.replace(b",", b".")
         spaced = self.delimiter == " "
         try:
-            made = np.loadtxt(
+            matrix = np.loadtxt(
                 io.TextIOWrapper(io.BytesIO(body), "utf-8"),
                 delimiter=None if spaced else self.delimiter,
                 usecols=None if spaced else wanted,
@@ -118,13 +118,13 @@ class TextTable(Table):
             )
         except (ValueError, OverflowError):
             return None
-        if not len(made) or not (spaced or cells == len(made) * (self.width - 1)):
+        if not len(matrix) or not (spaced or cells == len(matrix) * (self.width - 1)):
             return None
         if spaced:
-            made = made[:, list(wanted)]
-        return {number: Column(made[:, k].copy()) for k, number in enumerate(wanted)}
+            matrix = matrix[:, list(wanted)]
+        return {number: TableColumn(matrix[:, k].copy()) for k, number in enumerate(wanted)}
 
-    def _cell_by_cell(self, wanted: Mapping[int, str]) -> dict[int, Column]:
+    def _cell_by_cell(self, wanted: Mapping[int, str]) -> dict[int, TableColumn]:
         """The columns, each cell looked at; raises `UserError` naming line, column and cell."""
         cells: dict[int, list[str]] = {number: [] for number in wanted}
         done: dict[int, list[np.ndarray]] = {number: [] for number in wanted}
@@ -133,23 +133,23 @@ class TextTable(Table):
         self._lines = None
         for line, row in self._rows(max(wanted)):
             lines.append(line)
-            for number, kept in cells.items():
-                kept.append(row[number])
+            for number, column_cells in cells.items():
+                column_cells.append(row[number])
             if len(lines) % BLOCK == 0:
                 self._convert(wanted, clock, cells, done, lines)
         self._convert(wanted, clock, cells, done, lines)
         self._lines = np.array(lines)
-        made = {n: Column(np.concatenate(parts)) for n, parts in done.items() if n not in clock}
+        columns = {n: TableColumn(np.concatenate(parts)) for n, parts in done.items() if n not in clock}
         for number in clock:
             try:
-                made[number] = column(cells[number], "time", self.decimal)
+                columns[number] = column(cells[number], "time", self.decimal)
             except BadCell as bad:
                 raise self.refuse(bad.row, number, bad.why) from None
-        return made
+        return columns
 
     def _convert(self, wanted: Mapping[int, str], clock: set[int], cells: dict[int, list[str]],
                  done: dict[int, list[np.ndarray]], lines: list[int]) -> None:  # fmt: skip
-        """Turn the cells read since the last time into numbers: of all columns alike, so the first bad line is told."""
+        """Convert the cells read since the last call, of all columns alike, so that the first bad line is refused."""
         bad: list[tuple[int, int, str]] = []
         for number in wanted:
             if number in clock:
@@ -165,7 +165,7 @@ class TextTable(Table):
             raise self.refuse(*min(bad))
 
     def _rows(self, last: int) -> Iterator[tuple[int, list[str]]]:
-        """The rows of cells with their lines; the file's last row is left out where it is cut short, with a note."""
+        """The rows of cells with their lines; a last row that is cut short is skipped, with a note."""
         short: tuple[int, int] | None = None
         for line, row in _parsed(self._body(), self.delimiter, self.source, self.line):
             if short is not None:
@@ -177,7 +177,7 @@ class TextTable(Table):
                 raise self._ragged(line, len(row))
             yield line, row
         if short is not None:
-            self.notes += (f"line {short[0]}, the last one, is cut short and left out",)
+            self.notes += (f"line {short[0]}, the last one, is cut short and not used",)
 
     def _ragged(self, line: int, cells: int) -> UserError:
         return UserError(
@@ -186,8 +186,8 @@ class TextTable(Table):
         )
 
 
-def open_text(path: str, data: bytes, form: Form) -> TextTable:
-    """A text file as a table; raises `UserError` for one that is no text, or none that can be told."""
+def open_text(path: str, data: bytes, form: TableForm) -> TextTable:
+    """A text file as a table; raises `UserError` for one that is not text, or holds no table."""
     text, codec = decode(data, path, form.encoding or _unmarked(data))
     plain = codec.startswith("utf-8")
     data = (data if plain else text.encode()).removeprefix(b"\xef\xbb\xbf")
@@ -204,7 +204,7 @@ def open_text(path: str, data: bytes, form: Form) -> TextTable:
 
 
 def _unmarked(data: bytes) -> str | None:
-    """The UTF-16 of a text without the mark that tells it: every other byte is zero."""
+    """The UTF-16 of a text without a byte order mark: every other byte is zero."""
     for first, codec in ((1, "utf-16-le"), (0, "utf-16-be")):
         half = data[first:400:2]
         if not data.startswith(tuple(MARKS)) and len(half) > 10 and half.count(0) > 0.9 * len(half):
@@ -216,8 +216,8 @@ def _lines(head: bytes, whole: bool) -> list[tuple[int, str]]:
     """The first lines that hold more than a remark, with their numbers from 1."""
     lines = head.decode(errors="replace").split("\n")
     lines = lines if whole else lines[:-1]
-    told = ((n, HEADER_MARK.sub("", REMARK.sub("", line))) for n, line in enumerate(lines, 1))
-    return [(n, text) for n, text in told if text.strip()][:SAMPLE]
+    bare = ((n, HEADER_MARK.sub("", REMARK.sub("", line))) for n, line in enumerate(lines, 1))
+    return [(n, text) for n, text in bare if text.strip()][:SAMPLE]
 
 
 def _delimiter(lines: Sequence[str]) -> str:
@@ -256,7 +256,7 @@ def _cells(line: str, delimiter: str) -> list[str]:
 
 
 def _parsed(body: bytes, delimiter: str, source: str, begin: int) -> Iterator[tuple[int, list[str]]]:
-    """The rows of values with their lines, blank lines and remarks left out."""
+    """The rows of values with their lines, without blank lines and remarks."""
     text = io.TextIOWrapper(io.BytesIO(body), "utf-8")
     lines: Any = (REMARK.sub("", line) if "#" in line else line for line in text)
     if delimiter == " ":
@@ -269,4 +269,4 @@ def _parsed(body: bytes, delimiter: str, source: str, begin: int) -> Iterator[tu
                 yield begin + reader.line_num - 1, row
     except csv.Error as error:
         line = begin + reader.line_num - 1
-        raise UserError(f"{source}: line {line}: the cells cannot be told apart; is a quote left open?") from error
+        raise UserError(f"{source}: line {line}: the cells cannot be separated; is a quote not closed?") from error

@@ -1,4 +1,4 @@
-"""What a table holds, made of its columns: a load's powers against time, or a recording of waveforms."""
+"""The content of a table, from its columns: a load's powers against time, or a recording of waveforms."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,7 @@ from tractexp.filetypes.cells import is_number
 from tractexp.filetypes.columns import PER_UNIT, factor, role
 from tractexp.filetypes.mapping import LINES, PHASES, Mapped, check_mapping, mapped
 from tractexp.filetypes.sidecar import Sidecar, beside
-from tractexp.filetypes.table import Form, Table, open_table
+from tractexp.filetypes.table import TableFile, TableForm, open_table
 from tractexp.record.phasor import sequences
 from tractexp.record.record import JITTER
 from tractexp.recording.recording import Channel, Recording, Segment
@@ -28,10 +28,10 @@ HUGE = 1e38  # of a value: no unit makes sense of a greater one
 
 @dataclass(frozen=True, kw_only=True)
 class Tabular:
-    """The settings of readers of tables; what is left out is found, and a note says what it was taken for."""
+    """The settings of readers of tables; what is not set is detected, and a note says how it was read."""
 
     columns: dict[str, Any] = field(default_factory=dict)  # {U: name of a column, or its number from 0}
-    units: dict[str, str] = field(default_factory=dict)  # {U: kV, P: MW, t: ms} where the header does not tell them
+    units: dict[str, str] = field(default_factory=dict)  # {U: kV, P: MW, t: ms} where the header does not have them
     decimal: str = ""  # decimal mark, "." or ","
     header: int | None = None  # line of the columns' names, from 1
     sheet: Any = None  # of a workbook, by name or number from 1
@@ -43,23 +43,23 @@ class Tabular:
         self._form.check()
 
     @property
-    def _form(self) -> Form:
-        return Form(self.decimal, self.header, self.sheet, self.encoding)
+    def _form(self) -> TableForm:
+        return TableForm(self.decimal, self.header, self.sheet, self.encoding)
 
-    def table_of(self, path: str, told: Sidecar) -> tuple[Table, Mapped]:
-        """A table and what its columns are; raises `UserError` for what is no table, or not to be told."""
+    def table_of(self, path: str, sidecar: Sidecar) -> tuple[TableFile, Mapped]:
+        """A table and what its columns are; raises `UserError` for what is no table, or ambiguous."""
         table = open_table(path, self._form)
-        columns, units = {**told.columns, **self.columns}, {**told.units, **self.units}
-        return table, mapped(table, columns, units, told.more)
+        columns, units = {**sidecar.columns, **self.columns}, {**sidecar.units, **self.units}
+        return table, mapped(table, columns, units, sidecar.more)
 
 
 def kind_of(path: str) -> str:
-    """What the table in a file holds: "powers", "phasors" or "waves"; "powers" where that cannot be told."""
+    """What the table in a file holds: "powers", "phasors" or "waves"; "powers" where it is ambiguous."""
     try:
-        told = beside(path)
-        if told.recording is not None:
+        sidecar = beside(path)
+        if sidecar.recording is not None:
             return "waves"
-        return mapped(open_table(path, Form(), whole=False), told.columns, told.units).kind
+        return mapped(open_table(path, TableForm(), whole=False), sidecar.columns, sidecar.units).kind
     except UserError:
         return "powers"  # whose reader says what is wrong
 
@@ -73,68 +73,69 @@ class Powers:
     notes: tuple[str, ...]
 
 
-def powers(table: Table, found: Mapped, nominal: float, reverse: bool, kilovolts: bool) -> Powers:
+def powers(table: TableFile, mapping: Mapped, nominal: float, reverse: bool, kilovolts: bool) -> Powers:
     """What a table of powers or of phasors holds.
 
     `reverse` negates P and Q; `kilovolts` says that a voltage without a unit is in kV. Raises `UserError` for cells
-    that are no numbers, and for units that cannot be told.
+    that are no numbers, and for ambiguous units.
     """
-    if found.kind == "phasors":
-        made = _of_phasors(table, found, nominal)
-    elif found.kind == "powers":
-        made = _of_powers(table, found, kilovolts)
+    if mapping.kind == "phasors":
+        result = _of_phasors(table, mapping, nominal)
+    elif mapping.kind == "powers":
+        result = _of_powers(table, mapping, kilovolts)
     else:
         raise UserError(
-            f"{table.source} holds waveforms ({', '.join(c.told for c in found.columns.values())}), not powers; read "
-            f"it as such: data=waveforms data.path={table.source}"
+            f"{table.source} holds waveforms ({', '.join(c.label for c in mapping.columns.values())}), not powers; "
+            f"read it as such: data=waveforms data.path={table.source}"
         )
     if reverse:
-        made.columns["P"], made.columns["Q"] = -made.columns["P"], -made.columns["Q"]
-    return made
+        result.columns["P"], result.columns["Q"] = -result.columns["P"], -result.columns["Q"]
+    return result
 
 
-def _of_powers(table: Table, found: Mapped, kilovolts: bool) -> Powers:
-    values, start = _read(table, found)
-    made, notes = {"t": values["t"]}, [*found.notes, *start]
+def _of_powers(table: TableFile, mapping: Mapped, kilovolts: bool) -> Powers:
+    values, start = _read(table, mapping)
+    columns, notes = {"t": values["t"]}, [*mapping.notes, *start]
     for letter in "UPQ":
         keys = [key for key in values if key[0] == letter and key != "U2"]
-        made[letter] = values[keys[0]] if len(keys) == 1 else np.add.reduce([values[key] for key in keys])
+        columns[letter] = values[keys[0]] if len(keys) == 1 else np.add.reduce([values[key] for key in keys])
         if len(keys) > 1:
-            made[letter] = made[letter] / (len(keys) if letter == "U" else 1)
+            columns[letter] = columns[letter] / (len(keys) if letter == "U" else 1)
             notes.append(f"{letter} is the {'mean' if letter == 'U' else 'sum'} of {', '.join(keys)}")
-    made |= {key: values[key] for key in ("f", "U2") if key in values}
-    first = next(key for key in found.columns if key[0] == "U" and key != "U2")
-    absolute = {"U": _absolute(found, first), "P": _absolute(found, next(k for k in found.columns if k[0] == "P"))}
+    columns |= {key: values[key] for key in ("f", "U2") if key in values}
+    first = next(key for key in mapping.columns if key[0] == "U" and key != "U2")
+    power = next(key for key in mapping.columns if key[0] == "P")
+    absolute = {"U": _absolute(mapping, first), "P": _absolute(mapping, power)}
     if absolute["U"] or (absolute["U"] is None and kilovolts):
-        notes += _to_lines(made, found.columns[first].role.line, first)
-    return Powers(made, absolute, (*table.notes, *notes))
+        notes += _to_lines(columns, mapping.columns[first].role.line, first)
+    return Powers(columns, absolute, (*table.notes, *notes))
 
 
-def _to_lines(made: dict[str, np.ndarray], line: bool | None, key: str) -> list[str]:
+def _to_lines(columns: dict[str, np.ndarray], line: bool | None, key: str) -> list[str]:
     """Make phase voltages line-to-line ones; what was taken for what."""
     if line is False:
-        for name in {"U", "U2"} & set(made):
-            made[name] = made[name] * np.sqrt(3)
+        for name in {"U", "U2"} & set(columns):
+            columns[name] = columns[name] * np.sqrt(3)
         return [f"{key} taken as a phase voltage: times sqrt(3) it is line to line"]
     return ["U taken as line-to-line voltage"] if line is None else []
 
 
-def _absolute(found: Mapped, key: str) -> bool | None:
-    unit = found.columns[key].role.unit.strip().lower()
+def _absolute(mapping: Mapped, key: str) -> bool | None:
+    unit = mapping.columns[key].role.unit.strip().lower()
     return None if not unit else unit not in PER_UNIT
 
 
-def _read(table: Table, found: Mapped) -> tuple[dict[str, np.ndarray], list[str]]:
+def _read(table: TableFile, mapping: Mapped) -> tuple[dict[str, np.ndarray], list[str]]:
     """The values (N,) by key, in s, kV, MW, Hz, and angles as they are; a note on what the time was counted from."""
-    wanted = {one.number: _wanted(key) for key, one in found.columns.items()}
+    wanted = {one.number: _wanted(key) for key, one in mapping.columns.items()}
     cells = table.read(wanted)
-    values = {key: cells[one.number].values for key, one in found.columns.items()}
+    values = {key: cells[one.number].values for key, one in mapping.columns.items()}
     values |= {
         key: values[key] * by
-        for key, one in found.columns.items()
+        for key, one in mapping.columns.items()
         if not key.endswith("_angle") and (by := factor(one.role.unit)) != 1 and not cells[one.number].clock
     }
-    time = cells[found.columns["t"].number]
+    time = cells[mapping.columns["t"].number]
     values["t"], note = _counted(values["t"], time.start)
     return values, note
 
@@ -144,7 +145,7 @@ def _wanted(key: str) -> str:
 
 
 def _counted(t: np.ndarray, start: datetime | None) -> tuple[np.ndarray, list[str]]:
-    """Times from the first row on where they tell a day or are seconds since long ago; a note on it."""
+    """Times from the first row on where they have a date or are seconds since long ago; a note on it."""
     if start is not None:
         return t, [f"t counted from {start.isoformat()}, the first row"]
     if len(t) and abs(t[0]) > EPOCH:
@@ -152,49 +153,50 @@ def _counted(t: np.ndarray, start: datetime | None) -> tuple[np.ndarray, list[st
     return t, []
 
 
-def _of_phasors(table: Table, found: Mapped, nominal: float) -> Powers:
-    values, note = _read(table, found)
-    values = _in_units(table, found, values)
+def _of_phasors(table: TableFile, mapping: Mapped, nominal: float) -> Powers:
+    values, note = _read(table, mapping)
+    values = _in_units(table, mapping, values)
     keys = {letter: [k for k in values if k[0] == letter and not k.endswith("_angle")] for letter in "UI"}
-    scale, told = _radians(table, found, values)
+    scale, angle_notes = _radians(table, mapping, values)
     V, I = (np.array([values[k] * np.exp(1j * scale * values[f"{k}_angle"]) for k in keys[letter]]) for letter in "UI")
     (V1, V2), (I1, _) = _sequences(V, keys["U"]), _sequences(I, keys["I"])
-    absolute = _absolute(found, keys["U"][0])
+    absolute = _absolute(mapping, keys["U"][0])
     absolute = absolute if absolute is not None else not NEAR_ONE[0] < np.nanmedian(np.abs(V1)) < NEAR_ONE[1]
     size, three = (np.sqrt(3), 3.0) if absolute else (1.0, 1.0)
     S = three * V1 * I1.conj()
-    made = {"t": values["t"], "U": size * np.abs(V1), "P": S.real, "Q": S.imag}
+    columns = {"t": values["t"], "U": size * np.abs(V1), "P": S.real, "Q": S.imag}
     if V2 is not None:
-        made["U2"] = size * np.abs(V2)
-    notes = [*found.notes, *note, *told, "U, P, Q from phasors" + (", positive sequence" if V2 is not None else "")]
+        columns["U2"] = size * np.abs(V2)
+    source = "U, P, Q from phasors" + (", positive sequence" if V2 is not None else "")
+    notes = [*mapping.notes, *note, *angle_notes, source]
     if "f" in values:
-        made["f"] = values["f"] if np.median(values["f"]) > nominal / 2 else nominal + values["f"]
+        columns["f"] = values["f"] if np.median(values["f"]) > nominal / 2 else nominal + values["f"]
     else:
-        made["f"] = nominal + np.gradient(np.unwrap(np.angle(V1)), values["t"]) / (2 * np.pi)
+        columns["f"] = nominal + np.gradient(np.unwrap(np.angle(V1)), values["t"]) / (2 * np.pi)
         notes.append(f"f from the angle of the voltage, which stands still at {nominal:g} Hz")
-    return Powers(made, {"U": bool(absolute), "P": bool(absolute)}, (*table.notes, *notes))
+    return Powers(columns, {"U": bool(absolute), "P": bool(absolute)}, (*table.notes, *notes))
 
 
-def _in_units(table: Table, found: Mapped, values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _in_units(table: TableFile, mapping: Mapped, values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Magnitudes without a unit as V and A where a voltage can be nothing else, as per unit where it is near one."""
-    made = dict(values)
-    for key, one in found.columns.items():
+    result = dict(values)
+    for key, one in mapping.columns.items():
         if key[0] not in "UI" or key.endswith("_angle") or one.role.unit:
             continue
         level = float(np.nanmedian(np.abs(values[next(k for k in values if k[0] == "U")])))
         if level > VOLTS:
-            made[key] = values[key] * 1e-3
+            result[key] = values[key] * 1e-3
         elif not NEAR_ONE[0] < level < NEAR_ONE[1]:
             raise UserError(
-                f"{table.source}: the unit of {one.told} is not told, and its voltage is {level:.4g}: say the units, "
+                f"{table.source}: {one.label} has no unit, and its voltage is {level:.4g}: say the units, "
                 "e.g. data.units={U: kV, I: A}"
             )
-    return made
+    return result
 
 
-def _radians(table: Table, found: Mapped, values: Mapping[str, np.ndarray]) -> tuple[float, list[str]]:
-    """From the unit of the angles to rad, and a note where it was told by the values."""
-    angles = {key: one for key, one in found.columns.items() if key.endswith("_angle")}
+def _radians(table: TableFile, mapping: Mapped, values: Mapping[str, np.ndarray]) -> tuple[float, list[str]]:
+    """The factor from the unit of the angles to rad, and a note where the values decided it."""
+    angles = {key: one for key, one in mapping.columns.items() if key.endswith("_angle")}
     unit = next((one.role.unit for one in angles.values() if one.role.unit), "")
     if unit:
         return factor(unit), []
@@ -207,8 +209,8 @@ def _radians(table: Table, found: Mapped, values: Mapping[str, np.ndarray]) -> t
         if abs(apart - 2 * np.pi / 3) < 0.3:
             return 1.0, ["angles taken as rad, for the phases are 2 pi/3 apart"]
     raise UserError(
-        f"{table.source}: the unit of {next(iter(angles.values())).told} is not told, and its values suit degrees and "
-        "rad: say data.units={angle: deg} or data.units={angle: rad}"
+        f"{table.source}: {next(iter(angles.values())).label} has no unit, and its values suit degrees and rad: "
+        "say data.units={angle: deg} or data.units={angle: rad}"
     )
 
 
@@ -222,19 +224,20 @@ def _sequences(X: np.ndarray, keys: list[str]) -> tuple[np.ndarray, np.ndarray |
     return positive, negative
 
 
-def recording(table: Table, found: Mapped, nominal: float) -> Recording:
+def recording(table: TableFile, mapping: Mapped, nominal: float) -> Recording:
     """The waveforms of a table: every column of numbers is a channel; gaps in time part segments.
 
     Raises `UserError` for a table of something else, and for times that are not even within a segment.
     """
-    if found.kind != "waves":
+    if mapping.kind != "waves":
         raise UserError(
-            f"{table.source} holds {found.kind}, not waveforms; read it as such: data=csv data.path={table.source}"
+            f"{table.source} holds {mapping.kind}, not waveforms; read it as such: data=csv data.path={table.source}"
         )
-    t = found.columns["t"]
+    t = mapping.columns["t"]
     named = [k for k, name in enumerate(table.heading.names) if name and k != t.number]
     numbers = {k: "number" for k in named if _numeric(table, k)}
-    _refuse_other_rates(table, [one.number for one in found.columns.values() if one.number not in (*numbers, t.number)])
+    others = [one.number for one in mapping.columns.values() if one.number not in (*numbers, t.number)]
+    _refuse_other_rates(table, others)
     cells = table.read({t.number: "time", **numbers})
     for k in numbers:
         wild = ~(np.abs(cells[k].values) <= HUGE)
@@ -245,28 +248,28 @@ def recording(table: Table, found: Mapped, nominal: float) -> Recording:
             )
     time, note = _counted(cells[t.number].values * (1.0 if cells[t.number].clock else factor(t.role.unit)), None)
     segments, odd = _segments(table, time)
-    named = {one.number: key for key, one in found.columns.items()}
-    channels = [_channel(table, found, k, cells[k].values, named.get(k, "")) for k in numbers]
+    named = {one.number: key for key, one in mapping.columns.items()}
+    channels = [_channel(table, mapping, k, cells[k].values, named.get(k, "")) for k in numbers]
     bare = [c.name for c in channels if c.quantity and not c.unit]
     if bare:
-        odd.append(f"unit of {', '.join(bare)} is not told: taken as V and A (data.units={{U: kV, I: kA}} says else)")
+        odd.append(f"no unit of {', '.join(bare)}: taken as V and A (data.units={{U: kV, I: kA}} says else)")
     return Recording(
         table.source, channels, segments, nominal, start=cells[t.number].start, notes=[*table.notes, *note, *odd]
     )
 
 
-def _numeric(table: Table, number: int) -> bool:
+def _numeric(table: TableFile, number: int) -> bool:
     """Whether a column begins with numbers, and not with words."""
     return all(_numbers_of(table, number))
 
 
-def _numbers_of(table: Table, number: int) -> list[bool]:
+def _numbers_of(table: TableFile, number: int) -> list[bool]:
     """Which of a column's first cells are numbers."""
     cells = [row[number] if number < len(row) else "" for row in table.sample[:20]]
     return [is_number(cell) or is_number(cell, ",") for cell in cells]
 
 
-def _refuse_other_rates(table: Table, numbers: Sequence[int]) -> None:
+def _refuse_other_rates(table: TableFile, numbers: Sequence[int]) -> None:
     """Raise `UserError` for a column of samples that has a number in some rows only."""
     for number in numbers:
         there = _numbers_of(table, number)
@@ -278,18 +281,18 @@ def _refuse_other_rates(table: Table, numbers: Sequence[int]) -> None:
             )
 
 
-def _channel(table: Table, found: Mapped, number: int, values: np.ndarray, key: str) -> Channel:
-    """A column as a channel; what it measures is told by its key, else by its name."""
+def _channel(table: TableFile, mapping: Mapped, number: int, values: np.ndarray, key: str) -> Channel:
+    """A column as a channel; its key says what it measures, else its name."""
     name, unit = table.label(number), table.heading.units[number]
-    told = role(name, unit)
-    key = key or (told.key if told else "")
-    unit = found.columns[key].role.unit if key in found.columns else unit
+    meaning = role(name, unit)
+    key = key or (meaning.key if meaning else "")
+    unit = mapping.columns[key].role.unit if key in mapping.columns else unit
     quantity = {"U": "voltage", "I": "current"}.get(key[:1], "") if not key.endswith("_angle") else "angle"
     phase = key[1:].upper() if key[1:] in (*PHASES, *LINES) else ""
     return Channel(name, values, unit, quantity, phase)
 
 
-def _segments(table: Table, t: np.ndarray) -> tuple[list[Segment], list[str]]:
+def _segments(table: TableFile, t: np.ndarray) -> tuple[list[Segment], list[str]]:
     """Runs of even sampling; a note on jitter and on gaps."""
     if not np.isfinite(t).all():
         i = int(np.argmin(np.isfinite(t)))
@@ -304,7 +307,7 @@ def _segments(table: Table, t: np.ndarray) -> tuple[list[Segment], list[str]]:
         )  # fmt: skip
     usual = float(np.median(steps))
     breaks = [0, *(np.flatnonzero(steps > GAP * usual) + 1).tolist(), len(t)]
-    made, widest = [], 0.0
+    segments, widest = [], 0.0
     for first, stop in itertools.pairwise(breaks):
         if stop - first < 3:
             continue
@@ -318,10 +321,10 @@ def _segments(table: Table, t: np.ndarray) -> tuple[list[Segment], list[str]]:
                 "off the uniform grid; waveforms must be sampled evenly"
             )
         widest = max(widest, float(off.max()))
-        made.append(Segment(first, stop, 1 / step, float(t[first] - t[0])))
+        segments.append(Segment(first, stop, 1 / step, float(t[first] - t[0])))
     notes = [f"times up to {100 * widest:.2g} % of a step off a uniform grid: taken as even"] if widest > JITTER else []
-    if len(made) > 1:
+    if len(segments) > 1:
         notes.append(
-            f"{len(made) - 1} gaps in time, the first at {table.place(breaks[1])}: each part is read by itself"
+            f"{len(segments) - 1} gaps in time, the first at {table.place(breaks[1])}: each part is read by itself"
         )
-    return made, notes
+    return segments, notes

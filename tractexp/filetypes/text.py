@@ -1,4 +1,4 @@
-"""Text as instruments and office programs write it: the encoding is found, not asked for."""
+"""Text as instruments and office programs write it: its encoding is detected."""
 
 import re
 
@@ -8,24 +8,26 @@ ENCODINGS = ("utf-8", "gbk", "cp1251", "latin-1")
 MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 
 
-def decode(content: bytes, where: str, given: str | None = None) -> tuple[str, str]:
-    """The text and its encoding: `given`, or else the one of `ENCODINGS` whose letters make words.
+def decode(content: bytes, where: str, encoding: str | None = None) -> tuple[str, str]:
+    """The text and its encoding: `encoding`, or else the one of `ENCODINGS` whose letters make words.
 
-    Raises `UserError` where `given` is no encoding or does not fit.
+    Raises `UserError` where `encoding` is none or does not fit.
     """
-    found = given or next((name for mark, name in MARKS.items() if content.startswith(mark)), None) or _guess(content)
+    marked = next((name for mark, name in MARKS.items() if content.startswith(mark)), None)
+    codec = encoding or marked or _guess(content)
     try:
-        return content.decode(found), found
+        return content.decode(codec), codec
     except LookupError as error:
-        raise UserError(f"data.encoding={given}: there is no such text encoding; try {', '.join(ENCODINGS)}") from error
+        names = ", ".join(ENCODINGS)
+        raise UserError(f"data.encoding={encoding}: there is no such text encoding; try {names}") from error
     except (UnicodeError, ValueError) as error:
-        if given:
-            raise UserError(f"{where}: not {given} text; leave data.encoding out to have it found") from error
+        if encoding:
+            raise UserError(f"{where}: not {encoding} text; leave data.encoding out to have it detected") from error
         return content.decode("latin-1"), "latin-1"
 
 
 def _guess(content: bytes) -> str:
-    """One-byte letters and the pairs of GBK overlap: what tells them apart is which letters are common."""
+    """One-byte letters and the pairs of GBK overlap: they differ in which letters are common."""
     try:
         content.decode("utf-8")
         return "utf-8"

@@ -19,7 +19,7 @@ import numpy as np
 
 from tractexp import files
 from tractexp.errors import UserError
-from tractexp.filetypes.table import Form, open_table
+from tractexp.filetypes.table import TableForm, open_table
 from tractexp.record.record import Record
 from tractexp.recording.recording import Channel, Recording, Segment, Status
 
@@ -28,7 +28,7 @@ UNITS = {"t": "s", "U": "pu", "P": "pu", "Q": "pu", "f": "Hz"}  # as data.units;
 
 def write_record(record: Record, path: Path) -> list[Path]:
     """Write a record as a table, by the ending of `path`, and its sidecar; raises `UserError` where it cannot."""
-    told = {
+    content = {
         "name": record.name,
         "source": record.source,
         "base": asdict(record.base),
@@ -38,7 +38,7 @@ def write_record(record: Record, path: Path) -> list[Path]:
         "window": record.window and record.window.to_dict(),
         "more": list(record.more),
     }
-    return [_written({**record.channels, **record.more}, path), files.write_json(path.with_suffix(".json"), told)]
+    return [_written({**record.channels, **record.more}, path), files.write_json(path.with_suffix(".json"), content)]
 
 
 def write_recording(recording: Recording, path: Path) -> list[Path]:
@@ -49,50 +49,50 @@ def write_recording(recording: Recording, path: Path) -> list[Path]:
     named = unique(["t", *(c.name.strip() for c in (*recording.channels, *recording.status))])
     values = [t, *map(_recorded, recording.channels), *(s.values() for s in recording.status)]
     table = _written(dict(zip(named, values, strict=True)), path)
-    told = {"source": recording.source, "recording": _told(recording)}
-    return [table, files.write_json(path.with_suffix(".json"), told)]
+    content = {"source": recording.source, "recording": _content(recording)}
+    return [table, files.write_json(path.with_suffix(".json"), content)]
 
 
 def unique(names: Sequence[str]) -> list[str]:
-    """The names, those without one or with one that is taken made different."""
-    made: list[str] = []
+    """The names, with a number behind those that would occur twice; "unnamed" for none."""
+    result: list[str] = []
     for name in names:
         stem, k = name or "unnamed", 2
         name = stem
-        while name in made:
+        while name in result:
             name, k = f"{stem} ({k})", k + 1
-        made.append(name)
-    return made
+        result.append(name)
+    return result
 
 
-def restored(path: str, told: Mapping[str, Any]) -> Recording:
+def restored(path: str, content: Mapping[str, Any]) -> Recording:
     """The recording of a table that `write_recording` wrote, from its sidecar; raises `UserError` where they differ."""
-    table = open_table(path, Form())
+    table = open_table(path, TableForm())
     try:
-        channels, status = told["channels"], told["status"]
+        channels, status = content["channels"], content["status"]
         if len(table.heading.names) != 1 + len(channels) + len(status):
             raise UserError(
-                f"{path}: has {len(table.heading.names)} columns where its sidecar tells of t, {len(channels)} "
+                f"{path}: has {len(table.heading.names)} columns where its sidecar names t, {len(channels)} "
                 f"channels and {len(status)} status channels; convert the recording again, or remove the sidecar"
             )
         cells = table.read({k: "gaps" for k in range(1, len(table.heading.names))})
-        segments = [Segment(**one) for one in told["segments"]]
+        segments = [Segment(**one) for one in content["segments"]]
         _check_segments(path, segments, len(cells[1].values))
         return Recording(
             path,
             [_channel(one, cells[k].values) for k, one in enumerate(channels, 1)],
             segments,
-            float(told["frequency"]),
-            told["station"],
-            told["device"],
-            datetime.fromisoformat(told["start"]) if told["start"] else None,
-            told["trigger"],
+            float(content["frequency"]),
+            content["station"],
+            content["device"],
+            datetime.fromisoformat(content["start"]) if content["start"] else None,
+            content["trigger"],
             [
                 Status(**one, raw=(cells[k].values == 1).astype(np.int8))
                 for k, one in enumerate(status, 1 + len(channels))
             ],
-            list(told["notes"]),
-            {key: _extra(value) for key, value in told["extra"].items()},
+            list(content["notes"]),
+            {key: _extra(value) for key, value in content["extra"].items()},
         )  # fmt: skip
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise UserError(f"{path}: its sidecar is not as task=convert writes it; remove it, or convert again") from error
@@ -109,11 +109,11 @@ def _check_segments(path: str, segments: Sequence[Segment], rows: int) -> None:
             )
         edges.append(one.stop)
     if len(edges) == 1:
-        raise UserError(f"{path}: its sidecar tells of no segment of samples; convert the recording again")
+        raise UserError(f"{path}: its sidecar names no segment of samples; convert the recording again")
 
 
 def _extra(value: Any) -> Any:
-    """An array again, or what else it was."""
+    """A stored array as an array, any other value unchanged."""
     marked = isinstance(value, dict) and set(value) == {"array", "type"}
     return np.array(value["array"], dtype=value["type"]) if marked else value
 
@@ -121,10 +121,12 @@ def _extra(value: Any) -> Any:
 def recording_of(record: Record) -> Recording:
     """A record as a recording of magnitudes in kV (line to line), MW, Mvar and Hz, for formats that know no other."""
     base = record.base
-    told = {"U": ("kV", "voltage"), "P": ("MW", "power"), "Q": ("Mvar", "reactive_power"), "f": ("Hz", "frequency"),
-            "U2": ("kV", "voltage")}  # fmt: skip
+    quantities = {
+        "U": ("kV", "voltage"), "P": ("MW", "power"), "Q": ("Mvar", "reactive_power"), "f": ("Hz", "frequency"),
+        "U2": ("kV", "voltage"),
+    }  # fmt: skip
     channels = [
-        Channel(name, values, *told[name], form="value")
+        Channel(name, values, *quantities[name], form="value")
         for name, values in base.absolute(record.channels).items()
         if name != "t"
     ]
@@ -139,8 +141,8 @@ def _recorded(channel: Channel) -> np.ndarray:
     return channel.recorded()
 
 
-def _told(recording: Recording) -> dict[str, Any]:
-    """What a recording is, apart from its samples."""
+def _content(recording: Recording) -> dict[str, Any]:
+    """A recording without its samples, for the sidecar."""
     fields = ("name", "unit", "quantity", "phase", "circuit", "gain", "offset", "ratio", "skew", "missing", "form")
     return {
         "channels": [
@@ -165,17 +167,17 @@ def _told(recording: Recording) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _channel(told: Mapping[str, Any], values: np.ndarray) -> Channel:
+def _channel(content: Mapping[str, Any], values: np.ndarray) -> Channel:
     """A channel with the raw numbers that its converter gave."""
-    known = dict(told)
-    kind, limits = np.dtype(known.pop("raw")), known.pop("limits")
-    raw = values if known["gain"] == 1 and known["offset"] == 0 else (values - known["offset"]) / known["gain"]
+    fields = dict(content)
+    kind, limits = np.dtype(fields.pop("raw")), fields.pop("limits")
+    raw = values if fields["gain"] == 1 and fields["offset"] == 0 else (values - fields["offset"]) / fields["gain"]
     if kind.kind in "iu":
-        missing = known["missing"]
+        missing = fields["missing"]
         raw = np.where(np.isnan(raw), 0 if missing is None else missing, np.rint(raw))
         if not (np.iinfo(kind).min <= raw.min() and raw.max() <= np.iinfo(kind).max):
-            raise ValueError(f"{told['name']} leaves the range of its converter")
-    return Channel(raw=raw.astype(kind), limits=limits and (limits[0], limits[1]), **known)
+            raise ValueError(f"{content['name']} leaves the range of its converter")
+    return Channel(raw=raw.astype(kind), limits=limits and (limits[0], limits[1]), **fields)
 
 
 def _written(columns: Mapping[str, np.ndarray], path: Path) -> Path:

@@ -1,4 +1,4 @@
-"""When samples were taken: segments of one rate, from declared rates or time stamps, made even where they are not."""
+"""When samples were taken: segments of one rate, from declared rates or time stamps, evened where they are uneven."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ class Stretch:
 def from_rates(rates: Sequence[tuple[float, int]], t: np.ndarray | None = None) -> list[Stretch]:
     """From (Hz, last sample counted from 1); neighbours of nearly one rate become one segment.
 
-    `t` (N,) [s], where the samples have good time stamps, tells when a segment begins and whether two are joined.
+    `t` (N,) [s], are good time stamps, which say when a segment begins and whether two are joined.
     """
     groups: list[list[tuple[float, int, int]]] = []
     first = 0
@@ -39,14 +39,14 @@ def from_rates(rates: Sequence[tuple[float, int]], t: np.ndarray | None = None) 
         else:
             groups.append([(rate, first, stop)])
         first = stop
-    made: list[Stretch] = []
+    stretches: list[Stretch] = []
     start = 0.0
     for group in groups:
-        start += 1 / group[0][0] if made else 0.0
-        made.append(_declared(group, start if t is None else float(t[group[0][1]])))
-        last = made[-1].segment
+        start += 1 / group[0][0] if stretches else 0.0
+        stretches.append(_declared(group, start if t is None else float(t[group[0][1]])))
+        last = stretches[-1].segment
         start = last.start + (last.stop - last.first - 1) / last.rate
-    return made
+    return stretches
 
 
 def _declared(group: list[tuple[float, int, int]], start: float) -> Stretch:
@@ -60,7 +60,7 @@ def _declared(group: list[tuple[float, int, int]], start: float) -> Stretch:
 
 
 def from_stamps(t: np.ndarray, unit: float, where: str) -> list[Stretch]:
-    """From times (N,) [s] of every sample, known to `unit` [s]; raises `UserError` where they do not increase."""
+    """From times (N,) [s] of every sample, exact to `unit` [s]; raises `UserError` where they do not increase."""
     steps = np.diff(t)
     if not len(steps):
         raise UserError(f"{where}: one sample alone has no sampling rate; give a longer record")
@@ -68,14 +68,14 @@ def from_stamps(t: np.ndarray, unit: float, where: str) -> list[Stretch]:
         i = int(np.argmax(~(steps > 0)))
         raise UserError(
             f"{where}: sample {i + 2}: its time stamp {t[i + 1]:g} s is not after {t[i]:g} s of the sample before, and "
-            "the sampling rate is given as 0, so that the time stamps must be valid; write the rate into the .cfg"
+            "the sampling rate is declared as 0, so that the time stamps must be valid; write the rate into the .cfg"
         )
-    made = [
+    stretches = [
         _stamped(t, unit, first, stop) for first, stop in _runs(steps, unit, where) if stop - first > 1 or len(t) == 1
     ]
-    if not made:
+    if not stretches:
         raise UserError(f"{where}: time stamps without order: no two steps between samples are alike")
-    return made
+    return stretches
 
 
 def _runs(steps: np.ndarray, unit: float, where: str) -> list[tuple[int, int]]:
@@ -89,14 +89,14 @@ def _runs(steps: np.ndarray, unit: float, where: str) -> list[tuple[int, int]]:
             f"{steps[i - 1]:g} s, and {len(breaks) - 1} more are like it"
         )
     edges = [0, *breaks.tolist(), len(steps)]
-    made: list[tuple[int, int]] = []
+    runs: list[tuple[int, int]] = []
     taken = 0
     for k, (a, b) in enumerate(pairwise(edges)):
         if b - a == 1 and len(edges) > 2 and _gap(steps, edges, k):
             continue  # between two segments
-        made.append((max(a, taken), b + 1))
+        runs.append((max(a, taken), b + 1))
         taken = b + 1
-    return made
+    return runs
 
 
 def _gap(steps: np.ndarray, edges: list[int], k: int) -> bool:
@@ -110,7 +110,7 @@ def _stamped(t: np.ndarray, unit: float, first: int, stop: int) -> Stretch:
     own = t[first:stop]
     length = float(own[-1] - own[0])
     rate = (len(own) - 1) / length
-    if abs(round(rate) - rate) <= rate * unit / length:  # a whole number within what the stamps can tell
+    if abs(round(rate) - rate) <= rate * unit / length:  # a whole number, to the resolution of the stamps
         rate = float(round(rate))
     worst = _evenness(own, rate)
     uneven = worst > EVEN + 1.01 * unit * rate
@@ -126,12 +126,12 @@ def laid_out(stretches: Sequence[Stretch]) -> list[Segment]:
     """The segments after `evened`: numbered from 0 without what lies between them where anything is interpolated."""
     if all(s.t is None for s in stretches):
         return [s.segment for s in stretches]
-    made, first = [], 0
+    segments, first = [], 0
     for s in stretches:
         count = s.stop - s.first
-        made.append(Segment(first, first + count, s.segment.rate, s.segment.start))
+        segments.append(Segment(first, first + count, s.segment.rate, s.segment.start))
         first += count
-    return made
+    return segments
 
 
 def evened(raw: np.ndarray, stretches: Sequence[Stretch], missing: float | None) -> np.ndarray:
@@ -171,6 +171,6 @@ def _interpolated(raw: np.ndarray, s: Stretch, missing: float | None) -> np.ndar
         return values
     if lacking.any():
         values[lacking] = np.interp(s.t[lacking], s.t[~lacking], values[~lacking])
-    made = CubicSpline(s.t, values)(_even(s)) if len(values) > 3 else np.interp(_even(s), s.t, values)
-    made[lacking[_closest(s.t, _even(s))]] = np.nan
-    return made
+    even = CubicSpline(s.t, values)(_even(s)) if len(values) > 3 else np.interp(_even(s), s.t, values)
+    even[lacking[_closest(s.t, _even(s))]] = np.nan
+    return even

@@ -16,7 +16,7 @@ from tractexp.identification.problem import Problem
 from tractexp.identification.uncertainty import LEVEL
 from tractexp.noise import Autoregression, Noise
 from tractexp.record import Base, Event, Record, WaveEvent
-from tractexp.record.unrecorded import unrecorded
+from tractexp.record.synthetic import synthetic_event
 from tractexp.record.wave_event import COARSEST
 
 BEFORE, AFTER = 0.3, 1.5  # s recorded before and after a planned dip
@@ -91,7 +91,7 @@ class Shape:
         if self.waves:
             v = U * np.exp(1j * np.radians(self.jump) * (fall - back))
             v = v + self.unbalance * self.depth * (fall - back) * np.exp(-4j * np.pi * self.frequency * t)
-            return unrecorded(name, t, v, (1.0, self.P0, self.Q0), self.frequency, start, end)
+            return synthetic_event(name, t, v, (1.0, self.P0, self.Q0), self.frequency, start, end)
         record = Record(
             name, t, U,
             np.full(len(t), self.P0), np.full(len(t), self.Q0), base=Base(frequency=self.frequency),

@@ -8,7 +8,7 @@ from tractexp.errors import UserError
 from tractexp.identification.problem import excited
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import Model
-from tractexp.record.unrecorded import unrecorded
+from tractexp.record.synthetic import synthetic_event
 
 FINEST = 64  # samples per cycle at least, of a voltage that is played in waveforms
 
@@ -47,7 +47,7 @@ def _in_waveforms(
         speed = np.interp(fine, t, omega_s) - omega_s0
         v *= np.exp(1j * np.cumsum(np.concatenate([[0.0], (speed[1:] + speed[:-1]) / 2 * np.diff(fine)])))
     known = before["U0"], before["P0"], before["Q0"]
-    event = unrecorded("played", fine, v, known, nominal + omega_s0 / (2 * np.pi), 1, len(fine) - 1)
+    event = synthetic_event("played", fine, v, known, nominal + omega_s0 / (2 * np.pi), 1, len(fine) - 1)
     i = _simulated(model, values, Drive.of([excited(event, model)]))
     power = (v * np.conj((i[0] + 1j * i[1]) / event.turn))[::every]
     return power.real, power.imag

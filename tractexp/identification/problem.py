@@ -17,7 +17,7 @@ from tractexp.model.model import CLASSICAL, MOST_SUBSTEPS, Model
 from tractexp.model.parts import COMPARED, Effect
 from tractexp.parameter import Box, Parameter
 from tractexp.record import Event, WaveEvent, in_waves
-from tractexp.record.through import sharpened
+from tractexp.record.deconvolution import sharpened
 
 WEIGHTS = {3: (0.5, 0.5, 1.0), 1: (1.0, 0.0, 0.0)}  # by phases, so that the objective is the mean over them
 PROBES = 64  # candidates across the box on which the Runge-Kutta step is judged

@@ -115,7 +115,7 @@ def current_error(event: WaveEvent, currents: np.ndarray) -> float:
     before = slice(event.first, event.start)
     rms = lambda i, part: float(np.sqrt(np.mean(event.of_phases(i)[:, part] ** 2)))  # noqa: E731
     recorded = np.nan_to_num(event.currents)
-    known = np.array(event.known)[:, None]
+    known = np.array(event.compared)[:, None]
     return rms((currents - recorded) * known, window) / rms(recorded, before)
 
 
@@ -302,7 +302,7 @@ def conclude(
         optimizer=optimizer,
         search=searched(problem, found),
         notes=[note for f in fits for note in f.event.record.notes],
-        records=[{"name": f.event.record.name, "role": f.role} | provenance.told(f.event.record) for f in fits],
+        records=[{"name": f.event.record.name, "role": f.role} | provenance.identity(f.event.record) for f in fits],
         own_base=asdict(own),
         parameters_on_given_base={} if own.ratio == 1 else own.values(by_event(*found_values.values()), exponents),
         tractexp_version=provenance.version(),

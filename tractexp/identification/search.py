@@ -199,7 +199,7 @@ def search(
         status = str(stop)
     except KeyboardInterrupt as stop:
         ended = _found(counter, rows, f"was stopped after {counter.simulations} simulations")
-        raise Stopped.of(stop, found=ended) from None
+        raise Stopped.of(stop, state=ended) from None
     if not rows or rows[-1][0] < counter.simulations:
         note()
     return _found(counter, rows, status)

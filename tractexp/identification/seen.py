@@ -18,7 +18,7 @@ def seen_by_estimator(event: WaveEvent, currents: np.ndarray) -> tuple[Event, np
     was, own = event.phasors, event.phasors.record
     record = Record(
         own.name, measured.t, measured.U, measured.S.real, measured.S.imag, base=own.base, source=own.source,
-        notes=own.notes, given_base=own.given_base, identity=own.identity, digest=own.digest,
+        notes=own.notes, original_base=own.original_base, identity=own.identity, digest=own.digest,
     )  # fmt: skip
     start, end = np.searchsorted(measured.t, [was.t_start, was.t_end]).tolist()
     last = len(measured.t) - 1

@@ -1,4 +1,4 @@
-"""A load's power as phasors show it that are averages over a window; see `tractexp.record.through`."""
+"""A load's power as phasors show it that are averages over a window; see `tractexp.record.deconvolution`."""
 
 import numpy as np
 

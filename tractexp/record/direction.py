@@ -1,14 +1,14 @@
-"""Which way power flows where P is negative: a load whose current is counted the wrong way, or a source."""
+"""The cause of a negative P: a load whose current is counted the wrong way, or a source."""
 
 import numpy as np
 
-DISTURBED = 0.03  # of the voltage: what a load must answer
-CALM = 0.01  # of the voltage: where P is that before
+DISTURBED = 0.03  # of the voltage: a larger deviation is a disturbance, which a load answers
+CALM = 0.01  # of the voltage: within this deviation P counts as before the disturbance
 FEWEST = 3  # samples in either state
 FALLS = 0.5  # exponent of |P| over U from which on power falls with the voltage as a load's does
 STEEPEST = 4.0  # exponent that no load exceeds: what falls faster was switched off
 IMPEDANCE = 1.3  # exponent above that of a constant current, which a converter may keep as well
-REACTIVE = 0.1  # of |P|: less Q than this tells nothing
+REACTIVE = 0.1  # of |P|: a smaller Q says nothing about the direction
 NOISY = 3.0  # times the noise that P must exceed to have a sign
 TURNS = 0.1  # of |P|: positive power of this size, at normal voltage, is a train that motors and brakes
 REMEDY = "set data.reverse_current=true"
@@ -25,18 +25,18 @@ def at_level(x: np.ndarray, share: float) -> np.ndarray:
 def direction(U: np.ndarray, P: np.ndarray, Q: np.ndarray, polarity: int = 0, calm: np.ndarray | None = None) -> str:
     """Why P is negative before a disturbance, one clause; "" where it is not.
 
-    `calm` (N,) is the state to compare with, by default the one that lasts longest. `polarity` says what the negative
-    sequence has shown, where it is known: 1 the current is counted as a load's, -1 the other way. A passive load draws
+    `calm` (N,) marks the state to compare with, by default the one that lasts longest. `polarity` is the direction that
+    the negative sequence shows: 1 as a load's, -1 reversed, 0 where it shows none. A passive load draws
     negative-sequence current whatever its power does. Otherwise the answer of P and Q to the voltage decides: a load's
     |P| falls with U and returns, and so does its inductive Q; a converter keeps P or the current, or reverses.
     """
-    known = np.isfinite(U) & np.isfinite(P) & np.isfinite(Q)
-    if not known.any() or (calm is not None and not (calm & known).any()):
+    valid = np.isfinite(U) & np.isfinite(P) & np.isfinite(Q)
+    if not valid.any() or (calm is not None and not (calm & valid).any()):
         return ""
-    U, P, Q = U[known], P[known], Q[known]
+    U, P, Q = U[valid], P[valid], Q[valid]
     rough = 3 * float(np.median(np.abs(np.diff(U)))) / max(float(np.median(U)), 1e-12) if len(U) > 1 else 0.0
     near = max(CALM, rough)
-    calm = at_level(U, near) if calm is None else calm[known]
+    calm = at_level(U, near) if calm is None else calm[valid]
     level, P0, Q0 = (float(np.median(x[calm])) for x in (U, P, Q))
     normal = np.abs(U - level) <= near * level
     spread = float(np.median(np.abs(np.diff(P)))) if len(P) > 1 else 0.0
@@ -55,7 +55,7 @@ def direction(U: np.ndarray, P: np.ndarray, Q: np.ndarray, polarity: int = 0, ca
         return "the negative-sequence current is that of a load, so its direction is right and this is regeneration"
     if fell and a < FALLS:
         return f"{answer}, as a converter's or a generator's: regeneration (a braking train), no reversed current"
-    return f"{answer}, which tells no reversed current ({REMEDY}) from regeneration"
+    return f"{answer}, which cannot separate a reversed current ({REMEDY}) from regeneration"
 
 
 def _load_like(a: float, P0: float, Q0: float) -> bool:

@@ -63,7 +63,7 @@ class Event:
 
     @property
     def calm(self) -> np.ndarray:
-        """What P and Q do before the dip beside their means, (2, n) [pu]; nan in a gap."""
+        """Deviations of P and Q from their means before the dip, (2, n) [pu]; nan in a gap."""
         quiet = np.stack([self.record.P[self.steady], self.record.Q[self.steady]])
         return np.stack([row - row[np.isfinite(row)].mean() for row in quiet])
 
@@ -87,11 +87,11 @@ class Event:
 
 
 def noise(t: np.ndarray, values: np.ndarray) -> float:
-    """Standard deviation of `values` (N,) about their least-squares line, gaps (nan) left out."""
-    known = np.isfinite(values)
-    if np.count_nonzero(known) < 3:
+    """Standard deviation of `values` (N,) about their least-squares line, without gaps (nan)."""
+    valid = np.isfinite(values)
+    if np.count_nonzero(valid) < 3:
         return float("nan")
-    x, y = t[known] - t[known].mean(), values[known] - values[known].mean()
+    x, y = t[valid] - t[valid].mean(), values[valid] - values[valid].mean()
     rest = y - x * (x @ y) / (x @ x)
     return float(np.sqrt(rest @ rest / (len(y) - 2)))
 
@@ -191,14 +191,14 @@ def detect(record: Record) -> Event:
             f"{record.where}: the dip starts at sample {start + 1} (t = {record.t[start]:g} s): the steady state "
             f"before it needs at least {FEWEST_BEFORE} samples; give a record that starts earlier"
         )
-    if told := _no_such_dip(record, start, end):
-        raise UserError(f"{record.where}: {told}")
+    if reason := _no_such_dip(record, start, end):
+        raise UserError(f"{record.where}: {reason}")
     before = _steady(record, start, swells)
     t, U, P, Q = (values[before] for values in (record.t, record.U, record.P, record.Q))
     if np.count_nonzero(np.isfinite(P) & np.isfinite(Q)) < FEWEST_BEFORE:
         raise UserError(
             f"{record.where}: P and Q have fewer than {FEWEST_BEFORE} values in the {before.stop - before.start} "
-            f"samples before the dip at t = {record.t[start]:g} s; the steady state cannot be told"
+            f"samples before the dip at t = {record.t[start]:g} s; the steady state cannot be computed"
         )
     U0 = float(U.mean())
     return Event(
@@ -241,7 +241,7 @@ def _steady(record: Record, start: int, swells: list[tuple[int, int]]) -> slice:
 
 
 def _no_such_dip(record: Record, start: int, end: int) -> str:
-    """What a fall of the voltage is where it is no dip that can be fitted; "" where it is one."""
+    """Why a fall of the voltage is not a dip that can be fitted, a clause; "" where it is one."""
     t, U = record.t, record.U
     before = float(U[:start].mean())
     inside = U[start:end]
@@ -275,7 +275,7 @@ def _no_such_dip(record: Record, start: int, end: int) -> str:
 
 
 def _unfinished(record: Record, start: int, before: float) -> str:
-    """What is said of a fall that lasts to the record's end."""
+    """The reason against a fall that lasts to the record's end."""
     t, U = record.t, record.U
     fall = 1 - float(np.median(U[start:])) / before
     level = np.abs(U[start:] / float(np.median(U[start:])) - 1) <= _margin(U)
@@ -283,7 +283,7 @@ def _unfinished(record: Record, start: int, before: float) -> str:
     if fall <= STEP_AT_MOST and lasts >= STEP_LASTS and level.mean() > 0.8:
         return (
             f"the voltage falls by {100 * fall:.3g} % at t = {t[start]:g} s and stays there for the {lasts:.2g} s that "
-            "are left: a step (a tap changer, or something switched), no dip; choose another event"
+            "remain: a step (a tap changer, or something switched), no dip; choose another event"
         )
     return (
         f"the record is shorter than the dip: it ends at t = {t[-1]:g} s with U = {U[-1]:.3g} where it was "
@@ -296,7 +296,7 @@ def _no_dip(record: Record) -> str:
     reference, margin = float(np.median(U[:FEWEST_BEFORE])), _margin(U)
     low, high = int(np.argmin(U)), int(np.argmax(U))
     fall, rise = 1 - U[low] / reference, U[high] / reference - 1
-    start = f"{record.where}: no dip found: the voltage starts at {reference:.4g} and falls"
+    start = f"{record.where}: there is no dip: the voltage starts at {reference:.4g} and falls"
     if fall <= margin:
         sentence = (
             f"{start} at most {100 * fall:.3g} % below it (t = {t[low]:g} s), but a dip must exceed "
@@ -313,7 +313,7 @@ def _no_dip(record: Record) -> str:
 
 
 def describe(event: Event) -> str:
-    """What a run prints about the record it read, one sentence, a second one where something is unusual."""
+    """The line that a run prints about its record; a second sentence notes anything unusual."""
     record = event.record
     P = max(abs(event.P0), 1e-9)
     sentence = (
@@ -324,13 +324,13 @@ def describe(event: Event) -> str:
     )
     odd = []
     if event.dips > 1:
-        odd.append(f"the record holds {event.dips} dips, and the first is meant")
+        odd.append(f"the record holds {event.dips} dips, and the first is used")
     if event.P0 <= 0:
         calm = np.zeros(record.samples, bool)
         calm[event.steady] = True
-        told = direction(record.U, record.P, record.Q, calm=calm) or "no more than noise, so this is no load"
-        odd.append(f"P is {event.P0:.3g} before the dip: {told}")
+        reason = direction(record.U, record.P, record.Q, calm=calm) or "no more than noise, so this is no load"
+        odd.append(f"P is {event.P0:.3g} before the dip: {reason}")
     gaps = int(np.count_nonzero(np.isnan(record.P) | np.isnan(record.Q)))
     if gaps:
-        odd.append(f"{gaps} samples lack P or Q and are left out")
+        odd.append(f"{gaps} samples lack P or Q and are not used")
     return sentence + (f". Note: {'; '.join(odd)}." if odd else "")

@@ -29,9 +29,9 @@ FOREIGN = {
 
 
 def sentence(path: str | Path) -> str:
-    """What a file of a known foreign ending is and how to go on, a sentence with its path; "" for other endings."""
-    told = FOREIGN.get(Path(path).suffix.lower())
-    return f"{path} is {told}" if told else ""
+    """What a file of a listed foreign ending is and how to convert it, a sentence; "" for other endings."""
+    kind = FOREIGN.get(Path(path).suffix.lower())
+    return f"{path} is {kind}" if kind else ""
 
 
 def is_record(path: str | Path) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 from tractexp.errors import UserError
 from tractexp.provenance import digest
 from tractexp.record.event import Event, detect
-from tractexp.record.record import GIVEN, LOAD, Base, Record
+from tractexp.record.record import DECLARATION, LOAD, Base, Record
 from tractexp.record.wave_event import WaveEvent, in_waves
 
 LEAST_S, MOST_P = 0.5, 1.05  # pu before the dip, on a base of the load: bounds reach to a torque of one
@@ -30,18 +30,18 @@ class OwnBase:
 
     power: float = 1.0
     file_power: float = 1.0
-    known: bool = False  # whether these are MVA
-    origin: str = GIVEN  # of the file's base
+    in_mva: bool = False  # whether these are MVA
+    origin: str = DECLARATION  # of the file's base
 
     @classmethod
     def at(cls, record: Record) -> "OwnBase":
-        """That which a record is on."""
+        """The base of a record."""
         file = record.file_base
-        return cls(record.base.power, file.power, file.known, file.origin)
+        return cls(record.base.power, file.power, file.in_mva, file.origin)
 
     @classmethod
     def of(cls, event: Event) -> "OwnBase":
-        """That of the first event that is fitted; what it is on already where that is one of the load."""
+        """The base for a first fitted event: its power before the dip, or its present base if that is its own."""
         at, S = cls.at(event.record), float(np.hypot(event.P0, event.Q0))
         own = event.record.base.origin == LOAD or (S >= LEAST_S and abs(event.P0) <= MOST_P)
         return at if own or not S > SMALLEST else replace(at, power=S * at.power)
@@ -60,7 +60,7 @@ class OwnBase:
         file = record.file_base
         if self.origin == file.origin == LOAD:
             return 1.0
-        if self.known != file.known:
+        if self.in_mva != file.in_mva:
             return self.ratio / (record.base.power / file.power)
         return self.power / record.base.power
 
@@ -72,28 +72,28 @@ class OwnBase:
     @property
     def file(self) -> str:
         """The file's base, in words."""
-        return f"the file's base ({self.file_power:.6g} MVA)" if self.known else "the file's base"
+        return f"the file's base ({self.file_power:.6g} MVA)" if self.in_mva else "the file's base"
 
     def values(self, values: Mapping[str, float], exponents: Mapping[str, int]) -> dict[str, float]:
         """Parameters by name, or by name and event as `T_m[1]`, on the file's base."""
         return {name: scaled(value, exponents[name.partition("[")[0]], self.ratio) for name, value in values.items()}
 
     def __str__(self) -> str:
-        return f"{self.power:.4g} MVA" if self.known else f"{self.power:.4g} pu of the file"
+        return f"{self.power:.4g} MVA" if self.in_mva else f"{self.power:.4g} pu of the file"
 
 
 def on_own_base(events: Sequence[Event]) -> list[Event]:
     """Events of one call, the first one fitted, all on the base of the load in that.
 
-    Raises `UserError` where they must be rebased and it is not known how many MVA one per unit of some of them is.
+    Raises `UserError` where they must be rebased and some of them do not say how many MVA one per unit is.
     """
     if not events:
         return []
     first, own = events[0].record, OwnBase.of(events[0])
     for event in events:
         record = event.record
-        if own.power != first.base.power and record.file_base.known != own.known:
-            which, other = (first, record) if own.known else (record, first)
+        if own.power != first.base.power and record.file_base.in_mva != own.in_mva:
+            which, other = (first, record) if own.in_mva else (record, first)
             raise UserError(
                 f"{other.where} does not say how many MVA one per unit is, and {which.where} is per unit of"
                 f" {which.file_base.power:g} MVA, so that they cannot be put on one base; say it of both"
@@ -109,15 +109,15 @@ def rebased(event: Event, ratio: float, own: OwnBase) -> Event:
     record = event.record
     by, base = Base(1.0, ratio), replace(record.base, power=ratio * record.base.power, origin=LOAD)
     arrays = by.per_unit({"P": record.P, "Q": record.Q})
-    note = said(own) if record.given_base is None else ""
+    note = said(own) if record.original_base is None else ""
     return detect(
-        replace(record, base=base, given_base=record.file_base, digest=digest(record), more=by.per_unit(record.more),
+        replace(record, base=base, original_base=record.file_base, digest=digest(record), more=by.per_unit(record.more),
                 notes=(*record.notes, *[note] * bool(note)), **arrays)
     )  # fmt: skip
 
 
 def said(own: OwnBase) -> str:
-    """What was done to a record, in one sentence."""
+    """A sentence on the change of base."""
     return (
         f"put on a base of {own}, the apparent power before the first dip that is fitted: on {own.file} powers, torque"
         f" and inertia are {own.ratio:.5g} times, impedances {1 / own.ratio:.5g} times the values on this base"

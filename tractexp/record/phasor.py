@@ -11,12 +11,12 @@ from tractexp.errors import UserError
 
 TURN = np.exp(2j * np.pi / 3)  # the operator a of symmetrical components
 SLOWEST, FASTEST = 0.9, 1.1  # of the nominal frequency: what is tracked
-PASSES = 3  # of the tracking, each at the frequency found by the one before
+PASSES = 3  # of the tracking, each at the frequency that the previous one measured
 DEAD = 0.01  # of the highest voltage: a phasor below it has no angle to speak of
 BLOCK = 1 << 15  # samples measured at once, about: what fits into a processor's cache
 
 
-class Waves(Protocol):
+class WaveSource(Protocol):
     """Voltages [kV] and as many currents [kA], (2 K, N): an array, or what is read when it is sliced like one."""
 
     @property
@@ -33,7 +33,7 @@ class Averager:
     """The window of an estimator at one sampling rate.
 
     `means(y, rate, frequency, at)` are weighted means (..., M) of y (..., N), sampled at `rate` [Hz], about the
-    samples `at` (M,), the weights of sum 1; `frequency` (N,) [Hz] is that of the waveforms y is made from.
+    samples `at` (M,), the weights of sum 1; `frequency` (N,) [Hz] is that of the waveforms behind y.
     """
 
     reach: int  # samples it needs on either side of its center
@@ -41,15 +41,15 @@ class Averager:
 
 
 def cycle_means(y: np.ndarray, rate: float, frequency: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Means over one cycle, to a fraction of a sample: the two end samples are weighted by what is left over of it."""
+    """Means over one cycle, to a fraction of a sample: the two end samples have fractional weights."""
     cycle = rate / frequency[at]  # samples
     whole = np.floor(cycle / 2 - 0.5).astype(int)  # of full weight on either side of the center
     total = np.zeros((*y.shape[:-1], y.shape[-1] + 1), dtype=y.dtype)
     np.cumsum(y, axis=-1, out=total[..., 1:])
     low, high = at - whole, at + whole + 1
-    made = total.take(high, axis=-1) - total.take(low, axis=-1)
-    made += (cycle / 2 - 0.5 - whole) * (y.take(high, axis=-1) + y.take(low - 1, axis=-1))
-    return made / cycle
+    sums = total.take(high, axis=-1) - total.take(low, axis=-1)
+    sums += (cycle / 2 - 0.5 - whole) * (y.take(high, axis=-1) + y.take(low - 1, axis=-1))
+    return sums / cycle
 
 
 def one_cycle(rate: float, nominal: float) -> Averager:
@@ -65,8 +65,8 @@ def weighted(weights: np.ndarray) -> Averager:
         from scipy.fft import next_fast_len
 
         length = next_fast_len(y.shape[-1])  # what wraps around falls where no whole window lies
-        made = np.fft.ifft(np.fft.fft(y, length) * np.fft.fft(weights, length)).take(at + reach, axis=-1)
-        return made if np.iscomplexobj(y) else made.real
+        filtered = np.fft.ifft(np.fft.fft(y, length) * np.fft.fft(weights, length)).take(at + reach, axis=-1)
+        return filtered if np.iscomplexobj(y) else filtered.real
 
     return Averager(reach, means)
 
@@ -90,18 +90,18 @@ def fundamental(
     in the `frame` that turns at `frequency`. With `harmonics`, those of each (H, ..., M), in frames as many times
     as fast.
 
-    In the window the least-squares sinusoid is taken, x = sqrt(2) Re(X e^{j phi}), so a phasor is exact at any known
-    frequency, where the plain DFT leaks its mirror image: with S and G the weighted means of x e^{-j phi} and
+    In the window the least-squares sinusoid is taken, x = sqrt(2) Re(X e^{j phi}), so a phasor is exact at any
+    `frequency`, where the plain DFT leaks its mirror image: with S and G the weighted means of x e^{-j phi} and
     e^{-2 j phi}, the normal equation sqrt(2) S = X + G X* is solved for X.
     """
     f = np.broadcast_to(np.asarray(frequency, dtype=float), x.shape[-1])
     angle = frame(f, rate)
-    found = []
+    phasors = []
     for h in harmonics or (1,):
         turn = np.exp(-1j * h * angle)
         S, G = means(x * turn, rate, f, at), means(turn**2, rate, f, at)
-        found.append(np.sqrt(2) * (S - G * S.conj()) / (1 - np.abs(G) ** 2))
-    return np.array(found) if harmonics else found[0]
+        phasors.append(np.sqrt(2) * (S - G * S.conj()) / (1 - np.abs(G) ** 2))
+    return np.array(phasors) if harmonics else phasors[0]
 
 
 def sequences(phases: np.ndarray) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
@@ -124,7 +124,7 @@ def track(voltages: np.ndarray, rate: float, nominal: float, cycles: float = 4.0
     """Frequency (N,) [Hz] of phase voltages (K, N), three or one, smoothed over `cycles`, within 10 % of `nominal`.
 
     The mean speed of the positive-sequence voltage (of the one there is) over the span about each sample. Three passes,
-    each with the frequency found by the one before, remove what the unknown frequency did to the phasors themselves.
+    each at the frequency that the previous one measured, remove the error of the frequency from the phasors.
     A voltage below `least` has no angle: spans end before it, and within the nominal frequency is taken.
     """
     n, (every, reach, half) = voltages.shape[-1], _tracking(rate, nominal, cycles)
@@ -145,9 +145,9 @@ def _speed(angle: np.ndarray, dead: np.ndarray, half: int) -> np.ndarray:
     k, last = np.arange(len(angle)), len(angle) - 1
     early = np.maximum(k - half, np.maximum.accumulate(np.where(dead, k + 1, 0)))
     late = np.minimum(k + half, np.minimum.accumulate(np.where(dead, k - 1, last)[::-1])[::-1])
-    made = np.full(len(angle), np.nan)
-    np.divide(angle[late] - angle[early.clip(max=last)], late - early, out=made, where=late > early)
-    return made
+    speed = np.full(len(angle), np.nan)
+    np.divide(angle[late] - angle[early.clip(max=last)], late - early, out=speed, where=late > early)
+    return speed
 
 
 def _tracking(rate: float, nominal: float, cycles: float = 4.0) -> tuple[int, int, int]:
@@ -203,7 +203,7 @@ class Phasors:
 
 
 def measure(
-    waves: Waves,
+    waves: WaveSource,
     rate: float,
     nominal: float,
     start: float = 0.0,
@@ -228,7 +228,7 @@ def measure(
             f"{nominal:g} Hz and more than their window"
         )
     least = DEAD * max(float(np.abs(waves[:K, a:b]).max()) for a, b in _blocks(n, block)) / np.sqrt(2)
-    at, angle, found, seen = np.arange(over.reach, n - over.reach, every), 0.0, [], []
+    at, angle, pieces, distortions = np.arange(over.reach, n - over.reach, every), 0.0, [], []
     for (first, stop), (a, b) in _overlapping(n, rate, nominal, over.reach, block):
         x = waves[:, first:stop]
         f = track(x[:K], rate, nominal, least=least)
@@ -239,14 +239,14 @@ def measure(
         angle += turned[min(b, n - 1) - first] - turned[a - first]
         if skew is not None:
             X *= np.exp(-2j * np.pi * np.array([1, *harmonics])[:, None, None] * f[here] * skew[:, None])
-        found.append((X[0], f[here]))
+        pieces.append((X[0], f[here]))
         if harmonics:
             products = over.means(np.concatenate([x**2, x[:K] * x[K:]]), rate, f, here)
-            seen.append(_distortion(X, products[: 2 * K], products[2 * K :], harmonics))
-    X, f = (np.concatenate([part[k] for part in found], axis=-1) for k in (0, 1))
-    more = {name: np.concatenate([part[name] for part in seen]) for name in (seen[0] if seen else ())}
-    made = Phasors(start + at / rate, X[:K], X[K:], f, more)
-    return replace(made, f=_turned(made, rate / every, least))
+            distortions.append(_distortion(X, products[: 2 * K], products[2 * K :], harmonics))
+    X, f = (np.concatenate([part[k] for part in pieces], axis=-1) for k in (0, 1))
+    more = {name: np.concatenate([one[name] for one in distortions]) for name in next(iter(distortions), ())}
+    phasors = Phasors(start + at / rate, X[:K], X[K:], f, more)
+    return replace(phasors, f=_turned(phasors, rate / every, least))
 
 
 def _distortion(
@@ -258,25 +258,25 @@ def _distortion(
     fundamental; of three phases together as in its effective values, 3.2.2.
     """
     K = X.shape[1] // 2
-    made = {"P_H": power.sum(axis=0) - np.real(X[0, :K] * X[0, K:].conj()).sum(axis=0)}
-    made |= {
+    channels = {"P_H": power.sum(axis=0) - np.real(X[0, :K] * X[0, K:].conj()).sum(axis=0)}
+    channels |= {
         f"P_{h}": np.real(V * I.conj()).sum(axis=0) for h, V, I in zip(harmonics, X[1:, :K], X[1:, K:], strict=True)
     }
     for name, side in (("THD_u", slice(K)), ("THD_i", slice(K, None))):
         one = (np.abs(X[0, side]) ** 2).sum(axis=0)
         rest = np.maximum(squares[side].sum(axis=0) - one, 0.0)
-        made[name] = np.sqrt(np.divide(rest, one, out=np.zeros_like(one), where=one > 0))
-    return made
+        channels[name] = np.sqrt(np.divide(rest, one, out=np.zeros_like(one), where=one > 0))
+    return channels
 
 
-def _turned(made: Phasors, rate: float, least: float) -> np.ndarray:
+def _turned(phasors: Phasors, rate: float, least: float) -> np.ndarray:
     """Frequency (M,) [Hz] at which the voltage really turns; where it is dead, that before and after."""
-    dead = np.abs(made.V1) < least
+    dead = np.abs(phasors.V1) < least
     alive = ~(dead | np.r_[dead[1:], False] | np.r_[False, dead[:-1]])  # a slope needs both neighbours
     if not alive.any():
-        return made.f
+        return phasors.f
     k = np.arange(len(alive))
-    return np.interp(k, k[alive], (made.f + turning(np.angle(made.V1), rate))[alive])
+    return np.interp(k, k[alive], (phasors.f + turning(np.angle(phasors.V1), rate))[alive])
 
 
 def _blocks(n: int, block: int) -> Iterator[tuple[int, int]]:

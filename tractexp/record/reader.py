@@ -1,4 +1,4 @@
-"""What a reader plugin must do: turn the `data` configuration into records."""
+"""The interface of reader plugins: records from the `data` configuration."""
 
 from abc import abstractmethod
 from collections.abc import Sequence
@@ -11,13 +11,13 @@ from tractexp.plugin import Plugin, discover
 from tractexp.record import foreign
 
 if TYPE_CHECKING:
-    from tractexp.record.dips import Dip
+    from tractexp.record.dips import FileDip
     from tractexp.record.record import Record
 
 
 @dataclass(frozen=True)
 class Events:
-    """The recorded events of one run, fitted and held out: as records, or with their dips found."""
+    """The recorded events of one run, fitted and held out: as records, or as `Event`s."""
 
     train: Sequence[Any]
     validate: Sequence[Any] = ()
@@ -44,8 +44,8 @@ class Reader(Plugin):
     def read(self) -> Events:
         """Read and check everything; raises `UserError` naming the file, the place and the value."""
 
-    def table(self) -> tuple["Record", Sequence["Dip"]] | None:
-        """Of a reader of one table: all of it, and its dips."""
+    def table(self) -> tuple["Record", Sequence["FileDip"]] | None:
+        """The whole record of a file and its dips, from a reader of one table; None from other readers."""
         return None
 
 
@@ -55,15 +55,15 @@ def reader_of(path: str) -> type[Any]:
     Raises `UserError` for a folder, and for an ending that no reader takes.
     """
     ending = Path(path).suffix.lower()
-    known: list[Any] = list(discover()[Reader.group].values())
-    readers = [cls for cls in known if ending and ending in cls.endings]
+    classes: list[Any] = list(discover()[Reader.group].values())
+    readers = [cls for cls in classes if ending and ending in cls.endings]
     if Path(path).is_dir():
         raise UserError(
             f"{path} is a folder; give a file of it, or 'tractexp task=survey data.path={path}' for a table"
         )
     if not readers:
-        told = foreign.sentence(path) or f"{path}: no reader takes files ending in '{ending}'"
-        raise UserError(f"{told}; endings that can be read: {', '.join(endings())}")
+        reason = foreign.sentence(path) or f"{path}: no reader takes files ending in '{ending}'"
+        raise UserError(f"{reason}; endings that can be read: {', '.join(endings())}")
     return next((cls for cls in readers if cls.takes(path)), readers[0])
 
 

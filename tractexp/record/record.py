@@ -10,8 +10,8 @@ from tractexp.record.waves import Waves
 from tractexp.record.window import Window
 
 JITTER = 0.01  # of a step: times closer than this to a uniform grid count as uniform
-# s: coarser sampling leaves a dip of 100 ms fewer than two samples, and a transient time constant T' of 50 to 300 ms
-# none to tell it by. The slowest phasor units that record dips send 25 per second.
+# s: at coarser sampling a dip of 100 ms has fewer than two samples, and a transient time constant T' of 50 to 300 ms
+# cannot be identified. The slowest phasor units that record dips send 25 per second.
 LONGEST_STEP = 0.05
 SELDOM = 0.05  # of the steps: where more than these are odd, a simulator chose them
 WHOLE = 0.02  # of a step: a step so close to a multiple of the usual one is of missing rows
@@ -22,7 +22,7 @@ PLAUSIBLE_POWER = 20.0  # pu, at the start of a record
 SIZES = {"voltage": (1e-6, 1e5), "power": (1e-6, 1e7), "frequency": (0.1, 1e4)}  # of a base [kV, MVA, Hz]
 
 
-GIVEN, LOAD = "given", "load"
+DECLARATION, LOAD = "given", "load"
 
 
 @dataclass(frozen=True)
@@ -30,25 +30,25 @@ class Base:
     """What one per unit stands for. Voltage is line-to-line RMS; power is three-phase.
 
     `origin` says who chose it: "load", the steady state of the load itself before a dip, or "given", by a user or by
-    the file. A power of 1 that was given is one of which nobody said how many MVA it is.
+    the file. A power of 1 from a user or a file means that nobody said how many MVA one per unit is.
     """
 
     voltage: float = 1.0  # kV
     power: float = 1.0  # MVA
     frequency: float = 50.0  # Hz, nominal
-    origin: str = field(default=GIVEN, compare=False)
+    origin: str = field(default=DECLARATION, compare=False)
 
     @property
-    def known(self) -> bool:
-        """Whether it is known how many MVA one per unit of power is, of the base of a file."""
+    def in_mva(self) -> bool:
+        """Whether the base of a file says how many MVA one per unit of power is."""
         return self.origin == LOAD or self.power != 1.0
 
     def per_unit(self, columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Columns by name, U and U2 [kV], P and P_3, P_5, ... [MW] and Q [Mvar] made per unit."""
+        """Columns by name, U and U2 [kV], P and P_3, P_5, ... [MW] and Q [Mvar], in per unit."""
         return {name: values / self._one(name) for name, values in columns.items()}
 
     def absolute(self, columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Columns per unit made kV, MW and Mvar: the way back."""
+        """Columns in per unit, converted to kV, MW and Mvar: the inverse of `per_unit`."""
         return {name: values * self._one(name) for name, values in columns.items()}
 
     def _one(self, name: str) -> float:
@@ -62,11 +62,11 @@ class Base:
 class Record:
     """Positive-sequence voltage and power of one event, P and Q positive when consumed.
 
-    Arrays have shape (N,), are finite except where `P` or `Q` is missing (nan: a gap, left out of every sum),
-    and are sampled uniformly. `window` is what its phasors are averages over, where that is known; `more` are further
-    channels, which no model reads. `source` says where the record came from, `notes` what was done to it or found
-    odd about it, one sentence each. `given_base` is the base in which the file was, None where that is `base`;
-    `identity` is what else tells which load it is: station, device, load, channels; `digest` is the SHA-256 of its
+    Arrays have shape (N,), are finite except where `P` or `Q` is missing (nan: a gap, in no sum),
+    and are sampled uniformly. `window` is the averaging window of its phasors, None where no one says it; `more` are
+    further channels, which no model reads. `source` says where the record came from, `notes` what was changed in it or
+    is odd about it, one sentence each. `original_base` is the base of the file, None where that is `base`;
+    `identity` says which load it is: station, device, load, channels; `digest` is the SHA-256 of its
     channels as they were read, "" where they still are that.
     """
 
@@ -82,8 +82,8 @@ class Record:
     notes: tuple[str, ...] = ()
     window: Window | None = None
     more: Mapping[str, np.ndarray] = field(default_factory=dict)  # P_3, P_5, ... [pu], THD_u, THD_i
-    waves: Waves | None = None  # what the phasors were measured from, where the recorder kept it
-    given_base: Base | None = None
+    waves: Waves | None = None  # what the phasors were measured from, where the recorder stored it
+    original_base: Base | None = None
     identity: Mapping[str, str] = field(default_factory=dict)
     digest: str = ""
 
@@ -108,7 +108,7 @@ class Record:
     @property
     def file_base(self) -> Base:
         """The base in which its file was."""
-        return self.given_base or self.base
+        return self.original_base or self.base
 
     @property
     def where(self) -> str:

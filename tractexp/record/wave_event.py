@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from tractexp.errors import UserError
 from tractexp.record.event import Event
+from tractexp.record.noise_filter import NoiseFilter
 from tractexp.record.phasor import TURN
-from tractexp.record.quieted import Quieting
 from tractexp.record.record import Record
 from tractexp.record.waves import Waves
 
@@ -34,7 +34,7 @@ class WaveEvent(Event):
     """An event in waveforms. `record` has t, U, P and Q on the waveforms' samples, as the last half cycle shows them.
 
     v (N,) complex is the voltage's space vector in the frame [pu of its peak], v_zero (N,) its zero sequence, both
-    without the noise that can be told from them; `weights` (2 m + 1,) are what is left of that of one sample. `turn`
+    filtered of noise; `weights` (2 m + 1,) are the filter's response to the noise of one sample. `turn`
     (N,) turns into the stationary frame of phase a; currents (3, N) are alpha, beta and zero sequence there [pu], nan
     where not compared. The first `lead` samples stand before the record. `omega_s0` [rad/s] is the frame's speed
     relative to nominal; `random` (3,) is what is not periodic in the currents before the dip [pu], `noise_U` in either
@@ -62,7 +62,7 @@ class WaveEvent(Event):
     @property
     def channels(self) -> tuple[str, ...]:
         """With I0 where the currents' zero sequence is compared."""
-        return (*super().channels, *(("I0",) if self.known[2] else ()))
+        return (*super().channels, *(("I0",) if self.compared[2] else ()))
 
     @property
     def levels(self) -> tuple[float, ...]:
@@ -74,7 +74,7 @@ class WaveEvent(Event):
         return self.unexplained
 
     @property
-    def known(self) -> tuple[bool, ...]:
+    def compared(self) -> tuple[bool, ...]:
         """Which of the three currents are compared."""
         return tuple(bool(np.isfinite(row).any()) for row in self.currents)
 
@@ -120,11 +120,12 @@ class Periodic:
     def of(cls, t: np.ndarray, x: np.ndarray, frequency: float, rate: float) -> "Periodic":
         """Fitted to channels x (channels, n) at times t (n,) [s]."""
         highest = max(1, min(HIGHEST, int(0.45 * rate / frequency), (len(t) // 3 - 1) // 2))
-        made = cls(np.zeros((2 * highest + 1, len(x))), frequency, float(t[0]), np.zeros(len(x)))
-        basis = made.basis(t)
-        found = np.linalg.lstsq(basis, x.T, rcond=None)[0]
-        left = x.T - basis @ found
-        return replace(made, coefficients=found, rest=np.sqrt((left**2).sum(axis=0) / max(len(t) - len(found), 1)))
+        series = cls(np.zeros((2 * highest + 1, len(x))), frequency, float(t[0]), np.zeros(len(x)))
+        basis = series.basis(t)
+        coefficients = np.linalg.lstsq(basis, x.T, rcond=None)[0]
+        residual = x.T - basis @ coefficients
+        scale = np.sqrt((residual**2).sum(axis=0) / max(len(t) - len(coefficients), 1))
+        return replace(series, coefficients=coefficients, rest=scale)
 
     def basis(self, t: np.ndarray) -> np.ndarray:
         """(n, 2 H + 1): one, then cosine and sine of each harmonic."""
@@ -133,7 +134,7 @@ class Periodic:
         return np.concatenate([np.ones((len(t), 1)), waves], axis=1)
 
     def at(self, t: np.ndarray) -> np.ndarray:
-        """The channels (channels, n), their offsets left out."""
+        """The channels (channels, n), without their offsets."""
         return (self.basis(t)[:, 1:] @ self.coefficients[1:]).T
 
     @property
@@ -177,13 +178,13 @@ def in_waves(event: Event) -> WaveEvent:
     turn = np.exp(1j * (2 * np.pi * frequency * (time - periodic.origin) + np.angle(V)))
     (v, v_zero), (i, i_zero) = (stationary(part, waves.rate, frequency) for part in np.split(x, 2))
     noise, noise_U = periodic.rest[K:], np.sqrt(np.mean(periodic.rest[:K] ** 2) * (2 / 3 if K == 3 else 1))
-    quieting = Quieting.at(waves.rate, frequency)
+    noise_filter = NoiseFilter.at(waves.rate, frequency)
     course, course_zero = stationary(periodic.at(time)[:K], waves.rate, frequency)
-    v = course + quieting(v - course, 2 * noise_U**2)
-    v_zero = course_zero + quieting(v_zero - course_zero, noise_U**2 / 2)
+    v = course + noise_filter(v - course, 2 * noise_U**2)
+    v_zero = course_zero + noise_filter(v_zero - course_zero, noise_U**2 / 2)
     power = V * np.conj(I)
     start = lead + _onset(t, x[:K, lead:], periodic, K, before)
-    made = half_cycle(v / turn, i / turn, turn, waves.rate, frequency)
+    half = half_cycle(v / turn, i / turn, turn, waves.rate, frequency)
     currents = np.stack([i.real, i.imag, i_zero])
     currents[:, :lead] = np.nan
     calm = _calm(i, i_zero, turn, I * np.exp(-1j * np.angle(V)), slice(lead, lead + np.count_nonzero(before)))
@@ -191,7 +192,7 @@ def in_waves(event: Event) -> WaveEvent:
     currents[~compared] = np.nan
     levels = (noise.mean() * np.sqrt(2 / 3),) * 2 + (noise.mean() / np.sqrt(3),) if K == 3 else (noise[0], 1.0, 1.0)
     slow = replace(
-        record, t=time, U=made[0], P=np.real(made[1]), Q=np.imag(made[1]), U2=made[2],
+        record, t=time, U=half[0], P=np.real(half[1]), Q=np.imag(half[1]), U2=half[2],
         f=None, window=None, more={}, waves=None,
     )  # fmt: skip
     end = min(max(int(np.searchsorted(time, event.t_end)), start + 1), len(time) - 1)
@@ -205,7 +206,7 @@ def in_waves(event: Event) -> WaveEvent:
         phasors=event, v=v / turn, v_zero=v_zero, turn=turn, currents=currents, lead=lead,
         omega_s0=2 * np.pi * (frequency - nominal), random=tuple(map(float, levels)), unexplained=calm,
         offsets=periodic.offsets * _scale(record, K), phases=K,
-        weights=quieting.weights,
+        weights=noise_filter.weights,
     )  # fmt: skip
 
 
@@ -259,26 +260,26 @@ def _positive(phasors: np.ndarray) -> complex:
 
 def _frequency(t: np.ndarray, v: np.ndarray, rate: float, guess: float) -> float:
     """Frequency [Hz] of voltages (K, n), from how their fundamental turns from the first half to the second."""
-    found = guess
+    frequency = guess
     for _ in range(2):
-        whole = max(1, int((t[-1] - t[0]) * found / 2)) / found  # s: cycles of a half
+        whole = max(1, int((t[-1] - t[0]) * frequency / 2)) / frequency  # s: cycles of a half
         n = round(whole * rate)
-        halves = (Periodic.of(t[part], v[:, part], found, rate) for part in (slice(0, n), slice(-n, None)))
+        halves = (Periodic.of(t[part], v[:, part], frequency, rate) for part in (slice(0, n), slice(-n, None)))
         first, last = halves
         angle = np.angle(_positive(last.fundamentals) / _positive(first.fundamentals))
         between = last.origin - first.origin
-        found += float(np.angle(np.exp(1j * (angle - 2 * np.pi * found * between)))) / (2 * np.pi * between)
-    return found
+        frequency += float(np.angle(np.exp(1j * (angle - 2 * np.pi * frequency * between)))) / (2 * np.pi * between)
+    return frequency
 
 
 def _onset(t: np.ndarray, v: np.ndarray, periodic: Periodic, K: int, before: np.ndarray) -> int:
-    """The first sample at which a voltage (K, M) has left its periodic course."""
+    """The first sample at which a voltage (K, M) departs from its periodic course."""
     off = np.abs(v - periodic.at(t)[:K]).max(axis=0)
     limit = max(LEAVES, NOISY * float(periodic.rest[:K].max()))
-    left = off > limit
-    left &= np.r_[left[1:], False] | np.r_[left[2:], False, False]
-    left[: np.count_nonzero(before) // 2] = False
-    return int(np.argmax(left)) if left.any() else int(np.count_nonzero(before))
+    beyond = off > limit
+    beyond &= np.r_[beyond[1:], False] | np.r_[beyond[2:], False, False]
+    beyond[: np.count_nonzero(before) // 2] = False
+    return int(np.argmax(beyond)) if beyond.any() else int(np.count_nonzero(before))
 
 
 def half_cycle(
@@ -300,8 +301,8 @@ def half_cycle(
 
 def _calm(i: np.ndarray, zero: np.ndarray, turn: np.ndarray, I: complex, part: slice) -> np.ndarray:
     """What is no fundamental in the currents before the dip, (3, n)."""
-    left = (i - I * turn)[part]
-    return np.stack([left.real, left.imag, zero[part]])
+    residual = (i - I * turn)[part]
+    return np.stack([residual.real, residual.imag, zero[part]])
 
 
 def _compared(after: np.ndarray, before: np.ndarray, phases: int) -> np.ndarray:

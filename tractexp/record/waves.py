@@ -1,4 +1,4 @@
-"""Sampled waveforms of one load, as a fault recorder took them: what the phasors of a record were measured from."""
+"""Sampled waveforms of one load, as a fault recorder took them, from which a record's phasors were measured."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -41,12 +41,12 @@ class Waves:
     def to_dict(self) -> dict[str, Any]:
         """As plain data."""
         late = None if self.late is None else self.late.tolist()
-        told = {"start": self.start, "rate": self.rate, "estimator": self.estimator, "late": late}
-        return {"samples": np.asarray(self.samples[:, :]), **told}
+        fields = {"start": self.start, "rate": self.rate, "estimator": self.estimator, "late": late}
+        return {"samples": np.asarray(self.samples[:, :]), **fields}
 
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> "Waves":
-        """What `to_dict` told."""
+        """From the content of `to_dict`."""
         late = content["late"] if content["late"] is None else np.array(content["late"])
         samples = np.array(content["samples"], dtype=float)
         return cls(samples, content["start"], content["rate"], content["estimator"], late)

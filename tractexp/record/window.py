@@ -1,4 +1,4 @@
-"""The window a record was seen through: what its phasors are averages over."""
+"""The averaging window of a record's phasors."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -25,11 +25,11 @@ class Window:
     def on(self, step: float) -> np.ndarray:
         """Weights (odd,) of samples `step` [s] apart, for what is linear between them."""
         reach = int(np.ceil(np.abs(self.at).max() / step - 1e-9))
-        made = np.zeros(2 * reach + 2)
+        weights = np.zeros(2 * reach + 2)
         whole, part = np.divmod(self.at / step, 1)
-        np.add.at(made, whole.astype(int) + reach, (1 - part) * self.weights)
-        np.add.at(made, whole.astype(int) + reach + 1, part * self.weights)
-        return made[:-1]
+        np.add.at(weights, whole.astype(int) + reach, (1 - part) * self.weights)
+        np.add.at(weights, whole.astype(int) + reach + 1, part * self.weights)
+        return weights[:-1]
 
     def to_dict(self) -> dict[str, Any]:
         """As plain data."""
@@ -37,7 +37,7 @@ class Window:
 
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> "Window":
-        """What `to_dict` told; of anything else a `ValueError`, `TypeError`, `KeyError` or `OverflowError`."""
+        """From the content of `to_dict`; any other raises `ValueError`, `TypeError`, `KeyError` or `OverflowError`."""
         at, weights = (np.array(content[key], dtype=float) for key in ("at", "weights"))
         if at.ndim != 1 or at.shape != weights.shape or len(at) < 2 or not np.isfinite(weights).all():
             raise ValueError("times and weights are two lists of as many numbers")

@@ -9,7 +9,7 @@ from pathlib import Path
 from tractexp.errors import UserError, nearest
 from tractexp.record import Record, endings, reader_of
 from tractexp.record.foreign import is_record
-from tractexp.recording.overview import Seen, Sight, View, view_of
+from tractexp.recording.overview import LoadEvent, Sight, View, view_of
 from tractexp.recording.reader import WaveformReader
 
 NAMED = re.compile(r"(?P<file>.+?)(?:#(?P<load>\d+)(?:\.(?P<dip>\d+))?)?")
@@ -20,28 +20,28 @@ RUN = ".hydra"  # a folder that holds it is that of a run: what lies there was w
 
 
 def files(folder: Path) -> Iterator[Path]:
-    """The records below a folder, in order of name; hidden files and those of runs below it are left out.
+    """The records below a folder, in order of name; without hidden files and those of runs below it.
 
     Raises `UserError` where there is no such folder.
     """
     if not folder.is_dir():
         kind = "a file; give the folder it lies in" if folder.exists() else "no folder that is there"
         raise UserError(f"data.path={folder} is {kind}")
-    known = endings()
+    readable = endings()
     for place, below, names in os.walk(folder):
-        if RUN in below and Path(place) != folder:  # what a run converted may be asked for by name
+        if RUN in below and Path(place) != folder:  # a converted file may still be opened by its own path
             below.clear()
             continue
         below[:] = sorted(name for name in below if not name.startswith("."))
         beside = {name.lower() for name in names}
         for name in sorted(names):
-            if not name.startswith(".") and _wanted(Path(place, name), known, beside):
+            if not name.startswith(".") and _wanted(Path(place, name), readable, beside):
                 yield Path(place, name)
 
 
-def _wanted(path: Path, known: Collection[str], beside: Collection[str]) -> bool:
+def _wanted(path: Path, readable: Collection[str], beside: Collection[str]) -> bool:
     """Whether a file is looked at: it can be read, or is a record of another format; what belongs to one is not."""
-    if path.suffix.lower() not in known:
+    if path.suffix.lower() not in readable:
         return is_record(path)
     cls = reader_of(str(path))
     if not issubclass(cls, WaveformReader):
@@ -56,7 +56,7 @@ def _prose(path: Path) -> bool:
         with path.open("rb") as file:
             head = file.read(BEGINNING)
     except OSError:
-        return False  # why it cannot be read is told where it is read
+        return False  # its reader will say why it cannot be read
     return not any(_numbers(line) >= NUMBERS for line in head.replace(b"\0", b"").splitlines())
 
 
@@ -79,9 +79,9 @@ def looked(path: Path) -> View:
     return view_of(str(path), {"name": cls.name, **cls.of(str(path))})
 
 
-def event_name(file: str, load: int, seen: Seen) -> str:
+def event_name(file: str, load: int, event: LoadEvent) -> str:
     """What an event is called within its archive: FILE#LOAD.DIP, both counted from 1."""
-    return f"{file}#{load}" + ("" if seen.dip is None else f".{seen.dip}")
+    return f"{file}#{load}" + ("" if event.dip is None else f".{event.dip}")
 
 
 def records(folder: Path, names: list[str], where: str) -> list[Record]:
@@ -107,16 +107,16 @@ def _record(folder: Path, name: str, where: str, see: "functools._lru_cache_wrap
     if not 1 <= load <= len(view.sights):
         loads = f"{len(view.sights)} load{'s' * (len(view.sights) != 1)}"
         raise UserError(f"{where}: {name}: {path} shows {loads}, and there is no load {load}; the first is 1")
-    seen = _seen(view.sights[load - 1], dip, f"{where}: {name}")
-    assert seen.event is not None
-    made = seen.event.record
-    return Record(**{**vars(made), "name": event_name(path.relative_to(folder).as_posix(), load, seen)})
+    event = _select(view.sights[load - 1], dip, f"{where}: {name}")
+    assert event.event is not None
+    record = event.event.record
+    return Record(**{**vars(record), "name": event_name(path.relative_to(folder).as_posix(), load, event)})
 
 
-def _seen(shown: Sight, dip: int | None, where: str) -> Seen:
-    found = [s for s in shown.seen if (s.worth if dip is None else s.dip == dip)]
-    if not found or found[0].event is None:
-        known = "; ".join(f"dip {s.dip}: {s.why}" for s in shown.seen if s.dip is not None) or "nothing happened to it"
+def _select(shown: Sight, dip: int | None, where: str) -> LoadEvent:
+    matches = [s for s in shown.events if (s.worth if dip is None else s.dip == dip)]
+    if not matches or matches[0].event is None:
+        reasons = [f"dip {s.dip}: {s.why}" for s in shown.events if s.dip is not None] or ["nothing happened to it"]
         which = "an event that is worth fitting" if dip is None else f"a dip {dip} that can be fitted"
-        raise UserError(f"{where}: the load '{shown.name}' has not {which} ({known})")
-    return found[0]
+        raise UserError(f"{where}: the load '{shown.name}' has not {which} ({'; '.join(reasons)})")
+    return matches[0]

@@ -1,8 +1,8 @@
-"""Whether the channels chosen are what they are taken for: phases or lines, their order, their direction.
+"""Checks of the chosen channels: phases or lines, their order, and the direction of the currents.
 
-All of it is told while the voltage and the current are alive: a dead line after a trip has no order. What the labels
-say and what the waves say must agree; where the order given makes no sense and another does, it is refused with that
-other one, never silently changed, because two orders can both look plausible where the load is unusual.
+Each check uses times at which voltage and current are alive: a dead line after a trip has no order. Labels and
+waveforms must agree. Where the order makes no sense and another one does, it is refused and the other one proposed. It
+is never changed silently, because two orders can both look plausible where the load is unusual.
 """
 
 from collections.abc import Sequence
@@ -36,13 +36,13 @@ UNBALANCED = 0.05  # V2 over V1 of such a fault
 EARTH = 0.1  # I0 over I1 of such a fault
 ROOT3 = 0.02  # line over phase voltages may be so far from sqrt 3, and 3 degrees from 30
 ANSWERS = (-110.0, 30.0)  # degrees of I2 / V2 of a passive load: inductive, at most a little capacitive
-ADDED = 0.02  # V2 over V1 that must be added for the answer in I2 to be told
+ADDED = 0.02  # V2 over V1 that must be added before the answer in I2 counts
 FAULT = 2.5  # times the current before: more feeds a fault behind the current transformer, and says nothing of a load
 TURNED = "has the opposite polarity of the other two; mend its sign in the file (in a .cfg, that of its factor)"
 
 
 @dataclass(frozen=True, eq=False)
-class _Seen:
+class _LivePhasors:
     """Phasors of a feeder while it is alive, (3, M) each, and which of them are calm."""
 
     V: np.ndarray
@@ -63,28 +63,28 @@ def tuned(recording: Recording, numbers: Sequence[int]) -> Recording:
 
 
 def arranged(recording: Recording, feeder: Feeder) -> Feeder:
-    """The feeder as given, or with line voltages taken as such, and a sentence for each thing found in `why`.
+    """The feeder unchanged, or with line voltages taken as such, and a sentence for each observation in `why`.
 
-    Raises `UserError` where the order given makes no sense and another does, which is proposed with its P and Q.
+    Raises `UserError` where the order makes no sense and another one does, which is proposed with its P and Q.
     """
     _residuals(recording, feeder)
     feeder = _lines_by_label(recording, feeder)
     connection = chosen("connection", feeder.connection)
-    seen = _seen(recording, feeder)
-    if seen is None:
+    live = _live_phasors(recording, feeder)
+    if live is None:
         _labels(recording, feeder, None)
         return replace(feeder, why=(*feeder.why, "the order of the channels cannot be checked: nothing is alive"))
-    if len(seen.V) < 3:
-        return _directed(feeder, seen)
+    if len(live.V) < 3:
+        return _directed(feeder, live)
     _lines(recording, feeder)
-    if _to_ground(feeder) and (told := _lines_by_shape(recording, feeder, seen)):
-        feeder = replace(feeder, connection=_between(feeder), why=(*feeder.why, told))
-        seen = _seen(recording, feeder) or seen
-    _voltages(recording, feeder, seen)
-    if connection.currents == 3 == len(seen.V):
-        _labels(recording, feeder, seen)
-        _currents(recording, feeder, seen)
-    return _directed(feeder, seen)
+    if _to_ground(feeder) and (reason := _lines_by_shape(recording, feeder, live)):
+        feeder = replace(feeder, connection=_between(feeder), why=(*feeder.why, reason))
+        live = _live_phasors(recording, feeder) or live
+    _voltages(recording, feeder, live)
+    if connection.currents == 3 == len(live.V):
+        _labels(recording, feeder, live)
+        _currents(recording, feeder, live)
+    return _directed(feeder, live)
 
 
 def _residuals(recording: Recording, feeder: Feeder) -> None:
@@ -100,10 +100,10 @@ def _residuals(recording: Recording, feeder: Feeder) -> None:
 
 def _lines_by_label(recording: Recording, feeder: Feeder) -> Feeder:
     """Voltages that their labels call line to line, put in the order AB, BC, CA."""
-    told = order([recording.channels[i] for i in feeder.voltages]) if len(feeder.voltages) == 3 else None
-    if not _to_ground(feeder) or told is None or not told[1]:
+    labels = order([recording.channels[i] for i in feeder.voltages]) if len(feeder.voltages) == 3 else None
+    if not _to_ground(feeder) or labels is None or not labels[1]:
         return feeder
-    voltages = tuple(feeder.voltages[told[0].index(k)] for k in range(3))
+    voltages = tuple(feeder.voltages[labels[0].index(k)] for k in range(3))
     names = ", ".join(f"'{recording.channels[i].name}'" for i in voltages)
     why = f"the voltages {names} are line to line, as their labels say: data.connection={_between(feeder)} is used"
     if backward([recording.channels[i] for i in voltages]):
@@ -122,9 +122,10 @@ def _between(feeder: Feeder) -> Any:
 
 
 def _lines(recording: Recording, feeder: Feeder) -> None:
-    """Refuse phase voltages where line-to-line ones are asked for."""
-    told, connection = order([recording.channels[i] for i in feeder.voltages]), chosen("connection", feeder.connection)
-    if not connection.lines or told is None or told[1]:
+    """Refuse phase voltages where the connection needs line-to-line ones."""
+    connection = chosen("connection", feeder.connection)
+    labels = order([recording.channels[i] for i in feeder.voltages])
+    if not connection.lines or labels is None or labels[1]:
         return
     names = ", ".join(f"{i} '{recording.channels[i].name}' [{recording.channels[i].unit}]" for i in feeder.voltages)
     raise UserError(
@@ -133,17 +134,17 @@ def _lines(recording: Recording, feeder: Feeder) -> None:
     )
 
 
-def _seen(recording: Recording, feeder: Feeder) -> _Seen | None:
+def _live_phasors(recording: Recording, feeder: Feeder) -> _LivePhasors | None:
     """The feeder's phasors while voltage and current are alive; None where they never are."""
     numbers = [*feeder.voltages, *feeder.currents]
-    made = snapshots(recording, numbers, frequency(recording, feeder.voltages))
-    if made is None:
+    windows = snapshots(recording, numbers, frequency(recording, feeder.voltages))
+    if windows is None:
         return None
     connection = chosen("connection", feeder.connection)
-    V = connection.voltage() @ made.of(feeder.voltages)
-    I = connection.current() @ made.of(feeder.currents) * (-1 if feeder.reverse_current else 1)
-    known = np.isfinite(V).all(axis=0) & np.isfinite(I).all(axis=0)
-    V, I = V[:, known], I[:, known]
+    V = connection.voltage() @ windows.of(feeder.voltages)
+    I = connection.current() @ windows.of(feeder.currents) * (-1 if feeder.reverse_current else 1)
+    valid = np.isfinite(V).all(axis=0) & np.isfinite(I).all(axis=0)
+    V, I = V[:, valid], I[:, valid]
     size, load = (np.linalg.norm(x, axis=0) for x in (V, I))
     if not V.shape[1] or size.max() == 0 or load.max() == 0:
         return None
@@ -154,23 +155,23 @@ def _seen(recording: Recording, feeder: Feeder) -> _Seen | None:
     even = np.ones(len(size), bool)
     if len(V) == 3:
         small, large = np.sort(np.abs(sequences(V)), axis=0)  # whatever the order is
-        even = found if (found := small < UNBALANCED * large).any() else even
+        even = small_share if (small_share := small < UNBALANCED * large).any() else even
     calm = np.zeros(len(size), bool)
     calm[even] = at_level(size[even], CALM)
-    return _Seen(V, I, calm)
+    return _LivePhasors(V, I, calm)
 
 
 def _zero(x: np.ndarray) -> np.ndarray:
     return np.abs(x.mean(axis=0))
 
 
-def _lines_by_shape(recording: Recording, feeder: Feeder, seen: _Seen) -> str:
+def _lines_by_shape(recording: Recording, feeder: Feeder, live: _LivePhasors) -> str:
     """Why three voltages must be line to line though no label says so; "" where nothing shows it."""
     used = f"they are line to line, and data.connection={_between(feeder)} is used"
-    V1, V2 = (np.abs(x) for x in sequences(seen.V))
-    I0, I1 = _zero(seen.I), np.median(np.abs(sequences(seen.I)[0])[seen.calm])
-    fault = (V2 > UNBALANCED * V1) & (I0 > EARTH * I1) & (5 * np.median(I0[seen.calm]) < I0)
-    if np.count_nonzero(fault) >= 2 and (_zero(seen.V)[fault] < ZERO * V2[fault]).all():
+    V1, V2 = (np.abs(x) for x in sequences(live.V))
+    I0, I1 = _zero(live.I), np.median(np.abs(sequences(live.I)[0])[live.calm])
+    fault = (V2 > UNBALANCED * V1) & (I0 > EARTH * I1) & (5 * np.median(I0[live.calm]) < I0)
+    if np.count_nonzero(fault) >= 2 and (_zero(live.V)[fault] < ZERO * V2[fault]).all():
         return f"the voltages add up to zero even in a fault to earth, where the currents do not: {used}"
     volts = {i: c for i, c in enumerate(recording.channels) if kind(c) == "voltage" and i not in feeder.voltages}
     for group in groups(volts):
@@ -182,10 +183,10 @@ def _lines_by_shape(recording: Recording, feeder: Feeder, seen: _Seen) -> str:
 
 def _root3(recording: Recording, ours: Sequence[int], theirs: Sequence[int]) -> bool:
     """Whether three voltages are the differences of three others."""
-    made = snapshots(recording, [*ours, *theirs])
-    if made is None:
+    windows = snapshots(recording, [*ours, *theirs])
+    if windows is None:
         return False
-    x, y = (sequences(made.of(numbers))[0] for numbers in (ours, theirs))
+    x, y = (sequences(windows.of(numbers))[0] for numbers in (ours, theirs))
     large = np.nan_to_num(np.abs(y)) > ALIVE * np.nanmax(np.abs(y), initial=0)
     if not large.any():
         return False
@@ -193,9 +194,9 @@ def _root3(recording: Recording, ours: Sequence[int], theirs: Sequence[int]) -> 
     return abs(np.abs(ratio) / np.sqrt(3) - 1) < ROOT3 and abs(np.degrees(np.angle(ratio)) - 30) < 3
 
 
-def _voltages(recording: Recording, feeder: Feeder, seen: _Seen) -> None:
+def _voltages(recording: Recording, feeder: Feeder, live: _LivePhasors) -> None:
     """Refuse voltages whose negative sequence exceeds the positive one while they are alive."""
-    V1, V2 = (float(np.median(np.abs(x)[seen.calm])) for x in sequences(seen.V))
+    V1, V2 = (float(np.median(np.abs(x)[live.calm])) for x in sequences(live.V))
     if UNEVEN * V1 < V2 <= V1:
         names = ", ".join(_called(recording, i) for i in feeder.voltages)
         raise UserError(
@@ -204,7 +205,7 @@ def _voltages(recording: Recording, feeder: Feeder, seen: _Seen) -> None:
         )
     if V2 <= V1:
         return
-    if _to_ground(feeder) and (k := _turned(seen.V[:, seen.calm])) is not None:
+    if _to_ground(feeder) and (k := _turned(live.V[:, live.calm])) is not None:
         raise UserError(f"data.voltages={[*feeder.voltages]}: {_called(recording, feeder.voltages[k])} {TURNED}")
     raise UserError(
         f"data.voltages={[*feeder.voltages]}: the phases are not in the order a, b, c: while alive, the negative "
@@ -233,15 +234,15 @@ def _turned(X: np.ndarray) -> int | None:
 
 
 def _said(voltages: Sequence[int] | None, currents: Sequence[int]) -> str:
-    made = f"data.currents=[{', '.join(map(str, currents))}]"
-    return made if voltages is None else f"data.voltages=[{', '.join(map(str, voltages))}] {made}"
+    currents_text = f"data.currents=[{', '.join(map(str, currents))}]"
+    return currents_text if voltages is None else f"data.voltages=[{', '.join(map(str, voltages))}] {currents_text}"
 
 
 def _called(recording: Recording, number: int) -> str:
     return f"channel {number} '{recording.channels[number].name}'"
 
 
-def _labels(recording: Recording, feeder: Feeder, seen: _Seen | None) -> None:
+def _labels(recording: Recording, feeder: Feeder, live: _LivePhasors | None) -> None:
     """Refuse currents that are labelled in another order than the voltages."""
     channels = recording.channels
     volts, amps = (order([channels[i] for i in each]) for each in (feeder.voltages, feeder.currents))
@@ -252,9 +253,9 @@ def _labels(recording: Recording, feeder: Feeder, seen: _Seen | None) -> None:
         return
     labelled = tuple(feeder.currents[c.index(k)] for k in v)
     both = ""
-    if seen is not None:
-        S, T = _power(seen, (0, 1, 2)), _power(seen, tuple(feeder.currents.index(i) for i in labelled))
-        both = f", which gives {_mw(T)} where the order given has {_mw(S)}"
+    if live is not None:
+        S, T = _power(live, (0, 1, 2)), _power(live, tuple(feeder.currents.index(i) for i in labelled))
+        both = f", which gives {_mw(T)} where the present order has {_mw(S)}"
     raise UserError(
         f"data.currents are the phases {_letters(c)} where data.voltages are {_letters(v)}, says {recording.source}; "
         f"give both in the same order: {_said(None, labelled)}{both}"
@@ -265,10 +266,10 @@ def _letters(places: Sequence[int]) -> str:
     return ", ".join("ABC"[k] for k in places)
 
 
-def _power(seen: _Seen, permutation: tuple[int, ...]) -> complex:
+def _power(live: _LivePhasors, permutation: tuple[int, ...]) -> complex:
     """P + jQ [MVA] in the calm state with the currents in another order."""
-    S = 3 * sequences(seen.V)[0] * sequences(seen.I[[*permutation]])[0].conj()
-    S = S[seen.calm]
+    S = 3 * sequences(live.V)[0] * sequences(live.I[[*permutation]])[0].conj()
+    S = S[live.calm]
     return complex(np.median(S.real), np.median(S.imag))
 
 
@@ -285,80 +286,80 @@ def _mw(S: complex) -> str:
     return f"P = {P:.3g} MW, Q = {Q:.3g} Mvar"
 
 
-def _currents(recording: Recording, feeder: Feeder, seen: _Seen) -> None:
+def _currents(recording: Recording, feeder: Feeder, live: _LivePhasors) -> None:
     """Refuse an order of the currents that is impossible, or that makes no sense where another does."""
-    I1, I2 = (float(np.median(np.abs(x)[seen.calm])) for x in sequences(seen.I))
-    S = _power(seen, (0, 1, 2))
+    I1, I2 = (float(np.median(np.abs(x)[live.calm])) for x in sequences(live.I))
+    S = _power(live, (0, 1, 2))
     if I2 > I1:
-        _negative(recording, feeder, seen, S, I2 / max(I1, 1e-12))
+        _negative(recording, feeder, live, S, I2 / max(I1, 1e-12))
         return
     labelled = [order([recording.channels[i] for i in each]) for each in (feeder.voltages, feeder.currents)]
     confirmed = None not in labelled
     middle = SENSIBLE < abs(_angle(S)) < BACKWARD and abs(abs(_angle(S)) - 90) > REACTIVE
     if confirmed or not middle or I2 > BALANCED * I1:
         return
-    better = [p for p in ((1, 2, 0), (2, 0, 1)) if _sensible(_power(seen, p)) and _answers(seen, p) >= 0]
+    better = [p for p in ((1, 2, 0), (2, 0, 1)) if _sensible(_power(live, p)) and _answers(live, p) >= 0]
     if len(better) == 1:
         _refuse(
-            feeder, seen, better[0], f"P and Q make no sense ({_mw(S)}): the currents are rotated against the voltages"
+            feeder, live, better[0], f"P and Q make no sense ({_mw(S)}): the currents are rotated against the voltages"
         )
 
 
-def _negative(recording: Recording, feeder: Feeder, seen: _Seen, S: complex, ratio: float) -> None:
+def _negative(recording: Recording, feeder: Feeder, live: _LivePhasors, S: complex, ratio: float) -> None:
     """Refuse currents of the opposite sequence where another order, or one turned round, is balanced."""
-    if (k := _turned(seen.I[:, seen.calm])) is not None:
+    if (k := _turned(live.I[:, live.calm])) is not None:
         raise UserError(f"data.currents={[*feeder.currents]}: {_called(recording, feeder.currents[k])} {TURNED}")
     tried = []
     for p in permutations(range(3)):
-        first, second = (float(np.median(np.abs(x)[seen.calm])) for x in sequences(seen.I[[*p]]))
+        first, second = (float(np.median(np.abs(x)[live.calm])) for x in sequences(live.I[[*p]]))
         if second < BALANCED * first:
             tried.append(p)
     if tried:
-        best = min(tried, key=lambda p: abs(_angle(_power(seen, p))))
+        best = min(tried, key=lambda p: abs(_angle(_power(live, p))))
         why = f"the currents' negative sequence is {ratio:.3g} times the positive one ({_mw(S)}): two are swapped"
-        _refuse(feeder, seen, best, why)
+        _refuse(feeder, live, best, why)
 
 
-def _refuse(feeder: Feeder, seen: _Seen, permutation: tuple[int, ...], why: str) -> None:
+def _refuse(feeder: Feeder, live: _LivePhasors, permutation: tuple[int, ...], why: str) -> None:
     proposal = tuple(feeder.currents[k] for k in permutation)
     raise UserError(
-        f"data.currents={[*feeder.currents]}: {why}; {_said(None, proposal)} gives {_mw(_power(seen, permutation))}"
+        f"data.currents={[*feeder.currents]}: {why}; {_said(None, proposal)} gives {_mw(_power(live, permutation))}"
     )
 
 
-def _answers(seen: _Seen, permutation: tuple[int, ...] = (0, 1, 2)) -> int:
+def _answers(live: _LivePhasors, permutation: tuple[int, ...] = (0, 1, 2)) -> int:
     """1 where the added I2 is what a passive load draws from the added V2, -1 where it is turned round, else 0."""
-    V2, I2 = sequences(seen.V)[1], sequences(seen.I[[*permutation]])[1]
-    V1 = np.abs(sequences(seen.V)[0])
-    V2, I2 = V2 * _still(seen), I2 * _still(seen)
-    dV, dI = V2 - np.median(V2[seen.calm]), I2 - np.median(I2[seen.calm])
-    known = np.abs(dV) > ADDED * np.median(V1)
-    most = np.abs(seen.I).max(axis=0)
-    if np.count_nonzero(known) < 2 or most[known].max() > FAULT * np.median(most[seen.calm]):
+    V2, I2 = sequences(live.V)[1], sequences(live.I[[*permutation]])[1]
+    V1 = np.abs(sequences(live.V)[0])
+    V2, I2 = V2 * _still(live), I2 * _still(live)
+    dV, dI = V2 - np.median(V2[live.calm]), I2 - np.median(I2[live.calm])
+    changed = np.abs(dV) > ADDED * np.median(V1)
+    most = np.abs(live.I).max(axis=0)
+    if np.count_nonzero(changed) < 2 or most[changed].max() > FAULT * np.median(most[live.calm]):
         return 0
-    Y = np.vdot(dV[known], dI[known])
+    Y = np.vdot(dV[changed], dI[changed])
     low, high = ANSWERS
     if low <= _angle(Y) <= high:
         return 1
     return -1 if low <= _angle(-Y) <= high else 0
 
 
-def _still(seen: _Seen) -> np.ndarray:
+def _still(live: _LivePhasors) -> np.ndarray:
     """What turns phasors so that V1 has angle zero: windows far apart can then be compared."""
-    V1 = sequences(seen.V)[0]
+    V1 = sequences(live.V)[0]
     return V1.conj() / np.maximum(np.abs(V1), 1e-12)
 
 
-def _directed(feeder: Feeder, seen: _Seen) -> Feeder:
+def _directed(feeder: Feeder, live: _LivePhasors) -> Feeder:
     """The feeder with a sentence on negative power, where it is."""
-    if len(seen.V) == 3:
-        V1, I1 = sequences(seen.V)[0], sequences(seen.I)[0]
-        polarity = _answers(seen)
+    if len(live.V) == 3:
+        V1, I1 = sequences(live.V)[0], sequences(live.I)[0]
+        polarity = _answers(live)
     else:
-        V1, I1, polarity = seen.V[0], seen.I[0], 0
-    S = len(seen.V) * V1 * I1.conj()
-    told = direction(np.abs(V1), S.real, S.imag, polarity, seen.calm)
-    if not told:
+        V1, I1, polarity = live.V[0], live.I[0], 0
+    S = len(live.V) * V1 * I1.conj()
+    reason = direction(np.abs(V1), S.real, S.imag, polarity, live.calm)
+    if not reason:
         return feeder
-    middle = complex(np.median(S[seen.calm].real), np.median(S[seen.calm].imag))
-    return replace(feeder, why=(*feeder.why, f"{_mw(middle)}: {told}"))
+    middle = complex(np.median(S[live.calm].real), np.median(S[live.calm].imag))
+    return replace(feeder, why=(*feeder.why, f"{_mw(middle)}: {reason}"))

@@ -1,4 +1,4 @@
-"""What a connection plugin must do: turn the channels that were recorded into the voltages and currents of a load."""
+"""The interface of connection plugins: the voltages and currents of a load from recorded channels."""
 
 from abc import abstractmethod
 from collections.abc import Mapping
@@ -47,12 +47,12 @@ class Connection(Plugin):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is said with every record that is connected so, one sentence each."""
+        """Notes for every record with this connection, one sentence each."""
         return (SINGLE,) if len(self.voltage()) == 1 else ()
 
 
 def usual(voltages: int, currents: int, lines: bool = False) -> Any:
-    """The connection that so many channels say, voltages between phases or to ground; None where none does."""
+    """The default connection of so many channels, voltages between phases or to ground; None where there is none."""
     for name, cls in sorted(discover()[Connection.group].items()):
         settings = getattr(cls, "usual", {}).get((voltages, currents, lines))
         if settings is not None:

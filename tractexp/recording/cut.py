@@ -15,7 +15,7 @@ def cut(recording: Recording, begin: float, end: float) -> Recording:
 
     Raises `UserError` where nothing was recorded then.
     """
-    kept: list[Segment] = []
+    segments: list[Segment] = []
     parts: list[slice] = []
     count = 0
     for segment in recording.segments:
@@ -23,17 +23,17 @@ def cut(recording: Recording, begin: float, end: float) -> Recording:
         first, stop = np.searchsorted(t, [begin - 1e-9, end + 1e-9]).tolist()
         if stop > first:
             parts.append(slice(segment.first + first, segment.first + stop))
-            kept.append(Segment(count, count + stop - first, segment.rate, float(t[first])))
+            segments.append(Segment(count, count + stop - first, segment.rate, float(t[first])))
             count += stop - first
-    if not kept:
+    if not segments:
         raise UserError(f"{recording.source}: nothing was recorded between {begin:.3f} and {end:.3f} s")
-    origin = kept[0].start
+    origin = segments[0].start
     trigger = None if recording.trigger is None else recording.trigger - origin
     return replace(
         recording,
         channels=[_part(channel, parts) for channel in recording.channels],
         status=[_part(status, parts) for status in recording.status],
-        segments=[replace(segment, start=segment.start - origin) for segment in kept],
+        segments=[replace(segment, start=segment.start - origin) for segment in segments],
         start=recording.start and recording.start + timedelta(seconds=origin),
         trigger=trigger if trigger is not None and 0 <= trigger <= end - origin else None,
         notes=[*recording.notes, f"cut from {recording.source}, {begin:.3f} to {end:.3f} s"],

@@ -1,4 +1,4 @@
-"""What an estimator plugin must do: say over what window phasors are averaged."""
+"""The interface of estimator plugins: the window over which phasors are averaged."""
 
 from abc import abstractmethod
 from typing import Any, ClassVar
@@ -9,7 +9,7 @@ from tractexp.plugin import Plugin, chosen, discover
 from tractexp.record.phasor import Averager, weighted
 from tractexp.record.window import Window
 
-SEEN = 1e-3  # s: spacing of the weights a record keeps, as phasors are a millisecond apart
+SPACING = 1e-3  # s between the weights that a record stores, as phasors are a millisecond apart
 
 
 class Estimator(Plugin):
@@ -22,15 +22,15 @@ class Estimator(Plugin):
 
     group: ClassVar[str] = "estimator"
     chosen: ClassVar[bool] = False
-    usual: ClassVar[bool] = False  # taken where none is asked for
+    usual: ClassVar[bool] = False  # taken where none is chosen
 
     @abstractmethod
     def half(self, nominal: float) -> float:
-        """Half of the window's length [s]. Raises `UserError` for a nominal frequency [Hz] it is not made for."""
+        """Half of the window's length [s]. Raises `UserError` for a nominal frequency [Hz] that it does not support."""
 
     @abstractmethod
     def weight(self, at: np.ndarray, nominal: float) -> np.ndarray:
-        """What counts at times (W,) [s] about the center, none further away than half; of any scale, symmetric."""
+        """Symmetric weights (W,), of any scale, at times (W,) [s] about the center, none further away than half."""
 
     def averager(self, rate: float, nominal: float) -> Averager:
         """The window on samples taken at `rate` [Hz]."""
@@ -38,14 +38,14 @@ class Estimator(Plugin):
         return weighted(self.weight(np.arange(-reach, reach + 1) / rate, nominal))
 
     def window(self, nominal: float) -> Window:
-        """What a record keeps of it, at the nominal frequency."""
+        """The window as a record stores it, at the nominal frequency."""
         half = self.half(nominal)
-        at = (np.arange(max(round(2 * half / SEEN), 2)) + 0.5) / max(round(2 * half / SEEN), 2) * 2 * half - half
+        at = (np.arange(max(round(2 * half / SPACING), 2)) + 0.5) / max(round(2 * half / SPACING), 2) * 2 * half - half
         weights = self.weight(at, nominal)
         return Window(self.name, at, weights / weights.sum())
 
 
-def estimator_of(given: Any = None) -> Estimator:
+def estimator_of(setting: Any = None) -> Estimator:
     """The estimator of a setting: a name, a mapping of name and settings, or None for the usual one."""
     usual = (name for name, cls in sorted(discover()[Estimator.group].items()) if getattr(cls, "usual", False))
-    return chosen(Estimator.group, next(usual) if given is None else given)
+    return chosen(Estimator.group, next(usual) if setting is None else setting)

@@ -1,7 +1,7 @@
 """Where a voltage leaves its sliding reference, and when it is back: IEC 61000-4-30, with finer thresholds.
 
-The standard's 10 % would hide dips that a load answers; here a voltage that leaves its reference by 3 % (positive
-sequence, what models are driven by) or 5 % (any phase, as for the standard's rapid voltage changes) has left.
+The standard's 10 % would hide dips that a load answers. Here an excursion is a deviation from the reference by 3 %
+(positive sequence, which drives the models) or 5 % (any phase, as for the standard's rapid voltage changes).
 Hysteresis 2 % of the reference as in the standard, which also gives the reference's time constant, a minute.
 """
 
@@ -30,9 +30,9 @@ class Excursion:
 
     start: int
     end: int
-    worst: float  # deviation of the positive sequence (or of the phase that made it one): negative for a fall
+    worst: float  # deviation of the positive sequence (or of the phase that crossed the limit): negative for a fall
     returned: bool  # to the reference
-    settled: bool  # at a new level
+    new_level: bool  # at a new level
     sudden: bool  # at its start
     reference: float  # positive sequence before
     dead: bool = False  # no voltage from the record's first sample on
@@ -45,12 +45,12 @@ def excursions(trace: Trace) -> list[Excursion]:
     if not levels.any() or len(trace.t) < 4:
         return []
     alive = levels.max(axis=0) > DEAD * np.percentile(levels.max(axis=0), 95)
-    found: list[Excursion] = []
+    events: list[Excursion] = []
     k = int(np.argmax(alive))
     count = max(2, round(REFERENCE / trace.step))
     if k > 0:
         k = min(k + round(2 * trace.cycle / trace.step), len(trace.t) - 1)
-        found.append(Excursion(0, k, -1.0, True, False, False, max(float(trace.U.max()), 1e-12), True))
+        events.append(Excursion(0, k, -1.0, True, False, False, max(float(trace.U.max()), 1e-12), True))
     reference = _reference(levels, k, count)
     share = 1 - np.exp(-trace.step / SLIDING)
     while k < len(trace.t):
@@ -59,14 +59,14 @@ def excursions(trace: Trace) -> list[Excursion]:
             reference = reference + share * (levels[:, k] - reference)
             k += 1
             continue
-        made = _one(trace, levels, limits, reference, k, found[-1].end if found else 0)
-        found.append(made)
-        if not made.returned and made.end < len(trace.t):
-            reference = _reference(levels, made.end, count)
-        k = made.end
-        if made.returned:
+        event = _one(trace, levels, limits, reference, k, events[-1].end if events else 0)
+        events.append(event)
+        if not event.returned and event.end < len(trace.t):
+            reference = _reference(levels, event.end, count)
+        k = event.end
+        if event.returned:
             k, reference = _after(trace, levels, limits, reference, k, count)
-    return found
+    return events
 
 
 def _levels(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
@@ -83,7 +83,7 @@ def _levels(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
 def _one(
     trace: Trace, levels: np.ndarray, limits: np.ndarray, reference: np.ndarray, k: int, earliest: int
 ) -> Excursion:
-    """The excursion that sample k has found."""
+    """The excursion to which sample k belongs."""
     off = levels[:, k:] / reference[:, None] - 1
     row = int(np.argmax(np.abs(off[:, 0]) / limits))
     side = np.sign(off[row, 0])
@@ -98,21 +98,21 @@ def _one(
     flat = _flat(levels, limits, k, trace.step)
     leaves = len(back) and (inside[back[0]] or flat is None or k + back[0] - flat < FLAT / trace.step)
     if leaves:
-        end, returned, settled = k + int(back[0]), True, False
+        end, returned, new_level = k + int(back[0]), True, False
     else:
         stop = k + int(back[0]) if len(back) else len(trace.t)
-        end, returned, settled = (flat, False, True) if flat is not None and flat < stop else (stop, False, False)
+        end, returned, new_level = (flat, False, True) if flat is not None and flat < stop else (stop, False, False)
     end = max(end, k + 1)
     whole = levels[:, start:end] / reference[:, None] - 1
     most = whole[0][np.argmax(np.abs(whole[0]))]
-    if settled:
+    if new_level:
         after = levels[0, end : end + max(2, round(REFERENCE / trace.step))]
         most = float(np.median(after)) / reference[0] - 1 if len(after) else most
     within = max(2, round(ABRUPT * trace.cycle / trace.step))
     sudden = _fastest(levels[row, max(start - 2, 0) : end + 1] / reference[row], within) > 0.5 * max(
         np.abs(whole[row]).max(), limits[row]
     )
-    return Excursion(start, end, float(most), returned, settled, bool(sudden), max(float(reference[0]), 1e-12))
+    return Excursion(start, end, float(most), returned, new_level, bool(sudden), max(float(reference[0]), 1e-12))
 
 
 def _onset(level: np.ndarray, reference: float, limit: float, k: int, earliest: int) -> int:

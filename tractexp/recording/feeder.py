@@ -31,17 +31,17 @@ class Feeder:
     connection: Any  # the plugin that makes phase quantities of them: a name, or name and settings
     reverse_current: bool = False  # the recorder counts current out of the load as positive
     name: str = ""
-    why: tuple[str, ...] = ()  # what it was recognised by, and what was changed in the order given, one sentence each
+    why: tuple[str, ...] = ()  # the evidence for it, and what was changed in the order, one sentence each
     loaded: bool = True
 
     @property
     def settings(self) -> dict[str, Any]:
         """The settings of a reader that reads this load."""
-        told: dict[str, Any] = {"voltages": list(self.voltages), "currents": list(self.currents)}
+        result: dict[str, Any] = {"voltages": list(self.voltages), "currents": list(self.currents)}
         counts = len(self.voltages), len(self.currents)
         if self.connection != usual(*counts, lines=counts[0] == 2):
-            told["connection"] = self.connection
-        return told | ({"reverse_current": True} if self.reverse_current else {})
+            result["connection"] = self.connection
+        return result | ({"reverse_current": True} if self.reverse_current else {})
 
 
 def propose(recording: Recording) -> list[Feeder]:
@@ -53,17 +53,18 @@ def propose(recording: Recording) -> list[Feeder]:
     volts = [i for i in waves if kind(waves[i]) == "voltage"]
     amps = [i for i in waves if kind(waves[i]) == "current"]
     f, strange = _frequency(recording, volts, amps)
-    seen = snapshots(recording, sorted(waves), f)
-    if not volts or not amps or seen is None:
+    phasors = snapshots(recording, sorted(waves), f)
+    if not volts or not amps or phasors is None:
         return []
-    buses = _groups(recording, seen, volts)
+    buses = _groups(recording, phasors, volts)
     three = any(len(bus.numbers) == 3 or bus.pairs for bus in buses)  # without them two currents are two feeders
-    loads = [g for g in _groups(recording, seen, amps) if len(g.numbers) == 3 or three]
-    feeders = [_feeder(recording, seen, load, buses) for load in loads if buses and _fits(load, buses)]
-    feeders += _single(recording, seen, volts, amps, [*buses, *loads])
-    feeders = _kirchhoff(seen, feeders)
-    level = max((_size(seen, f.currents) for f in feeders), default=0.0)
-    return sorted((_marked(recording, seen, feeder, level, strange) for feeder in feeders), key=lambda f: not f.loaded)
+    loads = [g for g in _groups(recording, phasors, amps) if len(g.numbers) == 3 or three]
+    feeders = [_feeder(recording, phasors, load, buses) for load in loads if buses and _fits(load, buses)]
+    feeders += _single(recording, phasors, volts, amps, [*buses, *loads])
+    feeders = _kirchhoff(phasors, feeders)
+    level = max((_size(phasors, f.currents) for f in feeders), default=0.0)
+    marked = (_marked(recording, phasors, feeder, level, strange) for feeder in feeders)
+    return sorted(marked, key=lambda f: not f.loaded)
 
 
 def _frequency(recording: Recording, volts: Sequence[int], amps: Sequence[int]) -> tuple[float, str]:
@@ -71,34 +72,34 @@ def _frequency(recording: Recording, volts: Sequence[int], amps: Sequence[int]) 
     f = frequency(recording, volts) or frequency(recording, amps)
     if f is None or nearest_nominal(f) is not None:
         return f or recording.frequency, ""
-    seen = snapshots(recording, volts, f)
-    turns = seen is not None and any(seen.pure(i) for i in volts)
+    phasors = snapshots(recording, volts, f)
+    turns = phasors is not None and any(phasors.pure(i) for i in volts)
     return recording.frequency, f"the voltages have {f:.3g} Hz, which is no network's" if turns else ""
 
 
-def _groups(recording: Recording, seen: Snapshots, numbers: Sequence[int]) -> list[Group]:
-    """Groups among the channels of one quantity: by label, and by magnitude and angle among those left."""
-    found = [
+def _groups(recording: Recording, phasors: Snapshots, numbers: Sequence[int]) -> list[Group]:
+    """Groups among the channels of one quantity: by label, and the rest by magnitude and angle."""
+    result = [
         g for g in groups({i: recording.channels[i] for i in numbers})
         if len(g.numbers) == 3 or g.pairs == (recording.channels[g.numbers[0]].quantity != "current")
     ]  # fmt: skip
-    found = [g for g in found if g.certain or all(seen.pure(i) for i in g.numbers)]
-    taken = {i for g in found for i in g.numbers}
-    left = [i for i in numbers if i not in taken and not residual(recording.channels[i]) and seen.pure(i)]
+    result = [g for g in result if g.certain or all(phasors.pure(i) for i in g.numbers)]
+    taken = {i for g in result for i in g.numbers}
+    free = [i for i in numbers if i not in taken and not residual(recording.channels[i]) and phasors.pure(i)]
     k = 0
-    while k + 3 <= len(left):
-        ordered = _symmetric(seen, left[k : k + 3])
+    while k + 3 <= len(free):
+        ordered = _symmetric(phasors, free[k : k + 3])
         if ordered:
-            found.append(Group(ordered, False, f"channels {', '.join(map(str, ordered))}", False))
+            result.append(Group(ordered, False, f"channels {', '.join(map(str, ordered))}", False))
             k += 3
         else:
             k += 1
-    return sorted(found, key=lambda g: g.numbers[0])
+    return sorted(result, key=lambda g: g.numbers[0])
 
 
-def _symmetric(seen: Snapshots, numbers: Sequence[int]) -> tuple[int, ...]:
+def _symmetric(phasors: Snapshots, numbers: Sequence[int]) -> tuple[int, ...]:
     """The three channels in the order a, b, c where their phasors are equal and 120 degrees apart; else ()."""
-    X = seen.of(numbers)
+    X = phasors.of(numbers)
     level = np.abs(X).mean(axis=0)
     if not np.isfinite(level).any() or np.nanmax(level) == 0:
         return ()
@@ -122,8 +123,8 @@ def _fits(load: Group, buses: Sequence[Group]) -> bool:
     return len(load.numbers) == 3 or any(len(bus.numbers) == 2 or not bus.pairs for bus in buses)
 
 
-def _feeder(recording: Recording, seen: Snapshots, load: Group, buses: Sequence[Group]) -> Feeder:
-    bus, why = _bus(recording, seen, load, buses)
+def _feeder(recording: Recording, phasors: Snapshots, load: Group, buses: Sequence[Group]) -> Feeder:
+    bus, why = _bus(recording, phasors, load, buses)
     voltages, connection = _connection(load, bus)
     said = [
         f"currents {_names(recording, load.numbers)}: {_by(load)}",
@@ -139,16 +140,18 @@ def _feeder(recording: Recording, seen: Snapshots, load: Group, buses: Sequence[
 def _connection(load: Group, bus: Group) -> tuple[tuple[int, ...], Any]:
     """(the voltages used, the connection that makes phase quantities of them)."""
     voltages = bus.numbers
-    made = usual(len(voltages), len(load.numbers), bus.pairs)
-    if made is None:  # three line-to-line voltages and two currents: two of them say the same
+    connection = usual(len(voltages), len(load.numbers), bus.pairs)
+    if connection is None:  # three line-to-line voltages and two currents: two of them say the same
         voltages = voltages[:2]
-        made = usual(2, len(load.numbers), bus.pairs)
-    settings: dict[str, Any] = {} if isinstance(made, str) else {**made}
+        connection = usual(2, len(load.numbers), bus.pairs)
+    settings: dict[str, Any] = {} if isinstance(connection, str) else {**connection}
     if load.missing not in (None, 1):
         settings["phases"] = "".join(p for k, p in enumerate("abc") if k != load.missing)
     if bus.missing not in (None, 2):
         settings["pairs"] = [pair for k, pair in enumerate(("ab", "bc", "ca")) if k != bus.missing]
-    return voltages, {"name": made, **settings} if isinstance(made, str) and settings else settings or made
+    if isinstance(connection, str) and settings:
+        return voltages, {"name": connection, **settings}
+    return voltages, settings or connection
 
 
 def _by(group: Group) -> str:
@@ -161,7 +164,7 @@ def _names(recording: Recording, numbers: Sequence[int]) -> str:
     return ", ".join(f"{i} '{recording.channels[i].name}'" for i in numbers)
 
 
-def _bus(recording: Recording, seen: Snapshots, load: Group, buses: Sequence[Group]) -> tuple[Group, str]:
+def _bus(recording: Recording, phasors: Snapshots, load: Group, buses: Sequence[Group]) -> tuple[Group, str]:
     """The voltages that a group of currents belongs to, and what says so."""
     if len(buses) == 1:
         return buses[0], "the only ones in the file"
@@ -176,26 +179,26 @@ def _bus(recording: Recording, seen: Snapshots, load: Group, buses: Sequence[Gro
     if len(ties) == 1:
         shared = sorted(w for w in texts[0] & texts[1 + buses.index(ties[0])] if common[own.index(w)] < len(buses))
         return ties[0], f"their names share '{' '.join(shared)}' with the currents'"
-    alive = [bus for bus in ties if _size(seen, bus.numbers) > 0.5 * max(_size(seen, b.numbers) for b in ties)]
-    apart = max(_apart(seen, a, b) for a, b in combinations(alive, 2)) if len(alive) > 1 else np.inf
+    alive = [bus for bus in ties if _size(phasors, bus.numbers) > 0.5 * max(_size(phasors, b.numbers) for b in ties)]
+    apart = max(_apart(phasors, a, b) for a, b in combinations(alive, 2)) if len(alive) > 1 else np.inf
     if len(alive) == 1:
         return alive[0], "the only ones alive"
     if apart < SAME_BUS:
         return alive[0], f"{len(alive)} groups of voltages differ by at most {100 * apart:.2g} %, the first is taken"
-    return min(alive, key=lambda bus: _stray(seen, bus, load)), "the currents follow these voltages best"
+    return min(alive, key=lambda bus: _stray(phasors, bus, load)), "the currents follow these voltages best"
 
 
 def _text(recording: Recording, group: Group) -> set[str]:
     channels = [recording.channels[i] for i in group.numbers]
-    made = set.intersection(*(words(f"{c.name} {c.circuit}") for c in channels)) - {"u", "v", "i"}
+    shared = set.intersection(*(words(f"{c.name} {c.circuit}") for c in channels)) - {"u", "v", "i"}
     if len(channels) == 1:  # a phase is a name of its own there: "Ia" goes with "Ua"
-        made |= {f"phase {word[1:]}" for word in made if word[0] in "uvi" and 1 < len(word) < 4}
-    return made
+        shared |= {f"phase {word[1:]}" for word in shared if word[0] in "uvi" and 1 < len(word) < 4}
+    return shared
 
 
-def _size(seen: Snapshots, numbers: Sequence[int]) -> float:
+def _size(phasors: Snapshots, numbers: Sequence[int]) -> float:
     """Magnitude [kV, kA] where it is large: the upper quartile of the mean over the channels."""
-    size = np.nan_to_num(np.abs(seen.of(numbers))).mean(axis=0)
+    size = np.nan_to_num(np.abs(phasors.of(numbers))).mean(axis=0)
     return float(np.percentile(size, 75)) if len(size) else 0.0
 
 
@@ -206,60 +209,60 @@ def _positive(X: np.ndarray, pairs: bool) -> np.ndarray:
     return (X[0] - TURN**2 * X[1]) / 3 if pairs else X[0]
 
 
-def _apart(seen: Snapshots, a: Group, b: Group) -> float:
+def _apart(phasors: Snapshots, a: Group, b: Group) -> float:
     """How far two groups of voltages differ at worst, as a share of the larger."""
-    x, y = (_positive(seen.of(g.numbers), g.pairs) for g in (a, b))
+    x, y = (_positive(phasors.of(g.numbers), g.pairs) for g in (a, b))
     return float(np.nanmax(np.abs(x - y)) / max(np.nanmax(np.abs(x)), 1e-12))
 
 
-def _stray(seen: Snapshots, bus: Group, load: Group) -> float:
-    """What of the currents is left when a constant admittance to these voltages is taken away."""
-    v, i = _positive(seen.of(bus.numbers), bus.pairs), _positive(seen.of(load.numbers), False)
-    known = np.isfinite(v) & np.isfinite(i)
-    v, i = v[known], i[known]
+def _stray(phasors: Snapshots, bus: Group, load: Group) -> float:
+    """Norm of the currents' residual about a constant admittance at these voltages."""
+    v, i = _positive(phasors.of(bus.numbers), bus.pairs), _positive(phasors.of(load.numbers), False)
+    valid = np.isfinite(v) & np.isfinite(i)
+    v, i = v[valid], i[valid]
     y = np.vdot(v, i) / max(float(np.vdot(v, v).real), 1e-12)
     return float(np.linalg.norm(i - y * v))
 
 
 def _single(
-    recording: Recording, seen: Snapshots, volts: Sequence[int], amps: Sequence[int], taken: Sequence[Group]
+    recording: Recording, phasors: Snapshots, volts: Sequence[int], amps: Sequence[int], taken: Sequence[Group]
 ) -> list[Feeder]:
     """Single-phase feeders among the channels no group has taken: each current with its voltage."""
     used = {i for group in taken for i in group.numbers}
-    free = [i for i in volts if i not in used and not residual(recording.channels[i]) and seen.pure(i)]
-    made = []
+    free = [i for i in volts if i not in used and not residual(recording.channels[i]) and phasors.pure(i)]
+    single = []
     for i in amps:
-        if i in used or residual(recording.channels[i]) or not free or not seen.pure(i):
+        if i in used or residual(recording.channels[i]) or not free or not phasors.pure(i):
             continue
         group = Group((i,), False, recording.channels[i].name.strip(), False)
-        bus, why = _bus(recording, seen, group, [Group((v,), False, "", False) for v in free])
+        bus, why = _bus(recording, phasors, group, [Group((v,), False, "", False) for v in free])
         said = (f"one current {_names(recording, [i])}", f"one voltage {_names(recording, bus.numbers)}: {why}")
-        made.append(Feeder(bus.numbers, (i,), usual(1, 1), name=group.name, why=said))
-    return made
+        single.append(Feeder(bus.numbers, (i,), usual(1, 1), name=group.name, why=said))
+    return single
 
 
-def _kirchhoff(seen: Snapshots, feeders: list[Feeder]) -> list[Feeder]:
-    """The feeders, with what the sum of their currents says of them: that it closes, or closes with one reversed.
+def _kirchhoff(phasors: Snapshots, feeders: list[Feeder]) -> list[Feeder]:
+    """The feeders, with a note where the sum of their currents is zero, as they are or with one reversed.
 
     The whole station first, then the feeders of each bus.
     """
     three = [k for k, f in enumerate(feeders) if len(f.currents) == 3]
-    level = max((_size(seen, feeders[k].currents) for k in three), default=0.0)
-    loaded = [k for k in three if _size(seen, feeders[k].currents) > UNLOADED * level]
-    if found := _closed(seen, feeders, loaded):
-        return _said(feeders, loaded, *found)
+    level = max((_size(phasors, feeders[k].currents) for k in three), default=0.0)
+    loaded = [k for k in three if _size(phasors, feeders[k].currents) > UNLOADED * level]
+    if closed := _closed(phasors, feeders, loaded):
+        return _said(feeders, loaded, *closed)
     for bus in sorted({feeders[k].voltages for k in loaded}):
         own = [k for k in loaded if feeders[k].voltages == bus]
-        if found := _closed(seen, feeders, own):
-            feeders = _said(feeders, own, *found)
+        if closed := _closed(phasors, feeders, own):
+            feeders = _said(feeders, own, *closed)
     return feeders
 
 
-def _closed(seen: Snapshots, feeders: list[Feeder], loaded: list[int]) -> tuple[np.ndarray, float] | None:
-    """(signs, what is left) of the simplest sum of three or more currents that closes; None where none does."""
+def _closed(phasors: Snapshots, feeders: list[Feeder], loaded: list[int]) -> tuple[np.ndarray, float] | None:
+    """(signs, residual) of the simplest sum of three or more currents that closes; None where none does."""
     if len(loaded) < 3:
         return None
-    X = np.array([seen.of(feeders[k].currents) for k in loaded])  # (F, 3, M)
+    X = np.array([phasors.of(feeders[k].currents) for k in loaded])  # (F, 3, M)
     X = X[:, :, np.isfinite(X).all(axis=(0, 1))]
     if not X.size:
         return None
@@ -282,7 +285,7 @@ def _closure(X: np.ndarray, signs: np.ndarray) -> float:
 
 
 def _said(feeders: list[Feeder], loaded: list[int], signs: np.ndarray, closes: float) -> list[Feeder]:
-    made = list(feeders)
+    marked = list(feeders)
     out = [feeders[k].name for k, s in zip(loaded, signs, strict=True) if s == 0]
     for k, sign in zip(loaded, signs, strict=True):
         said = f"the currents of {np.count_nonzero(signs)} feeders add up to {100 * closes:.2g} % of their magnitudes"
@@ -290,26 +293,26 @@ def _said(feeders: list[Feeder], loaded: list[int], signs: np.ndarray, closes: f
             said += f", without {' and '.join(out)}" + (": a bus tie, or one of another bus" if sign == 0 else "")
         if sign < 0:
             said += " once this one's polarity is reversed"
-        made[k] = replace(made[k], reverse_current=bool(sign < 0), why=(*made[k].why, said))
-    return made
+        marked[k] = replace(marked[k], reverse_current=bool(sign < 0), why=(*marked[k].why, said))
+    return marked
 
 
-def _dead(seen: Snapshots, numbers: Sequence[int]) -> bool:
+def _dead(phasors: Snapshots, numbers: Sequence[int]) -> bool:
     """Whether three voltages never turn as three phases do, in either order."""
     if len(numbers) < 3:
-        return not any(seen.pure(i) for i in numbers)
-    X = np.nan_to_num(seen.of(numbers))
-    rest = np.nan_to_num(seen.rest[[seen.numbers.index(i) for i in numbers]])
+        return not any(phasors.pure(i) for i in numbers)
+    X = np.nan_to_num(phasors.of(numbers))
+    rest = np.nan_to_num(phasors.rest[[phasors.numbers.index(i) for i in numbers]])
     size = np.sqrt((np.abs(X) ** 2 + rest**2).mean(axis=0))
     return not (np.abs(sequences(X)).max(axis=0) > SYSTEM * size).any()
 
 
-def _marked(recording: Recording, seen: Snapshots, feeder: Feeder, level: float, strange: str) -> Feeder:
-    """The feeder with a word on its load where it carries none."""
-    if _dead(seen, feeder.voltages):
+def _marked(recording: Recording, phasors: Snapshots, feeder: Feeder, level: float, strange: str) -> Feeder:
+    """The feeder, marked as unloaded where it carries no load."""
+    if _dead(phasors, feeder.voltages):
         why = strange or "the voltages are no three phases: the line is dead, or they were named otherwise"
         return replace(feeder, why=(*feeder.why, why), loaded=False)
-    size = _size(seen, feeder.currents)
+    size = _size(phasors, feeder.currents)
     step = max(abs(c.gain * c.ratio * c.factor) for c in (recording.channels[i] for i in feeder.currents))
     integral = all(recording.channels[i].raw.dtype.kind in "iu" for i in feeder.currents)
     if size > UNLOADED * level and not (integral and size < STEPS_LOADED * step):

@@ -62,7 +62,7 @@ def _happenings(trace: Trace) -> list[Happening]:
         return []
     if _no_system(trace):
         whole = Excursion(0, len(trace.t), -1.0, False, False, False, max(float(np.median(trace.U)), 1e-12), True)
-        return [replace(_told(trace, "dead line", whole, [whole]), why=NO_SYSTEM)]
+        return [replace(_describe(trace, "dead line", whole, [whole]), why=NO_SYSTEM)]
     slips = _pole_slips(trace)
     outside = [e for e in excursions(trace) if not any(_part(trace, e, slip) for slip in slips)]
     spans = [(kind, part) for e in outside for kind, part in _kinds(trace, e)]
@@ -70,7 +70,7 @@ def _happenings(trace: Trace) -> list[Happening]:
     spans += _open_alone(trace, spans)
     spans += [(kind, e) for kind, e in _inrush(trace) if not any(_part(trace, e, slip) for slip in slips)]
     spans.sort(key=lambda each: (each[1].start, each[1].end))
-    return [_told(trace, kind, e, [s for _, s in spans]) for kind, e in spans]
+    return [_describe(trace, kind, e, [s for _, s in spans]) for kind, e in spans]
 
 
 def _no_system(trace: Trace) -> bool:
@@ -87,18 +87,18 @@ def _part(trace: Trace, e: Excursion, slip: Excursion) -> bool:
 
 
 def _kinds(trace: Trace, e: Excursion) -> list[tuple[str, Excursion]]:
-    """What an excursion is; of a fault that leaves a pole open, both parts."""
+    """The kind of an excursion; two parts of a fault that leaves a pole open."""
     if e.dead or _all_dead(trace, e):
         return [("dead line" if e.dead or not e.returned else "interruption", e)]
     opened = _open(trace, e)
     if opened is not None:
         fault = replace(e, end=opened.start, cleared=False)
         return [("dip", fault), ("open pole", opened)] if fault.end - fault.start >= 3 else [("open pole", opened)]
-    if not e.returned and abs(e.worst) <= STEP_AT_MOST and e.settled:
+    if not e.returned and abs(e.worst) <= STEP_AT_MOST and e.new_level:
         return [("step" if e.sudden else "ramp", e)]
     if not e.sudden:
         return [("ramp", e)]
-    if not e.returned and e.settled and e.worst > 0:
+    if not e.returned and e.new_level and e.worst > 0:
         return [("step", e)]
     return [("dip" if e.worst < 0 else "swell", e)]
 
@@ -126,15 +126,15 @@ def _open(trace: Trace, e: Excursion) -> Excursion | None:
 def _open_runs(trace: Trace) -> list[tuple[int, int]]:
     """Spans in which exactly one of three currents is gone while the other two carry load as it did before."""
     carries = CARRIES * np.percentile(trace.I, 95)
-    found = []
+    runs = []
     for k in range(3):
         others = np.delete(trace.I, k, axis=0)
         gone = (trace.I[k] < OPEN_CURRENT * others.mean(axis=0)) & (others.min(axis=0) > carries)
-        found += [
+        runs += [
             run for run in _runs(gone, max(3, round(OPEN_CYCLES * trace.cycle / trace.step)))
             if run[0] >= 4 and (trace.I[k, : run[0]] > carries).any()
         ]  # fmt: skip
-    return sorted(found)
+    return sorted(runs)
 
 
 def _open_alone(trace: Trace, spans: list[tuple[str, Excursion]]) -> list[tuple[str, Excursion]]:
@@ -183,7 +183,7 @@ def _pole_slips(trace: Trace) -> list[Excursion]:
         return []
     lows = [k for k in _swings(U / level) if _smooth(U / level, k, trace)]
     lows = [k for k in lows if not trace.U2[k] > BALANCED * max(trace.U[k], level)]
-    found, first = [], 0
+    slips, first = [], 0
     while first < len(lows):
         last = first + 1
         while last < len(lows) and _even(trace.t[lows[first : last + 1]]):
@@ -191,11 +191,11 @@ def _pole_slips(trace: Trace) -> list[Excursion]:
         if last - first >= SWINGS:
             half = int(np.diff(lows[first:last]).max()) // 2
             a, b = max(lows[first] - half, 0), min(lows[last - 1] + half + 1, len(U))
-            if found and a - found[-1].end < 2 * half:
-                a = found.pop().start
-            found.append(Excursion(a, b, float(U[a:b].min() / level - 1), True, False, False, level))
+            if slips and a - slips[-1].end < 2 * half:
+                a = slips.pop().start
+            slips.append(Excursion(a, b, float(U[a:b].min() / level - 1), True, False, False, level))
         first = last
-    return found
+    return slips
 
 
 def _swings(u: np.ndarray) -> list[int]:
@@ -232,7 +232,7 @@ def _even(t: np.ndarray) -> bool:
     return bool(steps.min() >= low and steps.max() <= high and steps.max() <= EVEN * steps.min())
 
 
-def _told(trace: Trace, kind: str, e: Excursion, spans: list[Excursion]) -> Happening:
+def _describe(trace: Trace, kind: str, e: Excursion, spans: list[Excursion]) -> Happening:
     first = max((s.end for s in spans if s.end <= e.start), default=0)
     stop = min((s.start for s in spans if s.start >= e.end), default=len(trace.t))
     count = max(2, round(STEADY / trace.step))
@@ -241,7 +241,7 @@ def _told(trace: Trace, kind: str, e: Excursion, spans: list[Excursion]) -> Happ
     inside = slice(e.start, max(e.end, e.start + 1))
     edge = round(trace.cycle / trace.step)  # where a window holds two states, whose difference looks unbalanced
     U2 = trace.U2[inside][edge : -edge or None] if e.end - e.start > 3 * edge else trace.U2[inside]
-    depth = -e.worst if e.settled or e.dead else 1 - _extreme(trace.U[inside], e.worst) / e.reference
+    depth = -e.worst if e.new_level or e.dead else 1 - _extreme(trace.U[inside], e.worst) / e.reference
     last = min(e.end, len(trace.t) - 1)
     worth, why = _worth(trace, kind, e, depth, first, before)
     return Happening(
@@ -255,10 +255,10 @@ def _extreme(U: np.ndarray, side: float) -> float:
 
 
 def _power(trace: Trace, first: int, stop: int) -> tuple[float, float]:
-    """Mean P and Q; nan where there is nothing to take it of."""
+    """Mean P and Q; nan without samples."""
     P, Q = trace.P[first:stop], trace.Q[first:stop]
-    known = np.isfinite(P) & np.isfinite(Q)
-    return (float(P[known].mean()), float(Q[known].mean())) if known.any() else (float("nan"), float("nan"))
+    valid = np.isfinite(P) & np.isfinite(Q)
+    return (float(P[valid].mean()), float(Q[valid].mean())) if valid.any() else (float("nan"), float("nan"))
 
 
 def _worth(
@@ -280,12 +280,12 @@ def _worth(
     if not e.returned:
         return False, f"{size}, but the record ends before the voltage is back"
     if depth < SHALLOWEST:
-        return False, f"{size}: too little to tell a load's answer from its noise"
+        return False, f"{size}: too little to separate a load's answer from its noise"
     noise = len(trace.I) and not np.median(_clean(trace)[:, first : e.start], axis=1).any()
     if not np.isfinite(before[0]) or np.hypot(*before) == 0 or noise:
         return False, f"{size}, but no load current flows before it"
     if not e.sudden:
-        return False, f"{size}, but slowly: only the static part of the load can be told"
+        return False, f"{size}, but slowly: it determines only the static part of the load"
     if before[0] < 0:
         why = (
             "power is fed back, or the current is counted out of the load (then data.reverse_current=true makes it one)"
@@ -298,8 +298,8 @@ NO_SYSTEM = "the voltages are no three phases of this frequency: the line is dea
 NO_FIT = {
     "swell": "a swell: loads answer it, but the models here are fitted to dips",
     "interruption": "an interruption: without voltage there is no load to model, and what follows is a start-up",
-    "step": "the voltage stays at its new level: only the static part of the load can be told from it",
-    "ramp": "the voltage changes slowly: only the static part of the load can be told from it",
+    "step": "the voltage stays at its new level, which determines only the static part of the load",
+    "ramp": "the voltage changes slowly, which determines only the static part of the load",
     "open pole": "one phase is open: the unbalance is not that of a fault, and single-phase power decides",
     "dead line": "the line is dead: there is no voltage to draw a load from",
     "pole slip": "the voltage swings with machines that have lost synchronism: frequency and angle swing with it",

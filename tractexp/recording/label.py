@@ -1,6 +1,6 @@
 """What the names of channels say: which three (or two) belong together as phases, which one is residual.
 
-A name tells its phase by one mark: `Ia`, `UL1`, `VRS`. Three names that are equal but for that mark are a group, so
+One mark in a name stands for its phase: `Ia`, `UL1`, `VRS`. Three names equal but for that mark are a group, so that
 no list of naming schemes is needed: only the alphabets that number phases, and where in a name the mark may stand.
 """
 
@@ -39,7 +39,7 @@ class Group:
 
 
 def plain(text: str) -> str:
-    """Lower case, full-width and Roman characters and look-alike Cyrillic letters made Latin."""
+    """Lower case, full-width and Roman characters and look-alike Cyrillic letters as Latin ones."""
     return unicodedata.normalize("NFKC", text).strip().lower().translate(CYRILLIC)
 
 
@@ -56,14 +56,14 @@ def kind(channel: Channel) -> str:
         return channel.quantity if channel.quantity in ("voltage", "current") else ""
     if channel.unit.strip().lower() not in ("", "pu", "p.u.", "none"):
         return ""
-    found = re.search(r"(?<![a-z])(u|v|i)(?=[_ ]?(?:l?[123]|l?[abcrstuvwn]{1,2})(?![a-z]))", plain(channel.name))
-    return "" if found is None else "current" if found[1] == "i" else "voltage"
+    letter = re.search(r"(?<![a-z])(u|v|i)(?=[_ ]?(?:l?[123]|l?[abcrstuvwn]{1,2})(?![a-z]))", plain(channel.name))
+    return "" if letter is None else "current" if letter[1] == "i" else "voltage"
 
 
 def phase(channel: Channel) -> str:
     """The phase that a channel's label gives: one or two of a, b, c; "" where it gives none."""
-    told = re.sub(r"phase|[-_/ ]", "", plain(channel.phase))
-    for text in (told, told.removeprefix("l"), told[1:] if told[:1] in QUANTITY else ""):
+    label = re.sub(r"phase|[-_/ ]", "", plain(channel.phase))
+    for text in (label, label.removeprefix("l"), label[1:] if label[:1] in QUANTITY else ""):
         marks = [*text.replace("l", "")]
         for letters in ALPHABETS:
             if 1 <= len(marks) <= 2 and all(m in letters for m in marks) and len(set(marks)) == len(marks):
@@ -72,39 +72,39 @@ def phase(channel: Channel) -> str:
 
 
 def groups(channels: Mapping[int, Channel]) -> list[Group]:
-    """The groups among channels of one quantity, residual ones left aside, by their names and phases."""
-    left = {i: c for i, c in channels.items() if not residual(c)}
-    found: list[Group] = []
+    """The groups among channels of one quantity, without residual ones, by their names and phases."""
+    free = {i: c for i, c in channels.items() if not residual(c)}
+    result: list[Group] = []
     for full, counters in ((True, True), (False, True), (True, False), (False, False)):
         for size in (3, 2):
-            made = _by_name(left, full, counters, size)
-            found += made
-            left = {i: c for i, c in left.items() if not any(i in g.numbers for g in made)}
+            matches = _by_name(free, full, counters, size)
+            result += matches
+            free = {i: c for i, c in free.items() if not any(i in g.numbers for g in matches)}
     for size in (3, 2):
-        made = _by_column(left, size)
-        found += made
-        left = {i: c for i, c in left.items() if not any(i in g.numbers for g in made)}
-    return sorted(found, key=lambda g: g.numbers[0])
+        matches = _by_column(free, size)
+        result += matches
+        free = {i: c for i, c in free.items() if not any(i in g.numbers for g in matches)}
+    return sorted(result, key=lambda g: g.numbers[0])
 
 
 def order(channels: Sequence[Channel]) -> tuple[tuple[int, ...], bool] | None:
-    """Which phase (0, 1, 2) each channel is labelled as, and whether they are line to line; None: not told.
+    """Which phase (0, 1, 2) each channel is labelled as, and whether they are line to line; None: no label says.
 
     What the file's phases say comes first, then what the names share.
     """
-    told = [phase(c) for c in channels]
+    labels = [phase(c) for c in channels]
     for pairs, reading in ((False, "abc".find), (True, lambda mark: PLACE.get(mark, -1))):
-        places = tuple(reading(mark) for mark in told)
-        if all(len(mark) == 1 + pairs for mark in told) and len(set(places)) == len(places):
+        places = tuple(reading(mark) for mark in labels)
+        if all(len(mark) == 1 + pairs for mark in labels) and len(set(places)) == len(places):
             return places, pairs
     for counters in (True, False):
         texts = [plain(c.name) if counters else COUNTER.sub("", plain(c.name)) for c in channels]
         read = [{m[:3]: m[3:] for m in _marks(text)} for text in texts]
         shared = set.intersection(*(set(each) for each in read))
-        found = [(max(r[s][1] for r in read), tuple(r[s][0] for r in read), s[2]) for s in shared]
-        found = [each for each in found if len(set(each[1])) == len(channels)]
-        if found:
-            _, places, pairs = max(found)
+        readings = [(max(r[s][1] for r in read), tuple(r[s][0] for r in read), s[2]) for s in shared]
+        readings = [each for each in readings if len(set(each[1])) == len(channels)]
+        if readings:
+            _, places, pairs = max(readings)
             return places, pairs
     return None
 
@@ -124,10 +124,10 @@ def _by_name(channels: Mapping[int, Channel], full: bool, counters: bool, size: 
         for key, letters, pairs, place, score in _marks(text):
             label = (f"{key} {plain(channel.circuit)}" if full else key, letters, pairs)
             buckets[label][place].append(i)
-            told = phase(channel)
-            agrees = told == ("ab", "bc", "ca")[place] or told == "abc"[place]
-            worth[label] = max(worth[label], score + 4 * agrees - 4 * (bool(told) and not agrees and len(told) == 1))
-    made, used = [], set()
+            own = phase(channel)
+            agrees = own == ("ab", "bc", "ca")[place] or own == "abc"[place]
+            worth[label] = max(worth[label], score + 4 * agrees - 4 * (bool(own) and not agrees and len(own) == 1))
+    result, used = [], set()
     for label in sorted(buckets, key=lambda each: -worth[each]):
         places = buckets[label]
         if size == 2 and not _two_may_do(label, places):
@@ -139,8 +139,10 @@ def _by_name(channels: Mapping[int, Channel], full: bool, counters: bool, size: 
             missing = None if size == 3 else next(k for k in range(3) if numbers[k] is None)
             used |= set(have)
             pairs = label[2] or all(len(phase(channels[n])) == 2 for n in have)
-            made.append(Group(tuple(have), pairs, _shared([channels[n] for n in have]), worth[label] >= SURE, missing))
-    return made
+            result.append(
+                Group(tuple(have), pairs, _shared([channels[n] for n in have]), worth[label] >= SURE, missing)
+            )
+    return result
 
 
 def _two_may_do(label: tuple[str, str, bool], places: Mapping[int, list[int]]) -> bool:
@@ -155,15 +157,15 @@ def _marks(text: str) -> Iterable[tuple[str, str, bool, int, float]]:
         digits = letters == "123"
         one, word = f"[{letters}]", r"\d" if digits else "[a-z]"
         before = rf"(?:(?<!{word})|(?<=[{QUANTITY}l]))" if not digits else r"(?<!\d)"
-        for found in re.finditer(rf"{before}({one})[-_/ ]?l?({one})(?!{word}(?![ng]))", text):
-            x, y = letters.index(found[1]), letters.index(found[2])
-            if x != y and not (digits and not _quantity_before(text, found.start())):
+        for match in re.finditer(rf"{before}({one})[-_/ ]?l?({one})(?!{word}(?![ng]))", text):
+            x, y = letters.index(match[1]), letters.index(match[2])
+            if x != y and not (digits and not _quantity_before(text, match.start())):
                 place = PLACE["abc"[x] + "abc"[y]]
-                key = f"{text[: found.start()]}**{text[found.end() :]}"
+                key = f"{text[: match.start()]}**{text[match.end() :]}"
                 yield f"{key}{'-' if (y - x) % 3 == 2 else ''}", letters, True, place, 6.0 - 2 * digits
-        for found in re.finditer(rf"{before}({one})(?!{word}(?<![ng]))", text):
-            score = 3.0 * _quantity_before(text, found.start()) + 2 * (not digits)
-            yield f"{text[: found.start()]}*{text[found.end() :]}", letters, False, letters.index(found[1]), score
+        for match in re.finditer(rf"{before}({one})(?!{word}(?<![ng]))", text):
+            score = 3.0 * _quantity_before(text, match.start()) + 2 * (not digits)
+            yield f"{text[: match.start()]}*{text[match.end() :]}", letters, False, letters.index(match[1]), score
 
 
 def _quantity_before(text: str, at: int) -> bool:
@@ -175,18 +177,18 @@ def _by_column(channels: Mapping[int, Channel], size: int) -> list[Group]:
     """Groups by the file's phase column: in order, within a circuit."""
     rows: dict[tuple[str, bool], dict[int, list[int]]] = defaultdict(lambda: defaultdict(list))
     for i, channel in channels.items():
-        told = phase(channel)
-        if told:
-            place = "abc".index(told) if len(told) == 1 else PLACE[told]
-            rows[plain(channel.circuit), len(told) == 2][place].append(i)
-    made = []
+        mark = phase(channel)
+        if mark:
+            place = "abc".index(mark) if len(mark) == 1 else PLACE[mark]
+            rows[plain(channel.circuit), len(mark) == 2][place].append(i)
+    result = []
     for (_, pairs), places in rows.items():
         for numbers in zip_longest(*(places.get(k, []) for k in range(3))):
             have = tuple(n for n in numbers if n is not None)
             if len(have) == size:
                 missing = None if size == 3 else next(k for k in range(3) if numbers[k] is None)
-                made.append(Group(have, pairs, _shared([channels[n] for n in have]), False, missing))
-    return made
+                result.append(Group(have, pairs, _shared([channels[n] for n in have]), False, missing))
+    return result
 
 
 def _shared(channels: list[Channel]) -> str:
@@ -210,10 +212,10 @@ def _shared(channels: list[Channel]) -> str:
 
 
 def words(text: str) -> set[str]:
-    """What a name is made of, to be compared with another: words, numbers, single Chinese characters."""
+    """The parts of a name, to be compared with another: words, numbers, single Chinese characters."""
     text = plain(text)
-    found: set[str] = set(re.findall(r"[a-z]+|\d+|[^\W\d_a-z\u2e80-\u9fff]+|[\u2e80-\u9fff]", text))
-    found |= set(re.findall(r"\d+[^\W\d_\u2e80-\u9fff]+|[^\W\d_\u2e80-\u9fff]+\d+", text))  # "2СШ", "T1"
+    parts: set[str] = set(re.findall(r"[a-z]+|\d+|[^\W\d_a-z\u2e80-\u9fff]+|[\u2e80-\u9fff]", text))
+    parts |= set(re.findall(r"\d+[^\W\d_\u2e80-\u9fff]+|[^\W\d_\u2e80-\u9fff]+\d+", text))  # "2СШ", "T1"
     single = {"1", "5"} if re.search(r"[\u2e80-\u9fff][iv](?![a-z])", text) else set()  # "母线I"
-    made = {ROMAN.get(word, word) for word in found if len(word) > 1 or word not in ROMAN}
-    return made | {ROMAN[word] for word in found & {"i", "v"} if ROMAN[word] in single}
+    result = {ROMAN.get(word, word) for word in parts if len(word) > 1 or word not in ROMAN}
+    return result | {ROMAN[word] for word in parts & {"i", "v"} if ROMAN[word] in single}

@@ -46,9 +46,9 @@ class FeederWaves:
     def late(self) -> np.ndarray:
         """Time (2 K,) [s] by which each is sampled later than stamped.
 
-        Raises `UserError` where one is made of channels that differ in it.
+        Raises `UserError` where one combines channels that differ in it.
         """
-        made = []
+        delays = []
         for matrix, numbers in zip(self.matrices, (self.feeder.voltages, self.feeder.currents), strict=True):
             skew = np.array([self.recording.channels[i].skew for i in numbers])
             for row in matrix:
@@ -58,8 +58,8 @@ class FeederWaves:
                         f"data.skew=true: the channels {names} are sampled at different times, and the connection "
                         "needs them at once; leave data.skew out"
                     )
-                made.append(skew[row != 0][0])
-        return np.array(made)
+                delays.append(skew[row != 0][0])
+        return np.array(delays)
 
 
 def waves_of(recording: Recording, feeder: Feeder, segment: Segment) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""A file looked at without being told anything: which loads it shows, what happened to each, and what can be fitted."""
+"""What a file holds, without any setting: its loads, the events of each, and what can be fitted."""
 
 import functools
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,7 +10,7 @@ import numpy as np
 from tractexp.errors import UserError
 from tractexp.plugin import build
 from tractexp.record import Event, Record, detect, find_dips
-from tractexp.record.dips import Dip
+from tractexp.record.dips import FileDip
 from tractexp.record.phasor import Phasors
 from tractexp.recording.arrangement import arranged
 from tractexp.recording.feeder import Feeder, propose
@@ -20,16 +20,16 @@ from tractexp.recording.quality import Quality, quality
 from tractexp.recording.reader import WaveformReader
 from tractexp.recording.recording import Recording
 
-ALIVE = 0.5  # of the greatest voltage: what is less does not tell the frequency
+ALIVE = 0.5  # of the greatest voltage: at less the frequency is not measured
 APART = 0.06  # s: three cycles, within which what happened and the dip that is fitted begin
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What happened to a load, and what a reader makes of it."""
+class LoadEvent:
+    """One event of a load, and the record that a reader cuts out of it."""
 
     what: Happening
-    dip: int | None = None  # the number by which the reader knows it
+    dip: int | None = None  # its number in the reader
     event: Event | None = None  # what would be fitted
     why: str = ""  # what makes it (not) worth fitting, one sentence
 
@@ -44,31 +44,31 @@ class Sight:
     """One load that a file shows: its channels and their phasors by segment, or the record that the file is."""
 
     name: str
-    seen: tuple[Seen, ...] = ()
+    events: tuple[LoadEvent, ...] = ()
     feeder: Feeder | None = None
     phasors: tuple[Phasors, ...] = ()
     record: Record | None = None
-    said: tuple[str, ...] = ()  # what could not be told of it, one sentence each
+    said: tuple[str, ...] = ()  # why parts of it could not be analysed, one sentence each
     settings: Mapping[str, Any] = field(default_factory=dict)  # by which a reader reads it, without the dips
 
     @property
     def dips(self) -> list[int]:
         """The numbers of the dips that are worth fitting."""
-        return [s.dip for s in self.seen if s.worth and s.dip is not None]
+        return [s.dip for s in self.events if s.worth and s.dip is not None]
 
     def choice(self) -> dict[str, Any] | None:
         """The reader's settings that fit what is worth it, first dip first, others held out; None where nothing is."""
-        if not any(s.worth for s in self.seen):
+        if not any(s.worth for s in self.events):
             return None
         return {**self.settings, **({"train": self.dips[:1], "validate": self.dips[1:]} if self.dips else {})}
 
     @property
     def per_unit(self) -> bool:
-        """Whether nothing says what one per unit is: then U, P and Q are per unit, not in kV, MW and Mvar."""
+        """Whether U, P and Q are per unit of an unknown base, not in kV, MW and Mvar."""
         return self.record is not None and self.record.base.voltage == self.record.base.power == 1
 
     def powers(self) -> tuple[float, float, float] | None:
-        """Voltage [kV], P [MW] and Q [Mvar] at the beginning, before anything happened; None where nothing is known."""
+        """Voltage [kV], P [MW] and Q [Mvar] at the beginning, before the first event; None without measurements."""
         if self.record is not None:
             first, base = slice(0, max(1, self.record.samples // 20)), self.record.base
             U, P, Q = (float(np.nanmedian(v[first])) for v in (self.record.U, self.record.P, self.record.Q))
@@ -76,7 +76,7 @@ class Sight:
         if not self.phasors:
             return None
         p = self.phasors[0]
-        before = p.t < (self.seen[0].what.start if self.seen else np.inf)
+        before = p.t < (self.events[0].what.start if self.events else np.inf)
         first = slice(0, max(1, min(int(np.count_nonzero(before)), len(p.t))))
         return tuple(float(np.median(v[first])) for v in (p.U, np.real(p.S), np.imag(p.S)))  # type: ignore[return-value]
 
@@ -93,11 +93,11 @@ class View:
     @functools.cached_property
     def quality(self) -> list[Quality]:
         """What each channel is fit for."""
-        made = self.recording
-        if made is None:
+        recording = self.recording
+        if recording is None:
             return []
-        segment = max(made.segments, key=lambda s: s.rate)
-        return [quality(made, number, segment) for number in range(len(made.channels))]
+        segment = max(recording.segments, key=lambda s: s.rate)
+        return [quality(recording, number, segment) for number in range(len(recording.channels))]
 
     @property
     def frequency(self) -> float | None:
@@ -126,31 +126,31 @@ def view_of(source: str, node: Mapping[str, Any]) -> View:
 
 def overview(reader: WaveformReader, recording: Recording) -> list[Sight]:
     """The loads of a recording as they are proposed, each with what happened to it; `reader` is that of its file."""
-    found = propose(recording)
-    loaded = any(feeder.loaded for feeder in found)
-    made = []
-    for feeder in found:
+    feeders = propose(recording)
+    loaded = any(feeder.loaded for feeder in feeders)
+    sights = []
+    for feeder in feeders:
         said = ()
         try:
             feeder = arranged(recording, feeder)
         except UserError as error:
             said = (str(error),)
         shown = sight(reader, recording, feeder, events=feeder.loaded or not loaded)
-        made.append(replace(shown, said=(*said, *shown.said)))
-    return made
+        sights.append(replace(shown, said=(*said, *shown.said)))
+    return sights
 
 
 def sight(reader: WaveformReader, recording: Recording, feeder: Feeder, events: bool = True) -> Sight:
-    """One load of a recording, looked at. What cannot be told of it is said, and is no error.
+    """The view of one load of a recording. What cannot be analysed is noted in `said`, and raises nothing.
 
-    Without `events` what happened is not looked for: beside loads, what carries nothing tells of noise only.
+    Without `events` no event is sought: beside loaded feeders, an unloaded one shows noise only.
     """
-    phasors, found, said = [], [], []
-    made = Sight(feeder.name or "load", feeder=feeder, settings=feeder.settings)
+    phasors, changes, said = [], [], []
+    blank = Sight(feeder.name or "load", feeder=feeder, settings=feeder.settings)
     try:
         segments = recording.waveforms()
     except UserError as error:
-        return replace(made, said=(*said, str(error)))
+        return replace(blank, said=(*said, str(error)))
     for segment in segments:
         try:
             measured = phasors_of(recording, feeder, segment)
@@ -160,67 +160,69 @@ def sight(reader: WaveformReader, recording: Recording, feeder: Feeder, events: 
             continue
         phasors.append(measured)
         if events:
-            found += happenings(waves, segment.rate, segment.start, recording.frequency, measured)
+            changes += happenings(waves, segment.rate, segment.start, recording.frequency, measured)
     dips, refused = [], ""
     try:
-        dips = reader.dips(feeder, [(p, None) for p in phasors], recording.frequency) if found else []
+        dips = reader.dips(feeder, [(p, None) for p in phasors], recording.frequency) if changes else []
     except UserError as error:
         refused = str(error)
-    seen = _numbered(found, dips, reader.path, refused)
-    return replace(made, phasors=tuple(phasors), seen=tuple(seen), said=tuple(said))
+    numbered = _numbered(changes, dips, reader.path, refused)
+    return replace(blank, phasors=tuple(phasors), events=tuple(numbered), said=tuple(said))
 
 
-def sight_of(record: Record, dips: Sequence[Dip] | None = None) -> Sight:
+def sight_of(record: Record, dips: Sequence[FileDip] | None = None) -> Sight:
     """The load of a record, looked at; `dips` are those that a reader makes of it.
 
     Without them the record is what would be fitted, and its dips have no numbers.
     """
     power = record.base.power
-    found = [
+    changes = [
         replace(what, before=(power * what.before[0], power * what.before[1]),
                 after=(power * what.after[0], power * what.after[1]))
         for what in happenings_of(record)
     ]  # fmt: skip
-    seen = list(_numbered(found, _own(record) if dips is None else dips, record.source))
+    numbered = list(_numbered(changes, _own(record) if dips is None else dips, record.source))
     if dips is None:
-        seen = [replace(each, dip=None) for each in seen]
-    return Sight(record.name, tuple(seen), record=record)
+        numbered = [replace(each, dip=None) for each in numbered]
+    return Sight(record.name, tuple(numbered), record=record)
 
 
-def _own(record: Record) -> list[Dip]:
+def _own(record: Record) -> list[FileDip]:
     """The dips of a record that is fitted as it is: its first is the one that is meant."""
     later, t = UserError("another dip of the record comes first, and is the one that is fitted"), record.t
     return [
-        Dip(number, float(t[a]), float(t[min(b, record.samples - 1)]), record if number == 1 else later)
+        FileDip(number, float(t[a]), float(t[min(b, record.samples - 1)]), record if number == 1 else later)
         for number, (a, b) in enumerate(find_dips(t, record.U), 1)
     ]
 
 
-def _numbered(found: Sequence[Happening], dips: Sequence[Dip], source: str, refused: str = "") -> Iterator[Seen]:
-    """What happened, with the dip that the reader makes of it."""
-    tried = {dip.number: dip.made for dip in dips}
-    for what, number in zip(found, _numbers(found, dips), strict=True):
-        event, why = _event(tried.get(number) if number else None, refused)
+def _numbered(
+    changes: Sequence[Happening], dips: Sequence[FileDip], source: str, refused: str = ""
+) -> Iterator[LoadEvent]:
+    """The events, each with the dip that the reader cuts out of it."""
+    results = {dip.number: dip.result for dip in dips}
+    for what, number in zip(changes, _numbers(changes, dips), strict=True):
+        event, why = _event(results.get(number) if number else None, refused)
         if event is not None and abs(event.t_start - what.start) > APART:
             why, event = f"the reader's dip {number} begins at {event.t_start:.3f} s, with something else", None
-        yield Seen(what, number, event, _why(what, event, why.removeprefix(f"{source} dip {number}: ")))
+        yield LoadEvent(what, number, event, _why(what, event, why.removeprefix(f"{source} dip {number}: ")))
 
 
-def _event(made: Record | UserError | None, refused: str) -> tuple[Event | None, str]:
+def _event(result: Record | UserError | None, refused: str) -> tuple[Event | None, str]:
     """The event of a record, or why there is none."""
-    if not isinstance(made, Record):
-        return None, str(made or refused or "it is no dip")
+    if not isinstance(result, Record):
+        return None, str(result or refused or "it is no dip")
     try:
-        return detect(made), ""
+        return detect(result), ""
     except UserError as error:
         return None, str(error)
 
 
-def _numbers(found: Sequence[Happening], dips: Sequence[Dip]) -> list[int | None]:
+def _numbers(changes: Sequence[Happening], dips: Sequence[FileDip]) -> list[int | None]:
     """For each happening the dip, counted from 1, that shares more of its time with it than with any other."""
-    numbers: list[int | None] = [None] * len(found)
+    numbers: list[int | None] = [None] * len(changes)
     for dip in dips:
-        shared = [_common(what, dip.start, dip.end) for what in found]
+        shared = [_common(what, dip.start, dip.end) for what in changes]
         if shared and max(shared) > 0 and numbers[int(np.argmax(shared))] is None:
             numbers[int(np.argmax(shared))] = dip.number
     return numbers
@@ -232,5 +234,5 @@ def _common(what: Happening, start: float, end: float) -> float:
 
 
 def _why(what: Happening, event: Event | None, refused: str) -> str:
-    """What makes it (not) worth fitting: what happened, or that no record can be made of it."""
-    return what.why if event is not None or not what.worth else f"no record can be made of it: {refused}"
+    """What makes it (not) worth fitting: the event itself, or that it gives no record."""
+    return what.why if event is not None or not what.worth else f"it gives no record: {refused}"

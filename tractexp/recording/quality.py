@@ -14,12 +14,12 @@ FEW_CLIPPED = 1e-3  # of the samples: more is not fit for waves
 WHITE = 3.0  # standard errors that the lag-1 correlation of white noise stays within
 GAP = 1.5  # steps: time stamps farther apart leave a gap
 HARMONICS = 25  # as many as the rate allows are taken away to see the noise
-QUIET_CYCLES = 10  # whole cycles in which noise and distortion are told
+QUIET_CYCLES = 10  # whole cycles in which noise and distortion are estimated
 
 
 @dataclass(frozen=True)
 class Quality:
-    """What can be said of one channel in one segment. Sizes in kV, kA or the channel's own unit; nan: not told."""
+    """The quality of one channel in one segment. Sizes in kV, kA or the channel's own unit; nan: not available."""
 
     rate: float  # Hz
     jitter: float  # greatest deviation of a time stamp from a uniform grid, in steps; nan without time stamps
@@ -31,7 +31,7 @@ class Quality:
     level: float  # RMS of the fundamental in the quiet part
     noise: float  # standard deviation about fundamental and harmonics
     lag: float  # correlation of that noise with itself one sample later: 0 for white noise
-    colour: str  # white, coloured (neighbours alike), blue (neighbours opposite), or "" where it cannot be told
+    colour: str  # white, coloured (neighbours alike), blue (neighbours opposite), or "" where it is undecided
     thd: float  # of the harmonics up to the 25th over the fundamental
     fit: str  # what it is fit for, one sentence
 
@@ -40,10 +40,10 @@ def quality(recording: Recording, number: int, segment: Segment) -> Quality:
     """The quality of channel `number` in one segment of a recording."""
     channel = recording.channels[number]
     x = channel.values(segment.first, segment.stop)
-    known = np.isfinite(x)
+    valid = np.isfinite(x)
     jitter, holes = _stamps(recording, segment)
-    gaps = int(np.count_nonzero(~known)) + holes
-    step, span = _step(channel, x[known])
+    gaps = int(np.count_nonzero(~valid)) + holes
+    step, span = _step(channel, x[valid])
     f = _frequency(recording, number, segment)
     clipped = _clipped(channel, x, segment, f or recording.frequency, step)
     offset, level, noise, lag, count, thd = _quiet(x, segment.rate, f)
@@ -84,7 +84,7 @@ def _step(channel: Channel, x: np.ndarray) -> tuple[float, float]:
 
 
 def _clipped(channel: Channel, x: np.ndarray, segment: Segment, f: float, step: float) -> float:
-    """Share of samples in runs at a limit: the converter's where it is known, else the greatest and least value."""
+    """Share of samples in runs at a limit: the converter's where the file says it, else the extreme values."""
     if len(x) < 10 or not np.isfinite(x).any():
         return 0.0
     raw = np.asarray(channel.raw[segment.first : segment.stop], dtype=float)
@@ -123,9 +123,9 @@ def _quiet(x: np.ndarray, rate: float, f: float | None) -> tuple[float, float, f
     of its amplitude, so that neither a drift nor a frequency a little off passes for noise.
     """
     none = float("nan")
-    known = np.isfinite(x)
+    valid = np.isfinite(x)
     if f is None or rate < 2.5 * f:
-        rest = x[known]
+        rest = x[valid]
         return (float(rest.mean()) if len(rest) else none), none, none, none, 0, none
     n = min(round(QUIET_CYCLES * rate / f), len(x))
     if n < 2 * rate / f:
@@ -159,7 +159,7 @@ def _quietest(x: np.ndarray, n: int, cycle: int) -> int:
 
 
 def _colour(lag: float, count: int, noise: float, step: float) -> str:
-    """What the lag-1 correlation says, where there is more noise than the rounding of the converter."""
+    """The color of the noise by its lag-1 correlation, where there is more noise than the converter's rounding."""
     if not np.isfinite(lag) or count < 50 or noise <= 0.2 * step:
         return ""
     if abs(lag) * np.sqrt(count) < WHITE:
@@ -174,7 +174,7 @@ def _fit(segment: Segment, f: float | None, form: str, gaps: int, clipped: float
     if f is None or segment.rate < FEWEST_PER_CYCLE * f:
         return f"{segment.rate:g} Hz is no waveform: fit for magnitudes only"
     if not np.isfinite(level):
-        return "too short, or with too many gaps, for anything to be told"
+        return "too short, or with too many gaps, for any estimate"
     if level <= 2 * noise:
         return "carries no more than noise or rounding: no signal to fit"
     if gaps:
@@ -189,5 +189,5 @@ def _fit(segment: Segment, f: float | None, form: str, gaps: int, clipped: float
 def spectrum(wave: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies (M,) [Hz] and RMS values (M,) of a wave (N,), by a Hann window (a sinusoid is right at its peak)."""
     window = np.hanning(len(wave) + 1)[:-1]
-    made = np.fft.rfft((wave - wave.mean()) * window)
-    return np.fft.rfftfreq(len(wave), 1 / rate), np.sqrt(2) * np.abs(made) / window.sum()
+    lines = np.fft.rfft((wave - wave.mean()) * window)
+    return np.fft.rfftfreq(len(wave), 1 / rate), np.sqrt(2) * np.abs(lines) / window.sum()

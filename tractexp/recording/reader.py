@@ -11,7 +11,7 @@ from tractexp import plugin
 from tractexp.errors import UserError, check_range
 from tractexp.overrides import assigned
 from tractexp.record import Base, Events, Reader, Record, Waves, detect
-from tractexp.record.dips import Dip, check_numbers, chosen, level, numbered
+from tractexp.record.dips import FileDip, check_numbers, chosen, level, numbered
 from tractexp.record.phasor import Phasors
 from tractexp.record.record import LOAD
 from tractexp.recording.arrangement import arranged, tuned
@@ -24,7 +24,7 @@ from tractexp.recording.recording import Recording
 from tractexp.wording import counted
 
 Stream = tuple[Phasors, Waves | None]  # of one segment
-BESIDE = 2  # cycles of waveforms kept beside a record's phasors, for the windows of its first and last
+BESIDE = 2  # cycles of waveforms stored beside a record's phasors, for the windows of its first and last
 COUNT = {1: "one", 2: "two", 3: "three"}
 
 
@@ -40,10 +40,10 @@ class WaveformReader(Reader):
     harmonics: list[int] = field(default_factory=list)  # whose powers P_h, with THD_u and THD_i, the record holds
     train: list[int] | None = None  # dips to fit; null: the first that can be used
     validate: list[int] | None = None  # dips held out; null: every other one that can be used
-    pre: float = 1.0  # s kept before a dip starts, at most
-    post: float = 10.0  # s kept after a dip starts, at most
+    pre: float = 1.0  # s of the record before a dip starts, at most
+    post: float = 10.0  # s of the record after a dip starts, at most
     reverse_current: bool = False  # true where the recorder counts current out of the load as positive
-    skew: bool = False  # true: correct the time skew of each channel given in the file
+    skew: bool = False  # true: correct the time skew of each channel that the file states
 
     def opened(self) -> Recording:
         """The file, at the nominal frequency that its voltages really have."""
@@ -69,25 +69,25 @@ class WaveformReader(Reader):
         dips = self.dips(feeder, self._streams(recording, feeder), recording.frequency)
         events = chosen(self.path, dips, self.train, self.validate, self._notes(recording, feeder, dips))
         identity = _identity(recording, feeder)
-        train, validate = ([_kept(replace(r, identity=identity)) for r in g] for g in (events.train, events.validate))
-        return Events(train, validate)
+        groups = (events.train, events.validate)
+        return Events(*([_in_memory(replace(r, identity=identity)) for r in group] for group in groups))
 
-    def dips(self, feeder: Feeder, streams: Sequence[Stream], frequency: float) -> list[Dip]:
+    def dips(self, feeder: Feeder, streams: Sequence[Stream], frequency: float) -> list[FileDip]:
         """The dips of one load, on one base: voltage and apparent power before the first that can be used.
 
         Raises `UserError` where there is none, and where the load carries no power.
         """
         wholes = [self._whole(feeder, stream, frequency) for stream in streams]
-        made = numbered(wholes, self.path, self.pre, self.post)
-        if not made:
+        file_dips = numbered(wholes, self.path, self.pre, self.post)
+        if not file_dips:
             detect(max(wholes, key=lambda whole: whole.samples))  # raises, and says what there is instead
-        first = next((dip.made for dip in made if isinstance(dip.made, Record)), None)
+        first = next((dip.result for dip in file_dips if isinstance(dip.result, Record)), None)
         if first is None:
-            return made
+            return file_dips
         U, S = level(first)
         if S < 1e-6:
             raise UserError(f"{self.path}: data.currents carry no power before the first dip ({1e6 * S:.2g} VA)")
-        return [replace(dip, made=_per_unit(dip.made, Base(U, S, frequency, LOAD))) for dip in made]
+        return [replace(dip, result=_per_unit(dip.result, Base(U, S, frequency, LOAD))) for dip in file_dips]
 
     def _whole(self, feeder: Feeder, stream: Stream, frequency: float) -> Record:
         """All of one segment, in kV, MW and Mvar."""
@@ -109,74 +109,75 @@ class WaveformReader(Reader):
         )
 
     def feeder(self, recording: Recording) -> Feeder:
-        """The channels asked for, or those of the only load that the file shows."""
+        """The chosen channels, or those of the only load that the file shows."""
         if not (self.voltages or self.currents):
             return self._only(recording)
         name = self.connection or self._usual(recording)
-        connection, made = plugin.chosen("connection", name), {}
+        connection, numbers = plugin.chosen("connection", name), {}
         for key, wanted in (("voltages", connection.voltages), ("currents", connection.currents)):
-            given = getattr(self, key)
-            if len(given) != wanted:
+            channels = getattr(self, key)
+            if len(channels) != wanted:
                 raise UserError(
-                    f"data.{key}={[*given]} must name {COUNT[wanted]} channels (data.connection={connection.name}); "
+                    f"data.{key}={[*channels]} must name {COUNT[wanted]} channels (data.connection={connection.name}); "
                     f"{recording.source} has "
                     + ", ".join(f"{i} '{c.name}' [{c.unit}]" for i, c in enumerate(recording.channels))
                 )
-            made[key] = tuple(recording.number(each, f"data.{key}") for each in given)
-            if len(set(made[key])) < wanted:
-                raise UserError(f"data.{key}={[*given]} names a channel twice; {wanted} different ones are needed")
-            for i in made[key]:
+            numbers[key] = tuple(recording.number(each, f"data.{key}") for each in channels)
+            if len(set(numbers[key])) < wanted:
+                raise UserError(f"data.{key}={[*channels]} names a channel twice; {wanted} different ones are needed")
+            for i in numbers[key]:
                 if recording.channels[i].quantity not in (key.removesuffix("s"), ""):
                     raise UserError(
                         f"data.{key}: channel {i} '{recording.channels[i].name}' of {recording.source} is in "
                         f"{recording.channels[i].unit}; choose {key}"
                     )
-        return arranged(recording, Feeder(**made, connection=name, reverse_current=self.reverse_current))
+        return arranged(recording, Feeder(**numbers, connection=name, reverse_current=self.reverse_current))
 
     def _usual(self, recording: Recording) -> Any:
         """The connection that the number of channels says; two voltages to ground say none."""
         counts = len(self.voltages), len(self.currents)
         channels = [recording.channels[recording.number(each, "data.voltages")] for each in self.voltages]
-        told = order(channels) if counts[0] == 2 else None
-        two = counts[0] == 2 and not (told and not told[1])
+        labels = order(channels) if counts[0] == 2 else None
+        two = counts[0] == 2 and not (labels and not labels[1])
         return usual(*counts, lines=two) or usual(3, 3)
 
     def _only(self, recording: Recording) -> Feeder:
         """The only load that the file shows. Raises `UserError` naming all, where there is not one."""
-        found = [feeder for feeder in propose(recording) if feeder.loaded]
-        if len(found) == 1:
-            channels = ", ".join(recording.channels[i].name for i in (*found[0].voltages, *found[0].currents))
-            why = (f"channels chosen by themselves, for they are the only load in the file: {channels}", *found[0].why)
-            reverse = found[0].reverse_current != self.reverse_current
-            return arranged(recording, replace(found[0], reverse_current=reverse, why=why))
+        proposed = [feeder for feeder in propose(recording) if feeder.loaded]
+        if len(proposed) == 1:
+            (only,) = proposed
+            channels = ", ".join(recording.channels[i].name for i in (*only.voltages, *only.currents))
+            why = (f"channels chosen by themselves, for they are the only load in the file: {channels}", *only.why)
+            reverse = only.reverse_current != self.reverse_current
+            return arranged(recording, replace(only, reverse_current=reverse, why=why))
         every = ", ".join(f"{i} '{c.name}' [{c.unit}]" for i, c in enumerate(recording.channels))
         loads = "; ".join(
             f"{f.name}: {shlex.join(assigned(f'data.{key}', value) for key, value in f.settings.items())}"
-            for f in found
+            for f in proposed
         )
-        shown = f"{len(found)} loads; choose one: {loads}" if found else f"none by itself; its channels: {every}"
+        shown = f"{len(proposed)} loads; choose one: {loads}" if proposed else f"none by itself; its channels: {every}"
         raise UserError(f"data.voltages and data.currents are missing, and {recording.source} shows {shown}")
 
     def _streams(self, recording: Recording, feeder: Feeder) -> list[Stream]:
         """The phasors and the waves of each segment that holds waveforms."""
-        settings, made = (self.estimator, self.skew, self.harmonics), []
+        settings, streams = (self.estimator, self.skew, self.harmonics), []
         for segment in recording.waveforms():
             phasors = phasors_of(recording, feeder, segment, *settings)
             waves = FeederWaves.of(recording, feeder, segment)
             late = waves.late if self.skew else None
-            made.append((phasors, Waves(waves, segment.start, segment.rate, self.estimator, late)))
-        return made
+            streams.append((phasors, Waves(waves, segment.start, segment.rate, self.estimator, late)))
+        return streams
 
-    def _notes(self, recording: Recording, feeder: Feeder, dips: Sequence[Dip]) -> tuple[str, ...]:
+    def _notes(self, recording: Recording, feeder: Feeder, dips: Sequence[FileDip]) -> tuple[str, ...]:
         kind = estimator_of(self.estimator).name.replace("_", "-")
-        steps = [dip.made.step for dip in dips if isinstance(dip.made, Record)]
+        steps = [dip.result.step for dip in dips if isinstance(dip.result, Record)]
         every = f" every {1000 * steps[0]:.3g} ms" if steps else ""
-        notes = [f"{kind} phasors{every}, {counted(len(dips), 'dip')} found", *recording.notes, *feeder.why]
+        notes = [f"{kind} phasors{every}, {counted(len(dips), 'dip')}", *recording.notes, *feeder.why]
         fast = recording.waveforms()
         slow = [s for s in recording.segments if s not in fast]
         if slow:
             spans = ", ".join(f"{s.rate:g} Hz from {s.start:.3f} s" for s in slow)
-            notes.append(f"segments without waveform left out: {spans}")
+            notes.append(f"segments without waveform not used: {spans}")
         chosen = [recording.channels[i] for i in (*feeder.voltages, *feeder.currents)]
         if unknown := [channel for channel in chosen if not channel.quantity]:
             notes.append(f"unit '{unknown[0].unit}' of channel '{unknown[0].name}' taken as V or A")
@@ -188,12 +189,13 @@ class WaveformReader(Reader):
 
 def _identity(recording: Recording, feeder: Feeder) -> dict[str, str]:
     """Which load it is, as far as the file says."""
-    names = [", ".join(recording.channels[i].name.strip() for i in each) for each in (feeder.voltages, feeder.currents)]
-    told = {"station": recording.station, "device": recording.device, "load": feeder.name}
-    return {key: text for key, text in (told | dict(zip(("voltages", "currents"), names, strict=True))).items() if text}
+    fields = {"station": recording.station, "device": recording.device, "load": feeder.name}
+    for key, numbers in (("voltages", feeder.voltages), ("currents", feeder.currents)):
+        fields[key] = ", ".join(recording.channels[i].name.strip() for i in numbers)
+    return {key: text for key, text in fields.items() if text}
 
 
-def _kept(record: Record) -> Record:
+def _in_memory(record: Record) -> Record:
     """The record with its own waveforms in memory, and a window's length about them."""
     if record.waves is None:
         return record
@@ -201,11 +203,11 @@ def _kept(record: Record) -> Record:
     return replace(record, waves=record.waves.between(record.t[0] - about, record.t[-1] + about))
 
 
-def _per_unit(made: Record | UserError, base: Base) -> Record | UserError:
+def _per_unit(record: Record | UserError, base: Base) -> Record | UserError:
     """A record in kV, MW and Mvar on a base and checked, or why it cannot be used."""
-    if isinstance(made, UserError):
-        return made
+    if isinstance(record, UserError):
+        return record
     try:
-        return replace(made, base=base, more=base.per_unit(made.more), **base.per_unit(made.channels)).check()
+        return replace(record, base=base, more=base.per_unit(record.more), **base.per_unit(record.channels)).check()
     except UserError as error:
         return error

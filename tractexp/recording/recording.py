@@ -1,6 +1,6 @@
 """A file as its instrument recorded it: channels, sampling rates, times; primary values on demand.
 
-Readers of files make a `Recording` and nothing else; which channels make up a load, and what happened to it, is told
+Readers of files make a `Recording` and nothing else; which channels make up a load, and its events, follow
 from it (`feeder`, `happening`), whatever the format was.
 """
 
@@ -67,18 +67,18 @@ class Channel:
 
     def values(self, first: int = 0, stop: int | None = None) -> np.ndarray:
         """Primary values (M,) in kV, kA, MW, Mvar, Hz or rad (another quantity in its own unit); nan where missing."""
-        made = self.recorded(first, stop)
-        made *= self.ratio * self.factor
-        return made
+        primary = self.recorded(first, stop)
+        primary *= self.ratio * self.factor
+        return primary
 
     def recorded(self, first: int = 0, stop: int | None = None) -> np.ndarray:
         """Values (M,) in `unit`, on the side that was recorded; nan where missing."""
         raw = self.raw[first:stop]
         with np.errstate(invalid="ignore"):  # a damaged float may be a signalling nan
-            made = np.asarray(raw, dtype=np.float64) * self.gain + self.offset
+            values = np.asarray(raw, dtype=np.float64) * self.gain + self.offset
         if self.missing is not None:
-            made[raw == self.missing] = np.nan
-        return made
+            values[raw == self.missing] = np.nan
+        return values
 
     @property
     def factor(self) -> float:
@@ -155,11 +155,11 @@ class Recording:
 
     def matrix(self, numbers: Sequence[int], segment: Segment) -> np.ndarray:
         """Primary values (K, M) of channels within a segment; raises `UserError` where one is missing."""
-        made = np.empty((len(numbers), segment.stop - segment.first))
-        for row, number in zip(made, numbers, strict=True):
+        rows = np.empty((len(numbers), segment.stop - segment.first))
+        for row, number in zip(rows, numbers, strict=True):
             row[:] = self.channels[number].values(segment.first, segment.stop)
             if not np.isfinite(row).all():
                 i = segment.first + int(np.argmin(np.isfinite(row)))
                 name = self.channels[number].name
                 raise UserError(f"{self.source}: channel {number} '{name}' has no value at sample {i + 1}")
-        return made
+        return rows

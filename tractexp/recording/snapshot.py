@@ -1,4 +1,4 @@
-"""Phasors of many channels at once, one window of a cycle after another: enough to tell what a file holds."""
+"""Phasors of many channels at once, one window of a cycle after another: enough for an overview of a file."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -71,32 +71,32 @@ def _windows(recording: Recording, numbers: Sequence[int], segment: Segment, f: 
             blocks = channel.values(begin, begin + count * n).reshape(count, n)
         else:
             blocks = np.array([channel.values(begin + i, begin + i + n) for i in firsts])
-        found = blocks @ inverse.T  # (M, 3)
-        X[k] = found[:, 1] + 1j * found[:, 2]
-        rest[k] = np.sqrt(np.mean((blocks - found @ basis.T) ** 2, axis=1))
+        fitted = blocks @ inverse.T  # (M, 3)
+        X[k] = fitted[:, 1] + 1j * fitted[:, 2]
+        rest[k] = np.sqrt(np.mean((blocks - fitted @ basis.T) ** 2, axis=1))
     start = segment.start + firsts / segment.rate
     return start + (n - 1) / 2 / segment.rate, X * np.exp(-2j * np.pi * f * start), rest
 
 
 def frequency(recording: Recording, numbers: Sequence[int]) -> float | None:
-    """Frequency [Hz] measured on the largest of the channels while it is alive; None where none can be told.
+    """Frequency [Hz] measured on the largest of the channels while it is alive; None where none turns.
 
     The strongest line of its spectrum between 10 and 75 Hz, refined by how its phase turns from window to window.
     """
-    coarse = [made for s in recording.segments if (made := _line(recording, numbers, s)) is not None]
+    coarse = [line for s in recording.segments if (line := _line(recording, numbers, s)) is not None]
     if not coarse:
         return None
     at = max(coarse)[1]
-    seen = snapshots(recording, numbers, at)
-    if seen is None or seen.X.shape[1] < 3:
+    windows = snapshots(recording, numbers, at)
+    if windows is None or windows.X.shape[1] < 3:
         return at
-    X = np.nan_to_num(seen.X)
+    X = np.nan_to_num(windows.X)
     x = X[int(np.argmax(np.median(np.abs(X), axis=1)))]
     alive = np.abs(x) > 0.5 * np.abs(x).max()
-    pairs = alive[1:] & alive[:-1] & (np.diff(seen.t) < 1.5 * np.median(np.diff(seen.t)))
+    pairs = alive[1:] & alive[:-1] & (np.diff(windows.t) < 1.5 * np.median(np.diff(windows.t)))
     if np.count_nonzero(pairs) < 2:
         return at
-    turned = (np.angle(x[1:] * x[:-1].conj()) / np.diff(seen.t) / (2 * np.pi))[pairs]
+    turned = (np.angle(x[1:] * x[:-1].conj()) / np.diff(windows.t) / (2 * np.pi))[pairs]
     return at + float(np.median(turned))
 
 

@@ -8,21 +8,19 @@ import numpy as np
 from tractexp.record.phasor import Phasors, frame
 from tractexp.record.record import Record
 
-SETTLED = 1.0  # cycles about a jump left out when the frequency before it is told
-
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """What a feeder does, every half cycle. Voltages in the record's unit, one row per phase known."""
+    """The quantities of a feeder, every half cycle. Voltages in the unit of the record, one row per recorded phase."""
 
     t: np.ndarray  # (M,) s, centers of the windows
     U: np.ndarray  # (M,) positive sequence, phase to ground
-    phases: np.ndarray  # (K, M) RMS of each voltage; K = 0 where only U is known
-    U2: np.ndarray  # (M,) nan where it is not known
-    P: np.ndarray  # (M,) MW; nan where it is not known
+    phases: np.ndarray  # (K, M) RMS of each voltage; K = 0 where only U is recorded
+    U2: np.ndarray  # (M,) nan where it is not recorded
+    P: np.ndarray  # (M,) MW; nan where it is not recorded
     Q: np.ndarray  # (M,) Mvar
     f: np.ndarray  # (M,) Hz, at which the voltage turns
-    I: np.ndarray  # (K, M) RMS of each current's fundamental; K = 0 where none is known
+    I: np.ndarray  # (K, M) RMS of each current's fundamental; K = 0 where none is recorded
     second: np.ndarray  # (K, M) second harmonic of each current, RMS
     content: np.ndarray  # (K, M) RMS of each current about its mean: with all harmonics and noise
     cycle: float  # s, nominal
@@ -112,7 +110,7 @@ def _tracked(phasors: Phasors, nominal: float) -> np.ndarray:
 
 
 def _turning(t: np.ndarray, at: np.ndarray, f: np.ndarray) -> np.ndarray:
-    """The mean of f between the middles of the steps of t, so that its integral, the angle, is kept."""
+    """The mean of f between the middles of the steps of t, so that its integral, the angle, stays the same."""
     angle = np.concatenate([[0.0], np.cumsum((f[1:] + f[:-1]) / 2 * np.diff(at))])
     middles = np.concatenate([[t[0]], (t[1:] + t[:-1]) / 2, [t[-1]]])
     return np.diff(np.interp(middles, at, angle)) / np.diff(middles) if len(t) > 1 else f[:1]

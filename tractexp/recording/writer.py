@@ -1,4 +1,4 @@
-"""What a writer plugin must do: write a record or a recording in a format that a reader reads."""
+"""The interface of writer plugins: a record or a recording in a format that a reader reads."""
 
 from abc import abstractmethod
 from pathlib import Path
@@ -14,7 +14,7 @@ class Writer(Plugin):
 
     group: ClassVar[str] = "writer"
     chosen: ClassVar[bool] = False
-    endings: ClassVar[tuple[str, ...]] = ()  # of the files it writes, the one that a reader is given first
+    endings: ClassVar[tuple[str, ...]] = ()  # of the files it writes, first the one that a reader opens
     usual: ClassVar[bool] = False  # taken where none is named
     waves: ClassVar[bool] = False  # events of waveforms are written as the waveforms about them
 

@@ -218,7 +218,7 @@ def _marked(chart: Chart, shown: Sight) -> Chart:
     spans = [shown.record.t] if shown.record is not None else [p.t for p in shown.phasors]
     room = LABEL * float(spans[-1][-1] - spans[0][0])
     last = -np.inf
-    for seen in shown.seen:
+    for seen in shown.events:
         what = seen.what
         text = "" if what.start < last + room else what.kind if seen.dip is None else f"{what.kind} {seen.dip}"
         last = what.start if text else last
@@ -329,7 +329,7 @@ def _spectrum(recording: Recording, shown: Sight) -> Chart:
     segment = recording.waveforms()[0]
     whole = FeederWaves.of(recording, shown.feeder, segment)
     length = min(round(CYCLES * segment.rate / recording.frequency), whole.shape[1])
-    first = shown.seen[0].what.start - segment.start if shown.seen else np.inf
+    first = shown.events[0].what.start - segment.start if shown.events else np.inf
     quiet = int(np.clip(first * segment.rate, length, whole.shape[1]))
     waves = whole[:, quiet - length : quiet]
     K = len(waves) // 2
@@ -343,13 +343,13 @@ def _spectrum(recording: Recording, shown: Sight) -> Chart:
 
 def _details(made: Report, recording: Recording, shown: Sight) -> None:
     """A chart with every sample for each event, where the chart of the whole has not all of them."""
-    for seen in shown.seen[:DETAILED]:
+    for seen in shown.events[:DETAILED]:
         what = seen.what
         span = (what.start - AROUND[0], min(what.end, what.start + LONGEST) + AROUND[1])
         with made.folded(f"Every sample of the {what.kind} at {what.start:.3f} s"):
             made.chart(_of_waves(recording, shown, span=span), "As above, not thinned.")
-    if len(shown.seen) > DETAILED:
-        made.text(f"The {len(shown.seen) - DETAILED} events after the first {DETAILED} have no such chart.")
+    if len(shown.events) > DETAILED:
+        made.text(f"The {len(shown.events) - DETAILED} events after the first {DETAILED} have no such chart.")
 
 
 def _count(n: int, what: str) -> str:

@@ -90,7 +90,7 @@ def wave_chart(
 def _noise_bands(made: Chart, event: WaveEvent, deviation: np.ndarray, around: np.ndarray) -> None:
     """Where noise alone would let a sample lie: about each phase's current and, the widest of them, about zero."""
     t = event.record.t[event.lead :]
-    known = np.array(event.known)[:, None]
+    known = np.array(event.compared)[:, None]
     half = WITHIN * np.sqrt(event.of_phases(np.eye(3)) ** 2 @ (deviation * known) ** 2)[:, event.lead :]
     middle, name = event.of_phases(around)[:, event.lead :], f"± {WITHIN:g} σ of the noise"
     for k in range(event.phases):
@@ -135,7 +135,7 @@ def spectra(event: WaveEvent, currents: np.ndarray) -> tuple[Spectrum, Spectrum]
 
     Unweighted, the squares of all of it add up to the residual's energy, a decay at its beginning included.
     """
-    known = np.array(event.known)[:, None]
+    known = np.array(event.compared)[:, None]
     left = event.of_phases((np.nan_to_num(event.currents) - currents) * known)
     cycle = event.rate / event.f0
     after = min(AFTER * event.rate, left.shape[1] - event.start)
@@ -181,7 +181,7 @@ def _prepared(fit: Fit) -> str:
     event: Any = fit.waves
     cycles = (event.start - event.lead) * event.f0 / event.rate
     volts, amperes = np.abs(event.offsets[: event.phases]).max(), np.abs(event.offsets[event.phases :]).max()
-    zero = "" if event.phases == 1 else " Zero sequence is " + ("" if event.known[2] else "not ") + "compared."
+    zero = "" if event.phases == 1 else " Zero sequence is " + ("" if event.compared[2] else "not ") + "compared."
     return (
         f"{event.record.name}: {event.f0:.3f} Hz, {cycles:.1f} cycles before the dip; offsets of up to"
         f" {1000 * volts:.3g} V and {1000 * amperes:.3g} A taken off.{zero} The periodic voltage before the dip is"

@@ -16,7 +16,7 @@ from tractexp.cli.chosen import given
 from tractexp.errors import UserError
 from tractexp.sweep import identity
 from tractexp.sweep.status import FAILED, FINISHED, RUNNING, Status
-from tractexp.tracking.swept import parent_of
+from tractexp.tracking.sweepfile import parent_of
 
 OUTPUT, TRACEBACK = "output.txt", "traceback.txt"
 
@@ -68,7 +68,7 @@ def work(job: SweepJob) -> Status:
     _prepare(job)
     job.status.write(job.folder)
     started = time.perf_counter()
-    output = files.Said(job.folder / OUTPUT)
+    output = files.Transcript(job.folder / OUTPUT)
     with output, contextlib.redirect_stdout(output), contextlib.redirect_stderr(output):
         message = _run(job)
     status = FAILED if message else FINISHED

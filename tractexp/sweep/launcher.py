@@ -11,7 +11,7 @@ from typing import Any
 from hydra.core.utils import JobReturn, JobStatus
 from hydra.plugins.launcher import Launcher
 
-from tractexp.doors.hydra_plugins import NAMESPACE
+from tractexp.compat.hydra_plugins import NAMESPACE
 from tractexp.errors import UserError, check_choice, check_range
 from tractexp.sweep import status
 from tractexp.sweep.compose import Composer

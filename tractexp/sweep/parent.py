@@ -11,7 +11,7 @@ from tractexp.errors import UserError
 from tractexp.files import write_json
 from tractexp.progress import say
 from tractexp.sweep.status import FAILED, FINISHED, INTERRUPTED, objective, read
-from tractexp.tracking.swept import FILE, parent_of
+from tractexp.tracking.sweepfile import FILE, parent_of
 
 
 @contextmanager
@@ -61,14 +61,14 @@ def _opened(folder: Path, run: Any, uri: str, afresh: bool) -> str | None:
 def _closed(folder: Path, run: Any, run_id: str | None, uri: str) -> None:
     """Close the parent run, and send what could not be sent before; what still cannot be is kept."""
     from tractexp import tracking
-    from tractexp.tracking.kept import keep
+    from tractexp.tracking.runfile import save
     from tractexp.tracking.sync import NOT, sync, waiting
 
     try:
-        kept = keep(folder, run, uri, sweep=True)
+        entry = save(folder, run, uri, sweep=True)
         if run_id is not None:
             tracking.finish_parent(run_id, uri, run.status, run.metrics)
-            kept.logged(run_id)
+            entry.logged(run_id)
     except UserError as error:
         say(f"not logged: {error}")
     left = waiting(folder)

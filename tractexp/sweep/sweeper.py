@@ -21,7 +21,7 @@ from tractexp import files
 from tractexp.api.task import Job
 from tractexp.blocks import Table
 from tractexp.cli.chosen import refuse_unread
-from tractexp.doors.hydra_plugins import NAMESPACE
+from tractexp.compat.hydra_plugins import NAMESPACE
 from tractexp.errors import Stopped, UserError
 from tractexp.plugin import build, get
 from tractexp.progress import say

@@ -31,8 +31,8 @@ def contract(package: str, samples: Mapping[str, Sequence[Mapping[str, Any]]] | 
     for base, without, checks in SUITES:
         chosen = [cls for cls in members if issubclass(cls, base) and not issubclass(cls, without)]
         for check in checks if chosen else ():
-            given = functools.partial(check, samples=samples or {}) if base is readers.Reader else check
-            tests[f"test_{base.__name__.lower()}_{check.__name__}"] = _test(given, check.__doc__, chosen)
+            test = functools.partial(check, samples=samples or {}) if base is readers.Reader else check
+            tests[f"test_{base.__name__.lower()}_{check.__name__}"] = _test(test, check.__doc__, chosen)
     return type("Contract", (), tests)
 
 
@@ -40,8 +40,8 @@ def plugins_of(package: str) -> list[type[Plugin]]:
     """The plugin classes in a package, in order of group and name."""
     discover()
     import_all([importlib.import_module(package)])
-    known = (cls for _, classes in sorted(discover().items()) for _, cls in sorted(classes.items()))
-    return [cls for cls in known if cls.__module__.startswith(package + ".")]
+    members = (cls for _, classes in sorted(discover().items()) for _, cls in sorted(classes.items()))
+    return [cls for cls in members if cls.__module__.startswith(package + ".")]
 
 
 def _test(check: Callable[..., None], about: str | None, members: Sequence[type[Plugin]]) -> Callable[..., None]:

@@ -12,9 +12,9 @@ EXACT = 1e-6
 
 
 def makes_three_phases_or_one(cls: type[Connection]) -> None:
-    """Voltages and currents are as many, three or one, each made of at least one channel by finite numbers."""
-    made = cls()
-    V, I = made.voltage(), made.current()
+    """Voltages and currents are as many, three or one, each combines at least one channel with finite factors."""
+    connection = cls()
+    V, I = connection.voltage(), connection.current()
     assert len(V) == len(I), f"'{cls.name}' makes {len(V)} voltages and {len(I)} currents; they must be as many"
     assert len(V) in (1, 3), f"'{cls.name}' makes {len(V)} voltages: a load has three phases or one"
     for what, matrix in (("voltage", V), ("current", I)):
@@ -23,7 +23,7 @@ def makes_three_phases_or_one(cls: type[Connection]) -> None:
 
 
 def is_exact_in_steady_state(cls: type[Estimator]) -> None:
-    """The phasor of a steady sinusoid of known frequency is that sinusoid's."""
+    """The phasor of a steady sinusoid is exact where its frequency is given."""
     over = cls().averager(RATE, NOMINAL)
     count = 2 * over.reach + 200
     x = np.sqrt(2) * np.cos(2 * np.pi * F / RATE * np.arange(count) + 0.7)
@@ -34,8 +34,8 @@ def is_exact_in_steady_state(cls: type[Estimator]) -> None:
 
 def keeps_a_window_of_sum_one_about_its_center(cls: type[Estimator]) -> None:
     """The window a record keeps has weights of sum 1, symmetric about the time stamp, within its length."""
-    made = cls()
-    window, half = made.window(NOMINAL), made.half(NOMINAL)
+    estimator = cls()
+    window, half = estimator.window(NOMINAL), estimator.half(NOMINAL)
     assert np.isclose(window.weights.sum(), 1), f"the weights of '{cls.name}' have the sum {window.weights.sum():g}"
     middle = float(window.weights @ window.at)
     assert abs(middle) < 1e-9, f"the window of '{cls.name}' has its center {1000 * middle:.3g} ms off its stamp"

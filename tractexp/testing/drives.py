@@ -40,8 +40,8 @@ def wave_flat(voltage: float = 0.97, rate: float = 3200.0, samples: int = 640) -
 
 def drive(*depths: float, domain: str = "", power: float = 1.0) -> Drive:
     """Dips of these depths, end to end; `power` is how many times P0 and Q0 are drawn before each."""
-    made = wave_dip if domain == WAVES else dip
-    return Drive.of([replace(one, P0=power * P0, Q0=power * Q0) for one in map(made, depths)])
+    shape = wave_dip if domain == WAVES else dip
+    return Drive.of([replace(one, P0=power * P0, Q0=power * Q0) for one in map(shape, depths)])
 
 
 def _waves(v: np.ndarray, v_zero: np.ndarray, theta: np.ndarray, rate: float) -> Waveforms:

@@ -137,7 +137,7 @@ def _shown(of: Model, drive: Drive, outputs: np.ndarray) -> np.ndarray:
 
 
 def says_what_it_is(cls: type[Part]) -> None:
-    """The docstring has equations, their source and what departs from it; every parameter is told and bounded."""
+    """The docstring has equations, their source and what departs from it; parameters have units and bounds."""
     text = cls.__doc__ or ""
     assert "=" in text or "->" in text, f"the docstring of '{cls.name}' has no equation: no line with '=' or '->'"
     for needed in ("Source:", "Departures:"):
@@ -242,12 +242,12 @@ def takes_or_refuses_every_effect(cls: type[Part]) -> None:
 def has_sizes_that_matter(cls: type[Effect]) -> None:
     """Its sizes start at their null, and it says from where each matters and what looks like it."""
     sizes = [p for p in cls.parameters if p.null is not None]
-    known = discover()["effect"]
+    effects = discover()["effect"]
     for p in sizes:
         assert p.default == p.null, f"the size {p.name} of '{cls.name}' starts at {p.default:g}, not at its null"
         assert p.name in cls.relevant, f"'{cls.name}' does not say in 'relevant' from where its size {p.name} matters"
     for name in cls.confused_with:
-        others = known.keys() - {cls.name}
+        others = effects.keys() - {cls.name}
         assert name in others, f"'{cls.name}' is confused with '{name}', no other effect{among(name, others)}"
 
 
@@ -268,11 +268,11 @@ def acts_where_it_says(cls: type[Effect]) -> None:
 
 def belongs_to_its_family(cls: type[Effect]) -> None:
     """A member of a family names a textbook effect of its kind, says what differs, and nests it where it says so."""
-    known = discover()["effect"]
+    effects = discover()["effect"]
     if not cls.family:
         return
-    assert cls.family in known, f"'{cls.name}' belongs to '{cls.family}', no effect{among(cls.family, known)}"
-    textbook = known[cls.family]
+    assert cls.family in effects, f"'{cls.name}' belongs to '{cls.family}', no effect{among(cls.family, effects)}"
+    textbook = effects[cls.family]
     assert issubclass(textbook, Effect)
     assert not textbook.family, f"'{cls.name}' belongs to '{cls.family}', which is itself a member of a family"
     assert textbook.kind == cls.kind, f"'{cls.name}' is a {cls.kind}, and '{cls.family}' a {textbook.kind}"
@@ -300,7 +300,7 @@ def is_the_base_model_at_its_null(cls: type[Effect]) -> None:
     assert off < SAME, f"at its null '{cls.name}' is {off:.2g} pu away from the base model"
 
 
-def is_seen_in_a_dip(cls: type[Effect]) -> None:
+def shows_in_a_dip(cls: type[Effect]) -> None:
     """Each size has a derivative at its null, and the size that matters changes the response of a dip."""
     of, own = with_part(cls), cls()
     drive = drives.drive(0.6, domain=of.domain)
@@ -345,7 +345,7 @@ EQUATIONS: tuple[Check, ...] = (prints_its_equations, rests, converges_in_order_
 PARTS: tuple[Check, ...] = (*EVERY, *EQUATIONS, composes_with_every_other, takes_or_refuses_every_effect)
 EFFECTS: tuple[Check, ...] = (
     *EVERY, acts_where_it_says, belongs_to_its_family, has_sizes_that_matter, is_the_base_model_at_its_null,
-    is_seen_in_a_dip, is_taken_or_refused_by_every_model,
+    shows_in_a_dip, is_taken_or_refused_by_every_model,
 )  # fmt: skip
 SUITES: Sequence[tuple[type, tuple[type, ...], tuple[Check, ...]]] = (
     (Motor, (), PARTS),

@@ -27,7 +27,7 @@ class Bowl:
 
 
 class Noted(Bowl):
-    """The same, with every batch kept."""
+    """The same, which also stores every batch."""
 
     def __init__(self) -> None:
         self.batches: list[np.ndarray] = []
@@ -47,17 +47,17 @@ def says_what_it_is(cls: type[Optimizer]) -> None:
 def gives_the_same_bits_for_the_same_seed(cls: type[Optimizer]) -> None:
     """All randomness comes from `rng`: one seed, one history."""
     one, two = _run(cls, Bowl(), 7), _run(cls, Bowl(), 7)
-    for kept in ("simulations", "objective", "values"):
-        same = np.array_equal(getattr(one.history, kept), getattr(two.history, kept))
-        assert same, f"'{cls.name}' gives another history of {kept} for the same seed"
+    for name in ("simulations", "objective", "values"):
+        same = np.array_equal(getattr(one.history, name), getattr(two.history, name))
+        assert same, f"'{cls.name}' gives another history of {name} for the same seed"
 
 
 def stays_in_the_box_and_ends_at_the_budget(cls: type[Optimizer]) -> None:
     """What is evaluated lies in the bounds, no more often than the budget says."""
     problem = Noted()
-    found = _run(cls, problem, 3)
+    result = _run(cls, problem, 3)
     points = np.concatenate(problem.batches)
-    assert len(points) == found.simulations <= BUDGET, f"'{cls.name}' spent {len(points)} of {BUDGET} simulations"
+    assert len(points) == result.simulations <= BUDGET, f"'{cls.name}' spent {len(points)} of {BUDGET} simulations"
     assert ((points >= Bowl.lower) & (points <= Bowl.upper)).all(), f"'{cls.name}' was evaluated outside the bounds"
 
 
@@ -90,10 +90,10 @@ def finds_the_bottom_of_a_bowl(cls: type[Optimizer]) -> None:
     """After the budget it is well below the best of its first batch, in either space."""
     for space in ("unit", "raw"):
         problem = Noted()
-        found = _run(cls, problem, 11, space)
+        result = _run(cls, problem, 11, space)
         first = Bowl().objective(problem.batches[0]).min()
-        assert found.objective <= BETTER * first, (
-            f"'{cls.name}' ends at {found.objective:.3g} after a start of {first:.3g}"
+        assert result.objective <= BETTER * first, (
+            f"'{cls.name}' ends at {result.objective:.3g} after a start of {first:.3g}"
         )
 
 

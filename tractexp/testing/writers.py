@@ -19,15 +19,15 @@ RECORD = Record(
 
 
 def writes_a_record_that_is_read_again(cls: type[Writer]) -> None:
-    """A record is written into the files told, and a reader that takes them gives its numbers back."""
+    """A record is written into the files returned, and a reader that takes them gives its numbers back."""
     with tempfile.TemporaryDirectory() as folder:
         files = _written(cls, lambda: cls().record(RECORD, Path(folder, f"dip{cls.endings[0]}")))
         if not files or files[0].suffix not in endings():
             return
-        found = reader_of(str(files[0]))
-        if issubclass(found, WaveformReader):
+        reader = reader_of(str(files[0]))
+        if issubclass(reader, WaveformReader):
             return  # a format of waveforms, which holds U, P, Q as channels
-        (again,) = build("data", {"name": found.name, **found.of(str(files[0]))}).read().train
+        (again,) = build("data", {"name": reader.name, **reader.of(str(files[0]))}).read().train
         for name, values in RECORD.channels.items():
             off = np.abs(again.channels[name] - values).max()
             assert off < 1e-9, f"'{cls.name}' writes {name} that is read {off:.2g} off"
@@ -39,20 +39,20 @@ def writes_a_recording_that_is_read_again(cls: type[Writer]) -> None:
     names = ("Ua", "Ub", "Uc", "Ia", "Ib", "Ic")
     raw = [np.round(30000 * np.cos(2 * np.pi * (50 * t - k / 3))).astype(np.int16) for k in range(6)]
     kinds = [("kV", "voltage")] * 3 + [("kA", "current")] * 3
-    made = [
+    channels = [
         Channel(n, x, *kind, "ABC"[k % 3], gain=1e-3)
         for k, (n, x, kind) in enumerate(zip(names, raw, kinds, strict=True))
     ]
-    whole = Recording("made", made, [Segment(0, len(t), 4000.0, 0.0)])
+    whole = Recording("test", channels, [Segment(0, len(t), 4000.0, 0.0)])
     with tempfile.TemporaryDirectory() as folder:
         files = _written(cls, lambda: cls().recording(whole, Path(folder, f"all{cls.endings[0]}")))
         if not files or files[0].suffix not in endings():
             return
-        found = reader_of(str(files[0]))
-        assert issubclass(found, WaveformReader), (
-            f"'{cls.name}' writes a recording that '{found.name}' takes for a table"
+        reader = reader_of(str(files[0]))
+        assert issubclass(reader, WaveformReader), (
+            f"'{cls.name}' writes a recording that '{reader.name}' takes for a table"
         )
-        again = build("data", {"name": found.name, **found.of(str(files[0]))}).recording()
+        again = build("data", {"name": reader.name, **reader.of(str(files[0]))}).recording()
         for one, other in zip(whole.channels, again.channels, strict=True):
             assert one.name == other.name, f"'{cls.name}' writes channel {one.name}, which is read as {other.name}"
             off = np.abs(one.values() - other.values()).max()
@@ -67,7 +67,7 @@ def _written(cls: type[Writer], write: Callable[[], list[Path]]) -> list[Path]:
     except UserError:
         return []  # a format of one kind alone refuses the other
     for file in files:
-        assert file.is_file(), f"'{cls.name}' tells of {file.name}, which is not there"
+        assert file.is_file(), f"'{cls.name}' names {file.name}, which is not there"
         assert file.suffix in cls.endings, f"'{cls.name}' writes {file.name}, and its endings are {cls.endings}"
     return files
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import UserError, among
+from tractexp.tracking.owner import search
 from tractexp.tracking.store import open_store, sentences
 
-PAGE = 1000  # runs asked for at a time
 CURVES = ("fitness_by_simulations",)
 FILES = ("result.json", "history.csv")
 
@@ -42,7 +42,7 @@ def find(uri: str, filter: str, experiment: str | None = None, curves: tuple[str
     """
     client = open_store(uri)
     with sentences(uri):
-        names = {found.experiment_id: found.name for found in client.search_experiments()}
+        names = {one.experiment_id: one.name for one in client.search_experiments()}
     if experiment is not None:
         chosen = [key for key, name in names.items() if name == experiment]
         if not chosen:
@@ -58,22 +58,16 @@ def find(uri: str, filter: str, experiment: str | None = None, curves: tuple[str
 def _search(client: Any, experiments: list[str], filter: str) -> list[Any]:
     from mlflow.exceptions import MlflowException
 
-    runs, token = [], None
-    while True:
-        try:
-            page = client.search_runs(experiments, filter, max_results=PAGE, order_by=["start_time"], page_token=token)
-        except MlflowException as error:
-            if error.error_code != "INVALID_PARAMETER_VALUE":
-                raise
-            reason = str(error).strip().partition("\n")[0]
-            raise UserError(
-                f"task.filter={filter} is not a filter that MLflow understands ({reason}); one is "
-                "\"tags.data = 'tibet_50pct' and tags.optimizer = 'issa'\""
-            ) from error
-        runs += page
-        token = page.token
-        if not token:
-            return runs
+    try:
+        return search(client, experiments, filter, ("start_time",))
+    except MlflowException as error:
+        if error.error_code != "INVALID_PARAMETER_VALUE":
+            raise
+        reason = str(error).strip().partition("\n")[0]
+        raise UserError(
+            f"task.filter={filter} is not a filter that MLflow understands ({reason}); one is "
+            "\"tags.data = 'tibet_50pct' and tags.optimizer = 'issa'\""
+        ) from error
 
 
 def _logged(client: Any, run: Any, experiment: str, curves: tuple[str, ...]) -> Logged:
@@ -88,12 +82,12 @@ def _files(client: Any, run_id: str) -> dict[str, str]:
     """Artifacts lie by absolute path, so those of a folder that was moved are missing."""
     from mlflow.exceptions import MlflowException
 
-    found = {}
+    texts = {}
     with tempfile.TemporaryDirectory() as folder:
         for name in FILES:
             with contextlib.suppress(MlflowException, OSError, ValueError):
-                found[name] = Path(client.download_artifacts(run_id, name, folder)).read_text(encoding="utf-8")
-    return found
+                texts[name] = Path(client.download_artifacts(run_id, name, folder)).read_text(encoding="utf-8")
+    return texts
 
 
 def _curve(client: Any, run_id: str, name: str) -> tuple[np.ndarray, np.ndarray]:

@@ -22,7 +22,7 @@ def log_model(client: Any, run_id: str, result: Path, name: str = "model") -> st
     """Log the model of the file `result` under a run, with an open `MlflowClient`, and return the model id.
 
     `mlflow.pyfunc.log_model` is not used: it lists every file of every installed package (0.4 s) to find
-    requirements that are known here.
+    requirements that this module has at hand.
     """
     from mlflow.entities import LoggedModelOutput
 

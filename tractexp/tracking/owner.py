@@ -1,4 +1,4 @@
-"""Which process writes a run: from that another one tells whether a run that says it is running still is."""
+"""The process that writes a run, so that another process can decide whether a run marked as running still is."""
 
 import contextlib
 import functools
@@ -8,19 +8,19 @@ from pathlib import Path
 from typing import Any
 
 TAG = "tractexp.process"
-PAGE = 1000  # runs asked for at a time
+PAGE = 1000  # runs a query
 closed: list[str] = []  # runs that this process has closed where it opened a store
 
 
 @functools.cache
 def _machine() -> tuple[str, str, str]:
-    """This computer, since when it runs, and which processes it sees; "-" where that is not told."""
+    """This computer, its boot, and its namespace of processes; "-" where the system does not say."""
     number, boot = (_read(Path(path))[:12] for path in ("/etc/machine-id", "/proc/sys/kernel/random/boot_id"))
     try:
-        seen = os.readlink("/proc/self/ns/pid")
+        namespace = os.readlink("/proc/self/ns/pid")
     except OSError:
-        seen = "-"
-    return f"{socket.gethostname()}/{number}".replace(" ", "_"), boot, seen
+        namespace = "-"
+    return f"{socket.gethostname()}/{number}".replace(" ", "_"), boot, namespace
 
 
 def _read(path: Path) -> str:
@@ -31,7 +31,7 @@ def _read(path: Path) -> str:
 
 
 def _begun(pid: int) -> str:
-    """When a process began, in the system's own count; "" where there is none, "-" where it cannot be told."""
+    """When a process began, in the system's own count; "" where there is none, "-" where the system does not say."""
     if os.name == "nt":
         return "-"
     try:
@@ -40,10 +40,10 @@ def _begun(pid: int) -> str:
         return ""
     except OSError:
         return "-"
-    told = _read(Path(f"/proc/{pid}/stat")).rpartition(")")[2].split()
-    if told and told[0] in "ZX":
+    status = _read(Path(f"/proc/{pid}/stat")).rpartition(")")[2].split()
+    if status and status[0] in "ZX":
         return ""
-    return told[19] if len(told) > 19 else "-"
+    return status[19] if len(status) > 19 else "-"
 
 
 def signature() -> str:
@@ -51,9 +51,9 @@ def signature() -> str:
     return " ".join([*_machine(), str(os.getpid()), _begun(os.getpid())])
 
 
-def gone(told: str) -> bool | None:
-    """Whether the process of a signature has ended; None where that cannot be told from here."""
-    parts = told.split()
+def gone(tag: str) -> bool | None:
+    """Whether the process of a signature has ended; None where this computer cannot decide."""
+    parts = tag.split()
     if len(parts) != 5 or parts[0] != _machine()[0]:
         return None
     if parts[1] != _machine()[1]:
@@ -74,18 +74,22 @@ def close_stale(client: Any) -> list[str]:
 
 def running(client: Any) -> list[Any]:
     """All runs that say they are running."""
-    experiments = [found.experiment_id for found in client.search_experiments()]
-    found, token = [], None
-    while experiments:
-        page = client.search_runs(experiments, "attributes.status = 'RUNNING'", max_results=PAGE, page_token=token)
-        found += page
+    experiments = [experiment.experiment_id for experiment in client.search_experiments()]
+    return search(client, experiments, "attributes.status = 'RUNNING'") if experiments else []
+
+
+def search(client: Any, experiments: list[str], filter: str, order: tuple[str, ...] = ()) -> list[Any]:
+    """All runs of some experiments that match MLflow's `filter`, page by page."""
+    runs, token = [], None
+    while True:
+        page = client.search_runs(experiments, filter, max_results=PAGE, order_by=[*order], page_token=token)
+        runs += page
         token = page.token
         if not token:
-            break
-    return found
+            return runs
 
 
 def close_quietly(client: Any) -> None:
-    """As `close_stale`, where something else is to be done: a store that refuses tells so then."""
+    """As `close_stale`, but errors are ignored: the next use of the store raises them."""
     with contextlib.suppress(Exception):
         closed.extend(close_stale(client))

@@ -2,7 +2,7 @@
 
 Importing MLflow and opening the store take two seconds, and in a thread they would hold up the job by as much
 (measured). In a process of their own they cost a job that takes as long next to nothing, if they begin when the command
-does: before the configuration is composed, and long before anything is known to be worth logging. For a single job;
+does: before the configuration is composed, and long before there is anything to log. For a single job;
 the workers of a sweep keep every core busy and import MLflow once each, so they call `tracking.log`.
 """
 
@@ -31,23 +31,23 @@ def start_ahead() -> None:
 
 
 def _end_ahead() -> None:
-    """End what was not taken. A process that was taken and given no run ends by itself, and nobody waits for it."""
+    """End the processes that nobody took. A process that was taken but got no run ends by itself."""
     while _ahead:
         _ahead.pop().close()
 
 
 def logger(uri: str) -> "Logger":
     """The process that was started ahead or a new one, with the store at `uri` opened."""
-    made = _ahead.pop() if _ahead else Logger()
-    made.open(uri)
-    return made
+    process = _ahead.pop() if _ahead else Logger()
+    process.open(uri)
+    return process
 
 
 class Logger:
-    """`with Logger(uri) as logger: ...; logger.log(run)`. Left without a run, it logs nothing.
+    """`with Logger(uri) as logger: ...; logger.log(run)`. Without a run it logs nothing.
 
-    It imports MLflow at once. It creates the store when it is told where that is, at first or by `open`: do so when the
-    input has been found right.
+    It imports MLflow at once. It creates the store when it gets the address, here or by `open`: do so once the input is
+    valid.
     """
 
     def __init__(self, uri: str = ""):
@@ -65,7 +65,7 @@ class Logger:
         return self
 
     def open(self, uri: str) -> None:
-        """Let the process create or open the store at `uri` meanwhile, once; what is wrong with it, `log` tells."""
+        """Let the process create or open the store at `uri` meanwhile, once; `log` raises what is wrong with it."""
         self._tell(uri)
         self._opened = True
 
@@ -75,7 +75,7 @@ class Logger:
             pickle.dump(message, self._process.stdin)
             self._process.stdin.flush()
         except BrokenPipeError:
-            pass  # it has ended, which `log` tells
+            pass  # it has ended, which `log` reports
 
     def log(self, run: Run) -> str:
         """As `tracking.log`, once. Paths in `run` are taken from where the process was started."""
@@ -104,7 +104,7 @@ def main() -> None:
     """Get ready, wait for an address and a run on standard input, log the run, answer on standard output.
 
     What ends the job may be sent to all its processes. This one ends when the job does, by the end of its input, and
-    finishes a run that it was given.
+    finishes the run that it has.
     """
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     import_mlflow()
@@ -113,7 +113,7 @@ def main() -> None:
         prepare(uri := pickle.load(sys.stdin.buffer))
         run_id = log(pickle.load(sys.stdin.buffer), uri)
     except (EOFError, pickle.UnpicklingError):
-        os._exit(0)  # nothing to log, and perhaps nobody to tell
+        os._exit(0)  # nothing to log, and perhaps nobody listens
     except UserError as error:
         problem = str(error)
         sys.stdin.buffer.read()

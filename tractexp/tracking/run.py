@@ -1,7 +1,7 @@
 """A run as plain data, and how it is written: at its end and in one go.
 
 MLflow knows no transaction over a whole run. One whose writer is killed meanwhile stays RUNNING until the store is
-opened next, which closes it (`owner`); what it was to hold is kept beside the results (`kept`).
+opened next, which closes it (`owner`); its content is stored beside the results (`runfile`).
 """
 
 import contextlib
@@ -57,7 +57,7 @@ class Run:
     model: Path | None = None
     records: "Sequence[Mapping[str, str]]" = ()  # name, role, sha256: MLflow's inputs
     children: "Sequence[Run]" = ()
-    key: str = ""  # by which a run is known that is sent again
+    key: str = ""  # identifies a run that is sent again
     ended: float | None = None  # s since 1970; None: now
 
     def check(self) -> None:
@@ -100,6 +100,13 @@ def metric_name(text: str) -> str:
     return re.sub(r"[^\w.\- :/]", "_", text.replace("=", ":"), flags=re.ASCII)
 
 
+def thinned(count: int) -> "np.ndarray":
+    """The points of a curve of `count` points that are logged: `CURVE_POINTS` of them, evenly spread, or all."""
+    import numpy as np
+
+    return np.unique(np.linspace(0, count - 1, min(count, CURVE_POINTS)).round().astype(int))
+
+
 def at_common_steps(steps: "np.ndarray", values: "np.ndarray") -> "tuple[np.ndarray, np.ndarray]":
     """A curve (n,) of what was reached, by steps (n,) above 0, at steps that all such curves share.
 
@@ -116,12 +123,12 @@ def at_common_steps(steps: "np.ndarray", values: "np.ndarray") -> "tuple[np.ndar
 def log(run: Run, uri: str, *, again: bool = False) -> str:
     """Write one finished run and return its id. Raises `UserError`; nothing is logged for a run that fails `check`.
 
-    A run that is sent `again` is written once: what is left of an earlier attempt goes, a whole one stays.
+    A run that is sent `again` is written once: the rest of an earlier attempt is deleted, a whole run stays.
     """
     run.check()
     client = open_store(uri)
     with sentences(uri):
-        if again and (whole := _swept(client, run)):
+        if again and (whole := _whole_run(client, run)):
             return whole
         run_id, ended = _create(client, run, uri), _milliseconds(run.ended)
         try:
@@ -136,16 +143,43 @@ def log(run: Run, uri: str, *, again: bool = False) -> str:
     return run_id
 
 
-def _swept(client: Any, run: Run) -> str:
-    """The run of this key where the store has it whole, else ""; what an earlier attempt left is deleted."""
-    experiments = [found.experiment_id for found in client.search_experiments()]
-    for found in client.search_runs(experiments, f"tags.`{KEY}` = '{run.key}'") if run.key else ():
-        if found.info.status == run.status:
-            return found.info.run_id
-        for child in client.search_runs(experiments, f"tags.`mlflow.parentRunId` = '{found.info.run_id}'"):
+def _whole_run(client: Any, run: Run) -> str:
+    """The run of this key where the store has it whole, else ""; the rest of an earlier attempt is deleted."""
+    experiments = [one.experiment_id for one in client.search_experiments()]
+    for one in client.search_runs(experiments, f"tags.`{KEY}` = '{run.key}'") if run.key else ():
+        if one.info.status == run.status:
+            return one.info.run_id
+        for child in client.search_runs(experiments, f"tags.`mlflow.parentRunId` = '{one.info.run_id}'"):
             client.delete_run(child.info.run_id)
-        client.delete_run(found.info.run_id)
+        client.delete_run(one.info.run_id)
     return ""
+
+
+def run_of(client: Any, uri: str, run_id: str) -> Any:
+    """MLflow's run of this id, deleted or not; None where the store has none."""
+    from mlflow.exceptions import MlflowException
+
+    if not run_id:
+        return None
+    with sentences(uri):
+        try:
+            return client.get_run(run_id)
+        except MlflowException as error:
+            if error.error_code != "RESOURCE_DOES_NOT_EXIST":
+                raise
+            return None
+
+
+def attach(run_id: str, uri: str, paths: Sequence[Path]) -> bool:
+    """Copy files to the artifacts of a run that has ended; False where the store has no such run (any more)."""
+    client = open_store(uri)
+    run = run_of(client, uri, run_id)
+    if run is None or run.info.lifecycle_stage == "deleted":
+        return False
+    with sentences(uri):
+        for path in paths:
+            client.log_artifact(run_id, str(path))
+    return True
 
 
 def start_parent(run: Run, uri: str) -> str:
@@ -212,14 +246,12 @@ def _create(client: Any, run: Run, uri: str) -> str:
 
 
 def _write(client: Any, run_id: str, run: Run) -> None:
-    import numpy as np
     from mlflow.entities import Metric, Param
 
     now = _milliseconds(run.ended)
     points = [(name, value, 0) for name, value in run.metrics.items()]
     for name, (steps, values) in run.curves.items():
-        keep = np.unique(np.linspace(0, len(steps) - 1, min(len(steps), CURVE_POINTS)).round().astype(int))
-        points += [(name, values[i], steps[i]) for i in keep]
+        points += [(name, values[i], steps[i]) for i in thinned(len(steps))]
     metrics = [Metric(name, float(value), now, int(step)) for name, value, step in points]
     parameters = [Param(key, _text(value)[:VALUE_LENGTH]) for key, value in run.parameters.items()]
     chunks = zip_longest(_chunks(metrics, BATCH_METRICS), _chunks(parameters, BATCH_PARAMETERS), fillvalue=[])
@@ -236,7 +268,7 @@ def _write(client: Any, run_id: str, run: Run) -> None:
 
 
 def _log_inputs(client: Any, run_id: str, datasets: list[Any]) -> None:
-    """Say what a run has read. Of two processes that make a record known at once, one is refused, and finds it then."""
+    """Log what a run has read. Of two processes that register a record at once, one is refused and tries again."""
     from mlflow.exceptions import MlflowException
 
     try:
@@ -259,26 +291,26 @@ def _chunks(items: list[Any], size: int) -> list[list[Any]]:
 
 
 def _experiment(client: Any, name: str, uri: str) -> str:
-    """The id of the experiment `name`, made if need be, its artifacts beside the database wherever the process runs."""
+    """The id of the experiment `name`, created if need be; artifacts lie beside the database wherever this runs."""
     from mlflow.exceptions import MlflowException
 
-    found = client.get_experiment_by_name(name)
-    if found is None:
+    experiment = client.get_experiment_by_name(name)
+    if experiment is None:
         database = database_of(uri)
         folder = re.sub(r"[^\w.-]+", "_", name)
         location = (database.parent / "mlartifacts" / folder).as_uri() if database else None
         try:
             return client.create_experiment(name, artifact_location=location)
-        except MlflowException:  # another process made it first; if not, the next line raises
-            found = client.get_experiment_by_name(name)
-            if found is None:
+        except MlflowException:  # another process created it first; if not, the next line raises
+            experiment = client.get_experiment_by_name(name)
+            if experiment is None:
                 raise
-    if found.lifecycle_stage == "deleted":
+    if experiment.lifecycle_stage == "deleted":
         raise UserError(
             f"the experiment '{name}' in {uri} was deleted: restore it with "
-            f"'mlflow experiments restore --experiment-id {found.experiment_id}' or log under another name"
+            f"'mlflow experiments restore --experiment-id {experiment.experiment_id}' or log under another name"
         )
-    return found.experiment_id
+    return experiment.experiment_id
 
 
 def _milliseconds(time_of: float | None = None) -> int:

@@ -1,7 +1,7 @@
-"""The store behind an address: made once, whoever comes first, opened quickly, its troubles told in a sentence.
+"""The store behind an address: created once by the first process, opened quickly, its errors as one sentence.
 
-MLflow's own migrations fail when two processes start them together, and are left half-done by a process that is
-killed. Here the first to arrive makes the database in memory, under a lock, and moves it into place whole.
+MLflow's own migrations fail when two processes start them together, and stay half-done when a process is killed. Here
+the first process makes the database in memory, under a lock, and moves it into place whole.
 """
 
 import contextlib
@@ -40,7 +40,7 @@ def address(chosen: str | None) -> str:
 def prepare(uri: str) -> None:
     """Create the store at `uri` if it is not there yet; any number of processes may do so at the same moment.
 
-    Raises `UserError` when it cannot be written or reached, or was made by another version of MLflow.
+    Raises `UserError` when it cannot be written or reached, or comes from another version of MLflow.
     """
     open_store(uri)
 
@@ -54,7 +54,7 @@ def database_of(uri: str) -> Path | None:
 def open_store(uri: str) -> Any:
     """An open `MlflowClient`, the store behind it created or migrated. One per store and process.
 
-    Runs that were left running by processes which have ended are closed.
+    Runs still marked as running by processes that have ended are closed.
     """
     if not uri.strip():
         raise UserError("tracking: the address of the MLflow store is empty; it is like sqlite:////folder/mlflow.db")
@@ -80,7 +80,7 @@ def open_store(uri: str) -> Any:
 
 
 def _create_database(database: Path) -> None:
-    """Migrate an empty database in memory and move a copy into place, so that a killed process leaves none half-made.
+    """Migrate an empty database in memory and move a copy into place, so that a killed process leaves no half of one.
 
     On disk the migrations wait hundreds of times for the drive: 3 to 6 s on a busy one, against 1 s.
     """
@@ -110,7 +110,7 @@ def import_mlflow(sql: bool = False) -> None:
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
     os.environ.setdefault("MLFLOW_LOGGING_LEVEL", "WARNING")
     os.environ.setdefault("MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR", "false")
-    os.environ.setdefault("MLFLOW_HTTP_REQUEST_MAX_RETRIES", "2")  # what cannot be sent now is kept and sent later
+    os.environ.setdefault("MLFLOW_HTTP_REQUEST_MAX_RETRIES", "2")  # what cannot be sent now is sent later by `sync`
     os.environ.setdefault("MLFLOW_HTTP_REQUEST_TIMEOUT", "30")
     with light_import():
         import mlflow
@@ -152,13 +152,13 @@ def sentences(uri: str) -> Iterator[None]:
             warnings.simplefilter("ignore")
             yield
     except Exception as error:
-        known = isinstance(error, MlflowException | sqlite3.Error | OSError)
-        if not known and not type(error).__module__.startswith("sqlalchemy."):
+        expected = isinstance(error, MlflowException | sqlite3.Error | OSError)
+        if not expected and not type(error).__module__.startswith("sqlalchemy."):
             raise
         reason = str(error).strip().partition("\n")[0]
         if "database schema" in reason or "Can't locate revision" in reason:
             raise UserError(
-                f"the MLflow store {uri} was made by another version of MLflow: 'mlflow db upgrade {uri}' brings an "
+                f"the MLflow store {uri} comes from another version of MLflow: 'mlflow db upgrade {uri}' brings an "
                 "older one up to date (keep a copy), a newer one needs the newer MLflow"
             ) from error
         raise UserError(f"the MLflow store {uri} cannot be used: {reason}") from error

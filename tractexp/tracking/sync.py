@@ -8,26 +8,26 @@ from typing import Any
 
 from tractexp import files
 from tractexp.errors import UserError
-from tractexp.tracking import kept
-from tractexp.tracking.kept import Kept
-from tractexp.tracking.run import finish_parent, log, reopen_parent, start_parent
+from tractexp.tracking import runfile
+from tractexp.tracking.run import finish_parent, log, reopen_parent, run_of, start_parent
+from tractexp.tracking.runfile import RunFile
 from tractexp.tracking.store import address, open_store, sentences
-from tractexp.tracking.swept import FILE, parent_of
+from tractexp.tracking.sweepfile import FILE, parent_of
 
-PAGES = ("comparison.json", "comparison.html")  # of a sweep, made when its jobs have ended
+PAGES = ("comparison.json", "comparison.html")  # of a sweep, written when its jobs have ended
 THERE, BROUGHT, DELETED, NOT = "already there", "brought in", "deleted in MLflow and left so", "not logged"
 
 
 def sync(root: Path, uri: str | None = None, tell: Callable[[str], None] = lambda line: None) -> Counter[str]:
-    """Send every run kept at `root` and below to its store, or to `uri`, unless it is there; how many were what.
+    """Send every run file at `root` and below to its store, or to `uri`, unless it is there; counts by outcome.
 
-    `tell` hears a sentence for each that could not be. Sending twice is harmless: a run is known by its key.
+    `tell` hears a sentence for each that could not be. Sending twice is harmless: its key identifies a run.
     """
     counts: Counter[str] = Counter()
     broken: dict[str, str] = {}  # {address: why it cannot be used}: nobody waits for it twice
-    for folder in kept.below(root):
+    for folder in runfile.below(root):
         try:
-            one = kept.read(folder)
+            one = runfile.read(folder)
         except UserError as error:
             tell(str(error))
             counts[NOT] += 1
@@ -48,18 +48,18 @@ def sync(root: Path, uri: str | None = None, tell: Callable[[str], None] = lambd
     return counts
 
 
-def _sent(one: Kept, uri: str) -> str:
+def _sent(one: RunFile, uri: str) -> str:
     """Send one run; what became of it."""
     client = open_store(uri)
     parent = None if one.sweep else parent_of(one.folder.parent)
     one = replace(one, run=replace(one.run, parent=parent or one.run.parent))
-    known = _known(client, uri, one.run_id)
-    if known is not None and known.info.lifecycle_stage == "deleted":
+    run_there = run_of(client, uri, one.run_id)
+    if run_there is not None and run_there.info.lifecycle_stage == "deleted":
         return DELETED
     if one.sweep:
-        return _sweep(one, known, uri)
-    if known is not None and known.info.status == one.run.status:
-        _below(client, uri, known, one.run.parent)
+        return _sweep(one, run_there, uri)
+    if run_there is not None and run_there.info.status == one.run.status:
+        _below(client, uri, run_there, one.run.parent)
         return THERE
     model = one.run.model if one.run.model and one.run.model.exists() else None
     run = replace(one.run, artifacts=[path for path in one.run.artifacts if path.exists()], model=model)
@@ -67,49 +67,34 @@ def _sent(one: Kept, uri: str) -> str:
     return BROUGHT
 
 
-def _sweep(one: Kept, known: Any, uri: str) -> str:
+def _sweep(one: RunFile, run_there: Any, uri: str) -> str:
     """The run of a sweep: it keeps its id where the store has it, for its jobs point to it."""
-    if known is not None and known.info.status == one.run.status:
+    if run_there is not None and run_there.info.status == one.run.status:
         return THERE
     run_id = one.run_id
-    if known is None or not reopen_parent(run_id, uri):
+    if run_there is None or not reopen_parent(run_id, uri):
         run_id = start_parent(replace(one.run, metrics={}), uri)
     pages = [path for name in PAGES if (path := one.folder / name).is_file()]
     finish_parent(run_id, uri, one.run.status, one.run.metrics, pages)
     one.logged(run_id, uri)
-    told = one.folder / FILE
-    files.write_json(told, {"run": run_id, "uri": uri, "overrides": one.run.tags.get("sweep", "").split()})
+    sweep_file = one.folder / FILE
+    files.write_json(sweep_file, {"run": run_id, "uri": uri, "overrides": one.run.tags.get("sweep", "").split()})
     return BROUGHT
 
 
-def _known(client: Any, uri: str, run_id: str) -> Any:
-    """The run of this id; None where the store has none."""
-    from mlflow.exceptions import MlflowException
-
-    if not run_id:
-        return None
-    with sentences(uri):
-        try:
-            return client.get_run(run_id)
-        except MlflowException as error:
-            if error.error_code != "RESOURCE_DOES_NOT_EXIST":
-                raise
-            return None
-
-
-def _below(client: Any, uri: str, known: Any, parent: str | None) -> None:
+def _below(client: Any, uri: str, run_there: Any, parent: str | None) -> None:
     """Let a run that was logged point to the run of its sweep, which was not then."""
-    if parent and known.data.tags.get("mlflow.parentRunId") != parent:
+    if parent and run_there.data.tags.get("mlflow.parentRunId") != parent:
         with sentences(uri):
-            client.set_tag(known.info.run_id, "mlflow.parentRunId", parent)
+            client.set_tag(run_there.info.run_id, "mlflow.parentRunId", parent)
 
 
 def waiting(root: Path) -> int:
-    """How many runs kept at `root` and below are in no store yet."""
+    """How many run files at `root` and below are in no store yet."""
     count = 0
-    for folder in kept.below(root):
+    for folder in runfile.below(root):
         try:
-            one = kept.read(folder)
+            one = runfile.read(folder)
         except UserError:
             continue
         count += one is not None and not one.run_id

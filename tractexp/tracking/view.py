@@ -17,7 +17,7 @@ KEY = "tractexp"
 TAG = f"mlflow.sharedViewState.{KEY}"
 SECTION = "tractexp-charts"
 RUNS = "tags.task = 'identify' and metrics.objective >= 0"  # a sweep's own run has no objective
-GROUPS = ("variant", "optimizer")  # tags to group by: runs logged before they had the first are told by the second
+GROUPS = ("variant", "optimizer")  # tags to group by: early runs have only the second
 STATE = {
     "searchFilter": RUNS,
     "orderByKey": "metrics.`search_objective`",
@@ -77,7 +77,7 @@ def comparison_view(uri: str) -> str:
     """
     client = open_store(uri)
     with sentences(uri):
-        names = {found.experiment_id: found.name for found in client.search_experiments()}
+        names = {one.experiment_id: one.name for one in client.search_experiments()}
         newest = client.search_runs(list(names), RUNS, max_results=1, order_by=["start_time DESC"])
         if not newest:
             return ""

@@ -115,7 +115,7 @@ def _waves(like: WaveEvent, event: Imagined) -> Waveforms:
     turn = np.exp(1j * (omega_n + like.omega_s0) * t)
     U, U2 = like.U0 * (1 - event.depth * course), like.U0 * event.unbalance * event.depth * course
     v = U * np.exp(1j * np.radians(event.jump) * course) + U2 * np.conj(turn) ** 2
-    compared = np.where(np.array(like.known)[:, None], 0.0, np.nan) * np.ones(n)
+    compared = np.where(np.array(like.compared)[:, None], 0.0, np.nan) * np.ones(n)
     return Waveforms(
         step, v, np.zeros(n), turn, compared, U, U2,
         like.U0, like.P0, like.Q0, omega_s0=like.omega_s0, omega_n=omega_n, weights=WEIGHTS[like.phases],

@@ -277,8 +277,8 @@ class Compare(Task, call=compare, given=("uri", "experiment")):
 def _track(job: Job, result: ComparisonResult, paths: list[Path]) -> None:
     """Add the page to the sweep's run, or log a run of its own where there is no such run."""
     from tractexp import tracking
-    from tractexp.tracking.attach import attach
-    from tractexp.tracking.swept import parent_of, waits
+    from tractexp.tracking.run import attach
+    from tractexp.tracking.sweepfile import parent_of, waits
 
     if result.folder is not None and waits(result.folder):
         return  # the page is sent with the run of the sweep

@@ -9,17 +9,17 @@ FILE = "sweep.json"
 
 def parent_of(folder: Path) -> str | None:
     """The run id of the sweep in `folder`; None where it is not logged."""
-    return _told(folder).get("run")
+    return _content(folder).get("run")
 
 
 def waits(folder: Path) -> bool:
     """Whether the run of the sweep in `folder` is still to be logged: its jobs then wait, too."""
-    return "run" in (told := _told(folder)) and told["run"] is None
+    return "run" in (content := _content(folder)) and content["run"] is None
 
 
-def _told(folder: Path) -> dict[str, Any]:
+def _content(folder: Path) -> dict[str, Any]:
     try:
-        told = json.loads((folder / FILE).read_text(encoding="utf-8"))
+        content = json.loads((folder / FILE).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
-    return told if isinstance(told, dict) else {}
+    return content if isinstance(content, dict) else {}

@@ -1,7 +1,7 @@
-"""Noise taken out of a sampled voltage, which a model is driven by and which shows in all that it calculates.
+"""Noise removed from a sampled voltage, which drives the model, so that its noise appears in every calculated current.
 
-Within a cycle nothing tells noise from voltage for sure, but away from the edges of a dip a voltage departs from its
-periodic course slowly, and what is faster is noise. It stays where it is louder than noise: at the edges.
+Within a cycle noise and voltage cannot be separated with certainty. But away from the edges of a dip the voltage
+departs from its periodic course slowly, so that faster changes are noise. Changes larger than noise stay: the edges.
 """
 
 from dataclasses import dataclass
@@ -9,22 +9,22 @@ from typing import Any
 
 import numpy as np
 
-PASSED, BETWEEN = 7.0, 4.0  # times the frequency: up to where all is kept, and how wide the filter falls about it
-RIPPLE = 80.0  # dB below one: what the filter may change of what it keeps
+PASSED, BETWEEN = 7.0, 4.0  # times the frequency: upper end of the pass band, and width of the transition about it
+RIPPLE = 80.0  # dB below one: ripple in the pass band
 LOUD = 2.5  # of the variance of fast noise, below which it is taken for noise
-NEAR = 8  # of a cycle: the stretch in which its loudness is told
+NEAR = 8  # windows a cycle in which the power of fast changes is averaged
 
 
 @dataclass(frozen=True, eq=False)
-class Quieting:
-    """A filter of weights (2 m + 1,) without delay, and over how many samples loudness is told."""
+class NoiseFilter:
+    """A low-pass filter of weights (2 m + 1,) without delay; `near` samples average the power of fast changes."""
 
     weights: np.ndarray
     near: int
 
     @classmethod
-    def at(cls, rate: float, frequency: float) -> "Quieting":
-        """That for a sampling rate and a frequency [Hz], which it keeps; where nothing is faster it keeps all."""
+    def at(cls, rate: float, frequency: float) -> "NoiseFilter":
+        """The filter for a sampling rate and a frequency [Hz] in its pass band; at too low a rate all passes."""
         from scipy.signal import firwin, kaiserord
 
         edge, width = PASSED * frequency, BETWEEN * frequency
@@ -35,8 +35,8 @@ class Quieting:
         half = taps // 2 + 1
         window: Any = ("kaiser", beta)  # SciPy's type of it is inferred from its default, a name
         weights = firwin(2 * half + 1, edge, window=window, fs=rate)
-        kept = weights @ np.cos(2 * np.pi * frequency / rate * np.arange(-half, half + 1))
-        return cls(weights / kept, near)
+        gain = weights @ np.cos(2 * np.pi * frequency / rate * np.arange(-half, half + 1))
+        return cls(weights / gain, near)
 
     def __call__(self, departure: np.ndarray, noise: float) -> np.ndarray:
         """Departures (N,) from a periodic course, real or complex, whose samples have white noise of a variance."""
@@ -46,8 +46,8 @@ class Quieting:
         slow = np.convolve(_beyond(departure, half), self.weights, "valid")
         fast = departure - slow
         loud = np.convolve(np.abs(fast) ** 2, np.ones(self.near) / self.near, "same")
-        left = noise * (1 - 2 * self.weights[half] + float(self.weights @ self.weights))
-        return slow + np.clip(1 - LOUD * left / np.maximum(loud, 1e-300), 0.0, 1.0) * fast
+        rest = noise * (1 - 2 * self.weights[half] + float(self.weights @ self.weights))
+        return slow + np.clip(1 - LOUD * rest / np.maximum(loud, 1e-300), 0.0, 1.0) * fast
 
 
 def _beyond(x: np.ndarray, n: int) -> np.ndarray:

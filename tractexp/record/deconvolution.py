@@ -1,7 +1,7 @@
-"""The voltage that a load saw, reckoned back from phasors that are averages over a window.
+"""The voltage at the load, computed back from phasors that are averages over a window.
 
 With a window h, U = h * u and I = h * i are recorded, and P + jQ = U conj(I). A load whose current is linear in the
-voltage would not show it; any other does wherever the voltage bends. u is reckoned back from U near the edges of the
+voltage would not show it; any other does wherever the voltage bends. u is computed back from U near the edges of the
 dip, where it is free to bend; the current a model draws at u is then averaged as the recorder does
 (`tractexp.model.window`).
 
@@ -22,7 +22,7 @@ ERROR = 2e-4  # pu: how exactly the averaged voltage must be the recorded one, i
 
 
 def sharpened(event: Event, weights: np.ndarray, window: float) -> Event:
-    """The event with the voltage that the load saw, where the record's was averaged with weights over `window` [s].
+    """The event with the voltage at the load, where the record's was averaged with weights over `window` [s].
 
     That which bends least, weighted, among those whose average is the recorded one: least squares.
     """

@@ -19,7 +19,7 @@ NAMESPACE = "hydra_plugins.tractexp"
 
 
 def admit(cls: type) -> None:
-    """Make a sweeper or launcher known to Hydra under the target `NAMESPACE`.<name of the class>."""
+    """Register a sweeper or launcher with Hydra under the target `NAMESPACE`.<name of the class>."""
     from hydra.core.plugins import Plugins
 
     cls.__module__ = NAMESPACE

@@ -8,7 +8,7 @@ from tractexp.record.wave_event import WaveEvent, half_cycle
 from tractexp.record.waves import Waves
 
 
-def unrecorded(
+def synthetic_event(
     name: str, t: np.ndarray, v: np.ndarray, before: tuple[float, float, float], frequency: float, start: int, end: int
 ) -> WaveEvent:
     """The event of a voltage v (N,) complex [pu] in the frame of that before, at uniform times t (N,) [s].
@@ -23,14 +23,14 @@ def unrecorded(
     waves = Waves(np.empty((6, 0)), float(t[0]), float(rate))
     flat = np.full(len(t), P0), np.full(len(t), Q0)
     record = Record(name, t, U, *flat, U2=U2, base=Base(frequency=frequency), waves=waves)
-    known = {
+    fields = {
         "start": start, "end": end, "depth": 1 - float(U[start:end].min(initial=U0)) / U0, "U0": U0, "P0": P0,
         "Q0": Q0, "f0": frequency, "noise_U": 0.0, "noise_P": 0.0, "noise_Q": 0.0, "steady": slice(0, max(start, 1)),
         "dips": 1,
     }  # fmt: skip
     i = (P0 - 1j * Q0) / U0 * turn
     return WaveEvent(
-        record=record, **known, phasors=Event(record=record, **known), v=v.astype(complex), v_zero=np.zeros(len(t)),
+        record=record, **fields, phasors=Event(record=record, **fields), v=v.astype(complex), v_zero=np.zeros(len(t)),
         weights=np.ones(1), turn=turn, currents=np.stack([i.real, i.imag, absent]), lead=0, omega_s0=0.0,
         random=(0.0, 0.0, 0.0), unexplained=np.zeros((3, max(start, 1))), offsets=np.zeros(6), phases=3,
     )  # fmt: skip

@@ -1,0 +1,102 @@
+"""`mlflow.json`: what is to be logged of a folder, stored beside its results until the store has it, and after.
+
+It is written before anything is sent. So a server that is away, a locked store or a lost one costs nothing: `sync`
+sends what a store lacks, and sends nothing twice.
+"""
+
+import json
+import time
+import uuid
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from tractexp import files
+from tractexp.errors import UserError
+from tractexp.tracking.run import Line, Run, flatten, thinned
+
+FILE = "mlflow.json"
+
+
+@dataclass(frozen=True)
+class RunFile:
+    """The content of `mlflow.json`: a run, where it is to be logged, and under which id it is; "" where it is not yet.
+
+    `sweep` marks the run of a whole sweep, below which those of its jobs are.
+    """
+
+    folder: Path
+    run: Run
+    uri: str
+    run_id: str = ""
+    sweep: bool = False
+
+    def write(self) -> "RunFile":
+        """Write it. Raises `UserError` where that is impossible."""
+        content = {"uri": self.uri, "run_id": self.run_id, "sweep": self.sweep, "run": _plain(self.run, self.folder)}
+        files.write(self.folder / FILE, json.dumps(content, ensure_ascii=False, default=str) + "\n")
+        return self
+
+    def logged(self, run_id: str, uri: str | None = None) -> "RunFile":
+        """Note that it is in the store."""
+        return replace(self, run_id=run_id, uri=uri or self.uri).write()
+
+
+def save(folder: Path, run: Run, uri: str, sweep: bool = False) -> RunFile:
+    """Write down what is to be logged, with a key that identifies it, and the time at which the run ended."""
+    key, ended = run.key or uuid.uuid4().hex, run.ended or time.time()
+    return RunFile(folder, replace(run, key=key, ended=ended), uri, sweep=sweep).write()
+
+
+def read(folder: Path) -> RunFile | None:
+    """The file of a folder; None where there is none. Raises `UserError` for a damaged file."""
+    path = folder / FILE
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        return RunFile(folder, _run(content["run"], folder), content["uri"], content["run_id"], content["sweep"])
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise UserError(f"{path} cannot be read: {error.strerror or error}") from error
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise UserError(f"{path} is damaged ({error}); remove it, or run its command again") from error
+
+
+def below(root: Path) -> list[Path]:
+    """The folders at `root` and below that have such a file, those above first."""
+    return sorted((path.parent for path in root.rglob(FILE)), key=lambda folder: (len(folder.parts), folder))
+
+
+def _plain(run: Run, folder: Path) -> dict[str, Any]:
+    """A run as JSON knows it; paths within the folder are relative, so that it may be moved."""
+    content: dict[str, Any] = {field.name: getattr(run, field.name) for field in fields(Run)}
+    content["parameters"] = flatten(run.parameters)
+    content["metrics"] = {name: float(value) for name, value in run.metrics.items()}
+    content["curves"] = {name: _thin(*curve) for name, curve in run.curves.items()}
+    content["artifacts"] = [_relative(path, folder) for path in run.artifacts]
+    content["model"] = None if run.model is None else _relative(run.model, folder)
+    content["records"] = [dict(record) for record in run.records]
+    content["children"] = [_plain(child, folder) for child in run.children]
+    return content
+
+
+def _thin(steps: Line, values: Line) -> list[list[float]]:
+    """A curve with as many points as are logged."""
+    points = thinned(len(steps))
+    return [[float(line[k]) for k in points] for line in (steps, values)]
+
+
+def _relative(path: Path, folder: Path) -> str:
+    path = Path(path).absolute()
+    return path.relative_to(folder.absolute()).as_posix() if path.is_relative_to(folder.absolute()) else str(path)
+
+
+def _run(content: Mapping[str, Any], folder: Path) -> Run:
+    there = {
+        "artifacts": [folder / path for path in content["artifacts"]],
+        "model": None if content["model"] is None else folder / content["model"],
+        "curves": {name: (steps, values) for name, (steps, values) in content["curves"].items()},
+        "children": [_run(child, folder) for child in content["children"]],
+    }
+    return Run(**{**content, **there})
