@@ -30,8 +30,8 @@ LEVELS = (0.01, 0.02, 0.03, 0.04, 0.05, 0.1, 0.2, 0.5)
 def ranked(noise: str, planned: cases.Planned) -> dict:
     """The rank of the best effect among chance's draws, from 0 to 1, and p of what the base model leaves."""
     from tractexp.discrepancy.base_fit import base_fit
-    from tractexp.discrepancy.bench import Bench
     from tractexp.discrepancy.catalogue import catalogue
+    from tractexp.discrepancy.context import Context
     from tractexp.discrepancy.criteria import Criteria
     from tractexp.discrepancy.disagreement import disagreement
     from tractexp.discrepancy.effort import Effort
@@ -44,7 +44,7 @@ def ranked(noise: str, planned: cases.Planned) -> dict:
     events = [detect(Record(f"event{k + 1}", **r, source=f"{k}").check()) for k, r in enumerate(made)]
     model = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
     missing = catalogue(model.motor, model.static, (), events, ())
-    first = disagreement(base_fit(Bench.of(model, missing, Records.of(events), {}, {}, Criteria(), Effort())), 0)
+    first = disagreement(base_fit(Context.of(model, missing, Records.of(events), {}, {}, Criteria(), Effort())), 0)
     drawn, best = first.chance.least_p, first.scores[0]
     rank = (np.count_nonzero(drawn < best.p) + 1) / (len(drawn) + 1)
     return {"noise": noise, "seed": planned.seed, "best": best.name, "rank": round(rank, 4), "p_left": first.p_left}

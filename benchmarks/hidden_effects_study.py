@@ -188,7 +188,7 @@ def _left(found, clean: np.ndarray) -> float:
     At its fit the problem is linear enough: what its parameters and the nuisances can still take is projected out.
     """
     from tractexp.discrepancy.explanations import searched
-    from tractexp.discrepancy.tangent import tangent
+    from tractexp.discrepancy.linearization import tangent
 
     bench, first, refits = found.bench, found.first, found.explanations.refits
     singles = [f for names, f in refits.items() if len(names) == 1 and names == found.catalogue.textbook(names)]

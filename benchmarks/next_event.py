@@ -27,12 +27,13 @@ import oracle  # noqa: F401
 from hidden_effects import Case, Noise
 from hidden_effects.generator import Scene, scene
 from independent import Dip
-from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.investigate import Investigation, investigate
+from tractexp.discrepancy.investigate import Findings, investigate
 from tractexp.discrepancy.next_event import choose
 from tractexp.discrepancy.next_event.choose import HOPELESS, NextEvent
-from tractexp.discrepancy.next_event.imagined import EDGE, Imagined, imagined
+from tractexp.discrepancy.next_event.imagined import ImaginedDip, imagined
+from tractexp.domain import PHASORS
 from tractexp.model.model import compose
 from tractexp.plugin import get
 from tractexp.record import Event, Record, detect
@@ -59,7 +60,7 @@ def recorded(made: Scene, seed: int) -> list[Event]:
     return [detect(Record(f"event{k}", **r, source=f"made {k}").check()) for k, r in enumerate(noisy, 1)]
 
 
-def plain(bench: Bench, reads: Sequence[str] = ()) -> list[Imagined]:
+def plain(bench: Context, reads: Sequence[str] = ()) -> list[ImaginedDip]:
     """What the generator can make of the events that are tried."""
     return [event for event in imagined(bench, reads) if not event.burden[0]]
 
@@ -69,11 +70,11 @@ def with_event(made: Scene, chosen: NextEvent, by_noise: bool) -> Scene:
     tried = chosen.by_noise if by_noise else chosen.best
     assert tried is not None
     event = tried.event
-    dip = Dip(depth=event.depth, start=0.5, duration=event.duration, fall=EDGE, rise=EDGE)
+    dip = Dip(depth=event.depth, start=0.5, duration=event.duration, fall=PHASORS.dips.edge, rise=PHASORS.dips.edge)
     return replace(made, dips=(*made.dips, dip), static=(*made.static, made.static[0]))
 
 
-def investigated(events: list[Event], **criteria: float) -> Investigation:
+def investigated(events: list[Event], **criteria: float) -> Findings:
     model = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
     return investigate(model, events, (), {}, {}, only=AMONG, criteria=Criteria.of(criteria))
 

@@ -32,7 +32,7 @@ import yaml
 
 from tractexp import files, provenance
 from tractexp.identification.problem import Problem
-from tractexp.identification.search import Found, Limits, search
+from tractexp.identification.search import Limits, SearchResult, search
 from tractexp.plugin import build
 from tractexp.studies.bbob import runs as bbob
 from tractexp.studies.comparison import floor
@@ -109,7 +109,9 @@ def restarted(problem: Any, optimizer: Any, seeds: Sequence[int], budget: int, t
     """Search, and search again from new random numbers, until the budget is spent or the target reached."""
     spent, seconds, best = 0, 0.0, None
     while spent < budget and (best is None or best.objective > target):
-        found: Found = search(problem, optimizer, bbob.seed_of(*seeds, spent), Limits(budget - spent, target=target))
+        found: SearchResult = search(
+            problem, optimizer, bbob.seed_of(*seeds, spent), Limits(budget - spent, target=target)
+        )
         spent, seconds = spent + found.simulations, seconds + found.seconds
         if best is None or found.objective < best.objective:
             best = found

@@ -22,7 +22,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import wave_records as waves
 from simulation import excitation
 
-from tractexp.identification.problem import Problem, excited
+from tractexp.domain import domain_of
+from tractexp.identification.problem import Problem
 from tractexp.identification.search import search
 from tractexp.model.drive import Drive
 from tractexp.model.model import Model, compose
@@ -52,7 +53,7 @@ def kernels(rounds: int) -> list[dict]:
     rng, event = np.random.default_rng(0), recorded()
     phasors = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
     prepared = []
-    for load, driving in ((phasors, excitation()), (model(), excited(event))):
+    for load, driving in ((phasors, excitation()), (model(), domain_of(event).excitation(event))):
         values = np.array([p.default for p in load.parameters]) * rng.uniform(0.97, 1.03, (CANDIDATES, len(load.names)))
         drive, n = Drive.of([driving]), np.array([1 if load is phasors else 4])
         refused = load.errors(drive, values, n).refused.sum()

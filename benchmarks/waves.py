@@ -120,7 +120,7 @@ def told_at_truth(event, truth: dict[str, float]) -> dict[str, float]:
     likelihood = Likelihood.of(observed.problem)
     values = np.array([truth[n] for n in observed.problem.space.names])
     unit = likelihood.to_unit(values)[0]
-    noise = noise_at(observed, likelihood, unit, observed.blurred(values))
+    noise = noise_at(observed, likelihood, unit, observed.input_errors(values))
     errors = conclude(replace(likelihood, noise=noise), unit).information.standard_errors
     return dict(zip(observed.problem.space.names, (errors / values).tolist(), strict=True))
 

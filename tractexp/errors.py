@@ -10,6 +10,10 @@ class UserError(Exception):
     """Wrong input. The message is a complete sentence for the user; no traceback is shown."""
 
 
+class Unfit(UserError):
+    """Why an effect makes no sense for a model: what it asks for is not there. Raised by what it asks `eq` for."""
+
+
 class Stopped(KeyboardInterrupt):
     """The user or the system ends what runs. `code` is the exit code, `result` the result so far, or None.
 

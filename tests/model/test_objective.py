@@ -9,7 +9,7 @@ import uncertainty as study
 from tractexp.errors import UserError
 from tractexp.identification.problem import Problem
 from tractexp.identification.search import search
-from tractexp.identification.starts import even
+from tractexp.parameter import even
 from tractexp.plugin import build, get
 
 

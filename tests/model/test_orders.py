@@ -12,9 +12,9 @@ from tractexp.choices import set_holding
 from tractexp.discrepancy.investigate import investigate
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
-from tractexp.model.window import mean, seen
 from tractexp.plugin import discover, get
 from tractexp.record import Record, detect
+from tractexp.record.window import average, averaged_power
 
 TRUTH = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p_v": 1.4, "q_v": 3.0}
 ORDERS = ("rotor_flux", "rotor_speed", "second_cage", "stator_transients")
@@ -84,7 +84,7 @@ def test_at_their_other_end_they_are_the_motor_of_higher_order(motor, names, the
 def test_the_stator_s_offset_rings_at_the_supply_frequency_and_decays_as_told():
     drive, of = dip(), model("electromechanical", "stator_transients")
     ring = response(of, drive, stator_share=1, offset_decay=20)[0] - response(model("electromechanical"), drive)[0]
-    after = ring[300:700] - mean(ring[None], np.r_[0.5, np.ones(19), 0.5] / 20)[0, 300:700]
+    after = ring[300:700] - average(ring[None], np.r_[0.5, np.ones(19), 0.5] / 20)[0, 300:700]
     power = np.abs(np.fft.rfft(after * np.hanning(400)))
     assert np.argmax(power) * 2.5 == pytest.approx(50, abs=2.6)
     sizes = [np.abs(after[a : a + 40]).max() for a in (0, 100)]
@@ -143,9 +143,9 @@ def test_silent_where_the_order_is_right():
 def test_the_windowed_ring_of_whole_cycles_averages_out_up_to_the_ends_of_the_record():
     t = np.arange(400) * 2e-3
     weights = np.r_[0.5, np.ones(9), 0.5] / 10
-    assert np.abs(mean(np.cos(2 * np.pi * 50 * t + 0.4)[None], weights)).max() < 1e-12
-    assert np.abs(mean((0.3 * t)[None], weights) - 0.3 * t).max() < 1e-12  # and a trend goes on
-    assert np.abs(seen(np.ones((1, 1, 400)), np.full(400, 0.8), weights) - 1).max() < 1e-12
+    assert np.abs(average(np.cos(2 * np.pi * 50 * t + 0.4)[None], weights)).max() < 1e-12
+    assert np.abs(average((0.3 * t)[None], weights) - 0.3 * t).max() < 1e-12  # and a trend goes on
+    assert np.abs(averaged_power(np.ones((1, 1, 400)), np.full(400, 0.8), weights) - 1).max() < 1e-12
 
 
 @pytest.mark.parametrize("name", ["tibet", "contactors"])

@@ -14,7 +14,7 @@ from tractexp.identification.posterior import Posterior
 from tractexp.identification.problem import Problem
 from tractexp.identification.profile import End, Profile, checked, profiles, revised
 from tractexp.identification.uncertainty import conclude, threshold
-from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, Verdict
+from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, ParameterVerdict
 from tractexp.report import posterior
 from tractexp.report.profile import meaning, page
 
@@ -97,7 +97,7 @@ def test_a_better_optimum_restarts_the_profiles_and_is_said(quiet):
 
 
 def test_two_minima_and_open_sides_change_the_verdict():
-    good = Verdict(IDENTIFIED, "± 3 %")
+    good = ParameterVerdict(IDENTIFIED, "± 3 %")
     base = Profile("C", np.array([0.4, 0.5, 0.6]), np.array([5.0, 0, 5.0]), (0.48, 0.52), (End.CLOSED, End.CLOSED), ())
     assert revised(good, base, 0, 1).word == IDENTIFIED
     twice = revised(good, replace(base, minima=(0.58,)), 0, 1)

@@ -9,7 +9,7 @@ from tractexp.identification.descent import descend
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.problem import Problem
 from tractexp.identification.sandwich import scatter
-from tractexp.identification.uncertainty import conclude_squares, threshold
+from tractexp.identification.uncertainty import conclude, threshold
 
 NOISE = 0.004
 
@@ -100,7 +100,7 @@ def test_intervals_hold_the_truth_under_a_correlated_error_that_the_usual_ones_m
         rng = np.random.default_rng([seed, 4])
         case = problem(study.noise(rng, 1000, 3 * NOISE, 0.97), seed=seed)
         squares, unit = least_squares(case)
-        known = conclude_squares(squares, unit, squares.with_initial_power)
+        known = conclude(squares, unit, squares.with_initial_power)
         off = np.abs(known.values - study.TYPICAL)[own]
         told.append(off <= known.half[own])
         rows, J = squares.jacobian(unit)
@@ -126,7 +126,7 @@ def test_a_parameter_on_a_bound_is_held_for_the_others_and_has_an_error_of_its_o
 def test_the_deviance_rises_to_its_limit_where_the_interval_ends():
     """Of a parameter by itself, others free: the parabola of the sandwich, by the likelihood as wide as the scatter."""
     squares, unit = least_squares(problem())
-    known = conclude_squares(squares, unit, squares.with_initial_power)
+    known = conclude(squares, unit, squares.with_initial_power)
     j = known.names.index("T_m")
     moved = unit.copy()
     moved[j] += known.half[j] / (known.upper[j] - known.lower[j])

@@ -11,13 +11,13 @@ import uncertainty as study
 from scipy.linalg import cholesky, toeplitz
 from scipy.signal import lfilter
 
+from tractexp.identification.agreement import compare_events
 from tractexp.identification.descent import descend
 from tractexp.identification.information import Information
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.problem import Problem
 from tractexp.identification.profile import checked
 from tractexp.identification.residual_tests import jarque_bera, ljung_box
-from tractexp.identification.together import compare_events
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, judge
 from tractexp.noise import Noise
 from tractexp.noise.color import Autoregression, fit_autoregression, stretches

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from test_discrepancy import FEW, base, events, steady
 
-from tractexp.discrepancy.all_events import Together
+from tractexp.discrepancy.all_events import JointFit
 from tractexp.discrepancy.catalogue import candidate, missing_channel
 from tractexp.discrepancy.chance import Chance
 from tractexp.discrepancy.coordinates import Coordinates
@@ -15,17 +15,17 @@ from tractexp.discrepancy.criteria import CHOSEN, DERIVED, Criteria
 from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.discrepancy.families import near, worth
 from tractexp.discrepancy.fitting import Refit
-from tractexp.discrepancy.gap import Gap
-from tractexp.discrepancy.held_out import Judged
+from tractexp.discrepancy.gap import GapTest
+from tractexp.discrepancy.held_out import Assessment
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.judgement import judged
-from tractexp.discrepancy.next_event.choose import Tried, mildest
-from tractexp.discrepancy.next_event.imagined import Imagined
+from tractexp.discrepancy.next_event.choose import TestedEvent, mildest
+from tractexp.discrepancy.next_event.imagined import ImaginedDip
 from tractexp.discrepancy.next_event.separation import Chances
-from tractexp.discrepancy.projection import Score
 from tractexp.discrepancy.proposal.judge import Before, Weighed
+from tractexp.discrepancy.score_test import Score
 from tractexp.errors import UserError
-from tractexp.noise.wander import Rest, find
+from tractexp.noise.random_walk import Rest, find
 from tractexp.plugin import get
 
 
@@ -53,8 +53,8 @@ def refitted(deviance, parameters):
 
 def judged_by(c, closed=1.0, gain=100.0, expected=100.0, p_left=1.0):
     """What held-out events say of an explanation."""
-    gap = Gap(None, None, closed, gain, expected, c.shown, None)
-    return Judged(gap, SimpleNamespace(criteria=c), (), p_left)
+    gap = GapTest(None, None, closed, gain, expected, c.shown, None)
+    return Assessment(gap, SimpleNamespace(criteria=c), (), p_left)
 
 
 def wandering(c, seed, rests=(), walk=0.0):
@@ -99,7 +99,9 @@ def status(c):
 
 def chosen_dip(c):
     tried = [
-        Tried(Imagined(depth, 0.1), Chances(np.array([p]), np.ones((1, 1))), Chances(np.array([p]), np.ones((1, 1))))
+        TestedEvent(
+            ImaginedDip(depth, 0.1), Chances(np.array([p]), np.ones((1, 1))), Chances(np.array([p]), np.ones((1, 1)))
+        )
         for depth, p in ((0.2, 0.93), (0.6, 0.99))
     ]
     return mildest(tried, c.decided, lambda t: t.chances).event.depth
@@ -138,7 +140,7 @@ CASES = {  # criterion: a looser value, the decision, what it is by default
     "shown": (12.0, lambda c: judged_by(c, gain=-1.0, expected=11.0).helps, False),
     "convincing": (0.75, lambda c: judged_by(c, closed=0.78).convincing, False),
     "stands": (0.04, lambda c: judged_by(c, p_left=0.045).helps, False),
-    "quieter": (4.0, lambda c: Together(None, -3.5, 1.0).confirmed(c, doubted=True), False),
+    "quieter": (4.0, lambda c: JointFit(None, -3.5, 1.0).confirmed(c, doubted=True), False),
     "window_least": (9.0, lambda c: c.least_window(best=0.0) < 9.5, False),
     "window_behind": (7.0, lambda c: c.least_window(best=30.0) < 24.0, False),
     "window_clear": (25.0, lambda c: c.least_window(best=100.0) < 28.0, False),

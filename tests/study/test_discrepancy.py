@@ -15,12 +15,11 @@ from command_line import run_command
 from scipy.special import chdtrc
 
 from hidden_effects import Case, Noise, make, write
-from tractexp.discrepancy import adequacy
 from tractexp.discrepancy.all_events import AllEvents
 from tractexp.discrepancy.base_fit import base_fit
-from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.catalogue import catalogue
 from tractexp.discrepancy.chance import scales
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.disagreement import disagreement, examined
 from tractexp.discrepancy.discrepancy_json import content, write_left, write_model
@@ -30,21 +29,21 @@ from tractexp.discrepancy.fitting import Refit, refit
 from tractexp.discrepancy.held_out import carried, judged_on, weighed
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.judgement import judgements
+from tractexp.discrepancy.linearization import tangent
 from tractexp.discrepancy.noise_in_quiet import QuietNoise
-from tractexp.discrepancy.projection import signed_drop
 from tractexp.discrepancy.records import Records, check_events
-from tractexp.discrepancy.tangent import tangent
+from tractexp.discrepancy.score_test import ScoreTest, signed_drop
 from tractexp.errors import UserError
-from tractexp.identification import observed
-from tractexp.identification.descent import Apart, normal
+from tractexp.identification import observed, surprises
+from tractexp.identification.descent import SeparableColumns, normal
 from tractexp.identification.surprises import Scale, tail
 from tractexp.model.model import compose
 from tractexp.noise import Autoregression, white_noise
 from tractexp.noise import Noise as PowerNoise
 from tractexp.noise.quiet import estimate
+from tractexp.noise.random_walk import Load, RandomWalk, Rest
+from tractexp.noise.random_walk import find as wandering
 from tractexp.noise.voltage import smoothed
-from tractexp.noise.wander import Load, Rest, Wander
-from tractexp.noise.wander import find as wandering
 from tractexp.plugin import get
 from tractexp.record import Record, detect
 
@@ -63,7 +62,7 @@ def events(effect=None, size=1.0, seed=3, count=2, noise=QUIET, **settings):
 
 def bench(model, made, only=FEW, bounds=None):
     missing = catalogue(model.motor, model.static, model.effects, made, only)
-    return Bench.of(model, missing, Records.of(made), bounds or {}, {}, Criteria(), Effort())
+    return Context.of(model, missing, Records.of(made), bounds or {}, {}, Criteria(), Effort())
 
 
 def steady(samples):
@@ -253,7 +252,7 @@ def test_the_largest_of_many_has_the_tail_of_its_own_law(shape, p):
 def test_noise_of_a_wandering_load_is_white_once_whitened():
     """Draws that wander come out of the whitening with unit variance, also in their slow sums."""
     power = np.stack([np.where(np.arange(600) < 300, 1.0, 0.5), np.zeros(600)])
-    wander = Wander(np.array([2.0, 0.0]), 0.002, Load(power, np.array([[1.0, 0.0]])))
+    wander = RandomWalk(np.array([2.0, 0.0]), 0.002, Load(power, np.array([[1.0, 0.0]])))
     noise = PowerNoise(PowerNoise.white(1.0, 1.0).pairs, wander=wander)
     drive = SimpleNamespace(events=1, samples=600, part=lambda e: slice(0, 600))
     drawn = noise.draw(np.random.default_rng(9), 400, [600])
@@ -273,7 +272,7 @@ def test_what_the_reactive_power_of_customers_does_after_a_dip_follows_their_act
     recorded = clean * walk + 0.05 * rng.normal(size=(count, 2, n))
     load = Load.of(clean, np.array([[1.0, 0.4]]), np.array([0, n]))
     mix = np.array([[20.0, 0.0], [-8.0, 20.0]])  # in which what goes together in P and Q before the dip is P's alone
-    noise = PowerNoise(PowerNoise.white(1.0, 1.1).pairs, mix, wander=Wander(np.array([20.0, 0.0]), 0.002, load))
+    noise = PowerNoise(PowerNoise.white(1.0, 1.1).pairs, mix, wander=RandomWalk(np.array([20.0, 0.0]), 0.002, load))
     drive = SimpleNamespace(events=1, samples=n, part=lambda e: slice(0, n))
     rows = noise.whiten(recorded, drive, np.ones((2, n), dtype=bool)).reshape(count, 2, n)
     slow = (np.arange(n) >= 300) / np.sqrt(300)
@@ -437,11 +436,12 @@ def test_only_a_decision_that_is_open_asks_for_exact_scales(silent):
 
 @pytest.mark.parametrize(("events", "asked"), [(1, False), (2, True)])
 def test_parameters_of_each_event_are_asked_for_where_there_are_two(events, asked, monkeypatch):
-    monkeypatch.setattr(adequacy, "channels_of", lambda projection, bench: None)
-    monkeypatch.setattr(adequacy.surprises, "statistics", lambda channels, bench: {})
-    monkeypatch.setattr(adequacy, "least_p", lambda projection: np.ones(1))
-    projection = SimpleNamespace(unrest=lambda: np.zeros(1), unsteadiness=lambda: np.zeros(1))
-    made = adequacy.statistics(projection, SimpleNamespace(events=("a dip",) * events))
+    monkeypatch.setattr(surprises, "statistics", lambda channels, layout: {})
+    projection = SimpleNamespace(
+        unrest=lambda: np.zeros(1), least_p=np.ones(1), channels=lambda layout: None, r=np.zeros((1, 3)),
+        split=np.ones((1, 3)),
+    )  # fmt: skip
+    made = ScoreTest.statistics(projection, SimpleNamespace(events=("a dip",) * events))
     assert ("parameters of each event" in made) == asked
 
 
@@ -481,7 +481,7 @@ def test_coordinates_that_act_on_different_rows_share_one_difference():
     unit, lanes = np.full((2, 3), 0.4), np.arange(2)
     masks = np.array([np.arange(40) < 20, np.arange(40) >= 20])
     alone = normal(rows, unit, rows(unit, lanes), lanes)
-    together = normal(rows, unit, rows(unit, lanes), lanes, [Apart(np.array([1, 2]), masks)])
+    together = normal(rows, unit, rows(unit, lanes), lanes, [SeparableColumns(np.array([1, 2]), masks)])
     for one, other in zip(alone, together, strict=True):
         assert other == pytest.approx(one, rel=1e-9)
     assert calls == [2, 6, 2, 4]
@@ -701,7 +701,7 @@ def test_whitened_bits_do_not_depend_on_the_number_of_cores(planted, monkeypatch
     from tractexp.discrepancy import cores
 
     bench = planted.bench
-    wander = Wander(np.array([1.0, 0.3]), 0.002, bench.power)
+    wander = RandomWalk(np.array([1.0, 0.3]), 0.002, bench.power)
     noise = replace(planted.last.noise, mix=np.eye(2), wander=wander)
     residuals = np.random.default_rng(1).normal(size=(150, *bench.known.shape))
     rows = []

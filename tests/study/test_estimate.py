@@ -13,10 +13,10 @@ from tractexp.identification.adequacy import Grade, Surprise, graded
 from tractexp.identification.descent import Descent
 from tractexp.identification.estimate import estimate, polished
 from tractexp.identification.likelihood import Likelihood
+from tractexp.identification.local_minima import distinct
 from tractexp.identification.model_error import ModelError
 from tractexp.identification.observed import Observed
 from tractexp.identification.problem import Problem
-from tractexp.identification.valleys import distinct
 from tractexp.noise import Noise
 
 TRUTH = study.TYPICAL

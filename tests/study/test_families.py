@@ -14,10 +14,11 @@ from tractexp.discrepancy.explanations import worth_another
 from tractexp.discrepancy.families import against_members, near, open_settings, starts, worth
 from tractexp.discrepancy.fitting import Refit, scattered
 from tractexp.discrepancy.forms import forms
-from tractexp.discrepancy.gap import Gap
-from tractexp.discrepancy.held_out import HeldOut, Judged, searched_again
+from tractexp.discrepancy.gap import GapTest
+from tractexp.discrepancy.held_out import Assessment, HeldOut, searched_again
 from tractexp.discrepancy.investigate import investigate
-from tractexp.discrepancy.tangent import tangent
+from tractexp.discrepancy.linearization import tangent
+from tractexp.domain import PHASORS
 from tractexp.errors import UserError
 from tractexp.extend import Effect, Parameter, plugin
 from tractexp.plugin import discover, get
@@ -197,7 +198,7 @@ def test_held_out_events_deny_a_rival_only_by_what_it_leaves(chosen, rival, kept
     at = SimpleNamespace(criteria=Criteria(), catalogue=SimpleNamespace(textbook=lambda names: names))
     told = {("chosen",): chosen, ("rival",): rival}
     judged = {
-        names: Judged(Gap(None, None, closed, 100.0, 100.0, 10.8, None), at, (), p)
+        names: Assessment(GapTest(None, None, closed, 100.0, 100.0, 10.8, None), at, (), p)
         for names, (p, closed) in told.items()
     }
     adequate = [SimpleNamespace(fit=fit(0.0, 1, *names)) for names in told]
@@ -296,7 +297,7 @@ def test_a_search_in_all_events_that_finds_nothing_new_changes_nothing(names, de
     adequate = [] if names is None else [SimpleNamespace(fit=Refit(names, np.zeros(1), 0.0, 0))]
     found = SimpleNamespace(adequate=adequate, explanations=SimpleNamespace(chosen=SimpleNamespace(names=names)))
     plain = SimpleNamespace(deviance=deviance)
-    both = SimpleNamespace(fitted=SimpleNamespace(waves=False), plain=plain, searched=lambda valleys, seed: found)
+    both = SimpleNamespace(fitted=SimpleNamespace(domain=PHASORS), plain=plain, searched=lambda valleys, seed: found)
     assert searched_again(before, both, 0) is before
 
 

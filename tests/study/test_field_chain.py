@@ -12,8 +12,7 @@ from tractexp.api.compose import model_of
 from tractexp.filetypes import comtrade
 from tractexp.identification.problem import Problem
 from tractexp.identification.result import respond
-from tractexp.model.window import mean
-from tractexp.record.deconvolution import sharpened
+from tractexp.record.window import average, sharpened
 
 DATA = Path(tractexp.__file__).parent / "data"
 NAMES = ("tibet_30pct", "tibet_50pct", "tibet_65pct")
@@ -37,7 +36,7 @@ def test_the_voltage_reckoned_back_has_the_recorded_average():
     weights = event.record.window.on(event.record.step)
     back = sharpened(event, weights, event.record.window.length).record.U
     inside = slice(len(weights), -len(weights))
-    assert np.abs(mean(back, weights) - event.record.U)[inside].max() < 5e-3
+    assert np.abs(average(back, weights) - event.record.U)[inside].max() < 5e-3
     assert np.abs(back - event.record.U).max() > 0.01
 
 

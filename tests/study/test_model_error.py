@@ -20,7 +20,8 @@ def played(off_P=0.0, off_Q=0.0, noise=0.0, drift=0.0, seed=0, depth=0.5, name="
     power = clean + noise * rng.standard_normal(clean.shape) + drift * np.array([[1.0], [0.0]]) * (t - 0.15)
     event = study.event(t, U, power, name)
     response = clean - clean[:, :1]
-    return Fit(event, "train", clean[0] + off_P * response[0], clean[1] + off_Q * response[1], 0.0, 0.0)
+    P, Q = clean[0] + off_P * response[0], clean[1] + off_Q * response[1]
+    return Fit(event=event, role="train", P=P, Q=Q, epsilon_p=0.0, epsilon_q=0.0)
 
 
 def test_a_model_that_follows_nine_tenths_of_the_response_is_off_by_a_tenth():

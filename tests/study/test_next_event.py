@@ -18,8 +18,8 @@ from hidden_effects import Case, Noise
 from hidden_effects.generator import scene
 from independent import Dip
 from tractexp.discrepancy.base_fit import base_fit
-from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.catalogue import Catalogue, candidate, catalogue
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.effort import Effort
@@ -27,10 +27,11 @@ from tractexp.discrepancy.fitting import refit
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.next_event import rivals
 from tractexp.discrepancy.next_event.choose import next_event
-from tractexp.discrepancy.next_event.imagined import EDGE, Imagined, as_recorded, imagined
+from tractexp.discrepancy.next_event.imagined import ImaginedDip, as_recorded, imagined
 from tractexp.discrepancy.next_event.same import same
-from tractexp.discrepancy.next_event.separation import Chances, Seen, Separation, _reduced, seen, sided
+from tractexp.discrepancy.next_event.separation import Chances, EventView, Separation, _reduced, seen, sided
 from tractexp.discrepancy.records import Records
+from tractexp.domain import PHASORS
 from tractexp.errors import UserError
 from tractexp.extend import Effect, Parameter, sites
 from tractexp.model.model import compose
@@ -83,7 +84,7 @@ def alike():
     """A bench of three effects, of which two are one, fitted to events with stator resistance."""
     events, model = recorded(hidden(*MILD, effect="stator_resistance", size=1.0)), base()
     known = catalogue(model.motor, model.static, (), events, ("stator_resistance", "speed_dependent_torque"))
-    bench = Bench.of(
+    bench = Context.of(
         model, Catalogue((*known.candidates, candidate(LeakageLoss())), {}), Records.of(events), {}, {}, Criteria(),
         Effort(),
     )  # fmt: skip
@@ -108,7 +109,7 @@ def test_two_rivals_tie_and_the_recommended_event_ends_the_tie(tied):
     assert chosen.probability >= chosen.criteria.decided
     assert chosen.sentence().startswith(f"record {chosen.best.event.words}: it tells ")
     event = chosen.best.event
-    dip = Dip(depth=event.depth, start=0.5, duration=event.duration, fall=EDGE, rise=EDGE)
+    dip = Dip(depth=event.depth, start=0.5, duration=event.duration, fall=PHASORS.dips.edge, rise=PHASORS.dips.edge)
     made = hidden(*MILD)
     more = replace(made, dips=(*made.dips, dip), static=(*made.static, made.static[0]))
     after = judged(recorded(more))
@@ -147,7 +148,7 @@ def test_effects_that_only_look_alike_are_not_called_the_same(alike, tied):
 def test_a_rival_is_linearised_as_its_refit_moves(alike):
     """What a rival gains and loses by one mild event more is, linearised, what a refit of all parameters finds."""
     bench, noise, bare, fits = alike
-    truth, rival, event = fits["stator_resistance"], fits["speed_dependent_torque"], Imagined(0.1, 0.2)
+    truth, rival, event = fits["stator_resistance"], fits["speed_dependent_torque"], ImaginedDip(0.1, 0.2)
     sides = [sided(bench, noise, fit) for fit in (bare, truth, rival)]
     views = [seen(bench, noise, side, [event])[0] for side in sides]
     separation = Separation(sides, bench.criteria)
@@ -179,7 +180,7 @@ def test_a_set_is_not_told_from_itself_whatever_the_recorder_did(alike):
     unit = fit.unit.copy()
     unit[at.parameters(["time_skew", "load_drift"])] += 0.1
     sides = [sided(bench, noise, f) for f in (bare, fit, replace(fit, unit=unit))]
-    event = Imagined(0.5, 0.4)
+    event = ImaginedDip(0.5, 0.4)
     own, other = (seen(bench, noise, side, [event])[0].f for side in sides[1:])
     assert other == pytest.approx(own, abs=1e-9)
 
@@ -187,7 +188,7 @@ def test_a_set_is_not_told_from_itself_whatever_the_recorder_did(alike):
 def test_what_a_model_does_not_survive_tells_nothing(alike):
     bench, noise, bare, fits = alike
     sides = [sided(bench, noise, f) for f in (bare, fits["stator_resistance"], fits["leakage_loss"])]
-    lost = Seen(np.full(10, np.nan), np.zeros((3, 10)))
+    lost = EventView(np.full(10, np.nan), np.zeros((3, 10)))
     assert not Separation(sides, bench.criteria).denied([lost] * 3, 1).any()
 
 
@@ -199,13 +200,13 @@ def test_dips_switching_phase_jumps_and_rates_are_tried(alike):
     assert {e.rate for e in events} == {1, 4}
     assert not any(e.unbalance for e in events)
     assert any(e.unbalance for e in imagined(bench, ["U2"]))
-    assert "with the frequency f" in Imagined(0.3, 0.1, jump=20.0).words
-    assert "tap or a capacitor bank" in Imagined(0.04, 1.0, switched=True).words
+    assert "with the frequency f" in ImaginedDip(0.3, 0.1, jump=20.0).words
+    assert "tap or a capacitor bank" in ImaginedDip(0.04, 1.0, switched=True).words
 
 
 def test_the_smallest_switching_is_an_event_that_can_be_read(alike):
     bench = alike[0]
-    made = as_recorded(bench, Imagined(0.04, 1.0, switched=True), np.ones((2, 1400)))
+    made = as_recorded(bench, ImaginedDip(0.04, 1.0, switched=True), np.ones((2, 1400)))
     again = detect(replace(made.record, name="switched").check())
     assert again.depth == pytest.approx(0.04, abs=0.005)
     assert again.duration == pytest.approx(1.0, abs=0.1)

@@ -15,7 +15,7 @@ import tractexp as public
 from tractexp.errors import UserError
 from tractexp.identification.adequacy import Adequacy, Grade
 from tractexp.identification.advice import advise
-from tractexp.identification.plan import Shape, best_events, combined, depth_needed, each, forecast, over_depth
+from tractexp.identification.plan import DipShape, best_events, combined, depth_needed, each, forecast, over_depth
 from tractexp.identification.problem import Problem
 from tractexp.identification.profile import checked
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK
@@ -24,11 +24,11 @@ from tractexp.plugin import get
 from tractexp.report.plan import marks
 
 GOOD = Adequacy(Grade.ADEQUATE, "the model describes this load: use it", 0.5)
-SHAPE = Shape(depth=0.4, duration=0.2, rate=500.0, noise_P=0.004, noise_Q=0.004, P0=1.0, Q0=1.0)
+SHAPE = DipShape(depth=0.4, duration=0.2, rate=500.0, noise_P=0.004, noise_Q=0.004, P0=1.0, Q0=1.0)
 
 
 def recorded(depth, deviation=0.004, seed=5, name="dip"):
-    t, U = study.Shape(depth).voltage()
+    t, U = study.DipShape(depth).voltage()
     clean = study.printed(study.TYPICAL, t, U, 0.35)
     return study.event(t, U, clean + study.noise(np.random.default_rng(seed), len(t), deviation, 0.0), name)
 
@@ -41,7 +41,7 @@ def problem():
 def test_the_forecast_is_what_the_record_then_gives(problem):
     known = study.judged(problem, study.TYPICAL).known
     event = problem.events[0]
-    shape = replace(Shape.of(event), duration=0.2, noise_P=0.004, noise_Q=0.004, memory=0.0)
+    shape = replace(DipShape.of(event), duration=0.2, noise_P=0.004, noise_Q=0.004, memory=0.0)
     planned = forecast(problem, study.TYPICAL, shape)
     # The plan's trapezoid has edges of 20 ms, the record's of 30 ms; q_v and C are at other estimates.
     np.testing.assert_allclose(planned.half[[0, 3, 4, 5]], known.half[[0, 3, 4, 5]], rtol=0.25)

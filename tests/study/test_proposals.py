@@ -13,14 +13,14 @@ import pytest
 import tractexp
 from hidden_effects import EFFECTS, Case, Noise, make
 from tractexp.discrepancy.base_fit import base_fit
-from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.catalogue import catalogue
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.disagreement import disagreement
 from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.fitting import refit
 from tractexp.discrepancy.proposal import generate
-from tractexp.discrepancy.proposal.bed import bench_of_terms, carried_over, place, sizes_of, with_terms
+from tractexp.discrepancy.proposal.bed import carried_over, context_of_terms, place, sizes_of, with_terms
 from tractexp.discrepancy.proposal.effect import Library
 from tractexp.discrepancy.proposal.library import ANSWER, BALANCES, CLOCKS, SIGNALS, Term, term, terms
 from tractexp.discrepancy.proposal.propose import propose, told
@@ -28,6 +28,7 @@ from tractexp.discrepancy.proposal.refit import fitted
 from tractexp.discrepancy.proposal.screen import Ground, scores, screen
 from tractexp.discrepancy.proposal.wording import proposed_in_words
 from tractexp.discrepancy.records import Records
+from tractexp.domain import PHASORS, WAVES
 from tractexp.model.model import compose
 from tractexp.plugin import get
 from tractexp.record import Record, detect
@@ -52,7 +53,7 @@ def events(effect=None, size=1.0, seed=800001, count=3, noise=0.003):
 def fitted_base(made):
     model = base()
     missing = catalogue(model.motor, model.static, (), made, ["stator_resistance"])
-    return base_fit(Bench.of(model, missing, Records.of(made), {}, {}, Criteria(), Effort()))
+    return base_fit(Context.of(model, missing, Records.of(made), {}, {}, Criteria(), Effort()))
 
 
 def searched(made, held, among=FEW, seed=0):
@@ -67,7 +68,7 @@ def searched(made, held, among=FEW, seed=0):
 @pytest.fixture(scope="module")
 def ground():
     fit = fitted_base(events(count=2))
-    bench = bench_of_terms(fit.bench)
+    bench = context_of_terms(fit.bench)
     return Ground.at(bench, carried_over(bench, fit.bench, fit.fit.unit), fit.noise)
 
 
@@ -95,7 +96,7 @@ def test_a_column_is_the_difference_of_two_simulations(ground, name):
 
 def test_the_linear_drop_is_that_of_a_refit_where_the_term_is_small():
     fit = fitted_base(events("load_step", 0.15, count=2))
-    bench = bench_of_terms(fit.bench)
+    bench = context_of_terms(fit.bench)
     there = Ground.at(bench, carried_over(bench, fit.bench, fit.fit.unit), fit.noise)
     made = fitted(screen(there, [term(STEP)], 0, 20), [])
     (found,) = scores(there, [(term(STEP), {"instant": made.values(made.fits[0])["instant"]})])
@@ -106,7 +107,7 @@ def test_the_linear_drop_is_that_of_a_refit_where_the_term_is_small():
 
 def test_equal_bits_of_the_base_model_on_both_benches():
     fit = fitted_base(events(count=2))
-    bench = bench_of_terms(fit.bench)
+    bench = context_of_terms(fit.bench)
     mine = bench.residuals(carried_over(bench, fit.bench, fit.fit.unit)[None], ())
     assert np.array_equal(mine, fit.bench.residuals(fit.fit.unit[None], ()))
 
@@ -213,9 +214,9 @@ def test_nothing_is_proposed_where_nothing_is_missing(seed):
 
 
 def test_without_a_held_out_event_or_on_waveforms_nothing_is_proposed():
-    anything = SimpleNamespace(bench=SimpleNamespace(waves=False))
+    anything = SimpleNamespace(bench=SimpleNamespace(domain=PHASORS))
     assert "none was held out" in propose(anything, None, None, None, (), 0).why
-    anything.bench.waves = True
+    anything.bench.domain = WAVES
     assert "of phasors" in propose(anything, None, None, None, ("an event",), 0).why
     assert proposed_in_words(None, "why not") == ["no term is proposed: why not"]
     assert proposed_in_words(None, None) == []

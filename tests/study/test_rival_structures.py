@@ -10,7 +10,7 @@ from hidden_effects import Case, Noise
 from hidden_effects.generator import make, truth
 from tractexp.identification.estimate import polished
 from tractexp.identification.problem import Problem
-from tractexp.identification.rivals import Rival, with_rivals
+from tractexp.identification.rivals import RivalStructure, with_rivals
 from tractexp.identification.verdict import IDENTIFIED, WEAK
 from tractexp.record import Record, detect
 
@@ -65,7 +65,7 @@ def test_a_parameter_that_a_rival_moves_far_is_not_called_identified(missing):
 
     known, _ = missing
     j = known.names.index("T_m")
-    far = Rival("other", 1.0, {"T_m": float(1.5 * known.values[j])})
+    far = RivalStructure("other", 1.0, {"T_m": float(1.5 * known.values[j])})
     told = dict(module._moved(replace(known, rivals=()), [far]))
     assert list(told) == ["T_m"]
     assert known.verdicts["T_m"].word == IDENTIFIED

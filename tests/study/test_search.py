@@ -13,7 +13,7 @@ from tractexp.errors import UserError
 from tractexp.identification.least_squares import APART, Elite, _Residuals, least_squares_from, race
 from tractexp.identification.optimizer import REFUSED, Box, Evaluate, Optimizer
 from tractexp.identification.search import Limits, search
-from tractexp.identification.starts import best_distinct
+from tractexp.parameter import best_distinct
 from tractexp.plugin import build
 
 LOWER, UPPER = np.array([-2.0, 0.5, 100.0]), np.array([3.0, 0.75, 900.0])

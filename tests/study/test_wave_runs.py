@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 import tractexp
+from tractexp.domain import WAVES, domain_of
+from tractexp.domain.playback import as_phasors, unsettled
 from tractexp.errors import UserError
-from tractexp.identification.advice import waves_better
-from tractexp.identification.periodic import unsettled
-from tractexp.identification.plan import Shape, forecast
-from tractexp.identification.play import play
+from tractexp.identification.advice import better_domain
+from tractexp.identification.plan import DipShape, forecast
 from tractexp.identification.problem import Problem
-from tractexp.identification.seen import seen_by_estimator
 from tractexp.plugin import get
 from tractexp.record import in_waves
 from tractexp.report.waves import Drawn, spectra, wave_chart
@@ -91,7 +90,7 @@ def test_currents_are_drawn_whole_and_the_dip_is_in_view(fit):
 
 def test_the_estimator_sees_in_recorded_currents_the_power_before_the_dip(dip):
     event = in_waves(dip)
-    seen, P, Q = seen_by_estimator(event, 2 * np.nan_to_num(event.currents))
+    seen, P, Q = as_phasors(event, 2 * np.nan_to_num(event.currents))
     before = seen.steady
     assert seen.record.P[before].mean() == pytest.approx(event.P0, rel=2e-3)
     assert seen.record.Q[before].mean() == pytest.approx(event.Q0, rel=5e-3)
@@ -154,7 +153,7 @@ def test_a_slow_voltage_draws_in_waveforms_what_it_draws_in_phasors():
     for domain in ("waves", "phasors"):
         model = tractexp.compose(**LOAD | {"domain": domain}).model
         values = np.array([p.default for p in model.parameters])
-        made.append(np.stack(play(model, values, t, U, BEFORE)))
+        made.append(np.stack(domain_of(model).play(model, values, t, U, BEFORE)))
     np.testing.assert_allclose(made[0], made[1], atol=4e-3)
     assert np.ptp(made[1][0]) > 0.04
 
@@ -169,7 +168,7 @@ def test_a_result_of_waveforms_predicts_from_a_voltage(fit):
 
 def test_a_forecast_in_waveforms_narrows_with_depth_and_with_a_jump_of_the_phase(fit):
     problem, values = fit.asked.problem, fit.judged.known.values
-    shape = Shape.of(problem.events[0])
+    shape = DipShape.of(problem.events[0])
     assert shape.waves
     assert shape.jump == pytest.approx(0, abs=1)
     shape = replace(shape, depth=0.2, duration=0.1, jump=0.0, noise_P=0.005, noise_Q=0.005)
@@ -186,14 +185,14 @@ def test_a_forecast_in_waveforms_narrows_with_depth_and_with_a_jump_of_the_phase
 
 def test_a_planned_dip_has_the_sequences_that_were_asked_for():
     """Long after the edge the last half cycle shows 1 - depth of the positive and unbalance x depth of the negative."""
-    shape = Shape(0.4, 0.2, 6400.0, 0.005, 0.005, waves=True, jump=20.0, unbalance=0.6)
+    shape = DipShape(0.4, 0.2, 6400.0, 0.005, 0.005, domain=WAVES, jump=20.0, unbalance=0.6)
     event = shape.event()
     low = slice(event.start + 128, event.end - 32)
     np.testing.assert_allclose(event.record.U[low], 0.6, atol=1e-9)
     np.testing.assert_allclose(event.record.U2[low], 0.24, atol=1e-9)
     np.testing.assert_allclose(np.abs(event.v[low]).max(), 0.84, atol=1e-3)
     assert event.depth == pytest.approx(0.4)
-    again = Shape.of(event)
+    again = DipShape.of(event)
     assert (again.depth, again.unbalance) == pytest.approx((0.4, 0.6), abs=1e-6)
     assert again.jump == pytest.approx(20.0, abs=1e-6)
     with pytest.raises(UserError, match=r"task\.unbalance=1\.5 is out of range"):
@@ -204,7 +203,7 @@ def test_an_unbalanced_dip_tells_more_of_the_locked_rotor(fit):
     """The negative sequence sees the machine at a slip of nearly two: its leakages, whatever its flux does."""
     problem, values = fit.asked.problem, fit.judged.known.values
     shape = replace(
-        Shape.of(problem.events[0]), depth=0.2, duration=0.2, jump=0.0, unbalance=0.0, noise_P=0.005, noise_Q=0.005
+        DipShape.of(problem.events[0]), depth=0.2, duration=0.2, jump=0.0, unbalance=0.0, noise_P=0.005, noise_Q=0.005
     )
     plain, unbalanced = (forecast(problem, values, replace(shape, unbalance=u)) for u in (0.0, 1.0))
     X_prime = plain.names.index("X_prime")
@@ -250,7 +249,7 @@ def test_what_was_found_in_waveforms_is_exported_for_phasors(fit, format):
 def test_a_short_or_unbalanced_dip_with_samples_is_better_fitted_in_waveforms(dip):
     def said(event, domain="phasors"):
         model = tractexp.compose(domain=domain).model
-        return waves_better(Problem(model, [event]))
+        return better_domain(Problem(model, [event]))
 
     assert said(dip) == []  # 340 ms, balanced
     short = replace(dip, end=dip.start + round(0.06 * dip.rate))

@@ -31,7 +31,7 @@ from tractexp.wording import joined, with_error
 
 if TYPE_CHECKING:
     from tractexp.discrepancy.criteria import Criteria
-    from tractexp.discrepancy.investigate import Investigation as Steps
+    from tractexp.discrepancy.investigate import Findings as Steps
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -339,7 +339,7 @@ def _estimated(question: Question, steps: "Steps") -> Result:
     from tractexp.discrepancy.recommended import adequacy
     from tractexp.identification.problem import Problem
     from tractexp.identification.result import conclude
-    from tractexp.identification.search import Found, History
+    from tractexp.identification.search import History, SearchResult
 
     base, bench, unit = question.model, steps.bench, steps.extended.unit
     model = base.with_(effects=sorted({*base.effects, *steps.names}))
@@ -348,7 +348,7 @@ def _estimated(question: Question, steps: "Steps") -> Result:
     objective = float(problem.objective(values[None])[0])
     history = History(np.array([bench.effort.simulations]), np.array([objective]), values[None], np.zeros(1))
     status = f"ended with the verdict {steps.verdict.word}"
-    found = Found(values, objective, bench.effort.simulations, 0, 0, 0.0, status, history)
+    found = SearchResult(values, objective, bench.effort.simulations, 0, 0, 0.0, status, history)
     result, _ = conclude(problem, found, question.validate, question.seed, model.node, "descent")
     return replace(result, adequacy=adequacy(steps).told())
 

@@ -23,11 +23,11 @@ from tractexp.progress import Progress, tell
 
 if TYPE_CHECKING:
     from tractexp.identification.adequacy import Adequacy
-    from tractexp.identification.estimate import Estimated
+    from tractexp.identification.agreement import EventAgreement
+    from tractexp.identification.estimate import EstimationResult
     from tractexp.identification.model_error import ModelError
     from tractexp.identification.result import Fit
-    from tractexp.identification.search import Found
-    from tractexp.identification.together import Together
+    from tractexp.identification.search import SearchResult
     from tractexp.identification.uncertainty import Uncertainty
 
 FIXED = "fixed"
@@ -41,12 +41,12 @@ class Asked(Setup):
     optimizer: Choice
     check_intervals: bool = True
 
-    def found(self, progress: Progress) -> "Found":
+    def found(self, progress: Progress) -> "SearchResult":
         """Where the search ends; raises `UserError` where the input is wrong, before anything is told."""
         tell(progress, [*self.lines(), f"optimizer: {self.optimizer.name}, seed {self.seed}"])
         return self.search(self.optimizer, self.seed, progress)
 
-    def so_far(self, found: "Found | None") -> "Identification | None":
+    def so_far(self, found: "SearchResult | None") -> "Identification | None":
         """Where a search was when it was stopped, as an identification that nothing is judged of."""
         from tractexp.identification.result import conclude
         from tractexp.identification.search import REFUSED
@@ -99,9 +99,9 @@ class Judged(NamedTuple):
     """What stands behind a result: heavy, and reckoned again from a loaded one."""
 
     fits: "list[Fit]"
-    estimated: "Estimated"
+    estimated: "EstimationResult"
     known: "Uncertainty"  # with the intervals that profiles gave
-    together: "Together | None"
+    together: "EventAgreement | None"
     adequacy: "Adequacy"
 
 
@@ -114,11 +114,11 @@ class Identification(Written):
 
     result: Result
     setup: Asked | None = None  # None where only a result.json is known
-    found: "Found | None" = None
+    found: "SearchResult | None" = None
     behind: "Judged | None" = None  # None where it was loaded
 
     @classmethod
-    def of(cls, setup: Asked, found: "Found") -> "Identification":
+    def of(cls, setup: Asked, found: "SearchResult") -> "Identification":
         """Judge what a search found."""
         result, judged = _judge(setup, found)
         return cls(result, setup, found, judged)
@@ -139,7 +139,7 @@ class Identification(Written):
         return self.setup
 
     @property
-    def ended(self) -> "Found":
+    def ended(self) -> "SearchResult":
         """Where the search ended."""
         _ = self.asked
         assert self.found is not None
@@ -289,12 +289,12 @@ class Identification(Written):
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        from tractexp.identification.search import Found, History
+        from tractexp.identification.search import History, SearchResult
 
         setup, found = content["setup"], content["found"]
         if found is not None:
             history = History(**{key: np.array(v, dtype=float) for key, v in found["history"].items()})
-            found = Found(**found | {"values": np.array(found["values"], dtype=float), "history": history})
+            found = SearchResult(**found | {"values": np.array(found["values"], dtype=float), "history": history})
         return cls(Result(**content["result"]), setup and Asked.from_dict(setup), found)
 
     def write_results(self, folder: Path) -> list[Path]:
@@ -355,16 +355,16 @@ def identify(
         raise Stopped.of(stop, result=setup.so_far(found or getattr(stop, "state", None))) from None
 
 
-def _judge(setup: Asked, found: "Found") -> tuple[Result, Judged]:
+def _judge(setup: Asked, found: "SearchResult") -> tuple[Result, Judged]:
     """The estimate that a search led to, and what stands behind it."""
     from tractexp.choices import set_holding
     from tractexp.identification.adequacy import graded
     from tractexp.identification.advice import advise
+    from tractexp.identification.agreement import compare_events
     from tractexp.identification.estimate import estimate
     from tractexp.identification.profile import checked
     from tractexp.identification.result import active_bounds, conclude, errors_of, refuse_nothing_found
     from tractexp.identification.rivals import with_rivals
-    from tractexp.identification.together import compare_events
 
     problem = setup.problem
     refuse_nothing_found(problem, found)

@@ -22,7 +22,7 @@ from tractexp.record import Event
 from tractexp.report.plan import CURRENT_NOISE, DEPTH, DURATION, JUMP, NOISE, RATE, UNBALANCE
 
 if TYPE_CHECKING:
-    from tractexp.identification.plan import Choice, Shape
+    from tractexp.identification.plan import ChosenEvent, DipShape
     from tractexp.noise import Noise
     from tractexp.report.plan import Planned
 
@@ -175,7 +175,7 @@ def _planned(setup: Setup, parameter: str, within: float, values: Any, least: fl
     return Planned(problem, at, origin, _described(shape), needed, scans, best, least, events)
 
 
-def chosen_events(setup: Setup, values: Any, most: int) -> "list[Choice]":
+def chosen_events(setup: Setup, values: Any, most: int) -> "list[ChosenEvent]":
     """The events of a setup that tell most about its model together, at most `most`; `values` are those of `plan`.
 
     Events before which the model has no steady state at these values are left out. Raises `UserError` where that are
@@ -197,11 +197,11 @@ def chosen_events(setup: Setup, values: Any, most: int) -> "list[Choice]":
     return best_of([*told.values()], [*told], 0.0, most)
 
 
-def _shape(event: Event, noise: float | None, seen: "Noise | None" = None, **given: float | None) -> "Shape":
+def _shape(event: Event, noise: float | None, seen: "Noise | None" = None, **given: float | None) -> "DipShape":
     """The dip to plan for: the recorded one, with the noise `seen` in its fit, and what is given replaced."""
-    from tractexp.identification.plan import Shape
+    from tractexp.identification.plan import DipShape
 
-    shape = replace(Shape.of(event, seen), **{key: value for key, value in given.items() if value is not None})  # type: ignore[arg-type]
+    shape = replace(DipShape.of(event, seen), **{key: value for key, value in given.items() if value is not None})  # type: ignore[arg-type]
     if noise is not None:
         shape = replace(shape, noise_P=noise * abs(event.P0), noise_Q=noise * abs(event.P0), memory=0.0)
     return shape
@@ -230,7 +230,7 @@ def _guess(setup: Setup, event: Event, values: Any) -> "tuple[np.ndarray, str, N
     return np.array([known[n] for n in problem.space.names]), origin, None
 
 
-def _scans(problem: Any, values: np.ndarray, shape: "Shape") -> dict[str, Any]:
+def _scans(problem: Any, values: np.ndarray, shape: "DipShape") -> dict[str, Any]:
     """{label: (x, forecasts)}: one property of the dip varied at a time."""
     from tractexp.identification.plan import forecast, over_depth
 
@@ -249,7 +249,7 @@ def _scans(problem: Any, values: np.ndarray, shape: "Shape") -> dict[str, Any]:
     return made | {CURRENT_NOISE if shape.waves else NOISE: (NOISES, [forecast(problem, values, s) for s in loud])}
 
 
-def _described(shape: "Shape") -> str:
+def _described(shape: "DipShape") -> str:
     memory = f"forgotten within {1000 * shape.memory:.0f} ms" if shape.memory > 0 else "white"
     first, second = (f"{100 * level / abs(shape.P0):.2g} %" for level in (shape.noise_P, shape.noise_Q))
     names = ("i_alpha", "i_beta") if shape.waves else ("P", "Q")

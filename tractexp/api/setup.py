@@ -14,7 +14,7 @@ from tractexp.record import Event, describe
 
 if TYPE_CHECKING:
     from tractexp.identification.problem import Problem
-    from tractexp.identification.search import Found, Limits
+    from tractexp.identification.search import Limits, SearchResult
 
 LEAST = {"seed": 0, "budget": 1, "time_limit": 0, "target": 0}
 PLAIN: Mapping[Any, Any] = {  # by the type of a field: to plain data, and back
@@ -94,7 +94,7 @@ class Setup(Given):
         steps = f"Runge-Kutta steps: {problem.step.describe(problem.events)}"
         return [*recorded(self.train, self.validate), f"{model}; {steps}"]
 
-    def search(self, optimizer: Choice, seed: int, progress: Progress) -> "Found":
+    def search(self, optimizer: Choice, seed: int, progress: Progress) -> "SearchResult":
         """Search, and show how far that is."""
         from tractexp.identification.search import search
 

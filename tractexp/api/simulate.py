@@ -169,11 +169,11 @@ def simulate(
 
 def _played(load: LoadModel, values: np.ndarray, dip: Dip, before: Mapping[str, float], ratio: float) -> Response:
     """The response to a dip made by hand, `ratio` times the power that the model draws on its own base."""
-    from tractexp.identification.play import play
+    from tractexp.domain import domain_of
 
     t, shape = dip.voltage()
     U = before["U0"] * shape
-    P, Q = play(load.model, values, t, U, before)
+    P, Q = domain_of(load.model).play(load.model, values, t, U, before)
     return Response(f"dip of {dip.depth:.0%} for {dip.duration:g} s", t, U, ratio * P, ratio * Q)
 
 

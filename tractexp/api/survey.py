@@ -20,7 +20,7 @@ from tractexp.recording import archive
 from tractexp.report.survey import UNREAD
 
 if TYPE_CHECKING:
-    from tractexp.identification.plan import Choice
+    from tractexp.identification.plan import ChosenEvent
 
 JOURNAL = "rows.jsonl"  # a line for each file that was looked at: its state then, and its rows
 CANDIDATES = 300  # events that are read again to be ranked: those of the greatest depth over noise
@@ -173,7 +173,7 @@ def _cores() -> int:
 
 def _best(
     folder: Path, names: Sequence[str], most: int, model: Any, values: Any, known: Mapping[str, Any]
-) -> "list[Choice]":
+) -> "list[ChosenEvent]":
     """The events that tell most together. Raises `UserError` where none is worth fitting."""
     from tractexp.api.plan import chosen_events
     from tractexp.api.setup import Setup

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.discrepancy.base_fit import fitted_from
-from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.disagreement import disagreement, examined
@@ -29,7 +29,7 @@ Names = tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Together:
+class JointFit:
     """An explanation fitted to fitted and held-out events together, in coordinates of the fitted ones."""
 
     fit: Refit
@@ -49,14 +49,14 @@ class AllEvents:
     `faults` are those of the measurement in every explanation.
     """
 
-    fitted: Bench
+    fitted: Context
     events: Sequence[Event]  # held out
     noise: Noise
     faults: Names
     bare: Refit
 
     @functools.cached_property
-    def bench(self) -> Bench:
+    def bench(self) -> Context:
         records = self.fitted.records
         return self.fitted.on(Records.of((*records.recorded, *self.events), records.window))
 
@@ -74,7 +74,7 @@ class AllEvents:
         """The base model, fitted to all events."""
         return refit(self.bench, self.level, [((), self.bench.coordinates.widened(self.bare.unit))], faults=())[0]
 
-    def together(self, alone: Sequence[Refit], seed: int, *, anew: bool = False) -> list[Together]:
+    def together(self, alone: Sequence[Refit], seed: int, *, anew: bool = False) -> list[JointFit]:
         """Explanations as fitted to the fitted events `alone`, fitted to all: from there, or from every setting."""
         by_name = {fit.names: fit for fit in alone}
         fits = best_of(better for fit in alone for better in self._refitted(fit, anew=anew))
@@ -88,7 +88,7 @@ class AllEvents:
         base = fitted_from(bench, wide, wide[1:])
         return survivors(explanations(base, disagreement(base, seed), seed), seed)
 
-    def carried_back(self, fits: Sequence[Refit], seed: int) -> list[tuple[Refit, Together]]:
+    def carried_back(self, fits: Sequence[Refit], seed: int) -> list[tuple[Refit, JointFit]]:
         """Explanations (D of all events) as fitted to the fitted events alone, and to all."""
         there = {f.names: self._narrowed(f) for f in fits}
         alone = {names: refit(self.fitted, self.noise, [(names, u)], self.faults)[0] for names, u in there.items()}
@@ -103,12 +103,12 @@ class AllEvents:
     def _narrowed(self, fit: Refit) -> np.ndarray:
         return fit.unit[: self.fitted.coordinates.dimension]
 
-    def _told(self, fit: Refit, alone: Refit, seed: int) -> Together:
+    def _told(self, fit: Refit, alone: Refit, seed: int) -> JointFit:
         louder = (self.plain.deviance - fit.deviance) - (self.bare.deviance - alone.deviance)
         p_left = examined(self.quiet, fit, self.level, seed, plain=True).p_left
-        return Together(replace(fit, unit=self._narrowed(fit)), louder, p_left)
+        return JointFit(replace(fit, unit=self._narrowed(fit)), louder, p_left)
 
 
-def _settings(bench: Bench, names: Sequence[str]) -> list[Mapping[str, float]]:
+def _settings(bench: Context, names: Sequence[str]) -> list[Mapping[str, float]]:
     """No change, and every setting of the scanned parameters of one of the effects."""
     return [{}, *itertools.chain.from_iterable(bench.catalogue[name].settings for name in names)]

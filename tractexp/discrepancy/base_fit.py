@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.fitting import Refit, refit
 from tractexp.discrepancy.noise_in_quiet import QuietNoise, white
 from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.valleys import best_fits
+from tractexp.identification.local_minima import best_fits
 from tractexp.noise import Noise
 
 ROUNDS = 2  # of noise and fit in turn
@@ -19,7 +19,7 @@ ROUNDS = 2  # of noise and fit in turn
 class BaseFit:
     """The fit, its noise, and the valleys of the base model: its best fits (D,) from all over its box."""
 
-    bench: Bench
+    bench: Context
     fit: Refit
     noise: Noise
     quiet: QuietNoise
@@ -32,13 +32,13 @@ class BaseFit:
         return [valley for valley, distance in zip(self.valleys, far, strict=True) if distance > min(far)]
 
 
-def base_fit(bench: Bench) -> BaseFit:
+def base_fit(bench: Context) -> BaseFit:
     """Fit the base model from all over its box."""
     valleys = _valleys(bench)
     return fitted_from(bench, valleys, valleys)
 
 
-def fitted_from(bench: Bench, starts: Sequence[np.ndarray], valleys: Sequence[np.ndarray]) -> BaseFit:
+def fitted_from(bench: Context, starts: Sequence[np.ndarray], valleys: Sequence[np.ndarray]) -> BaseFit:
     """Fit the base model from these starts (D,): noise and fit in turn, the first time with what precedes the dips."""
     noise = white(bench)
     fit = refit(bench, noise, [((), start) for start in starts])[0]
@@ -49,7 +49,7 @@ def fitted_from(bench: Bench, starts: Sequence[np.ndarray], valleys: Sequence[np
     return BaseFit(bench, fit, noise, quiet, tuple(valleys))
 
 
-def _valleys(bench: Bench) -> list[np.ndarray]:
+def _valleys(bench: Context) -> list[np.ndarray]:
     """The best fits (D,) of the base model alone, by its own fast kernel."""
     at = bench.coordinates
     ends = best_fits(Likelihood.of(bench.kernels.bare))

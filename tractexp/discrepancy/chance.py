@@ -9,12 +9,11 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from tractexp.discrepancy.adequacy import channels_of, least_p, statistics
-from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.cores import each_apart
+from tractexp.discrepancy.linearization import Linearization, rich_residuals
 from tractexp.discrepancy.noise_in_quiet import QuietNoise
-from tractexp.discrepancy.projection import Projection
-from tractexp.discrepancy.tangent import Tangent, rich_residuals
+from tractexp.discrepancy.score_test import ScoreTest
 from tractexp.identification import shelf, surprises
 from tractexp.identification.surprises import SMALLEST_P, Scale, tail
 from tractexp.noise import Noise
@@ -35,14 +34,14 @@ class Chance:
         """The p a single candidate must undercut so that chance names any with probability `alpha`."""
         return float(np.quantile(self.least_p, alpha, method="lower"))
 
-    def surprises(self, projection: Projection, bench: Bench) -> dict[str, float]:
+    def surprises(self, projection: ScoreTest, bench: Context) -> dict[str, float]:
         """How often chance leaves as much as a fit does, by each test of adequacy."""
-        found = statistics(projection, bench)
+        found = projection.statistics(bench)
         return {name: tail(self.left[name], value, self.scales.get(name)) for name, value in found.items()}
 
 
 def chance_at(
-    t: Tangent, own: Projection, noise: Noise, quiet: QuietNoise, seed: int, plain: bool, draws: int = DRAWS
+    t: Linearization, own: ScoreTest, noise: Noise, quiet: QuietNoise, seed: int, plain: bool, draws: int = DRAWS
 ) -> Chance:  # fmt: skip
     """Draw every statistic at a fit as chance makes it; where the case is `plain`, with the noise taken as known.
 
@@ -65,7 +64,7 @@ def chance_at(
     return Chance(least, dict(zip(names.tolist(), left, strict=True)))
 
 
-def scales(t: Tangent, own: Projection, noise: Noise, seed: int) -> dict[str, Scale]:
+def scales(t: Linearization, own: ScoreTest, noise: Noise, seed: int) -> dict[str, Scale]:
     """Scales of the statistics of which the largest counts, by many draws of noise that is taken as known.
 
     The scale of the column that turns out largest is the one most likely to be too small. By the draws of a `Chance`
@@ -74,7 +73,7 @@ def scales(t: Tangent, own: Projection, noise: Noise, seed: int) -> dict[str, Sc
 
     def part(k: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         drawn = own.of(t.bench.whiten(noise, _noise(t, noise, np.random.default_rng((seed, k)), DRAWS)))
-        found = surprises.statistics(channels_of(drawn, t.bench), t.bench)
+        found = surprises.statistics(drawn.channels(t.bench), t.bench)
         return {name: (values.mean(axis=0), (values**2).mean(axis=0)) for name, values in found.items()}
 
     parts = each_apart(part, range(1, MORE + 1))
@@ -83,7 +82,7 @@ def scales(t: Tangent, own: Projection, noise: Noise, seed: int) -> dict[str, Sc
 
 
 def _drawn(
-    t: Tangent, own: Projection, noise: Noise, quiet: QuietNoise, seed: int, plain: bool, draws: int
+    t: Linearization, own: ScoreTest, noise: Noise, quiet: QuietNoise, seed: int, plain: bool, draws: int
 ) -> Chance:  # fmt: skip
     drawn = _noise(t, noise, np.random.default_rng(seed), draws)
     if plain:
@@ -99,19 +98,20 @@ def _drawn(
     return Chance(np.concatenate([one.least_p for one in each]), left)
 
 
-def _noise(t: Tangent, noise: Noise, rng: np.random.Generator, draws: int) -> np.ndarray:
+def _noise(t: Linearization, noise: Noise, rng: np.random.Generator, draws: int) -> np.ndarray:
     """Noise (b, C, N) [pu] where the events have samples that count."""
     return noise.draw(rng, draws, np.diff(t.bench.drive.first).tolist()) * t.bench.known
 
 
-def noise_known(bench: Bench, noise: Noise) -> bool:
-    """Whether quiet stretches tell the noise exactly enough; two numbers tell that of waveforms."""
-    return bench.waves or bench.criteria.knows_noise(noise.worth(sum(p.stop - p.start for p in bench.quiet)))
+def noise_known(bench: Context, noise: Noise) -> bool:
+    """Whether quiet stretches tell the noise exactly enough; of one that follows from the model, its size alone."""
+    samples = sum(part.stop - part.start for part in bench.quiet)
+    return bench.domain.noise_from_model or bench.criteria.knows_noise(noise.worth(samples))
 
 
-def _told(t: Tangent, projection: Projection, noise: Noise) -> Chance:
-    p = least_p(projection)
+def _told(t: Linearization, projection: ScoreTest, noise: Noise) -> Chance:
+    p = projection.least_p
     if noise.loudest_blur <= t.bench.criteria.blurred:
         faults = np.array(list(projection.fault_p().values())).reshape(-1, len(p))
         p = np.maximum(np.minimum(p, faults.min(axis=0, initial=1.0)), SMALLEST_P)
-    return Chance(p, statistics(projection, t.bench))
+    return Chance(p, projection.statistics(t.bench))

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import UserError, among, check_range
-from tractexp.noise import wander
+from tractexp.noise import random_walk
 
 DERIVED, CHOSEN = "derived", "chosen"
 
@@ -116,15 +116,15 @@ class Criteria:
         "the error of the estimate then is a tenth of the noise, as large as what a level of 5 % allows",
     )  # fmt: skip
     wandering_seen: float = _criterion(
-        wander.SEEN, (0.0, 1e6), "twice the log-likelihood from which a load is said to wander", CHOSEN,
+        random_walk.SEEN, (0.0, 1e6), "twice the log-likelihood from which a load is said to wander", CHOSEN,
         "half a chi-square of one degree is beyond it in 8 % of channels; a wandering that is not there costs little",
     )  # fmt: skip
     wandering_within: float = _criterion(
-        wander.WITHIN, (0.0, 1e6), "what the events must show beyond that where it is not seen before them", CHOSEN,
-        "what answers a dip does not wander",
+        random_walk.WITHIN, (0.0, 1e6), "what the events must show beyond that where it is not seen before them",
+        CHOSEN, "what answers a dip does not wander",
     )  # fmt: skip
     wandering_likely: float = _criterion(
-        wander.LESS, (0.0, 1e6), "log-likelihood below the largest at which the intensity is taken", CHOSEN,
+        random_walk.LESS, (0.0, 1e6), "log-likelihood below the largest at which the intensity is taken", CHOSEN,
         "to be safe: the larger end of an interval of 84 %",
     )  # fmt: skip
     measurement_prior: float = _criterion(

@@ -4,13 +4,13 @@ import functools
 from dataclasses import dataclass, replace
 
 from tractexp.discrepancy.base_fit import BaseFit
-from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.chance import Chance, chance_at, noise_known, scales
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.fitting import Refit, refit
+from tractexp.discrepancy.linearization import Linearization, rich_residuals, tangent
 from tractexp.discrepancy.noise_in_quiet import QuietNoise
-from tractexp.discrepancy.projection import Projection, Score
-from tractexp.discrepancy.tangent import Tangent, rich_residuals, tangent
+from tractexp.discrepancy.score_test import Score, ScoreTest
 from tractexp.noise import Noise
 
 PLAIN = 1e-10  # a score of this p needs no exact threshold
@@ -23,13 +23,13 @@ class Disagreement:
 
     fit: Refit
     noise: Noise
-    tangent: Tangent
-    projection: Projection
+    tangent: Linearization
+    projection: ScoreTest
     chance: Chance
     scores: list[Score]  # of the candidates outside the fit, the rarest by chance first
 
     @property
-    def bench(self) -> Bench:
+    def bench(self) -> Context:
         return self.tangent.bench
 
     @property

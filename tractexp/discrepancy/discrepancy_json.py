@@ -9,21 +9,21 @@ import numpy as np
 from tractexp import files
 from tractexp.discrepancy import recommended
 from tractexp.discrepancy.forms import forms, told_by_name
-from tractexp.discrepancy.gap import Curves, Gap
-from tractexp.discrepancy.investigate import Investigation
+from tractexp.discrepancy.gap import Curves, GapTest
+from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
-from tractexp.discrepancy.precision import Estimate, estimates, own_parameters
+from tractexp.discrepancy.precision import ParameterEstimate, estimates, own_parameters
 from tractexp.discrepancy.proposal import generate
 from tractexp.discrepancy.proposal.propose import told as told_of_proposal
 from tractexp.discrepancy.verdict import NAMED, TIED, UNEXPLAINED
+from tractexp.domain import DOMAINS
 from tractexp.identification.adequacy import Grade
-from tractexp.model.drive import PHASORS
 from tractexp.wording import joined
 
 PLUGIN = f"{generate.NAME}.py"  # of a proposal, beside the page
 
 
-def content(investigation: Investigation) -> dict[str, Any]:
+def content(investigation: Findings) -> dict[str, Any]:
     """The content of `discrepancy.json`."""
     window = investigation.bench.records.window
     return {
@@ -57,7 +57,7 @@ def content(investigation: Investigation) -> dict[str, Any]:
     }
 
 
-def recommendation(investigation: Investigation) -> str:
+def recommendation(investigation: Findings) -> str:
     """What to do next, one sentence."""
     chosen = investigation.next_event
     if chosen is not None and investigation.verdict.word == TIED:
@@ -77,16 +77,16 @@ def recommendation(investigation: Investigation) -> str:
     return "use the base model; what is missing, if anything, is below the limits given for each effect"
 
 
-def parameters(investigation: Investigation) -> dict[str, dict[str, float]]:
+def parameters(investigation: Findings) -> dict[str, dict[str, float]]:
     """Parameters of the extended model, each with its standard error where the fit gives one."""
     return {e.parameter.name: {"value": e.value, "standard_error": e.error} for e in investigation.after}
 
 
-def _gap(gap: Gap) -> dict[str, Any]:
+def _gap(gap: GapTest) -> dict[str, Any]:
     return {"before": _curves(gap.before), "after": _curves(gap.after), "closed": _number(gap.closed)}
 
 
-def _nearest(investigation: Investigation) -> dict[str, Any] | None:
+def _nearest(investigation: Findings) -> dict[str, Any] | None:
     """The set that comes nearest where nothing explains the disagreement, with the shares it explains."""
     near = investigation.verdict.nearest
     if near is None:
@@ -94,7 +94,7 @@ def _nearest(investigation: Investigation) -> dict[str, Any] | None:
     assert near.rival.tests is not None
     unit, own = near.rival.fit.unit, own_parameters(investigation.bench, near.names)
     known = {e.parameter.name: e for e in estimates(near.rival.tests, unit, near.names)}
-    on = {"train": near.curves, "validate": near.carried} if investigation.bench.waves else {}
+    on = {"train": near.curves, "validate": near.carried} if investigation.bench.domain.nearest_gap else {}
     told = {role: both and {"before": _curves(both[0]), "after": _curves(both[1])} for role, both in on.items()}
     return {
         "effects": list(near.names),
@@ -106,7 +106,7 @@ def _nearest(investigation: Investigation) -> dict[str, Any] | None:
     }
 
 
-def _remainder(investigation: Investigation) -> dict[str, Any] | None:
+def _remainder(investigation: Findings) -> dict[str, Any] | None:
     """Shapes in what the nearest candidates leave, and in what the base model alone leaves, and the sentence."""
     if not investigation.headline:
         return None
@@ -117,12 +117,12 @@ def _remainder(investigation: Investigation) -> dict[str, Any] | None:
     }
 
 
-def _estimate(known: Estimate) -> dict[str, Any]:
+def _estimate(known: ParameterEstimate) -> dict[str, Any]:
     interval = [_number(end) for end in known.interval]
     return {"value": known.value, "standard_error": _number(known.error), "interval": interval}
 
 
-def write_left(investigation: Investigation, path: Path) -> Path:
+def write_left(investigation: Findings, path: Path) -> Path:
     """Write what the nearest candidates leave, measured less calculated [pu], as CSV: event, t [s], each channel."""
     drive, nearest = investigation.bench.drive, investigation.verdict.nearest
     near = investigation.train.before.calculated if nearest is None else nearest.calculated
@@ -134,7 +134,7 @@ def write_left(investigation: Investigation, path: Path) -> Path:
     return files.write(path, "\n".join(lines) + "\n")
 
 
-def write_plugin(investigation: Investigation, path: Path) -> Path:
+def write_plugin(investigation: Findings, path: Path) -> Path:
     """Write the plugin file of a proposal."""
     made = investigation.proposed.proposal
     assert made is not None
@@ -147,7 +147,7 @@ def _curves(curves: Curves) -> dict[str, float]:
     return errors | own | {"chi2_per_sample": curves.chi2_per_sample}
 
 
-def sets(investigation: Investigation) -> list[dict[str, Any]]:
+def sets(investigation: Findings) -> list[dict[str, Any]]:
     """The refitted sets of the chosen size."""
     rows, at = [], investigation.bench.coordinates
     for rival in investigation.survivors.rivals:
@@ -162,7 +162,7 @@ def sets(investigation: Investigation) -> list[dict[str, Any]]:
     return rows
 
 
-def _singles(investigation: Investigation) -> list[dict[str, Any]]:
+def _singles(investigation: Findings) -> list[dict[str, Any]]:
     """Every effect of the catalogue, with its one-step size at the chosen model."""
     rows = []
     for j in judgements(investigation):
@@ -187,10 +187,10 @@ def _number(value: float) -> float | None:
 
 def use_of(domain: str, conf: str) -> str:
     """The command that runs the extended model, to be found in the folder `conf`."""
-    return f"python -m tractexp --config-dir {conf} {f'domain={domain} ' * (domain != PHASORS)}model=extended"
+    return f"python -m tractexp --config-dir {conf} {DOMAINS[domain].setting}model=extended"
 
 
-def write_model(investigation: Investigation, node: dict[str, Any], path: Path) -> Path:
+def write_model(investigation: Findings, node: dict[str, Any], path: Path) -> Path:
     """Write the extended model as a choice of the group `model`, usable at once through `--config-dir`."""
     import yaml
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.investigate import Investigation
+from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import standard_errors
 from tractexp.discrepancy.survivors import Rival
@@ -16,7 +16,7 @@ FITTED, ONE_STEP = "refitted", "one step"
 
 
 @dataclass(frozen=True)
-class Size:
+class EffectSize:
     """A parameter of a candidate, in `unit`; `error` is its standard error, nan where it was not reckoned."""
 
     name: str
@@ -39,7 +39,7 @@ class Evidence:
     drop: float
     how: str
     status: str
-    sizes: tuple[Size, ...]
+    sizes: tuple[EffectSize, ...]
     why: str
 
     @property
@@ -48,7 +48,7 @@ class Evidence:
         return {CHOSEN: 0, KEPT: 1}.get(self.status, 2)
 
 
-def evidence(found: Investigation) -> list[Evidence]:
+def evidence(found: Findings) -> list[Evidence]:
     """All candidates: what was added first, then what is tied with it, then the others; the most helpful first."""
     sets = [_of_set(found, rival) for rival in found.survivors.rivals if _names(found, rival)]
     known = {row.names for row in sets}  # of the chosen size
@@ -56,14 +56,14 @@ def evidence(found: Investigation) -> list[Evidence]:
     return sorted(rows, key=lambda row: (row.standing, -np.nan_to_num(row.drop, nan=-1.0), row.names))
 
 
-def chance_level(found: Investigation) -> float:
+def chance_level(found: Findings) -> float:
     """The drop of the deviance that chance gives to the most helpful candidate as often as false alarms are allowed."""
     from scipy.special import chdtri
 
     return float(chdtri(1, found.first.chance.critical_p(found.bench.criteria.false_alarms)))
 
 
-def why_not_the_most_helpful(found: Investigation) -> str:
+def why_not_the_most_helpful(found: Findings) -> str:
     """Where the verdict is not the effect that a single linear step favours: one sentence why; "" otherwise."""
     scores = found.first.scores
     if not scores or scores[0].drop < chance_level(found) or found.names == (scores[0].name,):
@@ -84,7 +84,7 @@ def why_not_the_most_helpful(found: Investigation) -> str:
     )
 
 
-def beside(found: Investigation) -> str:
+def beside(found: Findings) -> str:
     """Why an effect that helps the base model may be called not testable: one sentence; "" where nothing is added."""
     chosen = found.last.fit.names
     if not chosen:
@@ -95,7 +95,7 @@ def beside(found: Investigation) -> str:
     )
 
 
-def _verdict_on(found: Investigation, name: str) -> str:
+def _verdict_on(found: Findings, name: str) -> str:
     """What became of one effect, as the end of a sentence."""
     row = next((r for r in evidence(found) if r.names == (name,)), None)
     if row is None:
@@ -103,11 +103,11 @@ def _verdict_on(found: Investigation, name: str) -> str:
     return f"it is {row.why}" if row.status == "relevant" else f"it is {row.status}: {row.why}"
 
 
-def _names(found: Investigation, rival: Rival) -> tuple[str, ...]:
+def _names(found: Findings, rival: Rival) -> tuple[str, ...]:
     return tuple(sorted((*rival.fit.names, *found.held_out.faults)))
 
 
-def _of_set(found: Investigation, rival: Rival) -> Evidence:
+def _of_set(found: Findings, rival: Rival) -> Evidence:
     """A refitted set of the chosen size; the faults of the measurement where they alone explain."""
     weighed, names = found.held_out, rival.fit.names or found.held_out.faults
     drop = rival.lowered if rival.fit.names else weighed.bare.deviance - weighed.extended[()].deviance
@@ -116,11 +116,11 @@ def _of_set(found: Investigation, rival: Rival) -> Evidence:
     errors = {} if rival.tests is None else standard_errors(rival.tests)
     at = found.bench.coordinates
     own = [p for name in names for p in found.catalogue[name].sizes]
-    sizes = tuple(Size(p.name, at.value(p.name, unit), errors.get(p.name, np.nan), p.unit) for p in own)
+    sizes = tuple(EffectSize(p.name, at.value(p.name, unit), errors.get(p.name, np.nan), p.unit) for p in own)
     return Evidence(names, max(drop, 0.0), FITTED, status, sizes, why)
 
 
-def _fate(found: Investigation, rival: Rival) -> tuple[str, str]:
+def _fate(found: Findings, rival: Rival) -> tuple[str, str]:
     """What became of a refitted set, and why."""
     names = _names(found, rival)
     judged = found.held_out.judged.get(rival.fit.names)
@@ -140,7 +140,7 @@ def _fate(found: Investigation, rival: Rival) -> tuple[str, str]:
     return "denied", "does not hold on the held-out events"
 
 
-def _singles(found: Investigation) -> list[Evidence]:
+def _singles(found: Findings) -> list[Evidence]:
     """Every effect of the catalogue by itself: refitted where it was, else in one linear step from the base model."""
     refits, scores = found.explanations.refits, {s.name: s for s in found.first.scores}
     base, at = found.first.fit.deviance, found.bench.coordinates
@@ -148,12 +148,12 @@ def _singles(found: Investigation) -> list[Evidence]:
     for j in judgements(found):
         score, fit = scores.get(j.name), refits.get((j.name,))
         drop = base - fit.deviance if fit else score.drop if score else np.nan
-        sizes: list[Size] = []
+        sizes: list[EffectSize] = []
         for p in found.catalogue[j.name].sizes if fit or score else ():
             if fit:
-                sizes.append(Size(p.name, at.value(p.name, fit.unit), np.nan, p.unit))
+                sizes.append(EffectSize(p.name, at.value(p.name, fit.unit), np.nan, p.unit))
             elif score and score.deviation[p.name] < np.ptp(p.bounds):  # else these events say nothing of it
-                sizes.append(Size(p.name, p.absent + score.size[p.name], score.deviation[p.name], p.unit))
+                sizes.append(EffectSize(p.name, p.absent + score.size[p.name], score.deviation[p.name], p.unit))
         how = FITTED if fit else ONE_STEP if score else ""
         status = CHOSEN if j.name in found.names else j.status
         rows.append(Evidence((j.name,), max(drop, 0.0), how, status, tuple(sizes), j.why))

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from tractexp.discrepancy.base_fit import BaseFit
-from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.disagreement import Disagreement, examined
 from tractexp.discrepancy.families import against_members
 from tractexp.discrepancy.fitting import (
@@ -22,14 +22,14 @@ from tractexp.discrepancy.fitting import (
     Start,
     best_of,
     no_worse_than_subsets,
-    off_walls,
+    off_bounds,
     refit,
     rough_refit,
     wide_refits,
 )  # fmt: skip
-from tractexp.discrepancy.projection import Score
-from tractexp.discrepancy.tangent import Column, tangent
-from tractexp.identification.valleys import DISTINCT
+from tractexp.discrepancy.linearization import CandidateColumn, tangent
+from tractexp.discrepancy.score_test import Score
+from tractexp.identification.local_minima import DISTINCT
 from tractexp.noise import Noise
 
 MOST_EFFECTS = 3
@@ -138,7 +138,7 @@ def with_families(base: BaseFit, tests: Disagreement, refits: dict[Names, Refit]
 
     None is tried unless `family_p` asks for them, and none of waveforms: no criterion was calibrated with members.
     """
-    if base.bench.waves or not base.bench.criteria.family_p:
+    if not base.bench.domain.calibrated or not base.bench.criteria.family_p:
         return tests
     tests, fits = against_members(base, tests, refits, seed + FAMILIES)
     refits |= {f.names: f for f in fits}
@@ -170,13 +170,13 @@ def searched_widely(
     bench, bare = base.bench, refits[()].unit
     singles: Refits = {f.names: f for f in best_of(refits.values()) if len(f.names) == 1}
     unlike = [f for f in singles.values() if len(bench.catalogue[f.names[0]].settings) > 1]
-    grounds = bare, *off_walls(bench, bare)
+    grounds = bare, *off_bounds(bench, bare)
     wanted = [[(f.names, f.unit), *(s for unit in grounds for s in _every_setting(bench, f, unit))] for f in unlike]
     found = wide_refits(bench, first.noise, wanted, WIDELY)
     return first, [f for f in found if f.deviance < singles[f.names].deviance - NESTED]
 
 
-def _every_setting(bench: Bench, fit: Refit, unit: np.ndarray) -> list[Start]:
+def _every_setting(bench: Context, fit: Refit, unit: np.ndarray) -> list[Start]:
     """Starts for a single effect at coordinates (D,): of the size that it was fitted with, at all its settings."""
     at, sized = bench.coordinates, unit.copy()
     sized[at.sizes(fit.names)] = fit.unit[at.sizes(fit.names)]
@@ -281,7 +281,7 @@ def _placed(at: Disagreement, name: str, rank: int, unit: np.ndarray) -> np.ndar
     return to.placed(unit, values)
 
 
-def ranked_settings(at: Disagreement, name: str) -> list[tuple[Column, np.ndarray]]:
+def ranked_settings(at: Disagreement, name: str) -> list[tuple[CandidateColumn, np.ndarray]]:
     """A candidate's settings by how much they lower the deviance, each with its one-step sizes."""
     drops, _ = at.projection.drops
     rows = []

@@ -13,10 +13,10 @@ import numpy as np
 from scipy.special import chdtrc
 
 from tractexp.discrepancy.base_fit import BaseFit
-from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.catalogue import Candidate
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.disagreement import Disagreement, examined
-from tractexp.discrepancy.fitting import Refit, Start, off_walls, wide_refits
+from tractexp.discrepancy.fitting import Refit, Start, off_bounds, wide_refits
 
 NEAREST = 4  # members that are searched to the end
 EXAMINED = 3  # members whose remainder is tested
@@ -49,7 +49,7 @@ def against_members(
     return tests, [f for f in fits if family.joins(f.names[0])] if tests.suffices else []
 
 
-def near(bench: Bench, best: Refit, refits: Mapping[Names, Refit]) -> list[Candidate]:
+def near(bench: Context, best: Refit, refits: Mapping[Names, Refit]) -> list[Candidate]:
     """Members of families whose textbook effect comes near the best single one, that one's own left out."""
     bare = refits[()].deviance
     least = bare - bench.criteria.near_family * (bare - best.deviance)
@@ -64,7 +64,7 @@ def worth(member: Refit, textbook: Refit, p: float) -> bool:
     return gained > 0 and float(chdtrc(further, gained)) < p
 
 
-def starts(bench: Bench, member: Candidate, refits: Mapping[Names, Refit]) -> list[Start]:
+def starts(bench: Context, member: Candidate, refits: Mapping[Names, Refit]) -> list[Start]:
     """Starts of a member: from the textbook's fit, with every setting that it leaves open and its size told whole or
     shared, and where the member does not nest that, from the base model's with every setting, since the textbook's fit
     may have gone astray."""
@@ -76,7 +76,7 @@ def starts(bench: Bench, member: Candidate, refits: Mapping[Names, Refit]) -> li
         told = {own: at.value(theirs, textbook.unit) for own, theirs in effect.as_textbook.items()}
         begun += [(ground, told), *((ground, told | shared) for shared in _shared(member, told))]
     if textbook is None or not effect.nests_textbook:
-        begun += [(unit, {}) for unit in (bare, *off_walls(bench, bare))]
+        begun += [(unit, {}) for unit in (bare, *off_bounds(bench, bare))]
     made = []
     for ground, told in begun:
         known = dict(told)

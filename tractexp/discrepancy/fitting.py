@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.promising import promising
 from tractexp.identification import shelf
@@ -22,7 +22,7 @@ MOVES, WORTH = 8, 1.0  # of such parameters in a row, and the deviance that one 
 BEGUN = 8  # starts of one set that are begun, of those that promise most
 TURNS, KEPT = 3, 6  # of moving and descending in turn, and the starts that take part
 SCATTERED, SPREAD, AGAIN = 24, 0.5, 3  # starts around a fit, of the range to either side, and how often
-WALL = 1e-3  # of a coordinate's range: how near a bound a parameter rests on it
+ON_BOUND = 1e-3  # of a coordinate's range: how near a bound a parameter rests on it
 NESTED = 0.1  # of the deviance: a set that is worse than its own subset by more has not converged
 
 Start = tuple[Sequence[str], np.ndarray]  # names of effects, and coordinates (D,) to start from
@@ -55,7 +55,7 @@ def best_of(fits: Iterable[Refit]) -> list[Refit]:
     return list(best.values())
 
 
-def refit(bench: Bench, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None = None) -> list[Refit]:
+def refit(bench: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None = None) -> list[Refit]:
     """Fit sets of effects side by side, with the named faults of the measurement free beside each (by default all).
 
     Of several starts of one set the best is returned; the result is in order of cost.
@@ -63,7 +63,7 @@ def refit(bench: Bench, noise: Noise, wanted: Sequence[Start], faults: Sequence[
     return best_of(_descended(bench, noise, wanted, faults, EXACT))
 
 
-def rough_refit(bench: Bench, noise: Noise, wanted: Sequence[Start]) -> list[Refit]:
+def rough_refit(bench: Context, noise: Noise, wanted: Sequence[Start]) -> list[Refit]:
     """As `refit`, good enough to rank sets that are far apart; what falls behind early is given up."""
     begun = _descended(bench, noise, wanted, None, (FIRST, ROUGH[1]))
     best = best_of(begun)
@@ -77,7 +77,7 @@ def rough_refit(bench: Bench, noise: Noise, wanted: Sequence[Start]) -> list[Ref
 
 
 def wide_refit(
-    bench: Bench, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None = None, again: int = AGAIN
+    bench: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None = None, again: int = AGAIN
 ) -> list[Refit]:  # fmt: skip
     """As `refit`, for one set whose thresholds and times have hardly a slope: moved far and descended in turn.
 
@@ -93,7 +93,7 @@ def wide_refit(
     return refit(bench, noise, [(f.names, f.unit) for f in fits if f.cost < fits[0].cost + CLOSE], faults)
 
 
-def _in_turns(bench: Bench, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None) -> list[Refit]:
+def _in_turns(bench: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None) -> list[Refit]:
     """The best of these starts, moved and descended in turn until none gains that may end best; the best first."""
     fits = _begun(bench, noise, wanted, faults)
     for _ in range(TURNS):
@@ -108,7 +108,7 @@ def _in_turns(bench: Bench, noise: Noise, wanted: Sequence[Start], faults: Seque
     return fits
 
 
-def scattered(bench: Bench, fit: Refit) -> list[Start]:
+def scattered(bench: Context, fit: Refit) -> list[Start]:
     """Starts around a fit, with all that an effect has beside its sizes moved at once, by little and by much.
 
     Two relays may each be at its best beside the other and still have each other's times: one parameter at a time
@@ -125,7 +125,7 @@ def scattered(bench: Bench, fit: Refit) -> list[Start]:
 
 
 def wide_refits(
-    bench: Bench, noise: Noise, wanted: Iterable[Sequence[Start]], most: int, faults: Sequence[str] | None = None
+    bench: Context, noise: Noise, wanted: Iterable[Sequence[Start]], most: int, faults: Sequence[str] | None = None
 ) -> list[Refit]:  # fmt: skip
     """`wide_refit` of those `most` sets, each with starts of its own, that come nearest in a few iterations."""
     begun = each_apart(lambda starts: _begun(bench, noise, starts, faults), list(wanted))
@@ -134,7 +134,7 @@ def wide_refits(
     return best_of(itertools.chain(*each_apart(lambda starts: wide_refit(bench, noise, starts, faults), again)))
 
 
-def _begun(bench: Bench, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None) -> list[Refit]:
+def _begun(bench: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None) -> list[Refit]:
     """The best starts of one set after a few iterations, of those that promise most by one simulation each."""
     names = wanted[0][0]
     nuisances = [*bench.coordinates.base, *bench.coordinates.before, *_with_prior(bench, [names], faults)[0]]
@@ -142,7 +142,7 @@ def _begun(bench: Bench, noise: Noise, wanted: Sequence[Start], faults: Sequence
     return sorted(_descended(bench, noise, [(names, u) for u in units], faults, (FIRST, ROUGH[1])), key=_cost)[:KEPT]
 
 
-def moved_across(bench: Bench, noise: Noise, fit: Refit, faults: Sequence[str] | None = None) -> np.ndarray:
+def moved_across(bench: Context, noise: Noise, fit: Refit, faults: Sequence[str] | None = None) -> np.ndarray:
     """Coordinates (D,) with what an effect has beside its sizes moved, one parameter at a time and by any reach."""
     columns = bench.coordinates.settings(fit.names)
     if not columns:
@@ -162,7 +162,7 @@ def moved_across(bench: Bench, noise: Noise, fit: Refit, faults: Sequence[str] |
 
 
 def no_worse_than_subsets(
-    bench: Bench, noise: Noise, refits: Mapping[tuple[str, ...], Refit], fits: Sequence[Refit]
+    bench: Context, noise: Noise, refits: Mapping[tuple[str, ...], Refit], fits: Sequence[Refit]
 ) -> list[Refit]:  # fmt: skip
     """Refit from its best subset any set that came out worse than that subset."""
     again = []
@@ -178,7 +178,7 @@ def no_worse_than_subsets(
 
 
 def _descended(
-    bench: Bench, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None, effort: tuple[int, float]
+    bench: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None, effort: tuple[int, float]
 ) -> list[Refit]:
     """The end of a descent from each start; of one that was made before, as by a run that was stopped, as it was."""
     spent = 0
@@ -214,7 +214,7 @@ def _descended(
 
 
 def _with_prior(
-    bench: Bench, sets: Iterable[Sequence[str]], faults: Sequence[str] | None
+    bench: Context, sets: Iterable[Sequence[str]], faults: Sequence[str] | None
 ) -> tuple[list[int], list[int]]:
     """The columns of the faults of the measurement that are free, and all that have a prior beside these sets."""
     at = bench.coordinates
@@ -222,16 +222,16 @@ def _with_prior(
     return measured, [*measured, *at.shapes(sorted({name for names in sets for name in names}))]
 
 
-def off_walls(bench: Bench, unit: np.ndarray, to: float | None = None) -> list[np.ndarray]:
+def off_bounds(bench: Context, unit: np.ndarray, to: float | None = None) -> list[np.ndarray]:
     """Coordinates (D,) with what rests on a bound of the base model back at its default or at `to`: there it has no
     slope. None where nothing rests."""
     moved, base = unit.copy(), bench.coordinates.base
-    resting = base[(unit[base] <= WALL) | (unit[base] >= 1 - WALL)]
+    resting = base[(unit[base] <= ON_BOUND) | (unit[base] >= 1 - ON_BOUND)]
     moved[resting] = bench.coordinates.null[resting] if to is None else to
     return [moved] if len(resting) else []
 
 
-def settled(bench: Bench, unit: np.ndarray, noise: Noise, names: Sequence[str]) -> np.ndarray:
+def settled(bench: Context, unit: np.ndarray, noise: Noise, names: Sequence[str]) -> np.ndarray:
     """Coordinates (D,) with P0 and Q0 of each event fitted, and nothing else."""
     before = bench.coordinates.before
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.discrepancy.investigate import Investigation
+from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.precision import WIDE, covariance
 from tractexp.model.parts import Curve, Effect
 
@@ -15,7 +15,7 @@ STEP = 0.05  # of a standard error: the step by which a curve's slopes are taken
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class FittedLaw:
     """A law as it was found: `curve`, its 95 % band (2, n), and the `textbook` law that fits best, (n,)."""
 
     curve: Curve
@@ -24,12 +24,12 @@ class Found:
 
 
 @dataclass(frozen=True, eq=False)
-class Form:
+class EffectForm:
     """One effect named: `name` is the catalogue's, `effect` the member of its family that is in the model."""
 
     name: str
     effect: Effect
-    found: Found | None
+    found: FittedLaw | None
 
     @property
     def law(self) -> str:
@@ -53,13 +53,13 @@ class Form:
         }  # fmt: skip
 
 
-def forms(found: Investigation) -> list[Form]:
+def forms(found: Findings) -> list[EffectForm]:
     """The form of each effect of the verdict."""
     at = found.catalogue
-    return [Form(at.family(name), at[name].effect, _curve(found, at[name].effect)) for name in found.names]
+    return [EffectForm(at.family(name), at[name].effect, _curve(found, at[name].effect)) for name in found.names]
 
 
-def told_by_name(found: Sequence[Form]) -> dict[str, dict[str, Any]]:
+def told_by_name(found: Sequence[EffectForm]) -> dict[str, dict[str, Any]]:
     """Forms by the catalogue's names; a second one of a family by its own."""
     told: dict[str, dict[str, Any]] = {}
     for form in found:
@@ -67,7 +67,7 @@ def told_by_name(found: Sequence[Form]) -> dict[str, dict[str, Any]]:
     return told
 
 
-def _curve(found: Investigation, effect: Effect) -> Found | None:
+def _curve(found: Findings, effect: Effect) -> FittedLaw | None:
     """The law found with its band, by the slopes of the curve along the parameters; None of what is no curve."""
     at, unit, tests = found.bench.coordinates, found.extended.unit, found.verdict.chosen.tests or found.last
     values = {p.name: at.value(p.name, unit) for p in effect.parameters}
@@ -78,7 +78,7 @@ def _curve(found: Investigation, effect: Effect) -> Found | None:
     told = [k for k in range(len(names)) if spread[k, k] > 0]
     J = np.array([_slope(effect, values, names[k], spread[k, k] ** 0.5) for k in told]).reshape(-1, len(curve.y))
     half = WIDE * np.sqrt(np.einsum("kn,kl,ln->n", J, spread[np.ix_(told, told)], J))
-    return Found(curve, np.stack([curve.y - half, curve.y + half]), _textbook(found, effect, values, curve))
+    return FittedLaw(curve, np.stack([curve.y - half, curve.y + half]), _textbook(found, effect, values, curve))
 
 
 def _slope(effect: Effect, values: Mapping[str, float], name: str, error: float) -> np.ndarray:
@@ -90,7 +90,7 @@ def _slope(effect: Effect, values: Mapping[str, float], name: str, error: float)
     return (up.y - down.y) / (2 * h)
 
 
-def _textbook(found: Investigation, effect: Effect, values: Mapping[str, float], curve: Curve) -> np.ndarray:
+def _textbook(found: Findings, effect: Effect, values: Mapping[str, float], curve: Curve) -> np.ndarray:
     """The textbook's law (n,) as it fitted these events, beside the curve found; the shapes at their defaults."""
     default = {p.name: p.default for p in effect.parameters}
     at, fit = found.bench.coordinates, found.explanations.refits.get((effect.family or effect.name,))

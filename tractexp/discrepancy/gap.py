@@ -5,16 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.context import Context
+from tractexp.discrepancy.injection import perturbations
 from tractexp.discrepancy.linear import two_sided
-from tractexp.discrepancy.pushes import push_points
-from tractexp.discrepancy.tangent import resting
+from tractexp.discrepancy.linearization import resting
+from tractexp.domain.playback import relative_error
 from tractexp.identification.model_error import ModelError, model_error
-from tractexp.identification.result import current_error, relative_error
-from tractexp.identification.seen import seen_by_estimator
 from tractexp.noise import Noise
 from tractexp.noise.span import spanned
-from tractexp.record import Event, WaveEvent
 
 SAME = 0.03  # singular values below this share of the largest: pushes that differ from others in noise only
 
@@ -37,7 +35,7 @@ class Curves:
 
 
 @dataclass(frozen=True, eq=False)
-class Gap:
+class GapTest:
     """Before and after: `closed` is the share of the explainable gap, `gain` the deviance gained.
 
     `expected` is the gain to be expected of a true explanation, the squared distance of both curves in standard
@@ -66,7 +64,7 @@ class Gap:
         return self.gain > 0 or not self.telling
 
 
-def curves(bench: Bench, unit: np.ndarray, noise: Noise, names: Sequence[str] | None = None) -> Curves:
+def curves(bench: Context, unit: np.ndarray, noise: Noise, names: Sequence[str] | None = None) -> Curves:
     """What a fit with the named effects (by default any) leaves; beyond all measure where it has no steady state."""
     residual = bench.residuals(unit[None], names)
     white = bench.whiten(noise, residual)[0]
@@ -77,40 +75,20 @@ def curves(bench: Bench, unit: np.ndarray, noise: Noise, names: Sequence[str] | 
     return Curves(calculated, P, Q, deviance, deviance / max(bench.samples, 1), error, i)
 
 
-@dataclass(frozen=True, eq=False)
-class _Played:
-    """An event, and P and Q (N,) [pu] calculated of it."""
-
-    event: Event
-    P: np.ndarray
-    Q: np.ndarray
-
-
-def _errors(bench: Bench, calculated: np.ndarray) -> tuple[float, float, ModelError, float | None]:
+def _errors(bench: Context, calculated: np.ndarray) -> tuple[float, float, ModelError, float | None]:
     """epsilon_p, epsilon_q, the model's error and, of waveforms, epsilon_i of what is calculated (C, N) [pu]."""
-    each = [
-        (event, calculated[:, bench.drive.part(e)])
-        for e, event in enumerate(bench.events)
-        if isinstance(event, WaveEvent)
-    ]
-    if not each:
-        counted = np.where(bench.known, bench.drive.measured, np.nan)
-        P, Q = (relative_error(counted[c], calculated[c]) for c in (0, 1))
-        parts = [calculated[:, bench.drive.part(e)] for e in range(bench.drive.events)]
-        played = [_Played(event, *part) for event, part in zip(bench.events, parts, strict=True)]
-        return P, Q, model_error(played), None
-    seen = [seen_by_estimator(event, currents) for event, currents in each]
-    measured = np.concatenate([np.stack([event.record.P, event.record.Q]) for event, _, _ in seen], axis=1)
-    made = np.concatenate([np.stack(power) for _, *power in seen], axis=1)
-    P, Q = (relative_error(measured[c], made[c]) for c in (0, 1))
-    error = model_error([_Played(*one) for one in seen])
-    return P, Q, error, float(np.sqrt(np.mean([current_error(*one) ** 2 for one in each])))
+    each = [bench.domain.comparison(event, calculated[:, bench.drive.part(e)]) for e, event in enumerate(bench.events)]
+    measured = np.concatenate([np.stack([one.event.record.P, one.event.record.Q]) for one in each], axis=1)
+    power = np.concatenate([np.stack([one.P, one.Q]) for one in each], axis=1)
+    P, Q = (relative_error(measured[c], power[c]) for c in (0, 1))
+    currents = [one.epsilon_i**2 for one in each if one.epsilon_i is not None]
+    return P, Q, model_error(each), float(np.sqrt(np.mean(currents))) if currents else None
 
 
 def gap(
-    bench: Bench, base: np.ndarray, extended: np.ndarray, names: Sequence[str], noise: Noise,
+    bench: Context, base: np.ndarray, extended: np.ndarray, names: Sequence[str], noise: Noise,
     fitted: Sequence[int] | np.ndarray,
-) -> Gap:  # fmt: skip
+) -> GapTest:  # fmt: skip
     """Compare the base model's fit and that with the named effects on the events of `bench`.
 
     Coordinates `fitted` were fitted to these events in the extended model.
@@ -122,11 +100,11 @@ def gap(
     apart = (after.calculated - before.calculated)[None] * bench.known
     rows = bench.whiten(noise, apart)[0]
     expected = float(np.nan_to_num(rows @ rows, nan=np.inf))
-    return Gap(before, after, float(closed), float(gained), expected, bench.criteria.shown, noise)
+    return GapTest(before, after, float(closed), float(gained), expected, bench.criteria.shown, noise)
 
 
 def left_over(
-    bench: Bench, unit: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int] | np.ndarray
+    bench: Context, unit: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int] | np.ndarray
 ) -> float:
     """How much more than chance pushes into all balances would still lower the deviance at coordinates (D,).
 
@@ -135,15 +113,15 @@ def left_over(
     return beyond_chance(bench, unit, names, noise, fitted, pushed(bench, unit, names, noise))
 
 
-def pushed(bench: Bench, unit: np.ndarray, names: Sequence[str], noise: Noise) -> np.ndarray:
+def pushed(bench: Context, unit: np.ndarray, names: Sequence[str], noise: Noise) -> np.ndarray:
     """What pushes into all balances in all windows change at coordinates (D,), whitened (c, C N)."""
-    pushes, _ = push_points(bench, unit)
+    pushes, _ = perturbations(bench, unit)
     raw = bench.residuals_of(np.concatenate([unit[None], pushes]), [(names, True)] * (1 + len(pushes)))
     return bench.whiten(noise, np.nan_to_num(raw[1:] - raw[0]))
 
 
 def beyond_chance(
-    bench: Bench, unit: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int] | np.ndarray,
+    bench: Context, unit: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int] | np.ndarray,
     changes: np.ndarray,
 ) -> float:  # fmt: skip
     """How much more than chance `changes` (c, C N) would still lower the deviance at coordinates (D,).

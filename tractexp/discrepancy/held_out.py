@@ -6,13 +6,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tractexp.discrepancy.all_events import AllEvents, Together
-from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.all_events import AllEvents, JointFit
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.disagreement import examined
 from tractexp.discrepancy.explanations import Explanations
 from tractexp.discrepancy.fitting import Refit, refit, settled
-from tractexp.discrepancy.gap import Gap, gap
+from tractexp.discrepancy.gap import GapTest, gap
 from tractexp.discrepancy.noise_in_quiet import QuietNoise, white
 from tractexp.discrepancy.records import Records
 from tractexp.discrepancy.survivors import Rival, Survivors
@@ -23,14 +23,14 @@ Names = tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class Assessment:
     """The gap of one explanation on the held-out events, and the coordinates of both models there.
 
     `p_left` tells how often chance leaves as much as a fit to all events does, where that was asked.
     """
 
-    gap: Gap
-    bench: Bench
+    gap: GapTest
+    bench: Context
     units: tuple[np.ndarray, np.ndarray]
     p_left: float = 1.0
 
@@ -65,7 +65,7 @@ class HeldOut:
     faults: Names  # of the measurement, in every explanation
     bare: Refit
     extended: Mapping[Names, Refit]
-    judged: Mapping[Names, Judged] = field(default_factory=dict)
+    judged: Mapping[Names, Assessment] = field(default_factory=dict)
     together: tuple[Refit, ...] = ()
 
     @property
@@ -130,7 +130,7 @@ def telling(explained: Explanations, bare: Refit) -> Names:
 
 def weighed(
     both: AllEvents, extended: Mapping[Names, Refit], seed: int, *, doubted: bool
-) -> tuple[dict[Names, Judged], list[Refit]]:
+) -> tuple[dict[Names, Assessment], list[Refit]]:
     """Judge explanations on held-out events; where none helps as it was fitted, also those that all events confirm.
 
     Where the base model is `doubted` all events need only bear with them: the held-out ones may not show them at all.
@@ -167,7 +167,7 @@ def searched_again(made: HeldOut, both: AllEvents, seed: int) -> HeldOut:
     Of waveforms nothing is, for no criterion was calibrated with it.
     """
     bench, surviving = both.fitted, made.survivors
-    if bench.waves or not np.isfinite(both.plain.deviance):  # there the base model has no steady state
+    if not bench.domain.calibrated or not np.isfinite(both.plain.deviance):  # there the base model has no steady state
         return made
     found = both.searched(surviving.explanations.base.valleys, seed)
     of_all = {s.fit.names: s for s in found.adequate if s.fit.names}
@@ -192,23 +192,25 @@ def searched_again(made: HeldOut, both: AllEvents, seed: int) -> HeldOut:
     return made.fitted_to_all([fit for _, fit in fits])
 
 
-def _borne_out(fitted: Together, criteria: Criteria) -> bool:
+def _borne_out(fitted: JointFit, criteria: Criteria) -> bool:
     """Whether all events bear out what a search in them found; several effects, chosen among hundreds of sets, must
     leave nothing."""
     least = criteria.stands if len(fitted.fit.names) > 1 else criteria.adequate_p
     return fitted.confirmed(criteria, doubted=True) and fitted.p_left >= least
 
 
-def judged_on(bench: Bench, events: Sequence[Event], bare: Refit, extended: Sequence[Refit]) -> dict[Names, Judged]:
+def judged_on(
+    bench: Context, events: Sequence[Event], bare: Refit, extended: Sequence[Refit]
+) -> dict[Names, Assessment]:
     """Compare the base model and extended ones, as they were fitted, on held-out events."""
     other, units, noise = carried(bench, events, [bare, *extended])
     return {
-        fit.names: Judged(gap(other, units[0], u, fit.names, noise, other.coordinates.before), other, (units[0], u))
+        fit.names: Assessment(gap(other, units[0], u, fit.names, noise, other.coordinates.before), other, (units[0], u))
         for fit, u in zip(extended, units[1:], strict=True)
     }
 
 
-def carried(bench: Bench, events: Sequence[Event], fits: Sequence[Refit]) -> tuple[Bench, list[np.ndarray], Noise]:
+def carried(bench: Context, events: Sequence[Event], fits: Sequence[Refit]) -> tuple[Context, list[np.ndarray], Noise]:
     """Carry fits over to held-out events: everything keeps its trained value but P0 and Q0 of each event.
 
     Returns the bench of those events, the coordinates of each fit there, and the noise of the last one that has a

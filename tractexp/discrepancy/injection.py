@@ -4,8 +4,16 @@ Not an effect of the catalogue but the yardstick of adequacy: if pushes of no ca
 effect was added, the effect is not the explanation. Source: score test of a variance component (Lin 1997).
 """
 
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tractexp.identification.surprises import windows
 from tractexp.model.parts import Effect
 from tractexp.parameter import Parameter
+
+if TYPE_CHECKING:
+    from tractexp.discrepancy.context import Context
 
 SOURCE = "a unit push, for the tangent space only"
 EDGE = 0.002  # s: how sharp a window starts and ends
@@ -50,4 +58,19 @@ class Injection(Effect):
             eq.consume(gate * push_P, gate * push_Q)
 
 
-PUSHES = tuple(p.name for p in Injection.parameters[:5])
+PERTURBATIONS = tuple(p.name for p in Injection.parameters[:5])
+PUSH = 1e-3  # how hard
+
+
+def perturbations(bench: "Context", unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points (c, D) with a push into one balance in one window of the union of the events', and which balance."""
+    at = bench.coordinates
+    spans = sorted({w for e in range(len(bench.events)) for w in windows(bench, e)})
+    points, groups = [], []
+    for g, push in enumerate(PERTURBATIONS):
+        for a, b in spans:
+            point = at.placed(unit, {"window_on": a, "window_off": b})
+            point[at.column[push]] += PUSH / at.width(push)
+            points.append(point)
+            groups.append(g)
+    return np.array(points), np.array(groups)

@@ -5,47 +5,48 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from tractexp.discrepancy.base_fit import BaseFit, base_fit
-from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.catalogue import Catalogue, catalogue
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.disagreement import Disagreement, disagreement
 from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.explanations import Explanations, explanations
 from tractexp.discrepancy.fitting import Refit
-from tractexp.discrepancy.gap import Gap, gap
-from tractexp.discrepancy.held_out import HeldOut, Judged, held_out
+from tractexp.discrepancy.gap import GapTest, gap
+from tractexp.discrepancy.held_out import Assessment, HeldOut, held_out
 from tractexp.discrepancy.kernels import Family
 from tractexp.discrepancy.next_event.choose import NextEvent
 from tractexp.discrepancy.overlay import Overlay, left, on_fitted, on_held_out
-from tractexp.discrepancy.places import Place, places
-from tractexp.discrepancy.precision import Estimate, estimates
+from tractexp.discrepancy.places import DisagreementInterval, places
+from tractexp.discrepancy.precision import ParameterEstimate, estimates
 from tractexp.discrepancy.proposal.propose import Proposed, propose
-from tractexp.discrepancy.records import Records, check_events, in_waves_of
+from tractexp.discrepancy.records import Records, check_events
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.survivors import Survivors, survivors
 from tractexp.discrepancy.verdict import NONE, UNEXPLAINED, Verdict, verdict
 from tractexp.discrepancy.window_search import behind_recorder
+from tractexp.domain import domain_of
 from tractexp.model.model import Model
 from tractexp.record import Event
 
 
 @dataclass(frozen=True, eq=False)
-class Investigation:
+class Findings:
     """Everything found, step by step."""
 
     base: BaseFit
     first: Disagreement  # of the base model
-    places: tuple[Place, ...]  # where it is; none where the verdict is none
+    places: tuple[DisagreementInterval, ...]  # where it is; none where the verdict is none
     explanations: Explanations
     survivors: Survivors
     held_out: HeldOut
     verdict: Verdict
-    train: Gap  # on the fitted events
+    train: GapTest  # on the fitted events
     withheld: tuple[Event, ...]  # the held-out events
     proposed: Proposed  # the term that an unexplained disagreement asks for
 
     @property
-    def bench(self) -> Bench:
+    def bench(self) -> Context:
         return self.base.bench
 
     @property
@@ -79,22 +80,22 @@ class Investigation:
         return self.verdict.next_event or (made and made.next_event)
 
     @property
-    def judged(self) -> Judged | None:
+    def judged(self) -> Assessment | None:
         """What the held-out events say of the names."""
         return self.held_out.judged.get(self.verdict.chosen.fit.names) if self.names else None
 
     @property
-    def validate(self) -> Gap | None:
+    def validate(self) -> GapTest | None:
         """The gap on the held-out events."""
         return None if self.judged is None else self.judged.gap
 
     @functools.cached_property
-    def before(self) -> list[Estimate]:
+    def before(self) -> list[ParameterEstimate]:
         """The parameters of the base model alone."""
         return estimates(self.first, self.bare.unit, ())
 
     @functools.cached_property
-    def after(self) -> list[Estimate]:
+    def after(self) -> list[ParameterEstimate]:
         """The parameters of the extended model."""
         return estimates(self.verdict.chosen.tests or self.last, self.extended.unit, self.names)
 
@@ -157,7 +158,7 @@ def investigate(
     criteria: Criteria | None = None,
     seed: int = 0,
     tell: Callable[[str], None] = lambda line: None,
-) -> Investigation:
+) -> Findings:
     """Find where model and records disagree, name what is missing, add it, and measure how the gap shrinks.
 
     `bounds` {name: (lower, upper)} and `fixed` {name: value} are of the base model's parameters, `only` names the
@@ -165,7 +166,7 @@ def investigate(
     `UserError` for wrong events or names.
     """
     criteria = criteria or Criteria()
-    train, validate = (in_waves_of(model, events) for events in (train, validate))
+    train, validate = (domain_of(model).events(events) for events in (train, validate))
     check_events(train, validate)
     with Effort(tell).audible() as effort:
         missing = catalogue(
@@ -176,7 +177,7 @@ def investigate(
         Family(model, missing).compile(effort.say)
 
         records = Records.of(train)
-        base = base_fit(Bench.of(model, missing, records, bounds or {}, fixed or {}, criteria, effort, substeps))
+        base = base_fit(Context.of(model, missing, records, bounds or {}, fixed or {}, criteria, effort, substeps))
         base, first = behind_recorder(base, disagreement(base, seed), seed)
         standing_out = places(first)
         explained = explanations(base, first, seed)
@@ -186,7 +187,7 @@ def investigate(
         proposed = Proposed()
         if said.word == UNEXPLAINED:
             proposed = propose(base, first, weighed.bare, explained.last.noise, validate, seed)
-        return Investigation(
+        return Findings(
             base=base,
             first=first,
             places=() if said.word == NONE else tuple(standing_out),
@@ -200,7 +201,7 @@ def investigate(
         )
 
 
-def _gap(bench: Bench, weighed: HeldOut, said: Verdict) -> Gap:
+def _gap(bench: Context, weighed: HeldOut, said: Verdict) -> GapTest:
     """The gap on the fitted events before and after."""
     at = bench.coordinates
     after = weighed.extended[said.chosen.fit.names] if said.names else weighed.bare

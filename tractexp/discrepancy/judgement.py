@@ -6,8 +6,8 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from tractexp.discrepancy.catalogue import Candidate
-from tractexp.discrepancy.investigate import Investigation
-from tractexp.discrepancy.projection import Score
+from tractexp.discrepancy.investigate import Findings
+from tractexp.discrepancy.score_test import Score
 from tractexp.wording import in_words
 
 ONE_SIDED = 1.6449  # standard deviations: 5 %
@@ -23,7 +23,7 @@ class Judgement:
     score: Score | None = None
 
 
-def judgements(investigation: Investigation) -> list[Judgement]:
+def judgements(investigation: Findings) -> list[Judgement]:
     """Every effect of the catalogue classified (Saris, Satorra and van der Veld 2009), at the chosen model."""
     criteria = investigation.bench.criteria
     critical = investigation.first.chance.critical_p(criteria.false_alarms)

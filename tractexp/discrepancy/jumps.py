@@ -10,8 +10,8 @@ import functools
 
 import numpy as np
 
-from tractexp.discrepancy.bench import Bench
-from tractexp.identification.observed import off_neighbors
+from tractexp.discrepancy.context import Context
+from tractexp.domain.wave_errors import off_neighbors
 
 MOST = 4  # samples of one channel and event that are the least smooth
 AROUND = 3  # samples on either side that a filter may spread a jump over
@@ -19,13 +19,16 @@ SPREAD = 1.0  # of how far a sample lies off its neighbors: what may be wrong wi
 ABRUPT = 0.02  # of the most that the effects change: from there a sample off its neighbors is a jump
 
 
-def jumps(bench: Bench, unit: np.ndarray) -> np.ndarray:
-    """What may be wrong at the jumps that effects make at coordinates (D,), one standard deviation: (k, C, N) [pu]."""
-    return _jumps(bench, unit.tobytes())
+def jumps(bench: Context, unit: np.ndarray) -> np.ndarray | None:
+    """What may be wrong at the jumps that effects make at coordinates (D,), one standard deviation: (k, C, N) [pu].
+
+    None where samples are averages over a window, in which no jump stays.
+    """
+    return None if bench.domain.windowed else _jumps(bench, unit.tobytes())
 
 
 @functools.lru_cache(maxsize=2)  # of the two fits that are examined side by side; it holds their bench
-def _jumps(bench: Bench, told: bytes) -> np.ndarray:
+def _jumps(bench: Context, told: bytes) -> np.ndarray:
     at, unit = bench.coordinates, np.frombuffer(told)
     there = tuple(n for n in bench.catalogue.of_load if (unit != at.null)[at.sizes([n])].any())
     if not there:

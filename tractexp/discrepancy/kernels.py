@@ -15,8 +15,9 @@ import numpy as np
 from tractexp.discrepancy.catalogue import Catalogue
 from tractexp.discrepancy.cores import side_by_side
 from tractexp.discrepancy.injection import Injection
+from tractexp.domain import domain_of
 from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.problem import FINE_OF_WAVES, Problem
+from tractexp.identification.problem import Problem
 from tractexp.model.compiling import compile_missing
 from tractexp.model.drive import Drive
 from tractexp.model.model import Model, compose
@@ -135,12 +136,13 @@ class Kernels:
         self._made: dict[Key, tuple[Likelihood, np.ndarray]] = {None: self._simulator(self.whole)}
 
     def _fewest(self) -> int:
-        """Steps that the model of everything needs where every effect is at its null: of waveforms some are stiff."""
-        if not self.family.model.waves:
+        """Steps that the model of everything needs where every effect is at its null: some are stiff."""
+        domain = domain_of(self.family.model)
+        if not domain.stiff:
             return 1
         whole = Problem(self.family.whole, self.events, self.bounds, self.fixed, 1)
         null = [p.default if p.null is None else p.null for p in whole.parameters]
-        return int(whole.model.substeps(whole.drive, np.array(null), FINE_OF_WAVES)[0].max())
+        return int(whole.model.substeps(whole.drive, np.array(null), domain.finest)[0].max())
 
     def residuals(self, key: Key, unit: np.ndarray) -> np.ndarray:
         """Calculated minus measured (n, C, N) [pu] at coordinates (n, D)."""

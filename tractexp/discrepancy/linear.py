@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.context import Context
 from tractexp.noise import Noise
 
 STEP = 1e-4  # of a coordinate's range
@@ -20,7 +20,7 @@ def two_sided(unit: np.ndarray, columns: Sequence[int] | np.ndarray) -> tuple[np
 
 
 def linearised(
-    bench: Bench, unit: np.ndarray, noise: Noise, columns: Sequence[int], names: Sequence[str]
+    bench: Context, unit: np.ndarray, noise: Noise, columns: Sequence[int], names: Sequence[str]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Residuals (C, N) of a fit with the named effects, and rows (1 + k, R): they and their differences, whitened.
 

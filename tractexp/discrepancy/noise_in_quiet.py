@@ -10,15 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.jumps import jumps
 from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.observed import answers, unsure
 from tractexp.identification.problem import Problem
 from tractexp.noise import Noise
-from tractexp.noise.quiet import estimate
-from tractexp.noise.wander import Rest, Wander, find
-from tractexp.noise.waves import of_waves
+from tractexp.noise.random_walk import walk_of_load
 from tractexp.record import Event
 
 
@@ -26,14 +23,14 @@ from tractexp.record import Event
 class QuietNoise:
     """Estimates noise on a bench. `blur` (k, C, N) [pu] is what errors of the record do to what is compared."""
 
-    bench: Bench
+    bench: Context
     blur: np.ndarray | None  # of the voltage's noise, None where it has none; of waveforms, of the currents' offsets
 
     @classmethod
-    def at(cls, bench: Bench, unit: np.ndarray) -> "QuietNoise":
+    def at(cls, bench: Context, unit: np.ndarray) -> "QuietNoise":
         """Where errors of the voltage act as they do on the base model at coordinates (D,)."""
-        if bench.waves:
-            return cls(bench, unsure(bench.problem, _values(bench, unit)))
+        if (errors := bench.domain.input_errors(bench.problem, _values(bench, unit))) is not None:
+            return cls(bench, errors)
         most = bench.records.voltage_errors
         if not most:
             return cls(bench, None)
@@ -57,41 +54,30 @@ class QuietNoise:
         What a fit leaves (C, N), and columns of all that could explain it (k, C, N), tell more of how the load wanders.
         Of waveforms the model there tells how noise of the voltage is passed on.
         """
-        bench = self.bench
-        if bench.waves:
-            passed, phases = answers(bench.problem, _values(bench, unit)), bench.records.phases
-            blur = np.concatenate([shapes for shapes in (self.blur, jumps(bench, unit)) if shapes is not None])
-            return of_waves(residual, bench.known, bench.quiet, passed, phases, blur)
-        wander = functools.partial(self._wander, left, columns)
-        return estimate(residual, bench.known, bench.quiet, wander, self.blur)
-
-    def _wander(self, left: np.ndarray | None, columns: np.ndarray | None, mix: np.ndarray) -> Wander | None:
-        """How the load wanders before the events and during them, in mixed channels."""
-        bench, drive, criteria = self.bench, self.bench.drive, self.bench.criteria
-        before = [drive.measured[:, drive.part(e)][:, event.steady] for e, event in enumerate(bench.events)]
-        rests = []
-        if left is not None and columns is not None and bench.known.all():
-            mixed, parts = np.einsum("ij,kjt->kit", mix, columns), map(drive.part, range(drive.events))
-            rests = [Rest(mix @ left[:, part], mixed[:, :, part], bench.power.apparent[part]) for part in parts]
-        return find(
-            [mix @ b for b in before if np.isfinite(b).all()], bench.events[0].record.step, bench.power, rests,
+        bench, criteria = self.bench, self.bench.criteria
+        walk = functools.partial(
+            walk_of_load, bench.events, bench.drive, bench.power, left, columns, bench.known,
             seen=criteria.wandering_seen, within=criteria.wandering_within, less=criteria.wandering_likely,
         )  # fmt: skip
+        errors = [shapes for shapes in (self.blur, jumps(bench, unit)) if shapes is not None]
+        values, shapes = _values(bench, unit), np.concatenate(errors) if errors else None
+        return bench.domain.noise(residual, bench.known, bench.quiet, bench.problem, values, walk, shapes)
 
 
-def white(bench: Bench) -> Noise:
+def white(bench: Context) -> Noise:
     """White noise of the level before the dips: what is known before the first fit."""
     each = zip(*(e.levels for e in bench.events), strict=True)
     levels = [float(np.sqrt(np.mean([level**2 for level in channel]))) for channel in each]
     return Noise(Noise.white(*levels).pairs, np.eye(len(levels)))
 
 
-def _values(bench: Bench, unit: np.ndarray) -> np.ndarray:
+def _values(bench: Context, unit: np.ndarray) -> np.ndarray:
     """Free values (d,) of the problem of everything at coordinates (D,)."""
-    return Likelihood.of(bench.problem).values(unit)
+    space = bench.problem.space
+    return space.from_unit(unit[: space.dimension])
 
 
-def _at_voltage(bench: Bench, events: tuple[Event, ...] | list[Event], unit: np.ndarray) -> np.ndarray:
+def _at_voltage(bench: Context, events: tuple[Event, ...] | list[Event], unit: np.ndarray) -> np.ndarray:
     """Residuals (C, N) of the base model at coordinates (D,), driven by the voltages of other events."""
     kernels, at = bench.kernels, bench.coordinates
     problem = Problem(bench.model, events, kernels.bounds, kernels.fixed, kernels.substeps)

@@ -5,14 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.fitting import Refit
-from tractexp.discrepancy.gap import Gap
-from tractexp.discrepancy.held_out import Judged, carried
-from tractexp.discrepancy.places import Place
+from tractexp.discrepancy.gap import GapTest
+from tractexp.discrepancy.held_out import Assessment, carried
+from tractexp.discrepancy.places import DisagreementInterval
 from tractexp.discrepancy.remainder import Remainder, remainders
 from tractexp.discrepancy.verdict import Nearest
-from tractexp.identification.problem import excited
+from tractexp.domain import domain_of
 from tractexp.noise import Noise
 from tractexp.record import Event
 
@@ -32,16 +32,16 @@ class Overlay:
     after: np.ndarray | None
     nearest: np.ndarray | None
     deviation: np.ndarray
-    places: tuple[Place, ...]
+    places: tuple[DisagreementInterval, ...]
 
     @property
     def measured(self) -> np.ndarray:
         """What the models are compared with (C, n) [pu], nan in gaps."""
-        return excited(self.event).measured
+        return domain_of(self.event).excitation(self.event).measured
 
 
 def on_fitted(
-    bench: Bench, gap: Gap, nearest: Nearest | None, places: Sequence[Place], *, extended: bool
+    bench: Context, gap: GapTest, nearest: Nearest | None, places: Sequence[DisagreementInterval], *, extended: bool
 ) -> list[Overlay]:  # fmt: skip
     """The fitted events; `extended` tells whether there is an extended model."""
     after = gap.after.calculated if extended else None
@@ -50,7 +50,7 @@ def on_fitted(
 
 
 def on_held_out(
-    bench: Bench, withheld: Sequence[Event], judged: Judged | None, bare: Refit, nearest: Nearest | None
+    bench: Context, withheld: Sequence[Event], judged: Assessment | None, bare: Refit, nearest: Nearest | None
 ) -> list[Overlay]:  # fmt: skip
     """The held-out events: as the names were `judged` on them or, without any, the base model carried over."""
     if not withheld:
@@ -76,10 +76,10 @@ def left(overlays: Sequence[Overlay], noise: Noise, false_alarms: float) -> list
 
 
 def _each(
-    bench: Bench,
+    bench: Context,
     noise: Noise,
     curves: tuple[np.ndarray, np.ndarray | None, np.ndarray | None],
-    places: Sequence[Place],
+    places: Sequence[DisagreementInterval],
     *,
     held_out: bool,
 ) -> list[Overlay]:

@@ -4,13 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.adequacy import channels_of
 from tractexp.discrepancy.disagreement import Disagreement
-from tractexp.identification.surprises import LOUDEST, Cell, cells_of, energies, extremes
+from tractexp.identification.surprises import LOUDEST, ResidualWindow, energies, extremes, residual_windows
 
 
 @dataclass(frozen=True)
-class Place:
+class DisagreementInterval:
     """One interval of one channel; `share` is its part of all the excess energy."""
 
     event: str
@@ -20,16 +19,16 @@ class Place:
     share: float
 
 
-def places(at: Disagreement) -> list[Place]:
+def places(at: Disagreement) -> list[DisagreementInterval]:
     """Intervals that stand out at the family-wise error of `false_alarms`, adjacent ones joined, the largest first."""
     bench = at.bench
-    cells = cells_of(bench)
+    cells = residual_windows(bench)
     (mean, spread), highest = extremes(at.chance.left[LOUDEST])
-    excess = energies(channels_of(at.projection, bench), bench)[0] - mean
+    excess = energies(at.projection.channels(bench), bench)[0] - mean
     loud = excess / spread > np.quantile(highest, 1 - at.criteria.false_alarms)
     total = np.maximum(excess, 0.0).sum()
     standing_out = [
-        Place(
+        DisagreementInterval(
             bench.events[group[0].event].record.name, group[0].channel, group[0].start, group[-1].end,
             float(sum(excess[cells.index(c)] for c in group) / total),
         )
@@ -38,9 +37,9 @@ def places(at: Disagreement) -> list[Place]:
     return sorted(standing_out, key=lambda p: -p.share)
 
 
-def _joined(cells: list[Cell]) -> list[list[Cell]]:
+def _joined(cells: list[ResidualWindow]) -> list[list[ResidualWindow]]:
     """Cells of one channel that follow each other, together."""
-    groups: list[list[Cell]] = []
+    groups: list[list[ResidualWindow]] = []
     for cell in sorted(cells, key=lambda c: (c.event, c.channel, c.part.start)):
         last = groups[-1][-1] if groups else None
         if last and (last.event, last.channel, last.part.stop) == (cell.event, cell.channel, cell.part.start):

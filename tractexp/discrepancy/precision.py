@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtri
 
-from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.identification.information import Information
 from tractexp.identification.uncertainty import LEVEL
@@ -17,7 +17,7 @@ WIDE = float(ndtri((1 + LEVEL) / 2))  # standard errors in half of an interval: 
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate:
+class ParameterEstimate:
     """One parameter at a fit: `error` is its standard error, nan where it rests on a bound or is not told."""
 
     parameter: Parameter
@@ -60,7 +60,7 @@ def covariance(tests: Disagreement, names: Sequence[str]) -> tuple[list[str], np
     return known, (rows @ rows.T) * np.outer(width, width)
 
 
-def estimates(tests: Disagreement, unit: np.ndarray, effects: Sequence[str]) -> list[Estimate]:
+def estimates(tests: Disagreement, unit: np.ndarray, effects: Sequence[str]) -> list[ParameterEstimate]:
     """The base model's parameters and those of the named effects at coordinates (D,), as the tests of a fit know them.
 
     The words are those of an identification.
@@ -75,10 +75,10 @@ def estimates(tests: Disagreement, unit: np.ndarray, effects: Sequence[str]) -> 
     words = _words(tests, seen, [values[n] for n in seen], [errors[n] for n in seen])
     held = {n for n in names if at.column[n] in tests.tangent.held}
     words |= {n: f"{BOUND}: better values lie beyond it" for n in held}
-    return [Estimate(declared[n], values[n], errors.get(n, np.nan), words.get(n, "not judged")) for n in names]
+    return [ParameterEstimate(declared[n], values[n], errors.get(n, np.nan), words.get(n, "not judged")) for n in names]
 
 
-def own_parameters(bench: Bench, effects: Sequence[str]) -> list[str]:
+def own_parameters(bench: Context, effects: Sequence[str]) -> list[str]:
     """Names of the parameters that effects bring with them."""
     return [p.name for name in effects for p in bench.catalogue[name].effect.parameters]
 

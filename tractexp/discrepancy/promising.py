@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.linear import linearised
 from tractexp.noise import Noise
 
@@ -17,7 +17,7 @@ LEAST = 1e-9  # of the deviance: a change below that is none
 
 
 def promising(
-    bench: Bench, noise: Noise, names: Sequence[str], units: np.ndarray, nuisances: Sequence[int], most: int
+    bench: Context, noise: Noise, names: Sequence[str], units: np.ndarray, nuisances: Sequence[int], most: int
 ) -> np.ndarray:
     """The starts (n, D) of one set of effects that promise most, at most so many, in their order.
 
@@ -34,7 +34,7 @@ def promising(
 
 
 def _expected(
-    bench: Bench, noise: Noise, names: Sequence[str], ground: np.ndarray, units: np.ndarray, nuisances: Sequence[int]
+    bench: Context, noise: Noise, names: Sequence[str], ground: np.ndarray, units: np.ndarray, nuisances: Sequence[int]
 ) -> np.ndarray:
     """The deviance (n,) of a linear step from each start, which differ from `ground` (D,) by their effects alone."""
     raw, rows = linearised(bench, ground, noise, nuisances, ())

@@ -6,18 +6,17 @@ more of them.
 
 from dataclasses import replace
 
-from tractexp.discrepancy.adequacy import channels_of
 from tractexp.discrepancy.disagreement import Disagreement
-from tractexp.discrepancy.investigate import Investigation
+from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.verdict import NONE, TIED
 from tractexp.identification.adequacy import Adequacy, Surprise, graded, loudest_stretch
 from tractexp.identification.verdict import UNIDENTIFIED, size
 
 
-def adequacy(found: Investigation) -> Adequacy:
+def adequacy(found: Findings) -> Adequacy:
     """The grade of the extended model, or of the base model where nothing is named, on all events."""
     tests: Disagreement = (found.verdict.chosen.tests or found.last) if found.names else found.first
-    ratio, where = loudest_stretch(channels_of(tests.projection, found.bench)[0], found.bench)
+    ratio, where = loudest_stretch(tests.projection.channels(found.bench)[0], found.bench)
     p = 1.0 if found.verdict.word == NONE else tests.p_left  # no disagreement: by the same false-alarm rate
     surprise = Surprise(p, tests.loudest, ratio, where)
     held_out = found.validate and found.validate.after.error
@@ -27,7 +26,7 @@ def adequacy(found: Investigation) -> Adequacy:
     return grade
 
 
-def held(found: Investigation) -> dict[str, float]:
+def held(found: Findings) -> dict[str, float]:
     """Parameters of the extended model that the events cannot tell (to half their size), at the values found."""
     if not found.names:
         return {}

@@ -1,4 +1,4 @@
-"""A recorder's own window as an investigation looks for it; see `tractexp.record.deconvolution`."""
+"""A recorder's own window as an investigation looks for it; what one does is told in `tractexp.record.window`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,9 +7,8 @@ import numpy as np
 
 from tractexp.model.drive import Drive
 from tractexp.model.parts import Measurement
-from tractexp.model.window import mean, seen
 from tractexp.record import Event, Window
-from tractexp.record.deconvolution import sharpened
+from tractexp.record.window import average, averaged_power, sharpened
 
 CYCLES = (1, 2, 3, 4, 5, 6)
 
@@ -38,7 +37,7 @@ class RecorderWindow(Measurement):
         for e in range(drive.events):
             part, weights = drive.part(e), self.weights(drive.event[e, -1])
             u = drive.inputs[0, part]
-            shown[:, :, part] = seen(power[:, :, part], u, weights)
+            shown[:, :, part] = averaged_power(power[:, :, part], u, weights)
         return shown
 
     def sharpened(self, event: Event) -> Event:
@@ -46,9 +45,9 @@ class RecorderWindow(Measurement):
         return sharpened(event, self.weights(event.record.step), self.window)
 
 
-def averaged(y: np.ndarray, samples: float) -> np.ndarray:
+def window_mean(y: np.ndarray, samples: float) -> np.ndarray:
     """Mean of y (..., N) over a window around each sample, y linear between samples and constant beyond its ends."""
-    return mean(y, _weights(samples))
+    return average(y, _weights(samples))
 
 
 def _weights(samples: float) -> np.ndarray:

@@ -7,13 +7,11 @@ import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from tractexp.discrepancy.recorder_window import RecorderWindow
+from tractexp.domain import domain_of
 from tractexp.errors import UserError
-from tractexp.model.model import Model
-from tractexp.noise.voltage import Smoothed, smoothed
-from tractexp.record import Event, WaveEvent, in_waves
+from tractexp.noise.voltage import SmoothedEvent
+from tractexp.record import Event
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,13 +19,13 @@ class Records:
     """Events as recorded, and as a simulation is driven by them."""
 
     recorded: tuple[Event, ...]
-    smoothed: tuple[Smoothed, ...]
+    smoothed: tuple[SmoothedEvent, ...]
     window: RecorderWindow | None = None  # over which the recorder forms phasors, where that is known
 
     @classmethod
     def of(cls, events: Sequence[Event], window: RecorderWindow | None = None) -> "Records":
         """The events, by a recorder of this window."""
-        driving = tuple(_unsmoothed(e) if isinstance(e, WaveEvent) else smoothed(e) for e in events)
+        driving = tuple(domain_of(e).smoothed(e) for e in events)
         if window is not None:
             driving = tuple(replace(s, event=window.sharpened(s.event)) for s in driving)
         return cls(tuple(events), driving, window)
@@ -42,25 +40,9 @@ class Records:
         """How many shapes of error the voltage of some event may still have."""
         return max(len(s.errors) for s in self.smoothed)
 
-    @property
-    def phases(self) -> int:
-        """How many currents were sampled; none of phasors."""
-        first = self.recorded[0]
-        return first.phases if isinstance(first, WaveEvent) else 0
-
     def off_by(self, shape: int) -> list[Event]:
         """The events with one of the errors of their voltage each."""
         return [s.off_by(shape) for s in self.smoothed]
-
-
-def in_waves_of(model: Model, events: Sequence[Event]) -> tuple[Event, ...]:
-    """The events as a model is compared with them. Raises `UserError` where it needs samples that there are not."""
-    return tuple(map(in_waves, events)) if model.waves else tuple(events)
-
-
-def _unsmoothed(event: Event) -> Smoothed:
-    """An event with its voltage as recorded."""
-    return Smoothed(event, np.empty((0, event.record.samples)))
 
 
 def check_events(train: Sequence[Event], validate: Sequence[Event]) -> None:

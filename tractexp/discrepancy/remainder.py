@@ -14,12 +14,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tractexp.identification.problem import excited
+from tractexp.domain import domain_of
 from tractexp.model.drive import Drive
 from tractexp.noise import Noise
 from tractexp.noise.color import FEWEST, SMALLEST
 from tractexp.noise.quiet import estimate
-from tractexp.record import Event, WaveEvent
+from tractexp.record import Event
 
 MOST = 4  # shapes that are told
 DECAYS = 6  # time constants tried, from two samples to the length of the record after the dip
@@ -125,17 +125,16 @@ class _Stretch:
 
         Of waveforms it stays what it is, for what is left cannot color that.
         """
-        drive = Drive.of([excited(event)])
+        drive, domain = Drive.of([domain_of(event).excitation(event)]), domain_of(event)
         known, before = drive.weights > 0, slice(0, event.start)
-        if not isinstance(event, WaveEvent) and np.count_nonzero(np.all(known, axis=0)[before]) >= FEWEST:
+        if not domain.noise_from_model and np.count_nonzero(np.all(known, axis=0)[before]) >= FEWEST:
             noise = estimate(_level(residual[:, before]), known[:, before], [before])
         return cls(event, residual, replace(noise, wander=None, blur=blur), drive)
 
     @property
     def size(self) -> int:
-        """Values that count; of waveforms the time before the record does not."""
-        waves = isinstance(self.event, WaveEvent)
-        return int(np.count_nonzero(self.drive.weights)) if waves else self.residual.size
+        """Values that count."""
+        return domain_of(self.event).values(self.drive)
 
     def white(self, rows: np.ndarray) -> np.ndarray:
         """(m, C, n) [pu] to independent rows (m, C, n) of unit variance."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.explanations import Explanations
 from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.gap import Curves, curves
@@ -194,7 +194,7 @@ def _denied(weighed: HeldOut) -> str:
 
 
 def _nearest(
-    bench: Bench, bare: Refit, rivals: Sequence[Rival], noise: Noise, validate: Sequence[Event]
+    bench: Context, bare: Refit, rivals: Sequence[Rival], noise: Noise, validate: Sequence[Event]
 ) -> Nearest | None:  # fmt: skip
     best = rivals[0].fit
     if not best.names:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from tractexp.discrepancy.base_fit import BaseFit, fitted_from
-from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.disagreement import Disagreement, disagreement
 from tractexp.discrepancy.explanations import starts
 from tractexp.discrepancy.fitting import Refit, refit, rough_refit
@@ -21,10 +21,10 @@ FAR = 2.0  # times the deviance that a window explains: no effect that only imit
 
 
 @dataclass(frozen=True, eq=False)
-class Tried:
+class WindowFit:
     """A window: the bench behind it, the base model's fit there, and by how much it lowers the deviance."""
 
-    behind: Bench
+    behind: Context
     fit: Refit
     gained: float
 
@@ -32,19 +32,19 @@ class Tried:
 def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[BaseFit, Disagreement]:
     """The base model's fit and tests behind the recorder's window, where there is one; else those given."""
     bench, noise = base.bench, first.noise
-    if bench.waves:  # samples have no window
+    if not bench.domain.windowed:
         return base, first
     if bench.drive.windows:  # the model is of a kind that is always looked at through what the records say
         return base, first
     if noise.loudest_blur > bench.criteria.blurred:  # noise of the voltage would pass for a window
         return base, first
-    tried: list[Tried] = []
+    tried: list[WindowFit] = []
     for window in windows_of(bench.events):
         behind = bench.on(Records.of(bench.records.recorded, window))
         valleys = (first.fit.unit, *base.valleys)  # the load's: no window moves them far
         begun = rough_refit(behind, noise, [((), start) for start in valleys])[0]
         fit = refit(behind, noise, [((), begun.unit)])[0]
-        tried.append(Tried(behind, fit, first.fit.deviance - fit.deviance))
+        tried.append(WindowFit(behind, fit, first.fit.deviance - fit.deviance))
         if tried[0].gained <= 0:
             return base, first  # an average over several cycles is one of averages over one
     found = _believed(tried, first) if tried else None
@@ -56,7 +56,7 @@ def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[Base
     return base, disagreement(base, seed)
 
 
-def _believed(tried: Sequence[Tried], first: Disagreement) -> Tried | None:
+def _believed(tried: Sequence[WindowFit], first: Disagreement) -> WindowFit | None:
     """The window that helps most, where it helps enough.
 
     Where an effect explains far more than any window does, they are judged with it in the model: what lacks something

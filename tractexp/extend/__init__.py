@@ -9,14 +9,13 @@
 
 from typing import TYPE_CHECKING, Any
 
-from tractexp.errors import UserError, check_choice, check_distinct, check_range
+from tractexp.errors import Unfit, UserError, check_choice, check_distinct, check_range
 from tractexp.identification.loss import Loss
 from tractexp.identification.optimizer import REFUSED, Box, Evaluate, Iterative, Optimizer
 from tractexp.kernel.layout import EVENT, INPUTS
 from tractexp.kernel.stencil import Stencil
 from tractexp.model import sites
 from tractexp.model.parts import Curve, Effect, Measurement, Motor, Static
-from tractexp.model.unfit import Unfit
 from tractexp.parameter import Parameter
 from tractexp.plugin import build, plugin
 from tractexp.record import Base, Events, Reader, Record

@@ -2,6 +2,6 @@
 
 from tractexp.compat.scipy_differential_evolution import generations
 from tractexp.identification.least_squares import APART, race
-from tractexp.identification.starts import best_distinct
+from tractexp.parameter import best_distinct
 
 __all__ = ["APART", "best_distinct", "generations", "race"]

@@ -19,19 +19,16 @@ from tractexp.identification import surprises
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.model_error import ModelError
 from tractexp.identification.observed import Observed
-from tractexp.identification.surprises import SMALLEST_P, Layout, tail
-from tractexp.noise.span import spanned
+from tractexp.identification.surprises import PER_EVENT, SMALLEST_P, Layout, tail
 
 DRAWS = 199
 # p of what a fit leaves, below which it leaves something. Chosen on calibration seeds:
 # where nothing is missing one set in fifty has a smaller one, with an effect of four detection limits nearly all have.
 ADEQUATE_P = 0.001
-DISTINCT = 1e-3  # of the largest: weaker directions are rounding
 WALL = 1e-3  # of a range: what rests on a bound takes nothing from the residual
 SEED = 20201  # of the draws: the judgement of one record is always the same
 ACCEPTED = 0.05  # Eq. (20): a load model is acceptable below 5 %
 WRONG = 0.2  # of the response: a model that leaves a fifth of it does not describe the load. A word for a size.
-PER_EVENT = "parameters of each event"
 APART = "least squares apart from the likelihood"
 
 
@@ -103,7 +100,8 @@ def surprise(
     channels = rest.reshape(len(rest), observed.drive.channels, -1)
     by_test = surprises.statistics(channels, observed)
     if observed.drive.events > 1:
-        by_test[PER_EVENT] = ((rest @ _of_each_event(likelihood, J[:, : len(steady)][:, steady], Q).T) ** 2).sum(axis=1)
+        split = _of_each_event(likelihood, J[:, : len(steady)][:, steady], Q)
+        by_test[PER_EVENT] = surprises.of_each_event(rest, split, least=1e-9)
     if squares is not None:
         by_test[APART] = given_up(squares, unit, least, J, white, drawn)
     left = {name: tail(values[1:], values[:1]) for name, values in by_test.items()}
@@ -135,10 +133,8 @@ def _means(plain: Likelihood, drawn: np.ndarray) -> np.ndarray:
     """By how much draws (b, C, N) would have P0 and Q0 of each event wrong, (b, 2 E), in ranges, for Eq. (8)."""
     problem = plain.problem
     wrong = np.zeros((len(drawn), problem.drive.events, 2))
-    if problem.drive.channels == 2:
-        for e, event in enumerate(problem.events):
-            first = int(problem.drive.first[e])
-            wrong[:, e] = drawn[:, :, first + event.steady.start : first + event.steady.stop].mean(axis=2)
+    for e, steady in enumerate(problem.steady):
+        wrong[:, e] = drawn[:, :, steady].mean(axis=2)
     return -wrong.reshape(len(drawn), -1) / plain.width[plain.free :]
 
 
@@ -159,16 +155,15 @@ def _linear(likelihood: Likelihood) -> np.ndarray:
 
 
 def _of_each_event(likelihood: Likelihood, J: np.ndarray, Q: np.ndarray) -> np.ndarray:
-    """Orthonormal directions (m, R) along which columns (R, k) of their own for each event would move the rows."""
+    """How columns (R, k) of their own for each event would move the rows, (k E, R), without what the fit takes."""
     events = likelihood.problem.drive.events
     split = np.concatenate([(J * likelihood.part_of(e)[:, None]).T for e in range(events)])
-    split -= (split @ Q) @ Q.T
-    return spanned(split, DISTINCT, least=1e-9)
+    return split - (split @ Q) @ Q.T
 
 
 def loudest_stretch(channels: np.ndarray, layout: Layout) -> tuple[float, str]:
     """The loudest window of the whitened residual (2, N): how many times the noise, and where it is."""
-    cells = surprises.cells_of(layout)
+    cells = surprises.residual_windows(layout)
     row = layout.drive.spoken.index
     level = [float(np.sqrt(np.mean(channels[row(c.channel), c.part] ** 2))) for c in cells]
     k = int(np.argmax(level))

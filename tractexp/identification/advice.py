@@ -7,12 +7,11 @@ import numpy as np
 from tractexp.errors import UserError
 from tractexp.identification.adequacy import Adequacy, Grade
 from tractexp.identification.information import SHARE
-from tractexp.identification.plan import Forecast, Shape, over_depth
+from tractexp.identification.plan import DipShape, Forecast, over_depth
 from tractexp.identification.problem import Problem
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import BOUND, EDGE, UNIDENTIFIED, WEAK, WITHIN, shown, size
 from tractexp.noise.color import runs
-from tractexp.record.wave_event import COARSEST, smeared
 
 
 def advise(known: Uncertainty, adequacy: Adequacy, odd: Sequence[str] = (), data: str = "") -> list[str]:
@@ -21,7 +20,7 @@ def advise(known: Uncertainty, adequacy: Adequacy, odd: Sequence[str] = (), data
 
     Of a model that does not describe the load nothing is said that would only hold if it did.
     """
-    better = waves_better(known.likelihood.problem)
+    better = better_domain(known.likelihood.problem)
     said = [f"leave {name} out, or free what differs there by model.per_event" for name in odd]
     search = f"task=discrepancy data={data}" if data else "task=discrepancy"
     if adequacy.grade is Grade.WRONG_MODEL:
@@ -50,21 +49,9 @@ def advise(known: Uncertainty, adequacy: Adequacy, odd: Sequence[str] = (), data
     )
 
 
-def waves_better(problem: Problem) -> list[str]:
-    """That its waveforms tell more than the phasors of an event that is short or unbalanced; [] where none does.
-
-    Of records that hold no samples, or too few in a cycle, nothing is said.
-    """
-    for event in () if problem.model.waves else problem.events:
-        waves, record = event.record.waves, event.record
-        if waves is None or waves.rate < COARSEST * record.base.frequency:
-            continue
-        U2 = 0.0 if record.U2 is None else float(record.U2[event.start : event.end].max() / event.U0)
-        why = smeared(event.duration, U2, record.base.frequency)
-        if not why:
-            continue
-        return [f"fit the sampled waveforms, by domain=waves: the dip of {record.name} {why}"]
-    return []
+def better_domain(problem: Problem) -> list[str]:
+    """That another domain tells more of one of the events; [] where none does."""
+    return [why for why in map(problem.domain.better, problem.events) if why][:1]
 
 
 def _deeper(known: Uncertainty) -> list[str]:
@@ -85,7 +72,7 @@ def _deeper(known: Uncertainty) -> list[str]:
     if problem.per_event:
         return [without_figures]
     deepest = int(np.argmax([e.depth for e in problem.events]))
-    shape, noise = Shape.of(problem.events[deepest]), known.likelihood.noise.of(deepest)
+    shape, noise = DipShape.of(problem.events[deepest]), known.likelihood.noise.of(deepest)
     try:
         forecasts = over_depth(problem, known.values, shape, known.information, noise)
     except UserError:  # this model or these values cannot be planned with

@@ -29,7 +29,7 @@ class Descent:
 
 
 @dataclass(frozen=True, eq=False)
-class Apart:
+class SeparableColumns:
     """Coordinates (k,) that act on different rows, (k, R) where True: one simulation has the differences of all."""
 
     coordinates: np.ndarray
@@ -37,7 +37,7 @@ class Apart:
 
 
 def normal(
-    rows: Rows, unit: np.ndarray, base: np.ndarray, lanes: np.ndarray, apart: Sequence[Apart] = ()
+    rows: Rows, unit: np.ndarray, base: np.ndarray, lanes: np.ndarray, apart: Sequence[SeparableColumns] = ()
 ) -> tuple[np.ndarray, np.ndarray]:
     """Gradient (n, D) and Gauss-Newton matrix (n, D, D) of half the sum of squares; `base` (n, R) are the rows there.
 
@@ -80,7 +80,7 @@ def descend(
     frozen: np.ndarray | None = None,
     iterations: int = 40,
     tolerance: float = 1e-4,
-    apart: Sequence[Apart] = (),
+    apart: Sequence[SeparableColumns] = (),
 ) -> Descent:
     """Levenberg-Marquardt in the unit cube from `start` (n, D); columns where `frozen` (n, D) is True do not move.
 

@@ -23,10 +23,10 @@ from tractexp.identification.adequacy import Surprise, surprise
 from tractexp.identification.blocks import blocks_of, exceeds
 from tractexp.identification.descent import Descent, descend
 from tractexp.identification.likelihood import Likelihood
+from tractexp.identification.local_minima import along_least_certain, distinct, explored, screened
 from tractexp.identification.observed import Observed
 from tractexp.identification.problem import Problem
-from tractexp.identification.uncertainty import Uncertainty, Valley, conclude, conclude_squares, threshold
-from tractexp.identification.valleys import along_least_known, distinct, explored, screened
+from tractexp.identification.uncertainty import LocalMinimum, Uncertainty, conclude, threshold
 from tractexp.identification.verdict import elsewhere
 from tractexp.noise.color import FEWEST, SMALLEST, fit_autoregression, stretches, white_noise
 from tractexp.noise.model import Noise, Pair
@@ -61,7 +61,7 @@ class Start:
 
 
 @dataclass(frozen=True, eq=False)
-class Estimated:
+class EstimationResult:
     """An estimate, how surprising what it leaves is, and the valleys it was chosen from, the best first."""
 
     known: Uncertainty
@@ -70,7 +70,7 @@ class Estimated:
 
 
 @dataclass(frozen=True, eq=False)
-class Ends:
+class DescentEnds:
     """Where descents by least squares ended: coordinates (n, d), sums of squares (n,) over `likelihood`'s, origins."""
 
     observed: Observed
@@ -93,17 +93,17 @@ class Ends:
         near = self.descent.deviance <= HOPELESS * self.lowest
         return distinct(Descent(self.descent.unit[near], self.descent.deviance[near], 0), self.likelihood.free)
 
-    def joined(self, more: Descent, origin: str) -> "Ends":
+    def joined(self, more: Descent, origin: str) -> "DescentEnds":
         """These and further ends of one origin."""
         unit = np.concatenate([self.descent.unit, more.unit])
         deviance = np.concatenate([self.descent.deviance, more.deviance])
         both = Descent(unit, deviance, self.descent.simulations + more.simulations)
         return replace(self, descent=both, origins=(*self.origins, *[origin] * len(more.unit)))
 
-    def looked_beside(self) -> "Ends":
+    def looked_beside(self) -> "DescentEnds":
         """These and the ends of descents from beside the best."""
         return self.joined(
-            descend(self.likelihood.rows, along_least_known(self.likelihood, self.best)), "beside the best"
+            descend(self.likelihood.rows, along_least_certain(self.likelihood, self.best)), "beside the best"
         )
 
     def no_worse(self, unit: np.ndarray) -> bool:
@@ -124,10 +124,10 @@ class Ends:
         return tuple(Start(self.origins[k], values[k], float(above[k])) for k in order)
 
 
-_remembered: OrderedDict[str, tuple[Ends, Estimated]] = OrderedDict()
+_remembered: OrderedDict[str, tuple[DescentEnds, EstimationResult]] = OrderedDict()
 
 
-def polished(problem: Problem) -> Estimated:
+def polished(problem: Problem) -> EstimationResult:
     """The estimate where nothing was searched. Raises `UserError` where nothing of the box can be simulated."""
     _, best = _of_box(problem)
     if best is None:
@@ -138,7 +138,7 @@ def polished(problem: Problem) -> Estimated:
     return best
 
 
-def estimate(problem: Problem, values: np.ndarray) -> Estimated:
+def estimate(problem: Problem, values: np.ndarray) -> EstimationResult:
     """The estimate for a problem whose search ended at free `values` (d,).
 
     A robust loss takes samples more than `OUTLIER` standard deviations off the fit for outliers; what is left of the
@@ -154,12 +154,12 @@ def estimate(problem: Problem, values: np.ndarray) -> Estimated:
     return replace(best, starts=whole.starts)
 
 
-def _robust(problem: Problem, values: np.ndarray) -> Estimated:
+def _robust(problem: Problem, values: np.ndarray) -> EstimationResult:
     """The estimate of a robust loss, from where the search ended."""
     observed = Observed.of(problem)
     squares = Likelihood.of_squares(observed.problem, _level(observed.problem, values))
     squares = cleaned(squares, squares.to_unit(values))
-    ends = Ends(observed, squares, descend(squares.rows, squares.to_unit(values)), ("search",))
+    ends = DescentEnds(observed, squares, descend(squares.rows, squares.to_unit(values)), ("search",))
     return _finished(ends.looked_beside(), robust=True)
 
 
@@ -168,7 +168,7 @@ def _level(problem: Problem, values: np.ndarray) -> float:
     return max(float(np.sqrt(problem.objective(values[None])[0])), SMALLEST)
 
 
-def _of_box(problem: Problem) -> tuple[Ends, Estimated | None]:
+def _of_box(problem: Problem) -> tuple[DescentEnds, EstimationResult | None]:
     """The ends of descents from all over the box, and the estimate that they give; None where none can be simulated."""
     events = [(e.record.name, e.start, e.end, e.steady, e.noise_P, e.noise_Q) for e in problem.events]
     key = f"{problem.digest()} {events}"
@@ -177,7 +177,7 @@ def _of_box(problem: Problem) -> tuple[Ends, Estimated | None]:
         points, least = screened(observed.problem)
         likelihood = Likelihood.of_squares(observed.problem, max(float(np.sqrt(least)), SMALLEST))
         found = explored(likelihood, points)
-        ends = Ends(observed, likelihood, found, ("box",) * len(found.unit))
+        ends = DescentEnds(observed, likelihood, found, ("box",) * len(found.unit))
         if not np.isfinite(ends.lowest):
             return ends, None
         ends = _in_own_units(ends)
@@ -191,19 +191,20 @@ def _of_box(problem: Problem) -> tuple[Ends, Estimated | None]:
     return _remembered[key]
 
 
-def _in_own_units(ends: Ends) -> Ends:
+def _in_own_units(ends: DescentEnds) -> DescentEnds:
     """The same in mean squares of what the best leaves: there a descent's tolerance means the same for any record."""
     left = max(ends.lowest / ends.likelihood.samples, 1e-12)
     descent = replace(ends.descent, deviance=ends.descent.deviance / left)
     return replace(ends, likelihood=ends.likelihood.scaled(np.sqrt(left)), descent=descent)
 
 
-def _without_offsets(ends: Ends) -> Ends:
+def _without_offsets(ends: DescentEnds) -> DescentEnds:
     """The ends of waveforms where what their channels' offsets do is left out of the sum of squares; else the same.
 
     Offsets of the currents, and of the voltage as the model passes them on, are larger than a model's error there.
     """
-    offsets = ends.observed.offsets(ends.likelihood.values(ends.best))
+    problem = ends.observed.problem
+    offsets = problem.domain.input_errors(problem, ends.likelihood.values(ends.best))
     if offsets is None:
         return ends
     squares = ends.likelihood
@@ -211,34 +212,34 @@ def _without_offsets(ends: Ends) -> Ends:
     return replace(ends, likelihood=likelihood, descent=descend(likelihood.rows, ends.descent.unit))
 
 
-def _finished(ends: Ends, *, robust: bool = False) -> Estimated:
+def _finished(ends: DescentEnds, *, robust: bool = False) -> EstimationResult:
     """Least squares where more than noise is left, and the maximum of the likelihood of the noise elsewhere."""
     observed = ends.observed
     likelihood, units = _under_noise(ends, robust=robust)
     seen = surprise(observed, likelihood, units[0], ends.likelihood, ends.lowest)
     if not seen.adequate:
         return _of_squares(ends, likelihood, seen)
-    whole = noise_at(observed, likelihood, units[0], observed.blurred(likelihood.values(units[0])), whole=True)
+    whole = noise_at(observed, likelihood, units[0], observed.input_errors(likelihood.values(units[0])), whole=True)
     likelihood = replace(likelihood, noise=whole)  # nothing but noise is left: all of it tells
     found = descend(likelihood.rows, units, apart=likelihood.apart)
     best = int(found.deviance.argmin())
     if not ends.no_worse(found.unit[best]):
         return _of_squares(ends, likelihood, seen)
     others = found.unit[np.arange(len(units)) != best]
-    return Estimated(with_valleys(conclude(likelihood, found.unit[best]), others), seen, ends.starts)
+    return EstimationResult(with_local_minima(conclude(likelihood, found.unit[best]), others), seen, ends.starts)
 
 
-def _of_squares(ends: Ends, noise: Likelihood, seen: Surprise) -> Estimated:
+def _of_squares(ends: DescentEnds, noise: Likelihood, seen: Surprise) -> EstimationResult:
     """The minimum of Eq. (8) as the estimate."""
-    known = conclude_squares(ends.likelihood, ends.best, noise)
-    return Estimated(with_valleys(known, ends.near), seen, ends.starts)
+    known = conclude(ends.likelihood, ends.best, noise)
+    return EstimationResult(with_local_minima(known, ends.near), seen, ends.starts)
 
 
-def _under_noise(ends: Ends, *, robust: bool) -> tuple[Likelihood, np.ndarray]:
+def _under_noise(ends: DescentEnds, *, robust: bool) -> tuple[Likelihood, np.ndarray]:
     """The likelihood of the noise that the fit leaves in quiet, and its maxima (n, D), the best first."""
     observed, likelihood = ends.observed, ends.likelihood.with_initial_power
     units = likelihood.placed(ends.near)
-    blur = observed.blurred(likelihood.values(units[0]))
+    blur = observed.input_errors(likelihood.values(units[0]))
     for _ in range(ROUNDS):
         if robust:
             likelihood = cleaned(likelihood, units[:1])
@@ -254,14 +255,13 @@ def noise_at(
 ) -> Noise:
     """The noise that a fit at coordinates (D,) leaves in quiet; of the `whole` residual where too little is quiet.
 
-    The whole tells more, too, where what is left is nothing but noise. `blur` is that of `Observed.blurred`.
+    The whole tells more, too, where what is left is nothing but noise. `blur` is that of `Observed.input_errors`.
     """
     measured = likelihood.problem.drive.measured
     rows, J = replace(likelihood, noise=Noise.white(*[1.0] * len(measured))).jacobian(unit)
     residual, columns = rows.reshape(measured.shape), J.T.reshape(-1, *measured.shape)
-    answers = observed.answers(likelihood.values(unit))
-    seen = observed.noise(residual, likelihood.known, columns, blur, whole, answers)
-    return seen or noise_of(likelihood, residual)
+    values = likelihood.values(unit)
+    return observed.noise(residual, likelihood.known, columns, values, blur, whole) or noise_of(likelihood, residual)
 
 
 def noise_of(likelihood: Likelihood, residuals: np.ndarray) -> Noise:
@@ -294,7 +294,7 @@ def cleaned(likelihood: Likelihood, unit: np.ndarray) -> Likelihood:
     return replace(likelihood, known=known)
 
 
-def with_valleys(known: Uncertainty, units: np.ndarray) -> Uncertainty:
+def with_local_minima(known: Uncertainty, units: np.ndarray) -> Uncertainty:
     """The judgement with other valleys (n, D) that the records do not rule out: intervals reach over them.
 
     A parameter that has another value in another valley is not identified, however narrow either valley is.
@@ -302,7 +302,7 @@ def with_valleys(known: Uncertainty, units: np.ndarray) -> Uncertainty:
     rows = known.likelihood.rows(units) if len(units) else np.empty((0, 1))
     above = (rows**2).sum(axis=1) - known.deviance
     apart = np.abs(units - known.unit).max(axis=1, initial=0.0) > SAME
-    valleys = [Valley(unit, known.likelihood.values(unit), float(a))
+    valleys = [LocalMinimum(unit, known.likelihood.values(unit), float(a))
                for unit, a in zip(units[apart], above[apart], strict=True) if a < threshold()]  # fmt: skip
     said, own = dict(known.verdicts), known.intervals
     for valley in valleys:

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from tractexp.identification.optimizer import REFUSED, Box, Evaluate
-from tractexp.identification.starts import best_distinct
+from tractexp.parameter import best_distinct
 
 DIFFERENCE = 1e-6  # of the box's width; rounding (3e-13 relative) and curvature both stay below 1e-6 of a column
 EDGE = 1e-9  # SciPy's interior method starts strictly inside the box

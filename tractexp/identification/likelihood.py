@@ -10,14 +10,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.identification.descent import Apart
+from tractexp.domain import domain_of
+from tractexp.identification.descent import SeparableColumns
 from tractexp.identification.problem import Problem
 from tractexp.noise.color import SMALLEST, fit_autoregression, stretches
 from tractexp.noise.model import Noise, Pair
-from tractexp.record import Event, WaveEvent
+from tractexp.record import Event
 
 POWER_RANGE = 0.2  # of the apparent power before the event: how far P0 and Q0 may move
-QUIET_ORDER = 4  # of an autoregression of the few samples before a dip
 CENTRAL = 1e-5  # of a parameter's range: truncation and rounding both stay below 1e-7 of a column
 
 
@@ -25,8 +25,7 @@ def before_the_event(event: Event) -> Pair:
     """Level and color of each channel's noise before the dip: what is known of it before anything is fitted."""
     pair = []
     for quiet, level in zip(event.calm, event.levels, strict=True):
-        order = 0 if isinstance(event, WaveEvent) else QUIET_ORDER  # harmonics are no colored noise
-        made = fit_autoregression(stretches(quiet, np.isfinite(quiet)), order)
+        made = fit_autoregression(stretches(quiet, np.isfinite(quiet)), domain_of(event).quiet_order)
         pair.append(made.scaled(max(level, SMALLEST) / made.deviation[0]))
     return tuple(pair)
 
@@ -143,13 +142,13 @@ class Likelihood:
         return rows[0], ((above - below) / np.where(span > 0, span, 1.0)[:, None]).T
 
     @property
-    def apart(self) -> list[Apart]:
+    def apart(self) -> list[SeparableColumns]:
         """P0 and Q0 act on the rows of their own event only: one simulation has the differences of all events."""
         events = self.problem.drive.events
         if not self.initial_power:
             return []
         rows = np.array([self.part_of(e) for e in range(events)])
-        return [Apart(self.free + np.arange(events) * 2 + c, rows) for c in (0, 1)]
+        return [SeparableColumns(self.free + np.arange(events) * 2 + c, rows) for c in (0, 1)]
 
     def part_of(self, event: int) -> np.ndarray:
         """Which rows (R,) belong to an event."""

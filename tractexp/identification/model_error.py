@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from tractexp.identification.blocks import LENGTH, quantile
-from tractexp.noise.wander import SLOW, without_drift, without_slow
+from tractexp.noise.random_walk import SLOW, without_drift, without_slow
 from tractexp.record import Event
 
 

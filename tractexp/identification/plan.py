@@ -9,28 +9,25 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tractexp.domain import PHASORS, Domain, domain_of
 from tractexp.errors import UserError, among, check_range
 from tractexp.identification.information import Information
 from tractexp.identification.likelihood import Likelihood, before_the_event
 from tractexp.identification.problem import Problem
 from tractexp.identification.uncertainty import LEVEL
 from tractexp.noise import Autoregression, Noise
-from tractexp.record import Base, Event, Record, WaveEvent
-from tractexp.record.synthetic import synthetic_event
-from tractexp.record.wave_event import COARSEST
+from tractexp.record import Event
 
 BEFORE, AFTER = 0.3, 1.5  # s recorded before and after a planned dip
-EDGE, SUDDEN = 0.02, 0.001  # s, fall and rise of a planned dip, in phasors and in waveforms
-FINEST = 5e-4  # s, longest Runge-Kutta step of a forecast
 DEPTHS = np.arange(0.05, 0.951, 0.025)
 INERTIA = "H"  # H = M omega_s / 2 has the relative precision of M
 
 
 @dataclass(frozen=True)
-class Shape:
+class DipShape:
     """A dip that might be recorded, from 1 pu, with trapezoidal edges. Noise [pu] forgets within `memory` [s].
 
-    In `waves` it is a dip of the positive sequence in which the voltage's phase jumps by `jump` [degrees], with a
+    Of waveforms it is a dip of the positive sequence in which the voltage's phase jumps by `jump` [degrees], with a
     negative sequence of `unbalance` times its depth (0: balanced; 1: a fault between two phases, Bollen 2000, types C
     and D), and the noise is that of the currents alpha (noise_P) and beta (noise_Q).
     """
@@ -44,19 +41,24 @@ class Shape:
     Q0: float = 0.5
     frequency: float = 50.0
     memory: float = 0.0
-    waves: bool = False
+    domain: Domain = PHASORS
     jump: float = 0.0
     unbalance: float = 0.0
 
     @classmethod
-    def of(cls, event: Event, noise: Noise | None = None) -> "Shape":
+    def of(cls, event: Event, noise: Noise | None = None) -> "DipShape":
         """The shape of a recorded event, with the noise that a fit found there, or that before the dip."""
-        seen = noise or Noise((before_the_event(event),))
-        (noise_P, noise_Q, *_), memory = seen.levels, seen.memory(event.record.step)
+        noise, domain = noise or Noise((before_the_event(event),)), domain_of(event)
+        (noise_P, noise_Q, *_), memory = noise.levels, noise.memory(event.record.step)
         return cls(
             event.depth, event.duration, event.rate, noise_P, noise_Q, event.P0, event.Q0,
-            event.record.base.frequency, memory, *_in_waves(event),
+            event.record.base.frequency, memory, domain, **domain.shape(event),
         )  # fmt: skip
+
+    @property
+    def waves(self) -> bool:
+        """Whether the currents of waveforms are planned for."""
+        return self.domain is not PHASORS
 
     @property
     def noise(self) -> Noise:
@@ -64,13 +66,13 @@ class Shape:
         a = math.exp(-1 / (self.rate * self.memory)) if self.memory > 0 else 0.0
         color, shock = np.array([[0.0], [a]]), math.sqrt(1 - a * a)
         P, Q = (Autoregression(color, level * np.array([1.0, shock])) for level in (self.noise_P, self.noise_Q))
-        return Noise(((P, Q, P) if self.waves else (P, Q),))
+        return Noise(((P, Q, P)[: len(self.domain.channels)],))
 
     def check(self, where: str = "task") -> None:
         """Raise `UserError` for what cannot be recorded."""
         check_range(f"{where}.depth", self.depth, 0.03, 0.95)
         check_range(f"{where}.duration", self.duration, 2 / self.rate, 10.0)
-        check_range(f"{where}.rate", self.rate, COARSEST * self.frequency if self.waves else 5.0, 20_000.0)
+        check_range(f"{where}.rate", self.rate, self.domain.slowest(self.frequency), 20_000.0)
         check_range(f"{where}.jump", self.jump, -90.0, 90.0)
         check_range(f"{where}.unbalance", self.unbalance, 0.0, 1.0)
         if not min(self.noise_P, self.noise_Q) > 0:
@@ -80,45 +82,21 @@ class Shape:
             )
 
     def event(self) -> Event:
-        """The event as if it had been recorded; P and Q hold the steady state, for no forecast looks at them."""
+        """The event as if it had been recorded."""
         step = 1 / self.rate
         t = np.arange(math.ceil((BEFORE + self.duration + AFTER) * self.rate)) * step
-        edge = SUDDEN if self.waves else EDGE
+        edge = self.domain.edge
         fall, back = (np.clip((t - s) / edge, 0.0, 1.0) for s in (BEFORE, BEFORE + self.duration))
-        U = 1 - self.depth * (fall - back)
         start, end = (int(np.searchsorted(t, s)) for s in (BEFORE, BEFORE + self.duration + edge))
         name = f"{100 * self.depth:.0f} % for {1000 * self.duration:.0f} ms"
-        if self.waves:
-            v = U * np.exp(1j * np.radians(self.jump) * (fall - back))
-            v = v + self.unbalance * self.depth * (fall - back) * np.exp(-4j * np.pi * self.frequency * t)
-            return synthetic_event(name, t, v, (1.0, self.P0, self.Q0), self.frequency, start, end)
-        record = Record(
-            name, t, U,
-            np.full(len(t), self.P0), np.full(len(t), self.Q0), base=Base(frequency=self.frequency),
-        )  # fmt: skip
-        return Event(
-            record=record, start=start, end=min(end, len(t) - 1), depth=self.depth, U0=1.0, P0=self.P0, Q0=self.Q0,
-            f0=self.frequency, noise_U=0.0, noise_P=self.noise_P, noise_Q=self.noise_Q, steady=slice(0, start), dips=1,
-        )  # fmt: skip
-
-
-def _in_waves(event: Event) -> tuple[bool, float, float]:
-    """Whether an event is in waveforms, how far its voltage's phase jumps [degrees], and its `Shape.unbalance`."""
-    if not isinstance(event, WaveEvent):
-        return False, 0.0, 0.0
-    cycle = max(1, round(event.rate / event.f0 / 2))
-    middle = max((event.start + event.end) // 2, event.start + cycle)
-    around = slice(middle - cycle, middle + cycle)
-    v, turn = event.v[around], event.turn[around]
-    negative = abs(np.mean(np.conj(v * turn) / turn)) / max(event.U0 * event.depth, 1e-9)
-    return True, float(np.degrees(np.angle(v.mean()))), float(min(negative, 1.0))
+        return self.domain.planned(self, name, t, fall - back, start, end)
 
 
 @dataclass(frozen=True, eq=False)
 class Forecast:
     """What recording `shape` would tell: half 95 % intervals (d,) of the parameters `names`."""
 
-    shape: Shape
+    shape: DipShape
     names: tuple[str, ...]
     values: np.ndarray
     half: np.ndarray
@@ -138,15 +116,13 @@ def normal_quantile(level: float = LEVEL) -> float:
 def like(problem: Problem, events: Sequence[Event]) -> Problem:
     """The same free parameters, bounds and fixed values on other events."""
     bounds = {p.name: p.bounds for p in problem.parameters}
-    longest = FINEST
-    if problem.model.waves:  # as fine as what was recorded needs
-        longest = min(e.record.step / n for e, n in zip(problem.events, problem.step.substeps, strict=True))
+    longest = problem.domain.longest_step(problem.events, problem.step.substeps)
     substeps = max(1, math.ceil(max(e.record.step for e in events) / longest - 1e-6))
     return Problem(problem.model, events, bounds, problem.fixed, substeps)
 
 
 def forecast(
-    problem: Problem, values: np.ndarray, shape: Shape, known: Information | None = None, noise: Noise | None = None
+    problem: Problem, values: np.ndarray, shape: DipShape, known: Information | None = None, noise: Noise | None = None
 ) -> Forecast:
     """The intervals that `shape` would give at free `values` (d,), added to what is `known` already.
 
@@ -214,7 +190,7 @@ def column(names: Sequence[str], parameter: str) -> int:
 
 
 def over_depth(
-    problem: Problem, values: np.ndarray, shape: Shape, known: Information | None = None, noise: Noise | None = None
+    problem: Problem, values: np.ndarray, shape: DipShape, known: Information | None = None, noise: Noise | None = None
 ) -> list[Forecast]:
     """Forecasts for dips of every depth, otherwise of this `shape`."""
     return [forecast(problem, values, replace(shape, depth=float(d)), known, noise) for d in DEPTHS]
@@ -236,7 +212,7 @@ def depth_needed(forecasts: Sequence[Forecast], parameter: str, within: float) -
 
 
 @dataclass(frozen=True)
-class Choice:
+class ChosenEvent:
     """One event of the best set, in the order of choice: by how much the intervals shrink with it, on average."""
 
     event: int
@@ -245,14 +221,14 @@ class Choice:
     half: tuple[float, ...]  # half intervals of all parameters once it is added
 
 
-def best_events(problem: Problem, values: np.ndarray, least: float, most: int | None = None) -> list[Choice]:
+def best_events(problem: Problem, values: np.ndarray, least: float, most: int | None = None) -> list[ChosenEvent]:
     """The events of a problem that tell most together at free `values` (d,), as `best_of` chooses them."""
     return best_of(each(problem, values), [event.record.name for event in problem.events], least, most)
 
 
 def best_of(
     informations: Sequence[Information], names: Sequence[str], least: float, most: int | None = None
-) -> list[Choice]:
+) -> list[ChosenEvent]:
     """The events that tell most together, greedily by the determinant of the information (D-optimal).
 
     Ends before the event whose gain is below `least`, or after `most`. The parameters' bounds count as what is
@@ -262,7 +238,7 @@ def best_of(
     matrices = [i.J.T @ i.J for i in informations]
     volume = lambda chosen: np.linalg.slogdet(prior + sum(matrices[e] for e in chosen))[1]  # noqa: E731
     chosen: list[int] = []
-    choices: list[Choice] = []
+    choices: list[ChosenEvent] = []
     while len(chosen) < min(most or len(matrices), len(matrices)):
         rest = [e for e in range(len(matrices)) if e not in chosen]
         volumes = [volume([*chosen, e]) for e in rest]
@@ -272,7 +248,7 @@ def best_of(
             break
         chosen.append(best)
         half = normal_quantile() * combined([informations[e] for e in chosen]).standard_errors
-        choices.append(Choice(best, names[best], gain if len(chosen) > 1 else 1.0, tuple(half.tolist())))
+        choices.append(ChosenEvent(best, names[best], gain if len(chosen) > 1 else 1.0, tuple(half.tolist())))
     return choices
 
 

@@ -8,64 +8,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tractexp.domain import Domain, domain_of
 from tractexp.errors import UserError, among
 from tractexp.identification.loss import Loss
 from tractexp.identification.search import REFUSED
-from tractexp.identification.starts import even
-from tractexp.model.drive import Drive, Excitation, Waveforms
+from tractexp.model.drive import Drive
 from tractexp.model.model import CLASSICAL, MOST_SUBSTEPS, Model
 from tractexp.model.parts import COMPARED, Effect
-from tractexp.parameter import Box, Parameter
-from tractexp.record import Event, WaveEvent, in_waves
-from tractexp.record.deconvolution import sharpened
+from tractexp.parameter import Box, Parameter, even
+from tractexp.record import Event
 
-WEIGHTS = {3: (0.5, 0.5, 1.0), 1: (1.0, 0.0, 0.0)}  # by phases, so that the objective is the mean over them
 PROBES = 64  # candidates across the box on which the Runge-Kutta step is judged
-FINE_OF_WAVES, MOST_PROBES = 5e-5, 0.75  # pu, of sampled currents, whose noise starts near 1e-3; share judged
-FINE = 5e-6  # pu, largest error of the automatic step on those candidates; noise of records starts near 1e-4
-
-
-def excited(event: Event, model: Model | None = None, loss: Loss | None = None) -> Excitation | Waveforms:
-    """What drives a model through an event in its domain, squared errors weighed as the loss says."""
-    loss = loss or Loss()
-    if not isinstance(event, WaveEvent):
-        return replace(excitation(event, model), weight_P=loss.weight_P, weight_Q=loss.weight_Q)
-    assert event.record.U2 is not None
-    return Waveforms(
-        step=event.record.step, v=event.v, v_zero=event.v_zero, turn=event.turn, currents=event.currents,
-        U=event.record.U, U2=event.record.U2, U0=event.U0, P0=event.P0, Q0=event.Q0,
-        U20=float(event.record.U2[event.steady].mean()), omega_s0=event.omega_s0,
-        omega_n=2 * np.pi * event.record.base.frequency, weights=WEIGHTS[event.phases],
-    )  # fmt: skip
-
-
-def excitation(event: Event, model: Model | None = None) -> Excitation:
-    """What drives the model through a recorded event. A recorded frequency sets the synchronous speed.
-
-    A model that follows what happens within a cycle is driven by the voltage that the load saw, reckoned back through
-    the record's window where that is known, and looked at through it.
-    """
-    window = event.record.window if model is not None and model.motor.within_a_cycle else None
-    weights = None
-    if window is not None:
-        weights = window.on(event.record.step)
-        event = sharpened(event, weights, window.length)
-    record, nominal = event.record, 2 * np.pi * event.record.base.frequency
-    return Excitation(
-        step=record.step,
-        U=record.U,
-        P=record.P,
-        Q=record.Q,
-        U0=event.U0,
-        P0=event.P0,
-        Q0=event.Q0,
-        omega_s=None if record.f is None else 2 * np.pi * record.f - nominal,
-        omega_s0=0.0 if record.f is None else 2 * np.pi * event.f0 - nominal,
-        omega_n=nominal,
-        U2=record.U2,
-        U20=float("nan") if record.U2 is None else float(record.U2[event.steady].mean()),
-        window=weights,
-    )
 
 
 def narrowed(parameters: Sequence[Parameter], bounds: Mapping[str, Sequence[float]]) -> tuple[Parameter, ...]:
@@ -150,7 +103,7 @@ class Problem:
         `T_m[1]`, `T_m[2]`, ... `loss` None means least squares.
         """
         self.model = model
-        self.events: tuple[Event, ...] = tuple(map(in_waves, events)) if model.waves else tuple(events)
+        self.events = self.domain.events(events)
         _check_channels(model, self.events)
         self.parameters = narrowed(model.parameters, bounds or {})
         self.fixed = {name: float(value) for name, value in (fixed or {}).items()}
@@ -176,7 +129,7 @@ class Problem:
         self.loss = loss or Loss()
         self._rest = np.array([self.fixed.get(name, np.nan) for name in model.names])
         self._columns = np.array([self._sources(e) for e in range(len(self.events))])  # (E, d), -1: fixed
-        self.drive = Drive.of([excited(e, model, self.loss) for e in self.events])
+        self.drive = self._driven()
         self._scale = self.loss.scales(self.events, self.drive)
         self.step = self._step(substeps)
 
@@ -195,8 +148,23 @@ class Problem:
         """The same problem with other voltages of the same lengths; Runge-Kutta steps and scales stay."""
         other = copy.copy(self)
         other.events = tuple(events)
-        other.drive = Drive.of([excited(e, self.model, self.loss) for e in other.events])
+        other.drive = other._driven()
         return other
+
+    @property
+    def domain(self) -> Domain:
+        """What the model is compared with."""
+        return domain_of(self.model)
+
+    @property
+    def steady(self) -> list[slice]:
+        """The samples of the drive whose means are P0 and Q0 of each event; [] where those are not compared."""
+        return self.domain.steady(self.events, self.drive)
+
+    def _driven(self) -> Drive:
+        """The events end to end, squared errors weighed as the loss says."""
+        weights = self.loss.weight_P, self.loss.weight_Q
+        return Drive.of([self.domain.excitation(e, self.model, weights) for e in self.events])
 
     def _sources(self, event: int) -> list[int]:
         """Which free column each parameter of the model is taken from in an event, -1 where it is fixed."""
@@ -272,10 +240,10 @@ class Problem:
             given = np.full(len(self.events), substeps)
             return Step(given, np.full(len(self.events), np.nan))
         probes = self.candidates(self.space.from_unit(even(PROBES, self.space.dimension)))
-        # Of waveforms some stiff circuits of the box diverge, and are refused; the step of a fit is checked by itself.
-        fine, share = (FINE_OF_WAVES, MOST_PROBES) if self.model.waves else (FINE, 1.0)
+        fine, share = self.domain.finest, self.domain.probed
         chosen, error = self.model.substeps(self.drive, probes, fine, share)
-        if self.model.waves and np.isinf(error).any() and (lasting := self._lasting(probes)).any():
+        # Stiff circuits of the box may diverge, and are refused; the step of a fit is checked by itself.
+        if self.domain.stiff and np.isinf(error).any() and (lasting := self._lasting(probes)).any():
             chosen, error = self.model.substeps(self.drive, probes[lasting], fine, share)
         if self.model.integration == CLASSICAL and not (error <= fine).all():
             worst = int(np.argmax(error))

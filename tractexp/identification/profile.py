@@ -17,7 +17,7 @@ import numpy as np
 
 from tractexp.identification.descent import descend
 from tractexp.identification.uncertainty import Uncertainty, threshold
-from tractexp.identification.verdict import BOUND, IDENTIFIED, UNIDENTIFIED, WEAK, WITHIN, Verdict, size
+from tractexp.identification.verdict import BOUND, IDENTIFIED, UNIDENTIFIED, WEAK, WITHIN, ParameterVerdict, size
 
 BEYOND = 1.6  # of the threshold: a lane ends when its deviance has risen so far
 OVERSHOOT = 3.0  # of the threshold: a step that rises so far at once is taken back
@@ -81,7 +81,7 @@ class Profiles:
         return [f"a better optimum turned up along a profile; the profiles were restarted from it {times}"]
 
     @property
-    def verdicts(self) -> dict[str, Verdict]:
+    def verdicts(self) -> dict[str, ParameterVerdict]:
         """The verdicts of the information matrix, corrected by what the profiles show."""
         known = self.known
         bounds = dict(zip(known.names, zip(known.lower, known.upper, strict=True), strict=True))
@@ -92,7 +92,9 @@ class Profiles:
         }
 
 
-def revised(verdict: Verdict, profile: Profile, low: float, high: float, elsewhere: bool = False) -> Verdict:
+def revised(
+    verdict: ParameterVerdict, profile: Profile, low: float, high: float, elsewhere: bool = False
+) -> ParameterVerdict:
     """A verdict in the light of a profile: its width decides; an open side or a second minimum is a weakness.
 
     So is another valley, `elsewhere`.
@@ -111,7 +113,7 @@ def revised(verdict: Verdict, profile: Profile, low: float, high: float, elsewhe
         word = WEAK
     else:
         word = IDENTIFIED
-    return Verdict(word, f"{verdict.detail}; {detail}")
+    return ParameterVerdict(word, f"{verdict.detail}; {detail}")
 
 
 def checked(known: Uncertainty) -> Uncertainty:

@@ -9,24 +9,21 @@ from typing import Any
 import numpy as np
 
 from tractexp import files, provenance
+from tractexp.domain import DOMAINS, Playback, domain_of
+from tractexp.domain.playback import relative_error
 from tractexp.errors import UserError
 from tractexp.identification.adequacy import ACCEPTED
 from tractexp.identification.model_error import ModelError, in_percent, model_error
-from tractexp.identification.periodic import unsettled
-from tractexp.identification.play import play
-from tractexp.identification.problem import Problem, excited
-from tractexp.identification.search import REFUSED, Found, History
-from tractexp.identification.seen import seen_by_estimator
+from tractexp.identification.problem import Problem
+from tractexp.identification.search import REFUSED, History, SearchResult
 from tractexp.model.drive import PHASORS, Drive
 from tractexp.model.model import CLASSICAL, Model, compose
 from tractexp.plugin import build
-from tractexp.record import Event, OwnBase, Record, WaveEvent, find_dips, in_waves
+from tractexp.record import Event, OwnBase, Record, find_dips
 from tractexp.record.own_base import scaled
 
 TRAIN, VALIDATE = "train", "validate"
-EPSILONS = ("epsilon_p", "epsilon_q", "epsilon_i")
 SMALL_Q = 0.3  # of S: with less, an epsilon_q beyond Eq. (20) may be a small error of the load
-AFTER = 0.15  # s after a dip's start in which the currents' error counts
 
 
 def parts(node: Mapping[str, Any]) -> tuple[Any, Any, list[Any], str, str]:
@@ -36,25 +33,11 @@ def parts(node: Mapping[str, Any]) -> tuple[Any, Any, list[Any], str, str]:
     return motor, static, effects, node.get("integration", CLASSICAL), node.get("domain", PHASORS)
 
 
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """Measured and calculated power of one event, (N,) each, and the relative errors of Eq. (20), as fractions.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Fit(Playback):
+    """Measured and calculated power of one event that was fitted or held out."""
 
-    Of waveforms the power is that which the record's estimator sees in calculated and in recorded currents, and
-    `currents` (3, N), alpha, beta and zero, are the calculated ones [pu] on the samples of the event in `waves`;
-    `unsettled` is by how much they still change from one cycle to the next before the record, a share of them.
-    """
-
-    event: Event
     role: str  # TRAIN or VALIDATE
-    P: np.ndarray  # calculated, pu
-    Q: np.ndarray
-    epsilon_p: float
-    epsilon_q: float
-    epsilon_i: float | None = None
-    waves: WaveEvent | None = None
-    currents: np.ndarray | None = None
-    unsettled: float | None = None
 
     @property
     def told(self) -> dict[str, Any]:
@@ -71,12 +54,6 @@ def by_event(values: Mapping[str, float], per_event: Mapping[str, Sequence[float
     return {**values, **own}
 
 
-def relative_error(measured: np.ndarray, calculated: np.ndarray) -> float:
-    """epsilon of Eq. (20) as a fraction: RMS of the difference over RMS of the measurement, gaps left out."""
-    known = np.isfinite(measured)
-    return float(np.linalg.norm((calculated - measured)[known]) / np.linalg.norm(measured[known]))
-
-
 def reactive_share(record: Record) -> float:
     """The rms of Q over that of the apparent power: where it is small, Eq. (20) divides the error of Q by little."""
     return float(np.sqrt(np.nansum(record.Q**2) / max(np.nansum(record.P**2 + record.Q**2), 1e-30)))
@@ -84,39 +61,14 @@ def reactive_share(record: Record) -> float:
 
 def respond(model: Model, values: np.ndarray, event: Event, role: str) -> Fit:
     """Play one event through the model. Raises `UserError` where these parameters have no steady state there."""
-    event = in_waves(event) if model.waves else event
-    drive = Drive.of([excited(event, model)])
+    domain = domain_of(model)
+    event = domain.event(event)
+    drive = Drive.of([domain.excitation(event, model)])
     if refusal := model.refusal(values, drive):
         raise UserError(f"{event.record.name}: {refusal}")
     substeps, _ = model.substeps(drive, values)
     response = model.simulate(drive, values, substeps)
-    if isinstance(event, WaveEvent):
-        return _of_waves(event, role, response.outputs[:, 0])
-    P, Q = response.P[0], response.Q[0]
-    errors = relative_error(event.record.P, P), relative_error(event.record.Q, Q)
-    return Fit(event, role, P, Q, *errors)
-
-
-def _of_waves(event: WaveEvent, role: str, currents: np.ndarray) -> Fit:
-    """Calculated currents (3, N) beside the recorded ones, and the phasors of both by one estimator."""
-    compared, P, Q = seen_by_estimator(event, currents)
-    record = compared.record
-    errors = relative_error(record.P, P), relative_error(record.Q, Q)
-    error, change = current_error(event, currents), unsettled(event, currents)
-    return Fit(compared, role, P, Q, *errors, error, event, currents, change)
-
-
-def current_error(event: WaveEvent, currents: np.ndarray) -> float:
-    """epsilon_i: rms of what calculated currents (3, N) miss from the dip's start to 0.15 s after it, all phases.
-
-    Over the rms of the recorded currents before the dip.
-    """
-    window = slice(event.start, event.start + round(AFTER / event.record.step))
-    before = slice(event.first, event.start)
-    rms = lambda i, part: float(np.sqrt(np.mean(event.of_phases(i)[:, part] ** 2)))  # noqa: E731
-    recorded = np.nan_to_num(event.currents)
-    known = np.array(event.compared)[:, None]
-    return rms((currents - recorded) * known, window) / rms(recorded, before)
+    return Fit(role=role, **vars(domain.comparison(event, response.outputs[:, 0])))
 
 
 @dataclass(frozen=True)
@@ -192,7 +144,7 @@ class Result:
     @property
     def epsilons(self) -> tuple[str, ...]:
         """The relative errors that each event has: of P and Q, and of waveforms of the currents."""
-        return tuple(key for key in EPSILONS if all(key in event for event in self.events))
+        return DOMAINS[self.model.get("domain", PHASORS)].epsilons
 
     @property
     def acceptable(self) -> bool:
@@ -238,7 +190,8 @@ class Result:
         known = {key: value / ratio for key, value in {"P0": P0, "Q0": Q0}.items() if value is not None}
         before = self.before | known | {"U0": float(U[steady].mean())}
         values = np.array([self.parameters[name] for name in model.names])
-        P, Q = play(model, values, t, U, before, omega_s, 0.0 if omega_s is None else float(omega_s[steady].mean()))
+        omega_s0 = 0.0 if omega_s is None else float(omega_s[steady].mean())
+        P, Q = domain_of(model).play(model, values, t, U, before, omega_s, omega_s0)
         return ratio * P, ratio * Q
 
 
@@ -262,7 +215,7 @@ def load(path: Path) -> Result:
 
 def conclude(
     problem: Problem,
-    found: Found,
+    found: SearchResult,
     validate: Sequence[Event],
     seed: int,
     settings: Mapping[str, Any],
@@ -319,7 +272,7 @@ def _model_error(fits: Sequence[Fit]) -> dict[str, Any]:
     return {**fitted, "held_out": model_error(held_out).to_dict() if held_out else None, "events": each}
 
 
-def refuse_nothing_found(problem: Problem, found: Found) -> None:
+def refuse_nothing_found(problem: Problem, found: SearchResult) -> None:
     """Raise `UserError` where no candidate at all had a steady state."""
     if found.objective >= REFUSED:
         why = problem.model.refusal(problem.full(found.values)[0], problem.drive) or "all diverged"
@@ -344,7 +297,7 @@ def fitted(problem: Problem, free: np.ndarray) -> tuple[list[Fit], float, float]
     return fits, relative_error(measured["P"], calculated["P"]), relative_error(measured["Q"], calculated["Q"])
 
 
-def searched(problem: Problem, found: Found) -> dict[str, Any]:
+def searched(problem: Problem, found: SearchResult) -> dict[str, Any]:
     """Where the optimizer itself ended, and what that took: what optimizers are compared by."""
     _, epsilon_p, epsilon_q = fitted(problem, found.values)
     return {

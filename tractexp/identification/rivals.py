@@ -16,10 +16,10 @@ from tractexp.errors import UserError
 from tractexp.identification.descent import descend
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.problem import Problem
-from tractexp.identification.starts import even
 from tractexp.identification.uncertainty import Uncertainty, threshold
-from tractexp.identification.verdict import IDENTIFIED, WEAK, WITHIN, Verdict, size
+from tractexp.identification.verdict import IDENTIFIED, WEAK, WITHIN, ParameterVerdict, size
 from tractexp.model.model import Model, compose
+from tractexp.parameter import even
 from tractexp.plugin import discover, get
 
 STARTS = 5  # of the parameters that the rival alone has
@@ -27,7 +27,7 @@ ITERATIONS = 25
 
 
 @dataclass(frozen=True, eq=False)
-class Rival:
+class RivalStructure:
     """A structure that fits as well: its name, what it leaves over what the model leaves, and the shared parameters."""
 
     name: str
@@ -46,7 +46,7 @@ def with_rivals(known: Uncertainty) -> Uncertainty:
     return replace(known, rivals=found, verdicts=known.verdicts | dict(_moved(known, found)))
 
 
-def _moved(known: Uncertainty, rivals: Sequence[Rival]) -> Iterator[tuple[str, Verdict]]:
+def _moved(known: Uncertainty, rivals: Sequence[RivalStructure]) -> Iterator[tuple[str, ParameterVerdict]]:
     """Verdicts of the parameters that a rival structure moves beyond their interval: the farthest is told."""
     own = known.intervals
     for j, (name, value) in enumerate(zip(known.names, known.values, strict=True)):
@@ -56,7 +56,7 @@ def _moved(known: Uncertainty, rivals: Sequence[Rival]) -> Iterator[tuple[str, V
             continue
         verdict, narrow = known.verdicts[name], abs(far - value) <= WITHIN * size(value, known.lower[j], known.upper[j])
         word = WEAK if verdict.word == IDENTIFIED and not narrow else verdict.word
-        yield name, Verdict(word, f"{verdict.detail}; with {by} it is {far:.4g}")
+        yield name, ParameterVerdict(word, f"{verdict.detail}; with {by} it is {far:.4g}")
 
 
 def _structures(model: Model) -> Iterator[tuple[str, Model]]:
@@ -72,7 +72,7 @@ def _structures(model: Model) -> Iterator[tuple[str, Model]]:
             yield name, compose(model.motor, model.static, [*model.effects, cls()], model.integration, model.domain)
 
 
-def _fitted(known: Uncertainty, name: str, model: Model) -> Rival | None:
+def _fitted(known: Uncertainty, name: str, model: Model) -> RivalStructure | None:
     """A rival fitted from where the model's own fit ended; None where it cannot be, or fits worse."""
     problem = known.likelihood.problem
     own = {p.name: p.bounds for p in problem.parameters if p.name in model.names}
@@ -93,7 +93,7 @@ def _fitted(known: Uncertainty, name: str, model: Model) -> Rival | None:
         return None
     values = dict(zip(other.space.names, likelihood.values(ended.unit[best]).tolist(), strict=True))
     shared = {n: value for n, value in values.items() if n in known.names}
-    return Rival(name, float(ended.deviance[best] / max(known.deviance, 1e-30)), shared)
+    return RivalStructure(name, float(ended.deviance[best] / max(known.deviance, 1e-30)), shared)
 
 
 def _starts(known: Uncertainty, other: Problem) -> np.ndarray:

@@ -79,16 +79,13 @@ def _of_power(likelihood: Likelihood, blocks: Sequence[slice]) -> np.ndarray:
     """The change of P0 and Q0 of each event when a block is left out of their means, (G, 2 E), in ranges."""
     drive, free = likelihood.problem.drive, likelihood.free
     change = np.zeros((len(blocks), drive.events, 2))
-    if drive.channels == 2:
-        for e, event in enumerate(likelihood.problem.events):
-            first = int(drive.first[e])
-            steady = slice(first + event.steady.start, first + event.steady.stop)
-            n = steady.stop - steady.start
-            for b, block in enumerate(blocks):
-                a, z = max(block.start, steady.start), min(block.stop, steady.stop)
-                if 0 < z - a < n:
-                    off = np.nanmean(drive.measured[:, a:z], axis=1) - drive.before[e]
-                    change[b, e] = -np.nan_to_num(off) * (z - a) / (n - (z - a))
+    for e, steady in enumerate(likelihood.problem.steady):
+        n = steady.stop - steady.start
+        for b, block in enumerate(blocks):
+            a, z = max(block.start, steady.start), min(block.stop, steady.stop)
+            if 0 < z - a < n:
+                off = np.nanmean(drive.measured[:, a:z], axis=1) - drive.before[e]
+                change[b, e] = -np.nan_to_num(off) * (z - a) / (n - (z - a))
     return change.reshape(len(blocks), -1) / likelihood.width[free:]
 
 

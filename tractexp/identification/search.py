@@ -54,7 +54,7 @@ class History:
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchResult:
     """What a search found. `status` is the sentence the user reads."""
 
     values: np.ndarray  # (d,) raw
@@ -177,7 +177,7 @@ def search(
     seed: int,
     limits: Limits = Limits(),
     progress: Callable[[int, float, int], None] | None = None,
-) -> Found:
+) -> SearchResult:
     """Run `optimizer` on `problem` with one seed. The same seed gives the same history, bit for bit.
 
     `progress(iteration, best objective, simulations)` is called after each iteration. Ctrl-C is raised as `Stopped`,
@@ -205,12 +205,12 @@ def search(
     return _found(counter, rows, status)
 
 
-def _found(counter: _Counter, rows: list[tuple[int, float, np.ndarray, float]], status: str) -> Found:
+def _found(counter: _Counter, rows: list[tuple[int, float, np.ndarray, float]], status: str) -> SearchResult:
     """Where a search is."""
     rows = rows or [(counter.simulations, counter.best, counter.best_values, counter.seconds)]
     simulations, best, values, seconds = zip(*rows, strict=True)
     history = History(np.array(simulations), np.array(best), np.array(values), np.array(seconds))
-    return Found(
+    return SearchResult(
         counter.best_values,
         counter.best,
         counter.simulations,

@@ -15,11 +15,13 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from tractexp.model.drive import Drive
+from tractexp.noise.span import spanned
 from tractexp.record import Event
 
 SMALLEST_P = 1e-300
 HEAVIER = 2.33  # standard errors of its shape: once in 100 a Gumbel distribution passes for a heavier one
-LOUDEST = "the loudest window"
+LOUDEST, PER_EVENT = "the loudest window", "parameters of each event"
+DISTINCT = 1e-3  # of the largest: weaker directions are rounding
 STRIDE = 4  # samples between the instants at which a step is looked for
 BINS = 1024  # of the transform in which an oscillation is looked for
 PULSES = (0.01, 0.03, 0.1)  # s, lengths of the pulses that are looked for after the dips
@@ -60,7 +62,7 @@ class Scale(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Cell:
+class ResidualWindow:
     """A stretch of one channel of one event, as samples of the drive and as times of the record."""
 
     event: int
@@ -78,6 +80,14 @@ def statistics(channels: np.ndarray, layout: Layout) -> dict[str, np.ndarray]:
         "a step or a pulse": np.concatenate([steps(channels, layout), pulses(after, layout)], axis=1),
         "an oscillation": np.concatenate([tones(channels, layout), bursts(after, layout)], axis=1),
     }
+
+
+def of_each_event(rows: np.ndarray, split: np.ndarray, least: float) -> np.ndarray:
+    """How much parameters of their own for each event would lower the deviance of rows (b, R), (b,).
+
+    `split` (k, R) are what each parameter changes in one event alone; those of at most `least` change nothing.
+    """
+    return ((rows @ spanned(split, DISTINCT, least).T) ** 2).sum(axis=1)
 
 
 def tail(draws: np.ndarray, value: np.ndarray, scale: Scale | None = None) -> float:
@@ -129,7 +139,7 @@ def extremes(draws: np.ndarray) -> tuple[Scale, np.ndarray]:
     return Scale(draws.mean(axis=0), draws.std(axis=0) + 1e-12), largest
 
 
-def cells_of(layout: Layout) -> list[Cell]:
+def residual_windows(layout: Layout) -> list[ResidualWindow]:
     """Every window of every event, for each channel that is compared."""
     cells = []
     for e, event in enumerate(layout.events):
@@ -139,7 +149,9 @@ def cells_of(layout: Layout) -> list[Cell]:
             if j - i < 2:
                 continue
             part = slice(first + i, first + j)
-            cells += [Cell(e, c, part, origin + i * step, origin + (j - 1) * step) for c in layout.drive.spoken]
+            cells += [
+                ResidualWindow(e, c, part, origin + i * step, origin + (j - 1) * step) for c in layout.drive.spoken
+            ]
     return cells
 
 
@@ -149,7 +161,7 @@ def energies(channels: np.ndarray, layout: Layout) -> np.ndarray:
     quiet = np.mean(np.concatenate([square[:, :, part] for part in layout.quiet], axis=2), axis=2, keepdims=True)
     square /= np.where(quiet > 0, quiet, 1.0)  # a current that is not compared is zero throughout
     row = layout.drive.spoken.index
-    return np.stack([square[:, row(c.channel), c.part].sum(axis=1) for c in cells_of(layout)], axis=1)
+    return np.stack([square[:, row(c.channel), c.part].sum(axis=1) for c in residual_windows(layout)], axis=1)
 
 
 def aligned(channels: np.ndarray, layout: Layout) -> np.ndarray:

@@ -14,17 +14,17 @@ import numpy as np
 from tractexp.identification.blocks import LEVEL
 from tractexp.identification.information import Information
 from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.residual_tests import Test, jarque_bera, ljung_box
+from tractexp.identification.residual_tests import ResidualTest, jarque_bera, ljung_box
 from tractexp.identification.sandwich import scatter
-from tractexp.identification.verdict import Verdict, judge
+from tractexp.identification.verdict import ParameterVerdict, judge
 from tractexp.noise.color import FEWEST
 
 if TYPE_CHECKING:
-    from tractexp.identification.rivals import Rival
+    from tractexp.identification.rivals import RivalStructure
 
 
 @dataclass(frozen=True, eq=False)
-class Valley:
+class LocalMinimum:
     """Another minimum: coordinates (D,), free values (d,), and its deviance above the best."""
 
     unit: np.ndarray
@@ -49,12 +49,12 @@ class Uncertainty:
     upper: np.ndarray
     factors: np.ndarray  # half of the 95 % interval over the standard error
     limits: np.ndarray  # what the deviance may rise by within the interval
-    verdicts: dict[str, Verdict]
+    verdicts: dict[str, ParameterVerdict]
     of_noise: Likelihood
     notes: list[str]
     profiled: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # intervals that replace the curvature's
-    valleys: tuple[Valley, ...] = ()  # others that fit as well
-    rivals: "tuple[Rival, ...]" = ()  # structures that fit as well
+    valleys: tuple[LocalMinimum, ...] = ()  # others that fit as well
+    rivals: "tuple[RivalStructure, ...]" = ()  # structures that fit as well
 
     @property
     def elsewhere(self) -> np.ndarray:
@@ -69,9 +69,7 @@ class Uncertainty:
 
     def at(self, unit: np.ndarray) -> "Uncertainty":
         """The same judgement of another point (D,) of the same likelihood."""
-        if self.exact:
-            return conclude(self.likelihood, unit, self.notes)
-        return conclude_squares(self.likelihood, unit, self.of_noise, self.notes)
+        return conclude(self.likelihood, unit, None if self.exact else self.of_noise, self.notes)
 
     @property
     def exact(self) -> bool:
@@ -148,8 +146,29 @@ def threshold(level: float = LEVEL) -> float:
     return float(chdtri(1, 1 - level))
 
 
-def conclude(likelihood: Likelihood, unit: np.ndarray, notes: Sequence[str] = ()) -> Uncertainty:
-    """Intervals and verdicts at the maximum `unit` (D,) of the likelihood of the noise."""
+def conclude(
+    likelihood: Likelihood, unit: np.ndarray, noise: Likelihood | None = None, notes: Sequence[str] = ()
+) -> Uncertainty:
+    """Intervals and verdicts at the maximum `unit` (D,) of the likelihood of the noise, or at the minimum of Eq. (8).
+
+    Of the latter more than `noise` is left.
+    """
+    problem = likelihood.problem
+    likelihood, deviance, information, factors, limits = (
+        _curvature(likelihood, unit) if likelihood.initial_power else _scatter(likelihood, unit)
+    )
+    verdicts = judge(information, problem.lower, problem.upper, factors * information.standard_errors, factors)
+    return Uncertainty(
+        likelihood, unit, deviance, information, problem.lower, problem.upper, factors, limits, verdicts,
+        noise or likelihood, list(notes),
+    )  # fmt: skip
+
+
+Spread = tuple[Likelihood, float, Information, np.ndarray, np.ndarray]  # with deviance, factors (d,) and limits (d,)
+
+
+def _curvature(likelihood: Likelihood, unit: np.ndarray) -> Spread:
+    """How far the maximum of a likelihood spreads, by its curvature."""
     from scipy.special import stdtrit
 
     problem, free = likelihood.problem, likelihood.free
@@ -157,32 +176,18 @@ def conclude(likelihood: Likelihood, unit: np.ndarray, notes: Sequence[str] = ()
     width = problem.upper - problem.lower
     information = Information.of(problem.space.names, likelihood.values(unit), width, J[:, :free], J[:, free:])
     factor = float(stdtrit(max(likelihood.samples - len(unit), 1), (1 + LEVEL) / 2))
-    factors, limits = np.full(free, factor), np.full(free, threshold())
-    return _judged(likelihood, unit, float(rows @ rows), information, factors, limits, likelihood, notes)
+    return likelihood, float(rows @ rows), information, np.full(free, factor), np.full(free, threshold())
 
 
-def conclude_squares(
-    squares: Likelihood, unit: np.ndarray, noise: Likelihood, notes: Sequence[str] = ()
-) -> Uncertainty:
-    """Intervals and verdicts at the minimum `unit` (d,) of Eq. (8), of which more than `noise` is left."""
+def _scatter(squares: Likelihood, unit: np.ndarray) -> Spread:
+    """How far least squares spread, by their scatter over blocks, and the likelihood that is as wide."""
     left = float(np.sum(squares.rows(unit[None])[0] ** 2)) / max(squares.samples - len(unit), 1)
     scattered = scatter(squares.scaled(np.sqrt(left)), unit)
     likelihood = squares.scaled(np.sqrt(left) * scattered.spread)
     rows = likelihood.rows(unit[None])[0]
     factors = np.full(len(unit), scattered.quantile)
     limits = (factors * scattered.ratio / scattered.spread) ** 2
-    return _judged(likelihood, unit, float(rows @ rows), scattered.information, factors, limits, noise, notes)
-
-
-def _judged(
-    likelihood: Likelihood, unit: np.ndarray, deviance: float, information: Information, factors: np.ndarray,
-    limits: np.ndarray, noise: Likelihood, notes: Sequence[str],
-) -> Uncertainty:  # fmt: skip
-    lower, upper = likelihood.problem.lower, likelihood.problem.upper
-    verdicts = judge(information, lower, upper, factors * information.standard_errors, factors)
-    return Uncertainty(
-        likelihood, unit, deviance, information, lower, upper, factors, limits, verdicts, noise, list(notes)
-    )
+    return likelihood, float(rows @ rows), scattered.information, factors, limits
 
 
 def test(likelihood: Likelihood, rows: np.ndarray) -> list[dict[str, Any]]:
@@ -197,7 +202,7 @@ def test(likelihood: Likelihood, rows: np.ndarray) -> list[dict[str, Any]]:
             if len(seen) < FEWEST:
                 continue
             order = likelihood.noise.pair(e)[c].order
-            tests: list[Test] = [ljung_box(seen, order), jarque_bera(seen)]
+            tests: list[ResidualTest] = [ljung_box(seen, order), jarque_bera(seen)]
             results += [{"event": event.record.name, "channel": channel, **vars(t)} for t in tests]
     return results
 

@@ -22,7 +22,7 @@ EDGE = 1e-3  # of the range: closer than this is at the bound
 
 
 @dataclass(frozen=True)
-class Verdict:
+class ParameterVerdict:
     """One of the four words, and what stands behind it."""
 
     word: str
@@ -46,7 +46,7 @@ def shown(value: float, half: float, low: float, high: float) -> str:
 
 def judge(
     information: Information, lower: np.ndarray, upper: np.ndarray, half: np.ndarray, factors: np.ndarray
-) -> dict[str, Verdict]:
+) -> dict[str, ParameterVerdict]:
     """A verdict for each parameter: `half` (d,) is half of its 95 % interval, `factors` (d,) that over its error."""
     width = upper - lower
     unseen, identifiable = information.unseen, information.identifiable
@@ -56,28 +56,28 @@ def judge(
         low, high = value - half[j], value + half[j]
         at = [f"{b:g}" for b in (lower[j], upper[j]) if abs(value - b) < EDGE * width[j]]
         if not identifiable[j]:
-            verdicts[name] = Verdict(UNIDENTIFIED, _structural(information, unseen, j))
+            verdicts[name] = ParameterVerdict(UNIDENTIFIED, _structural(information, unseen, j))
         elif low <= lower[j] and high >= upper[j]:
             span = f"its 95 % interval holds its whole range {lower[j]:g} .. {upper[j]:g}"
-            verdicts[name] = Verdict(UNIDENTIFIED, "; ".join([span, *_trade(information, j, factors[j])]))
+            verdicts[name] = ParameterVerdict(UNIDENTIFIED, "; ".join([span, *_trade(information, j, factors[j])]))
         elif half[j] > WITHIN * size(value, lower[j], upper[j]):
             why = _trade(information, j, factors[j]) or ["the record hardly changes with it"]
             edge = [f"the estimate is at its bound {at[0]}"] if at else []
-            verdicts[name] = Verdict(WEAK, "; ".join([shown(value, half[j], lower[j], upper[j]), *why, *edge]))
+            verdicts[name] = ParameterVerdict(WEAK, "; ".join([shown(value, half[j], lower[j], upper[j]), *why, *edge]))
         elif at:
-            verdicts[name] = Verdict(
+            verdicts[name] = ParameterVerdict(
                 BOUND, f"{at[0]}; the record asks for a value beyond it: widen model.bounds.{name}"
             )
         else:
             tight = "" if lower[j] <= low and high <= upper[j] else "; the interval reaches past its bounds"
-            verdicts[name] = Verdict(IDENTIFIED, shown(value, half[j], lower[j], upper[j]) + tight)
+            verdicts[name] = ParameterVerdict(IDENTIFIED, shown(value, half[j], lower[j], upper[j]) + tight)
     return verdicts
 
 
-def elsewhere(verdict: Verdict, value: float) -> Verdict:
+def elsewhere(verdict: ParameterVerdict, value: float) -> ParameterVerdict:
     """A verdict where the records fit as well in another valley, in which the parameter has this value."""
     word = WEAK if verdict.word == IDENTIFIED else verdict.word
-    return Verdict(word, f"{verdict.detail}; another valley, at {value:.4g}, fits as well")
+    return ParameterVerdict(word, f"{verdict.detail}; another valley, at {value:.4g}, fits as well")
 
 
 def _trade(information: Information, j: int, factor: float) -> list[str]:

@@ -7,13 +7,12 @@ from typing import Any
 import sympy
 from sympy import conjugate, im, re
 
-from tractexp.errors import UserError
+from tractexp.errors import Unfit, UserError
 from tractexp.model import sites
 from tractexp.model.drive import PHASORS
 from tractexp.model.equations import Equations
 from tractexp.model.parts import Effect, Measurement, Motor, Part, Static
 from tractexp.model.signature import asked
-from tractexp.model.unfit import Unfit
 
 ROUNDING = 1e-9  # how far from 1 a law may be before the event
 

@@ -12,7 +12,7 @@ from typing import Any, Literal, NoReturn
 import sympy
 from sympy import I, conjugate, im, re
 
-from tractexp.errors import Unknown, UserError, nearest
+from tractexp.errors import Unfit, Unknown, UserError, nearest
 from tractexp.kernel.graph import Symbol, nodes, operations, symbols_of
 from tractexp.kernel.layout import EVENT, INPUTS
 from tractexp.model import sites
@@ -28,7 +28,6 @@ from tractexp.model.symbols import is_real as _is_real
 from tractexp.model.symbols import phasor_parts, start_symbol
 from tractexp.model.symbols import real_symbol as _real
 from tractexp.model.symbols import vector_symbol as _complex
-from tractexp.model.unfit import Unfit
 from tractexp.parameter import Parameter
 
 LONG = 300  # nodes of an expression

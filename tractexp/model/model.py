@@ -15,8 +15,8 @@ from tractexp.kernel.kernel import NOTHING, Kernel, width
 from tractexp.kernel.layout import EVENT
 from tractexp.model.drive import DOMAINS, PHASORS, WAVES, Drive
 from tractexp.model.parts import Effect, Measurement, Motor, Static
-from tractexp.model.window import seen
 from tractexp.parameter import Parameter
+from tractexp.record.window import averaged_power
 from tractexp.texts import at_hand, text_of
 
 TOLERANCE = 1e-7  # pu, largest step-doubling error of P or Q an automatic substep may leave
@@ -208,7 +208,7 @@ class Model:
         for e, window in enumerate(drive.windows):
             if window is not None:
                 part = drive.part(e)
-                outputs[:, :, part] = seen(outputs[:, :, part], drive.inputs[0, part], window)
+                outputs[:, :, part] = averaged_power(outputs[:, :, part], drive.inputs[0, part], window)
         for effect in self.measurements:
             columns = {p.name: candidates[:, self.names.index(p.name)] for p in effect.parameters}
             outputs = effect.observe(outputs, drive, columns)

@@ -13,7 +13,7 @@ import numpy as np
 
 from tractexp.model.drive import Drive
 from tractexp.noise.color import Autoregression, white_noise
-from tractexp.noise.wander import Load, Wander
+from tractexp.noise.random_walk import Load, RandomWalk
 
 BURN_IN = 500  # samples
 UNSEEN = 0.05  # standard deviations of the fast noise: shapes that do less are left out
@@ -33,7 +33,7 @@ class Noise:
     pairs: tuple[Pair, ...]
     mix: np.ndarray | None = None  # (C, C)
     shocks: tuple[np.ndarray, ...] | None = None  # of unit variance, as they were seen; None: normal
-    wander: Wander | None = None  # of the mixed channels
+    wander: RandomWalk | None = None  # of the mixed channels
     blur: np.ndarray | None = None  # (k, C, N) pu: what errors of the voltage do, each of one standard deviation
     vector: bool = False  # the first two channels are a space vector, whose autoregression is complex
     _shrunk: dict[int, Shrunk] = field(default_factory=dict, init=False)

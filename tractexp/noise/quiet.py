@@ -9,7 +9,7 @@ from tractexp.errors import UserError
 from tractexp.model.drive import Drive
 from tractexp.noise.color import FEWEST, SMALLEST, Autoregression, fit_autoregression, white_noise
 from tractexp.noise.model import Noise
-from tractexp.noise.wander import Wander, without_slow
+from tractexp.noise.random_walk import RandomWalk, without_slow
 from tractexp.record import Event
 
 HIGHEST = 8  # order of the autoregressions
@@ -36,7 +36,7 @@ def estimate(
     residuals: np.ndarray,
     known: np.ndarray,
     quiet: Sequence[slice],
-    wander: Callable[[np.ndarray], Wander | None] = lambda mix: None,
+    wander: Callable[[np.ndarray], RandomWalk | None] = lambda mix: None,
     blur: np.ndarray | None = None,
     highest: int = HIGHEST,
 ) -> Noise:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.noise.color import runs
-from tractexp.noise.wander import Walk, cosines
+from tractexp.noise.random_walk import Walk, cosines
 from tractexp.record import Event
 
 HALF_WIDTHS = (1, 2, 3, 5, 8)  # samples of the averages that must agree where the voltage is smooth
@@ -27,7 +27,7 @@ SILENT = 1e-5  # pu: less noise than this is none
 
 
 @dataclass(frozen=True, eq=False)
-class Smoothed:
+class SmoothedEvent:
     """An event with a smooth voltage, and what may still be wrong with it.
 
     `errors` (k, N) [pu] are shapes of it, independent, each of the size of one standard deviation.
@@ -44,11 +44,11 @@ class Smoothed:
         return replace(self.event, record=replace(record, U=record.U + self.errors[shape]))
 
 
-def smoothed(event: Event) -> Smoothed:
+def smoothed(event: Event) -> SmoothedEvent:
     """Take the noise of the voltage out of one event."""
     U, deviation = event.record.U, noise_of(event.record.U[event.steady])
     if deviation < SILENT:
-        return Smoothed(event, np.empty((0, len(U))))
+        return SmoothedEvent(event, np.empty((0, len(U))))
     rough = _edges(U, deviation)
     rough[[event.start, min(event.end, len(U) - 1)]] = True
     rough = _widened(rough)
@@ -68,7 +68,7 @@ def smoothed(event: Event) -> Smoothed:
     apart = np.maximum(event.start - raw, 0) + np.maximum(raw - event.end, 0)
     raw = raw[np.argsort(apart, kind="stable")[:MOST]]
     errors.append(deviation * (np.arange(len(U)) == raw[:, None]))
-    return Smoothed(replace(event, record=replace(event.record, U=smooth)), np.concatenate(errors))
+    return SmoothedEvent(replace(event, record=replace(event.record, U=smooth)), np.concatenate(errors))
 
 
 def noise_of(U: np.ndarray) -> float:

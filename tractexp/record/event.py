@@ -1,6 +1,7 @@
 """The event inside a record: where the dip is, what came before it, and how noisy the recording is."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -29,6 +30,7 @@ class Event:
     voltage has regained all but a fifth of the depth (or all but the threshold, if that is more).
     """
 
+    domain: ClassVar[str] = "phasors"  # in which models are compared with it
     record: Record
     start: int  # first sample of the dip
     end: int

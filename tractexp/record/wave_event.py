@@ -7,6 +7,7 @@ state.
 """
 
 from dataclasses import dataclass, fields, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +43,7 @@ class WaveEvent(Event):
     [kV, kA] were taken off.
     """
 
+    domain: ClassVar[str] = "waves"
     phasors: Event
     v: NDArray[np.complex128]
     v_zero: np.ndarray

@@ -20,11 +20,11 @@ from tractexp.discrepancy.evidence import (
     evidence,
     why_not_the_most_helpful,
 )
-from tractexp.discrepancy.forms import CATALOGUE, Found, forms
+from tractexp.discrepancy.forms import CATALOGUE, FittedLaw, forms
 from tractexp.discrepancy.gap import Curves
-from tractexp.discrepancy.investigate import Investigation
+from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
-from tractexp.discrepancy.precision import Estimate, estimates
+from tractexp.discrepancy.precision import ParameterEstimate, estimates
 from tractexp.discrepancy.recommended import adequacy, held
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.verdict import UNEXPLAINED, Nearest
@@ -59,9 +59,8 @@ CURRENTS = (
 def summary(found: "Outcome") -> Report:
     """The verdict first, then how large the gap is and how much of it is closed, where, and what to do next."""
     content, left = found.content, found.remainder.caption
-    report = Report().text(
-        "", f"verdict: {found.verdict.upper()} {' or '.join(map(joined, content['name_sets']))}".rstrip()
-    )
+    names = " or ".join(map(joined, content["name_sets"]))
+    report = Report().text(f"verdict: {found.verdict.upper()} {names}".rstrip())
     grade, which = content["adequacy"], "extended" if found.names else "base"
     report.items([found.reason, *found.sizes, *[left] * bool(left), *found.proposed])
     report.items([f"the {which} model is graded {grade['grade'].replace('_', ' ')}: {grade['sentence']}"])
@@ -129,7 +128,7 @@ def report(outcome: "Outcome") -> Report:
     return made
 
 
-def _graded(found: Investigation) -> str:
+def _graded(found: Findings) -> str:
     """What the model that the investigation ends with is good for."""
     which = "extended" if found.names else "base"
     grade = adequacy(found)
@@ -159,7 +158,7 @@ def _off(c: "Curves | Misfit") -> list[str]:
     return [*errors, f"{c.chi2_per_sample:.3f}"]
 
 
-def _left(made: Report, found: Investigation) -> None:
+def _left(made: Report, found: Findings) -> None:
     """What nothing explains, in words."""
     made.heading("What is left")
     shapes, near = found.remainder, found.verdict.nearest
@@ -171,7 +170,7 @@ def _left(made: Report, found: Investigation) -> None:
         _nearest(made, found)
 
 
-def _shapes(made: Report, found: Investigation, shapes: Sequence[Remainder], whose: str) -> None:
+def _shapes(made: Report, found: Findings, shapes: Sequence[Remainder], whose: str) -> None:
     """The shapes in what one model leaves."""
     if not shapes:
         made.text(f"Missed by {whose}: nothing of a simple shape, no ringing, decay, step or pulse.")
@@ -192,7 +191,7 @@ def _shapes(made: Report, found: Investigation, shapes: Sequence[Remainder], who
     )  # fmt: skip
 
 
-def _nearest(made: Report, found: Investigation) -> None:
+def _nearest(made: Report, found: Findings) -> None:
     """The candidates that come nearest, with their shares and sizes."""
     near = found.verdict.nearest
     assert near is not None
@@ -217,7 +216,7 @@ def _nearest(made: Report, found: Investigation) -> None:
         )  # fmt: skip
 
 
-def _forms(made: Report, found: Investigation) -> None:
+def _forms(made: Report, found: Findings) -> None:
     """Where each effect named acts, what it does there and by which law; curves that were found."""
     if not found.names:
         return
@@ -242,7 +241,7 @@ def _forms(made: Report, found: Investigation) -> None:
             )
 
 
-def _curve(found: Found) -> Chart:
+def _curve(found: FittedLaw) -> Chart:
     """A law with its band, and the textbook's."""
     law = found.curve
     made = Chart(law.x_label, [law.y_label], pixels=320)
@@ -254,7 +253,7 @@ def _curve(found: Found) -> Chart:
     return made.limits(0, float(shown.min()) - room, float(shown.max()) + room)
 
 
-def _candidates(made: Report, found: Investigation) -> None:
+def _candidates(made: Report, found: Findings) -> None:
     rows = evidence(found)
     labels = _labels(rows)
     made.heading("Candidates by their evidence")
@@ -291,7 +290,7 @@ def _labels(rows: Sequence[Evidence]) -> dict[Evidence, str]:
     return {row: f"set {sets.index(row) + 1}" if row in sets else row.names[0] for row in rows}
 
 
-def _bars(found: Investigation, rows: Sequence[Evidence], labels: Mapping[Evidence, str]) -> Chart:
+def _bars(found: Findings, rows: Sequence[Evidence], labels: Mapping[Evidence, str]) -> Chart:
     """How much each candidate explains by itself."""
     colors = [COLORS.get(r.status, REFITTED if r.how == FITTED else ESTIMATED) for r in rows]
     told = [f"{r.drop:.{int(r.drop < 100)}f}{f', {r.status}' * (r.standing < 2)}" for r in rows]
@@ -301,7 +300,7 @@ def _bars(found: Investigation, rows: Sequence[Evidence], labels: Mapping[Eviden
     return made.edge(chance, dash="dash").limits(None, 0.0, ROOM * max(chance, *(r.drop for r in rows)))
 
 
-def _bars_caption(found: Investigation, rows: Sequence[Evidence]) -> str:
+def _bars_caption(found: Findings, rows: Sequence[Evidence]) -> str:
     colors = ["green: added"] * bool(found.names)
     colors += ["orange: tied with it"] * any(r.status == KEPT for r in rows)
     colors += ["blue: refitted"] * any(r.how == FITTED and r.standing == 2 for r in rows)
@@ -313,7 +312,7 @@ def _bars_caption(found: Investigation, rows: Sequence[Evidence]) -> str:
     )
 
 
-def _sets(made: Report, found: Investigation) -> None:
+def _sets(made: Report, found: Findings) -> None:
     """How the refitted sets of the chosen size compare."""
     rows = [
         [joined(r.fit.names) or "the base model", f"{r.fit.deviance:.1f}", f"{r.behind:.1f}", f"{r.distance:.1f}",
@@ -329,7 +328,7 @@ def _sets(made: Report, found: Investigation) -> None:
         )  # fmt: skip
 
 
-def _further(made: Report, found: Investigation) -> None:
+def _further(made: Report, found: Findings) -> None:
     """What the others would add once the chosen effects are in the model."""
     rows = []
     for j in judgements(found):
@@ -345,7 +344,7 @@ def _further(made: Report, found: Investigation) -> None:
         )  # fmt: skip
 
 
-def _parameters(made: Report, found: Investigation) -> None:
+def _parameters(made: Report, found: Findings) -> None:
     """The base model's parameters before and after, and those that came in."""
     made.heading("Parameters before and after" if found.names else "Parameters of the base model")
     before = {e.parameter.name: e for e in found.before}
@@ -372,7 +371,7 @@ def _brief(verdict: str) -> str:
     return verdict.split("; ")[0] if ": " in verdict.split(" (")[0] else verdict
 
 
-def _equations(made: Report, found: Investigation) -> None:
+def _equations(made: Report, found: Findings) -> None:
     """The equations that changed or came in, and how the extended model is used."""
     from tractexp.model.model import compose
     from tractexp.model.printed import changed
@@ -396,7 +395,7 @@ def _equations(made: Report, found: Investigation) -> None:
             made.equation(line)
 
 
-def _disagreement(made: Report, found: Investigation) -> None:
+def _disagreement(made: Report, found: Findings) -> None:
     """Whether and where the base model disagrees with the records."""
     first = found.first
     made.heading("Is there a disagreement, and where?")
@@ -421,7 +420,7 @@ def _disagreement(made: Report, found: Investigation) -> None:
     )  # fmt: skip
 
 
-def _noise(made: Report, found: Investigation) -> None:
+def _noise(made: Report, found: Findings) -> None:
     level, free = found.bench.describe(found.last.noise), joined(found.catalogue.of_measurement)
     if found.bench.waves:
         unjudged = found.last.noise.loudest_blur > found.bench.criteria.blurred
@@ -445,12 +444,12 @@ def _noise(made: Report, found: Investigation) -> None:
         )
 
 
-def _value(known: Estimate) -> str:
+def _value(known: ParameterEstimate) -> str:
     bound = "" if np.isfinite(known.error) else ", at its bound"
     return f"{with_error(known.value, known.error)}{bound}"
 
 
-def _interval(known: Estimate) -> str:
+def _interval(known: ParameterEstimate) -> str:
     low, high = known.interval
     return f"{low:.4g} to {high:.4g}" if np.isfinite(low) else ""
 

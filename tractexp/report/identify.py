@@ -8,12 +8,12 @@ import numpy as np
 
 from tractexp.blocks import Report, Table, style
 from tractexp.blocks.chart import Chart
-from tractexp.identification.estimate import Estimated
+from tractexp.identification.agreement import EventAgreement
+from tractexp.identification.estimate import EstimationResult
 from tractexp.identification.model_error import in_percent
 from tractexp.identification.residual_tests import LAGS, REJECTED, autocorrelation
 from tractexp.identification.result import by_event
 from tractexp.identification.search import REFUSED, History
-from tractexp.identification.together import Together
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED, TRADES
 from tractexp.provenance import command
@@ -223,7 +223,7 @@ def _fitness(history: History, result: Any) -> Chart:
     return chart.level(max(result.objective, 1e-30), "estimate")
 
 
-def _starts(made: Report, estimated: Estimated, known: Uncertainty) -> None:
+def _starts(made: Report, estimated: EstimationResult, known: Uncertainty) -> None:
     """Where each descent to the estimate ended."""
     starts = estimated.starts
     above = np.maximum([s.above for s in starts], SMALLEST)
@@ -323,7 +323,7 @@ def _origin(result: Any, command: str) -> list[list[str]]:
     return told
 
 
-def _events(made: Report, known: Uncertainty, together: Together) -> None:
+def _events(made: Report, known: Uncertainty, together: EventAgreement) -> None:
     """What each event of a joint fit adds, and which does not belong."""
     made.heading("What each event adds")
     if together.notes:

@@ -7,7 +7,7 @@ import numpy as np
 from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.discrepancy.overlay import Overlay
-from tractexp.identification.seen import seen_by_estimator
+from tractexp.domain.playback import as_phasors
 from tractexp.record import WaveEvent, describe
 from tractexp.report.events import CAPTION, Curve, event_chart
 from tractexp.report.waves import CAPTION as WAVE_CAPTION
@@ -65,7 +65,7 @@ def currents(event: WaveEvent, overlay: Overlay) -> Chart:
 
 def in_phasors(event: WaveEvent, overlay: Overlay) -> Chart:
     """What the record's estimator sees in the currents, calculated and recorded."""
-    seen = [(name, seen_by_estimator(event, made), *look) for name, made, *look in _models(overlay)]
+    seen = [(name, as_phasors(event, made), *look) for name, made, *look in _models(overlay)]
     return event_chart(seen[0][1][0], [Curve(name, np.stack(power), *look) for name, (_, *power), *look in seen])
 
 

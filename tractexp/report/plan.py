@@ -11,7 +11,7 @@ import numpy as np
 from tractexp.blocks import Report, Table
 from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import PALETTE
-from tractexp.identification.plan import EDGE, INERTIA, SUDDEN, Choice, Forecast, Needed, column
+from tractexp.identification.plan import INERTIA, ChosenEvent, Forecast, Needed, column
 from tractexp.identification.problem import Problem
 from tractexp.wording import as_sentence
 
@@ -42,7 +42,7 @@ class Planned:
     dip: str  # what was planned, in words
     needed: Needed
     scans: Mapping[str, tuple[Sequence[float], Sequence[Forecast]]]
-    chosen: Sequence[Choice]  # none where there is one event
+    chosen: Sequence[ChosenEvent]  # none where there is one event
     least: float  # share by which an event must narrow the intervals to be chosen
     most: int | None  # events asked for
 
@@ -97,10 +97,10 @@ def report(planned: Planned, content: Mapping[str, Any]) -> Report:
     _events(made, planned)
     made.heading("What it rests on").items(
         [
-            f"Intervals follow from the sensitivity of {'the currents' if waves else 'P and Q'} to each parameter at"
+            f"Intervals follow from the sensitivity of {planned.problem.domain.compared} to each parameter at"
             " the values above. Where the interval is wide, or the values are far off, so is the forecast.",
             "The planned dip falls from 1 pu and comes back along straight edges of"
-            f" {1000 * (SUDDEN if waves else EDGE):g} ms{', without zero sequence' * waves}.",
+            f" {1000 * planned.problem.domain.edge:g} ms{', without zero sequence' * waves}.",
             "Noise of the recorded voltage, and effects that the model lacks, are not in it.",
         ]
     )

@@ -10,7 +10,7 @@ from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import ACTIVE, FAINT, PALETTE
 from tractexp.identification.profile import End, Profile, Profiles
 from tractexp.identification.uncertainty import Uncertainty
-from tractexp.identification.verdict import IDENTIFIED, Verdict, shown
+from tractexp.identification.verdict import IDENTIFIED, ParameterVerdict, shown
 from tractexp.wording import as_sentence
 
 ALIKE = 0.2  # of the half interval by curvature: closer ends are the same interval
@@ -124,11 +124,11 @@ def _where(says: Mapping[str, str]) -> list[str]:
     return told
 
 
-def _kind(verdicts: Mapping[str, Verdict], exact: bool) -> str:
+def _kind(verdicts: Mapping[str, ParameterVerdict], exact: bool) -> str:
     return "good" if exact and all(verdict.word == IDENTIFIED for verdict in verdicts.values()) else "plain"
 
 
-def _poor(verdicts: Mapping[str, Verdict]) -> list[str]:
+def _poor(verdicts: Mapping[str, ParameterVerdict]) -> list[str]:
     """Which parameters are not identified."""
     poor = [f"{name} is {verdict.word}" for name, verdict in verdicts.items() if verdict.word != IDENTIFIED]
     return [as_sentence("; ".join(poor)) if poor else "Every parameter is identified."]

@@ -7,7 +7,7 @@ import numpy as np
 from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.discrepancy.discrepancy_json import PLUGIN
-from tractexp.discrepancy.investigate import Investigation
+from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.proposal.judge import Before, Weighed
 from tractexp.discrepancy.proposal.library import Term
 from tractexp.discrepancy.proposal.propose import Proposal, told
@@ -18,12 +18,12 @@ MISSED, TERM = "#9A9A9A", "#0072B2"
 EVENTS = 4  # whose charts are shown at once
 
 
-def headlines(found: Investigation) -> list[str]:
+def headlines(found: Findings) -> list[str]:
     """What the box at the top says of a proposal."""
     return [as_sentence(s) for s in proposed_in_words(told(found.proposed, PLUGIN), None)[:2]]
 
 
-def proposed(made: Report, found: Investigation) -> None:
+def proposed(made: Report, found: Findings) -> None:
     """The term, its size, where and when it acts, what it closes, and what looks like it."""
     made.heading("Proposal")
     proposal = found.proposed.proposal

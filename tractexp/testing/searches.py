@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from tractexp.identification.optimizer import Box, Optimizer
-from tractexp.identification.search import Found, Limits, search
+from tractexp.identification.search import Limits, SearchResult, search
 
 BUDGET = 1500  # simulations
 BETTER = 0.5  # of the best of the first batch: more than luck
@@ -97,7 +97,7 @@ def finds_the_bottom_of_a_bowl(cls: type[Optimizer]) -> None:
         )
 
 
-def _run(cls: type[Optimizer], problem: Bowl, seed: int, space: str = "unit") -> Found:
+def _run(cls: type[Optimizer], problem: Bowl, seed: int, space: str = "unit") -> SearchResult:
     return search(problem, cls(space=space), seed, Limits(BUDGET))
 
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.fitting import Refit, refit
-from tractexp.discrepancy.next_event.imagined import Imagined, as_recorded, driven, imagined
+from tractexp.discrepancy.next_event.imagined import ImaginedDip, as_recorded, driven, imagined
 from tractexp.discrepancy.next_event.same import Same, same
 from tractexp.discrepancy.next_event.separation import FEW, Chances, Separation, Side, seen, sided
 from tractexp.discrepancy.noise_in_quiet import QuietNoise
@@ -24,17 +24,17 @@ WORTH = 0.1  # chance below which no refit is worth its time
 REPEATED = (2, 3, 5, 10, 20)  # events of one kind together
 NEARLY = 0.02  # of the chance: of events as sure as this the mildest is the surest
 
-Rule = Callable[["Tried"], Chances]
+Rule = Callable[["TestedEvent"], Chances]
 
 
 @dataclass(frozen=True)
-class Tried:
+class TestedEvent:
     """An event and how surely it leaves one rival: by the product's own rule, and where formulas are `exact`.
 
     The rule rejects no rival whose curves differ by less than `Criteria.alike` of what the best explains.
     """
 
-    event: Imagined
+    event: ImaginedDip
     chances: Chances
     exact: Chances
     refitted: bool = False  # whether rivals were refitted to it, not only linearised about their fits
@@ -51,9 +51,9 @@ class NextEvent:
     """
 
     rivals: tuple[str, ...]
-    best: Tried
-    by_noise: Tried | None
-    tried: tuple[Tried, ...]
+    best: TestedEvent
+    by_noise: TestedEvent | None
+    tried: tuple[TestedEvent, ...]
     criteria: Criteria
     same: tuple[tuple[int, int, Same], ...] = field(default=())
     hopeless: tuple[tuple[int, int, float], ...] = field(default=())
@@ -103,7 +103,7 @@ class NextEvent:
             ],
         }
 
-    def _told(self, tried: Tried) -> dict[str, Any]:
+    def _told(self, tried: TestedEvent) -> dict[str, Any]:
         chances = tried.exact if tried is self.by_noise else tried.chances
         return {
             **asdict(tried.event),
@@ -131,13 +131,13 @@ class NextEvent:
         )
 
 
-def _together(tried: Tried) -> str:
+def _together(tried: TestedEvent) -> str:
     """How many such events are sure to."""
     return f", {tried.repeated} of them are sure to" if tried.repeated else ""
 
 
 def next_event(
-    bench: Bench, noise: Noise, bare: Refit, rivals: Sequence[Refit], labels: Sequence[str], seed: int = 0
+    bench: Context, noise: Noise, bare: Refit, rivals: Sequence[Refit], labels: Sequence[str], seed: int = 0
 ) -> NextEvent:
     """Choose what to record to tell two rivals or more apart.
 
@@ -160,7 +160,8 @@ def next_event(
         for a, b, _ in open_pairs:
             ignored[a, b] = ignored[b, a] = True
     tried = [
-        Tried(e, Chances.of(d[0], ignored), Chances.of(d[1], ignored)) for e, d in zip(events, denied, strict=True)
+        TestedEvent(e, Chances.of(d[0], ignored), Chances.of(d[1], ignored))
+        for e, d in zip(events, denied, strict=True)
     ]
     best = _held(bench, noise, sides, tried, ignored, seed, _by_rule)
     sure = best.chances.least >= bench.criteria.decided
@@ -171,30 +172,30 @@ def next_event(
     return NextEvent(tuple(labels), best, by_noise, tuple(tried), bench.criteria, proved, hopeless)
 
 
-def _by_rule(tried: Tried) -> Chances:
+def _by_rule(tried: TestedEvent) -> Chances:
     return tried.chances
 
 
-def _by_noise(tried: Tried) -> Chances:
+def _by_noise(tried: TestedEvent) -> Chances:
     return tried.exact
 
 
-def mildest(tried: Sequence[Tried], decided: float, by: Rule) -> Tried:
+def mildest(tried: Sequence[TestedEvent], decided: float, by: Rule) -> TestedEvent:
     """Of the events that are sure enough the one that asks for least, or else of the surest."""
     enough = [t for t in tried if by(t).least >= min(decided, max(by(t).least for t in tried) - NEARLY)]
     return min(enough, key=lambda t: t.event.burden)
 
 
-def _alike(events: Sequence[Imagined]) -> list[list[Imagined]]:
+def _alike(events: Sequence[ImaginedDip]) -> list[list[ImaginedDip]]:
     """Events that are sampled alike together."""
     by_rate = sorted(events, key=lambda e: e.rate)
     return [list(group) for _, group in itertools.groupby(by_rate, key=lambda e: e.rate)]
 
 
 def _held(
-    bench: Bench, noise: Noise, sides: Sequence[Side], tried: Sequence[Tried], ignored: np.ndarray, seed: int,
+    bench: Context, noise: Noise, sides: Sequence[Side], tried: Sequence[TestedEvent], ignored: np.ndarray, seed: int,
     by: Rule,
-) -> Tried:  # fmt: skip
+) -> TestedEvent:  # fmt: skip
     """The mildest event that is sure enough after refits, too."""
     left, checked = list(tried), []
     while left and len(checked) < CHECKED:
@@ -209,14 +210,15 @@ def _held(
 
 
 def _refitted(
-    bench: Bench, noise: Noise, sides: Sequence[Side], best: Tried, ignored: np.ndarray, seed: int, by: Rule
-) -> Tried:  # fmt: skip
+    bench: Context, noise: Noise, sides: Sequence[Side], best: TestedEvent, ignored: np.ndarray, seed: int, by: Rule
+) -> TestedEvent:  # fmt: skip
     """The chances of one event with rivals linearised where they fit it best, each in turn the truth.
 
     Only of phasors without further channels or rates, which the bench has no records of: others stay linearised about
     their fits.
     """
-    event, plain = best.event, not (bench.waves or bench.records.window is not None or best.event.burden[0])
+    event = best.event
+    plain = bench.domain.recordable and bench.records.window is None and not event.burden[0]
     places = []
     for a in range(1, len(sides)):
         moved = _fitted_to(bench, noise, sides, sides[a], event) if plain else []
@@ -224,9 +226,9 @@ def _refitted(
         views = [seen(bench, noise, side, [event])[0] for side in there]
         places.append((Separation(there, bench.criteria, seed=seed), views))
 
-    def again(times: int) -> Tried:
+    def again(times: int) -> TestedEvent:
         denied = np.stack([s.denied(views, a, times) for a, (s, views) in enumerate(places, 1)], axis=1)
-        return Tried(event, *(Chances.of(rule, ignored) for rule in denied), refitted=plain)
+        return TestedEvent(event, *(Chances.of(rule, ignored) for rule in denied), refitted=plain)
 
     once = again(1)
     if by(once).least >= bench.criteria.decided:
@@ -235,7 +237,7 @@ def _refitted(
     return replace(once, repeated=next(enough, None))
 
 
-def _fitted_to(bench: Bench, noise: Noise, sides: Sequence[Side], truth: Side, event: Imagined) -> list[Refit]:
+def _fitted_to(bench: Context, noise: Noise, sides: Sequence[Side], truth: Side, event: ImaginedDip) -> list[Refit]:
     """Every side fitted to the records and one event more, in which `truth` holds exactly; coordinates of the bench."""
     at = bench.coordinates
     middle = at.without_faults(truth.fit.unit, ())

@@ -5,14 +5,15 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from tractexp.discrepancy.base_fit import base_fit
-from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.catalogue import Catalogue, catalogue
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.fitting import Start, refit
 from tractexp.discrepancy.kernels import Family
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
-from tractexp.discrepancy.records import Records, check_events, in_waves_of
+from tractexp.discrepancy.records import Records, check_events
+from tractexp.domain import domain_of
 from tractexp.errors import UserError
 from tractexp.model.model import Model
 from tractexp.record import Event
@@ -37,7 +38,7 @@ def event_for(
             f"task.rivals={[list(s) for s in sets]}: an event is planned to tell two explanations or more apart; name"
             " another one, such as 'task.rivals=[stator_resistance,feeder_impedance]'"
         )
-    events = in_waves_of(model, events)
+    events = domain_of(model).events(events)
     check_events(events, ())
     named = sorted({name for names in sets for name in names})
     missing = catalogue(
@@ -46,7 +47,7 @@ def event_for(
     _check(missing, named)
     with Effort(tell).audible() as effort:
         Family(model, missing).compile(effort.say)
-        bench = Bench.of(model, missing, Records.of(events), bounds, fixed, criteria, effort, substeps)
+        bench = Context.of(model, missing, Records.of(events), bounds, fixed, criteria, effort, substeps)
         base = base_fit(bench)
         effort.say(f"fitting {len(sets)} explanations")
         noise, begin = base.noise, [start for names in sets for start in _starts(bench, base.fit.unit, names)]
@@ -70,7 +71,7 @@ def _check(missing: Catalogue, named: Sequence[str]) -> None:
             )
 
 
-def _starts(bench: Bench, unit: np.ndarray, names: Names) -> list[Start]:
+def _starts(bench: Context, unit: np.ndarray, names: Names) -> list[Start]:
     """The base fit with every setting of each effect and its sizes at what matters least, either way."""
     at, found = bench.coordinates, []
     for name in names:

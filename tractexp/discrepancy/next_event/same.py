@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.linear import two_sided
-from tractexp.discrepancy.next_event.imagined import BRIEF, DURATIONS, Imagined, driven
+from tractexp.discrepancy.next_event.imagined import ImaginedDip, driven
 from tractexp.model.drive import Drive
 
 FOLLOWS = 1e-6  # pu: how near one comes to the other
@@ -41,9 +41,9 @@ class Same:
         )
 
 
-def same(bench: Bench, one: Refit, other: Refit) -> Same | None:
+def same(bench: Context, one: Refit, other: Refit) -> Same | None:
     """The proof that two explanations are the same function of the voltage, None where they are not."""
-    events = [Imagined(*made) for made in itertools.product(RICH, (BRIEF if bench.waves else DURATIONS)[::2], TURNED)]
+    events = [ImaginedDip(*made) for made in itertools.product(RICH, bench.domain.dips.durations[::2], TURNED)]
     drive = Drive.of([driven(bench, event) for event in events])
     told = []
     for truth, rival in ((one, other), (other, one)):
@@ -55,7 +55,7 @@ def same(bench: Bench, one: Refit, other: Refit) -> Same | None:
     return Same(max(rank for rank, _ in told), len(events), max(off for _, off in told))
 
 
-def _shrunk(bench: Bench, fit: Refit, size: float) -> np.ndarray:
+def _shrunk(bench: Context, fit: Refit, size: float) -> np.ndarray:
     """Coordinates (D,) of a fit with the sizes of its effects at this share, without faults of the measurement."""
     at = bench.coordinates
     unit, sizes = at.without_faults(fit.unit, ()), at.sizes(fit.names)
@@ -64,7 +64,7 @@ def _shrunk(bench: Bench, fit: Refit, size: float) -> np.ndarray:
 
 
 def _followed(
-    bench: Bench, drive: Drive, point: np.ndarray, names: Sequence[str], rival: Refit
+    bench: Context, drive: Drive, point: np.ndarray, names: Sequence[str], rival: Refit
 ) -> tuple[int, float] | None:  # fmt: skip
     """Rank and distance where the rival follows the truth at coordinates (D,); None where it does not."""
     answer = bench.kernels.simulate(names, point[None], drive)[0]
@@ -121,7 +121,7 @@ def _recovering(answer: np.ndarray, drive: Drive) -> np.ndarray:
     return alive
 
 
-def _of_load(bench: Bench, names: Sequence[str]) -> list[int]:
+def _of_load(bench: Context, names: Sequence[str]) -> list[int]:
     """Columns of the base model's and the effects' parameters."""
     at = bench.coordinates
     return [*at.base, *at.parameters(names)]

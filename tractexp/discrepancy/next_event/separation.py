@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.linear import linearised, two_sided
-from tractexp.discrepancy.next_event.imagined import Imagined, driven, noise_of
-from tractexp.discrepancy.tangent import resting
+from tractexp.discrepancy.linearization import resting
+from tractexp.discrepancy.next_event.imagined import ImaginedDip, driven, noise_of
 from tractexp.model.drive import Drive
 from tractexp.noise import Noise
 
@@ -49,7 +49,7 @@ class Side:
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class EventView:
     """An explanation on one new event: whitened prediction f (n,) and its differences K (k + 2, n), P0, Q0 at last.
 
     nan where the model does not survive it.
@@ -81,7 +81,7 @@ class Chances:
         return float(self.alone.min())
 
 
-def sided(bench: Bench, noise: Noise, fit: Refit) -> Side:
+def sided(bench: Context, noise: Noise, fit: Refit) -> Side:
     """Linearise an explanation at its fit."""
     at = bench.coordinates
     faults = at.sizes(bench.catalogue.of_measurement)
@@ -95,7 +95,7 @@ def sided(bench: Bench, noise: Noise, fit: Refit) -> Side:
     return Side(fit, tuple(columns), free, rows[0, :shared], J, rows[1:, shared:], rows[0, shared:], box)
 
 
-def seen(bench: Bench, noise: Noise, side: Side, events: Sequence[Imagined]) -> list[Seen]:
+def seen(bench: Context, noise: Noise, side: Side, events: Sequence[ImaginedDip]) -> list[EventView]:
     """What an explanation predicts of events that are sampled alike, with the faults of the measurement at their null.
 
     What the recorder did to earlier events says nothing of the load, but it may go on.
@@ -121,11 +121,11 @@ def seen(bench: Bench, noise: Noise, side: Side, events: Sequence[Imagined]) -> 
         K = np.zeros((len(side.columns) + 2, rows.shape[1]))
         K[:k] = (rows[1 : 1 + k] - rows[1 + k : 1 + 2 * k]) / width[:, None] * side.free[:k, None]
         K[-2:] = (rows[[-4, -2]] - rows[[-3, -1]]) / (2 * MOVED)
-        told.append(Seen(rows[0], K))
+        told.append(EventView(rows[0], K))
     return told
 
 
-def _simulated(bench: Bench, names: Sequence[str], points: np.ndarray, drives: Sequence) -> np.ndarray:
+def _simulated(bench: Context, names: Sequence[str], points: np.ndarray, drives: Sequence) -> np.ndarray:
     """What is compared (E, n, C, N) of drives of equal length."""
     power = bench.kernels.simulate(names, points, Drive.of(drives))
     bench.effort.spend(len(points))
@@ -146,7 +146,7 @@ class Separation:
         self.r, self.J = [x[0] for x in rows], [x[1:] for x in rows]
         self.known = [x.known for x in sides]
 
-    def denied(self, seen: Sequence[Seen], truth: int, times: int = 1) -> np.ndarray:
+    def denied(self, seen: Sequence[EventView], truth: int, times: int = 1) -> np.ndarray:
         """Which rivals (2, a, b) each of b draws denies by one new event, or `times` its like, with `truth` the truth.
 
         First by the product's rule, then where formulas are exact. None is denied where a side does not survive.

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from tractexp.discrepancy.bench import Bench
 from tractexp.discrepancy.catalogue import Candidate, Catalogue
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.coordinates import Coordinates
 from tractexp.discrepancy.kernels import Family, Key
 from tractexp.discrepancy.proposal.effect import Library
@@ -61,12 +61,12 @@ def choice_of(chosen: Term) -> list[str]:
     return [f"{chosen.signal.kind}_pick_{name}" for name in picked]
 
 
-def bench_of_terms(found: Bench) -> Bench:
+def context_of_terms(found: Context) -> Context:
     """The same events, base model and faults of the measurement with the library."""
     faults = tuple(c for c in found.catalogue.candidates if c.measurement)
     whole = tuple(Candidate(kind, effect, (), ({},)) for kind, effect in ((k, Library(k)) for k in KINDS))
     kernels = found.kernels
-    bench = Bench.of(
+    bench = Context.of(
         found.load, Catalogue((*faults, *whole), {}), found.records, kernels.bounds, kernels.fixed, found.criteria,
         found.effort, kernels.substeps, Terms,
     )  # fmt: skip
@@ -76,7 +76,7 @@ def bench_of_terms(found: Bench) -> Bench:
     return bench
 
 
-def with_terms(bench: Bench, chosen: Sequence[Term]) -> Bench:
+def with_terms(bench: Context, chosen: Sequence[Term]) -> Context:
     """A bench of the library on which these terms are candidates, each with its own parameters free."""
     there = {c.name for c in bench.catalogue.candidates}
     more = tuple(_candidate(bench, t) for t in dict.fromkeys(chosen) if t.name not in there)
@@ -84,7 +84,7 @@ def with_terms(bench: Bench, chosen: Sequence[Term]) -> Bench:
     return replace(bench, catalogue=catalogue, coordinates=replace(bench.coordinates, catalogue=catalogue))
 
 
-def _candidate(bench: Bench, chosen: Term) -> Candidate:
+def _candidate(bench: Context, chosen: Term) -> Candidate:
     declared = {p.name: p for p in bench.problem.parameters}
     sizes = tuple(declared[label] for _, label in sizes_of(chosen))
     shapes = tuple(declared[label] for label in shapes_of(chosen).values())
@@ -120,7 +120,7 @@ def values_of(at: Coordinates, unit: np.ndarray, chosen: Term) -> dict[str, floa
     return sizes | {name: at.value(label, unit) for name, label in shapes_of(chosen).items()}
 
 
-def carried_over(other: Bench, found: Bench, unit: np.ndarray) -> np.ndarray:
+def carried_over(other: Context, found: Context, unit: np.ndarray) -> np.ndarray:
     """Coordinates (D',) of the bench of terms with base model, faults and power before as at coordinates (D,)."""
     to, old = other.coordinates, found.coordinates
     moved = to.null.copy()

@@ -16,8 +16,8 @@ from tractexp.discrepancy.proposal.library import (
     shape_of,
     size_of,
 )
+from tractexp.errors import Unfit
 from tractexp.model.parts import Effect
-from tractexp.model.unfit import Unfit
 from tractexp.parameter import Parameter
 
 

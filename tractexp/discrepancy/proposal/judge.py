@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.gap import Curves, beyond_chance, curves, pushed
@@ -28,7 +28,7 @@ JUDGED = 5  # terms that held-out events are asked about
 class Before:
     """A model on some events without a term and with it, and how much more than chance explains what is left."""
 
-    bench: Bench  # of the events
+    bench: Context  # of the events
     without: Curves
     with_it: Curves
     explainable: float  # beside the term, of the deviance
@@ -75,7 +75,7 @@ class Weighed:
         return [why for why, true in told.items() if true]
 
 
-def weighed(found: Bench, made: Fitted, events: Sequence[Event], p: Sequence[float]) -> list[Weighed]:
+def weighed(found: Context, made: Fitted, events: Sequence[Event], p: Sequence[float]) -> list[Weighed]:
     """The best fits weighed on held-out events, in their order; `p` of each by chance.
 
     `found` is the bench of the investigation, by which the balances are pushed.
@@ -91,7 +91,7 @@ def weighed(found: Bench, made: Fitted, events: Sequence[Event], p: Sequence[flo
 
 
 def _compared(
-    found: Bench, bench: Bench, noise: Noise, fitted: Sequence[int], bare: np.ndarray, fits: Sequence[Refit],
+    found: Context, bench: Context, noise: Noise, fitted: Sequence[int], bare: np.ndarray, fits: Sequence[Refit],
     units: Sequence[np.ndarray],
 ) -> list[Before]:  # fmt: skip
     """Models with a term, at coordinates `units` (D,), beside the base model at `bare` (D,) on the events of `bench`.
@@ -123,6 +123,6 @@ def tied(made: Fitted, chosen: Weighed, others: Sequence[Weighed]) -> list[Weigh
     return kept
 
 
-def _rows(bench: Bench, made: Fitted, fits: Sequence[Refit]) -> np.ndarray:
+def _rows(bench: Context, made: Fitted, fits: Sequence[Refit]) -> np.ndarray:
     faults = bench.coordinates.sizes(bench.catalogue.of_measurement)
     return bench.rows(np.array([f.unit for f in fits]), made.noise, faults, [f.names for f in fits])

@@ -11,7 +11,7 @@ from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.discrepancy.precision import WIDE
 from tractexp.discrepancy.proposal import generate
-from tractexp.discrepancy.proposal.bed import bench_of_terms, carried_over, sizes_of
+from tractexp.discrepancy.proposal.bed import carried_over, context_of_terms, sizes_of
 from tractexp.discrepancy.proposal.judge import Before, Weighed, tied, weighed
 from tractexp.discrepancy.proposal.library import Term, terms
 from tractexp.discrepancy.proposal.refit import Fitted, fitted, standard_errors
@@ -26,7 +26,7 @@ LOOKS_LIKE = 0.5  # of a term's change that a textbook effect could have made
 
 
 @dataclass(frozen=True)
-class Known:
+class TermEstimate:
     """One number of a term: its value, and half of its 95 % interval (nan where nothing is known)."""
 
     name: str
@@ -58,7 +58,7 @@ class Proposal:
     """A term that held-out events confirm."""
 
     term: Term
-    known: tuple[Known, ...]
+    known: tuple[TermEstimate, ...]
     train: Before
     validate: Before
     p: float
@@ -91,11 +91,11 @@ def propose(
     `among` are the terms that are tried, by default the whole library.
     """
     bench = base.bench
-    if bench.waves:
+    if not bench.domain.calibrated:
         return Proposed(why="proposals are of phasors: what waveforms lack is told by where and what is left")
     if not validate:
         return Proposed(why="a term is proposed only where a held-out event confirms it, and none was held out")
-    under = bench_of_terms(bench)
+    under = context_of_terms(bench)
     ground = Ground.at(under, carried_over(under, bench, bare.unit), noise)
     bench.effort.say("screening a library of terms")
     screened = screen(ground, among or terms(), seed, DRAWS)
@@ -118,7 +118,7 @@ def _proposal(made: Fitted, first: Disagreement, standing: Sequence[Weighed], gr
     errors = standard_errors(made, chosen.fit)
     declared = {s.name: (s.unit, f"size in {s.where or term.balance.words}", s.latex) for s in term.balance.sizes}
     declared |= {s.name: (s.unit, s.about, s.latex) for s in term.signal.shapes}
-    known = tuple(Known(n, v, errors[n], *declared[n]) for n, v in values.items())
+    known = tuple(TermEstimate(n, v, errors[n], *declared[n]) for n, v in values.items())
     records = joined([e.record.name for e in made.bench.events])
     alternatives = tied(made, chosen, others)
     return Proposal(
@@ -205,7 +205,7 @@ def _named(term: Term) -> dict[str, object]:
     return {**names, "words": term.words, "latex": term.latex}
 
 
-def _number(known: Known) -> dict[str, object]:
+def _number(known: TermEstimate) -> dict[str, object]:
     interval = [_finite(end) for end in known.interval]
     return {"value": known.value, "standard_error": _finite(known.error), "interval": interval}
 

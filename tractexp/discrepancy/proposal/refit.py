@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.cores import each_apart
-from tractexp.discrepancy.fitting import Refit, Start, best_of, off_walls, refit, rough_refit, wide_refit
+from tractexp.discrepancy.fitting import Refit, Start, best_of, off_bounds, refit, rough_refit, wide_refit
 from tractexp.discrepancy.linear import linearised
 from tractexp.discrepancy.proposal.bed import place, values_of, with_terms
 from tractexp.discrepancy.proposal.library import ANSWER, Shape, Term, term, terms
@@ -36,7 +36,7 @@ AGAIN = 10  # terms that start from the other fits of the base model, too
 class Fitted:
     """Terms fitted under one noise, the best first, and the base model alone."""
 
-    bench: Bench  # with these terms as candidates
+    bench: Context  # with these terms as candidates
     noise: Noise
     bare: Refit
     fits: tuple[Refit, ...]
@@ -123,7 +123,7 @@ def fitted(screened: Screened, valleys: Sequence[np.ndarray]) -> Fitted:
     bare = refit(bench, noise, [((), ground.unit)])[0]
     fits = rough_refit(bench, noise, _starts(bench, chosen, [ground.unit]))
     best = {f.names[0] for f in fits[:AGAIN]}
-    others = [*off_walls(bench, ground.unit, MIDDLE), *valleys]
+    others = [*off_bounds(bench, ground.unit, MIDDLE), *valleys]
     again = _starts(bench, [f for f in chosen if f.term.name in best], others)
     fits = best_of([*fits, *(rough_refit(bench, noise, again) if again else [])])
     fits = _searched_anew(bench, noise, fits, REGRIDDED)
@@ -137,7 +137,7 @@ def fitted(screened: Screened, valleys: Sequence[np.ndarray]) -> Fitted:
 
 
 def _searched_anew(
-    bench: Bench, noise: Noise, fits: Sequence[Refit], most: int, *, scattered: bool = False
+    bench: Context, noise: Noise, fits: Sequence[Refit], most: int, *, scattered: bool = False
 ) -> list[Refit]:  # fmt: skip
     """The fits, with the shapes of the best terms searched over their grids and moved across their ranges."""
     again = ROUND_ABOUT if scattered else 0
@@ -154,7 +154,7 @@ def siblings(of: Term) -> list[Term]:
     return [t for t in terms() if (t.signal, t.clock) == (of.signal, of.clock) and t != of]
 
 
-def elsewhere(bench: Bench, noise: Noise, fit: Refit) -> list[Start]:
+def elsewhere(bench: Context, noise: Noise, fit: Refit) -> list[Start]:
     """Starts of a term's siblings at its setting, where the base model is that of its own refit.
 
     At the first fit of the base model they may have ranked far behind, or at another setting.
@@ -166,7 +166,7 @@ def elsewhere(bench: Bench, noise: Noise, fit: Refit) -> list[Start]:
     return _starts(bench, scores(there, [(t, setting) for t in siblings(chosen)]), [there.unit])
 
 
-def regridded(bench: Bench, noise: Noise, fit: Refit) -> Start:
+def regridded(bench: Context, noise: Noise, fit: Refit) -> Start:
     """A start for a term at the best setting of its whole grid where the base model is that of its own refit.
 
     At the first fit of the base model, which something missing bends, another setting may have seemed the best.
@@ -181,7 +181,7 @@ def regridded(bench: Bench, noise: Noise, fit: Refit) -> Start:
     return fit.names, place(at, fit.unit, chosen, best.setting, best.sizes)
 
 
-def _starts(bench: Bench, chosen: Sequence[Scored], units: Sequence[np.ndarray]) -> list[Start]:
+def _starts(bench: Context, chosen: Sequence[Scored], units: Sequence[np.ndarray]) -> list[Start]:
     """Each term at its one-step size on each of the base model's fits (D,)."""
     at = bench.coordinates
     return [((f.term.name,), place(at, unit, f.term, f.setting, f.sizes)) for f in chosen for unit in units]

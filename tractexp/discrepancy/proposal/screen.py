@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.discrepancy.bench import Bench
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.linear import linearised
 from tractexp.discrepancy.proposal.bed import Setting, place, sizes_of
@@ -31,7 +31,7 @@ Batch = list[Members]
 class Ground:
     """A fit with all that may give way projected out. R = C N rows of the records, then those of the priors."""
 
-    bench: Bench  # of terms
+    bench: Context  # of terms
     unit: np.ndarray  # (D,)
     noise: Noise
     raw: np.ndarray  # (C, N) residuals of the fit
@@ -39,7 +39,7 @@ class Ground:
     r: np.ndarray  # (R,) the fit's residual, projected
 
     @classmethod
-    def at(cls, bench: Bench, unit: np.ndarray, noise: Noise) -> "Ground":
+    def at(cls, bench: Context, unit: np.ndarray, noise: Noise) -> "Ground":
         """At coordinates (D,). The base model's parameters give way though they rest on their bounds."""
         at = bench.coordinates
         faults = [k for n in bench.catalogue.of_measurement for k in at.sizes([n])]

@@ -11,7 +11,7 @@ import numpy as np
 from tractexp.identification.descent import descend
 from tractexp.identification.problem import Problem
 from tractexp.identification.search import REFUSED
-from tractexp.identification.starts import best_distinct, even
+from tractexp.parameter import best_distinct, even
 from tractexp.studies.comparison.runs import Run
 
 AT_FLOOR = 0.01  # what ends within this share of the floor has reached it

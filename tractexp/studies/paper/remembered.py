@@ -15,7 +15,7 @@ import numpy as np
 from tractexp import files
 from tractexp.identification import shelf
 from tractexp.identification.problem import Problem
-from tractexp.identification.search import Found, History, Limits
+from tractexp.identification.search import History, Limits, SearchResult
 from tractexp.identification.shelf import DAMAGED, installed
 from tractexp.plugin import build
 
@@ -35,17 +35,17 @@ class Remembered:
         self.on = on and limits.seconds is None and all(map(installed, (*_parts(problem), problem.loss)))
         self.problem = _digest(problem, limits) if self.on else ""
 
-    def get(self, settings: Mapping[str, Any], seed: int) -> Found | None:
+    def get(self, settings: Mapping[str, Any], seed: int) -> SearchResult | None:
         """The search that was made before; None where there is none, or its file is damaged."""
         path = self._path(settings, seed)
         if path is None or (kept := shelf.read(path)) is None:
             return None
         with contextlib.suppress(*DAMAGED):
             history = History(**{name: kept[name] for name in ARRAYS})
-            return Found(**json.loads(str(kept["told"])), values=kept["found"], history=history)
+            return SearchResult(**json.loads(str(kept["told"])), values=kept["found"], history=history)
         return None
 
-    def put(self, settings: Mapping[str, Any], seed: int, found: Found) -> None:
+    def put(self, settings: Mapping[str, Any], seed: int, found: SearchResult) -> None:
         """Keep a search; where that is impossible, it is made again next time."""
         path = self._path(settings, seed)
         if path is None:

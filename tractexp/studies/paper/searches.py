@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.identification.problem import Problem
-from tractexp.identification.search import Found, Limits, search
+from tractexp.identification.search import Limits, SearchResult, search
 from tractexp.plugin import build
 from tractexp.studies.paper.remembered import Remembered
 from tractexp.workers import replaced
@@ -25,7 +25,7 @@ def run(
     tell: Callable[[int, int], None] = lambda done, total: None,
     remember: bool = True,
     note: Callable[[str], None] = lambda line: None,
-) -> dict[str, list[Found]]:
+) -> dict[str, list[SearchResult]]:
     """Search with every variant under seeds 0, 1, ...; `tell(done, total)` counts the searches done.
 
     One seed gives one history, whatever the number of workers (None: one for each core). What was searched before by
@@ -57,6 +57,6 @@ def run(
     return found  # type: ignore[return-value]
 
 
-def _chunk(recipe: Recipe, settings: dict[str, Any], seeds: Sequence[int], limits: Limits) -> list[Found]:
+def _chunk(recipe: Recipe, settings: dict[str, Any], seeds: Sequence[int], limits: Limits) -> list[SearchResult]:
     problem, optimizer = recipe(), build("optimizer", settings)
     return [search(problem, optimizer, seed, limits) for seed in seeds]

@@ -12,7 +12,7 @@ from tractexp.errors import UserError
 from tractexp.identification.generalization import by_depth, mean_residual
 from tractexp.identification.problem import Problem
 from tractexp.identification.result import Fit, respond
-from tractexp.identification.search import Found, Limits
+from tractexp.identification.search import Limits, SearchResult
 from tractexp.record import Event
 from tractexp.studies.comparison.statistics import expected_running_time, vargha_delaney, wilcoxon
 from tractexp.studies.paper import equations, maps, orders, printed, searches, valleys
@@ -78,7 +78,7 @@ class Study:
     literal: Callable[[], Problem] | None = None
     tell: Callable[[str], None] = lambda line: None
     count: Callable[[int, int], None] = lambda done, total: None
-    seen: dict[tuple[str, str], list[Found]] = field(default_factory=dict)  # by reading and budget
+    seen: dict[tuple[str, str], list[SearchResult]] = field(default_factory=dict)  # by reading and budget
 
     @functools.cached_property
     def problem(self) -> Problem:
@@ -97,7 +97,7 @@ class Study:
         return {m: orders.fit(self.node, m, self.train, self.held_out, self.seed) for m in printed.TABLE_1}
 
     @functools.cached_property
-    def reference(self) -> Found:
+    def reference(self) -> SearchResult:
         """The lowest objective known: least squares from many starts."""
         name = "multistart_least_squares"
         return searches.run(self.recipe, {name: {"name": name}}, 1, workers=1)[name][0]
@@ -108,7 +108,7 @@ class Study:
             wanted = dict.fromkeys(name for part in parts for name in SHOWN.get(part, {}).get(by, ()))
             self._gather([name for name in wanted if (name, by) not in self.seen], by)
 
-    def searched(self, name: str, by: str = "iterations") -> list[Found]:
+    def searched(self, name: str, by: str = "iterations") -> list[SearchResult]:
         """The searches of a reading, one for each seed: of 300 "iterations", or laid out for equal "simulations"."""
         if by == "simulations" and READINGS[name].optimizer == "pso":
             by = "iterations"  # its 300 iterations are what is equal
@@ -128,7 +128,7 @@ class Study:
                 found = self._run(chosen, by, self.seeds)
                 self.seen.update({(name, by): several for name, several in found.items()})
 
-    def _run(self, names: Sequence[str], by: str, seeds: int) -> dict[str, list[Found]]:
+    def _run(self, names: Sequence[str], by: str, seeds: int) -> dict[str, list[SearchResult]]:
         """Search with readings that all search the same problem."""
         several = f"{seeds} seeds" if seeds > 1 else "seed 0"
         limits = self.limits or Limits()
@@ -259,7 +259,7 @@ class Study:
             self._fits[name] = [self.respond(found, literal) for found in self.searched(name)]
         return self._fits[name]
 
-    def respond(self, found: Found, literal: bool = False) -> list[Fit]:
+    def respond(self, found: SearchResult, literal: bool = False) -> list[Fit]:
         """All events, played through the model with what a search found."""
         problem = self.printed_problem if literal and self.literal else self.problem
         whole = problem.full(found.values)[0]

@@ -15,7 +15,7 @@ DISAGREES = 0.01  # p-value below which an event does not fit with the others
 
 
 @dataclass(frozen=True, eq=False)
-class Together:
+class EventAgreement:
     """What each of several events adds. `gains` {event: {name: width of the interval without it over with it}}."""
 
     gains: dict[str, dict[str, float]]
@@ -29,7 +29,7 @@ class Together:
         return {"gains": gains, "odd_events": self.odd}
 
 
-def compare_events(known: Uncertainty) -> Together:
+def compare_events(known: Uncertainty) -> EventAgreement:
     """Each event's share in the precision, and the events that do not fit with the rest (deviance test)."""
     likelihood = known.likelihood
     _, J = likelihood.jacobian(known.unit)
@@ -46,7 +46,7 @@ def compare_events(known: Uncertainty) -> Together:
             ratio = errors(J * ~likelihood.part_of(e)[:, None]) / whole
         gains[event.record.name] = dict(zip(known.names, ratio.tolist(), strict=True))
     odd, notes = disagreeing(known)
-    return Together(gains, odd, notes)
+    return EventAgreement(gains, odd, notes)
 
 
 def disagreeing(known: Uncertainty) -> tuple[list[str], list[str]]:

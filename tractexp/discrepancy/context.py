@@ -13,19 +13,20 @@ from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.kernels import Family, Kernels
 from tractexp.discrepancy.records import Records
+from tractexp.domain import Domain, domain_of
 from tractexp.identification import shelf
-from tractexp.identification.descent import Apart
+from tractexp.identification.descent import SeparableColumns
 from tractexp.identification.problem import Problem
 from tractexp.model.drive import Drive
 from tractexp.model.model import Model
 from tractexp.noise import Noise
 from tractexp.noise.quiet import quiet_stretches
-from tractexp.noise.wander import Load
+from tractexp.noise.random_walk import Load
 from tractexp.record import Event
 
 
 @dataclass(frozen=True, eq=False)
-class Bench:
+class Context:
     """A base model with its catalogue on the events of `records`. Nothing of it changes but what `effort` counts."""
 
     load: Model
@@ -41,17 +42,17 @@ class Bench:
         cls, load: Model, catalogue: Catalogue, records: Records, bounds: Mapping[str, Sequence[float]],
         fixed: Mapping[str, float], criteria: Criteria, effort: Effort, substeps: int | None = None,
         family: type[Family] = Family,
-    ) -> "Bench":  # fmt: skip
+    ) -> "Context":  # fmt: skip
         """A bench for these records; the load is simulated behind the recorder's window, where there is one."""
         kernels = Kernels(family(load.behind(records.window), catalogue), records.events, bounds, fixed, substeps)
         coordinates = Coordinates.of(kernels.bare, kernels.whole, catalogue, criteria.measurement_prior)
         return cls(load, catalogue, records, kernels, coordinates, criteria, effort)
 
-    def on(self, records: Records) -> "Bench":
+    def on(self, records: Records) -> "Context":
         """The same model and catalogue on other records, with the same Runge-Kutta steps and a count of its own."""
         kernels, criteria, effort = self.kernels, self.criteria, self.effort.anew()
         known = kernels.bounds, kernels.fixed, criteria, effort, kernels.substeps
-        return Bench.of(self.load, self.catalogue, records, *known, type(kernels.family))
+        return Context.of(self.load, self.catalogue, records, *known, type(kernels.family))
 
     @property
     def model(self) -> Model:
@@ -72,6 +73,11 @@ class Bench:
     def waves(self) -> bool:
         """Whether currents are compared, sample by sample, not the power of phasors."""
         return self.load.waves
+
+    @property
+    def domain(self) -> Domain:
+        """What the load is compared with."""
+        return domain_of(self.load)
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -149,10 +155,10 @@ class Bench:
         prior = [(unit[:, k] - at.null[k]) / at.prior_deviation[k] for k in faults]
         return np.concatenate([white, *(p[:, None] for p in prior)], axis=1)
 
-    def apart(self, further_rows: int) -> list[Apart]:
+    def apart(self, further_rows: int) -> list[SeparableColumns]:
         """P0 and Q0 act on the rows of their own event only; `further_rows` follow those of the records."""
         events, size = len(self.events), self.drive.measured.size
         rows = np.zeros((events, size + further_rows), dtype=bool)
         for e in range(events):
             rows[e, :size].reshape(self.drive.measured.shape)[:, self.drive.part(e)] = True
-        return [Apart(len(self.coordinates.base) + np.arange(events) * 2 + c, rows) for c in (0, 1)]
+        return [SeparableColumns(len(self.coordinates.base) + np.arange(events) * 2 + c, rows) for c in (0, 1)]

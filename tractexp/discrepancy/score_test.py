@@ -13,13 +13,12 @@ import numpy as np
 from scipy.special import chdtrc
 
 from tractexp.discrepancy.catalogue import Candidate
-from tractexp.noise.span import spanned
-
-DISTINCT = 1e-3  # of the largest singular value: directions weaker than this are rounding
+from tractexp.identification import surprises
+from tractexp.identification.surprises import PER_EVENT, SMALLEST_P, Layout
 
 
 @dataclass(frozen=True, eq=False)
-class Column:
+class CandidateColumn:
     """A candidate with one setting of its scanned parameters: differences (k, C, N) per unit of each size."""
 
     candidate: Candidate
@@ -40,10 +39,10 @@ class Score:
 
 
 @dataclass(frozen=True, eq=False)
-class Projection:
+class ScoreTest:
     """Whitened and with the nuisances projected out; `r` has one row per residual (one, or the bootstrap's)."""
 
-    columns: tuple[Column, ...]
+    columns: tuple[CandidateColumn, ...]
     faults: Mapping[str, list[int]]  # which nuisances belong to which fault of the measurement
     groups: np.ndarray  # (c,) which balance a push goes into
     Q: np.ndarray
@@ -55,7 +54,7 @@ class Projection:
     split: np.ndarray  # (e, R)
     cells: np.ndarray  # (c, R)
 
-    def of(self, white: np.ndarray) -> "Projection":
+    def of(self, white: np.ndarray) -> "ScoreTest":
         """The same columns with other whitened residuals (b, C N) in place of the fit's own, off no prior mean."""
         rows = np.concatenate([white, np.zeros((len(white), len(self.Q) - white.shape[1]))], axis=1)
         along = rows @ self.Q
@@ -115,9 +114,26 @@ class Projection:
         scale = np.array([power[kept][groups == g].mean() for g in groups])
         return (z / scale).sum(axis=1)
 
-    def unsteadiness(self) -> np.ndarray:
-        """How much parameters of their own for each event would lower the deviance, (b,)."""
-        return ((self.r @ spanned(self.split, DISTINCT, least=1e-12).T) ** 2).sum(axis=1)
+    @property
+    def least_p(self) -> np.ndarray:
+        """The smallest p (b,) of all candidates."""
+        return np.maximum(self.drops[1].min(axis=0, initial=1.0), SMALLEST_P)
+
+    def channels(self, layout: Layout) -> np.ndarray:
+        """The residuals (b, C, N), without the rows of the prior."""
+        drive = layout.drive
+        return self.r[:, : drive.measured.size].reshape(len(self.r), drive.channels, -1)
+
+    def statistics(self, layout: Layout) -> dict[str, np.ndarray]:
+        """What no candidate accounts for, by what each test looks for: a sum (b,), or the largest of many (b, k)."""
+        by_test = {
+            "pushes into the balances": self.unrest(),
+            "a further effect": -np.log(self.least_p)[:, None],
+            **surprises.statistics(self.channels(layout), layout),
+        }
+        if len(layout.events) > 1:
+            by_test[PER_EVENT] = surprises.of_each_event(self.r, self.split, least=1e-12)
+        return by_test
 
 
 def signed_drop(block: np.ndarray, r: np.ndarray, signs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

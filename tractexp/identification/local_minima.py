@@ -8,7 +8,7 @@ import numpy as np
 from tractexp.identification.descent import Descent, descend
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.problem import Problem
-from tractexp.identification.starts import best_distinct, even
+from tractexp.parameter import best_distinct, even
 
 SCREENED = 4096  # points of the box that are simulated
 STARTS, APART = 24, 0.5  # the best of them that are so far apart in the unit cube
@@ -48,7 +48,7 @@ def distinct(ends: Descent, free: int) -> np.ndarray:
     return ends.unit[best_distinct(ends.unit[:, :free], ends.deviance, DISTINCT, KEPT, norm=2)]
 
 
-def along_least_known(likelihood: Likelihood, unit: np.ndarray) -> np.ndarray:
+def along_least_certain(likelihood: Likelihood, unit: np.ndarray) -> np.ndarray:
     """Points (6, D) on either side of an optimum (D,), in the direction that the records know least.
 
     Where q_v is near 2, for instance, the static load takes over the motor's U²/X' and any C will do, so that there

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.bench import Bench
-from tractexp.discrepancy.fitting import WALL, Refit
+from tractexp.discrepancy.context import Context
+from tractexp.discrepancy.fitting import ON_BOUND, Refit
+from tractexp.discrepancy.injection import perturbations
 from tractexp.discrepancy.linear import two_sided
-from tractexp.discrepancy.projection import Column, Projection
-from tractexp.discrepancy.pushes import push_points
+from tractexp.discrepancy.score_test import CandidateColumn, ScoreTest
 from tractexp.noise import Noise
 from tractexp.noise.span import spanned
 
@@ -20,17 +20,17 @@ LEAST_KEPT = 0.2  # of a residual's variance: where columns explain more, it tel
 
 
 @dataclass(frozen=True, eq=False)
-class Tangent:
-    """Raw residuals and differences at a fit; `whitened` turns them into a `Projection` under a noise model."""
+class Linearization:
+    """Raw residuals and differences at a fit; `whitened` turns them into a `ScoreTest` under a noise model."""
 
-    bench: Bench
+    bench: Context
     unit: np.ndarray  # (D,) coordinates of the fit
     residual: np.ndarray  # (C, N)
     nuisance: np.ndarray  # (k, C, N)
     prior: np.ndarray  # (k, k) prior rows of the nuisances, whitened
     estimate: np.ndarray  # (k,) the nuisances' departure from their prior mean, in its standard deviations (or 0)
     faults: dict[str, list[int]]  # which nuisances belong to which fault of the measurement
-    columns: tuple[Column, ...]
+    columns: tuple[CandidateColumn, ...]
     split: np.ndarray  # (e, C, N) differences of the fitted parameters but thresholds and times, each in one event only
     cells: np.ndarray  # (c, C, N) responses to injections
     groups: np.ndarray  # (c,) which balance an injection pushes
@@ -41,7 +41,7 @@ class Tangent:
         """All that the fit or any candidate could change, (k, C, N)."""
         return np.concatenate([self.nuisance, *(c.raw for c in self.columns)])
 
-    def whitened(self, noise: Noise) -> Projection:
+    def whitened(self, noise: Noise) -> ScoreTest:
         """Project under this noise; `Projection.of` puts other residuals in place of the fit's own."""
         raw = [self.nuisance, self.residual[None], *(c.raw for c in self.columns), self.split, self.cells]
         ends = np.cumsum([len(part) for part in raw])
@@ -55,12 +55,12 @@ class Tangent:
         along = rest @ Q
         rest -= along @ Q.T
         r, *blocks, split, cells = np.split(rest, ends[1:-1] - ends[0])
-        return Projection(
+        return ScoreTest(
             self.columns, self.faults, self.groups, Q, R, r, along[:1], self.estimate, blocks, split, cells
         )
 
 
-def tangent(bench: Bench, fit: Refit, noise: Noise) -> Tangent:
+def tangent(bench: Context, fit: Refit, noise: Noise) -> Linearization:
     """Differences of everything at a fit, in one batch. What is fitted, and faults of the measurement, are nuisances.
 
     A parameter of the base model on a wall that would leave the box is held there: what only values beyond its bounds
@@ -72,7 +72,7 @@ def tangent(bench: Bench, fit: Refit, noise: Noise) -> Tangent:
     nuisances = [*inside, *(k for members in faults.values() for k in members)]
     up, down = two_sided(fit.unit, nuisances)
     points, spans, labels = _candidate_points(bench, fit)
-    injected, groups = push_points(bench, fit.unit)
+    injected, groups = perturbations(bench, fit.unit)
     k, m = len(nuisances), len(points)
     sets = [(fit.names, False)] * (1 + 2 * k)
     sets += [((*fit.names, c.name), False) for c, _, first, last in labels for _ in range(first, last)]
@@ -84,7 +84,7 @@ def tangent(bench: Bench, fit: Refit, noise: Noise) -> Tangent:
     nuisance = np.nan_to_num((up_rows - down_rows) / width[:, None, None])
     moved = np.nan_to_num((raw[1 + 2 * k : 1 + 2 * k + m] - base) / spans[:, None, None])
     cells = np.nan_to_num(raw[1 + 2 * k + m :] - base)
-    columns = [Column(c, s, moved[a:b]) for c, s, a, b in labels]
+    columns = [CandidateColumn(c, s, moved[a:b]) for c, s, a, b in labels]
     members = {name: [nuisances.index(c) for c in cols] for name, cols in faults.items()}
     white = bench.whiten(noise, np.concatenate([nuisance, base[None]]))
     held = set(np.flatnonzero(resting(bench, fit.unit, nuisances, white[:k] @ white[k])).tolist())
@@ -97,22 +97,22 @@ def tangent(bench: Bench, fit: Refit, noise: Noise) -> Tangent:
     fitted = {*at.base, *at.sizes(fit.names)}  # a relay's instants hang on the voltage's noise, which no draw has
     split = _by_event(bench, nuisance[[i for i, c in enumerate(nuisances) if c in fitted and i not in held]])
     walls = tuple(nuisances[i] for i in sorted(held))
-    return Tangent(
+    return Linearization(
         bench, fit.unit, base, nuisance, prior, departure, members, tuple(columns), split, cells, groups, walls
     )
 
 
-def resting(bench: Bench, unit: np.ndarray, columns: Sequence[int] | np.ndarray, gradient: np.ndarray) -> np.ndarray:
+def resting(bench: Context, unit: np.ndarray, columns: Sequence[int] | np.ndarray, gradient: np.ndarray) -> np.ndarray:
     """Which of the columns are parameters of the base model on a wall beyond which the deviance falls.
 
     `gradient` of the deviance is needed for its sign only.
     """
     x = unit[list(columns)]
-    leaving = ((x <= WALL) & (gradient > 0)) | ((x >= 1 - WALL) & (gradient < 0))
+    leaving = ((x <= ON_BOUND) & (gradient > 0)) | ((x >= 1 - ON_BOUND) & (gradient < 0))
     return leaving & np.isin(columns, bench.coordinates.base)
 
 
-def _by_event(bench: Bench, columns: np.ndarray) -> np.ndarray:
+def _by_event(bench: Context, columns: np.ndarray) -> np.ndarray:
     """Columns (k, C, N) cut into one for each event, (k E, C, N)."""
     split = np.zeros((len(bench.events), *columns.shape))
     for e in range(len(split)):
@@ -121,7 +121,7 @@ def _by_event(bench: Bench, columns: np.ndarray) -> np.ndarray:
     return split.reshape(-1, *columns.shape[1:])
 
 
-def _candidate_points(bench: Bench, fit: Refit) -> tuple[np.ndarray, np.ndarray, list]:
+def _candidate_points(bench: Context, fit: Refit) -> tuple[np.ndarray, np.ndarray, list]:
     """One point per size and setting of each candidate outside the fit, and how far it steps [unit of the size]."""
     at = bench.coordinates
     points, spans, labels = [], [], []
@@ -138,7 +138,7 @@ def _candidate_points(bench: Bench, fit: Refit) -> tuple[np.ndarray, np.ndarray,
     return np.array(points).reshape(-1, at.dimension), np.array(spans), labels
 
 
-def rich_residuals(t: Tangent, residuals: np.ndarray) -> np.ndarray:
+def rich_residuals(t: Linearization, residuals: np.ndarray) -> np.ndarray:
     """Residuals (b, C, N) with everything any column explains taken away, unweighted: what noise is estimated from.
 
     Each is divided by what is left of its variance then, so that the noise does not come out too small.

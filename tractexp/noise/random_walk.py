@@ -10,8 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tractexp.model.drive import Drive
 from tractexp.noise.color import Autoregression, fit_autoregression
 from tractexp.noise.span import spanned
+from tractexp.record import Event
 
 MODES = 48
 LEAST = 0.3  # of the level of a load in both channels: one that has less of the first does not wander by it
@@ -72,7 +74,7 @@ class Load:
 
 
 @dataclass(frozen=True, eq=False)
-class Wander:
+class RandomWalk:
     """Random walks of two mixed channels: `intensity` (2,) is the variance gained in a second before an event.
 
     What wanders are customers, whose active and reactive power go together, in a dip and after it, too: what the first
@@ -106,7 +108,7 @@ class Rest:
 def find(
     before: Sequence[np.ndarray], step: float, load: Load, rests: Sequence[Rest] = (),
     *, seen: float, within: float, less: float,
-) -> Wander | None:  # fmt: skip
+) -> RandomWalk | None:  # fmt: skip
     """The wandering of two channels in stretches (2, n_i) before the events; None where there is none to be seen.
 
     To be safe the largest intensity whose log-likelihood is at most `less` below the likeliest's, given the fast
@@ -121,13 +123,31 @@ def find(
     total = np.array([_likelihood([s[c] for s in stretches], fast[c], step) for c in (0, 1)])
     total -= total[:, :1]
     most = [_last(row, less) for row in total]
-    found = Wander(GRID[most], step, load)
+    found = RandomWalk(GRID[most], step, load)
     if 2 * total.max() >= seen:
         return found
     rest = np.array([sum(_within(r, c, fast[c], step) for r in rests) * np.ones(len(GRID)) for c in (0, 1)])
     both = total + rest - rest[:, :1]
     gained = max(2 * row[: last + 1].max() for row, last in zip(both, most, strict=True))
     return found if gained - within >= seen else None
+
+
+def walk_of_load(
+    events: Sequence[Event], drive: Drive, load: Load, left: np.ndarray | None, columns: np.ndarray | None,
+    valid: np.ndarray, mix: np.ndarray, *, seen: float, within: float, less: float,
+) -> RandomWalk | None:  # fmt: skip
+    """How the load wanders before the events, and during them, in channels mixed by `mix`, as `find` tells it.
+
+    What a fit leaves (C, N) counts where it is there with all columns that could explain it (k, C, N) and has no gap.
+    """
+    parts = [drive.part(e) for e in range(drive.events)]
+    before = [drive.measured[:, part][:, event.steady] for part, event in zip(parts, events, strict=True)]
+    rests = []
+    if left is not None and columns is not None and valid.all():
+        mixed = np.einsum("ij,kjt->kit", mix, columns)
+        rests = [Rest(mix @ left[:, part], mixed[:, :, part], load.apparent[part]) for part in parts]
+    stretches = [mix @ b for b in before if np.isfinite(b).all()]
+    return find(stretches, events[0].record.step, load, rests, seen=seen, within=within, less=less)
 
 
 def _last(likelihood: np.ndarray, less: float) -> int:

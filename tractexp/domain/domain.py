@@ -1,0 +1,164 @@
+"""A domain: what a model is compared with, and all that follows from it."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from tractexp.domain.playback import Playback
+from tractexp.errors import UserError
+from tractexp.model.drive import IN_WORDS, OUTPUTS, Drive, Excitation, Waveforms
+from tractexp.model.model import Model
+from tractexp.noise import Noise
+from tractexp.noise.random_walk import RandomWalk
+from tractexp.noise.voltage import SmoothedEvent
+from tractexp.record import Event
+
+if TYPE_CHECKING:
+    from tractexp.identification.plan import DipShape
+    from tractexp.identification.problem import Problem
+
+
+@dataclass(frozen=True)
+class DipGrid:
+    """Dips that might be recorded next: durations [s] that are tried, edges [s], time before and from the start on."""
+
+    durations: tuple[float, ...]
+    edge: float
+    lead: float
+    length: float
+
+
+class Domain(ABC):
+    """What a model is compared with: the power of phasors, or sampled currents. See `tractexp.domain`."""
+
+    name: ClassVar[str]  # as a setting says it
+    setting: ClassVar[str]  # what a command needs to choose it, with a space behind it
+    compared: ClassVar[str]  # in a sentence
+    epsilons: ClassVar[tuple[str, ...]]  # relative errors of each event, as result.json has them
+    unit: ClassVar[str] = "pu"
+    # integration
+    finest: ClassVar[float]  # pu, largest error of the automatic Runge-Kutta step
+    probed: ClassVar[float]  # share of the candidates across the box on which that is judged
+    stiff: ClassVar[bool]  # whether some candidates of the box diverge at any step, and are refused
+    # noise
+    quiet_order: ClassVar[int]  # of an autoregression of the few samples before a dip
+    noise_from_model: ClassVar[bool]  # whether its color follows from the model, and only its size from the records
+    # records
+    windowed: ClassVar[bool]  # whether samples are averages over a recorder's window, which may have to be searched
+    # investigation
+    calibrated: ClassVar[bool]  # whether families, a search in all events and proposals have calibrated criteria
+    recordable: ClassVar[bool]  # whether a dip that nobody recorded can be made a record and fitted beside others
+    nearest_gap: ClassVar[bool]  # whether the gap is told of the set that comes nearest where nothing explains
+    # planning
+    edge: ClassVar[float]  # s, fall and rise of a planned dip
+    further: ClassVar[Mapping[str, str]]  # channels that a jump of the phase and an unbalance have to be recorded with
+    shaped_by: ClassVar[tuple[str, ...]]  # what a planned dip has beside depth, duration, rate and noise
+    dips: ClassVar[DipGrid]  # that might be recorded next
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of what is compared."""
+        return OUTPUTS[self.name]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The same as pages say it."""
+        return tuple(IN_WORDS.get(name, name) for name in self.channels)
+
+    @abstractmethod
+    def event(self, event: Event) -> Event:
+        """An event as a model is compared with it. Raises `UserError` where it needs samples that there are not."""
+
+    def events(self, events: Sequence[Event]) -> tuple[Event, ...]:
+        """The same of several."""
+        return tuple(map(self.event, events))
+
+    @abstractmethod
+    def excitation(
+        self, event: Event, model: Model | None = None, weights: tuple[float, float] = (1.0, 1.0)
+    ) -> Excitation | Waveforms:
+        """What drives a model through an event of this domain; `weights` are those of an objective, of P and Q."""
+
+    @abstractmethod
+    def smoothed(self, event: Event) -> SmoothedEvent:
+        """The event with the noise taken out of its voltage, where that can be told from it."""
+
+    @abstractmethod
+    def steady(self, events: Sequence[Event], drive: Drive) -> list[slice]:
+        """The samples of the drive whose means are P0 and Q0 of each event; [] where those are not compared."""
+
+    @abstractmethod
+    def longest_step(self, events: Sequence[Event], substeps: np.ndarray) -> float:
+        """Runge-Kutta step [s] that is fine enough for dips like these events, which took so many per sample."""
+
+    @abstractmethod
+    def values(self, drive: Drive) -> int:
+        """How many values of an event are judged."""
+
+    @abstractmethod
+    def noise(
+        self, residual: np.ndarray, valid: np.ndarray, quiet: Sequence[slice], problem: "Problem", values: np.ndarray,
+        walk: Callable[[np.ndarray], RandomWalk | None], shapes: np.ndarray | None,
+    ) -> Noise:  # fmt: skip
+        """The noise of residuals (C, N) in quiet stretches, at free values (d,) of the problem.
+
+        `walk` tells how the load wanders in channels mixed by a matrix (C, C), `shapes` (k, C, N) are what errors of
+        the record do. Raises `UserError` where too few samples are quiet.
+        """
+
+    @abstractmethod
+    def input_errors(self, problem: "Problem", values: np.ndarray) -> np.ndarray | None:
+        """What errors of the record beside the voltage's noise do at free values (d,), (k, C, N) [pu], or None."""
+
+    @abstractmethod
+    def comparison(self, event: Event, outputs: np.ndarray) -> Playback:
+        """What is calculated (C, N) of an event of this domain beside what was recorded."""
+
+    @abstractmethod
+    def better(self, event: Event) -> str:
+        """Why another domain shows more of an event, as a sentence; "" where none does."""
+
+    @abstractmethod
+    def slowest(self, frequency: float) -> float:
+        """The lowest sampling rate [Hz] of a planned dip in a grid of this frequency [Hz]."""
+
+    @abstractmethod
+    def shape(self, event: Event) -> dict[str, float]:
+        """What `shaped_by` names, of a recorded event."""
+
+    @abstractmethod
+    def planned(self, shape: "DipShape", name: str, t: np.ndarray, course: np.ndarray, start: int, end: int) -> Event:
+        """A dip as if it had been recorded at times t (N,) [s], `course` (N,) of it there: 0 to 1."""
+
+    @abstractmethod
+    def dip(
+        self, like: Event, step: float, course: np.ndarray, depth: float, jump: float, unbalance: float
+    ) -> Excitation | Waveforms:
+        """The voltage of a dip at the power before a recorded event, `course` (N,) of it there: 0 to 1.
+
+        The phase turns by `jump` [degrees]; the negative sequence is `unbalance` times the depth.
+        """
+
+    @abstractmethod
+    def play(
+        self, model: Model, values: np.ndarray, t: np.ndarray, U: np.ndarray, before: Mapping[str, float],
+        omega_s: np.ndarray | None = None, omega_s0: float = 0.0,
+    ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+        """P and Q (N,) [pu] that a load draws from a voltage U (N,) [pu] at uniform times t (N,) [s].
+
+        `before` has U0, P0, Q0 [pu] and the nominal `frequency` [Hz]; omega_s (N,) [rad/s] is the synchronous speed
+        relative to it, `omega_s0` that before. Raises `UserError` where there is no steady state.
+        """
+
+
+def simulated(model: Model, values: np.ndarray, drive: Drive) -> np.ndarray:
+    """What is compared (C, N), by as many Runge-Kutta steps as it takes.
+
+    Raises `UserError` where there is no steady state.
+    """
+    if refusal := model.refusal(values, drive):
+        raise UserError(refusal)
+    return model.simulate(drive, values, model.substeps(drive, values)[0]).outputs[:, 0]

@@ -1,0 +1,121 @@
+"""Phasors: P and Q are compared, a few samples in a cycle at most."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tractexp.domain import excitation
+from tractexp.domain.domain import DipGrid, Domain, simulated
+from tractexp.domain.playback import Playback
+from tractexp.model.drive import PHASORS, Drive, Excitation
+from tractexp.model.model import Model
+from tractexp.noise import Noise
+from tractexp.noise.quiet import estimate
+from tractexp.noise.random_walk import RandomWalk
+from tractexp.noise.voltage import SmoothedEvent, smoothed
+from tractexp.record import Base, Event, Record
+from tractexp.record.wave_event import COARSEST, smeared
+
+if TYPE_CHECKING:
+    from tractexp.identification.plan import DipShape
+    from tractexp.identification.problem import Problem
+
+FINEST_STEP = 5e-4  # s, longest Runge-Kutta step of a forecast
+
+
+class PhasorDomain(Domain):
+    name = PHASORS
+    setting = ""
+    compared = "P and Q"
+    epsilons = ("epsilon_p", "epsilon_q")
+    finest, probed, stiff = 5e-6, 1.0, False  # noise of records starts near 1e-4
+    quiet_order, noise_from_model = 4, False
+    windowed = calibrated = recordable = True
+    nearest_gap = False
+    edge = 0.02
+    further = {"jump": "the frequency f", "unbalance": "U2"}
+    shaped_by = ()
+    dips = DipGrid((0.1, 0.2, 0.4, 0.8), 0.04, 0.3, 2.5)  # the longest is a tap or a bank that is back after 1 s
+
+    def event(self, event: Event) -> Event:
+        return event
+
+    def excitation(
+        self, event: Event, model: Model | None = None, weights: tuple[float, float] = (1.0, 1.0)
+    ) -> Excitation:
+        return excitation.phasors(event, model, weights)
+
+    def smoothed(self, event: Event) -> SmoothedEvent:
+        return smoothed(event)
+
+    def steady(self, events: Sequence[Event], drive: Drive) -> list[slice]:
+        first = [int(drive.first[e]) for e in range(drive.events)]
+        return [slice(a + e.steady.start, a + e.steady.stop) for a, e in zip(first, events, strict=True)]
+
+    def longest_step(self, events: Sequence[Event], substeps: np.ndarray) -> float:
+        return FINEST_STEP
+
+    def values(self, drive: Drive) -> int:
+        return drive.measured.size
+
+    def noise(
+        self, residual: np.ndarray, valid: np.ndarray, quiet: Sequence[slice], problem: "Problem", values: np.ndarray,
+        walk: Callable[[np.ndarray], RandomWalk | None], shapes: np.ndarray | None,
+    ) -> Noise:  # fmt: skip
+        return estimate(residual, valid, quiet, walk, shapes)
+
+    def input_errors(self, problem: "Problem", values: np.ndarray) -> None:
+        return None
+
+    def comparison(self, event: Event, outputs: np.ndarray) -> Playback:
+        return Playback.of_power(event, outputs[0], outputs[1])
+
+    def better(self, event: Event) -> str:
+        """Of records that hold no samples, or too few in a cycle, nothing is said."""
+        waves, record = event.record.waves, event.record
+        if waves is None or waves.rate < COARSEST * record.base.frequency:
+            return ""
+        U2 = 0.0 if record.U2 is None else float(record.U2[event.start : event.end].max() / event.U0)
+        why = smeared(event.duration, U2, record.base.frequency)
+        return why and f"fit the sampled waveforms, by domain=waves: the dip of {record.name} {why}"
+
+    def slowest(self, frequency: float) -> float:
+        return 5.0
+
+    def shape(self, event: Event) -> dict[str, float]:
+        return {}
+
+    def planned(self, shape: "DipShape", name: str, t: np.ndarray, course: np.ndarray, start: int, end: int) -> Event:
+        """P and Q hold the steady state, for no forecast looks at them."""
+        record = Record(
+            name, t, 1 - shape.depth * course, np.full(len(t), shape.P0), np.full(len(t), shape.Q0),
+            base=Base(frequency=shape.frequency),
+        )  # fmt: skip
+        return Event(
+            record=record, start=start, end=min(end, len(t) - 1), depth=shape.depth, U0=1.0, P0=shape.P0, Q0=shape.Q0,
+            f0=shape.frequency, noise_U=0.0, noise_P=shape.noise_P, noise_Q=shape.noise_Q, steady=slice(0, start),
+            dips=1,
+        )  # fmt: skip
+
+    def dip(
+        self, like: Event, step: float, course: np.ndarray, depth: float, jump: float, unbalance: float
+    ) -> Excitation:
+        still = np.zeros(len(course))
+        return Excitation(
+            step, like.U0 * (1 - depth * course), still, still, like.U0, like.P0, like.Q0,
+            omega_s=np.radians(jump) * np.gradient(course, step), omega_n=2 * np.pi * like.record.base.frequency,
+            U2=unbalance * depth * like.U0 * course, U20=0.0,
+        )  # fmt: skip
+
+    def play(
+        self, model: Model, values: np.ndarray, t: np.ndarray, U: np.ndarray, before: Mapping[str, float],
+        omega_s: np.ndarray | None = None, omega_s0: float = 0.0,
+    ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+        unknown = np.full(len(U), np.nan)
+        event = Excitation(
+            step=float((t[-1] - t[0]) / (len(t) - 1)), U=U, P=unknown, Q=unknown, U0=before["U0"], P0=before["P0"],
+            Q0=before["Q0"], omega_s=omega_s, omega_s0=omega_s0, omega_n=2 * np.pi * before["frequency"],
+        )  # fmt: skip
+        outputs = simulated(model, values, Drive.of([event]))
+        return outputs[0], outputs[1]
