@@ -85,7 +85,7 @@ STRANGERS = """
 import pytest
 
 import tractexp.testing
-from tractexp.discrepancy.injection import PUSHES, Injection
+from tractexp.discrepancy.injection import PERTURBATIONS, Injection
 from tractexp.model.model import compose
 from tractexp.plugin import discover, get
 
@@ -120,7 +120,7 @@ def test_a_motor_takes_what_its_sites_allow_and_says_why_not():
 def test_every_motor_is_pushed_in_each_flux_and_its_speed(motor):
     eq = compose(get("model/motor", motor)(), get("model/static", "exponential")(), [Injection()]).equations
     for state in eq.states.values():
-        pushed = {s.name for s in state.derivative.free_symbols} & set(PUSHES)
+        pushed = {s.name for s in state.derivative.free_symbols} & set(PERTURBATIONS)
         assert pushed == {"flux": {"push_flux_d", "push_flux_q"}, "speed": {"push_speed"}}[state.role]
 """
 
