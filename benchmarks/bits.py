@@ -4,7 +4,7 @@ The same searches in fresh processes: again, from another folder, under other va
 derived and compiled anew, on one and on two workers; and with kernels compiled for the most general processor of this
 kind instead of the one that is here, which has no fused multiply-add and narrower vectors. Told are the largest
 difference of a parameter, of the width of its bounds, and of the objective, relative; and, of P and Q that 200 drawn
-candidates draw in the dip, the largest difference [pu].
+candidates draw in the dip, the largest difference [pu]. The file says on which processor the rows hold.
 """
 
 import argparse
@@ -14,6 +14,8 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+
+from processor import processor
 
 from tractexp import files
 
@@ -71,7 +73,7 @@ def drawn(folder: Path, **environment: str):
 def measured() -> dict:
     import numpy as np
 
-    made = {}
+    rows: dict = {"processor": processor()}
     with tempfile.TemporaryDirectory() as base:
         folder = Path(base)
         for name, arguments in SEARCHES.items():
@@ -84,16 +86,16 @@ def measured() -> dict:
                 "derived and compiled anew": anew,
                 "generic processor": GENERIC,
             }
-            made[name] = {}
+            rows[name] = {}
             for other, environment in others.items():
                 (found,) = identified(folder / name / "else where" / other, arguments, **environment)
-                made[name][other] = apart(first, found)
+                rows[name][other] = apart(first, found)
         swept = ["-m", "optimizer=pso,issa", "seed=0,1", "budget=1000", "hydra.sweep.dir=sweep"]
         one, two = (identified(folder / f"workers {n}", [*swept, f"hydra.launcher.n_jobs={n}"]) for n in (1, 2))
-        made["a sweep on one and two workers"] = [apart(a, b) for a, b in zip(one, two, strict=True)]
+        rows["a sweep on one and two workers"] = [apart(a, b) for a, b in zip(one, two, strict=True)]
         models = zip(drawn(folder), drawn(folder, **GENERIC), strict=True)
-        made["P and Q on a generic processor [pu]"] = [float(np.abs(a - b).max()) for a, b in models]
-    return made
+        rows["P and Q on a generic processor [pu]"] = [float(np.abs(a - b).max()) for a, b in models]
+    return rows
 
 
 def main() -> None:

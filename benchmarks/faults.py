@@ -420,7 +420,7 @@ def sweeps(work: Path, chance: random.Random) -> Iterator[Fault]:
         time.sleep(chance.uniform(0.1, 0.25) * took)
         if process.poll() is not None:
             break
-        workers = [pid for pid in everyone(process.pid)[:-1] if "spawn_main" in line_of(pid)]
+        workers = [pid for pid in everyone(process.pid)[:-1] if "LokyProcess" in line_of(pid)]
         if workers:
             kill([chance.choice(workers)])
             killed_at.append(len(swept(folder)))
@@ -508,9 +508,9 @@ def longer(work: Path, chance: random.Random) -> Iterator[Fault]:
 
     def investigates(folder: Path, kept: Path) -> Callable[[], int]:
         def act() -> int:
-            from tractexp.identification import shelf
+            from tractexp import store
 
-            shelf.cache_folder = lambda: kept
+            store.DESCENTS.folder = store.DRAWS.folder = kept
             return command(folder, *asked)
 
         return act
@@ -523,7 +523,7 @@ def longer(work: Path, chance: random.Random) -> Iterator[Fault]:
     folder, kept = made(work / "stopped"), made(work / "kept")
     for share in (0.35, 0.6, 0.8):
         code, _ = forked(investigates(folder, kept), share * took)
-        there = len(list((kept / "descents").glob("*.kept")))
+        there = len(list((kept / "descents").iterdir()))
         yield told(
             f"kill -9 of an investigation after {share:.0%} of its time",
             f"{there} of its {descents} fits and draws are kept", "" if there else "NOTHING IS KEPT", halves(folder),

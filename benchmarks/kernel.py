@@ -11,7 +11,6 @@ in processor time, so that other work on the machine disturbs little.
 import argparse
 import json
 import os
-import platform
 import subprocess
 import sys
 import tempfile
@@ -105,6 +104,8 @@ class Version:
 
 def measured(ours: Version, other: Version, rounds: int) -> dict[str, Any]:
     """Rows of both tables."""
+    from processor import processor  # not where the other version is served
+
     for version in (ours, other):
         version("compiled", ("phasors", "none", "zip"))  # what the first pays for all
     compiling = []
@@ -127,12 +128,6 @@ def measured(ours: Version, other: Version, rounds: int) -> dict[str, Any]:
             running.append(row)
             print(row, file=sys.stderr)
     return {"compiling": compiling, "running": running, "processor": processor(), "load": os.getloadavg()[0]}
-
-
-def processor() -> str:
-    from tractexp.kernel import target
-
-    return f"{target.processor()[0]}, vectors of {64 * target.width()} bits, {platform.system()}"
 
 
 def tables(rows: dict[str, Any]) -> str:

@@ -20,7 +20,7 @@ from make_tibet import DIPS, LOAD, main
 from independent import Waveforms, simulate
 from independent.recorder import PHASES
 from tractexp.filetypes.comtrade import write
-from tractexp.recording import Channel, Recording, Segment, Status
+from tractexp.recording import Channel, Recording, Segment, StatusChannel
 
 RATE = 4000.0  # Hz
 LENGTH = 2.04  # s, of the records 2 s and a window
@@ -58,7 +58,7 @@ def recording(seed: int, name: str) -> Recording:
     dip = DIPS[name][1]
     t = np.arange(round(LENGTH * RATE)) / RATE - 0.02
     made = channels(simulate(LOAD, dip, t), np.random.default_rng(seed))
-    trip = Status("dip", (dip.shape(t) > 0.1).astype(np.int8))
+    trip = StatusChannel("dip", (dip.shape(t) > 0.1).astype(np.int8))
     return Recording(
         name, made, [Segment(0, len(t), RATE, 0.0)], 50.0, "synthetic stand-in; not measured",
         "benchmarks/make_tibet_comtrade.py",

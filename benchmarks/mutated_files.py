@@ -28,7 +28,7 @@ from tractexp import files  # noqa: E402
 from tractexp.api.read import reader_of  # noqa: E402
 from tractexp.errors import UserError  # noqa: E402
 from tractexp.filetypes import cev, comtrade  # noqa: E402
-from tractexp.recording import Channel, Recording, Segment, Status  # noqa: E402
+from tractexp.recording import Channel, Recording, Segment, StatusChannel  # noqa: E402
 
 SECONDS, MEGABYTES = 5.0, 500.0
 LEAKS = re.compile(
@@ -56,7 +56,7 @@ def record():
         Channel(f"I{p}", np.round(i).astype(np.int16), "A", "current", p, "Feeder", 0.02)
         for p, i in zip("abc", amperes, strict=True)
     ]
-    states = [Status("trip", (t > 0.31).astype(int)), Status("close", (t > 0.5).astype(int))]
+    states = [StatusChannel("trip", (t > 0.31).astype(int)), StatusChannel("close", (t > 0.5).astype(int))]
     return Recording("made", channels, [Segment(0, 1280, 1600.0, 0.0)], 50.0, "Station", "device", status=states)
 
 

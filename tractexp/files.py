@@ -1,6 +1,6 @@
 """Paths of files, and the only way in which the package writes them: whole, or not at all.
 
-Nothing else in the package opens a file to write. What grows, a journal and what a job prints, has its own way in.
+Nothing else in the package opens a file to write. What a job prints, which grows, has its own way in.
 """
 
 import contextlib
@@ -20,7 +20,6 @@ from tractexp.errors import UserError
 
 PACKAGE = "pkg://"  # starts the path of a file inside an installed package
 PART = ".part"  # ends the name of a file that is being written
-SYNCED = 1.0  # s: what is added to a growing file is on the disk after so long
 
 
 def located(path: str) -> Path:
@@ -82,41 +81,6 @@ def move(source: Path | str, target: Path | str) -> Path:
         os.replace(source, target)
         _settle(target.parent)
     return target
-
-
-class Growing:
-    """A file that is added to: a kill or a full disk costs the last line at most. Raises `UserError` of a full disk."""
-
-    def __init__(self, path: Path):
-        self.path, self._synced = path, time.monotonic()
-        with _as_user_error(path):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = path.open("ab+")
-            self._mend()
-
-    def _mend(self) -> None:
-        """End a line that was cut short."""
-        size = self._file.seek(0, os.SEEK_END)
-        if size:
-            self._file.seek(size - 1)
-            if self._file.read(1) != b"\n":
-                self._file.write(b"\n")
-
-    def add(self, line: str) -> None:
-        """Add a line. It outlives the death of the process at once, a loss of power after `SYNCED` seconds."""
-        with _as_user_error(self.path):
-            self._file.write(line.encode() + b"\n")
-            self._file.flush()
-            if time.monotonic() > self._synced + SYNCED:
-                os.fsync(self._file.fileno())
-                self._synced = time.monotonic()
-
-    def __enter__(self) -> "Growing":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        with contextlib.suppress(OSError):  # `add` has raised already
-            self._file.close()
 
 
 class Transcript(io.TextIOBase):

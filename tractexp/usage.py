@@ -46,8 +46,7 @@ The commonest
       look at everything that was logged, in a browser on this computer only
   tractexp doctor
       whether everything here is sound; heal what can be (tractexp sync: log what was not logged)
-  tractexp new effect NAME
-      write a package with an effect of your own and its test (or: static, motor, optimizer)
+  tractexp new effect NAME        write a package with an effect of your own, and its test
 
 Tasks, chosen by task=NAME; {task} by default
 {tasks}

@@ -1,38 +1,154 @@
-"""Worker processes that start once for many jobs: on this computer, or on a Dask cluster.
+"""Worker processes for many calls, by `joblib.Parallel` with any of its backends.
 
-On this computer they are those of the standard library. `joblib.Parallel` cannot do it by its public interface: with
-one worker it runs the job in this process, which a job that kills its worker then takes along, and what runs cannot be
-ended (joblib/joblib#508, #881). A `concurrent.futures` executor has both, and one of loky's is no faster.
+Three things joblib cannot do by its public calls. With one worker it runs calls in this process, which a call that
+kills its worker takes along; so one that is to be apart is two, of which `pre_dispatch` keeps one at work.
+Where a worker is killed, `Parallel` ends and does not say whose worker it was; so what was in work is called again,
+one at a time, and only a call that kills a worker by itself is to blame. A loky worker outlives a parent that is
+killed; so a thread of it watches the parent.
 """
 
 import contextlib
-import logging
 import multiprocessing
 import os
 import signal
 import threading
+import time
 import warnings
-from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
-from typing import Any
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 from tractexp.errors import UserError
 
-MOST = 61  # processes Windows can wait for
+BARREN = 3  # times in a row that workers may be killed before they begin a call
+WATCH = 0.5  # s between two looks of a worker at its parent
+
+Item = TypeVar("Item")
+
+
+def backends() -> list[str]:
+    """The names of joblib's backends, and of those that a package or plugin has registered with it."""
+    from joblib.parallel import BACKENDS
+
+    return sorted({*BACKENDS, "dask"})
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Workers of a joblib backend: "loky" (processes of this computer), "dask", "threading" or a registered one.
+
+    `n_jobs` -1: one for each core this process may use, containers' limits considered, or all of a cluster. `address`
+    is that of a Dask scheduler; without one, "dask" starts a cluster here. One worker is this process, unless it is to
+    be `apart`.
+    """
+
+    n_jobs: int = -1
+    backend: str = "loky"
+    address: str | None = None
+    apart: bool = False
+
+    def completed(
+        self, function: Callable[[Item], Any], items: Iterable[Item], count: int
+    ) -> Iterator[tuple[int, Any]]:
+        """(position, result) of the `count` items, as they are done.
+
+        Raises `BrokenExecutor` where a worker is killed; a killed worker of a Dask cluster leaves its item out.
+        """
+        from joblib import Parallel, delayed, effective_n_jobs
+
+        with self._chosen(), _quiet():
+            n = min(self.n_jobs if self.n_jobs > 0 else effective_n_jobs(self.n_jobs), count)
+            dispatch: Any = {"batch_size": 1, "pre_dispatch": n}  # numbers, other than joblib's annotations say
+            parallel: Any = Parallel(max(n, 1 + self.apart), return_as="generator_unordered", **dispatch)
+            results = parallel(delayed(_numbered)(function, k, item) for k, item in enumerate(items))
+            with contextlib.closing(results):
+                yield from (result for result in results if result is not None)
+
+    def results(
+        self,
+        function: Callable[[Item], Any],
+        items: Sequence[Item],
+        tries: int = 2,
+        trace: Callable[[Item], Any] = lambda item: True,
+    ) -> Generator[tuple[Item, Any], None, None]:
+        """(item, result) as they are done; None for an item whose worker was killed each of the `tries` times.
+
+        `trace` tells what an item has left that was in work when a worker was killed: False where it had not begun,
+        True where it had, or its result. Raises `UserError` where workers are killed before they begin.
+        """
+        suspects = yield from self._side_by_side(function, items, trace)
+        for _ in range(tries - 1):
+            suspects = yield from replace(self, n_jobs=1, apart=True)._side_by_side(function, suspects, trace)
+        yield from ((item, None) for item in suspects)
+
+    def _side_by_side(
+        self, function: Callable[[Item], Any], items: Sequence[Item], trace: Callable[[Item], Any]
+    ) -> Generator[tuple[Item, Any], None, list[Item]]:
+        """Yield results and return the items that were in work when a worker was killed."""
+        left, suspects, barren = dict(enumerate(items)), [], 0
+        while left:
+            barren += 1
+            keys, working = list(left), set[int]()
+            with contextlib.suppress(BrokenExecutor):
+                for k, result in self.completed(function, _noted(left, keys, working), len(keys)):
+                    working.discard(k)
+                    barren = 0
+                    yield left.pop(keys[k]), result
+            for key in [keys[k] for k in sorted(working)]:
+                state = trace(left[key])
+                if state is False:
+                    continue
+                barren, item = 0, left.pop(key)
+                if state is True:
+                    suspects.append(item)
+                else:
+                    yield item, state
+            if barren == BARREN:
+                raise UserError("worker processes are killed before they begin: is there enough memory for them?")
+        return suspects
+
+    @contextlib.contextmanager
+    def _chosen(self) -> Iterator[None]:
+        """The backend, for the calls of joblib within."""
+        from joblib import parallel_config
+
+        with contextlib.ExitStack() as stack:
+            if self.backend == "dask":
+                from tractexp.compat.joblib_dask import Dask
+
+                chosen = {"backend": Dask(client=stack.enter_context(dask_client(self.n_jobs, self.address)))}
+            elif self.backend == "loky":
+                chosen = {"backend": "loky", "inner_max_num_threads": 1, "initializer": _begin}
+            else:
+                chosen = {"backend": self.backend}
+            stack.enter_context(parallel_config(**chosen))
+            yield
+
+
+def _numbered(function: Callable[[Any], Any], k: int, item: Any) -> tuple[int, Any]:
+    return k, function(item)
+
+
+def _noted(left: dict[int, Item], keys: Sequence[int], working: set[int]) -> Iterator[Item]:
+    """The items by their keys; the position of one that is taken is in work from then on."""
+    for k, key in enumerate(keys):
+        working.add(k)
+        yield left[key]
 
 
 @contextlib.contextmanager
-def processes(n: int) -> Iterator[Executor]:
-    """An executor on `n` processes of their own, which end with the block, whatever they are doing."""
-    before = set(multiprocessing.active_children())
-    context = multiprocessing.get_context("spawn")  # a fork would copy threads' locks, as MLflow's
-    executor = ProcessPoolExecutor(min(n, MOST), context, initializer=_begin)
-    try:
-        yield executor
-    finally:  # at a good end as well: the jobs' ends are on disk, and a worker takes a while to leave
-        for process in set(multiprocessing.active_children()) - before:
-            process.terminate()
-        executor.shutdown(cancel_futures=True)
+def _quiet() -> Iterator[None]:
+    """Without two warnings of joblib's.
+
+    A worker that has grown by 300 MB ends between two calls, and another takes its place. Joblib warns of it in the
+    thread that minds the workers: where warnings are errors that thread ends, and the calls never do. The other one
+    says that results are not used where this process is ended.
+    """
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "A worker stopped while some jobs were given", UserWarning)
+        warnings.filterwarnings("ignore", ".*tasks (have been|which were still)", UserWarning)
+        yield
 
 
 def _begin() -> None:
@@ -40,24 +156,20 @@ def _begin() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     if parent is not None:
-        threading.Thread(target=lambda: (parent.join(), os._exit(1)), daemon=True).start()
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: Any) -> None:
+    if os.name == "nt":
+        parent.join()
+    while os.name != "nt" and os.getppid() == parent.pid:  # elsewhere loky hands down nothing to wait for
+        time.sleep(WATCH)
+    os._exit(1)
 
 
 @contextlib.contextmanager
-def replaced() -> Iterator[None]:
-    """Around `joblib.Parallel`: a worker that has grown by 300 MB ends between two jobs, and another takes its place.
-
-    joblib warns of it in the thread that minds the workers. Where warnings are errors it is the thread that ends, and
-    the jobs never do.
-    """
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "A worker stopped while some jobs were given", UserWarning)
-        yield
-
-
-@contextlib.contextmanager
-def dask_cluster(n: int, address: str | None) -> Iterator[Executor]:
-    """An executor on the Dask cluster at `address`, or on one of our own with `n` workers.
+def dask_client(n_jobs: int, address: str | None) -> Iterator[Any]:
+    """A client of the Dask cluster at `address`, or of one of our own.
 
     Raises `UserError` where Dask is not installed or no scheduler answers.
     """
@@ -68,16 +180,21 @@ def dask_cluster(n: int, address: str | None) -> Iterator[Executor]:
         raise UserError(
             "hydra.launcher.backend=dask needs Dask, which is not installed: pip install 'tractexp[dask]'"
         ) from None
+    import logging
+
+    from joblib import cpu_count
+
     loud = logging.getLogger("distributed")  # its remarks on every worker that comes or goes would tear the bar
     loud.propagate, loud.handlers = False, [logging.NullHandler()]
     with contextlib.ExitStack() as stack:
         stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 0}))  # we count ourselves
         if address is None:
             local: Any = LocalCluster  # its annotations know neither a cluster without a dashboard nor its address
+            n = n_jobs if n_jobs > 0 else cpu_count()
             cluster = local(n_workers=n, threads_per_worker=1, dashboard_address=None, silence_logs=50)
             address = stack.enter_context(cluster).scheduler_address
         try:
             client = stack.enter_context(Client(address, timeout="10s"))
         except (OSError, ValueError) as error:
             raise UserError(f"hydra.launcher.address={address}: no Dask scheduler answers there ({error})") from error
-        yield client.get_executor(pure=False)
+        yield client

@@ -21,8 +21,7 @@ EXTEND = """
 def write(folder: Path) -> Path:
     """Write the page into a folder and return its path."""
     calls = [_entry(getattr(tractexp, name), f"tractexp.{name}") for name in PUBLIC]
-    elsewhere = {*PUBLIC, *extend.SYMBOLIC}
-    others = {name: getattr(extend, name) for name in extend.__all__ if name not in elsewhere}
+    others = {name: getattr(extend, name) for name in extend.__all__ if name not in PUBLIC}
     bases = [_entry(what, f"tractexp.extend.{name}") for name, what in others.items() if _told(what)]
     return files.write(folder / "api.md", "\n".join([TITLE, *calls, EXTEND, *bases]))
 

@@ -1,8 +1,13 @@
 """What a recorder does to P and Q, compiled: every candidate passes through it, as often as it is simulated."""
 
+import math
+import threading
+
 import numpy as np
 
 from tractexp.extend import Stencil
+
+_space = threading.local()  # memory used again: the system takes longer to give it anew than the loops take
 
 
 def earlier(y, lag, out):
@@ -80,7 +85,8 @@ def _averaged(y, window, out):
     beyond = whole.max(initial=0) + 1
     wide = _padded(y, beyond, edge=True)
     ahead, behind = beyond + whole, beyond - whole
-    arrays = dict.fromkeys(("ahead", "behind"), wide) | dict.fromkeys(("to_ahead", "to_behind"), np.cumsum(wide, -1))
+    sums = np.cumsum(wide, -1, out=_room("sums", wide.shape))
+    arrays = dict.fromkeys(("ahead", "behind"), wide) | dict.fromkeys(("to_ahead", "to_behind"), sums)
     shifts = {"ahead": ahead, "behind": behind, "to_ahead": ahead, "to_behind": behind}
     _written(MEAN, out, shifts, arrays, {"r": window / 2 - whole, "each": 1 / window})
 
@@ -115,17 +121,26 @@ MEAN = Stencil(_mean, rows=("ahead", "behind", "to_ahead", "to_behind"), numbers
 
 
 def _padded(y, beyond, edge=False):
-    """y (..., N) with so many samples more at both ends: its first and last, or 0."""
-    wide = np.empty((*y.shape[:-1], y.shape[-1] + 2 * beyond))
+    """y (..., N) with so many samples more at both ends: its first and last, or 0. Rows of candidates share a room."""
+    shape = (*y.shape[:-1], y.shape[-1] + 2 * beyond)
+    wide = _room("wide", shape) if y.ndim > 1 else np.empty(shape)
     wide[..., beyond:-beyond] = y
     wide[..., :beyond], wide[..., -beyond:] = (y[..., :1], y[..., -1:]) if edge else (0.0, 0.0)
     return wide
 
 
+def _room(name, shape):
+    """An array of this thread's, whose content lasts until it is asked for again."""
+    size = math.prod(shape)
+    if getattr(_space, name, np.empty(0)).size < size:
+        setattr(_space, name, np.empty(size))
+    return getattr(_space, name)[:size].reshape(shape)
+
+
 def _written(stencil, out, shifts, arrays, numbers, **shared):
     """Write a stencil of arrays (C, n, M), each of the n shifted by itself, to out (C, n, N)."""
     channels, n = out.shape[:2]
-    rows = np.empty((channels * n, out.shape[-1]))
+    rows = _room("rows", (channels * n, out.shape[-1]))
     given = {name: array.reshape(len(rows), -1) for name, array in arrays.items()}
     given |= {name: np.tile(number, channels) for name, number in numbers.items()}
     stencil(rows, {name: np.tile(shift, channels) for name, shift in shifts.items()}, **given, **shared)

@@ -46,6 +46,6 @@ class _Trip(Effect):
 
     def edit(self, eq, **values):
         share, *timers = values.values()
-        gone = opened(eq, *timers, self.stage)  # pyright: ignore[reportCallIssue] # as many as a subclass declares
+        gone = opened(eq, *timers, stage=self.stage)
         for site in self.wave_sites if eq.waves else self.phasor_sites:
             eq.edit(site, lambda drawn: drawn * (1 - share * gone))

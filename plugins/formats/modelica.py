@@ -67,7 +67,7 @@ BEFORE = {
 
 def _equations(eq):
     """(left, right) of each equation, as Modelica text; what the static load draws before the event is one name."""
-    from tractexp.extend import Symbol
+    from tractexp.extend.symbols import Symbol
 
     kept = {eq.P_s0: Symbol("P_left", real=True), eq.Q_s0: Symbol("Q_left", real=True)}
     named = {symbol: Symbol(name, real=True) for symbol, name in zip(kept.values(), ("P_s0", "Q_s0"), strict=True)}
@@ -80,7 +80,7 @@ def _equations(eq):
 
 def _starts(eq):
     """Each real state and the name of its value before the event."""
-    from tractexp.extend.formats import phasor_parts, start_symbol
+    from tractexp.extend.symbols import phasor_parts, start_symbol
 
     for state in eq.states:
         if state.is_real:

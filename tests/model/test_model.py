@@ -15,14 +15,14 @@ import tractexp
 from tractexp.errors import UserError
 from tractexp.kernel.layout import LANES
 from tractexp.model import operations
-from tractexp.model.drive import Drive, Excitation
+from tractexp.model.drive import PHASORS, WAVES, Drive, Excitation
 from tractexp.model.model import compose
 from tractexp.model.parts import Static
 from tractexp.model.sites import SITES
 from tractexp.model.states import State
 from tractexp.model.symbols import phasor_parts, real_symbol, start_symbol, vector_symbol
 from tractexp.parameter import Parameter
-from tractexp.plugin import get
+from tractexp.plugin import discover, get
 
 OMEGA_S = 2 * np.pi * 50
 TRUTH = np.array([0.12, 0.25, 0.9, 0.006, 0.55, 1.4, 3.0])  # T', X', C, M, T_m, p_v, q_v
@@ -305,7 +305,7 @@ def test_a_kernel_is_shared_by_processes_that_start_together(tmp_path):
     environment = os.environ | {"TRACTEXP_CACHE_DIR": str(tmp_path)}
     started = [subprocess.Popen([sys.executable, "-c", program], env=environment) for _ in range(3)]
     assert [p.wait() for p in started] == [0, 0, 0]
-    assert len(list(tmp_path.glob("code_*.kept"))) == 1
+    assert len(list(tmp_path.glob("code/*.entry"))) == 1
     assert len(list(tmp_path.iterdir())) == 2  # its text, too
     assert not list(tmp_path.glob("*.part"))
 
@@ -426,3 +426,14 @@ def test_whether_a_declared_steady_state_is_exact_is_found(motor, exact):
 
     of = compose(get("model/motor", motor)(), get("model/static", "exponential")())
     assert (lower(of.equations).rest is None) == exact
+
+
+@pytest.mark.parametrize("motor", sorted(discover()["model/motor"]))
+def test_a_kernel_is_written_of_every_motor_with_the_effects_that_every_fit_compares_it_with(motor):
+    """Rival structures: behind a resistance the first-order motor's current is a quotient that SymPy does not split."""
+    parts = get("model/motor", motor)(), get("model/static", "exponential")()
+    domains = [d for d in (PHASORS, WAVES) if not any(p.phasors_only if d == WAVES else p.waves_only for p in parts)]
+    effects = [e for e in (get("effect", name)() for name in discover()["effect"]) if e.rival]
+    for domain, effect in itertools.product(domains, effects):
+        if compose(*parts, domain=domain).acceptance(effect).refusal is None:
+            assert "define void @run(" in compose(*parts, [effect], domain=domain).source

@@ -46,6 +46,7 @@ def test_a_search_from_another_folder_under_another_hash_seed_is_the_same(tmp_pa
 
 def test_the_page_tells_what_the_stored_run_found():
     stored = json.loads((BENCHMARKS / "bits.json").read_text(encoding="utf-8"))
+    assert "vectors of" in stored.pop("processor")
     powers = stored.pop("P and Q on a generic processor [pu]")
     page = " ".join(PAGE.read_text(encoding="utf-8").split())
     generic = {name: rows.pop("generic processor") for name, rows in stored.items() if isinstance(rows, dict)}

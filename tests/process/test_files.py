@@ -126,14 +126,7 @@ def test_what_must_last_is_on_the_disk_before_it_has_its_name(tmp_path, monkeypa
     assert told == ["named"]
 
 
-def test_a_journal_that_was_cut_short_goes_on_with_a_line_of_its_own(tmp_path):
-    (tmp_path / "rows").write_bytes(b'{"a": 1}\n{"b"')
-    with files.Growing(tmp_path / "rows") as rows:
-        rows.add('{"c": 3}')
-    assert (tmp_path / "rows").read_text().splitlines() == ['{"a": 1}', '{"b"', '{"c": 3}']
-
-
-def test_a_full_disk_is_a_sentence_for_a_journal_and_nothing_for_what_is_printed(tmp_path):
+def test_a_full_disk_is_nothing_for_what_is_printed(tmp_path):
     full = Path("/dev/full")
     if not full.exists():
         pytest.skip("there is no /dev/full here")
@@ -141,8 +134,6 @@ def test_a_full_disk_is_a_sentence_for_a_journal_and_nothing_for_what_is_printed
     with files.Transcript(tmp_path / "said") as said:
         assert said.write("words\n") == 6
         said.flush()
-    with files.Growing(tmp_path / "said") as rows, pytest.raises(UserError, match="cannot be written: No space left"):
-        rows.add("a line")
 
 
 def test_a_lock_is_waited_for_no_longer_than_told(tmp_path):

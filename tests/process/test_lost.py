@@ -1,7 +1,6 @@
 """Nothing is lost: by a kill, by a signal, by a store that is away, locked, cut short or of another version."""
 
 import contextlib
-import io
 import json
 import os
 import shutil
@@ -338,49 +337,6 @@ time.sleep(60)"""
 
 
 # Work that goes on where it stopped
-
-
-def test_a_fit_of_an_investigation_is_read_back_to_the_bit_and_never_for_another(tmp_path, monkeypatch):
-    from tractexp.identification import shelf
-
-    monkeypatch.setattr(shelf, "cache_folder", lambda: tmp_path)
-    made = []
-
-    def make():
-        made.append(1)
-        return np.array([1 / 3]), np.array(["a"])
-
-    key = shelf.told(np.arange(3.0), [("a", 1)], {"b": None})
-    for _ in range(2):
-        number, text = shelf.arrays("descents", key, make)
-        assert (number[0], text.tolist(), len(made)) == (1 / 3, ["a"], 1)
-    others = [
-        (np.arange(3.0), [("a", 2)], {"b": None}),
-        (np.arange(3), [("a", 1)], {"b": None}),
-        (np.arange(3.0).reshape(3, 1), [("a", 1)], {"b": None}),
-        (np.arange(3.0), [("a", 1)], {"b": 0}),
-    ]
-    assert len({key, *(shelf.told(*other) for other in others)}) == 5
-    (file,) = (tmp_path / "descents").iterdir()
-    file.write_bytes(file.read_bytes()[:50])
-    assert shelf.damaged(tmp_path) == [file]
-    shelf.arrays("descents", key, make)
-    assert len(made) == 2
-    assert shelf.damaged(tmp_path) == []
-
-
-def test_what_a_shelf_holds_is_never_unpickled(tmp_path, monkeypatch):
-    from tractexp import cache
-    from tractexp.identification import shelf
-
-    monkeypatch.setattr(shelf, "cache_folder", lambda: tmp_path)
-    written = io.BytesIO()
-    np.savez(written, planted=np.array([{"an": "object"}], dtype=object))
-    file = shelf.place("descents", "planted")
-    file.parent.mkdir()
-    cache.write(file, written.getvalue())
-    assert cache.read(file) == written.getvalue()
-    assert shelf.read(file) is None
 
 
 # A server on PostgreSQL

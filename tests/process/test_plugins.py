@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import start_command
 
 from tractexp import plugin as framework
 from tractexp.errors import UserError
@@ -27,12 +28,6 @@ pytestmark = pytest.mark.usefixtures("registry_as_it_was")
 TESTS = Path(__file__).parent
 PAGE = TESTS.parents[1] / "docs" / "plugins.md"
 FRAMEWORK = TESTS.parents[1] / "tractexp"
-
-
-def tractexp(*arguments, cwd, **environment):
-    """Run the command line in a folder."""
-    command = [sys.executable, "-m", "tractexp", *arguments]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, env=os.environ | environment)
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +44,7 @@ def acme(tmp_path_factory):
 
 
 def test_a_second_package_adds_a_load_an_optimizer_and_an_experiment(acme, tmp_path):
-    done = tractexp(
+    done = start_command(
         "experiment=acme_trial", "tracking.enabled=false", "hydra.run.dir=run", cwd=tmp_path, PYTHONPATH=str(acme)
     )
     assert done.returncode == 0, done.stderr
@@ -61,9 +56,9 @@ def test_a_second_package_adds_a_load_an_optimizer_and_an_experiment(acme, tmp_p
 
 
 def test_a_second_package_is_in_the_help_and_checked_like_ours(acme, tmp_path):
-    done = tractexp("--help", cwd=tmp_path, PYTHONPATH=str(acme))
+    done = start_command("--help", cwd=tmp_path, PYTHONPATH=str(acme))
     assert "acme_descent" in done.stdout
-    done = tractexp("optimizer=acme_descent", "optimizer.tries=0", cwd=tmp_path, PYTHONPATH=str(acme))
+    done = start_command("optimizer=acme_descent", "optimizer.tries=0", cwd=tmp_path, PYTHONPATH=str(acme))
     assert done.returncode == 2
     assert done.stderr == "tractexp: optimizer.tries=0 is out of range: it must be at least 1\n"
 
@@ -169,7 +164,7 @@ def test_the_documentation_tells_every_word_of_the_equations_and_every_site(tmp_
 
 
 def test_without_the_package_its_names_are_unknown(tmp_path):
-    done = tractexp("optimizer=acme_descent", cwd=tmp_path)
+    done = start_command("optimizer=acme_descent", cwd=tmp_path)
     assert done.returncode == 2
     assert "there is no such choice" in done.stderr
 
@@ -368,8 +363,8 @@ def test_a_box_maps_names_to_the_unit_cube_and_back():
 
 def test_a_second_package_replaces_a_shipped_default(acme, tmp_path):
     shown = ("task=export", "--cfg", "job", "--package", "task.format")
-    assert "andes" in tractexp(*shown, cwd=tmp_path).stdout
-    done = tractexp(*shown, cwd=tmp_path, PYTHONPATH=str(acme))
+    assert "andes" in start_command(*shown, cwd=tmp_path).stdout
+    done = start_command(*shown, cwd=tmp_path, PYTHONPATH=str(acme))
     assert "modelica" in done.stdout, done.stderr
 
 

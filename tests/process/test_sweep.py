@@ -256,7 +256,7 @@ def test_a_bad_value_fails_its_job_with_the_same_sentence_as_alone(tmp_path):
     assert len(results(tmp_path / "sweep")) == 1
 
 
-@pytest.mark.parametrize("backend", ["processes", pytest.param("dask", marks=needs_dask)])
+@pytest.mark.parametrize("backend", ["processes", "loky", pytest.param("dask", marks=needs_dask)])
 def test_the_job_of_a_killed_worker_is_run_again_and_its_neighbors_are_not_blamed(backend, site, tmp_path):
     launcher = (TWO, f"hydra.launcher.backend={backend}")
     done = tractexp("-m", *SILENT, *launcher, "optimizer=dies,pso", "seed=range(0,3)", HERE, cwd=tmp_path, site=site)
@@ -284,7 +284,8 @@ def test_a_job_that_kills_its_worker_every_time_is_listed_and_the_others_finish(
 
 def test_results_are_the_same_bits_for_any_number_of_workers_and_backend(logged, tmp_path):
     _, sweep, _ = logged
-    launchers = [("hydra.launcher.n_jobs=1",), ("hydra/launcher=basic",)]  # two processes ran `logged`
+    threads = ("hydra.launcher.backend=threading", TWO)
+    launchers = [("hydra.launcher.n_jobs=1",), threads, ("hydra/launcher=basic",)]  # two processes ran `logged`
     if importlib.util.find_spec("distributed") is not None:
         launchers.append(("hydra/launcher=dask", TWO))
     for k, launcher in enumerate(launchers):
@@ -348,11 +349,10 @@ def test_a_sweep_that_is_ended_keeps_what_is_finished_and_closes_its_parent(way,
 
 def test_workers_end_with_a_parent_that_is_killed():
     script = """
-import os, time
-from tractexp.workers import processes
-with processes(1) as executor:
-    print(executor.submit(os.getpid).result(), flush=True)
-    executor.submit(time.sleep, 600).result()
+import time
+from tractexp.workers import Workers
+for _ in Workers(1, apart=True).completed(time.sleep, [0, 600], 2):
+    print(flush=True)
 """
     process = subprocess.Popen(
         [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
@@ -368,7 +368,10 @@ with processes(1) as executor:
         (["seed=range(3,3)"], "the sweep has no jobs: seed=range(3,3) is empty; a range ends before its second number"),
         (["optimizer.producers=interval(0,1)"], "optimizer.producers=interval(0,1): a sweep over a grid needs values"),
         (["optimizer=glob(nothing*)"], "the sweep has no jobs: optimizer=glob(nothing*) is empty"),
-        (["hydra.launcher.backend=threads"], "hydra.launcher.backend=threads is not one of processes, dask"),
+        (
+            ["hydra.launcher.backend=threads"],
+            "hydra.launcher.backend=threads is not one of dask, loky, multiprocessing, sequential, threading",
+        ),
         (["hydra.launcher.n_jobs=0"], "hydra.launcher.n_jobs=0 is out of range: it must be at least 1"),
         (["optimizer=issa,isa"], "optimizer=isa: there is no such choice; did you mean 'issa'?"),
         (["seed=1,abc"], "seed=abc is not a whole number"),

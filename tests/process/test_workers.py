@@ -1,27 +1,85 @@
-"""Worker processes that are replaced while jobs are waiting."""
+"""Worker processes: killed ones, one by itself, none that begins, and those that are replaced."""
 
+import os
 import subprocess
 import sys
+import time
+from concurrent.futures import BrokenExecutor
+from pathlib import Path
+
+import pytest
+
+from tractexp.errors import UserError
+from tractexp.workers import BARREN, Workers
 
 GROWING = """
 import sys
 import time
-from joblib import Parallel, delayed
-from tractexp.workers import replaced
+from tractexp.workers import Workers
 
 def grow(k):  # past the 300 MB at which joblib lets a worker end; it looks once in a second
     sys.__dict__.setdefault("kept", []).append(b"x" * 150_000_000)
     time.sleep(1.1)
     return k
 
-with replaced():
-    print(Parallel(n_jobs=2)(delayed(grow)(k) for k in range(10)))
+print(sorted(k for _, k in Workers(2).completed(grow, range(10), 10)))
 """
 
 
 def test_jobs_end_where_warnings_are_errors_and_their_workers_grow():
-    """Without `replaced` the last jobs never end: this one is killed."""
+    """With joblib's warning the last jobs never end: this one is killed."""
     done = subprocess.run([sys.executable, "-W", "error", "-c", GROWING], capture_output=True, text=True, timeout=100)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split("\n")[0] == str(list(range(10)))
     assert "A worker stopped" not in done.stderr
+
+
+def counted(case):
+    """Note in a file that a call has begun; the third one kills its worker."""
+    folder, k = case
+    with Path(folder, str(k)).open("a") as file:
+        file.write("x")
+    if k == 2:
+        os._exit(9)
+    time.sleep(0.05)
+    return k, os.getpid()
+
+
+@pytest.mark.parametrize("n_jobs", [1, 2])
+def test_a_call_that_kills_its_worker_is_blamed_and_no_other(n_jobs, tmp_path):
+    cases = [(tmp_path, k) for k in range(5)]
+    ends = {case[1]: result for case, result in Workers(n_jobs, apart=True).results(counted, cases, tries=3)}
+    assert {k: result and result[0] for k, result in ends.items()} == {0: 0, 1: 1, 2: None, 3: 3, 4: 4}
+    assert os.getpid() not in {result[1] for result in ends.values() if result}  # nor with one worker
+    begun = {k: len((tmp_path / str(k)).read_text()) for k in range(5)}
+    assert begun[2] == 3
+    assert all(1 <= begun[k] <= 2 for k in (0, 1, 3, 4))
+    if n_jobs == 1:
+        assert {begun[k] for k in (0, 1, 3, 4)} == {1}
+
+
+class Killed(Workers):
+    """Workers that are killed as soon as they start, as where there is no memory for them."""
+
+    def completed(self, function, items, count):
+        next(iter(items))
+        raise BrokenExecutor
+        yield
+
+
+def test_workers_that_never_begin_are_refused_in_a_sentence():
+    looks = []
+    with pytest.raises(UserError, match="killed before they begin: is there enough memory for them"):
+        list(Killed().results(abs, [1, 2], trace=lambda item: bool(looks.append(item))))
+    assert looks == [1] * BARREN
+
+
+def test_what_a_call_had_left_is_its_result():
+    ends = list(Killed().results(abs, [1, 2], trace=lambda item: f"end of {item}"))
+    assert ends == [(1, "end of 1"), (2, "end of 2")]
+
+
+def test_libraries_use_one_thread_in_each_worker(monkeypatch):
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
+    names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+    assert sorted(Workers(2).completed(os.getenv, names, 3)) == [(0, "1"), (1, "1"), (2, "1")]

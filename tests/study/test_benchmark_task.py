@@ -133,13 +133,14 @@ def test_running_times_and_shares_are_those_worked_out_by_hand(by_hand):
 
 
 def test_page_and_json_hold_the_numbers_and_load_nothing_from_elsewhere(by_hand, tmp_path):
-    path = report.write_page(by_hand, tmp_path / "benchmark.html")
+    result = BenchmarkResult(by_hand, {"a": {}, "b": {}})
+    path = result.report().save(tmp_path / "benchmark.html")
     page = read(path)
     assert "Take a in dimension 2: it met most targets, 88% against 12% of b." in page.words
     assert path.read_text().count('class="chart"') == 3  # over all functions, and over each of two groups
     for part in ("180 (1/2)", "160 (1/2)", "–", "88%", "12%", "f16 Weierstrass", "1 of 2"):
         assert part in page.words, part
-    content = json.loads(BenchmarkResult(by_hand, {"a": {}, "b": {}}).write_results(tmp_path)[0].read_text())
+    content = json.loads(result.write_results(tmp_path)[0].read_text())
     assert content["running_times"][1] == {"optimizer": "a", "dimension": 2, "function": 16, "ert": [65.0, 180.0]}
     assert content["running_times"][3]["ert"] == [None, None]
     assert content["runs"][3]["hits"] == [90.0, None]

@@ -516,7 +516,7 @@ def test_every_runs_parameters_are_drawn_over_their_bounds(polished, problem):
 
 @pytest.mark.parametrize(("count", "each"), [(3, 0), (7, 0), (20, 20)])
 def test_of_many_variants_the_first_are_in_color_and_each_has_a_chart(count, each):
-    from tractexp.report import style
+    from tractexp.blocks import style
     from tractexp.studies.comparison.charts import ecdf, fitness
 
     result = compared(samples({f"v{k:02}": 1.5**k for k in range(count)}, seeds=range(6)))

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from command_line import run_command, start_command
 
+from tractexp.blocks import Report
+from tractexp.blocks.markdown import markdown
 from tractexp.errors import UserError
 from tractexp.identification.generalization import by_depth, mean_residual
-from tractexp.report.markdown import Markdown
 from tractexp.studies.api.paper import PARTS
 from tractexp.studies.paper import claims, equations, maps, printed, searches, valleys, why
 from tractexp.studies.paper.study import Shares, Study
@@ -247,11 +248,10 @@ def test_workers_change_no_result():
 
 @pytest.fixture
 def memory(tmp_path, monkeypatch):
-    """A cache of its own, in which nothing is remembered yet; the kernels are those of the others."""
+    """A store of its own for searches, empty; the kernels are those of the others."""
+    from tractexp import store
 
-    from tractexp.identification import shelf
-
-    monkeypatch.setattr(shelf, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(store.SEARCHES, "folder", tmp_path)
     return tmp_path / "searches"
 
 
@@ -291,20 +291,20 @@ def test_a_search_of_anything_else_is_never_read_back(memory, monkeypatch):
     assert searched(monkeypatch)[1] == 2
 
 
-def test_a_damaged_memory_is_made_anew_and_the_oldest_are_forgotten(memory, monkeypatch):
-    from tractexp.identification import shelf
+def test_a_damaged_search_is_made_again_and_the_oldest_are_forgotten(memory, monkeypatch):
+    from tractexp import store
 
     searched(monkeypatch)
     for k, path in enumerate(memory.iterdir()):
         path.write_bytes([b"no zip", path.read_bytes()[:200]][k])
     assert searched(monkeypatch)[1] == 2
     assert searched(monkeypatch)[1] == 0
-    monkeypatch.setitem(shelf.SHELVES, "searches", 3)
+    monkeypatch.setattr(store.SEARCHES, "limit", 3)
     searched(monkeypatch, seeds=5)
     assert len(list(memory.iterdir())) == 3
 
 
-def test_a_search_that_a_clock_may_end_is_not_remembered(memory, monkeypatch):
+def test_a_search_that_a_clock_may_end_is_not_stored(memory, monkeypatch):
     limits = searches.Limits(150, seconds=60.0)
     searches.run(_recipe, {"pso": {"name": "pso"}}, 1, limits, workers=1)
     assert not memory.exists()
@@ -318,7 +318,7 @@ def test_a_figure_of_one_run_makes_one_search(memory, tmp_path, monkeypatch):
     for _ in range(2):
         study = Study(_recipe, {}, _recipe().events, (), 30, workers=1, limits=searches.Limits(150), tell=told.append)
         study.prepare(["figure8"])
-        page.sheets(study, ["figure8"], claims.claims(study, ["figure8"]))
+        page.report(study, ["figure8"], claims.claims(study, ["figure8"]))
     assert made == [(["issa"], 1)] * 2
     again = "  1 of them were made before by the same code on the same records, and are read back"
     searched_, wrote = "searches of issa: seed 0, 300 iterations of 50", "writing Figure 8"
@@ -671,13 +671,13 @@ def test_the_equations_alone_take_no_search(tmp_path, monkeypatch):
     study = Study(_recipe, {}, _recipe().events, (), 30)
     judged = claims.claims(study, ["equations"])
     assert [claim.verdict for claim in judged] == [claims.REFUTED] * 2
-    text = page.sheets(study, ["equations"], judged)[1].write(tmp_path / "paper.md").read_text()
+    text = markdown(page.report(study, ["equations"], judged))
     assert text.count("| does not agree |") == sum(not check.holds for check in equations.checks())
 
 
 def test_markdown_escapes_what_would_be_markup():
-    made = Markdown("t").table(["a", "b"], [["x|y", "_z_"]])
-    assert made._parts[-1] == "| a | b |\n| --- | ---: |\n| x\\|y | \\_z\\_ |"
+    report = Report("t").table(["a", "b"], [["x|y", "_z_"]])
+    assert markdown(report).endswith("\n\n| a | b |\n| --- | ---: |\n| x\\|y | \\_z\\_ |\n")
 
 
 # Refusals

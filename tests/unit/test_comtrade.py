@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from tractexp.errors import UserError
 from tractexp.filetypes import comtrade
 from tractexp.record import foreign
-from tractexp.recording import Channel, Recording, Segment, Status
+from tractexp.recording import Channel, Recording, Segment, StatusChannel
 
 CFG = """Substation,device,1999
 8,6A,2D
@@ -144,7 +144,9 @@ def recordings(draw):
             )
         )
     states = [
-        Status(draw(word) or "s", np.array(draw(st.lists(st.integers(0, 1), min_size=n, max_size=n))), normal=k % 2)
+        StatusChannel(
+            draw(word) or "s", np.array(draw(st.lists(st.integers(0, 1), min_size=n, max_size=n))), normal=k % 2
+        )
         for k in range(draw(st.integers(0, 20)))
     ]
     half = n // 2

@@ -16,7 +16,7 @@ from tractexp.filetypes.tidy import recording_of, restored, unique, write_record
 from tractexp.plugin import build
 from tractexp.record import Base, Record
 from tractexp.record.window import Window
-from tractexp.recording import Channel, Recording, Segment, Status
+from tractexp.recording import Channel, Recording, Segment, StatusChannel
 
 TABLES = [".csv", ".parquet"]
 NAMES = st.text(st.characters(codec="utf-8", exclude_categories=("C", "Z")), min_size=1, max_size=12)
@@ -35,7 +35,10 @@ def a_recording(**changed):
         Channel("IA, feeder", rng.normal(size=n), "kA", "current", "B"),
         Channel("电压", rng.normal(size=n).astype("<f4"), "kV", "voltage", "C"),
     ]  # fmt: skip
-    status = [Status("trip", (wave > 0).astype(np.uint8), "A", "line", 1), Status("cb", np.arange(n) % 8, bit=2)]
+    status = [
+        StatusChannel("trip", (wave > 0).astype(np.uint8), "A", "line", 1),
+        StatusChannel("cb", np.arange(n) % 8, bit=2),
+    ]
     segments = [Segment(0, 1000, 1200.0, 0.0), Segment(1000, n, 1200.0, 0.9)]
     known = {"station": "North", "device": "7", "start": datetime(2024, 3, 31, 1, 2, 3, 456789), "trigger": 0.25}
     known |= {"notes": ["line 3 mended"], "extra": {"format": "X", "stamps": np.arange(5, dtype="<u4")}}

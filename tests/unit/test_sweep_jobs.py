@@ -1,7 +1,10 @@
 """The parts of a sweep one by one: what a job is, how its end is kept, and what is told while others run."""
 
+import io
 import json
 import re
+import sys
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,6 +12,7 @@ import pytest
 
 from tractexp.sweep import launcher, progress
 from tractexp.sweep.job import SweepJob, shared
+from tractexp.sweep.output import printing_to
 from tractexp.sweep.status import FAILED, FILE, FINISHED, RUNNING, Status, read
 
 
@@ -103,10 +107,32 @@ def test_a_terminal_shows_each_variant_under_a_bar(jobs, monkeypatch):
 
 
 def test_the_end_of_a_job_whose_worker_did_not_answer_is_what_it_had_written(jobs):
-    noted = []
-    note = lambda end, one: noted.append((end.status, one.config["seed"]))  # noqa: E731
     jobs[0].status.write(jobs[0].folder)  # begun, not ended
-    ended(jobs[1], FAILED)
-    ended(jobs[2])
-    assert [launcher._end(one, note) for one in jobs] == [RUNNING, FAILED, FINISHED, None]
-    assert noted == [(FAILED, 1), (FINISHED, 2)]
+    ends = [ended(jobs[1], FAILED), ended(jobs[2])]
+    assert [launcher._trace(one) for one in jobs] == [True, *ends, False]
+
+
+def test_jobs_in_threads_print_into_their_own_files_and_what_is_beside_them_does_not(capsys):
+    begun = threading.Barrier(3)
+
+    def talk(output):
+        with printing_to(output):
+            begun.wait()
+            print("in", output.name, file=sys.stdout)
+            print("err", output.name, file=sys.stderr)
+            begun.wait()
+
+    outputs = [io.StringIO(), io.StringIO()]
+    for name, output in zip("ab", outputs, strict=True):
+        output.name = name
+    threads = [threading.Thread(target=talk, args=(output,)) for output in outputs]
+    for thread in threads:
+        thread.start()
+    begun.wait()
+    print("beside")
+    begun.wait()
+    for thread in threads:
+        thread.join()
+    assert [output.getvalue() for output in outputs] == ["in a\nerr a\n", "in b\nerr b\n"]
+    print("after")
+    assert capsys.readouterr() == ("beside\nafter\n", "")

@@ -1,5 +1,6 @@
 """A folder of recordings as a table: what happened in each file, to each load, and what is worth fitting."""
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.look import Listed
-from tractexp.api.surveying import kept, looked, states, writing
+from tractexp.api.surveying import keys, looked
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.errors import UserError, check_range
@@ -18,11 +19,12 @@ from tractexp.plugin import discover, get, plugin
 from tractexp.progress import Progress, counting, staged
 from tractexp.recording import archive
 from tractexp.report.survey import UNREAD
+from tractexp.store import Store
 
 if TYPE_CHECKING:
     from tractexp.identification.plan import ChosenEvent
 
-JOURNAL = "rows.jsonl"  # a line for each file that was looked at: its state then, and its rows
+ROWS = "rows"  # in the folder of `keep`: an entry for each file that was looked at
 CANDIDATES = 300  # events that are read again to be ranked: those of the greatest depth over noise
 LEAST_NOISE = 1e-4  # of P: what shows less is not told from what shows so much
 PICTURES = ("U_picture", "P_picture")
@@ -120,7 +122,7 @@ def survey(
 ) -> Surveyed:
     """Look at every file below a folder that can be read; what cannot be read is a row with the reason.
 
-    `cores` (all) processes look; `keep` is a folder where the rows of each file are kept as they come, so that the
+    `cores` (all) processes look; `keep` is a folder where the rows of each file are stored as they come, so that the
     next survey with it looks only at files that are new or changed. `informative` asks for so many events that tell
     most about `model` together (D-optimal), at `values` as `tractexp.plan` takes them. The model is as in
     `tractexp.identify`. Raises `UserError` for a folder that is not there or holds no file that can be read.
@@ -133,15 +135,14 @@ def survey(
     paths = list(archive.files(place))
     if not paths:
         raise UserError(f"data.path={folder} holds no file that can be read")
-    names = {path.relative_to(place).as_posix(): now for path, now in states(paths).items()}
-    journal = Path(keep) / JOURNAL if keep else None
-    known = kept(journal)
-    rows = {name: known[name][1] for name, now in names.items() if name in known and known[name][0] == now}
+    store, names = Store(ROWS, folder=Path(keep or "")), keys(place, paths)
+    entries = {name: store.read(key) for name, key in names.items()} if keep else {}
+    rows = {name: json.loads(entry) for name, entry in entries.items() if entry is not None}
     fresh = [name for name in names if name not in rows]
-    with counting("files", len(fresh), progress) as count, writing(journal) as write:
+    with counting("files", len(fresh), progress) as count:
         for name, made in looked(place, fresh, cores or _cores()):
             rows[name] = made
-            write(name, names[name], made)
+            store.write(names[name] if keep else "", json.dumps(files.plain(made), ensure_ascii=False).encode())
             count()
     content = {
         "folder": str(folder), "files": len(names), "looked_at": len(fresh), "about": ABOUT,

@@ -1,11 +1,9 @@
-"""The rows of a survey: made of one file, in worker processes, and kept in a journal as they come."""
+"""The rows of a survey: made of one file, in worker processes, and stored as they come."""
 
 import contextlib
-import json
+import functools
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Iterator, Sequence
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -18,7 +16,8 @@ from tractexp.errors import UserError
 from tractexp.recording import archive
 from tractexp.recording.overview import LoadEvent, Sight, View
 from tractexp.report.survey import QUIET, UNREAD
-from tractexp.workers import processes
+from tractexp.store import key
+from tractexp.workers import Workers
 
 Rows = list[dict[str, Any]]
 
@@ -26,7 +25,8 @@ COLUMNS = (
     "event", "file", "station", "load", "kind", "when", "start", "duration", "depth", "U2", "jump", "P_before",
     "Q_before", "P_after", "Q_after", "unit", "noise", "rate", "worth", "why", "command", "U_picture", "P_picture",
 )  # fmt: skip
-AHEAD = 4  # files given to each worker at a time
+KILLED = "the program was killed at this file, as where the computer's memory is too small for it"
+FEW = 2  # files that this process looks at sooner than others have started
 POINTS = 48  # of a small picture
 AROUND = (0.1, 0.3)  # s before and after an event in its picture
 LONGEST = 5.0  # s of an event there
@@ -99,90 +99,26 @@ def _few(values: np.ndarray) -> list[float | None]:
 def looked(folder: Path, names: Sequence[str], cores: int) -> Iterator[tuple[str, Rows]]:
     """(file, its rows) of files within a folder, as they are done, on so many processes.
 
-    A file at which a process dies is looked at again by itself; if that one dies too, its row says so.
+    A file at which a process is killed is looked at again by itself; if that one is killed too, its row says so.
     """
-    if cores == 1 or len(names) < 3:
-        yield from ((name, rows_of(str(folder), name)) for name in names)
-        return
-    left = list(names)
-    while left:
-        suspects: list[str] = []
-        with processes(min(cores, len(left))) as pool:
-            waiting: dict[Future[Rows], str] = {}
-            todo = iter(list(left))
-            try:
-                for name in todo:
-                    waiting[pool.submit(rows_of, str(folder), name)] = name
-                    if len(waiting) >= AHEAD * cores:
-                        for done, rows in _done(waiting):
-                            left.remove(done)
-                            yield done, rows
-                while waiting:
-                    for done, rows in _done(waiting):
-                        left.remove(done)
-                        yield done, rows
-            except BrokenProcessPool:
-                suspects = [name for name in left if name in {*waiting.values()}] or left[:1]
-        for name in suspects:
-            left.remove(name)
-            yield name, _alone(folder, name)
+    workers = Workers(cores if len(names) > FEW else 1)
+    with contextlib.closing(workers.results(functools.partial(rows_of, str(folder)), names)) as results:
+        for name, rows in results:
+            yield name, rows or [dict.fromkeys(COLUMNS) | {"file": name, "kind": UNREAD, "worth": False, "why": KILLED}]
 
 
-def _done(waiting: dict[Future[Rows], str]) -> list[tuple[str, Rows]]:
-    """What is done of what is waited for, which forgets it. Raises `BrokenProcessPool` and forgets nothing of it."""
-    ended, _ = wait(waiting, return_when=FIRST_COMPLETED)
-    made = [(future, future.result()) for future in ended if future.exception() is None]
-    if not made:
-        raise BrokenProcessPool
-    return [(waiting.pop(future), rows) for future, rows in made]
-
-
-def _alone(folder: Path, name: str) -> Rows:
-    try:
-        with processes(1) as pool:
-            return pool.submit(rows_of, str(folder), name).result()
-    except BrokenProcessPool:
-        why = "the program was killed at this file, as where the computer's memory is too small for it"
-        return [dict.fromkeys(COLUMNS) | {"file": name, "kind": UNREAD, "worth": False, "why": why}]
-
-
-def states(paths: Sequence[Path]) -> dict[Path, list[Any]]:
-    """What changes with each file: name, size and time of the files of its name, and the version of this program."""
+def keys(folder: Path, paths: Sequence[Path]) -> dict[str, str]:
+    """{file within the folder: key of its rows}: name, size and time of the files of its name, and this program."""
     from tractexp import __version__
 
     beside: dict[Path, list[Path]] = defaultdict(list)  # by folder and stem: each folder is listed once
-    for folder in {path.parent for path in paths}:
-        for path in sorted(folder.iterdir()):
-            beside[folder / path.stem].append(path)
-    found: dict[Path, list[Any]] = {}
-    for path in paths:
-        there = [(p, p.stat()) for p in beside[path.parent / path.stem] if p.is_file()]
-        found[path] = [__version__, *([p.name, told.st_size, told.st_mtime_ns] for p, told in there)]
-    return found
+    for place in {path.parent for path in paths}:
+        for path in sorted(place.iterdir()):
+            beside[place / path.stem].append(path)
+    names = {path: path.relative_to(folder).as_posix() for path in paths}
+    return {names[path]: key(__version__, names[path], _states(beside[path.parent / path.stem])) for path in paths}
 
 
-def kept(journal: Path | None) -> dict[str, tuple[list[Any], Rows]]:
-    """{file: (its state then, its rows)} of a journal; lines that were cut short are left out."""
-    found: dict[str, tuple[list[Any], Rows]] = {}
-    if journal is None or not journal.is_file():
-        return found
-    for line in journal.read_text(encoding="utf-8", errors="replace").splitlines():
-        with contextlib.suppress(ValueError, KeyError, TypeError):
-            told: Mapping[str, Any] = json.loads(line)
-            found[told["file"]] = (told["state"], told["rows"])
-    return found
-
-
-@contextlib.contextmanager
-def writing(journal: Path | None) -> Iterator[Callable[[str, list[Any], Rows], None]]:
-    """Yield what keeps the rows of a file: a line each, so that what is killed loses what it was at, and no more."""
-    if journal is None:
-        yield lambda name, state, rows: None
-        return
-    with files.Growing(journal) as growing:
-
-        def write(name: str, state: list[Any], rows: Rows) -> None:
-            told = files.plain({"file": name, "state": state, "rows": rows})
-            growing.add(json.dumps(told, ensure_ascii=False))
-
-        yield write
+def _states(paths: Sequence[Path]) -> list[Any]:
+    there = [(path, path.stat()) for path in paths if path.is_file()]
+    return [[path.name, state.st_size, state.st_mtime_ns] for path, state in there]

@@ -75,11 +75,10 @@ def cores() -> Iterator[Finding]:
     """How many cores a sweep may use, and whether a worker starts."""
     from joblib import cpu_count
 
-    from tractexp.workers import processes
+    from tractexp.workers import Workers
 
     try:
-        with processes(1) as executor:
-            executor.submit(os.getpid).result(timeout=60)
+        list(Workers(1, apart=True).completed(abs, [1], 1))
     except Exception as error:
         yield WRONG, f"no worker process starts ({type(error).__name__}: {error}): sweeps and surveys cannot run"
         return
@@ -99,9 +98,8 @@ def disk(folder: Path) -> Iterator[Finding]:
 
 
 def caches() -> Iterator[Finding]:
-    """Whether kernels and searches can be kept, and what is kept can be read."""
-    from tractexp.cache import cache_folder
-    from tractexp.identification.shelf import damaged
+    """Whether the store can be written and its entries be read."""
+    from tractexp.store import CODE, cache_folder, damaged
 
     try:
         folder = cache_folder()
@@ -114,7 +112,10 @@ def caches() -> Iterator[Finding]:
         path.unlink(missing_ok=True)
     if gone:
         yield HEALED, f"{len(gone)} damaged or unfinished files of the cache {folder} are removed"
-    yield SOUND, f"the cache {folder} holds {len(list(folder.glob('code_*.kept')))} kernels"
+    yield (
+        SOUND,
+        f"the cache {folder} holds {len(list((folder / CODE.kind).glob('*')))} kernels",
+    )
 
 
 def leavings(folder: Path) -> Iterator[Finding]:

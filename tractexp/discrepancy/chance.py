@@ -9,12 +9,13 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
+from tractexp import store
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.linearization import Linearization, rich_residuals
 from tractexp.discrepancy.noise_in_quiet import QuietNoise
 from tractexp.discrepancy.score_test import ScoreTest
-from tractexp.identification import shelf, surprises
+from tractexp.identification import surprises
 from tractexp.identification.surprises import SMALLEST_P, Scale, tail
 from tractexp.noise import Noise
 
@@ -59,8 +60,8 @@ def chance_at(
     if plain or not bench.told:
         return _drawn(t, own, noise, quiet, seed, plain, draws)
     fit = {part.name: getattr(t, part.name) for part in fields(t) if part.name != "bench"}
-    what = shelf.told("chance", bench.told, fit, noise, quiet.blur, seed, draws)
-    least, names, *left = shelf.arrays("draws", what, made)
+    key = store.key("chance", bench.told, fit, noise, quiet.blur, seed, draws)
+    least, names, *left = store.DRAWS.arrays(key, made)
     return Chance(least, dict(zip(names.tolist(), left, strict=True)))
 
 

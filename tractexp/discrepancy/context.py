@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tractexp import store
 from tractexp.discrepancy.catalogue import Catalogue
 from tractexp.discrepancy.coordinates import Coordinates
 from tractexp.discrepancy.cores import in_same_parts, side_by_side
@@ -14,7 +15,6 @@ from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.kernels import Family, Kernels
 from tractexp.discrepancy.records import Records
 from tractexp.domain import Domain, domain_of
-from tractexp.identification import shelf
 from tractexp.identification.descent import SeparableColumns
 from tractexp.identification.problem import Problem
 from tractexp.model.drive import Drive
@@ -64,10 +64,10 @@ class Context:
         """SHA-256 of all that a fit on this bench depends on beside noise and starts; "" where that cannot be told."""
         load, at = self.load, self.coordinates
         parts = (load.motor, load.static, *load.effects, *self.catalogue.effects)
-        if not all(map(shelf.installed, parts)):
+        if not all(map(store.installed, parts)):
             return ""
         known = self.problem.digest(), self.kernels.bare.digest(), self.criteria, at.null, at.prior_deviation
-        return shelf.told(shelf.behind(), repr(parts), self.records.window, *known)
+        return store.key(store.environment(), repr(parts), self.records.window, *known)
 
     @property
     def waves(self) -> bool:

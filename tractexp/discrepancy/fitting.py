@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tractexp import store
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.promising import promising
-from tractexp.identification import shelf
 from tractexp.identification.descent import descend
 from tractexp.noise import Noise
 
@@ -203,8 +203,8 @@ def _descended(
         done = descend(rows, begin, table == at.dimension, *effort, bench.apart(len(prior)))
         return done.unit, done.deviance, np.array(spent)
 
-    what = bench.told and shelf.told(bench.told, noise, [(tuple(names), unit) for names, unit in wanted], prior, effort)
-    unit, deviance, simulations = shelf.arrays("descents", what, made) if what else made()
+    key = bench.told and store.key(bench.told, noise, [(tuple(names), unit) for names, unit in wanted], prior, effort)
+    unit, deviance, simulations = store.DESCENTS.arrays(key, made)
     bench.effort.spend(int(simulations) - spent)  # of what was made before, what it took then
     np.put_along_axis(starts, table, unit, axis=1)
     return [

@@ -85,8 +85,11 @@ class Family:
         return (self.short, True) if load <= self.short else None
 
     def compile(self, say: Callable[[str], None]) -> None:
-        """Compile what is not in the cache yet, side by side."""
-        compile_missing(self._models(), lambda: say("compiling kernels, once for this base model and these channels"))
+        """Compile what is not in the cache yet, side by side; say what comes after it where it was long."""
+        if compile_missing(
+            self._models(), lambda: say("compiling kernels, once for this base model and these channels")
+        ):
+            say("fitting the base model")
 
     def joins(self, name: str) -> bool:
         """Whether a member of a family goes with the model of everything, by which what it leaves is tested."""
@@ -133,7 +136,7 @@ class Kernels:
         self.whole = Problem(family.whole, events, bounds, fixed, self.substeps)
         members = [p.name for member in family.catalogue.members for p in member.effect.parameters]
         self._column = {name: k for k, name in enumerate((*self.whole.space.names, *members))}
-        self._made: dict[Key, tuple[Likelihood, np.ndarray]] = {None: self._simulator(self.whole)}
+        self._likelihoods: dict[Key, tuple[Likelihood, np.ndarray]] = {None: self._simulator(self.whole)}
 
     def _fewest(self) -> int:
         """Steps that the model of everything needs where every effect is at its null: some are stiff."""
@@ -163,13 +166,13 @@ class Kernels:
 
     def _of(self, key: Key) -> tuple[Likelihood, np.ndarray]:
         """The likelihood by one kernel, and where its coordinates stand among all."""
-        if key not in self._made:
+        if key not in self._likelihoods:
             assert key is not None
             model = self.family.with_effects(*key)
             bounds = {n: v for n, v in self.bounds.items() if n in model.names}
             fixed = {n: v for n, v in self.fixed.items() if n in model.names}
-            self._made[key] = self._simulator(Problem(model, self.events, bounds, fixed, self.substeps))
-        return self._made[key]
+            self._likelihoods[key] = self._simulator(Problem(model, self.events, bounds, fixed, self.substeps))
+        return self._likelihoods[key]
 
     def _simulator(self, problem: Problem) -> tuple[Likelihood, np.ndarray]:
         before = len(self._column) + np.arange(2 * len(self.events))

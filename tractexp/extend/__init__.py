@@ -3,11 +3,9 @@
     from tractexp.extend import Effect, Parameter, plugin, sites
 
 `tractexp.extend.search` has parts for optimizers, `tractexp.extend.files` for readers and writers,
-`tractexp.extend.formats` for exports. `Equations`, `Symbol` and `Expr` are the types of what `declare`, `law` and
-`edit` take and return; SymPy is imported with them, at their first use.
+`tractexp.extend.formats` the base of exports, `tractexp.extend.symbols` the types of what `declare`, `law` and `edit`
+take and return.
 """
-
-from typing import TYPE_CHECKING, Any
 
 from tractexp.errors import Unfit, UserError, check_choice, check_distinct, check_range
 from tractexp.identification.loss import Loss
@@ -24,11 +22,6 @@ from tractexp.recording import Channel, Connection, Estimator, Recording, Segmen
 from tractexp.recording.connection import SINGLE
 from tractexp.recording.reader import WaveformReader
 
-if TYPE_CHECKING:
-    from sympy import Expr, Symbol
-
-    from tractexp.model.equations import Equations
-
 __all__ = [
     "EVENT",
     "INPUTS",
@@ -41,11 +34,9 @@ __all__ = [
     "Connection",
     "Curve",
     "Effect",
-    "Equations",
     "Estimator",
     "Evaluate",
     "Events",
-    "Expr",
     "Iterative",
     "Loss",
     "Measurement",
@@ -58,7 +49,6 @@ __all__ = [
     "Segment",
     "Static",
     "Stencil",
-    "Symbol",
     "Unfit",
     "UserError",
     "WaveformReader",
@@ -71,12 +61,3 @@ __all__ = [
     "plugin",
     "sites",
 ]
-SYMBOLIC = {"Equations": "tractexp.model.equations", "Expr": "sympy", "Symbol": "sympy"}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in SYMBOLIC:
-        raise AttributeError(f"module 'tractexp.extend' has no attribute '{name}'")
-    import importlib
-
-    return getattr(importlib.import_module(SYMBOLIC[name]), name)

@@ -19,7 +19,7 @@ from tractexp.filetypes.comtrade_header import number, quoted
 from tractexp.filetypes.comtrade_samples import HUGE
 from tractexp.filetypes.remarks import Remarks
 from tractexp.filetypes.text import decode
-from tractexp.recording.recording import Channel, Recording, Segment, Status, unit_of
+from tractexp.recording.recording import Channel, Recording, Segment, StatusChannel, unit_of
 
 ROOT = float(np.sqrt(2))
 LARGEST = 32 * 2**20  # bytes: event reports last seconds
@@ -31,7 +31,7 @@ _WAVE = re.compile(r"[IV](?:([ABCNGQ]|AB|BC|CA)(\w?)|1MEM|S\d?|P)", re.ASCII)
 
 
 @dataclass
-class Report:
+class EventReport:
     """Rows of the file by their meaning."""
 
     about: dict[str, str] = field(default_factory=dict)  # names over values: FID, date, summary
@@ -87,9 +87,9 @@ def checksum(text: str) -> str:
     return f"{sum(text.encode('latin-1', 'replace')) & 0xFFFF:04X}"
 
 
-def _report(path: Path, text: str, remarks: Remarks) -> Report:
+def _report(path: Path, text: str, remarks: Remarks) -> EventReport:
     body, _, rest = re.sub(r"[\x02\x03\x1a\0]", "", text).partition('"SETTINGS"')
-    report = Report(settings=rest.partition("\n")[2].strip())
+    report = EventReport(settings=rest.partition("\n")[2].strip())
     names: list[str] | None = None
     for line, row in _joined(body):
         if line > HEAD and not report.columns:
@@ -142,7 +142,7 @@ def _cells(row: str) -> list[str]:
         return [row]
 
 
-def _samples(path: Path, report: Report, remarks: Remarks) -> tuple[np.ndarray, list[str], list[str]]:
+def _samples(path: Path, report: EventReport, remarks: Remarks) -> tuple[np.ndarray, list[str], list[str]]:
     """Values (N, columns), marks and hexadecimal words of the samples."""
     at = report.columns.index("TRIG")
     wanted = len(report.columns)
@@ -173,7 +173,7 @@ def _value(path: Path, line: int, name: str, cell: str) -> float:
     return value
 
 
-def _rate(path: Path, report: Report) -> tuple[float, float]:
+def _rate(path: Path, report: EventReport) -> tuple[float, float]:
     """Samples a cycle and the frequency that the relay sampled by."""
     numbers = {key: number(report.about.get(key, "")) for key in ("SAM/CYC_A", "FREQ")}
     per_cycle, frequency = numbers["SAM/CYC_A"], numbers["FREQ"]
@@ -190,11 +190,11 @@ def _rate(path: Path, report: Report) -> tuple[float, float]:
     return per_cycle, frequency
 
 
-def _named(report: Report, k: int) -> bool:
+def _named(report: EventReport, k: int) -> bool:
     return report.columns[k] not in ("", "*")
 
 
-def _channel(report: Report, k: int, values: np.ndarray, gain: float, remarks: Remarks) -> Channel:
+def _channel(report: EventReport, k: int, values: np.ndarray, gain: float, remarks: Remarks) -> Channel:
     match = _COLUMN.fullmatch(report.columns[k])
     name, unit = (match[1], match[2] or "") if match else (report.columns[k], "")
     wave = _WAVE.fullmatch(name.upper())
@@ -212,7 +212,7 @@ def _channel(report: Report, k: int, values: np.ndarray, gain: float, remarks: R
     )  # fmt: skip
 
 
-def _ratio(report: Report, name: str, remarks: Remarks) -> float:
+def _ratio(report: EventReport, name: str, remarks: Remarks) -> float:
     """One, unless the summary says that the values are secondary ones (SEL-751)."""
     if report.about.get("PRIM_VAL", "YES").upper() != "NO":
         return 1.0
@@ -225,7 +225,7 @@ def _ratio(report: Report, name: str, remarks: Remarks) -> float:
     return ratio
 
 
-def _gain(report: Report, values: np.ndarray, marks: list[str], per_cycle: float, remarks: Remarks) -> float:
+def _gain(report: EventReport, values: np.ndarray, marks: list[str], per_cycle: float, remarks: Remarks) -> float:
     """The root of two, unless the summary's currents, RMS, show that the columns hold instantaneous values."""
     remarks.add("columns are taken as instantaneous values over the root of two, as SEL's manuals say")
     quarter = round(per_cycle / 4)
@@ -249,7 +249,7 @@ def _gain(report: Report, values: np.ndarray, marks: list[str], per_cycle: float
     return ROOT
 
 
-def _start(report: Report, before: float, remarks: Remarks) -> datetime | None:
+def _start(report: EventReport, before: float, remarks: Remarks) -> datetime | None:
     """Of the first sample; the report's time is that of the trigger."""
     keys = ("YEAR", "MONTH", "DAY", "HOUR", "MIN", "SEC", "MSEC")
     parts = [number(report.about.get(key, "")) for key in keys]
@@ -263,7 +263,7 @@ def _start(report: Report, before: float, remarks: Remarks) -> datetime | None:
         return None
 
 
-def _states(report: Report, words: list[str]) -> list[Status]:
+def _states(report: EventReport, words: list[str]) -> list[StatusChannel]:
     """One channel for each bit with a name; a row without a word keeps the one before."""
     at = report.columns.index("TRIG")
     names = report.columns[at + 1].split() if len(report.columns) > at + 1 else []
@@ -274,5 +274,5 @@ def _states(report: Report, words: list[str]) -> list[Status]:
     width = -(-len(names) // 8)
     packed = np.frombuffer(b"".join(row[:width].ljust(width, b"\0") for row in rows), np.uint8).reshape(-1, width)
     return [
-        Status(name, packed[:, k // 8], bit=7 - k % 8) for k, name in enumerate(names) if name != "*" and width
+        StatusChannel(name, packed[:, k // 8], bit=7 - k % 8) for k, name in enumerate(names) if name != "*" and width
     ]  # fmt: skip

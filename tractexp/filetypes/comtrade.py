@@ -18,7 +18,7 @@ from tractexp.filetypes.comtrade_writer import write as write
 from tractexp.filetypes.remarks import Remarks
 from tractexp.filetypes.text import decode, lines
 from tractexp.filetypes.timeline import Stretch
-from tractexp.recording.recording import Channel, Recording, Status, unit_of
+from tractexp.recording.recording import Channel, Recording, StatusChannel, unit_of
 
 LARGEST_CFG = 4 * 2**20  # bytes: fifty thousand channels
 MISSING = {"BINARY": -32768.0, "BINARY32": -2147483648.0}  # raw values that stand for none
@@ -136,10 +136,10 @@ def _missing(kind: str, analog: Analog, raw: np.ndarray) -> tuple[np.ndarray, fl
     return raw, missing if missing is None or analog.limits is None or least > missing else None
 
 
-def _status(header: Header, k: int, samples: Samples, stretches: list[Stretch]) -> Status:
+def _status(header: Header, k: int, samples: Samples, stretches: list[Stretch]) -> StatusChannel:
     digital: Digital = header.digitals[k]
     words = timeline.nearest(samples.words[:, k // 16], stretches)
-    return Status(digital.name, words, digital.phase, digital.circuit, digital.normal, bit=k % 16)
+    return StatusChannel(digital.name, words, digital.phase, digital.circuit, digital.normal, bit=k % 16)
 
 
 def _stretches(data: ByteRange, header: Header, samples: Samples, remarks: Remarks) -> list[Stretch]:

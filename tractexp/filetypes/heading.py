@@ -12,7 +12,7 @@ ALIKE = 3  # rows of numbers of one length make sure that a table has begun
 
 
 @dataclass(frozen=True)
-class Heading:
+class TableHeading:
     """The columns' names and units ("" where there is none), and the number of the first row of values, from 0."""
 
     names: tuple[str, ...]
@@ -21,7 +21,7 @@ class Heading:
     line: int | None  # number of the row with the names, from 0; None where there is none
 
 
-def heading(rows: Sequence[Sequence[Any]], source: str, header: int | None = None, line: str = "line") -> Heading:
+def heading(rows: Sequence[Sequence[Any]], source: str, header: int | None = None, line: str = "line") -> TableHeading:
     """The heading of a table's first rows; `header` is the row of the names, from 0, None to search for it.
 
     Raises `UserError` where there are no rows of numbers, or no names above them.
@@ -36,14 +36,14 @@ def heading(rows: Sequence[Sequence[Any]], source: str, header: int | None = Non
     named = header if header is not None else _named(rows, first)
     if named is None:
         width = len(rows[first])
-        return Heading(("",) * width, ("",) * width, first, None)
+        return TableHeading(("",) * width, ("",) * width, first, None)
     width = max(len(rows[first]), len(rows[named]))
     parted = [split_unit(_text(cell)) for cell in rows[named]]
     below = [_text(cell).strip("[]() ") for cell in rows[named + 1]] if named + 1 < first else []
     unit_row = below if _are_units(below) else []
     units = [unit_row[k] if k < len(unit_row) and unit_row[k] else unit for k, (_, unit) in enumerate(parted)]
     names = _joined(rows, named, [name for name, _ in parted])
-    return Heading(_padded(names, width), _padded(units, width), first, named)
+    return TableHeading(_padded(names, width), _padded(units, width), first, named)
 
 
 def is_value(cell: Any) -> bool:

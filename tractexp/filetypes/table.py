@@ -13,7 +13,7 @@ from tractexp.errors import UserError, among, check_choice, nearest
 from tractexp.files import located
 from tractexp.filetypes.cells import BadCell, is_number, is_time, numbers, times
 from tractexp.filetypes.columns import split_unit
-from tractexp.filetypes.heading import Heading, heading
+from tractexp.filetypes.heading import TableHeading, heading
 
 SPREADSHEETS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")  # how .xlsx, .ods and .xls begin
 PARQUET = b"PAR1"
@@ -52,7 +52,7 @@ class TableFile(ABC):
     """An open file with columns: names and units are there, the numbers are read on demand."""
 
     source: str
-    heading: Heading
+    heading: TableHeading
     sample: Sequence[Sequence[Any]]  # the first rows of cells
     notes: tuple[str, ...] = ()
 
@@ -88,7 +88,7 @@ class Rows(TableFile):
     """A table whose cells are at hand as Python's objects: a sheet, or columns of a Parquet file."""
 
     source: str
-    heading: Heading
+    heading: TableHeading
     columns: Callable[[int], Sequence[Any]]  # the cells of a column
     sample: Sequence[Sequence[Any]]
     first: int  # number of the first row of values, from 1
@@ -168,7 +168,7 @@ def _parquet(path: str, data: bytes) -> TableFile:
     except (pyarrow.ArrowException, OSError, ValueError) as error:
         raise UserError(f"{path}: not a whole Parquet file; write it again, or give the table as CSV") from error
     parted = [split_unit(name) for name in names]
-    head = Heading(tuple(name for name, _ in parted), tuple(unit for _, unit in parted), 0, 0)
+    head = TableHeading(tuple(name for name, _ in parted), tuple(unit for _, unit in parted), 0, 0)
     sample = [list(row) for row in zip(*(c[:200] for c in columns), strict=False)]
     return Rows(path, head, columns.__getitem__, sample, first=1)
 

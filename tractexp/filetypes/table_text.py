@@ -15,7 +15,7 @@ import numpy as np
 from tractexp.errors import UserError
 from tractexp.filetypes.cells import BadCell, is_number, is_time
 from tractexp.filetypes.columns import split_unit
-from tractexp.filetypes.heading import Heading, heading
+from tractexp.filetypes.heading import TableHeading, heading
 from tractexp.filetypes.table import TableColumn, TableFile, TableForm, column
 from tractexp.filetypes.text import MARKS, decode
 
@@ -49,7 +49,7 @@ class TextTable(TableFile):
         self.notes = tuple(notes)
         self._check_width()
 
-    def _heading(self, rows: Sequence[Sequence[str]], header: int | None) -> Heading:
+    def _heading(self, rows: Sequence[Sequence[str]], header: int | None) -> TableHeading:
         """The heading; the last remark above the values where names stand in a comment, as NumPy writes them."""
         result = heading(rows, self.source, header)
         if result.line is not None or result.first:
@@ -59,7 +59,7 @@ class TextTable(TableFile):
             cells = _cells(remark.decode(errors="replace"), self.delimiter)
             if len(cells) == len(rows[0]) and not any(map(is_number, cells)):
                 names, units = zip(*map(split_unit, cells), strict=True)
-                return Heading(names, units, 0, 0)
+                return TableHeading(names, units, 0, 0)
         return result
 
     def _check_width(self) -> None:

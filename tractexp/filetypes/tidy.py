@@ -21,7 +21,7 @@ from tractexp import files
 from tractexp.errors import UserError
 from tractexp.filetypes.table import TableForm, open_table
 from tractexp.record.record import Record
-from tractexp.recording.recording import Channel, Recording, Segment, Status
+from tractexp.recording.recording import Channel, Recording, Segment, StatusChannel
 
 UNITS = {"t": "s", "U": "pu", "P": "pu", "Q": "pu", "f": "Hz"}  # as data.units; U2 is as U
 
@@ -88,7 +88,7 @@ def restored(path: str, content: Mapping[str, Any]) -> Recording:
             datetime.fromisoformat(content["start"]) if content["start"] else None,
             content["trigger"],
             [
-                Status(**one, raw=(cells[k].values == 1).astype(np.int8))
+                StatusChannel(**one, raw=(cells[k].values == 1).astype(np.int8))
                 for k, one in enumerate(status, 1 + len(channels))
             ],
             list(content["notes"]),

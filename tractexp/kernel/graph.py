@@ -14,12 +14,12 @@ Symbol = sympy.Symbol
 
 def nodes(expression: Basic) -> Iterator[Basic]:
     """Each different part of an expression, itself first."""
-    seen, waiting = {expression}, [expression]
+    visited, waiting = {expression}, [expression]
     while waiting:
         node = waiting.pop()
         yield node
-        new = [part for part in node.args if part not in seen]
-        seen.update(new)
+        new = [part for part in node.args if part not in visited]
+        visited.update(new)
         waiting += new
 
 

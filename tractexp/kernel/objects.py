@@ -1,16 +1,15 @@
-"""Object code of kernels: compiled from IR, kept on disk under all that it hangs on, loaded once a process.
+"""Object code of kernels: compiled from IR, stored under all that it depends on, loaded once a process.
 
-What is kept is executed, so it is read through `tractexp.cache`, which takes nothing that was not written there whole.
+An entry is executed, so it is read through `tractexp.store`, which takes nothing that was not written there whole.
 """
 
 import functools
-import hashlib
 import itertools
 import threading
 from typing import Any
 
-from tractexp import cache
 from tractexp.kernel import target
+from tractexp.store import CODE, key
 
 FUNCTIONS = ("run", "steady")  # what a text may define for callers, one each
 _numbers = itertools.count()
@@ -27,34 +26,28 @@ class Code:
 
 @functools.lru_cache(maxsize=512)
 def load(text: str) -> Code:
-    """The function that this IR defines, compiled where the cache does not hold it."""
+    """The function that this IR defines, compiled where the store does not hold it."""
     name = next(name for name in FUNCTIONS if f"define void @{name}(" in text)
     from llvmlite import binding as llvm
 
-    code = keep(text)
+    code = object_code(text)
     with _one_at_a_time:
         library = llvm.JITLibraryBuilder().add_object_img(code).add_current_process().export_symbol(name)
         return Code(library.link(_linker(), f"{name}_{next(_numbers)}"), name)
 
 
 def available(text: str) -> bool:
-    """Whether the cache holds sound object code of this IR for this machine."""
-    return cache.read(_path(text)) is not None
+    """Whether the store holds sound object code of this IR for this machine."""
+    return CODE.read(_key(text)) is not None
 
 
-def keep(text: str) -> bytes:
-    """Object code of this IR, from the cache or compiled and written there."""
-    path = _path(text)
-    code = cache.read(path)
-    if code is None:
-        code = machine_code(text)
-        cache.write(path, code)
-    return code
+def object_code(text: str) -> bytes:
+    """Object code of this IR, from the store or compiled and written there."""
+    return CODE.get(_key(text), lambda: machine_code(text))
 
 
-def _path(text: str) -> Any:
-    digest = hashlib.sha256(f"{target.key()}\n{text}".encode())
-    return cache.cache_folder() / f"code_{digest.hexdigest()[:32]}.kept"
+def _key(text: str) -> str:
+    return key(target.key(), text)
 
 
 def machine_code(text: str, machine: Any = None) -> bytes:

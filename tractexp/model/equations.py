@@ -19,8 +19,8 @@ from tractexp.model import sites
 from tractexp.model.apart import Apart
 from tractexp.model.circuit import NOTHING, Circuit
 from tractexp.model.drive import OUTPUTS, PHASORS, WAVES
+from tractexp.model.graph import as_real_imag, replaced
 from tractexp.model.graph import halves as real_and_imaginary
-from tractexp.model.graph import replaced
 from tractexp.model.names import check_name
 from tractexp.model.sites import Site
 from tractexp.model.states import UNSAID, Memory, Requirement, State
@@ -112,7 +112,7 @@ class Equations(Circuit):
         drawn = (sites.current, sites.zero_current) if self.waves else (sites.P, sites.Q)
         self._drawn: dict[Site, sympy.Expr] = dict.fromkeys(drawn, sympy.Integer(0))
         self._fluxes: dict[sympy.Expr, Symbol] = {}  # of branches at the bus, by resistance over reactance
-        self._halves: dict[Symbol, tuple[sympy.Expr, sympy.Expr]] = {}  # of named quantities, as they stand now
+        self._halves: dict[sympy.Expr, tuple[sympy.Expr, sympy.Expr]] = {}  # of expressions, as names stand now
         self._lost = NOTHING, NOTHING  # power [pu] between the recorded bus and that which all parts see
         self._owners: dict[str, str] = {}  # who declared the parameter, state or quantity of a name
         self._writer = "bus"
@@ -217,8 +217,8 @@ class Equations(Circuit):
             taken = "is taken already" if site in self else f"belongs to the {site.owner}"
             raise UserError(f"the site {site.name} {taken}, so the {self._writer} cannot place it; edit it instead")
         self._check_kind(site, expression)
-        made = _real if site.kind == "real" and _is_real(expression) else _complex  # what is real keeps its name
-        return self._define(made(site.name), expression, latex or site.latex)
+        symbol_of = _real if site.kind == "real" and _is_real(expression) else _complex  # what is real keeps its name
+        return self._define(symbol_of(site.name), expression, latex or site.latex)
 
     def _define(self, symbol: Symbol, expression: sympy.Expr, latex: str) -> Symbol:
         if symbol.name in self:
@@ -231,14 +231,33 @@ class Equations(Circuit):
 
     def _check_kind(self, site: Site, expression: sympy.Expr) -> None:
         """Raise `UserError` where a real site would get what is not made of real symbols and real parts."""
+        if site.kind != "real" or self._plainly_real(expression):
+            return
         whole = self.expand(expression, lambda s: s.name not in sites.SITES)
         real = {s for s in symbols_of(whole) if s.name in sites.SITES and sites.SITES[s.name].kind == "real"}
         left: Any = whole.xreplace(dict.fromkeys({*whole.atoms(re, im, sympy.Abs), *real}, _real("part")))
-        if site.kind == "real" and not _is_real(left):
+        if not _is_real(left):
             raise UserError(
                 f"the site {site.name} is real, and what the {self._writer} puts there is not: {expression}; take its"
                 " real part by sympy.re"
             )
+
+    def _plainly_real(self, expression: sympy.Expr) -> bool:
+        """Whether all of it is real but what real parts and sizes are taken of: seen without writing it out."""
+        waiting: list[Any] = [expression]
+        visited = set()
+        while waiting:
+            part = waiting.pop()
+            if part in visited or isinstance(part, re | im | sympy.Abs):
+                continue
+            visited.add(part)
+            site = sites.SITES.get(part.name) if isinstance(part, Symbol) else None
+            if site is None and part in self.definitions:
+                waiting.append(self.definitions[part])
+            elif part is I or (isinstance(part, Symbol) and not part.is_real and not (site and site.kind == "real")):
+                return False
+            waiting += part.args
+        return True
 
     def compute(self, name: str, expression: sympy.Expr, before: sympy.Expr | None = None) -> Symbol:
         """A real quantity that is computed once and then referred to, such as a step of an unrolled iteration.
@@ -336,9 +355,9 @@ class Equations(Circuit):
             raise UserError(
                 f"eq.moves() was given '{state}', which is no state; make one by eq.flux, eq.speed or eq.lag"
             )
-        moved = self.states[state]
-        moved.derivative, moved.initial = sympy.sympify(derivative), sympy.sympify(initial)
-        moved.balance = None if balance is None else sympy.sympify(balance)
+        row = self.states[state]
+        row.derivative, row.initial = sympy.sympify(derivative), sympy.sympify(initial)
+        row.balance = None if balance is None else sympy.sympify(balance)
 
     def memory(self, name: str, latex: str) -> Symbol:
         """A real state that changes once a sample, such as a relay's."""
@@ -392,25 +411,25 @@ class Equations(Circuit):
 
     def _derive_starts(self) -> None:
         """Take the values before the event of states that are written in others' by these."""
-        known: dict[Symbol, sympy.Expr] = {}
+        values: dict[Symbol, sympy.Expr] = {}
         for symbol, state in self.states.items():
             if not state.derived:
-                known[start_symbol(symbol)] = state.initial
+                values[start_symbol(symbol)] = state.initial
                 if not symbol.is_real:
-                    known |= zip(
+                    values |= zip(
                         phasor_parts(start_symbol(symbol)), (re(state.initial), im(state.initial)), strict=True
                     )
         for state in self.states.values():
             if state.derived:
-                state.initial = replaced(self.before(state.initial), known)
+                state.initial = replaced(self.before(state.initial), values)
 
     def _check_still(self, what: str, expression: sympy.Expr) -> None:
         """Raise `UserError` where a value before the event is written in what moves after it."""
         inputs = {self.U: "eq.U0", self.omega_s: "eq.omega_s0", self.U2: "eq.U20"}
         moving = {*map(_real, INPUTS), *self.states, *self.memories}
-        if found := sorted(symbols_of(self.expand(expression)) & moving, key=str):
-            use = "".join(f"{inputs[s]} or " for s in found if s in inputs)
-            raise UserError(f"{what} contains {found[0]}, which moves; use {use}eq.before(...)")
+        if stray := sorted(symbols_of(self.expand(expression)) & moving, key=str):
+            use = "".join(f"{inputs[s]} or " for s in stray if s in inputs)
+            raise UserError(f"{what} contains {stray[0]}, which moves; use {use}eq.before(...)")
 
     def before(self, expression: sympy.Expr) -> sympy.Expr:
         """An expression's value before the event, of constants: `eq.before(eq.omega)` is the speed there."""
@@ -433,8 +452,8 @@ class Equations(Circuit):
     def expand(self, expression: sympy.Expr, named: Callable[[Symbol], bool] = lambda _: True) -> sympy.Expr:
         """The expression with the quantities that are `named` (by default all) replaced by what they stand for."""
         expression = sympy.sympify(expression)
-        while found := {s for s in symbols_of(expression) & self.definitions.keys() if named(s)}:
-            expression = replaced(expression, {s: self.definitions[s] for s in found})
+        while names := {s for s in symbols_of(expression) & self.definitions.keys() if named(s)}:
+            expression = replaced(expression, {s: self.definitions[s] for s in names})
         return expression
 
     def real_states(self) -> list[tuple[Symbol, sympy.Expr, sympy.Expr]]:
@@ -457,8 +476,15 @@ class Equations(Circuit):
         """Real and imaginary part in real symbols, names expanded.
 
         A name that stands for something real is lowered by itself and put in last: products are not expanded
-        across it, so that it stays one common subexpression.
+        across it, so that it stays one common subexpression. What was split once is not split again: a derivative is
+        asked for as what moves, and as what vanishes before the event.
         """
+        if expression not in self._halves:
+            self._halves[expression] = self._split(sympy.sympify(expression))
+        return self._halves[expression]
+
+    def _split(self, expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
+        """Real and imaginary part, reckoned anew."""
         split: dict[Symbol, sympy.Expr] = {}
         for state in self.states:
             if not state.is_real:
@@ -466,12 +492,12 @@ class Equations(Circuit):
                 a0, b0 = phasor_parts(start_symbol(state))
                 split |= {state: a + I * b, start_symbol(state): a0 + I * b0}
         if self.waves:  # of space vectors products are not expanded across a name either
-            return self._parts_by_name(sympy.sympify(expression), split)
+            return self._parts_by_name(expression, split)
         lowered = replaced(self.expand(expression, lambda s: not s.is_real), split)
         if _is_real(lowered):
             both = (lowered if lowered.is_real else _shorter(lowered), sympy.Integer(0))
         else:
-            both = map(_shorter, lowered.as_real_imag())
+            both = map(_shorter, as_real_imag(lowered))
         real, imaginary = (replaced(e, {s: self.real(s) for s in self._names(e)}) for e in both)
         return real, imaginary
 
@@ -481,12 +507,10 @@ class Equations(Circuit):
         halves = {s: phasor_parts(s) for s in names}
         lowered = replaced(expression, split | {s: a + I * b for s, (a, b) in halves.items()})
         both = real_and_imaginary(lowered)
-        known = {}
+        values = {}
         for s, pair in halves.items():
-            known |= zip(pair, self._parts_of(s), strict=True)
-        real, imaginary = (
-            replaced(_shorter(e), known | {s: self.real(s) for s in self._names(e)}, plain=True) for e in both
-        )
+            values |= zip(pair, self._parts_of(s), strict=True)
+        real, imaginary = (replaced(_shorter(e), values | {s: self.real(s) for s in self._names(e)}) for e in both)
         return real, imaginary
 
     def _names(self, expression: sympy.Expr) -> set[Symbol]:
@@ -499,10 +523,8 @@ class Equations(Circuit):
         return self.parts(expression)[0]
 
     def _parts_of(self, name: Symbol) -> tuple[sympy.Expr, sympy.Expr]:
-        """Real and imaginary part of a named quantity, reckoned once."""
-        if name not in self._halves:
-            self._halves[name] = self.parts(self.definitions[name])
-        return self._halves[name]
+        """Real and imaginary part of a named quantity."""
+        return self.parts(self.definitions[name])
 
     def latex(self) -> list[str]:
         """The equations one a line: states, memories, named quantities, power, steady state."""
@@ -517,6 +539,10 @@ def _shorter(expression: sympy.Expr) -> sympy.Expr:
     Long ones stay as they are: they gain nothing, and expanding them takes seconds.
     """
     if sum(1 for _ in itertools.islice(sympy.preorder_traversal(expression), LONG + 1)) > LONG:
+        return expression
+    if not any(
+        isinstance(part, sympy.Mul | sympy.Pow) and any(a.is_Add for a in part.args) for part in nodes(expression)
+    ):
         return expression
     extremes = [part for part in nodes(expression) if isinstance(part, sympy.Max | sympy.Min)]
     hidden: dict[Any, Any] = {part: _real(f"_extreme{k}") for k, part in enumerate(extremes)}

@@ -8,25 +8,34 @@ import sympy
 from tractexp.kernel.graph import Basic, Symbol
 
 
-def replaced(expression: sympy.Expr, known: Mapping[Symbol, sympy.Expr], plain: bool = False) -> sympy.Expr:
-    """The expression with symbols replaced, as `xreplace` does it; `plain`: maxima and minima are not looked into."""
-    made: dict[Basic, Basic] = {**known}
+def replaced(expression: sympy.Expr, known: Mapping[Symbol, sympy.Expr]) -> sympy.Expr:
+    """The expression with symbols replaced, as `xreplace` does it; maxima and minima are not looked into."""
+    new: dict[Basic, Basic] = {**known}
 
     def visit(part: Basic) -> Basic:
-        if part not in made:
+        if part not in new:
             args = [visit(a) for a in part.args]
             same = all(a is b for a, b in zip(args, part.args, strict=True))
-            made[part] = part if same else _rebuilt(part, args, plain)
-        return made[part]
+            new[part] = part if same else _rebuilt(part, args)
+        return new[part]
 
     return visit(expression)  # pyright: ignore[reportReturnType] # an expression's parts give one again
 
 
-def _rebuilt(part: Basic, args: Sequence[Basic], plain: bool) -> Any:
+def _rebuilt(part: Basic, args: Sequence[Basic]) -> Any:
     """The same function of other arguments. SymPy compares those of a maximum with each other, which takes seconds."""
-    if plain and isinstance(part, sympy.Max | sympy.Min) and not all(a.is_number for a in args):
+    if isinstance(part, sympy.Max | sympy.Min) and not all(a.is_number for a in args):
         return part.func(*args, evaluate=False)
     return part.func(*args)
+
+
+def as_real_imag(expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
+    """Real and imaginary part of an expression in real symbols, products multiplied out, as SymPy takes them.
+
+    Of some quotients it leaves a part as it is; those are split as `halves` does.
+    """
+    both: Any = expression.as_real_imag()
+    return halves(expression) if any(half.has(sympy.re, sympy.im) for half in both) else both
 
 
 def halves(expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
@@ -34,12 +43,12 @@ def halves(expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
 
     SymPy multiplies out what it splits, which of a product of many sums takes minutes.
     """
-    made: dict[Basic, tuple[sympy.Expr, sympy.Expr]] = {}
+    pairs: dict[Basic, tuple[sympy.Expr, sympy.Expr]] = {}
 
     def visit(part: Basic) -> tuple[sympy.Expr, sympy.Expr]:
-        if part not in made:
-            made[part] = _halves(part, [visit(a) for a in part.args])
-        return made[part]
+        if part not in pairs:
+            pairs[part] = _halves(part, [visit(a) for a in part.args])
+        return pairs[part]
 
     return visit(expression)
 
@@ -65,7 +74,7 @@ def _halves(part: Basic, args: list[tuple[sympy.Expr, sympy.Expr]]) -> tuple[sym
     if isinstance(part, sympy.Abs) and args[0][1] != 0:
         return sympy.sqrt(args[0][0] ** 2 + args[0][1] ** 2), zero
     if part.args and all(b == 0 for _, b in args):
-        return _rebuilt(part, [a for a, _ in args], plain=True), zero
+        return _rebuilt(part, [a for a, _ in args]), zero
     if isinstance(part, sympy.Pow) and part.exp == -1:
         (a, b), _ = args
         return a / (a**2 + b**2), -b / (a**2 + b**2)

@@ -102,7 +102,7 @@ def lower(eq: Equations) -> Lowered:
     slack = [replaced(eq.expand(r.slack), begin) for r in eq.requirements]
     start = _phase(None, first + slack)
     at_rest = eq.at_rest() | dict(zip((*states, *memories), starts, strict=True))
-    balances = _phase(None, [replaced(b, at_rest, eq.waves) for b in eq.real_balances()])
+    balances = _phase(None, [replaced(b, at_rest) for b in eq.real_balances()])
     phases = (derivative, renewal, output)
     used = tuple(s for s in inputs if s == eq.v or any(s in symbols(p) for p in phases))
     lowered = Lowered(

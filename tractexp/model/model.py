@@ -176,7 +176,7 @@ class Model:
 
     def compile(self) -> None:
         """Have the kernel in the cache."""
-        objects.keep(self.source)
+        objects.object_code(self.source)
 
     def bare(self) -> "Model":
         """The same model before anything was derived from it: little to hand to another process."""

@@ -3,12 +3,13 @@
 import sympy
 from sympy import I
 
-from tractexp.kernel.graph import Symbol, symbols_of
+from tractexp.kernel.graph import Symbol, nodes
 
 
 def is_real(expression: sympy.Expr) -> bool:
     """Whether an expression is made of real symbols, or SymPy knows it to be real wherever it is finite."""
-    return bool(expression.is_real) or not (expression.has(I) or any(not s.is_real for s in symbols_of(expression)))
+    made_of_real = I not in (parts := set(nodes(expression))) and all(s.is_real for s in parts if isinstance(s, Symbol))
+    return made_of_real or bool(expression.is_real)  # SymPy's answer may take a second
 
 
 def real_symbol(name: str) -> Symbol:

@@ -14,5 +14,5 @@ from tractexp.recording.quality import quality as quality
 from tractexp.recording.recording import Channel as Channel
 from tractexp.recording.recording import Recording as Recording
 from tractexp.recording.recording import Segment as Segment
-from tractexp.recording.recording import Status as Status
+from tractexp.recording.recording import StatusChannel as StatusChannel
 from tractexp.recording.writer import Writer as Writer

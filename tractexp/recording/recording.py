@@ -88,7 +88,7 @@ class Channel:
 
 
 @dataclass(frozen=True, eq=False)
-class Status:
+class StatusChannel:
     """One binary channel: contacts, trips, breaker positions.
 
     `raw` (N,) is 0 or 1, or the words of which bit `bit` is meant: a hundred channels share the file's few words.
@@ -119,7 +119,7 @@ class Recording:
     device: str = ""
     start: datetime | None = None  # of the first sample
     trigger: float | None = None  # s since the first sample
-    status: Sequence[Status] = ()
+    status: Sequence[StatusChannel] = ()
     notes: Sequence[str] = ()  # what was mended while reading, with the line
     extra: Mapping[str, Any] = field(default_factory=dict)  # what the format has besides, for a round trip
 

@@ -1,4 +1,4 @@
-"""What makes two jobs the same: what they are told to do, and the code and data they do it with."""
+"""What makes two jobs the same: their settings, and the code and data they work with."""
 
 import functools
 import glob
@@ -14,8 +14,8 @@ from tractexp.files import located
 
 def configuration(config: Mapping[str, Any], choices: Mapping[str, str]) -> str:
     """SHA-256 of a job's settings. Where it is logged does not belong to what it does."""
-    told = {key: value for key, value in config.items() if key != "tracking"}
-    return _digest(json.dumps([told, dict(choices)], sort_keys=True, default=str).encode())
+    settings = {key: value for key, value in config.items() if key != "tracking"}
+    return _digest(json.dumps([settings, dict(choices)], sort_keys=True, default=str).encode())
 
 
 def inputs(config: Mapping[str, Any]) -> str:

@@ -1,8 +1,6 @@
 """One job of a sweep, and how it is run: isolated, silent, with its end on disk."""
 
-import contextlib
 import shutil
-import signal
 import time
 import traceback
 from collections.abc import Collection, Mapping, Sequence
@@ -15,6 +13,7 @@ from tractexp.api.task import variant
 from tractexp.cli.chosen import given
 from tractexp.errors import UserError
 from tractexp.sweep import identity
+from tractexp.sweep.output import printing_to
 from tractexp.sweep.status import FAILED, FINISHED, RUNNING, Status
 from tractexp.tracking.sweepfile import parent_of
 
@@ -36,10 +35,10 @@ class SweepJob:
     @classmethod
     def of(cls, config: Mapping[str, Any], choices: Mapping[str, str], overrides: Any, folder: Path) -> "SweepJob":
         """A job from its composed configuration; Hydra's own choices are left out."""
-        kept = {g: c for g, c in sorted(choices.items()) if c and g != "experiment" and not g.startswith("hydra/")}
-        told = identity.configuration(config, kept)
+        groups = {g: c for g, c in sorted(choices.items()) if c and g != "experiment" and not g.startswith("hydra/")}
+        digest = identity.configuration(config, groups)
         chosen = given(overrides, choices)
-        return cls(config, kept, tuple(overrides), told, identity.inputs(config), folder, chosen)
+        return cls(config, groups, tuple(overrides), digest, identity.inputs(config), folder, chosen)
 
     def variant(self, common: Collection[str]) -> str:
         """What the optimizer is called with the settings that it does not share with all jobs: the `common` ones."""
@@ -63,13 +62,11 @@ def work(job: SweepJob) -> Status:
 
     What the task prints goes to `output.txt`; an unexpected error leaves its `traceback.txt`.
     """
-    with contextlib.suppress(ValueError):  # not in the main thread, as on a Dask worker
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group: the parent ends us
     _prepare(job)
     job.status.write(job.folder)
     started = time.perf_counter()
     output = files.Transcript(job.folder / OUTPUT)
-    with output, contextlib.redirect_stdout(output), contextlib.redirect_stderr(output):
+    with output, printing_to(output):
         message = _run(job)
     status = FAILED if message else FINISHED
     ended = replace(job.status, status=status, message=message, seconds=time.perf_counter() - started)

@@ -1,9 +1,7 @@
-"""`hydra/launcher=cores`: the jobs of a sweep on worker processes that start once, here or on a Dask cluster."""
+"""`hydra/launcher=cores`: the jobs of a sweep on the workers of a joblib backend, here or on a cluster."""
 
 import contextlib
-from collections.abc import Callable, Sequence
-from concurrent.futures import BrokenExecutor, Executor, as_completed
-from contextlib import AbstractContextManager
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,9 +16,9 @@ from tractexp.sweep.compose import Composer
 from tractexp.sweep.job import SweepJob, work
 from tractexp.sweep.progress import progress
 from tractexp.sweep.status import FAILED, RUNNING, Status
-from tractexp.workers import dask_cluster, processes
+from tractexp.workers import Workers, backends
 
-BARREN = 3  # times a pool may break before any job of it has started
+SPELLINGS = {"processes": "loky"}  # of a backend in earlier versions
 
 
 @dataclass
@@ -28,26 +26,26 @@ class CoresConfig:
     """Schema of `hydra.launcher`."""
 
     _target_: str = f"{NAMESPACE}.Cores"
-    backend: str = "processes"  # on this computer; "dask": workers of a Dask cluster
-    n_jobs: int = -1  # workers; -1: one for each core this process may use
+    backend: str = "loky"  # of joblib: "loky" (processes), "dask" (of a cluster), "threading", or a registered one
+    n_jobs: int = -1  # workers; -1: one for each core this process may use, or all of a cluster
     address: str | None = None  # of a Dask scheduler, such as tcp://host:8786; null: a cluster of our own, here
     tries: int = 3  # how often a job is run whose worker is killed
 
 
 class Cores(Launcher):
-    """Runs jobs on worker processes. A job whose worker is killed is run again, by itself, so that it alone is blamed.
+    """Runs jobs on workers. A job whose worker is killed is run again, by itself, so that it alone is blamed.
 
     Raises `UserError` for settings out of range, and where workers cannot be started.
     """
 
     def __init__(self, backend: str, n_jobs: int, address: str | None, tries: int):
-        self.backend, self.n_jobs, self.address, self.tries = backend, n_jobs, address, tries
+        self.workers, self.tries = Workers(n_jobs, SPELLINGS.get(backend, backend), address, apart=True), tries
 
     def setup(self, *, hydra_context: Any, task_function: Any, config: Any) -> None:
         self.hydra_context, self.config = hydra_context, config
-        check_choice("hydra.launcher.backend", self.backend, ("processes", "dask"))
-        if self.n_jobs != -1:
-            check_range("hydra.launcher.n_jobs", self.n_jobs, 1)
+        check_choice("hydra.launcher.backend", self.workers.backend, backends())
+        if self.workers.n_jobs != -1:
+            check_range("hydra.launcher.n_jobs", self.workers.n_jobs, 1)
         check_range("hydra.launcher.tries", self.tries, 1)
 
     def launch(self, job_overrides: Sequence[Sequence[str]], initial_job_idx: int) -> Sequence[JobReturn]:
@@ -62,85 +60,27 @@ class Cores(Launcher):
 
     def run(self, jobs: Sequence[SweepJob]) -> list[Status]:
         """Run all jobs and return how they ended, in their order."""
-        n_jobs = min(_cores() if self.n_jobs == -1 else self.n_jobs, len(jobs))
         warm(jobs)
-        with progress(jobs) as ended:
-            ends: dict[Path, Status] = {}
-
-            def note(end: Status, job: SweepJob) -> None:
-                ends[job.folder] = end
-                ended(job, end)
-
-            suspects = self._together(jobs, n_jobs, ends, note)
-            for job in suspects:
-                self._alone(job, note)
+        ends: dict[Path, Status] = {}
+        results = self.workers.results(work, jobs, self.tries, _trace)
+        with progress(jobs) as note, contextlib.closing(results):
+            for job, end in results:
+                ends[job.folder] = end or self._killed(job)
+                note(job, ends[job.folder])
         return [ends[job.folder] for job in jobs]
 
-    def _together(
-        self, jobs: Sequence[SweepJob], n_jobs: int, ends: dict[Path, Status], note: Callable[[Status, SweepJob], None]
-    ) -> list[SweepJob]:
-        """Run jobs side by side and return those that had begun when a worker was killed."""
-        suspects: list[SweepJob] = []
-        left, barren = list(jobs), 0
-        while left:
-            with self._executor(n_jobs) as executor:
-                whole = _collect(executor, left, note)
-            left = [job for job in left if job.folder not in ends]
-            begun = [job for job in left if _end(job, note) == RUNNING]
-            suspects += begun
-            left = [job for job in left if job.folder not in ends and job not in begun]
-            barren = 0 if begun or whole else barren + 1
-            if barren == BARREN:
-                raise UserError(
-                    "the workers of the sweep are killed before they begin: is there enough memory for them?"
-                )
-        return suspects
-
-    def _alone(self, job: SweepJob, note: Callable[[Status, SweepJob], None]) -> None:
-        """Run a job again that may have killed its worker, with nobody beside it."""
-        for _ in range(self.tries - 1):
-            with self._executor(1) as executor:
-                if _collect(executor, [job], note) or _end(job, note) != RUNNING:
-                    return
+    def _killed(self, job: SweepJob) -> Status:
+        """The end of a job that killed its worker each time."""
         message = f"its worker was killed each of the {self.tries} times it was run; is there enough memory for it?"
         end = replace(job.status, status=FAILED, message=message)
         end.write(job.folder)
-        note(end, job)
-
-    def _executor(self, n_jobs: int) -> AbstractContextManager[Executor]:
-        return processes(n_jobs) if self.backend == "processes" else dask_cluster(n_jobs, self.address)
+        return end
 
 
-def _collect(executor: Executor, jobs: Sequence[SweepJob], note: Callable[[Status, SweepJob], None]) -> bool:
-    """Note the ends of jobs as they come; False where a worker was killed."""
-    whole, futures = True, {}
-    with contextlib.suppress(BrokenExecutor):  # a worker was killed already: the futures tell
-        for job in jobs:
-            futures[executor.submit(work, job)] = job
-    for future in as_completed(futures):
-        try:
-            note(future.result(), futures[future])
-        except Exception as error:
-            if not (isinstance(error, BrokenExecutor) or type(error).__name__ == "KilledWorker"):
-                raise
-            whole = False
-    return whole
-
-
-def _end(job: SweepJob, note: Callable[[Status, SweepJob], None]) -> str | None:
-    """How a job stands whose worker has not answered; its end is noted where it had written it."""
-    end = status.read(job.folder)
-    if end is None or end.status == RUNNING:
-        return end and end.status
-    note(end, job)
-    return end.status
-
-
-def _cores() -> int:
-    """Cores this process may use, containers' limits considered."""
-    from joblib import cpu_count
-
-    return cpu_count()
+def _trace(job: SweepJob) -> Status | bool:
+    """What a job has left whose worker did not answer: its end, or whether it had begun."""
+    state = status.read(job.folder)
+    return state if state is not None and state.status != RUNNING else state is not None
 
 
 def warm(jobs: Sequence[SweepJob]) -> None:
@@ -155,7 +95,7 @@ def warm(jobs: Sequence[SweepJob]) -> None:
         if key in seen:
             continue
         seen.add(key)
-        with contextlib.suppress(Exception):  # the job itself will tell
+        with contextlib.suppress(Exception):  # the job itself will say
             problem = Job(job.config, job.choices, job.folder).problem
             middle = (problem.lower + problem.upper)[None] / 2
             problem.objective(middle)
@@ -165,6 +105,6 @@ def warm(jobs: Sequence[SweepJob]) -> None:
 def _returned(job: SweepJob, end: Status) -> JobReturn:
     failed = end.status == FAILED
     value: Any = UserError(f"job {job.folder.name}: {end.message}") if failed else status.objective(job.folder)
-    made = JobReturn(overrides=job.overrides, status=JobStatus.FAILED if failed else JobStatus.COMPLETED)
-    made.return_value = value
-    return made
+    outcome = JobReturn(overrides=job.overrides, status=JobStatus.FAILED if failed else JobStatus.COMPLETED)
+    outcome.return_value = value
+    return outcome

@@ -116,7 +116,7 @@ def _table(tally: Tally) -> Any:
     """The best objective of each variant so far, best first."""
     from rich.table import Table
 
-    made = Table.grid(padding=(0, 2))
+    grid = Table.grid(padding=(0, 2))
     for name, value in tally.ranked():
-        made.add_row(f"  {name}", f"best {value:.4e}", f"{tally.jobs[name]} jobs")
-    return made
+        grid.add_row(f"  {name}", f"best {value:.4e}", f"{tally.jobs[name]} jobs")
+    return grid

@@ -1,4 +1,4 @@
-"""What became of a job of a sweep: `status.json` in its folder."""
+"""The state of a job of a sweep: `status.json` in its folder."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -18,8 +18,8 @@ class Status:
 
     status: str
     message: str  # a sentence where it failed, "" otherwise
-    configuration: str  # SHA-256 of what the job was told to do
-    inputs: str  # SHA-256 of the code and the data files it did it with
+    configuration: str  # SHA-256 of the settings of the job
+    inputs: str  # SHA-256 of the code and the data files it worked with
     seconds: float
     choices: Mapping[str, str]
     seed: int
@@ -38,12 +38,12 @@ def read(folder: Path) -> Status | None:
 
 def objective(folder: Path) -> float | None:
     """The objective of the estimate in the job's `result.json`; None where its task writes none."""
-    return _objective(folder, lambda found: found)
+    return _objective(folder, lambda result: result)
 
 
 def search_objective(folder: Path) -> float | None:
-    """The objective where the job's search ended, by which optimizers are told apart."""
-    return _objective(folder, lambda found: found.get("search") or found)
+    """The objective where the job's search ended, by which optimizers are compared."""
+    return _objective(folder, lambda result: result.get("search") or result)
 
 
 def _objective(folder: Path, of: Callable[[Any], Any]) -> float | None:

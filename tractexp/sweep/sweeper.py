@@ -68,31 +68,32 @@ class Grid(Sweeper):
         )
 
     def sweep(self, arguments: list[str]) -> None:
-        told = [*(f"{key}={values}" for key, values in self.params.items()), *arguments]
+        arguments = [*(f"{key}={values}" for key, values in self.params.items()), *arguments]
         folder = Path(self.config.hydra.sweep.dir).absolute()
         comparison = self._comparison(folder)  # refused before the jobs, not after
-        jobs = place(self._composed(told), folder)
-        left = [job for job in jobs if self.redo or not finished(job)]
+        jobs = place(self._composed(arguments), folder)
+        remaining = [job for job in jobs if self.redo or not finished(job)]
         say(f"sweep: {len(jobs)} jobs in {folder}")
-        if len(left) < len(jobs):
-            say(f"  {len(jobs) - len(left)} of them are finished and kept; hydra.sweeper.redo=true runs them again")
-        if left:
+        if done := len(jobs) - len(remaining):
+            say(f"  {done} of them are finished and kept; hydra.sweeper.redo=true runs them again")
+        if remaining:
             files.write(folder / "multirun.yaml", OmegaConf.to_yaml(self.config))
-            with parent_run(folder, jobs, told, afresh=self.redo):
-                self._run(left)
+            with parent_run(folder, jobs, arguments, afresh=self.redo):
+                self._run(remaining)
         self._conclude(jobs, comparison)
 
-    def _composed(self, told: list[str]) -> list[SweepJob]:
+    def _composed(self, arguments: list[str]) -> list[SweepJob]:
         """The jobs of the sweep, composed and without duplicates, not yet placed."""
         compose = Composer(self.loader, self.config)
-        choices = {o.get_key_element(): swept(o) for o in OverridesParser.create(self.loader).parse_overrides(told)}
-        made: dict[str, SweepJob] = {}
+        parsed = OverridesParser.create(self.loader).parse_overrides(arguments)
+        choices = {override.get_key_element(): values_of(override) for override in parsed}
+        jobs: dict[str, SweepJob] = {}
         for combination in itertools.product(*choices.values()):
             overrides = [f"{key}={value}" for key, value in zip(choices, combination, strict=True)]
             job = SweepJob.of(*compose(overrides), overrides, Path())
             refuse_unread(get("task", job.config["task"]["name"]), job.given)
-            made.setdefault(job.configuration, job)
-        return list(made.values())
+            jobs.setdefault(job.configuration, job)
+        return list(jobs.values())
 
     def _comparison(self, folder: Path) -> Any:
         """The task that compares the variants at the end; None where it is not wanted."""
@@ -103,7 +104,7 @@ class Grid(Sweeper):
     def _conclude(self, jobs: Sequence[SweepJob], comparison: Any) -> None:
         """Compare the variants, where there is something to compare, and say which jobs failed."""
         if comparison is None or not comparable(jobs):
-            ended(jobs)
+            summary(jobs)
         else:
             folder = jobs[0].folder.parent
             say()
@@ -133,11 +134,11 @@ class Grid(Sweeper):
             problem = f"the launcher gave up: {str(error).strip().partition(chr(10))[0] or type(error).__name__}"
         finally:
             for job in jobs:
-                if end != INTERRUPTED or job.folder.exists():  # a job not begun has nothing to tell
+                if end != INTERRUPTED or job.folder.exists():  # a job that has not begun has no end
                     settle(job, end, problem)
 
 
-def swept(override: Override) -> list[str]:
+def values_of(override: Override) -> list[str]:
     """The values an override asks for: one, or those it sweeps over. Raises `UserError` where they cannot be listed."""
     if not override.is_sweep_override():
         return [override.get_value_element_as_str()]
@@ -145,13 +146,13 @@ def swept(override: Override) -> list[str]:
         raise UserError(
             f"{override.input_line}: a sweep over a grid needs values to count, such as 0.1,0.2,0.5 or range(0,1,0.1)"
         )
-    found = [*override.sweep_string_iterator()]
-    if not found:
+    values = [*override.sweep_string_iterator()]
+    if not values:
         raise UserError(
             f"the sweep has no jobs: {override.input_line} is empty; a range ends before its second number, "
             "as range(0,30) is 0 to 29, and a glob needs a name that matches"
         )
-    return found
+    return values
 
 
 def place(jobs: Sequence[SweepJob], folder: Path) -> list[SweepJob]:
@@ -159,13 +160,13 @@ def place(jobs: Sequence[SweepJob], folder: Path) -> list[SweepJob]:
 
     Free is also a folder that holds nothing yet but what Hydra hides in it, as a full disk or a kill leaves it.
     """
-    known = {s.configuration: p for p in _numbered(folder) if (s := status.read(p)) is not None}
+    folders = {s.configuration: p for p in _numbered(folder) if (s := status.read(p)) is not None}
     free = (k for k in itertools.count() if not _holds_something(folder / str(k)))
     placed = []
     for job in jobs:
-        if job.configuration not in known:
-            known[job.configuration] = folder / str(next(free))
-        placed.append(replace(job, folder=known[job.configuration]))
+        if job.configuration not in folders:
+            folders[job.configuration] = folder / str(next(free))
+        placed.append(replace(job, folder=folders[job.configuration]))
     return placed
 
 
@@ -185,15 +186,15 @@ def _holds_something(folder: Path) -> bool:
 
 def finished(job: SweepJob) -> bool:
     """Whether this job, with the same code and data, has been done in its folder."""
-    found = status.read(job.folder)
-    same = found is not None and (found.configuration, found.inputs) == (job.configuration, job.inputs)
-    return same and found.status == FINISHED  # type: ignore[union-attr]
+    state = status.read(job.folder)
+    same = state is not None and (state.configuration, state.inputs) == (job.configuration, job.inputs)
+    return same and state.status == FINISHED  # type: ignore[union-attr]
 
 
 def settle(job: SweepJob, end: str, problem: str) -> None:
-    """Write down the end of a job which has not said how it ended."""
-    found = status.read(job.folder)
-    if found is None or found.status == RUNNING:
+    """Write the end of a job that has not written its own."""
+    state = status.read(job.folder)
+    if state is None or state.status == RUNNING:
         job.folder.mkdir(parents=True, exist_ok=True)
         replace(job.status, status=end, message=problem).write(job.folder)
 
@@ -215,24 +216,24 @@ def show(page: Path) -> None:
         webbrowser.open(page.absolute().as_uri())
 
 
-def ended(jobs: Sequence[SweepJob]) -> None:
+def summary(jobs: Sequence[SweepJob]) -> None:
     """Print where the searches of a sweep ended, by variant and data."""
     common = shared(jobs)
-    found: dict[str, list[float]] = {}
+    objectives: dict[str, list[float]] = {}
     for job in jobs:
         value = status.search_objective(job.folder)
         if value is not None:
-            found.setdefault(job.variant(common), []).append(value)
-    if found:
+            objectives.setdefault(job.variant(common), []).append(value)
+    if objectives:
         say()
-        rows = sorted((sorted(values), name) for name, values in found.items())
+        rows = sorted((sorted(values), name) for name, values in objectives.items())
         cells = [[n, str(len(v)), *(f"{x:.4e}" for x in (v[0], median(v), v[-1]))] for v, n in rows]
         say(str(Table(["optimizer", "jobs", "best objective", "median", "worst"], cells)))
         say("objectives in pu² at the end of the search, before the estimate is polished")
 
 
 def failures(jobs: Sequence[SweepJob]) -> str:
-    """Print which jobs failed and why; returns what is to be said of them, "" where none did."""
+    """Print which jobs failed and why; returns the sentence of the error, "" where none did."""
     common, ends = shared(jobs), [(job, status.read(job.folder)) for job in jobs]
     failed = [(job, end.message) for job, end in ends if end is not None and end.status == FAILED]
     if not failed:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from tractexp.extend import Effect, Parameter, plugin, sites
 
 if TYPE_CHECKING:
-    from tractexp.extend import Equations, Symbol
+    from tractexp.extend.symbols import Equations, Symbol
 
 SOURCE = "author year, equation"  # of the bounds and the default
 

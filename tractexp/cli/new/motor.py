@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from tractexp.extend import Motor, Parameter, plugin
 
 if TYPE_CHECKING:
-    from tractexp.extend import Equations, Expr, Symbol
+    from tractexp.extend.symbols import Equations, Expr, Symbol
 
 SOURCE = "author year, equation"  # of the bounds and the default
 

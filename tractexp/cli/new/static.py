@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from tractexp.extend import Parameter, Static, plugin
 
 if TYPE_CHECKING:
-    from tractexp.extend import Expr, Symbol
+    from tractexp.extend.symbols import Expr, Symbol
 
 SOURCE = "author year, equation"  # of the bounds and the default
 

@@ -37,12 +37,12 @@ class ComparisonResult(Written):
     call: Mapping[str, Any]
     source: str  # where the runs are from, in words
     content: Mapping[str, Any]
-    judged: "Comparison | Several | None" = None  # None in a loaded result
+    computed: "Comparison | Several | None" = None  # None in a loaded result
 
     @functools.cached_property
     def comparison(self) -> "Comparison | Several":
         """What stands behind the page. A loaded result reads the runs again."""
-        return self.judged or _compared(**self.call)[1]
+        return self.computed or _compared(**self.call)[1]
 
     @property
     def comparisons(self) -> "Mapping[str, Comparison]":
@@ -209,14 +209,14 @@ def _compared(
 ) -> "tuple[str, Comparison | Several]":  # fmt: skip
     """Where the runs are from, and their comparison: of several problems each by itself and all together."""
     from tractexp.studies.comparison import runs as gathering
-    from tractexp.studies.comparison.judging import judged, several
+    from tractexp.studies.comparison.judging import compared, several
 
     runs, source = _runs(sweep, filter, uri, experiment)
     if data is not None:
         runs = gathering.on(runs, source, data)
     groups = gathering.parted(runs, apart)
     if len(groups) == 1 and not bbob:
-        return source, judged(gathering.gather(runs, source), progress, judging)
+        return source, compared(gathering.gather(runs, source), progress, judging)
     if judging["floor"] is not None and len(groups) > 1:
         raise UserError(
             f"task.floor={judging['floor']:g} is the floor of one problem, and {source} has {len(groups)}; leave it"

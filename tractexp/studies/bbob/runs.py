@@ -14,7 +14,7 @@ from tractexp.errors import UserError
 from tractexp.identification.optimizer import Optimizer
 from tractexp.identification.search import Limits, search
 from tractexp.studies.comparison.statistics import expected_running_time
-from tractexp.workers import replaced
+from tractexp.workers import Workers
 
 GROUPS = {
     "separable": range(1, 6),
@@ -138,6 +138,10 @@ def run(name: str, optimizer: Optimizer, case: tuple[int, int, int], plan: Plan)
     return Run(name, *case, problem.evaluations, searches, distance, tuple(problem.hits.tolist()))
 
 
+def _run(job: tuple[str, Optimizer, tuple[int, int, int], Plan]) -> Run:
+    return run(*job)
+
+
 def perform(
     optimizers: Mapping[str, Optimizer],
     plan: Plan,
@@ -148,16 +152,12 @@ def perform(
 
     `count()` is called as each run ends.
     """
-    from joblib import Parallel, delayed
-
     titles = {f: Bbob(f, plan.dimensions[0], plan.instances[0], plan.targets).name for f in plan.functions}
-    jobs = [delayed(run)(name, it, case, plan) for case in plan.cases for name, it in optimizers.items()]
-    ending: Any = Parallel(n_jobs=cores or -1, return_as="generator_unordered")(jobs)
+    jobs = [(name, it, case, plan) for case in plan.cases for name, it in optimizers.items()]
     runs = {}
-    with replaced():
-        for r in ending:
-            count()
-            runs[r.optimizer, r.dimension, r.function, r.instance] = r
+    for _, r in Workers(cores or -1).completed(_run, jobs, len(jobs)):
+        count()
+        runs[r.optimizer, r.dimension, r.function, r.instance] = r
     ordered = [
         runs[name, d, f, i] for name in optimizers for d in plan.dimensions for f in plan.functions
         for i in plan.instances

@@ -60,9 +60,9 @@ class Family:
 
     def ablation(self, values: Mapping[str, np.ndarray]) -> Ablation | None:
         """Effects from log10 of the objectives of each variant, (blocks,); None where no contrast can be made."""
-        found = _Contrasts(dict(self.members), {on: values[name] for on, name in self.members.items()}, self.switches)
-        made = found.ablation()
-        return made if made.effects else None
+        logs = {on: values[name] for on, name in self.members.items()}
+        ablation = _Contrasts(dict(self.members), logs, self.switches).ablation()
+        return ablation if ablation.effects else None
 
     def cost(self, spent: Mapping[str, float]) -> dict[str, float]:
         """What each switch adds, on average over its pairs, to what the variants spend."""
@@ -80,8 +80,8 @@ def family(variants: Sequence[Variant], plain: Mapping[str, str]) -> Family | No
 
     `plain` says which optimizer another one is with all its switches off.
     """
-    found = [members for optimizer, without in plain.items() for members in _families(variants, optimizer, without)]
-    largest = max(found, key=len, default={})
+    families = [members for optimizer, without in plain.items() for members in _families(variants, optimizer, without)]
+    largest = max(families, key=len, default={})
     if len(largest) < 2:
         return None
     switches = tuple(sorted({switch for on in largest for switch in on}))
@@ -118,14 +118,14 @@ def _families(variants: Sequence[Variant], optimizer: str, plain: str) -> list[d
     def rest(v: Variant) -> set[tuple[str, str]]:
         return {(k, repr(x)) for k, x in v.settings.items() if k not in switches and k != "name"}
 
-    made: dict[frozenset[tuple[str, str]], dict[On, Variant]] = defaultdict(dict)
+    groups: dict[frozenset[tuple[str, str]], dict[On, Variant]] = defaultdict(dict)
     for v in own:
-        made[frozenset(rest(v))].setdefault(on(v), v)
+        groups[frozenset(rest(v))].setdefault(on(v), v)
     for v in without:
-        for settings, family in made.items():
+        for settings, family in groups.items():
             if rest(v) <= settings:
                 family.setdefault(on(v), v)
-    return list(made.values())
+    return list(groups.values())
 
 
 @dataclass(frozen=True)

@@ -37,11 +37,11 @@ def fitness(variants: Sequence[Variant], by: str, floor: Floor) -> tuple[Chart, 
 
     def blank(title: str = "", pixels: int | None = None) -> Chart:
         label = "best objective [pu²]" if not title else "pu²"
-        made = Chart(
+        chart = Chart(
             by, [label], log_x=counted, log_y=True, hover="closest", title=title, pixels=pixels, legend=not title
         )
-        made.limits(0, low / (high / low) ** 0.06, high).level(floor.value, "floor")
-        return made.limits(None, first, last)
+        chart.limits(0, low / (high / low) ** 0.06, high).level(floor.value, "floor")
+        return chart.limits(None, first, last)
 
     curves = [(b.x, b.median) for b in bands]
     whole = _together(blank("", _height(names)), names, curves, [] if len(names) > TOGETHER else bands)
@@ -60,8 +60,8 @@ def runtime_curves(names: Sequence[str], costs: Sequence[np.ndarray], label: str
 
     def blank(title: str = "", pixels: int | None = None) -> Chart:
         share = "share of targets reached" if not title else "share"
-        made = Chart(label, [share], log_x=True, hover="closest", title=title, pixels=pixels, legend=not title)
-        return made.limits(0, 0, 1.02).limits(None, first, 1.1 * last)
+        chart = Chart(label, [share], log_x=True, hover="closest", title=title, pixels=pixels, legend=not title)
+        return chart.limits(0, 0, 1.02).limits(None, first, 1.1 * last)
 
     curves = [_shares(cost, first, 1.1 * last) for cost in costs]
     whole = _together(blank("", _height(names)), names, curves, [])
@@ -98,14 +98,14 @@ def _height(names: Sequence[str]) -> int:
 
 def _apart(blank: Blank, names: Sequence[str], curves: Curves, bands: Sequence[Band]) -> list[Chart]:
     """One small chart for each curve, the first curve behind it."""
-    made = []
+    charts = []
     for k, (name, (x, y)) in enumerate(zip(names, curves, strict=True)):
         chart = blank(name, SMALL)
         chart.line(names[0], *curves[0], style.BEHIND, step=True, legend=False)
         for b in bands[k : k + 1]:
             chart.band("", b.x, b.lower, b.upper, style.PALETTE[0], step=True)
-        made.append(chart.line(name, x, y, style.PALETTE[0], step=True, legend=False))
-    return made
+        charts.append(chart.line(name, x, y, style.PALETTE[0], step=True, legend=False))
+    return charts
 
 
 def spread(variants: Sequence[Variant], floor: Floor) -> Chart:
@@ -113,14 +113,14 @@ def spread(variants: Sequence[Variant], floor: Floor) -> Chart:
     variants = [variant for variant in variants if variant.finished]
     chart = _rows("objective [pu²]", [v.name for v in variants], log=True)
     dots = [(run, row + shift) for row, v in enumerate(variants) for run, shift in _scattered(v)]
-    told = [f"{run.optimizer}, seed {run.seed}: {number(run.objective, 4)} pu²" for run, _ in dots]
+    labels = [f"{run.optimizer}, seed {run.seed}: {number(run.objective, 4)} pu²" for run, _ in dots]
     ends = np.array([run.objective for run, _ in dots])
-    chart.points("every run", ends, [y for _, y in dots], style.FAINT, size=4, told=told)
+    chart.points("every run", ends, [y for _, y in dots], style.FAINT, size=4, told=labels)
     ended = [[run.objective for run in v.finished] for v in variants]
     lower, middle, upper = np.array([np.quantile(values, (0.25, 0.5, 0.75)) for values in ended]).T
-    told = [f"{v.name}: median {number(m, 4)} pu²" for v, m in zip(variants, middle, strict=True)]
+    labels = [f"{v.name}: median {number(m, 4)} pu²" for v, m in zip(variants, middle, strict=True)]
     chart.points(
-        "median and quartiles", middle, np.arange(len(variants)), style.PALETTE[0], told=told,
+        "median and quartiles", middle, np.arange(len(variants)), style.PALETTE[0], told=labels,
         spans=np.column_stack((lower, upper)), symbol="diamond", size=9,
     )  # fmt: skip
     margin = max(ends.max() / floor.value, 1.2) ** 0.04
@@ -155,9 +155,9 @@ def mean_ranks(ranks: Ranks, label: str = "mean rank over the seeds (1 is best)"
     names, mean = [ranks.names[k] for k in order], np.array(ranks.mean)[order]
     half = ranks.critical_difference / 2
     chart = _rows(label, names)
-    told = [f"{name}: {rank:.2f}" for name, rank in zip(names, mean, strict=True)]
+    labels = [f"{name}: {rank:.2f}" for name, rank in zip(names, mean, strict=True)]
     spans = np.column_stack((mean - half, mean + half))
-    chart.points("", mean, np.arange(len(names)), style.PALETTE[0], told=told, spans=spans)
+    chart.points("", mean, np.arange(len(names)), style.PALETTE[0], told=labels, spans=spans)
     return chart.limits(None, min(1, spans.min()) - 0.1, max(len(names), spans.max()) + 0.1)
 
 
@@ -173,9 +173,9 @@ def parameters(variants: Sequence[Variant], polished: Polished) -> Chart:
     for panel, name in enumerate(names):
         for inside, label, color in ((False, "elsewhere", OUTSIDE), (True, "in the floor's valley", INSIDE)):
             some = [(run, x) for run, x in dots if polished.in_valley(run) is inside]
-            told = [f"{run.optimizer}, seed {run.seed}: {name} {run.parameters[name]:.4g}" for run, _ in some]
+            labels = [f"{run.optimizer}, seed {run.seed}: {name} {run.parameters[name]:.4g}" for run, _ in some]
             values = [run.parameters[name] for run, _ in some]
-            chart.points(label, [x for _, x in some], values, color, panel, size=5, told=told)
+            chart.points(label, [x for _, x in some], values, color, panel, size=5, told=labels)
         low, high = polished.bounds[name]
         edge = 0.03 * (high - low)
         chart.level(polished.parameters[name], panel=panel, color=INSIDE).limits(panel, low - edge, high + edge)

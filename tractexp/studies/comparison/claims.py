@@ -167,9 +167,9 @@ def of_speed(comparison: Comparison) -> str:
 
 def of_floor(comparison: Comparison) -> str:
     """How often the noise floor was reached."""
-    told = _ranked([(s.at_floor, s.runs, s.name) for s in comparison.summaries])
+    shares = _ranked([(s.at_floor, s.runs, s.name) for s in comparison.summaries])
     value, source = number(comparison.floor.value, 5), comparison.floor.source
-    return f"Runs within {AT_FLOOR:.0%} of the floor of {value} pu² ({source}): {told}."
+    return f"Runs within {AT_FLOOR:.0%} of the floor of {value} pu² ({source}): {shares}."
 
 
 def of_valley(comparison: Comparison) -> str:
@@ -199,8 +199,8 @@ def of_effect(effect: Effect) -> str:
 
 
 def _listed_contrasts(effect: Effect) -> str:
-    told = [f"{with_} against {without}" for with_, without in effect.contrasts]
-    return " and ".join(told) if len(told) < 3 else f"{len(told)} pairs of variants that differ in it alone"
+    pairs = [f"{with_} against {without}" for with_, without in effect.contrasts]
+    return " and ".join(pairs) if len(pairs) < 3 else f"{len(pairs)} pairs of variants that differ in it alone"
 
 
 def of_unknown(ablation: Ablation) -> str:
@@ -216,15 +216,15 @@ def of_unknown(ablation: Ablation) -> str:
 
 def sentences(comparison: Comparison) -> list[str]:
     """All claims, the most general first."""
-    told = [
+    claims = [
         headline(comparison),
         of_floor(comparison),
         of_valley(comparison),
         of_speed(comparison),
         of_ranks(comparison),
     ]
-    told += [of_pair(comparison, pair) for group in near_and_far(comparison) for pair in group]
+    claims += [of_pair(comparison, pair) for group in near_and_far(comparison) for pair in group]
     if comparison.ablation:
-        told += [of_effect(effect) for effect in comparison.ablation.effects]
-        told.append(of_unknown(comparison.ablation))
-    return [text for text in told if text]
+        claims += [of_effect(effect) for effect in comparison.ablation.effects]
+        claims.append(of_unknown(comparison.ablation))
+    return [text for text in claims if text]

@@ -127,13 +127,13 @@ def _pairs(variants: Sequence[Variant], least: float, reference: str | None) -> 
             f"{len(short[0])} in common, and the Wilcoxon signed-rank test needs at least {LEAST_SEEDS} to reach "
             f"{ALPHA:.0%}; run more, such as 'seed=range(0,30)'."
         )
-    made = [_pair(*row, least) for row in enough]
-    corrected = holm([pair.p for pair in made])
-    pairs = [Pair(**{**vars(pair), "corrected": float(p)}) for pair, p in zip(made, corrected, strict=True)]
-    needed = seeds_needed(len(made))
-    if made and max(pair.seeds for pair in made) < needed:
+    tested = [_pair(*row, least) for row in enough]
+    corrected = holm([pair.p for pair in tested])
+    pairs = [Pair(**{**vars(pair), "corrected": float(p)}) for pair, p in zip(tested, corrected, strict=True)]
+    needed = seeds_needed(len(tested))
+    if tested and max(pair.seeds for pair in tested) < needed:
         notes.append(
-            f"With {len(made)} pairs corrected for, fewer than {needed} seeds can show no difference at {ALPHA:.0%}, "
+            f"With {len(tested)} pairs corrected for, fewer than {needed} seeds can show no difference at {ALPHA:.0%}, "
             "however large: run more seeds, or test against one variant by task.reference=NAME."
         )
     return tuple(sorted(pairs, key=lambda pair: (pair.corrected, pair.first, pair.second))), notes

@@ -54,9 +54,9 @@ def polish(problem: Problem, runs: Sequence[Run], counting: Callable[[int], Call
     where the objectives of the runs are not those of this problem: the records have changed since.
     """
     space = problem.space
-    known = [run for run in runs if run.finished and set(space.names) <= set(run.parameters)]
-    ends = np.array([[run.parameters[name] for name in space.names] for run in known]).reshape(-1, space.dimension)
-    if not problem.per_event and not _same(problem, ends, known):
+    complete = [run for run in runs if run.finished and set(space.names) <= set(run.parameters)]
+    ends = np.array([[run.parameters[name] for name in space.names] for run in complete]).reshape(-1, space.dimension)
+    if not problem.per_event and not _same(problem, ends, complete):
         return None
     units = np.concatenate([space.to_unit(ends), _spread(problem)])
     best = max(min(run.objective for run in runs if run.finished), TINY)
@@ -75,15 +75,15 @@ def polish(problem: Problem, runs: Sequence[Run], counting: Callable[[int], Call
     bounds = {name: (low, high) for name, (low, high) in zip(space.names, limits, strict=True)}
     return Polished(
         float(least), parameters, bounds,
-        {n: units_of[n.partition("[")[0]] for n in space.names}, len(units) - len(known),
-        dict(zip(known, map(float, objectives[: len(known)]), strict=True)),
+        {n: units_of[n.partition("[")[0]] for n in space.names}, len(units) - len(complete),
+        dict(zip(complete, map(float, objectives[: len(complete)]), strict=True)),
     )  # fmt: skip
 
 
-def floor_of(runs: Sequence[Run], given: float | None, polished: Polished | None, why_not: str = "") -> Floor:
-    """The floor as `given`, or what polishing found, or the best of all runs where there was no polishing, and why."""
-    if given is not None:
-        return Floor(given, "as given by task.floor")
+def floor_of(runs: Sequence[Run], value: float | None, polished: Polished | None, why_not: str = "") -> Floor:
+    """The floor as `value`, or what polishing found, or the best of all runs where there was no polishing, and why."""
+    if value is not None:
+        return Floor(value, "as given by task.floor")
     best = min((run for run in runs if run.finished), key=lambda run: run.objective)
     if polished is not None:
         n = len(polished.reached)

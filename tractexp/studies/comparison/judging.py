@@ -24,7 +24,7 @@ DIMENSION, EVALUATIONS = 5, 15_000  # on BBOB; the evaluations where the searche
 BBOB = "bbob.json"
 
 
-def judged(gathered: "Gathered", progress: Any, judging: Mapping[str, Any]) -> "Comparison":
+def compared(gathered: "Gathered", progress: Any, judging: Mapping[str, Any]) -> "Comparison":
     """The runs of one problem compared; `judging` are the arguments of `comparison.compare` that a user chooses."""
     from tractexp.studies.comparison.comparison import compare
 
@@ -40,22 +40,22 @@ def several(
     from tractexp.studies.comparison.overall import Several, on_records, terms_of
     from tractexp.studies.comparison.runs import gather
 
-    made: dict[str, Comparison] = {}
+    comparisons: dict[str, Comparison] = {}
     by_terms: dict[str, dict[str, Comparison]] = {}
     for (data, *_), runs in groups.items():
         terms = terms_of(runs)
         label = f"{data}, {terms}" if terms else data
-        made[label] = judged(gather(runs, f"{source} on {label}"), progress, judging)
-        by_terms.setdefault(terms, {})[label] = made[label]
+        comparisons[label] = compared(gather(runs, f"{source} on {label}"), progress, judging)
+        by_terms.setdefault(terms, {})[label] = comparisons[label]
     without = plain()
     overall = [on_records(terms, comparisons, without) for terms, comparisons in by_terms.items()]
-    notes = _noted(made)
+    notes = _noted(comparisons)
     if bbob:
         try:
-            overall.append(_on_bbob(next(iter(made.values())), bbob, folder, cores, progress))
+            overall.append(_on_bbob(next(iter(comparisons.values())), bbob, folder, cores, progress))
         except UserError as error:  # the records have been searched: what they say is told all the same
             notes.append(f"BBOB was left out: {str(error).rstrip('.')}.")
-    return Several(made, tuple(overall), tuple(notes))
+    return Several(comparisons, tuple(overall), tuple(notes))
 
 
 def _noted(comparisons: Mapping[str, "Comparison"]) -> list[str]:
@@ -64,7 +64,7 @@ def _noted(comparisons: Mapping[str, "Comparison"]) -> list[str]:
     for label, comparison in comparisons.items():
         for note in comparison.notes:
             of.setdefault(note, []).append(label)
-    return [n if len(found) == len(comparisons) else f"{joined(found)}: {n}" for n, found in of.items()]
+    return [n if len(labels) == len(comparisons) else f"{joined(labels)}: {n}" for n, labels in of.items()]
 
 
 def _on_bbob(
@@ -81,24 +81,24 @@ def _on_bbob(
     optimizers = {v.name: nested(v.runs[0].config)["optimizer"] for v in variants}
     budgets = {budget for v in variants for run in v.runs if (budget := run.config.get("budget")) is not None}
     multiplier = -(-int(budgets.pop() if len(budgets) == 1 else EVALUATIONS) // DIMENSION)
-    told = {"optimizers": optimizers, "instances": instances, "multiplier": multiplier, "code": provenance.code()}
-    made = _kept(folder, told) if folder else None
-    if made is None:
+    settings = {"optimizers": optimizers, "instances": instances, "multiplier": multiplier, "code": provenance.code()}
+    result = _stored(folder, settings) if folder else None
+    if result is None:
         chosen = {"instances": range(1, instances + 1), "dimensions": [DIMENSION], "multiplier": multiplier}
-        made = unwrap(benchmark)(optimizers, **chosen, cores=cores, progress=progress)
+        result = unwrap(benchmark)(optimizers, **chosen, cores=cores, progress=progress)
         if folder:
-            files.write_json(folder / BBOB, {"of": told, "made": made.to_dict()})
-    return on_functions(made.bbob, family(variants, plain()))
+            files.write_json(folder / BBOB, {"of": settings, "made": result.to_dict()})
+    return on_functions(result.bbob, family(variants, plain()))
 
 
-def _kept(folder: Path, told: Mapping[str, Any]) -> "BenchmarkResult | None":
+def _stored(folder: Path, settings: Mapping[str, Any]) -> "BenchmarkResult | None":
     """The runs on BBOB that were made before with the same code and settings."""
     from tractexp.studies.api.benchmark import BenchmarkResult
 
     with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
-        kept = json.loads((folder / BBOB).read_text(encoding="utf-8"))
-        if kept["of"] == files.plain(told):
-            return BenchmarkResult.from_dict(kept["made"])
+        content = json.loads((folder / BBOB).read_text(encoding="utf-8"))
+        if content["of"] == files.plain(settings):
+            return BenchmarkResult.from_dict(content["made"])
     return None
 
 
@@ -114,8 +114,9 @@ def _polished(gathered: "Gathered", progress: Any) -> "tuple[Polished | None, st
     except (KeyError, TypeError, ValueError) as error:
         return None, f"the configuration of the runs is not understood any more ({type(error).__name__}: {error})"
     with contextlib.ExitStack() as stack:
-        found = polish(problem, runs, lambda n: stack.enter_context(counting("groups of descents", n, progress)))
-    return found, "" if found else "the records or the model have changed since: these parameters fit otherwise now"
+        polished = polish(problem, runs, lambda n: stack.enter_context(counting("groups of descents", n, progress)))
+    why = "the records or the model have changed since: these parameters fit otherwise now"
+    return polished, "" if polished else why
 
 
 def _problem(run: "Run") -> "Problem":

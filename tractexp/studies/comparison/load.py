@@ -59,19 +59,19 @@ def _job(folder: Path) -> Run | None:
     if (folder / ".hydra" / "hydra.yaml").is_file() or not (unfinished and runtime["choices"]):
         runtime = _yaml(folder / ".hydra" / "hydra.yaml")["hydra"]["runtime"]  # of a job ended at once it is missing
     choices = runtime["choices"]
-    told: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "optimizer": choices["optimizer"], "data": choices["data"], "seed": int(config["seed"]),
         "config": flat(config), "where": folder.name, "folder": runtime.get("cwd", ""),
     }  # fmt: skip
     if unfinished:
-        return Run(**told, **unfinished)
+        return Run(**fields, **unfinished)
     with _readable(folder / "result.json") as path:
         result = json.loads(path.read_text(encoding="utf-8"))
         ended = ended_search(result)
-        told |= {key: float(ended[key]) for key in ENDED} | {"parameters": parameters_of(ended)}
-        told["code"] = code_of(result)
+        fields |= {key: float(ended[key]) for key in ENDED} | {"parameters": parameters_of(ended)}
+        fields["code"] = code_of(result)
     with _readable(folder / "history.csv") as path:
-        return Run(**told, **_history(path.read_text(encoding="utf-8")))
+        return Run(**fields, **_history(path.read_text(encoding="utf-8")))
 
 
 def _history(text: str) -> dict[str, Any]:
@@ -114,16 +114,16 @@ def _status(folder: Path) -> Mapping[str, Any]:
     if not (folder / "status.json").is_file():
         return {}
     with _readable(folder / "status.json") as path:
-        told = json.loads(path.read_text(encoding="utf-8"))
-        return {"message": "", **told, "status": str(told["status"])}
+        content = json.loads(path.read_text(encoding="utf-8"))
+        return {"message": "", **content, "status": str(content["status"])}
 
 
-def _unfinished(folder: Path, told: Mapping[str, Any]) -> dict[str, Any]:
+def _unfinished(folder: Path, status: Mapping[str, Any]) -> dict[str, Any]:
     """Why a job has no result: {"failure": ...} or {"interruption": ...}; {} where it has one."""
-    if INTERRUPTED in (told.get("status"), told.get("message")):  # early sweeps: "failed", with this message
+    if INTERRUPTED in (status.get("status"), status.get("message")):  # early sweeps: "failed", with this message
         return {"interruption": "its sweep was interrupted"}
-    if told and told["status"] not in (FINISHED, RUNNING):
-        return {"failure": told["message"] or f"its status is {told['status']}"}
+    if status and status["status"] not in (FINISHED, RUNNING):
+        return {"failure": status["message"] or f"its status is {status['status']}"}
     if (folder / "result.json").is_file() and (folder / "history.csv").is_file():
         return {}
     return {"interruption": "it left no result: it was ended, or still runs"}
@@ -141,22 +141,22 @@ def _yaml(path: Path) -> Any:
 
 def flat(node: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     """A nested configuration as {"optimizer.population": 50}."""
-    made: dict[str, Any] = {}
+    config: dict[str, Any] = {}
     for key, value in node.items():
-        made |= flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
-    return made
+        config |= flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
+    return config
 
 
 def nested(flattened: Mapping[str, Any]) -> dict[str, Any]:
     """The reverse of `flat`; a mapping that was empty is not there."""
-    made: dict[str, Any] = {}
+    config: dict[str, Any] = {}
     for key, value in flattened.items():
         *path, last = key.split(".")
-        node = made
+        node = config
         for part in path:
             node = node.setdefault(part, {})
         node[last] = value
-    return made
+    return config
 
 
 def from_logged(logged: Iterable[Any], source: str) -> list[Run]:
@@ -175,25 +175,25 @@ def from_logged(logged: Iterable[Any], source: str) -> list[Run]:
 
 
 def _logged(one: Any) -> Run:
-    told: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "optimizer": one.tags["optimizer"], "data": one.tags["data"], "seed": int(one.tags["seed"]),
         "config": {key: _value(text) for key, text in one.parameters.items()}, "where": one.name,
     }  # fmt: skip
     curve, ended = one.curves.get("fitness_by_simulations"), {}
     if one.status in UNDER_WAY:
-        return Run(**told, interruption=f"its status in MLflow is {one.status}")
+        return Run(**fields, interruption=f"its status in MLflow is {one.status}")
     if one.status != "FINISHED" or "objective" not in one.metrics or curve is None:
-        return Run(**told, failure=f"its status in MLflow is {one.status}")
+        return Run(**fields, failure=f"its status in MLflow is {one.status}")
     for key in (*ENDED, "simulations", "seconds"):  # early runs have one value of each, the search's
         ended[key] = one.metrics.get(f"search_{key}", one.metrics.get(key, np.nan))
     result = json.loads(one.files.get("result.json", "{}"))
-    known = {"parameters": parameters_of(ended_search(result)), "code": code_of(result)}
+    details = {"parameters": parameters_of(ended_search(result)), "code": code_of(result)}
     total, seconds = ended.pop("simulations"), ended.pop("seconds")
     if "history.csv" in one.files:
-        return Run(**told, **ended, **_history(one.files["history.csv"]), **known)
+        return Run(**fields, **ended, **_history(one.files["history.csv"]), **details)
     simulations = np.fmin(curve[0], total)
     spent = seconds * simulations / simulations[-1]
-    return Run(**told, **ended, simulations=simulations, seconds=spent, history=curve[1], **known)
+    return Run(**fields, **ended, simulations=simulations, seconds=spent, history=curve[1], **details)
 
 
 def _value(text: str) -> Any:

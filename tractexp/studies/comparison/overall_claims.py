@@ -26,17 +26,17 @@ def of_ranks(overall: Overall) -> str:
     if ranks.p >= ALPHA:
         return f"{said}, but the variants do not differ significantly (Friedman, p = {in_words(ranks.p)})."
     close = joined(alike) if len(alike) < 6 else f"{len(alike)} others"
-    told = f"; not told from it: {close}" if alike else ", significantly before all others"
-    return f"{said}{told} (critical difference {ranks.critical_difference:.2f})."
+    verdict = f"; not told from it: {close}" if alike else ", significantly before all others"
+    return f"{said}{verdict} (critical difference {ranks.critical_difference:.2f})."
 
 
 def of_switches(overall: Overall) -> str:
     """Which switches help and which harm, over all problems under the same terms; "" without an ablation."""
     if overall.ablation is None:
         return ""
-    told = [of_effect(effect) for effect in overall.ablation.effects]
+    effects = [of_effect(effect) for effect in overall.ablation.effects]
     where = [overall.terms] * bool(overall.terms) + ["BBOB"] * overall.share
-    return ", ".join(where) + ": " * bool(where) + "; ".join(told) + "."
+    return ", ".join(where) + ": " * bool(where) + "; ".join(effects) + "."
 
 
 def of_effect(effect: Effect) -> str:
@@ -51,24 +51,24 @@ def of_cost(overall: Overall) -> str:
     """What each switch costs; "" where that is not known."""
     if not overall.cost:
         return ""
-    told = [f"{switch} {cost:+.1f}" for switch, cost in overall.cost.items()]
-    return f"{overall.terms}: simulations that switching on adds to an iteration: {', '.join(told)}."
+    costs = [f"{switch} {cost:+.1f}" for switch, cost in overall.cost.items()]
+    return f"{overall.terms}: simulations that switching on adds to an iteration: {', '.join(costs)}."
 
 
 def of_agreement(several: Several) -> str:
     """Whether the switches do the same under all terms; "" without ablations."""
-    made = [overall.ablation for overall in several.overall if overall.ablation]
-    if len(made) < 2:
+    ablations = [overall.ablation for overall in several.overall if overall.ablation]
+    if len(ablations) < 2:
         return ""
     signs: dict[str, list[int]] = {}
-    for ablation in made:
+    for ablation in ablations:
         for effect in ablation.effects:
             signs.setdefault(effect.switches[0], []).append(int(np.sign(1 - effect.factor)) * effect.shown)
-    always = [s for s, found in signs.items() if len(found) == len(made) and all(sign > 0 for sign in found)]
-    never = [s for s, found in signs.items() if all(sign <= 0 for sign in found)]
-    told = [f"{_help(always)} everywhere" if always else "no ingredient helps everywhere"]
-    told += [f"{_help(never)} nowhere"] if never else []
-    return f"Over all terms together, {' and '.join(told)}."
+    always = [s for s, each in signs.items() if len(each) == len(ablations) and all(sign > 0 for sign in each)]
+    never = [s for s, each in signs.items() if all(sign <= 0 for sign in each)]
+    parts = [f"{_help(always)} everywhere" if always else "no ingredient helps everywhere"]
+    parts += [f"{_help(never)} nowhere"] if never else []
+    return f"Over all terms together, {' and '.join(parts)}."
 
 
 def _help(names: list[str]) -> str:
@@ -77,8 +77,8 @@ def _help(names: list[str]) -> str:
 
 def sentences(several: Several) -> list[str]:
     """All claims, the most general first."""
-    told = [of_agreement(several)]
+    claims = [of_agreement(several)]
     for overall in several.overall:
-        told += [of_ranks(overall), of_switches(overall)]
-    told += [of_cost(overall) for overall in several.overall]
-    return [text for text in told if text]
+        claims += [of_ranks(overall), of_switches(overall)]
+    claims += [of_cost(overall) for overall in several.overall]
+    return [text for text in claims if text]

@@ -25,8 +25,8 @@ def report(several: Several, source: str) -> Report:
     runs = sum(summary.runs for c in several.comparisons.values() for summary in c.summaries)
     title = f"Comparison of {len(first.summaries)} optimizers on {len(several.comparisons)} problems"
     page = Report(title, f"{runs} runs of {source}. Objectives are those {one.AT_END}.")
-    told = [claims.of_agreement(several), *(claims.of_ranks(overall) for overall in several.overall)]
-    page.verdict(*(text for text in told if text))
+    sentences = [claims.of_agreement(several), *(claims.of_ranks(overall) for overall in several.overall)]
+    page.verdict(*(text for text in sentences if text))
     if several.notes:
         page.heading("Mind").items(several.notes)
     for overall in several.overall:
@@ -84,9 +84,9 @@ def effects(overall: Overall) -> Chart:
         if not own:
             continue
         spans = np.array([(effect.low, effect.high) for _, effect, _ in own])
-        told = [f"{label}: {claims.of_effect(effect)}" for _, effect, label in own]
+        labels = [f"{label}: {claims.of_effect(effect)}" for _, effect, label in own]
         x, y = [effect.factor for _, effect, _ in own], [row for row, *_ in own]
-        chart.points(switch, x, y, style.PALETTE[k % len(style.PALETTE)], told=told, spans=spans)
+        chart.points(switch, x, y, style.PALETTE[k % len(style.PALETTE)], told=labels, spans=spans)
     chart.ticks(0, range(len(rows)), [label for _, label, _ in rows])
     ends = [bound for effect, *_ in rows for bound in (effect.low, effect.high)]
     low, high = min(0.9, *ends) / 1.02, max(1.1, *ends) * 1.02
@@ -115,8 +115,8 @@ def _effects(page: Report, overall: Overall, ablation: Ablation) -> None:
         return
     with page.folded("interactions of pairs of ingredients"):
         for changes, caption in ((ablation.interactions, one.INTERACTIONS), (ablation.company, one.COMPANY)):
-            told = [[*_factor(effect), "yes" if effect.shown else "no"] for effect in changes]
-            page.table(["switched on", "factor", "from", "to", "shown"], told, caption)
+            rows = [[*_factor(effect), "yes" if effect.shown else "no"] for effect in changes]
+            page.table(["switched on", "factor", "from", "to", "shown"], rows, caption)
 
 
 def _factor(effect: Effect) -> list[str]:

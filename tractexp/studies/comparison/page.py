@@ -27,8 +27,8 @@ def report(comparison: Comparison, source: str) -> Report:
     runs = sum(summary.runs for summary in comparison.summaries)
     title = f"Comparison of {len(comparison.summaries)} optimizers on {comparison.gathered.problem}"
     page = Report(title, f"{runs} runs of {source}. Objectives, errors and parameters are those {AT_END}.")
-    told = (claims.headline, claims.of_floor, claims.of_valley, claims.of_speed)
-    page.verdict(claims.answer(comparison), *(text for claim in told if (text := claim(comparison))))
+    headlines = (claims.headline, claims.of_floor, claims.of_valley, claims.of_speed)
+    page.verdict(claims.answer(comparison), *(text for claim in headlines if (text := claim(comparison))))
     if comparison.notes:
         page.heading("Mind").items(comparison.notes)
     quality(page, comparison)
@@ -107,11 +107,11 @@ def _speed(page: Report, comparison: Comparison) -> None:
         for s in comparison.summaries
     ]
     for by in ("simulations", "iterations"):
-        told = f"Best objective by {by}: the median" + (" and the quartiles." if _few(comparison) else ".")
+        caption = f"Best objective by {by}: the median" + (" and the quartiles." if _few(comparison) else ".")
         costs = " An iteration may cost several populations." if by == "iterations" else ""
-        _curves(page, comparison, charts.fitness(comparison.variants, by, comparison.floor), told + costs)
-    told = f"Runtimes: the share of {charts.targets_told()} reached by all runs, by simulations."
-    _curves(page, comparison, charts.ecdf(comparison.variants, comparison.floor), told)
+        _curves(page, comparison, charts.fitness(comparison.variants, by, comparison.floor), caption + costs)
+    caption = f"Runtimes: the share of {charts.targets_told()} reached by all runs, by simulations."
+    _curves(page, comparison, charts.ecdf(comparison.variants, comparison.floor), caption)
     page.table(
         columns,
         rows,
@@ -124,11 +124,11 @@ def _few(comparison: Comparison) -> bool:
     return len(comparison.summaries) <= charts.TOGETHER
 
 
-def _curves(page: Report, comparison: Comparison, drawn: tuple[Chart, list[Chart]], told: str) -> None:
+def _curves(page: Report, comparison: Comparison, drawn: tuple[Chart, list[Chart]], caption: str) -> None:
     """A chart of all variants; where there are many, one of each folded away."""
     whole, each = drawn
     many = f" In color the first {charts.TOGETHER}; gray ones are named when pointed at." if each else ""
-    page.chart(whole, told + many)
+    page.chart(whole, caption + many)
     if each:
         with page.folded("each variant in a chart of its own"):
             page.charts(each, f"In gray: {comparison.summaries[0].name}.")
@@ -150,11 +150,11 @@ def _differences(page: Report, comparison: Comparison) -> None:
     if rest:
         with page.folded(f"the other {len(rest)} pairs" if len(rest) > 1 else "the other pair"):
             _pairs(page, rest, "")
-    told = [claims.of_pair(comparison, pair) for pair in (*main, *rest)]
-    page.heading("To quote", 3).items(told[:QUOTED])
-    if told[QUOTED:]:
-        with page.folded(f"{len(told) - QUOTED} more sentences"):
-            page.items(told[QUOTED:])
+    sentences = [claims.of_pair(comparison, pair) for pair in (*main, *rest)]
+    page.heading("To quote", 3).items(sentences[:QUOTED])
+    if sentences[QUOTED:]:
+        with page.folded(f"{len(sentences) - QUOTED} more sentences"):
+            page.items(sentences[QUOTED:])
 
 
 def _pairs(page: Report, pairs: list[Pair], caption: str) -> None:
@@ -241,7 +241,7 @@ def content(comparison: Comparison, source: str) -> dict[str, Any]:
     interrupted = [(name, run.seed, run.where, run.interruption) for name, run in comparison.gathered.interrupted]
     keys = ("variant", "seed", "job", "message")
     polished = comparison.polished
-    told = {
+    whole = {
         "source": source,
         "problem": comparison.gathered.problem,
         "values": f"objectives, errors and parameters are those {AT_END}",
@@ -250,7 +250,7 @@ def content(comparison: Comparison, source: str) -> dict[str, Any]:
         "targets": comparison.targets,
         "ties": comparison.ties,
         "variants": comparison.summaries,
-        "runs": [_told(variant, run, comparison) for variant in comparison.variants for run in variant.finished],
+        "runs": [_of_run(variant, run, comparison) for variant in comparison.variants for run in variant.finished],
         "pairs": [asdict(pair) | {"significant": pair.significant} for pair in comparison.pairs],
         "ranks": comparison.ranks,
         "ablation": comparison.ablation,
@@ -259,14 +259,14 @@ def content(comparison: Comparison, source: str) -> dict[str, Any]:
         "failures": [dict(zip(keys, row, strict=True)) for row in failed],
         "interrupted": [dict(zip(keys, row, strict=True)) for row in interrupted],
     }
-    return files.plain(as_dicts(told))
+    return files.plain(as_dicts(whole))
 
 
-def _told(variant: Variant, run: Run, comparison: Comparison) -> dict[str, Any]:
+def _of_run(variant: Variant, run: Run, comparison: Comparison) -> dict[str, Any]:
     """One run, as `comparison.json` holds it."""
     inside = comparison.polished.in_valley(run) if comparison.polished else None
-    kept = {key: getattr(run, key) for key in ("seed", "objective", "epsilon_p", "epsilon_q", "parameters")}
-    return {"variant": variant.name, **kept, "simulations": run.simulations[-1], "in_valley": inside}
+    fields = {key: getattr(run, key) for key in ("seed", "objective", "epsilon_p", "epsilon_q", "parameters")}
+    return {"variant": variant.name, **fields, "simulations": run.simulations[-1], "in_valley": inside}
 
 
 def as_dicts(value: Any) -> Any:

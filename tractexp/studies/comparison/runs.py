@@ -81,20 +81,20 @@ class Gathered:
     interrupted: tuple[tuple[str, Run], ...] = ()  # (variant, run), which are not judged
 
     def __getitem__(self, name: str) -> Variant:
-        found = [variant for variant in self.variants if variant.name == name]
-        if not found:
+        variants = [variant for variant in self.variants if variant.name == name]
+        if not variants:
             raise UserError(
                 f"there is no variant '{name}' in this comparison{among(name, (v.name for v in self.variants))}"
             )
-        return found[0]
+        return variants[0]
 
 
 def on(runs: Sequence[Run], source: str, data: str) -> list[Run]:
     """The runs on one choice of data. Raises `UserError` where there is none."""
     chosen = [run for run in runs if run.data == data]
     if not chosen:
-        known = {run.data for run in runs}
-        raise UserError(f"task.data={data}: {source} has no run on these data{among(data, known, 'Data')}")
+        choices = {run.data for run in runs}
+        raise UserError(f"task.data={data}: {source} has no run on these data{among(data, choices, 'Data')}")
     return chosen
 
 
@@ -144,8 +144,8 @@ Settings = tuple[str, tuple[tuple[str, str], ...]]  # the optimizer as chosen, a
 
 
 def _settings(run: Run) -> Settings:
-    kept = {key: value for key, value in run.config.items() if key.partition(".")[0] in SETTINGS}
-    return run.optimizer, tuple(sorted((key, repr(value)) for key, value in kept.items()))
+    settings = {key: value for key, value in run.config.items() if key.partition(".")[0] in SETTINGS}
+    return run.optimizer, tuple(sorted((key, repr(value)) for key, value in settings.items()))
 
 
 def _identity(run: Run) -> tuple[Settings, int]:
@@ -171,12 +171,12 @@ def _variants(runs: list[Run], names: Mapping[Settings, str]) -> tuple[Variant, 
     groups: dict[Settings, list[Run]] = defaultdict(list)
     for run in runs:
         groups[_settings(run)].append(run)
-    made = []
+    variants = []
     for settings, members in groups.items():
         own = {key.removeprefix("optimizer."): members[0].config[key] for key, _ in settings[1]}
         members.sort(key=lambda run: run.seed)
-        made.append(Variant(names[settings], settings[0], own, tuple(members)))
-    return tuple(sorted(made, key=lambda variant: variant.name))
+        variants.append(Variant(names[settings], settings[0], own, tuple(members)))
+    return tuple(sorted(variants, key=lambda variant: variant.name))
 
 
 def _plain(value: str) -> str:

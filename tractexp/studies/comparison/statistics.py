@@ -46,15 +46,15 @@ def wilcoxon(a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
     if not len(difference):
         return 1.0, 0.0
     ranks = stats.rankdata(np.abs(difference))
-    found: Any = stats.wilcoxon(difference)
-    return float(found.pvalue), float(-np.sum(np.sign(difference) * ranks))
+    result: Any = stats.wilcoxon(difference)
+    return float(result.pvalue), float(-np.sum(np.sign(difference) * ranks))
 
 
 def finite(*samples: np.ndarray) -> list[np.ndarray]:
     """The samples with inf replaced by one number worse than all the others'."""
     together = np.concatenate(samples)
-    known = together[np.isfinite(together)]
-    worst = 2 * known.max() + 1 if len(known) else 0.0
+    values = together[np.isfinite(together)]
+    worst = 2 * values.max() + 1 if len(values) else 0.0
     return [np.where(np.isfinite(sample), sample, worst) for sample in samples]
 
 

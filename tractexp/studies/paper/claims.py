@@ -38,13 +38,13 @@ class Claim:
         return self.verdict.partition(":")[0]
 
 
-def counted(judged: Sequence[Claim]) -> str:
+def counted(claims: Sequence[Claim]) -> str:
     """How many there are and how many got which verdict: "38 claims: 7 confirmed, 31 not confirmed"."""
-    counts = Counter(claim.word for claim in judged)
-    told = {CONFIRMED: CONFIRMED, DEPENDS: "depending on the reading", REFUTED: REFUTED, IMPOSSIBLE: IMPOSSIBLE}
-    told |= {word: word for word in counts if word not in told}
-    return f"{len(judged)} claims: " + ", ".join(
-        f"{counts[word]} {said}" for word, said in told.items() if counts[word]
+    counts = Counter(claim.word for claim in claims)
+    phrases = {CONFIRMED: CONFIRMED, DEPENDS: "depending on the reading", REFUTED: REFUTED, IMPOSSIBLE: IMPOSSIBLE}
+    phrases |= {word: word for word in counts if word not in phrases}
+    return f"{len(claims)} claims: " + ", ".join(
+        f"{counts[word]} {said}" for word, said in phrases.items() if counts[word]
     )
 
 
@@ -63,22 +63,22 @@ def percent(value: float) -> str:
 
 def ranked(study: Study, first: str, second: str, by: str) -> tuple[str, str]:
     """Whether `first` ends lower than `second`, by every reading of both: the verdict and the numbers behind it."""
-    verdicts, told = {}, []
+    verdicts, phrases = {}, []
     for how, names in readings_of(first, second).items():
         verdicts[how], numbers = better(study, names, (first, second), by)
-        told.append(f"{how} {numbers}")
-    return together(verdicts), "; ".join(told)
+        phrases.append(f"{how} {numbers}")
+    return together(verdicts), "; ".join(phrases)
 
 
 def readings_of(first: str, second: str) -> dict[str, dict[str, str]]:
     """How the paper can be read where it matters to these two: {how: {optimizer: reading}}."""
     own = {name: name for name in printed.COMPARED}
-    made = {"with SD = 20 (section 4.3)": own}
+    readings = {"with SD = 20 (section 4.3)": own}
     if {first, second} & printed.TEN.keys():
-        made["with the 10 perceivers of section 4.2"] = own | printed.TEN
+        readings["with the 10 perceivers of section 4.2"] = own | printed.TEN
     if "pso" in (first, second):
-        made["with PSO's velocity limited to 0.2"] = own | {"pso": "pso_limited"}
-    return made
+        readings["with PSO's velocity limited to 0.2"] = own | {"pso": "pso_limited"}
+    return readings
 
 
 def together(verdicts: Mapping[str, str]) -> str:
@@ -95,8 +95,8 @@ def better(study: Study, names: Mapping[str, str], pair: tuple[str, str], by: st
     corrected = dict(zip(PAIRS, holm([each.p for each in three]), strict=True))
     p, A = corrected[pair], three[PAIRS.index(pair)].A
     medians = [float(np.median(study.objectives(names[name], by))) for name in pair]
-    told = f"medians {number(medians[0])} and {number(medians[1])} pu², p = {p:.2g}, A = {A:.2f}"
-    return _sure(study, p < ALPHA and A > 0.5), told
+    numbers = f"medians {number(medians[0])} and {number(medians[1])} pu², p = {p:.2g}, A = {A:.2f}"
+    return _sure(study, p < ALPHA and A > 0.5), numbers
 
 
 def table1(study: Study) -> list[Claim]:
@@ -129,12 +129,12 @@ def table1(study: Study) -> list[Claim]:
 
 def table2(study: Study) -> list[Claim]:
     """The values ISSA identifies and their errors."""
-    told, worst = [], {}
+    phrases, worst = [], {}
     for name in ("issa", printed.TEN["issa"], printed.LITERAL["issa"]):
         fits = [several[0] for several in study.fits(name)]
         P, Q = (np.array([getattr(f, e) for f in fits]) for e in ("epsilon_p", "epsilon_q"))
         worst[how_read(name)] = max(P.max(), Q.max())
-        told.append(f"{how_read(name)} medians {percent(np.median(P))} and {percent(np.median(Q))}, worst"
+        phrases.append(f"{how_read(name)} medians {percent(np.median(P))} and {percent(np.median(Q))}, worst"
                     f" {percent(worst[how_read(name)])}")  # fmt: skip
     sine = equations.steady_state_sine(printed.TABLE_3["issa"])
     accepted = {how: CONFIRMED if error < ACCEPTED else REFUTED for how, error in worst.items()}
@@ -144,7 +144,7 @@ def table2(study: Study) -> list[Claim]:
         Claim("table2", "all identified parameters are within reasonable ranges",
               "C lies outside (0, 1), where its definition puts it", REFUTED),
         Claim("table2", "the errors of P and Q are below 5 %: the model is acceptable",
-              f"epsilon_p and epsilon_q: {'; '.join(told)}", together(accepted)),
+              f"epsilon_p and epsilon_q: {'; '.join(phrases)}", together(accepted)),
     ]  # fmt: skip
 
 
@@ -158,15 +158,16 @@ def table3(study: Study) -> list[Claim]:
     claims = []
     for first, second in PAIRS:
         for by in BUDGETS:
-            verdict, told = ranked(study, first, second, by)
+            verdict, measured = ranked(study, first, second, by)
             at = "300 iterations" if by == "iterations" else f"{study.equal:,} simulations each"
             text = f"{LABELS[first]} is more accurate than {LABELS[second]}, after {at}"
-            claims.append(Claim("table3", text, told, verdict))
+            claims.append(Claim("table3", text, measured, verdict))
     letter = [better(study, printed.LITERAL, pair, "iterations") for pair in PAIRS[:2]]
-    told = "; ".join(f"{LABELS[a]} and {LABELS[b]}: {said}" for (a, b), (_, said) in zip(PAIRS, letter, strict=False))
+    numbers = (said for _, said in letter)
+    measured = "; ".join(f"{LABELS[a]} and {LABELS[b]}: {said}" for (a, b), said in zip(PAIRS, numbers, strict=False))
     won = all(verdict == CONFIRMED for verdict, _ in letter)
-    claims.append(Claim("table3", "to the letter, ISSA is more accurate than SSA and PSO, after 300 iterations", told,
-                        _sure(study, won)))  # fmt: skip
+    text = "to the letter, ISSA is more accurate than SSA and PSO, after 300 iterations"
+    claims.append(Claim("table3", text, measured, _sure(study, won)))
     P, Q = ({n: np.median([getattr(s[0], e) for s in study.fits(n)]) for n in printed.COMPARED}
             for e in ("epsilon_p", "epsilon_q"))  # fmt: skip
     said = "; ".join(f"{LABELS[n]} {percent(P[n])}, {percent(Q[n])}" for n in P)
@@ -191,12 +192,12 @@ def figure9(study: Study) -> list[Claim]:
     targets = " and ".join(f"{t:g}" for t in TARGETS)
     for first, second in PAIRS:
         for by in BUDGETS:
-            verdicts, told = {}, []
+            verdicts, phrases = {}, []
             for how, names in readings_of(first, second).items():
                 verdicts[how], numbers = faster(study, names[first], names[second], by)
-                told.append(f"{how} {LABELS[first]} {numbers[0]}, {LABELS[second]} {numbers[1]}")
+                phrases.append(f"{how} {LABELS[first]} {numbers[0]}, {LABELS[second]} {numbers[1]}")
             text = f"{LABELS[first]} converges faster than {LABELS[second]}, by {by}"
-            measured = f"expected {by} to {targets} times the floor: {'; '.join(told)}"
+            measured = f"expected {by} to {targets} times the floor: {'; '.join(phrases)}"
             claims.append(Claim("figure9", text, measured, together(verdicts)))
     claims.append(_jumps(study))
     return claims
@@ -209,8 +210,8 @@ def faster(study: Study, first: str, second: str, by: str) -> tuple[str, list[st
         a, b = (np.where(*_reached(study.spent(name, target, by))) for name in (first, second))
         p.append(wilcoxon(a, b)[0])
         A.append(vargha_delaney(a, b))
-    told = [", ".join(number(study.running_time(name, t, by)) for t in TARGETS) for name in (first, second)]
-    return _sure(study, max(holm(p)) < ALPHA and min(A) > 0.5), told
+    times = [", ".join(number(study.running_time(name, t, by)) for t in TARGETS) for name in (first, second)]
+    return _sure(study, max(holm(p)) < ALPHA and min(A) > 0.5), times
 
 
 def _reached(spent: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray, float]:
@@ -220,19 +221,19 @@ def _reached(spent: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarr
 
 def _jumps(study: Study) -> Claim:
     """Whether ISSA ends in the valley of the lowest objective more often than the two others do."""
-    verdicts, told = {}, []
+    verdicts, phrases = {}, []
     for how, names in readings_of("issa", "ssa").items():
         shares = {name: study.shares(names[name]) for name in printed.COMPARED}
         tests = [why.fisher(shares["issa"], shares[name], "valley") for name in ("ssa", "pso")]
         more = all(shares["issa"].valley > shares[name].valley for name in ("ssa", "pso"))
         verdicts[how] = _sure(study, more and max(holm(tests)) < ALPHA)
-        told.append(f"{how} " + ", ".join(f"{LABELS[n]} {s.valley} of {s.n} (at its floor {s.floor})"
+        phrases.append(f"{how} " + ", ".join(f"{LABELS[n]} {s.valley} of {s.n} (at its floor {s.floor})"
                                           for n, s in shares.items()))  # fmt: skip
     control = study.control_shares
-    told.append(f"of random points {control.valley} of {control.n} descend there")
+    phrases.append(f"of random points {control.valley} of {control.n} descend there")
     return Claim(
         "figure9", "SSA and PSO are caught in local optima, ISSA jumps out of them",
-        f"searches that end in the valley of the lowest objective: {'; '.join(told)}", together(verdicts),
+        f"searches that end in the valley of the lowest objective: {'; '.join(phrases)}", together(verdicts),
     )  # fmt: skip
 
 
@@ -246,7 +247,7 @@ def generalized(part: str, kind: str, table: dict[str, tuple[float, float]]) -> 
     def claims(study: Study) -> list[Claim]:
         residuals = study.residuals(kind)
         own = [min(table, key=lambda n, c=c: table[n][c]) for c in (0, 1)]
-        verdicts, told, good, worst = {}, [], {}, []
+        verdicts, phrases, good, worst = {}, [], {}, []
         for how, names in readings_of("issa", "ssa").items():
             errors = [getattr(fits[e], name) for fits in study.fits(names["issa"]) for e in study.held(kind)
                       for name in ("epsilon_p", "epsilon_q")]  # fmt: skip
@@ -254,14 +255,15 @@ def generalized(part: str, kind: str, table: dict[str, tuple[float, float]]) -> 
             worst.append(f"{how} {percent(max(errors))}")
             verdicts[how] = _lowest(study, {n: residuals[names[n]] for n in names})
             middle = {n: np.median(residuals[names[n]], axis=0) for n in names}
-            told.append(f"{how} " + ", ".join(f"{LABELS[n]} {number(r[0])}, {number(r[1])}" for n, r in middle.items()))
+            pairs = (f"{LABELS[n]} {number(r[0])}, {number(r[1])}" for n, r in middle.items())
+            phrases.append(f"{how} {', '.join(pairs)}")
         return [
             Claim(part, f"ISSA's model has good {kind} ability",
                   f"epsilon_p and epsilon_q of the held-out dip, worst of all seeds: {'; '.join(worst)}",
                   together(good)),
             Claim(part, f"ISSA's model has the best {kind} overall",
-                  f"median residuals of P, Q [pu]: {'; '.join(told)}. The paper's own table has {LABELS[own[0]]} lowest"
-                  " in P", together(verdicts)),
+                  f"median residuals of P, Q [pu]: {'; '.join(phrases)}. The paper's own table has {LABELS[own[0]]}"
+                  " lowest in P", together(verdicts)),
         ]  # fmt: skip
 
     return claims
@@ -280,11 +282,11 @@ def figure3(study: Study) -> list[Claim]:
     tent = {name: value for name, value in middle.items() if name.startswith("tent")}
     own = f"tent, alpha = {printed.ALPHA:g}"
     best = min(tent, key=lambda name: tent[name])
-    told = f"median centered discrepancy of {next(iter(study.uniformity))}: "
+    measured = f"median centered discrepancy of {next(iter(study.uniformity))}: "
     far = np.median(flock[own]) / np.median(flock["uniform"])
     return [
         Claim("figure3", "the tent map is more uniform than the logistic map",
-              f"{told}tent {number(middle[own])}, logistic {number(middle['logistic'])}",
+              f"{measured}tent {number(middle[own])}, logistic {number(middle['logistic'])}",
               CONFIRMED if middle[own] < middle["logistic"] else REFUTED),
         Claim("figure3", "with alpha = 0.3 it is relatively uniform",
               f"lowest of the alphas tried: {best.partition(', ')[2]} with {number(tent[best])}; 0.3 has"
@@ -321,9 +323,9 @@ def readings(study: Study) -> list[Claim]:
     both = [(study.objectives(name), study.objectives(name.replace("issa", "ssa", 1))) for name in BOTH]
     issa, ssa = lower(both), lower([(b, a) for a, b in both])
     whole = study.objectives("issa")
-    without = {told: study.objectives(f"issa_no_{name}") for name, (_, told) in printed.INGREDIENTS.items()}
+    without = {label: study.objectives(f"issa_no_{name}") for name, (_, label) in printed.INGREDIENTS.items()}
     helps = lower([(whole, ends) for ends in without.values()])
-    told = ", ".join(
+    factors = ", ".join(
         f"{what} × {np.median(ends) / np.median(whole):.2f} (A = {vargha_delaney(whole, ends):.2f}"
         + (")" if helped else ", not significant)")
         for (what, ends), helped in zip(without.items(), helps, strict=True)
@@ -334,7 +336,7 @@ def readings(study: Study) -> list[Claim]:
               f"of {len(both)} readings, at 300 iterations, ISSA ends significantly lower in {sum(issa)}, SSA in"
               f" {sum(ssa)}", _sure(study, all(issa))),
         Claim("readings", "each of the four ingredients improves the search",
-              f"with SD = 20, median objective without it over that of ISSA, both after 300 iterations: {told}",
+              f"with SD = 20, median objective without it over that of ISSA, both after 300 iterations: {factors}",
               _sure(study, all(helps))),
         Claim("readings", "SSA searches the space without preference",
               f"error on the sphere with the optimum one unit off zero over that at zero: SSA {zero['ssa']:.0e},"

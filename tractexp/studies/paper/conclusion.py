@@ -13,31 +13,31 @@ from tractexp.wording import joined
 NEAR = 2.0  # times the lowest objective: a valley that a search might take for the right one
 
 
-def sentences(study: Study, judged: Sequence[Claim]) -> list[str]:
+def sentences(study: Study, claims: Sequence[Claim]) -> list[str]:
     """The conclusion of the page, of as many of its parts as there are."""
-    parts: Mapping[str, list[Claim]] = {c.part: [d for d in judged if d.part == c.part] for c in judged}
-    made = []
+    parts: Mapping[str, list[Claim]] = {c.part: [d for d in claims if d.part == c.part] for c in claims}
+    paragraphs = []
     if parts.keys() & {"table2", "table4", "table5"}:
-        made.append(_model(parts))
+        paragraphs.append(_model(parts))
     if "equations" in parts or "table3" in parts:
-        made.append(_values())
+        paragraphs.append(_values())
     if "table3" in parts:
-        made.append(_ranking(study))
+        paragraphs.append(_ranking(study))
     if "figure9" in parts:
-        made.append(f"{_lack(study)} {_random(study)}")
+        paragraphs.append(f"{_lack(study)} {_random(study)}")
     if "readings" in parts:
-        made.append(_readings(parts["readings"]))
-    return made
+        paragraphs.append(_readings(parts["readings"]))
+    return paragraphs
 
 
 def _model(parts: Mapping[str, list[Claim]]) -> str:
     """Whether the errors are acceptable, on the fitted dip and on others."""
     where = {"table2": ("the fitted", 2), "table4": ("the milder", 0), "table5": ("the deeper", 0)}
-    verdicts = {told: parts[part][k].verdict for part, (told, k) in where.items() if part in parts}
-    good = [told for told, verdict in verdicts.items() if verdict == CONFIRMED]
+    verdicts = {dip: parts[part][k].verdict for part, (dip, k) in where.items() if part in parts}
+    good = [dip for dip, verdict in verdicts.items() if verdict == CONFIRMED]
     said = [f"describes {joined(good)} dip with errors below 5 %, with every seed and reading tried"] * bool(good)
-    said += [f"of {told} dip this {verdict}" if verdict.startswith(DEPENDS) else f"not {told} dip"
-             for told, verdict in verdicts.items() if verdict != CONFIRMED]  # fmt: skip
+    said += [f"of {dip} dip this {verdict}" if verdict.startswith(DEPENDS) else f"not {dip} dip"
+             for dip, verdict in verdicts.items() if verdict != CONFIRMED]  # fmt: skip
     return f"The load model that ISSA identifies {'; '.join(said)}."
 
 
@@ -52,8 +52,8 @@ def _values() -> str:
 
 def _ranking(study: Study) -> str:
     """How the three rank by both budgets."""
-    made = []
-    for by, told in (
+    parts = []
+    for by, budget in (
         ("iterations", "After 300 iterations"),
         ("simulations", f"after {study.equal:,} simulations each"),
     ):
@@ -61,10 +61,10 @@ def _ranking(study: Study) -> str:
         medians = ", ".join(f"{LABELS[n]} {number(float(np.median(study.objectives(n, by))))}" for n in order)
         apart = [f"between {LABELS[a]} and {LABELS[b]}" for a, b in PAIRS if not _differ(study, a, b, by)]
         rest = f" (no significant difference {joined(apart)})" if apart else " (all differences significant)"
-        made.append(f"{told} the median objectives are {medians} pu²{rest}")
+        parts.append(f"{budget} the median objectives are {medians} pu²{rest}")
     verdict, _ = ranked(study, "issa", "ssa", "iterations")
     reading = f" Whether ISSA ends lower than SSA {verdict}." if verdict.startswith(DEPENDS) else ""
-    return "; ".join(made) + "." + reading
+    return "; ".join(parts) + "." + reading
 
 
 def _differ(study: Study, first: str, second: str, by: str) -> bool:
@@ -90,36 +90,36 @@ def _random(study: Study) -> str:
     )
 
 
-def _readings(judged: Sequence[Claim]) -> str:
+def _readings(claims: Sequence[Claim]) -> str:
     """Which of the claims about readings and ingredients hold."""
-    held = [claim.text for claim in judged if claim.verdict == CONFIRMED]
+    held = [claim.text for claim in claims if claim.verdict == CONFIRMED]
     if held:
         return f"Of what the improvement rests on, this holds: {'; '.join(held)}."
-    return f"None of what the improvement rests on holds: {'; '.join(claim.text for claim in judged)}."
+    return f"None of what the improvement rests on holds: {'; '.join(claim.text for claim in claims)}."
 
 
 def reasons(study: Study) -> list[str]:
     """Why the three rank as they do, tested."""
-    made = [
+    paragraphs = [
         f"Is it convergence at the end, and not exploration, that the sparrows lack? {_lack(study)} {_random(study)}"
     ]
-    made += [_lacking(lack) for lack in why.lacks(study)]
+    paragraphs += [_lacking(lack) for lack in why.lacks(study)]
     rival, limited, control = study.shares(why.RIVAL), study.shares("pso_limited"), study.control_shares
     p = why.fisher(rival, control, "valley")
     word = "more" if rival.valley * control.n > control.valley * rival.n else "less"
     word = word if p < why.ALPHA else f"not significantly {word}"
-    made.append(
+    paragraphs.append(
         f"PSO is in the right valley {word} often than random points (p = {p:.2g}); with its velocity limited to 0.2 in"
         f" {limited.valley} of {limited.n} searches."
     )
-    return made
+    return paragraphs
 
 
 def _lacking(lack: why.Lack) -> str:
     """What one of the sparrow searches lacks."""
     farther = "" if lack.convergence.lacks else "not "
     others = {"PSO": lack.valley, "random points": lack.random, "the best of as many random points": lack.best}
-    lost = [told for told, test in others.items() if test.lacks]
+    lost = [name for name, test in others.items() if test.lacks]
     often, than = ("", joined(lost)) if lost else ("not ", joined(list(others), "or"))
     ended = "not significantly different from"
     if lack.polished.p < why.ALPHA:
@@ -145,78 +145,78 @@ def valley(study: Study) -> list[str]:
     groups, names = study.control.grouped(), study.problem.space.names
     if len(groups) < 2:
         return [f"All random points descend to {number(groups[0][0])} pu²: there is one valley."]
-    (lowest, _, right), (second, count, left) = groups[:2]
+    (lowest, _, right), (second, count, other) = groups[:2]
     column = names.index(TRADED)
     low, high = next(p.bounds for p in study.problem.parameters if p.name == TRADED)
-    at_bound = left[column] - low < 0.01 * (high - low)
+    at_bound = other[column] - low < 0.01 * (high - low)
     ended = {n: int(np.sum(np.abs(study.ends[n].objective / second - 1) < AT_FLOOR - 1)) for n in COMPARED}
-    where = f"on the lower bound of {TRADED}, {low:g}" if at_bound else f"at {TRADED} = {left[column]:.3g}"
+    where = f"on the lower bound of {TRADED}, {low:g}" if at_bound else f"at {TRADED} = {other[column]:.3g}"
     each = ", ".join(f"{LABELS[n]} {k}" for n, k in ended.items())
-    made = [
+    paragraphs = [
         f"{sum(ended.values())} of {3 * study.seeds} searches ({each}) end in a valley whose bottom lies {where}, with"
         f" {second / lowest:.2f} times the lowest objective, which is at {TRADED} = {right[column]:.3g};"
         f" {count} of {len(study.control.objective)} random points of the bounds descend there."
     ]
-    if at_bound and second < NEAR * lowest and right[column] > left[column]:
-        made += _attraction(study, lowest, right, left)
-    return [*made, _bounds(study, (low, high), lowest)]
+    if at_bound and second < NEAR * lowest and right[column] > other[column]:
+        paragraphs += _attraction(study, lowest, right, other)
+    return [*paragraphs, _bounds(study, (low, high), lowest)]
 
 
-def _attraction(study: Study, lowest: float, right: np.ndarray, left: np.ndarray) -> list[str]:
+def _attraction(study: Study, lowest: float, right: np.ndarray, other: np.ndarray) -> list[str]:
     """Why the lower bound attracts: what lies between it and the lowest valley, and what trades along its own."""
     grid, path = study.path
     column = study.problem.space.names.index(TRADED)
-    between = np.flatnonzero((grid > left[column]) & (grid < right[column]))
+    between = np.flatnonzero((grid > other[column]) & (grid < right[column]))
     ridge = int(between[np.argmax(path.objective[between])])
-    static = static_reactive(study, np.stack((right, left)))
-    told = (
+    static = static_reactive(study, np.stack((right, other)))
+    remark = (
         f" There the static load's part of the reactive power, Q_s0 = Q0 - Q_d0, changes its sign: {static[0]:+.2f} pu"
         f" in the lowest valley, {static[1]:+.2f} pu in the other, which stands for a source such as a capacitor."
         if static is not None and static[0] * static[1] < 0
         else ""
     )
-    made = [
+    paragraphs = [
         f"Between the two lies a ridge: at {TRADED} = {grid[ridge]:.2f} the best fit has"
-        f" {path.objective[ridge] / lowest:.1f} times the lowest objective.{told}"
+        f" {path.objective[ridge] / lowest:.1f} times the lowest objective.{remark}"
     ]
     along = np.flatnonzero((grid < grid[ridge]) & (path.objective < NEAR * lowest))
     if len(along) > 1 and (np.diff(path.objective[along]) > 0).all():
-        made.append(_traded(study, along, int(np.abs(grid - left[column]).argmin()), lowest))
-    return made
+        paragraphs.append(_traded(study, along, int(np.abs(grid - other[column]).argmin()), lowest))
+    return paragraphs
 
 
 def _traded(study: Study, along: np.ndarray, here: int, lowest: float) -> str:
     """What trades along the valley, which `along` are points of the path; its bottom within the bounds is `here`."""
     grid, path = study.path
     names = study.problem.space.names
-    told = f"Along the valley the objective falls with {TRADED}"
+    sentence = f"Along the valley the objective falls with {TRADED}"
     far, near = along[[0, -1]]
     places = [near, here, far]
-    told += (
+    sentence += (
         f", {joined([f'{path.objective[k] / lowest:.2f}' for k in places])} times the lowest at"
         f" {joined([f'{grid[k]:.2f}' for k in places])}, and has no minimum inside: whatever the bound, it attracts."
     )
     if "X_prime" in names:
         ratio = path.values[along, names.index("X_prime")] / path.values[along, names.index(TRADED)]
-        told += (
+        sentence += (
             f" {TRADED} trades against X': X'/{TRADED} stays {np.median(ratio):.3f}"
             f" (within {50 * np.ptp(ratio) / np.median(ratio):.1f} %), so that the motor draws the same active power."
         )
     if {"X_prime", "q_v"} <= set(names):
         q_v = path.values[:, names.index("q_v")]
-        told += (
+        sentence += (
             " As the U²/X' of its reactive power grows, the static load takes it off again, with its exponent"
             f" approaching that of the motor's term, 2: q_v is {joined([f'{q_v[k]:.2f}' for k in places])} there."
         )
-    return told
+    return sentence
 
 
 def _bounds(study: Study, own: tuple[float, float], lowest: float) -> str:
     """What other bounds change."""
     shares = {bounds: np.mean(ends.objective <= AT_FLOOR * lowest) for bounds, ends in study.rebounded.items()}
-    told = ", ".join(f"{shares[b]:.0%} from {b[0]:g}" for b in (WIDE, own, NARROW))
+    listed = ", ".join(f"{shares[b]:.0%} from {b[0]:g}" for b in (WIDE, own, NARROW))
     helps = shares[NARROW] > 1.5 * shares[own] and shares[WIDE] < 1.1 * shares[own]
     return (
-        f"Of random points, these descend to the lowest objective by the lower bound of {TRADED}: {told}, where"
+        f"Of random points, these descend to the lowest objective by the lower bound of {TRADED}: {listed}, where"
         " induction motors have it" + (". Wider bounds do not help, narrower ones do." if helps else ".")
     )

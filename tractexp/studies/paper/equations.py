@@ -102,41 +102,41 @@ def checks() -> list[Check]:
 def _steady_states() -> list[Check]:
     """Eqs. (1) to (3) and the definitions below them."""
     residual = rest_residual(FAIR)
-    made = [Check("Eq. (3)", "the steady state of Eq. (1)", f"with it the derivatives of Eq. (1) are {residual:.0e}",
+    results = [Check("Eq. (3)", "the steady state of Eq. (1)", f"with it the derivatives of Eq. (1) are {residual:.0e}",
                   residual < 1e-12)]  # fmt: skip
     for name, column in printed.TABLE_3.items():
         value, sine = dict(zip(printed.NAMES, column, strict=True)), steady_state_sine(column)
         where = f"Table 3, {LABELS[name]}"
         C, T = value["C"], value["T_prime"]
-        made += [
+        results += [
             Check(where, f"T_m = {value['T_m']:g}, X' = {value['X_prime']:g}, C = {C:g}",
                   f"Eq. (3) takes the arcsine of 2 T_m X'/(C U0²), in size {sine:.2f} at U0 = 1: it must not exceed 1",
                   sine <= 1),
             Check(where, f"C = {C:g}", "C = (X - X')/X, with X' between 0 and X, lies between 0 and 1", 0 < C < 1),
             Check(where, f"T' = {T:g} s", "T' = X'/X T0' is a time constant: positive", T > 0),
         ]  # fmt: skip
-    return made
+    return results
 
 
 def _errors() -> list[Check]:
     """Eqs. (8) and (20)."""
-    made = []
+    results = []
     for name, label in LABELS.items():
         if name in printed.EPSILON_P:
             P, Q = printed.EPSILON_P[name], printed.EPSILON_Q[name]
-            made.append(Check(f"Table 3, {label}", f"epsilon_p {100 * P:g} %, epsilon_q {100 * Q:g} %",
+            results.append(Check(f"Table 3, {label}", f"epsilon_p {100 * P:g} %, epsilon_q {100 * Q:g} %",
                               f"section 4.2 accepts less than {100 * ACCEPTED:g} %", max(P, Q) < ACCEPTED))  # fmt: skip
     gap = consistency()
     for pair, (P, Q) in gap.pairs.items():
         first, second = pair.split(" and ")
-        made.append(Check(f"Table 3, {LABELS[first]} and {LABELS[second]}", "errors and objectives of one record",
+        results.append(Check(f"Table 3, {LABELS[first]} and {LABELS[second]}", "errors and objectives of one record",
                           f"Eq. (8) is epsilon_p² mean(P²) + epsilon_q² mean(Q²), Eq. (20): the means are {P:.2f} and"
                           f" {Q:.2f}, and no mean of squares is negative", min(P, Q) >= 0))  # fmt: skip
     misses = ", ".join(f"{LABELS[n]} {100 * m:+.0f} %" for n, m in gap.misses.items())
-    made.append(Check("Table 3, all three", "errors and objectives of one record",
+    results.append(Check("Table 3, all three", "errors and objectives of one record",
                       f"the means that fit best miss the printed objectives by {misses}",
                       max(map(abs, gap.misses.values())) < TOLERANCE))  # fmt: skip
-    return made
+    return results
 
 
 def _methods() -> list[Check]:
@@ -159,17 +159,17 @@ def _methods() -> list[Check]:
 
 def _rankings() -> list[Check]:
     """What the text says of the tables."""
-    made = []
+    results = []
     tables = {"epsilon_p": printed.EPSILON_P, "epsilon_q": printed.EPSILON_Q, "Obj.E": printed.OBJECTIVE}
     for said, table in tables.items():
-        made.append(_lowest("Table 3", said, table))
+        results.append(_lowest("Table 3", said, table))
     P = printed.EPSILON_P
-    made.append(Check("Table 3", "SSA is more accurate than PSO", f"its epsilon_p is {100 * P['ssa']:g} %, PSO's"
+    results.append(Check("Table 3", "SSA is more accurate than PSO", f"its epsilon_p is {100 * P['ssa']:g} %, PSO's"
                       f" {100 * P['pso']:g} %", P["ssa"] < P["pso"]))  # fmt: skip
     for where, rows in (("Table 4", printed.INTERPOLATION), ("Table 5", printed.EXTRAPOLATION)):
         for c, channel in enumerate("PQ"):
-            made.append(_lowest(where, f"residual of {channel}", {n: pair[c] for n, pair in rows.items()}))
-    return made
+            results.append(_lowest(where, f"residual of {channel}", {n: pair[c] for n, pair in rows.items()}))
+    return results
 
 
 def _lowest(where: str, what: str, table: Mapping[str, float]) -> Check:
@@ -224,7 +224,7 @@ def bias(budget: int = 10_000, seeds: int = 7) -> dict[str, tuple[float, float]]
     Raw units and, for the sparrow searches, one scalar for A⁺L, as printed. An unbiased search has one size of error.
     """
     shift = np.where(np.arange(10) % 2 == 0, 1.0, -1.0)
-    found = {}
+    biases = {}
     for name in printed.COMPARED:
         settings = {"name": name, "space": "raw"} | ({} if name == "pso" else {"step": "scalar"})
         medians = [
@@ -232,5 +232,5 @@ def bias(budget: int = 10_000, seeds: int = 7) -> dict[str, tuple[float, float]]
                        for s in range(seeds)])
             for optimum in (np.zeros(10), shift)
         ]  # fmt: skip
-        found[name] = float(medians[0]), float(medians[1])
-    return found
+        biases[name] = float(medians[0]), float(medians[1])
+    return biases

@@ -46,8 +46,8 @@ def sobol(n: int, d: int, rng: np.random.Generator) -> np.ndarray:
 
 def flocks(n: int, d: int, alphas: tuple[float, ...]) -> dict[str, Callable[[np.random.Generator], np.ndarray]]:
     """The ways to scatter n sparrows over d coordinates, by name."""
-    made = {f"tent, alpha = {a:g}": lambda rng, a=a: tent_orbit(a, n, d, rng) for a in alphas}
-    return made | {
+    ways = {f"tent, alpha = {a:g}": lambda rng, a=a: tent_orbit(a, n, d, rng) for a in alphas}
+    return ways | {
         "logistic": lambda rng: logistic_orbit(n, d, rng),
         "uniform": lambda rng: rng.random((n, d)),
         "Sobol": lambda rng: sobol(n, d, rng),

@@ -76,18 +76,18 @@ def fit(node: Mapping[str, Any], motor: str, train: Sequence[Event], held_out: S
     model = compose(*parts({**node, "motor": {"name": motor}}))
     bounds, fixed = ({n: v for n, v in node[key].items() if n in model.names} for key in ("bounds", "fixed"))
     problem = Problem(model, train, bounds, fixed, node["substeps"])
-    found = search(problem, build("optimizer", {"name": "multistart_least_squares"}), seed)
-    values = problem.full(found.values)[0]
+    result = search(problem, build("optimizer", {"name": "multistart_least_squares"}), seed)
+    values = problem.full(result.values)[0]
     fits = [respond(model, values, event, "train") for event in train]
     fits += [respond(model, values, event, "validate") for event in held_out]
     substeps = int(problem.step.substeps.max())
-    known = dict(zip(model.names, values.tolist(), strict=True))
+    parameters = dict(zip(model.names, values.tolist(), strict=True))
     return Order(
         motor,
-        known,
-        found.objective,
+        parameters,
+        result.objective,
         tuple(fits),
-        estimate(problem, found.values).known,
+        estimate(problem, result.values).known,
         duration(problem),
         substeps,
         count(model.source),

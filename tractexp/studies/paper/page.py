@@ -25,21 +25,21 @@ LEAD = (
 SHOWN = ("0.3", "0.5", "0.7")  # alphas whose orbits are drawn
 
 
-def report(study: Study, parts: Sequence[str], judged: Sequence[Claim]) -> Report:
+def report(study: Study, parts: Sequence[str], claims: Sequence[Claim]) -> Report:
     """Measure `parts`, and report them with their claims."""
     sheet = Report(TITLE, LEAD)
-    _top(sheet, study, judged)
+    _top(sheet, study, claims)
     for part in parts:
         study.tell(f"writing {_place(part)}")
         SECTIONS[part](sheet, study)
     return sheet
 
 
-def _top(sheet: Report, study: Study, judged: Sequence[Claim]) -> None:
+def _top(sheet: Report, study: Study, claims: Sequence[Claim]) -> None:
     """What the reader must know first, and the verdicts."""
     sheet.verdict(
-        f"Of {counted(judged)}." if judged else "The parts chosen hold no claim.",
-        *conclusion.sentences(study, judged),
+        f"Of {counted(claims)}." if claims else "The parts chosen hold no claim.",
+        *conclusion.sentences(study, claims),
     )
     events = (*study.train, *study.held_out)
     notes = dict.fromkeys(note for event in events for note in event.record.notes)
@@ -56,12 +56,12 @@ def _top(sheet: Report, study: Study, judged: Sequence[Claim]) -> None:
         " danger (section 4.2 has 10), and velocities of particles have no limit, for none is printed. The other"
         " readings stand beside it, and a verdict that depends on the reading says so.",
     )
-    if not judged:
+    if not claims:
         return
     sheet.heading("The claims")
     sheet.table(
         ["where", "the paper's claim", "verdict", "measured"],
-        [[_place(c.part), c.text, c.verdict, c.measured] for c in judged],
+        [[_place(c.part), c.text, c.verdict, c.measured] for c in claims],
         "Where the paper does not say it in so many words, a claim is what its argument needs. p: Wilcoxon's"
         " signed-rank test over paired seeds, by Holm's correction; A: the probability that the first ends lower"
         " (Vargha and Delaney).",
@@ -131,8 +131,8 @@ def _rows_of_parameters(study: Study, columns: Sequence[tuple[str, str]]) -> lis
     for k, parameter in enumerate(printed.NAMES):
         row = [parameter, bounds[parameter] if parameter in index else "-"]
         for name, what in columns:
-            found = [f.values[index[parameter]] for f in study.searched(name)] if parameter in index else []
-            row.append(f"{printed.TABLE_3[name][k]:g}" if what == "paper" else _one(found, what))
+            values = [f.values[index[parameter]] for f in study.searched(name)] if parameter in index else []
+            row.append(f"{printed.TABLE_3[name][k]:g}" if what == "paper" else _one(values, what))
         rows.append(row)
     for label, table in (("epsilon_p", printed.EPSILON_P), ("epsilon_q", printed.EPSILON_Q)):
         errors = [_one([getattr(fits[0], label) for fits in study.fits(n)], w, table, n) for n, w in columns]
@@ -155,8 +155,8 @@ def _label(name: str) -> str:
 
 
 def _parameters(sheet: Report, study: Study, columns: Sequence[tuple[str, str]], caption: str) -> None:
-    told = {"paper": "the paper", "one": "one run", "median": "median"}
-    heads = [f"{_label(name)}, {told[what]}" for name, what in columns]
+    captions = {"paper": "the paper", "one": "one run", "median": "median"}
+    heads = [f"{_label(name)}, {captions[what]}" for name, what in columns]
     sheet.table(["", "bounds", *heads], _rows_of_parameters(study, columns), caption)
 
 
@@ -208,14 +208,14 @@ def table3(sheet: Report, study: Study) -> None:
 
 def _spent(study: Study, name: str) -> list[str]:
     """A row of what searches of a reading spend and where they end."""
-    found, literal = study.searched(name), READINGS[name].literal
+    searches, literal = study.searched(name), READINGS[name].literal
     ends = study.objectives(name)
-    each = np.median([f.simulations / max(f.iterations, 1) for f in found])
+    each = np.median([f.simulations / max(f.iterations, 1) for f in searches])
     return [
-        _label(name), _middle(ends), f"{np.median([f.simulations for f in found]):,.0f}", f"{each:.0f}",
+        _label(name), _middle(ends), f"{np.median([f.simulations for f in searches]):,.0f}", f"{each:.0f}",
         "-" if literal else f"{study.found_floor(ends):.0%}",
         "-" if literal else _middle(study.objectives(name, "simulations")),
-        f"{np.median([f.seconds for f in found]):.2f}",
+        f"{np.median([f.seconds for f in searches]):.2f}",
     ]  # fmt: skip
 
 
@@ -272,15 +272,15 @@ def figure6(sheet: Report, study: Study) -> None:
     event = study.train[0]
     record = event.record
     sheet.heading("Figure 6: the record")
-    told = [f"{record.name}, a dip of {100 * event.depth:.0f} %", *record.notes]
-    sheet.chart(figures.record(record.t, record.U, record.P, record.Q), ": ".join(told))
+    caption = [f"{record.name}, a dip of {100 * event.depth:.0f} %", *record.notes]
+    sheet.chart(figures.record(record.t, record.U, record.P, record.Q), ": ".join(caption))
 
 
 def _fit(sheet: Report, fit: Any, role: str) -> None:
     record = fit.event.record
-    told = f"{record.name} ({role}), ISSA, one run: epsilon_p {fit.epsilon_p:.2%}, epsilon_q {fit.epsilon_q:.2%}."
+    caption = f"{record.name} ({role}), ISSA, one run: epsilon_p {fit.epsilon_p:.2%}, epsilon_q {fit.epsilon_q:.2%}."
     curve = Curve("calculated", np.stack((fit.P, fit.Q)), PALETTE[1])
-    sheet.chart(event_chart(fit.event, [curve]), " ".join([told, CAPTION, *map(as_sentence, record.notes)]))
+    sheet.chart(event_chart(fit.event, [curve]), " ".join([caption, CAPTION, *map(as_sentence, record.notes)]))
 
 
 def figure8(sheet: Report, study: Study) -> None:
@@ -405,8 +405,8 @@ def equations_section(sheet: Report, study: Study) -> None:
         words=(1, 2, 3),
     )
     sheet.heading("What the model says to Table 3", 3)
-    told = equations.refusals(study.problem.model, study.problem.drive)
-    sheet.items([f"{LABELS[name]}: {sentence or 'accepted'}" for name, sentence in told.items()])
+    refusals = equations.refusals(study.problem.model, study.problem.drive)
+    sheet.items([f"{LABELS[name]}: {sentence or 'accepted'}" for name, sentence in refusals.items()])
     sheet.text(
         "T_m is the motor's power before the event, in per unit of a load normalized to about 1; Table 3 has 3.38, 3.02"
         " and 1.23. Mantegna's step and the classical Runge-Kutta method are used unless levy_formula=printed and"
@@ -428,7 +428,8 @@ def readings_section(sheet: Report, study: Study) -> None:
     )  # fmt: skip
     sheet.heading("ISSA without one of its ingredients", 3)
     rows = [["ISSA", *_costs(study, "issa")]]
-    rows += [[f"without {told}", *_costs(study, f"issa_no_{name}")] for name, (_, told) in printed.INGREDIENTS.items()]
+    for name, (_, label) in printed.INGREDIENTS.items():
+        rows.append([f"without {label}", *_costs(study, f"issa_no_{name}")])
     sheet.table(
         ["", "objective after 300 iterations [pu²]", "simulations"], rows,
         "SD = 20. By iterations, an ingredient that costs simulations is paid for by nobody: experiment=ablation"
@@ -444,7 +445,7 @@ def readings_section(sheet: Report, study: Study) -> None:
 
 
 def _costs(study: Study, name: str) -> tuple[str, str]:
-    spent = np.median([found.simulations for found in study.searched(name)])
+    spent = np.median([search.simulations for search in study.searched(name)])
     return _middle(study.objectives(name)), f"{spent:,.0f}"
 
 

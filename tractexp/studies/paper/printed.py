@@ -77,8 +77,8 @@ READINGS: dict[str, Reading] = {
     "ssa_raw_scalar": Reading("ssa", "raw units, one scalar for A⁺L", {"space": "raw", "step": "scalar"}),
     "issa_by_stage": Reading("issa", "perturbation by stage (3.2.3)", {"schedule": "stage"}),
     "issa_printed_levy": Reading("issa", "Eq. (15) as printed", {"levy_formula": "printed"}),
-    **{f"issa_no_{name}": Reading("issa", f"without {told}", {switch: False})
-       for name, (switch, told) in INGREDIENTS.items()},
+    **{f"issa_no_{name}": Reading("issa", f"without {label}", {switch: False})
+       for name, (switch, label) in INGREDIENTS.items()},
     "random_search": Reading("random_search", "the best of random points"),
 }  # fmt: skip
 TEN = {"issa": "issa_10_perceivers", "ssa": "ssa_10_perceivers"}  # section 4.2's reading of the same optimizer

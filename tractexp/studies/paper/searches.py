@@ -8,8 +8,8 @@ import numpy as np
 from tractexp.identification.problem import Problem
 from tractexp.identification.search import Limits, SearchResult, search
 from tractexp.plugin import build
-from tractexp.studies.paper.remembered import Remembered
-from tractexp.workers import replaced
+from tractexp.studies.paper.search_store import SearchStore
+from tractexp.workers import Workers
 
 CHUNK = 5  # searches that share the composition of a model
 Recipe = Callable[[], Problem]  # what a worker builds its problem from: a `Problem` holds compiled code
@@ -32,31 +32,29 @@ def run(
     the same code on the same problem is read back where it is to `remember`, and `note` is told; its seconds are those
     of then.
     """
-    from joblib import Parallel, cpu_count, delayed
-
     problem, limits = recipe(), limits or Limits()
-    known = Remembered(problem, limits, remember)
-    found = {label: [known.get(settings, seed) for seed in range(seeds)] for label, settings in variants.items()}
-    missing = {label: [seed for seed in range(seeds) if several[seed] is None] for label, several in found.items()}
+    stored = SearchStore(problem, limits, remember)
+    results = {label: [stored.get(settings, seed) for seed in range(seeds)] for label, settings in variants.items()}
+    missing = {label: [seed for seed in range(seeds) if several[seed] is None] for label, several in results.items()}
     done, total = 0, sum(map(len, missing.values()))
     if known_before := seeds * len(variants) - total:
         note(f"  {known_before} of them were made before by the same code on the same records, and are read back")
-    chunks = [(label, left[k : k + CHUNK]) for label, left in missing.items() for k in range(0, len(left), CHUNK)]
+    chunks = [(label, part[k : k + CHUNK]) for label, part in missing.items() for k in range(0, len(part), CHUNK)]
     if not chunks:
-        return found  # type: ignore[return-value]
+        return results  # type: ignore[return-value]
     problem.objective(problem.space.from_unit(np.full((1, problem.space.dimension), 0.5)))  # compiled once, for all
-    parallel: Any = Parallel(n_jobs=min(workers or cpu_count(), len(chunks)), return_as="generator")
-    jobs = (delayed(_chunk)(recipe, dict(variants[label]), part, limits) for label, part in chunks)
-    with replaced():
-        for (label, part), outcome in zip(chunks, parallel(jobs), strict=True):
-            for seed, one in zip(part, outcome, strict=True):
-                found[label][seed] = one
-                known.put(variants[label], seed, one)
-            done += len(part)
-            tell(done, total)
-    return found  # type: ignore[return-value]
+    jobs = [(recipe, dict(variants[label]), part, limits) for label, part in chunks]
+    for k, outcome in Workers(workers or -1).completed(_chunk, jobs, len(jobs)):
+        label, part = chunks[k]
+        for seed, one in zip(part, outcome, strict=True):
+            results[label][seed] = one
+            stored.put(variants[label], seed, one)
+        done += len(part)
+        tell(done, total)
+    return results  # type: ignore[return-value]
 
 
-def _chunk(recipe: Recipe, settings: dict[str, Any], seeds: Sequence[int], limits: Limits) -> list[SearchResult]:
+def _chunk(job: tuple[Recipe, dict[str, Any], Sequence[int], Limits]) -> list[SearchResult]:
+    recipe, settings, seeds, limits = job
     problem, optimizer = recipe(), build("optimizer", settings)
     return [search(problem, optimizer, seed, limits) for seed in seeds]

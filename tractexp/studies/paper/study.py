@@ -17,7 +17,7 @@ from tractexp.record import Event
 from tractexp.studies.comparison.statistics import expected_running_time, vargha_delaney, wilcoxon
 from tractexp.studies.paper import equations, maps, orders, printed, searches, valleys
 from tractexp.studies.paper.printed import COMPARED, EQUAL, ITERATIONS, LITERAL, READINGS, TEN
-from tractexp.studies.paper.remembered import Remembered
+from tractexp.studies.paper.search_store import SearchStore
 
 ALPHAS = (0.1, 0.3, 0.5, 0.7, 0.9)  # of the tent map
 TARGETS = (10.0, 2.0)  # of running times, times the floor
@@ -118,15 +118,15 @@ class Study:
 
     def first(self, name: str) -> list[Fit]:
         """The one run that the paper's figures show, seed 0: the fits of the fitted events, then of those held out."""
-        known = self.seen.get((name, "iterations"))
-        return self.respond(known[0] if known else self._run([name], "iterations", 1)[name][0])
+        results = self.seen.get((name, "iterations"))
+        return self.respond(results[0] if results else self._run([name], "iterations", 1)[name][0])
 
     def _gather(self, names: Sequence[str], by: str) -> None:
         for literal in (False, True):
             chosen = [name for name in names if READINGS[name].literal == literal]
             if chosen:
-                found = self._run(chosen, by, self.seeds)
-                self.seen.update({(name, by): several for name, several in found.items()})
+                results = self._run(chosen, by, self.seeds)
+                self.seen.update({(name, by): several for name, several in results.items()})
 
     def _run(self, names: Sequence[str], by: str, seeds: int) -> dict[str, list[SearchResult]]:
         """Search with readings that all search the same problem."""
@@ -156,7 +156,7 @@ class Study:
 
     def objectives(self, name: str, by: str = "iterations") -> np.ndarray:
         """(seeds,) where the searches end."""
-        return np.array([found.objective for found in self.searched(name, by)])
+        return np.array([search.objective for search in self.searched(name, by)])
 
     def pair(self, first: str, second: str, by: str) -> Pair:
         a, b = self.objectives(first, by), self.objectives(second, by)
@@ -165,10 +165,10 @@ class Study:
     def spent(self, name: str, target: float, by: str) -> tuple[np.ndarray, np.ndarray]:
         """What each search spent until `target` times the floor or in all (seeds,), and whether it got there."""
         spent, reached = [], []
-        for found in self.searched(name, by):
-            hit = found.history.objective <= target * self.floor
+        for search in self.searched(name, by):
+            hit = search.history.objective <= target * self.floor
             at = int(hit.argmax()) if hit.any() else -1
-            spent.append(range(len(hit))[at] if by == "iterations" else int(found.history.simulations[at]))
+            spent.append(range(len(hit))[at] if by == "iterations" else int(search.history.simulations[at]))
             reached.append(bool(hit.any()))
         return np.array(spent), np.array(reached)
 
@@ -184,25 +184,25 @@ class Study:
         """
         self.tell("Figure 9: descending from where the searches ended, and from random points")
         names = (*LEVEL, "random_search")
-        starts = np.array([found.values for name in names for found in self.searched(name)])
-        made = self._kept(self.problem, starts, lambda: valleys.descended(self.problem, starts, self.floor))
+        starts = np.array([search.values for name in names for search in self.searched(name)])
+        ends = self._descents(self.problem, starts, lambda: valleys.descended(self.problem, starts, self.floor))
         parts = {name: slice(k * self.seeds, (k + 1) * self.seeds) for k, name in enumerate(names)}
-        return {name: valleys.Ends(made.objective[part], made.values[part]) for name, part in parts.items()}
+        return {name: valleys.Ends(ends.objective[part], ends.values[part]) for name, part in parts.items()}
 
     def random_ends(self, problem: Problem) -> valleys.Ends:
         """The control: where least squares lead from random points of the bounds."""
         points = valleys.scattered(problem, RANDOM, self.seed)
-        return self._kept(problem, points, lambda: valleys.descended(problem, points, self.floor))
+        return self._descents(problem, points, lambda: valleys.descended(problem, points, self.floor))
 
-    def _kept(self, problem: Problem, starts: np.ndarray, descend: Callable[[], valleys.Ends]) -> valleys.Ends:
+    def _descents(self, problem: Problem, starts: np.ndarray, descend: Callable[[], valleys.Ends]) -> valleys.Ends:
         """Where descents from these starts (n, free) end, read back where the same code made them before."""
-        told = f"descents {self.floor!r} {hashlib.sha256(starts.tobytes()).hexdigest()}"
+        text = f"descents {self.floor!r} {hashlib.sha256(starts.tobytes()).hexdigest()}"
 
-        def made() -> tuple[np.ndarray, ...]:
+        def compute() -> tuple[np.ndarray, ...]:
             ends = descend()
             return ends.objective, ends.values
 
-        return valleys.Ends(*Remembered(problem, Limits()).arrays(told, made))
+        return valleys.Ends(*SearchStore(problem, Limits()).arrays(text, compute))
 
     @functools.cached_property
     def control(self) -> valleys.Ends:
@@ -235,7 +235,7 @@ class Study:
         wide = valleys.within(self.problem, TRADED, *WIDE)
         grid = np.linspace(*WIDE, 63)
         low = np.array([values for _, _, values in self.control.grouped()[:2]])
-        return grid, self._kept(wide, low, lambda: valleys.along(wide, low, TRADED, grid, self.floor))
+        return grid, self._descents(wide, low, lambda: valleys.along(wide, low, TRADED, grid, self.floor))
 
     @functools.cached_property
     def rebounded(self) -> dict[tuple[float, float], valleys.Ends]:
@@ -256,13 +256,13 @@ class Study:
         """For each seed of a reading the fits of the fitted events, then of those held out."""
         if name not in self._fits:
             literal = READINGS[name].literal
-            self._fits[name] = [self.respond(found, literal) for found in self.searched(name)]
+            self._fits[name] = [self.respond(search, literal) for search in self.searched(name)]
         return self._fits[name]
 
-    def respond(self, found: SearchResult, literal: bool = False) -> list[Fit]:
-        """All events, played through the model with what a search found."""
+    def respond(self, search: SearchResult, literal: bool = False) -> list[Fit]:
+        """All events, played through the model with what a search ended at."""
         problem = self.printed_problem if literal and self.literal else self.problem
-        whole = problem.full(found.values)[0]
+        whole = problem.full(search.values)[0]
         roles = ["train"] * len(self.train) + ["validate"] * len(self.held_out)
         events = (*self.train, *self.held_out)
         return [respond(problem.model, whole, e, role) for e, role in zip(events, roles, strict=True)]

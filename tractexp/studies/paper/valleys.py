@@ -22,13 +22,13 @@ class Ends:
 
     def grouped(self) -> list[tuple[float, int, np.ndarray]]:
         """Objective, count and values of each valley, the lowest first."""
-        left, found = np.argsort(self.objective), []
-        while len(left):
-            lowest = left[0]
-            same = self.objective[left] <= SAME * self.objective[lowest]
-            found.append((float(self.objective[lowest]), int(np.count_nonzero(same)), self.values[lowest]))
-            left = left[~same]
-        return found
+        rest, groups = np.argsort(self.objective), []
+        while len(rest):
+            lowest = rest[0]
+            same = self.objective[rest] <= SAME * self.objective[lowest]
+            groups.append((float(self.objective[lowest]), int(np.count_nonzero(same)), self.values[lowest]))
+            rest = rest[~same]
+        return groups
 
 
 def descended(problem: Problem, values: np.ndarray, floor: float, held: str = "") -> Ends:
@@ -40,17 +40,17 @@ def descended(problem: Problem, values: np.ndarray, floor: float, held: str = ""
 
     unit = np.array([space.to_unit(v) for v in values])
     frozen = np.tile([name == held for name in space.names], (len(unit), 1))
-    made = descend(rows, unit, frozen, iterations=STEPS, tolerance=1.0)
-    return Ends(made.deviance / scale**2, space.from_unit(made.unit))
+    ends = descend(rows, unit, frozen, iterations=STEPS, tolerance=1.0)
+    return Ends(ends.deviance / scale**2, space.from_unit(ends.unit))
 
 
 def scattered(problem: Problem, n: int, seed: int) -> np.ndarray:
     """n points (n, free), uniform among those of the bounds that have a steady state."""
-    rng, kept = np.random.default_rng(seed), np.empty((0, problem.space.dimension))
-    while len(kept) < n:
+    rng, points = np.random.default_rng(seed), np.empty((0, problem.space.dimension))
+    while len(points) < n:
         drawn = problem.space.from_unit(rng.random((n, problem.space.dimension)))
-        kept = np.concatenate((kept, drawn[problem.objective(drawn) < REFUSED]))
-    return kept[:n]
+        points = np.concatenate((points, drawn[problem.objective(drawn) < REFUSED]))
+    return points[:n]
 
 
 def within(problem: Problem, name: str, low: float, high: float) -> Problem:
@@ -70,10 +70,10 @@ def along(problem: Problem, starts: np.ndarray, name: str, grid: np.ndarray, flo
             at = start
             for k in way:
                 moved = np.where(np.arange(len(at)) == column, grid[k], at)
-                found = descended(problem, moved[None], floor, held=name)
-                if not np.isfinite(found.objective[0]):
+                fit = descended(problem, moved[None], floor, held=name)
+                if not np.isfinite(fit.objective[0]):
                     break
-                at = found.values[0]
-                if found.objective[0] < best[k]:
-                    best[k], values[k] = found.objective[0], at
+                at = fit.values[0]
+                if fit.objective[0] < best[k]:
+                    best[k], values[k] = fit.objective[0], at
     return Ends(best, values)

@@ -54,9 +54,9 @@ def lacks(study: Study) -> list[Lack]:
     """ISSA's and SSA's; the p-values are corrected over the tests of both."""
     tests = [test for name in SPARROWS for test in _tests(study, name)]
     corrected = holm([test.p for test in tests]).tolist()
-    judged = [Test(p, test.less) for p, test in zip(corrected, tests, strict=True)]
-    each = len(judged) // len(SPARROWS)
-    return [Lack(name, *judged[each * k : each * (k + 1)]) for k, name in enumerate(SPARROWS)]
+    final = [Test(p, test.less) for p, test in zip(corrected, tests, strict=True)]
+    each = len(final) // len(SPARROWS)
+    return [Lack(name, *final[each * k : each * (k + 1)]) for k, name in enumerate(SPARROWS)]
 
 
 def _tests(study: Study, name: str) -> list[Test]:
@@ -74,9 +74,9 @@ def _tests(study: Study, name: str) -> list[Test]:
     ]
 
 
-def answer(found: Sequence[Lack]) -> str:
+def answer(searches: Sequence[Lack]) -> str:
     """Whether "convergence at the end, not exploration, is what the sparrows lack" holds."""
-    converging, exploring = all(lack.convergence.lacks for lack in found), any(lack.exploration for lack in found)
+    converging, exploring = all(lack.convergence.lacks for lack in searches), any(lack.exploration for lack in searches)
     if converging:
         return "holds only in half, for they lack both" if exploring else "holds"
     return "does not hold: it is exploration" if exploring else "is not shown: neither test is significant"

@@ -1,15 +1,18 @@
 """Our uses of private parts of other packages: each is still needed, works, and is the only one of its kind."""
 
 import ast
+import asyncio
 import copy
 import inspect
 import sys
+from concurrent.futures import Future
 from pathlib import Path
 
 import pytest
 
 import tractexp
 from tractexp.compat import hydra_config_store, hydra_plugins
+from tractexp.compat.joblib_dask import Dask
 from tractexp.compat.scipy_differential_evolution import generations
 
 HERE = Path(tractexp.__file__).parent
@@ -112,6 +115,31 @@ def test_differential_evolution_goes_a_generation_at_a_time_as_the_public_functi
     made = differential_evolution(valley, bounds, updating="deferred", vectorized=True, **seeded, **settings)
     assert made.nit == count > 5
     assert np.array_equal(np.hstack(stepwise), np.hstack(points[: len(stepwise)]))
+
+
+def test_joblib_never_hears_of_a_dask_worker_that_was_killed_but_through_the_door():
+    class KilledWorker(Exception):
+        status = "error"  # a future of Dask's as well as its error
+
+    async def waiting():
+        yield failed, (KilledWorker, failed, None)
+        backend._continue = False
+
+    failed, future, heard = KilledWorker(), Future(), []
+    backend = Dask.__new__(Dask)
+    backend._continue, backend.waiting_futures = True, waiting()
+    backend._results, backend._callbacks = {failed: future}, {failed: heard.append}
+    try:
+        asyncio.run(backend._collect())
+    except (AttributeError, KeyError, TypeError) as error:
+        pytest.fail(CHANGED.format("joblib_dask", error))
+    assert future.exception() is failed
+    assert not heard, MENDED.format("joblib's Dask backend", "joblib_dask")
+    assert backend.retrieve_result_callback(future) == [None]
+    other = Future()
+    other.set_exception(ZeroDivisionError())
+    with pytest.raises(ZeroDivisionError):
+        backend.retrieve_result_callback(other)
 
 
 def reached(tree):

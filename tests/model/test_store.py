@@ -1,6 +1,7 @@
-"""What is kept on disk and executed later: only what was written there whole, in a folder of the user's own."""
+"""What is stored on disk and may be executed: only what was written there whole, in a folder of the user's own."""
 
 import ctypes
+import io
 import os
 import stat
 import subprocess
@@ -10,27 +11,28 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tractexp import cache, texts
+from tractexp import store, texts
 from tractexp.errors import UserError
 from tractexp.kernel import objects, target
 from tractexp.model import compiling
 from tractexp.model.model import compose
 from tractexp.plugin import get
 
+ONES = store.Store("ones")
 WITHOUT_OWNERS = pytest.mark.skipif(not hasattr(os, "geteuid"), reason="folders have no owner in this system")
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """An empty folder chosen for the cache."""
-    monkeypatch.setenv(cache.CHOICE, str(tmp_path / "cache"))
-    return cache.cache_folder()
+    """An empty folder chosen for the store."""
+    monkeypatch.setenv(store.CHOICE, str(tmp_path / "cache"))
+    return store.cache_folder()
 
 
 @pytest.fixture
 def home(tmp_path, monkeypatch):
     """A home whose cache folder is the usual one; what is set while a test runs is taken back."""
-    monkeypatch.setenv(cache.CHOICE, "")
+    monkeypatch.setenv(store.CHOICE, "")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
     return tmp_path / "home" / "tractexp"
 
@@ -49,51 +51,110 @@ class Nameless:
 # what is read
 
 
-def test_a_kept_file_is_read_as_it_was_written(folder):
-    cache.write(folder / "one.kept", b"content")
-    assert cache.read(folder / "one.kept") == b"content"
-    assert [p.name for p in folder.iterdir()] == ["one.kept"]
+def test_an_entry_is_read_as_it_was_written_and_computed_once(folder):
+    ONES.write("one", b"content")
+    assert ONES.read("one") == b"content"
+    assert [str(p.relative_to(folder)) for p in folder.rglob("*.*")] == [os.path.join("ones", "one.entry")]
+    assert ONES.get("one", lambda: b"other") == b"content"
+    assert ONES.get("two", lambda: b"other") == ONES.read("two") == b"other"
+
+
+def test_what_has_no_key_is_computed_each_time_and_not_stored(folder):
+    assert [ONES.get("", lambda k=k: bytes([k])) for k in range(2)] == [b"\0", b"\1"]
+    assert [ONES.arrays("", lambda k=k: (np.array(k),))[0] for k in range(2)] == [0, 1]
+    assert not list(folder.rglob("*.*"))
+
+
+def test_the_oldest_entries_are_forgotten(folder):
+    few = store.Store("few", limit=2)
+    for k, name in enumerate("abc"):
+        few.write(name, b"content")
+        os.utime(few.path(name), (k, k))
+    few.write("d", b"content")
+    assert sorted(path.stem for path in (folder / "few").iterdir()) == ["c", "d"]
+
+
+def test_arrays_are_read_back_to_the_bit_and_never_for_another_key(folder):
+    computed = []
+
+    def compute():
+        computed.append(1)
+        return np.array([1 / 3]), np.array(["a"])
+
+    key = store.key(np.arange(3.0), [("a", 1)], {"b": None})
+    for _ in range(2):
+        number, text = store.DESCENTS.arrays(key, compute)
+        assert (number[0], text.tolist(), len(computed)) == (1 / 3, ["a"], 1)
+    others = [
+        (np.arange(3.0), [("a", 2)], {"b": None}),
+        (np.arange(3), [("a", 1)], {"b": None}),
+        (np.arange(3.0).reshape(3, 1), [("a", 1)], {"b": None}),
+        (np.arange(3.0), [("a", 1)], {"b": 0}),
+    ]
+    assert len({key, *(store.key(*other) for other in others)}) == 5
+    (file,) = (folder / "descents").iterdir()
+    file.write_bytes(file.read_bytes()[:50])
+    assert store.damaged(folder) == [file]
+    store.DESCENTS.arrays(key, compute)
+    assert len(computed) == 2
+    assert store.damaged(folder) == []
+    earlier = folder / "code_0.kept"  # of a version before 0.2
+    earlier.write_bytes(b"")
+    assert store.damaged(folder) == [earlier]
+
+
+def test_no_entry_is_unpickled(folder):
+    written = io.BytesIO()
+    np.savez(written, planted=np.array([{"an": "object"}], dtype=object))
+    store.DESCENTS.write("planted", written.getvalue())
+    assert store.DESCENTS.read("planted") == written.getvalue()
+    assert store.DESCENTS.read_arrays("planted") is None
 
 
 @pytest.mark.parametrize(
     "damage",
     [
-        *(lambda b, k=k: b[:k] + bytes([b[k] ^ 1]) + b[k + 1 :] for k in (0, cache.SUM - 1, cache.SUM, -2)),
+        *(lambda b, k=k: b[:k] + bytes([b[k] ^ 1]) + b[k + 1 :] for k in (0, store.SUM - 1, store.SUM, -2)),
         lambda b: b[:-1],
         lambda b: b + b"\0",
-        lambda b: b[: cache.SUM],
-        lambda b: b[cache.SUM :],
+        lambda b: b[: store.SUM],
+        lambda b: b[store.SUM :],
         lambda b: b"",
     ],
 )
 def test_a_damaged_file_is_none(folder, damage):
-    cache.write(path := folder / "one.kept", b"content of a file")
+    ONES.write("one", b"content of a file")
+    path = ONES.path("one")
     path.write_bytes(damage(path.read_bytes()))
-    assert cache.read(path) is None
+    assert ONES.read("one") is None
 
 
 def test_a_sound_file_in_the_place_of_another_is_none(folder):
-    cache.write(folder / "one.kept", b"content")
-    os.replace(folder / "one.kept", folder / "two.kept")
-    assert cache.read(folder / "two.kept") is None
-    (folder / "three.kept").mkdir()
-    assert cache.read(folder / "three.kept") is None
-    cache.write(folder / "three.kept", b"content")  # cannot, and says nothing: it is made again next time
-    assert not list(folder.glob("*.part"))
+    ONES.write("one", b"content")
+    os.replace(ONES.path("one"), ONES.path("two"))
+    assert ONES.read("two") is None
+    ONES.path("three").mkdir()
+    assert ONES.read("three") is None
+    ONES.write("three", b"content")  # cannot, and says nothing: it is computed again next time
+    assert not list(folder.rglob("*.part"))
 
 
 def test_planted_code_is_not_run_and_the_file_heals(folder):
     """A file whose sum is not its own is none, and is compiled anew; one of another kernel in its place, too."""
-    answer, other = (objects.keep(stored(number)) for number in (42.0, 7.0))
+    answer, other = (objects.object_code(stored(number)) for number in (42.0, 7.0))
     assert called(42.0) == 42.0
-    path, theirs = (objects._path(stored(number)) for number in (42.0, 7.0))
+    path, theirs = (code_path(stored(number)) for number in (42.0, 7.0))
     sound = path.read_bytes()
-    for planted in (theirs.read_bytes(), other, sound[: cache.SUM] + other, sound[:-9], b""):
+    for planted in (theirs.read_bytes(), other, sound[: store.SUM] + other, sound[:-9], b""):
         path.write_bytes(planted)
         assert not objects.available(stored(42.0))
         assert called(42.0) == 42.0
         assert path.read_bytes() == sound
-    assert cache.read(path) == answer
+    assert store.CODE.read(path.stem) == answer
+
+
+def code_path(text):
+    return store.CODE.path(objects._key(text))
 
 
 def stored(number):
@@ -112,15 +173,15 @@ def called(number):
 
 def test_code_for_another_machine_or_of_another_text_is_another_file(folder, monkeypatch):
     def files():
-        return len([*folder.glob("code_*.kept")])
+        return len([*folder.glob("code/*.entry")])
 
-    objects.keep(stored(1.0))
-    objects.keep(stored(1.0))
+    objects.object_code(stored(1.0))
+    objects.object_code(stored(1.0))
     assert files() == 1
-    objects.keep(stored(2.0))
+    objects.object_code(stored(2.0))
     assert files() == 2
     monkeypatch.setattr(target, "key", lambda: "another processor")
-    objects.keep(stored(1.0))
+    objects.object_code(stored(1.0))
     assert files() == 3
 
 
@@ -128,32 +189,33 @@ def test_a_changed_digit_in_a_text_is_not_compiled(folder):
     made = []
     for _ in range(2):
         assert texts.text_of((Part(),), lambda: made.append(1) or "TORQUE = 0.55", "text") == "TORQUE = 0.55"
-        (text,) = folder.glob("text_*.kept")
+        (text,) = folder.glob("texts/*.entry")
         text.write_bytes(text.read_bytes().replace(b"0.55", b"0.66"))
     assert len(made) == 2
 
 
 @pytest.mark.parametrize("parts", [(Nameless(),), (Part(), Nameless())])
-def test_nothing_is_remembered_of_a_part_known_by_its_address(folder, parts):
+def test_nothing_is_stored_of_a_part_known_by_its_address(folder, parts):
     """Another part at the same address once got the equations of the first."""
     made = []
     for _ in range(2):
         texts.text_of(parts, lambda: made.append(1) or "text", "text")
     assert len(made) == 2
-    assert not list(folder.glob("text_*"))
+    assert not list(folder.glob("texts/*"))
 
 
-def test_a_kernel_whose_file_is_damaged_is_compiled_with_the_others(folder):
+def test_a_kernel_whose_file_is_damaged_is_compiled_with_the_others(folder, monkeypatch):
+    monkeypatch.setattr(compiling, "PATIENCE", 60.0)
     motor, static = get("model/motor", "none")(), get("model/static", "zip")()
     models = [compose(motor, static), compose(get("model/motor", "voltage")(), static)]
     said = []
     compiling.compile_missing(models, lambda: said.append(1))
     assert [model.bare().has_kernel for model in models] == [True, True]
-    objects._path(models[1].source).write_bytes(b"code")
+    code_path(models[1].source).write_bytes(b"code")
     assert [model.bare().has_kernel for model in models] == [True, False]
     compiling.compile_missing(models, lambda: said.append(1))
     assert all(model.bare().has_kernel for model in models)
-    assert not said  # of what takes no two seconds nothing is said
+    assert not said  # of what takes less than its patience nothing is said
 
 
 def test_many_kernels_are_compiled_side_by_side_and_it_is_said_once(folder, monkeypatch):
@@ -174,7 +236,7 @@ def test_many_kernels_are_compiled_side_by_side_and_it_is_said_once(folder, monk
 def test_a_new_folder_is_closed_to_others_whatever_the_umask(home):
     before = os.umask(0)
     try:
-        assert cache.cache_folder() == home
+        assert store.cache_folder() == home
     finally:
         os.umask(before)
     assert stat.S_IMODE(home.stat().st_mode) == 0o700
@@ -184,7 +246,7 @@ def test_a_new_folder_is_closed_to_others_whatever_the_umask(home):
 def test_a_folder_of_an_older_version_is_closed_to_others(home):
     home.mkdir(parents=True)
     home.chmod(0o755)
-    assert cache.cache_folder() == home
+    assert store.cache_folder() == home
     assert stat.S_IMODE(home.stat().st_mode) == 0o700
 
 
@@ -228,7 +290,7 @@ def test_a_chosen_folder_that_is_not_the_users_own_is_refused(folder, monkeypatc
     folder.parent.chmod(0o700)
     reason = fault(folder, monkeypatch)
     with pytest.raises(UserError) as refused:
-        cache.cache_folder()
+        store.cache_folder()
     assert f"TRACTEXP_CACHE_DIR={folder} cannot keep kernels: {reason}" in str(refused.value)
     assert "choose a folder of your own" in str(refused.value)
 
@@ -236,28 +298,28 @@ def test_a_chosen_folder_that_is_not_the_users_own_is_refused(folder, monkeypatc
 @WITHOUT_OWNERS
 @pytest.mark.parametrize("fault", [open_to_all, open_to_a_group, within_reach, no_folder])
 def test_in_the_place_of_a_usual_folder_that_is_not_the_users_own_comes_a_new_one(home, monkeypatch, capsys, fault):
-    reason = fault(cache.cache_folder(), monkeypatch)
+    reason = fault(store.cache_folder(), monkeypatch)
     undone: list = []
-    monkeypatch.setattr(cache.atexit, "register", undone.append)
-    made = cache.cache_folder()
+    monkeypatch.setattr(store.atexit, "register", undone.append)
+    made = store.cache_folder()
     assert f"({home}: {reason}" in capsys.readouterr().err
     assert stat.S_IMODE(made.stat().st_mode) == 0o700
-    assert cache.cache_folder() == made  # the same one next time, and in the processes that this one starts
+    assert store.cache_folder() == made  # the same one next time, and in the processes that this one starts
     assert not capsys.readouterr().err
     undone[0]()
     assert not made.exists()
 
 
 @pytest.mark.parametrize("home", ["/dev/null/nobody", ""])
-def test_without_a_home_a_command_keeps_kernels_until_it_ends(home):
+def test_without_a_home_a_command_stores_kernels_until_it_ends(home):
     program = (
-        "import os, sys; from pathlib import Path; from tractexp.cache import cache_folder, read, write\n"
+        "import os, sys; from pathlib import Path; from tractexp.store import CODE, cache_folder\n"
         "if not sys.argv[1]:\n"
         "    def unknown(*_): raise RuntimeError\n"
         "    Path.home = unknown\n"  # as for a user that the system does not know
-        "write(cache_folder() / 'x', b'1'); assert read(cache_folder() / 'x') == b'1'; print(cache_folder())"
+        "CODE.write('x', b'1'); assert CODE.read('x') == b'1'; print(cache_folder())"
     )
-    there = {k: v for k, v in os.environ.items() if k not in (cache.CHOICE, "XDG_CACHE_HOME", "LOCALAPPDATA")}
+    there = {k: v for k, v in os.environ.items() if k not in (store.CHOICE, "XDG_CACHE_HOME", "LOCALAPPDATA")}
     ran = subprocess.run(
         [sys.executable, "-c", program, home], env=there | {"HOME": home}, capture_output=True, text=True, check=True
     )
@@ -270,6 +332,6 @@ def test_a_full_disk_costs_time_and_nothing_else(folder, monkeypatch):
     def full(*_, **__):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(cache.tempfile, "mkstemp", full)
-    cache.write(folder / "one.kept", b"content")
+    monkeypatch.setattr(store.tempfile, "mkstemp", full)
+    ONES.write("one", b"content")
     assert called(3.0) == 3.0

@@ -1,0 +1,238 @@
+"""The store: what was computed is on disk as an entry, read back under its key and never otherwise.
+
+A key is the SHA-256 of all that an entry depends on, so an entry is the right one or is not there; what cannot tell
+all of it has the key "", and nothing is stored. Some entries become code of this process. Two things make that safe.
+Nobody but its user can write to the folder, nor put another in its place. And each file begins with the SHA-256 of its
+own name and content: one that is damaged, cut, exchanged or from another program is none, and is computed again. The
+sums alone would not keep anyone out, who could write them too; that is what the folder is for.
+"""
+
+import atexit
+import contextlib
+import dataclasses
+import hashlib
+import hmac
+import importlib.metadata
+import io
+import os
+import platform
+import shutil
+import stat
+import sys
+import tempfile
+import zipfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tractexp import files, provenance
+from tractexp.errors import UserError
+
+CHOICE = "TRACTEXP_CACHE_DIR"
+SUM = hashlib.sha256().digest_size  # bytes a file begins with
+ENDING, EARLIER = ".entry", ".kept"  # of its name, now and in versions before 0.2
+LIBRARIES = ("numpy", "scipy", "llvmlite")  # whose versions may change the last digits
+DAMAGED = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile)  # raised where arrays are unpacked
+
+
+class Store:
+    """Entries of one kind, below the cache folder or in a `folder` of their own; beyond `limit` the oldest go."""
+
+    def __init__(self, kind: str, limit: int | None = None, folder: Path | None = None):
+        self.kind, self.limit, self.folder = kind, limit, folder
+
+    def path(self, key: str) -> Path:
+        """The file of an entry."""
+        return (self.folder or cache_folder()) / self.kind / f"{key[:40]}{ENDING}"
+
+    def read(self, key: str) -> bytes | None:
+        """The content of an entry; None where there is none, or its file is damaged."""
+        return _sound(self.path(key)) if key else None
+
+    def write(self, key: str, content: bytes) -> None:
+        """Write an entry, whole or not at all; where that is impossible, it is computed again next time."""
+        if not key:
+            return
+        with contextlib.suppress(OSError, UserError):
+            path = self.path(key)
+            path.parent.mkdir(mode=0o777 if self.folder else 0o700, parents=True, exist_ok=True)
+            files.write(path, _sum(path, content) + content, lasting=False)
+            self._forget(path.parent)
+
+    def get(self, key: str, compute: Callable[[], bytes]) -> bytes:
+        """The content of an entry, computed and written where there is none."""
+        content = self.read(key)
+        if content is None:
+            self.write(key, content := compute())
+        return content
+
+    def arrays(self, key: str, compute: Callable[[], tuple[np.ndarray, ...]]) -> tuple[np.ndarray, ...]:
+        """The arrays of an entry, computed and written where there is none."""
+        if (entry := self.read_arrays(key)) is not None:
+            return tuple(entry.values())
+        result = compute()
+        self.write_arrays(key, **{f"arr_{k}": array for k, array in enumerate(result)})
+        return result
+
+    def read_arrays(self, key: str) -> dict[str, np.ndarray] | None:
+        """The arrays of an entry by name; None where there are none. Nothing in it is unpickled."""
+        content = self.read(key) or b""
+        with contextlib.suppress(*DAMAGED), np.load(io.BytesIO(content), allow_pickle=False) as entry:
+            return {name: entry[name] for name in entry.files}
+        return None
+
+    def write_arrays(self, key: str, **arrays: np.ndarray) -> None:
+        """Write an entry of arrays by name."""
+        if not key:
+            return
+        packed = io.BytesIO()
+        np.savez_compressed(packed, **arrays)  # type: ignore[arg-type]
+        self.write(key, packed.getvalue())
+
+    def _forget(self, folder: Path) -> None:
+        entries = list(folder.glob(f"*{ENDING}")) if self.limit is not None else []
+        if len(entries) > (self.limit or 0):
+            entries.sort(key=lambda path: path.stat().st_mtime)  # another process forgets, too: one may be gone
+            for path in entries[: len(entries) - (self.limit or 0)]:
+                path.unlink(missing_ok=True)
+
+
+CODE, TEXTS = Store("code", 4000), Store("texts", 4000)  # some 10 kB each
+SEARCHES, DESCENTS, DRAWS = Store("searches", 3000), Store("descents", 4000), Store("draws", 100)  # draws of 10 MB
+
+
+def damaged(folder: Path) -> list[Path]:
+    """The files of a cache folder that are damaged, or of an earlier version."""
+    return [*(path for path in folder.rglob(f"*{ENDING}") if _sound(path) is None), *folder.rglob(f"*{EARLIER}")]
+
+
+def _sound(path: Path) -> bytes | None:
+    """The content of a file as it was written; None where there is none, or another."""
+    try:
+        data = path.read_bytes()
+    except OSError:
+        return None
+    content = data[SUM:]
+    return content if hmac.compare_digest(data[:SUM], _sum(path, content)) else None
+
+
+def _sum(path: Path, content: bytes) -> bytes:
+    return hashlib.sha256(path.name.encode() + b"\0" + content).digest()
+
+
+# Keys
+
+
+def key(*things: Any) -> str:
+    """SHA-256 of numbers, texts, arrays, and of collections and dataclasses of them: equal for what is equal."""
+    digest = hashlib.sha256()
+    for thing in things:
+        digest.update(_content(thing))
+    return digest.hexdigest()
+
+
+def _content(thing: Any) -> bytes:
+    if isinstance(thing, np.ndarray):
+        return f"{thing.dtype.str} {thing.shape} ".encode() + np.ascontiguousarray(thing).tobytes()
+    if dataclasses.is_dataclass(thing):
+        fields = {field.name: getattr(thing, field.name) for field in dataclasses.fields(thing) if field.init}
+        return f"{type(thing).__qualname__} ".encode() + _content(fields)
+    if isinstance(thing, Mapping):
+        return b"{%s}" % key(*(item for pair in thing.items() for item in pair)).encode()
+    if isinstance(thing, list | tuple):
+        return b"[%s]" % key(*thing).encode()
+    return f"{type(thing).__name__} {thing!r} ".encode()
+
+
+def environment() -> str:
+    """What stands behind every number computed here: the code of all plugins, libraries, interpreter, processor."""
+    versions = [f"{name} {importlib.metadata.version(name)}" for name in LIBRARIES]
+    return repr((provenance.code(), versions, sys.version, platform.machine(), platform.processor()))
+
+
+def installed(part: Any) -> bool:
+    """Whether a part's code is among that whose digest is taken: a plugin in no installed file may change unseen."""
+    file = getattr(sys.modules.get(type(part).__module__), "__file__", None)
+    return file is not None and any(Path(file).is_relative_to(folder) for folder in provenance.folders())
+
+
+# The folder
+
+
+def cache_folder() -> Path:
+    """$TRACTEXP_CACHE_DIR, else `tractexp` in the user's cache folder, else a temporary one.
+
+    Raises `UserError` where the folder chosen cannot be written to, or can by others.
+    """
+    if chosen := os.environ.get(CHOICE):
+        if reason := _unfit(Path(chosen)):
+            raise UserError(
+                f"{CHOICE}={chosen} cannot keep kernels: {reason}; choose a folder of your own, such as a new one"
+            )
+        return Path(chosen)
+    usual = _usual()
+    reason = _unfit(usual, private=True) if usual else "no home folder is known"
+    return usual if usual and not reason else _temporary(f"{usual or CHOICE}: {reason}")
+
+
+def _usual() -> Path | None:
+    """`tractexp` in the user's cache folder; None where no home is known."""
+    for name in ("XDG_CACHE_HOME", "LOCALAPPDATA"):
+        if (base := Path(os.environ.get(name, ""))).is_absolute():
+            return base / "tractexp"
+    try:
+        return Path.home() / ".cache" / "tractexp"
+    except RuntimeError:
+        return None
+
+
+def _unfit(folder: Path, private: bool = False) -> str:
+    """Why a folder, created where there is none, cannot hold the store; "" where it can.
+
+    `private`: one of ours that others can read, as an older version created it, is closed to them.
+    """
+    try:
+        _create(folder)
+        place = folder.resolve()
+        state = place.stat()
+        if hasattr(os, "geteuid"):  # Windows keeps a user's folders by other means
+            if state.st_uid != os.geteuid():
+                return "it belongs to another user"
+            if state.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+                return "other users can write to it"
+            for parent in place.parents:
+                mode = parent.stat().st_mode
+                if mode & stat.S_IWOTH and not mode & stat.S_ISVTX:
+                    return f"every user can put another in its place, since every user can write to {parent}"
+            if private and stat.S_IMODE(state.st_mode) != stat.S_IRWXU:
+                place.chmod(stat.S_IRWXU)
+    except (OSError, ValueError) as error:
+        return f"it cannot be made or looked at ({getattr(error, 'strerror', None) or error})"
+    return "" if os.access(folder, os.W_OK | os.X_OK) else "it cannot be written to"
+
+
+def _create(folder: Path) -> None:
+    """Create a folder where there is none, and those above it, closed to others whatever the umask."""
+    if not folder.parent.is_dir():
+        _create(folder.parent)
+    folder.mkdir(mode=0o700, exist_ok=True)
+
+
+def _temporary(reason: str) -> Path:
+    """A folder of this process, and of those that it starts, which goes when it ends."""
+    try:
+        folder = Path(tempfile.mkdtemp(prefix="tractexp-"))
+    except OSError as error:
+        raise UserError(
+            f"kernels can be kept nowhere ({reason}; {error.strerror}); set {CHOICE} to a folder you can write to"
+        ) from error
+    print(
+        f"tractexp: kernels are compiled anew for every command ({reason}); set {CHOICE} to a folder of your own",
+        file=sys.stderr,
+    )
+    os.environ[CHOICE] = str(folder)
+    owner = os.getpid()
+    atexit.register(lambda: shutil.rmtree(folder, ignore_errors=True) if os.getpid() == owner else None)
+    return folder
