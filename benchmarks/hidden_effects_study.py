@@ -131,22 +131,22 @@ def _counted(found) -> dict:
         "refitted": found.fitted_to_both,
         "closed_held": None if found.validate is None else found.validate.closed,
         "gain_held": None if found.validate is None else [found.validate.gain, found.validate.expected],
-        "left_of_all": None if found.judged is None else found.judged.p_left,
+        "left_of_all": None if found.assessment is None else found.assessment.p_left,
         "left": [s.p_left for s in found.explanations.steps],
         "left_by": found.last.left,
-        "samples": found.bench.samples,
+        "samples": found.context.samples,
         "drops": {s.name: s.drop for s in first.scores},
         "parameters": {s.name: len(at[s.name].effect.parameters) for s in first.scores},
         "untestable": sorted(at.untestable),
-        "simulations": found.bench.effort.simulations,
+        "simulations": found.context.effort.simulations,
     }
 
 
 def _proposed(proposed) -> dict | None:
     """The term of a proposal: where, by which signal, and what it closes."""
-    from tractexp.discrepancy.proposal.propose import told
+    from tractexp.discrepancy.proposal.propose import to_dict
 
-    content = told(proposed, "")
+    content = to_dict(proposed, "")
     if content is None:
         return None
     return {k: content["terms"][0][k] for k in ("balance", "signal", "clock")} | {"closed": content["closed"]}
@@ -164,20 +164,20 @@ def _compared(found, trial: cases.Trial) -> dict:
         row |= {"estimate": own["value"], "error": own["standard_error"], "amount": told["effects"][0]["amount"]}
     made = scene(trial.case, trial.seed)
     clean = _powers(made.records())
-    if found.judged is not None:
-        other = found.judged.bench
+    if found.assessment is not None:
+        other = found.assessment.context
         N = other.drive.samples
         sets = [((), False), (found.names, False)]  # members of families have kernels of their own
-        got = other.residuals_of(np.array(found.judged.units), sets) + other.drive.measured - clean[:, -N:]
+        got = other.residuals_of(np.array(found.assessment.units), sets) + other.drive.measured - clean[:, -N:]
         before, after = np.sum(got**2, axis=(1, 2))
         row["closed_true"] = 1 - after / before
     textbook = {name for name, _ in made.effects} & CATALOG.keys()  # a stranger may have the name of an effect of waves
     if made.effects and not found.catalogue.untestable.keys() & textbook:
         without = _powers(replace(made, effects=()).records())
-        N = found.bench.drive.samples
+        N = found.context.drive.samples
         change = (clean - without)[:, :N]
         first = found.first
-        projection = first.projection.of(found.bench.whiten(first.noise, -change[None]))
+        projection = first.projection.of(found.context.whiten(first.noise, -change[None]))
         row |= {"lambda": float(projection.r[0] @ projection.r[0]), "lambda_left": _left(found, clean[:, :N])}
     return row
 
@@ -190,13 +190,13 @@ def _left(found, clean: np.ndarray) -> float:
     from tractexp.discrepancy.explanations import searched
     from tractexp.discrepancy.linearization import tangent
 
-    bench, first, refits = found.bench, found.first, found.explanations.refits
+    bench, first, refits = found.context, found.first, found.explanations.refits
     singles = [f for names, f in refits.items() if len(names) == 1 and names == found.catalogue.textbook(names)]
     singles = singles or searched([first], {(): first.fit}, 1, lambda line: None)
     left = []
     for fit in sorted(singles, key=lambda f: f.cost)[:BEST]:
         t = tangent(bench, fit, first.noise)
-        off = (t.residual + bench.drive.measured - clean) * bench.known
+        off = (t.residual + bench.drive.measured - clean) * bench.valid
         rows = t.whitened(first.noise).of(bench.whiten(first.noise, off[None])).r[0]
         left.append(float(rows @ rows))
     return min(left)

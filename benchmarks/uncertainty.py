@@ -121,7 +121,7 @@ def identified(load, events, seed: int = 0, starts: int = 3, bounds: dict | None
     problem = Problem(load, events, bounds)
     optimizer = get("optimizer", "multistart_least_squares")(starts=starts)
     found = search(problem, optimizer, seed)
-    return found, checked(judged(problem, found.values).known)
+    return found, checked(judged(problem, found.values).uncertainty)
 
 
 def judged(problem, values):
@@ -292,7 +292,7 @@ def timing(repeats: int = 9) -> dict:
         problem = Problem(load, events)
         found = search(problem, get("optimizer", "multistart_least_squares")(starts=3), k)
         marks.append(time.perf_counter())
-        known = judged(problem, found.values).known
+        known = judged(problem, found.values).uncertainty
         marks.append(time.perf_counter())
         made = profiles(known)
         _ = made.verdicts

@@ -87,7 +87,7 @@ def test_outliers_pull_least_squares_and_not_a_robust_loss(spoiled, name):
 
 def test_intervals_of_a_robust_fit_leave_the_outliers_out(spoiled):
     problem = Problem(study.model(), [spoiled], loss=loss("huber"))
-    known = study.judged(problem, study.TYPICAL).known
+    known = study.judged(problem, study.TYPICAL).uncertainty
     assert 0 <= 2 * 1000 - 55 - known.likelihood.samples <= 5
     assert (np.abs(known.values - study.TYPICAL) < 2 * known.half).all()
     assert known.noise[0]["deviation"] == pytest.approx(0.004, rel=0.1)
@@ -104,7 +104,7 @@ def test_a_parameter_per_event_is_found_for_each():
     problem = Problem(study.model(), events, per_event=["T_m"])
     assert problem.space.names == ("T_prime", "X_prime", "C", "M", "T_m[1]", "T_m[2]", "p_v", "q_v")
     start = np.insert(study.TYPICAL, 4, 0.4)
-    known = study.judged(problem, start).known
+    known = study.judged(problem, start).uncertainty
     assert known.values[4:6] == pytest.approx([0.35, 0.45], abs=0.005)
     assert problem.full(known.values)[0, 4] == pytest.approx(0.4, abs=0.005)
     np.testing.assert_array_equal(problem.by_event(known.values)[:, 0, 4], known.values[4:6])

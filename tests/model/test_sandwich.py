@@ -62,7 +62,7 @@ def test_leaving_out_a_block_is_what_a_refit_without_it_gives():
     blocks, moved = blocks_of(case.events, case.drive, 7), []
     (event,) = case.events
     for block in blocks:
-        known = squares.known.copy()
+        known = squares.valid.copy()
         known[:, block] = False
         before = np.arange(event.steady.start, event.steady.stop)
         rest = before[(before < block.start) | (before >= block.stop)]
@@ -154,7 +154,7 @@ def test_a_parameter_on_a_bound_that_changes_nothing_is_not_known_and_ruins_noth
     frozen = np.zeros((1, 7), dtype=bool)
     frozen[0, -1] = True
     unit = descend(squares.rows, unit[None], frozen).unit[0]
-    silent = Silent(case, squares.noise, squares.known, initial_power=False)
+    silent = Silent(case, squares.noise, squares.valid, initial_power=False)
     errors = scatter(silent, unit).information.standard_errors
     assert np.isinf(errors[-1])
     assert np.isfinite(errors[:-1]).all()
@@ -165,7 +165,7 @@ class Silent(Likelihood):
 
     @property
     def with_initial_power(self):
-        return Silent(self.problem, self.noise, self.known, initial_power=True)
+        return Silent(self.problem, self.noise, self.valid, initial_power=True)
 
     def jacobian(self, unit):
         rows, J = super().jacobian(unit)

@@ -49,7 +49,7 @@ def model():
 def deep(model):
     """A dip of 50 % with 0.5 % of colored noise, judged from the truth's neighborhood."""
     events = records((0.5,), 0.005, correlation=0.7)
-    return study.judged(Problem(model, events), study.TYPICAL * 1.02).known
+    return study.judged(Problem(model, events), study.TYPICAL * 1.02).uncertainty
 
 
 def test_burg_finds_the_coefficients_and_aicc_the_order():
@@ -198,8 +198,8 @@ def test_the_papers_model_has_no_structural_symmetry(deep):
 def test_one_shallow_dip_leaves_c_weak_and_three_dips_identify_it(model):
     """Noise of 1 % throughout; what C trades against is said."""
     truth = study.TYPICAL
-    one = checked(study.judged(Problem(model, records((0.15,), 0.01)), truth).known)
-    three = checked(study.judged(Problem(model, records((0.15, 0.3, 0.5), 0.01)), truth).known)
+    one = checked(study.judged(Problem(model, records((0.15,), 0.01)), truth).uncertainty)
+    three = checked(study.judged(Problem(model, records((0.15, 0.3, 0.5), 0.01)), truth).uncertainty)
     assert one.verdicts["C"].word == UNIDENTIFIED  # beyond a crest at 0.75 smaller values fit as well
     assert "trades against" in one.verdicts["C"].detail
     assert "q_v (correlation -0.9" in one.verdicts["C"].detail
@@ -213,7 +213,7 @@ def test_without_static_load_its_exponent_means_nothing(model):
     t, U = study.Shape(0.5).voltage()
     rng = np.random.default_rng(4)
     power = study.printed(truth, t, U, 0.35, P0=truth[4]) + study.noise(rng, len(t), 0.002, 0.0)
-    known = checked(study.judged(Problem(model, [study.event(t, U, power)]), truth).known)
+    known = checked(study.judged(Problem(model, [study.event(t, U, power)]), truth).uncertainty)
     assert known.verdicts["p_v"].word == UNIDENTIFIED
     assert known.verdicts["M"].word == IDENTIFIED
 
@@ -241,7 +241,7 @@ def test_another_valley_is_found_where_the_search_missed_it(model):
     events = records((0.5,), 0.002)
     stuck = study.TYPICAL.copy()
     stuck[[1, 2, 6]] = [0.35 * 0.4 / 0.85, 0.4, 2.0]
-    known = study.judged(Problem(model, events), stuck).known
+    known = study.judged(Problem(model, events), stuck).uncertainty
     assert known.values[2] == pytest.approx(0.85, rel=0.05)
 
 
@@ -276,19 +276,19 @@ def test_each_event_is_credited_and_the_one_that_does_not_belong_is_named(model)
     changed[3] *= 1.15  # another inertia on the second dip
     good = records((0.3, 0.5, 0.6), 0.003)
     (odd,) = records((0.4,), 0.003, seed=9, truth=changed)
-    fine = compare_events(study.judged(Problem(model, good), study.TYPICAL).known)
+    fine = compare_events(study.judged(Problem(model, good), study.TYPICAL).uncertainty)
     assert fine.odd == []
     assert all(ratio >= 1 for gain in fine.gains.values() for ratio in gain.values())
     assert fine.gains["dip 3"]["M"] > fine.gains["dip 1"]["M"]
     odd = replace(odd, record=replace(odd.record, name="changed"))
-    mixed = compare_events(study.judged(Problem(model, [*good, odd]), study.TYPICAL).known)
+    mixed = compare_events(study.judged(Problem(model, [*good, odd]), study.TYPICAL).uncertainty)
     assert mixed.odd == ["changed"]
     assert "changed does not fit with the rest: deviance higher by" in mixed.notes[0]
 
 
 def test_a_fit_at_a_bound_says_so(model):
     problem = Problem(model, records((0.5,), 0.002), {"M": [0.001, 0.005]})
-    known = study.judged(problem, np.minimum(study.TYPICAL, problem.upper)).known
+    known = study.judged(problem, np.minimum(study.TYPICAL, problem.upper)).uncertainty
     assert str(known.verdicts["M"]).startswith(
         "at its bound (0.005; the record asks for a value beyond it: widen model.bounds.M"
     )
@@ -299,7 +299,7 @@ def test_gaps_cost_precision_and_nothing_else(model):
     P = event.record.P.copy()
     P[300:600:3] = np.nan
     holed = replace(event, record=replace(event.record, P=P))
-    whole, gaps = (study.judged(Problem(model, [e]), study.TYPICAL).known for e in (event, holed))
+    whole, gaps = (study.judged(Problem(model, [e]), study.TYPICAL).uncertainty for e in (event, holed))
     assert gaps.likelihood.samples == whole.likelihood.samples - 100
     assert not any(row["wanders"] for row in (*whole.noise, *gaps.noise))  # or the two would stand on other noise
     off = np.abs(gaps.values - study.TYPICAL) / gaps.information.standard_errors

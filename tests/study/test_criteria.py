@@ -18,8 +18,8 @@ from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.gap import GapTest
 from tractexp.discrepancy.held_out import Assessment
 from tractexp.discrepancy.investigate import investigate
-from tractexp.discrepancy.judgement import judged
-from tractexp.discrepancy.next_event.choose import TestedEvent, mildest
+from tractexp.discrepancy.judgement import assessment
+from tractexp.discrepancy.next_event.choose import EventTrial, mildest
 from tractexp.discrepancy.next_event.imagined import ImaginedDip
 from tractexp.discrepancy.next_event.separation import Chances
 from tractexp.discrepancy.proposal.judge import Before, Weighed
@@ -36,8 +36,8 @@ def at_fit(c, p, names=(), fault_p=1.0, blur=0.0, left=1.0):
     """
     return Disagreement(
         fit=SimpleNamespace(names=names),
-        noise=SimpleNamespace(loudest_blur=blur),
-        tangent=SimpleNamespace(bench=SimpleNamespace(criteria=c)),
+        noise=SimpleNamespace(loudest_input_mode=blur),
+        tangent=SimpleNamespace(context=SimpleNamespace(criteria=c)),
         projection=SimpleNamespace(fault_p=lambda: {"time_skew": np.array([fault_p])}),
         chance=SimpleNamespace(
             critical_p=Chance(np.arange(1, 1001) / 1000, {}).critical_p, surprises=lambda *_: {"a test": left}
@@ -94,12 +94,12 @@ def status(c):
     """Of an effect that would be seen with a probability of 0.75 at its smallest relevant size."""
     one = candidate(get("effect", "stator_resistance")())
     score = Score("stator_resistance", 0.0, 0.5, {"R_s": 0.0}, {"R_s": 0.01 / (1.6449 + 0.6745)}, {})
-    return judged(one, score, 0.05, c.testable)[0]
+    return assessment(one, score, 0.05, c.testable)[0]
 
 
 def chosen_dip(c):
     tried = [
-        TestedEvent(
+        EventTrial(
             ImaginedDip(depth, 0.1), Chances(np.array([p]), np.ones((1, 1))), Chances(np.array([p]), np.ones((1, 1)))
         )
         for depth, p in ((0.2, 0.93), (0.6, 0.99))

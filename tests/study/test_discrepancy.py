@@ -132,7 +132,7 @@ def test_the_gap_shrinks_on_fitted_and_on_held_out_events(planted):
 
 
 def test_the_place_found_is_the_dip_and_what_follows(planted):
-    event = planted.bench.events[0]
+    event = planted.context.events[0]
     assert planted.places
     assert all(p.end > event.t_start - 0.05 for p in planted.places)
     assert sum(p.share for p in planted.places) > 0.5
@@ -142,7 +142,7 @@ def test_every_effect_is_judged_and_what_cannot_be_seen_is_said(planted):
     judged = {j.name: j for j in judgements(planted)}
     assert judged["stator_resistance"].status == "relevant"
     assert {"time_skew", "measurement_window", "load_drift"} <= judged.keys()
-    silent_channels = catalogue(base().motor, base().static, (), planted.bench.events).untestable
+    silent_channels = catalogue(base().motor, base().static, (), planted.context.events).untestable
     assert "not recorded" in silent_channels["frequency_dependence"]
     assert "U2" in silent_channels["negative_sequence_braking"]
 
@@ -253,7 +253,7 @@ def test_noise_of_a_wandering_load_is_white_once_whitened():
     """Draws that wander come out of the whitening with unit variance, also in their slow sums."""
     power = np.stack([np.where(np.arange(600) < 300, 1.0, 0.5), np.zeros(600)])
     wander = RandomWalk(np.array([2.0, 0.0]), 0.002, Load(power, np.array([[1.0, 0.0]])))
-    noise = PowerNoise(PowerNoise.white(1.0, 1.0).pairs, wander=wander)
+    noise = PowerNoise(PowerNoise.white(1.0, 1.0).pairs, random_walk=wander)
     drive = SimpleNamespace(events=1, samples=600, part=lambda e: slice(0, 600))
     drawn = noise.draw(np.random.default_rng(9), 400, [600])
     rows = noise.whiten(drawn, drive, np.ones((2, 600), dtype=bool)).reshape(400, 2, 600)
@@ -353,7 +353,7 @@ def test_the_voltages_noise_is_part_of_the_noise_of_the_power():
     rows = made.whiten(noise, drawn)
     ratio = drawn.std(axis=0) / noise.deviation(drive)  # also where errors of the voltage are most of it
     assert ratio.mean(axis=1) == pytest.approx([1.0, 1.0], abs=0.02)
-    assert noise.loudest_blur > Criteria().blurred
+    assert noise.loudest_input_mode > Criteria().blurred
     loud = drawn.var(axis=0) > 4 * np.median(drawn.var(axis=0), axis=1, keepdims=True)  # the edges of the dips
     assert loud.sum() > 20
     assert ratio[loud].mean() == pytest.approx(1.0, abs=0.02)
@@ -379,7 +379,7 @@ def test_the_voltages_noise_is_part_of_the_noise_of_the_power():
 )
 def test_what_no_effect_explains_is_found_by_the_test_that_looks_for_it(silent, looked_for, shape):
     """Planted into what the base model leaves, in standard deviations of the noise; without it nothing is found."""
-    first, at = silent.first, silent.bench
+    first, at = silent.first, silent.context
     assert first.p_left > 0.01
     planted = first.tangent.residual.copy()
     for e, event in enumerate(at.events):
@@ -418,7 +418,7 @@ def test_a_rare_value_of_many_is_judged_alike_by_any_draws_once_the_scales_are_e
 
 def test_only_a_decision_that_is_open_asks_for_exact_scales(silent):
     """p of the six tests together is moved to either side of what draws leave open."""
-    first, level = silent.first, silent.bench.criteria.adequate_p
+    first, level = silent.first, silent.context.criteria.adequate_p
     bare = replace(first, chance=replace(first.chance, scales={}))
     for p, open_ in [(level / 30, False), (level / 10, True), (level * 10, True), (level * 30, False)]:
         moved = replace(bare)
@@ -455,15 +455,15 @@ def test_an_effect_outside_the_catalogue_is_unexplained_and_what_is_left_is_writ
     assert 0 < near["explained"] < 1
     assert "gap" not in near  # that of waveforms
     rows = np.genfromtxt(write_left(found, tmp_path / "left.csv"), delimiter=",", names=True, dtype=None, encoding=None)
-    assert len(rows) == sum(e.record.samples for e in found.bench.events)
+    assert len(rows) == sum(e.record.samples for e in found.context.events)
     assert np.abs(rows["P"]).max() > 5 * 0.002  # the step stands out of the noise
 
 
 def test_a_sets_own_kernel_gives_what_the_kernel_of_everything_gives(silent):
-    at = silent.bench.coordinates
+    at = silent.context.coordinates
     unit = at.null.copy()
     unit[at.sizes(["stator_resistance"])] = at.to_unit("R_s", 0.02)
-    own, whole = silent.bench.residuals(unit[None], ("stator_resistance",)), silent.bench.residuals(unit[None])
+    own, whole = silent.context.residuals(unit[None], ("stator_resistance",)), silent.context.residuals(unit[None])
     assert own == pytest.approx(whole, abs=1e-10)
 
 
@@ -499,7 +499,7 @@ def test_a_held_out_event_speaks_only_where_it_can_show_the_effect(planted):
 
 def test_all_events_together_confirm_only_what_the_held_out_ones_show(planted):
     """An event with the effect adds to the evidence of the fitted ones, one without it takes from it."""
-    trained, alone, criteria = planted.bench, planted.extended, Criteria()
+    trained, alone, criteria = planted.context, planted.extended, Criteria()
     held = planted.held_out
     both = lambda made: AllEvents(trained, made, held.noise, held.faults, held.bare)  # noqa: E731
     fit = lambda made: both(made).together([alone], seed=0)  # noqa: E731
@@ -537,7 +537,7 @@ def test_an_effect_that_closes_little_of_the_held_out_gap_must_leave_nothing_in_
 
     def judged_on(made):
         held = planted.held_out
-        both = AllEvents(planted.bench, made, held.noise, held.faults, held.bare)
+        both = AllEvents(planted.context, made, held.noise, held.faults, held.bare)
         found, again = weighed(both, held.extended, seed=0, doubted=True)
         assert again == []
         return found["stator_resistance",]
@@ -573,7 +573,7 @@ def test_a_name_that_suffices_from_the_wrong_valley_does_not_hide_what_explains_
     found = investigate(base(), made[:3], made[3:], {}, {}, only=("shunt_capacitor", "static_var_compensator"))
     first, refits = found.first, found.explanations.refits
     assert found.explanations.chosen.names == ("shunt_capacitor",)
-    from_base = refit(found.bench, first.noise, [(("shunt_capacitor",), first.fit.unit)])[0]
+    from_base = refit(found.context, first.noise, [(("shunt_capacitor",), first.fit.unit)])[0]
     assert from_base.deviance > first.fit.deviance - 1
     assert refits["shunt_capacitor",].deviance < refits["static_var_compensator",].deviance - 10
     assert ("shunt_capacitor",) in found.verdict.sets
@@ -583,7 +583,7 @@ def test_an_effect_that_a_larger_set_does_not_need_is_left_out_again(planted):
     """A pair may lead to the better place of one of its members: then that one alone is the explanation."""
     (name,), first = planted.names, planted.first
     other = next(n for n in FEW if n != name)
-    pair = refit(planted.bench, first.noise, [((name, other), planted.verdict.chosen.fit.unit)])[0]
+    pair = refit(planted.context, first.noise, [((name, other), planted.verdict.chosen.fit.unit)])[0]
     tests = examined(planted.base.quiet, pair, first.noise, 0)
     astray = replace(planted.explanations.refits[name,], deviance=first.fit.deviance)
     refits = {**planted.explanations.refits, (name,): astray}
@@ -606,7 +606,7 @@ def test_candidates_at_their_null_leave_the_base_model(silent):
 
 def test_what_only_a_parameter_beyond_its_bounds_explains_is_left(silent):
     """The best fit lies on a wall; a projection that lets the parameter leave the box would find nothing."""
-    T = silent.bench.coordinates.value("T_prime", silent.first.fit.unit)
+    T = silent.context.coordinates.value("T_prime", silent.first.fit.unit)
     made = bench(base(), events(), bounds={"T_prime": [1.05 * T, 2 * T]})
     first = disagreement(base_fit(made), seed=0)
     assert first.fit.unit[made.coordinates.column["T_prime"]] == 0.0
@@ -618,7 +618,7 @@ def test_what_only_a_parameter_beyond_its_bounds_explains_is_left(silent):
 
 
 def test_nuisance_columns_are_orthogonal_to_the_projected_residual(silent):
-    projection = tangent(silent.bench, silent.first.fit, silent.first.noise).whitened(silent.first.noise)
+    projection = tangent(silent.context, silent.first.fit, silent.first.noise).whitened(silent.first.noise)
     assert np.abs(projection.r @ projection.Q).max() < 1e-8
     for block in projection.blocks:
         assert np.abs(block @ projection.Q).max() < 1e-6 * max(np.abs(block).max(), 1.0)
@@ -700,9 +700,9 @@ def test_whitened_bits_do_not_depend_on_the_number_of_cores(planted, monkeypatch
     """Products of matrices round by how many rows they have: rows are parted alike on any machine."""
     from tractexp.discrepancy import cores
 
-    bench = planted.bench
+    bench = planted.context
     wander = RandomWalk(np.array([1.0, 0.3]), 0.002, bench.power)
-    noise = replace(planted.last.noise, mix=np.eye(2), wander=wander)
+    noise = replace(planted.last.noise, mix=np.eye(2), random_walk=wander)
     residuals = np.random.default_rng(1).normal(size=(150, *bench.known.shape))
     rows = []
     for number in (1, 3):

@@ -65,15 +65,15 @@ def names(chart):
 
 def test_measured_before_and_after_of_every_event_come_first(named, tmp_path):
     words, charts = page(named, tmp_path)
-    assert [e.record.name for e in named.bench.events] == ["event1", "event2"]
+    assert [e.record.name for e in named.context.events] == ["event1", "event2"]
     assert words.index("Measured, before, after") < words.index("event1, fitted") < words.index("event3, held out")
     assert words.index("event3, held out") < words.index("How much smaller the gap is")
     first, _, held, bars = charts
     band = "± 2 σ of the noise"
     assert names(first) == {"measured", "base model", "extended model", "more than chance leaves", band}
     assert names(held) == {"measured", "base model", "extended model", band}
-    event = named.bench.records.recorded[0]
-    part = named.bench.drive.part(0)
+    event = named.context.records.recorded[0]
+    part = named.context.drive.part(0)
     calculated = named.train.after.calculated[:, part]
     for c, (channel, axis, below) in enumerate((("P", "y2", "y3"), ("Q", "y4", "y5"))):
         measured = getattr(event.record, channel)
@@ -217,7 +217,7 @@ def test_faults_of_the_measurement_are_not_counted_among_the_effects_together(na
     tests = SimpleNamespace(bench=bench, p_left=0.001, loudest="pushes into the balances")
     best = SimpleNamespace(fit=SimpleNamespace(names=names), tests=tests)
     explained = SimpleNamespace(faults=faults, base=SimpleNamespace(bench=bench))
-    weighed = SimpleNamespace(survivors=SimpleNamespace(kept=[best], explanations=explained), faults=faults)
+    weighed = SimpleNamespace(survivors=SimpleNamespace(retained=[best], explanations=explained), faults=faults)
     assert told in verdict._unexplained(weighed, SimpleNamespace(fitted=0.66))
 
 

@@ -146,7 +146,7 @@ def test_what_is_judged_is_the_estimate_against_all_draws(fit, monkeypatch):
 def test_p_of_noise_alone_is_no_smaller_than_it_says():
     """60 judgements of noise drawn anew: one in ten below 0.1, give or take."""
     observed = Observed.of(Problem(study.model(), [recorded()]))
-    known = polished(observed.problem).known
+    known = polished(observed.problem).uncertainty
     clean = known.likelihood.residuals(known.unit[None])[0] + observed.drive.measured
     rng, p = np.random.default_rng(2), []
     for _ in range(60):
@@ -189,7 +189,7 @@ def test_correlated_noise_of_p_and_q_is_seen_and_used():
     common = 0.004 * rng.standard_normal(len(t))
     power = study.printed(TRUTH, t, U, 0.35) + common * np.array([[1.0], [0.8]])
     power += 0.0005 * rng.standard_normal(power.shape)
-    known = polished(Problem(study.model(), [study.event(t, U, power)])).known
+    known = polished(Problem(study.model(), [study.event(t, U, power)])).uncertainty
     assert known.noise[0]["between_P_and_Q"] > 0.95
     apart = Likelihood.of(known.likelihood.problem, Noise.white(0.004, 0.0032))
     _, J = apart.jacobian(known.unit)
@@ -203,7 +203,7 @@ def test_noise_of_the_voltage_widens_the_intervals():
     rng = np.random.default_rng(8)
     noisy = clean.record.U + 0.003 * rng.standard_normal(clean.record.samples)
     spoiled = study.event(clean.record.t, noisy, np.array([clean.record.P, clean.record.Q]))
-    quiet, loud = (polished(Problem(study.model(), [e])).known for e in (clean, spoiled))
+    quiet, loud = (polished(Problem(study.model(), [e])).uncertainty for e in (clean, spoiled))
     assert quiet.noise[0]["of_the_voltage"] == 0.0
     assert loud.noise[0]["of_the_voltage"] > 0.5
     assert (loud.half > quiet.half).all()
@@ -221,7 +221,7 @@ def test_a_search_that_found_a_better_valley_leads_to_the_estimate(monkeypatch):
     from tractexp.identification import estimate as module
 
     problem = Problem(study.model(), [recorded(seed=77)])
-    whole = polished(problem).known
+    whole = polished(problem).uncertainty
 
     def one_bad_start(likelihood, points):
         from tractexp.identification.descent import descend
@@ -240,7 +240,7 @@ def test_a_search_that_found_a_better_valley_leads_to_the_estimate(monkeypatch):
 def test_a_model_that_takes_its_error_for_slow_noise_is_found_out_by_least_squares():
     """Had least squares left half as much, the likelihood would give up far more of Eq. (8) than it does on draws."""
     fit = polished(Problem(study.model(), [recorded()]))
-    known, likelihood = fit.known, fit.known.of_noise
+    known, likelihood = fit.uncertainty, fit.uncertainty.of_noise
     squares = Likelihood.of_squares(likelihood.problem, 0.004)
     rows = squares.with_initial_power.rows(known.unit[None])[0]
     least = float(rows @ rows)

@@ -68,10 +68,10 @@ def test_a_trip_of_the_static_load_alone_is_told_by_its_family_and_its_place():
     assert made.catalogue.textbook(made.names) == ("undervoltage_trip",)
     (form,) = forms(made)
     assert (form.effect.name, form.effect.differs) == ("static_trip", "of the static load only")
-    at = made.bench.coordinates
+    at = made.context.coordinates
     assert at.value("static_tripped", made.extended.unit) == pytest.approx(0.2, abs=0.01)
     assert made.validate.closed > 0.9
-    there = tangent(made.bench, made.extended, made.held_out.noise)  # its instants are no parameters of each event:
+    there = tangent(made.context, made.extended, made.held_out.noise)  # its instants are no parameters of each event:
     assert len(there.split) == 2 * (len(at.base) - len(there.held) + 1)  # of the relay the share alone
 
 
@@ -103,7 +103,7 @@ def test_a_bounded_flux_is_a_saturation_with_a_round_corner(seed, least):
     told = investigate(base(), made[:3], made[3:], {}, {}, only=("magnetic_saturation",))
     (form,) = forms(told)
     assert form.effect.name == "saturation_curve"
-    assert told.bench.coordinates.value("saturation_rounding", told.extended.unit) > 0.1
+    assert told.context.coordinates.value("saturation_rounding", told.extended.unit) > 0.1
     assert told.validate.closed > least
 
 
@@ -169,7 +169,7 @@ def test_the_chosen_set_comes_first_with_its_own_tests_though_another_fits_bette
         refits={f.names: f for f in (bare, better, chosen, far)},
     )  # fmt: skip
     left = survivors.survivors(explained, 0)
-    assert [(r.fit.names, r.behind, r.tests.fit.names) for r in left.kept] == [
+    assert [(r.fit.names, r.behind, r.tests.fit.names) for r in left.retained] == [
         (("chosen",), 0.0, ("chosen",)),
         (("better",), -4.0, ("better",)),
     ]
@@ -204,7 +204,7 @@ def test_held_out_events_deny_a_rival_only_by_what_it_leaves(chosen, rival, kept
     adequate = [SimpleNamespace(fit=fit(0.0, 1, *names)) for names in told]
     surviving = SimpleNamespace(adequate=adequate, explanations=SimpleNamespace(base=SimpleNamespace(bench=at)))
     made = HeldOut(surviving, None, (), None, {}, judged)
-    assert [r.fit.names[0] for r in made.kept] == kept
+    assert [r.fit.names[0] for r in made.retained] == kept
 
 
 @pytest.mark.parametrize(
@@ -219,14 +219,14 @@ def test_held_out_events_deny_a_rival_only_by_what_it_leaves(chosen, rival, kept
 )
 def test_a_third_effect_is_tried_where_two_explain_most(names, explained, another):
     """Of 1,000 that exceed the noise of 600 samples."""
-    first = SimpleNamespace(fit=fit(1600.0, 0), bench=SimpleNamespace(samples=600))
+    first = SimpleNamespace(fit=fit(1600.0, 0), context=SimpleNamespace(samples=600))
     last = SimpleNamespace(fit=fit(1600.0 - 1000 * explained, len(names), *names))
     assert worth_another([first, last] if names else [first]) == another
 
 
 def test_a_larger_set_that_led_back_to_the_one_before_is_not_tried_again():
     """Of the third, the names of the second are left: what follows would be the same search."""
-    first = SimpleNamespace(fit=fit(1600.0, 0), bench=SimpleNamespace(samples=600))
+    first = SimpleNamespace(fit=fit(1600.0, 0), context=SimpleNamespace(samples=600))
     steps = [first, *(SimpleNamespace(fit=fit(deviance, 2, "a", "b")) for deviance in (700.0, 690.0))]
     assert worth_another(steps[:2])
     assert not worth_another(steps)
@@ -247,7 +247,7 @@ def test_a_start_that_may_overtake_the_best_is_searched_on(monkeypatch):
     monkeypatch.setattr(fitting, "moved_across", lambda bench, noise, fit, faults: fit.unit)
     ended = fitting._in_turns(at, None, [(("still",), np.zeros(1)), (("falls",), np.zeros(1))], None)
     assert (ended[0].names, ended[0].deviance) == (("falls",), 60.0)
-    assert len(turns) == 1 + fitting.TURNS
+    assert len(turns) == 1 + fitting.MOST_TURNS
 
 
 def test_a_second_stage_that_the_fitted_dips_do_not_show_is_found_in_all_events(monkeypatch):
@@ -263,10 +263,10 @@ def test_a_second_stage_that_the_fitted_dips_do_not_show_is_found_in_all_events(
     told = investigate(base(), made[:3], made[3:], {}, {}, only=(TRIPS[0], CORE[0]))
     assert {"two_stage_trip", "saturation_curve"} <= set(tried)
     assert told.explanations.chosen.names == ("undervoltage_trip",)  # which leaves nothing of the fitted ones
-    assert not told.held_out.judged["undervoltage_trip",].helps
+    assert not told.held_out.assessments["undervoltage_trip",].helps
     assert told.names == ("two_stage_trip",)
     assert told.fitted_to_both
-    at = told.bench.coordinates
+    at = told.context.coordinates
     shares = [at.value(f"stage_{k}_tripped", told.extended.unit) for k in (1, 2)]
     assert shares == pytest.approx([0.075, 0.075], rel=0.05)
 
@@ -278,7 +278,7 @@ def test_a_second_effect_that_the_fitted_dips_do_not_show_is_found_in_all_events
     told = investigate(base(), made[:3], made[3:], {}, {}, only=(*pair, "load_drift"))
     assert told.explanations.chosen.names == pair[1:]
     assert told.explanations.last.suffices
-    assert not told.held_out.judged[pair[1:]].helps
+    assert not told.held_out.assessments[pair[1:]].helps
     assert told.names == pair
     assert told.verdict.sets == (pair,)
     both, one, *_ = told.survivors.rivals
@@ -292,8 +292,8 @@ def test_a_second_effect_that_the_fitted_dips_do_not_show_is_found_in_all_events
 def test_a_search_in_all_events_that_finds_nothing_new_changes_nothing(names, deviance):
     """No explanation that leaves nothing, the base model itself, what was fitted to all events before; and none is
     made where the base model cannot run before the held-out events."""
-    bases = SimpleNamespace(base=SimpleNamespace(valleys=()))
-    before = SimpleNamespace(survivors=SimpleNamespace(explanations=bases), judged={("denied",): None})
+    bases = SimpleNamespace(base=SimpleNamespace(local_minima=()))
+    before = SimpleNamespace(survivors=SimpleNamespace(explanations=bases), assessments={("denied",): None})
     adequate = [] if names is None else [SimpleNamespace(fit=Refit(names, np.zeros(1), 0.0, 0))]
     found = SimpleNamespace(adequate=adequate, explanations=SimpleNamespace(chosen=SimpleNamespace(names=names)))
     plain = SimpleNamespace(deviance=deviance)

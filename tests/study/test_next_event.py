@@ -235,7 +235,9 @@ def test_a_rival_is_an_effect_of_the_load_that_the_events_can_show():
 
 
 def test_a_plan_for_rivals_says_what_an_investigation_says(tied, tmp_path):
-    made = tractexp.plan(list(tied.bench.records.recorded), model="third_order_exponential", rivals=TIE, progress=False)
+    made = tractexp.plan(
+        list(tied.context.records.recorded), model="third_order_exponential", rivals=TIE, progress=False
+    )
     assert made.probability == pytest.approx(tied.next_event.probability, abs=0.05)
     assert made.sentence.startswith("record a dip of")
     paths = made.write(tmp_path)

@@ -39,7 +39,7 @@ def problem():
 
 
 def test_the_forecast_is_what_the_record_then_gives(problem):
-    known = study.judged(problem, study.TYPICAL).known
+    known = study.judged(problem, study.TYPICAL).uncertainty
     event = problem.events[0]
     shape = replace(DipShape.of(event), duration=0.2, noise_P=0.004, noise_Q=0.004, memory=0.0)
     planned = forecast(problem, study.TYPICAL, shape)
@@ -106,7 +106,7 @@ def test_a_further_dip_as_advised_gives_what_was_promised_and_a_repetition_does_
 
     def judged(*others):
         events = [recorded(depth, 0.006, seed, name="other") for depth, seed in others]
-        return checked(study.judged(Problem(study.model(), [one, *events]), study.TYPICAL).known)
+        return checked(study.judged(Problem(study.model(), [one, *events]), study.TYPICAL).uncertainty)
 
     known = judged()
     (said,) = [sentence for sentence in advise(known, GOOD) if sentence.startswith("for C:")]
@@ -127,7 +127,7 @@ def test_advice_for_a_model_that_no_planned_dip_can_hold_has_no_figures():
     event = recorded(0.2, 0.015)
     event = replace(event, record=replace(event.record, f=f + 0.2 * (event.record.t > 0.3)))
     problem = Problem(compose(get("model/motor", "electromechanical")(), static), [event])
-    known = study.judged(problem, np.array([*study.TYPICAL, 0.0, 0.0])).known
+    known = study.judged(problem, np.array([*study.TYPICAL, 0.0, 0.0])).uncertainty
     said = advise(known, GOOD)[-1]
     poor = [name for name, verdict in known.verdicts.items() if verdict.word in (WEAK, UNIDENTIFIED)]
     assert "q_f" in poor

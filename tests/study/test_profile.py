@@ -30,7 +30,7 @@ def events(depths, deviation, seed=1, Q_s0=0.35):
 
 @pytest.fixture(scope="module")
 def quiet():
-    return study.judged(Problem(study.model(), events((0.5,), 0.001)), study.TYPICAL).known
+    return study.judged(Problem(study.model(), events((0.5,), 0.001)), study.TYPICAL).uncertainty
 
 
 def test_the_threshold_is_chi_squared_of_one_degree():
@@ -69,7 +69,7 @@ def test_a_point_of_a_profile_is_the_constrained_optimum(quiet):
 
 def test_a_shallow_dip_leaves_c_open_on_both_sides_of_a_crest_and_the_verdict_says_so():
     """At C = 0.75 the deviance is up by 16, at 0.3 by 0.3: a lane from the estimate alone ends at the crest."""
-    known = study.judged(Problem(study.model(), events((0.15,), 0.01)), study.TYPICAL).known
+    known = study.judged(Problem(study.model(), events((0.15,), 0.01)), study.TYPICAL).uncertainty
     made = {p.name: p for p in profiles(known).profiles}
     assert made["C"].ends == (End.BOUND, End.BOUND)
     assert made["C"].interval == pytest.approx((0.3, 0.99))
@@ -93,7 +93,7 @@ def test_a_better_optimum_restarts_the_profiles_and_is_said(quiet):
     assert found.restarts >= 1
     assert "a better optimum turned up along a profile" in found.notes[0]
     np.testing.assert_allclose(found.known.values, quiet.values, atol=0.1 * quiet.half.min())
-    assert found.known.deviance == pytest.approx(quiet.deviance, abs=0.05)
+    assert found.uncertainty.deviance == pytest.approx(quiet.deviance, abs=0.05)
 
 
 def test_two_minima_and_open_sides_change_the_verdict():
@@ -159,7 +159,7 @@ def test_the_page_of_a_model_that_lacks_something_says_what_its_intervals_hold(t
     (event,) = events((0.5,), 0.002)
     step = 0.02 * (event.record.t > 0.85)  # a load that is switched on: nothing of the model can do that
     spoiled = study.event(event.record.t, event.record.U, np.array([event.record.P + step, event.record.Q]))
-    known = study.judged(Problem(study.model(), [spoiled]), study.TYPICAL).known
+    known = study.judged(Problem(study.model(), [spoiled]), study.TYPICAL).uncertainty
     assert not known.exact
     found = profiles(known, names=["M", "p_v"])
     told = read(page(tmp_path / "profile.html", found, "an effect is missing"))

@@ -26,11 +26,11 @@ def planted():
 
 def test_the_best_of_all_descents_begins_at_a_start_that_promises(planted):
     at, noise, units, nuisances = planted
-    kept = promising(at, noise, TRIP, units, nuisances, fitting.BEGUN)
-    assert len(units) == 2 * fitting.BEGUN
-    assert len(kept) == fitting.BEGUN
+    kept = promising(at, noise, TRIP, units, nuisances, fitting.MOST_STARTS)
+    assert len(units) == 2 * fitting.MOST_STARTS
+    assert len(kept) == fitting.MOST_STARTS
     best = lambda these: min(  # noqa: E731
-        f.deviance for f in fitting._descended(at, noise, [(TRIP, u) for u in these], None, fitting.ROUGH)
+        f.deviance for f in fitting._descended(at, noise, [(TRIP, u) for u in these], None, fitting.ROUGH_DESCENT)
     )
     assert best(kept) == pytest.approx(best(units), abs=1.0)
 

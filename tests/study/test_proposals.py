@@ -23,7 +23,7 @@ from tractexp.discrepancy.proposal import generate
 from tractexp.discrepancy.proposal.bed import carried_over, context_of_terms, place, sizes_of, with_terms
 from tractexp.discrepancy.proposal.effect import Library
 from tractexp.discrepancy.proposal.library import ANSWER, BALANCES, CLOCKS, SIGNALS, Term, term, terms
-from tractexp.discrepancy.proposal.propose import propose, told
+from tractexp.discrepancy.proposal.propose import propose, to_dict
 from tractexp.discrepancy.proposal.refit import fitted
 from tractexp.discrepancy.proposal.screen import Ground, scores, screen
 from tractexp.discrepancy.proposal.wording import proposed_in_words
@@ -60,16 +60,16 @@ def searched(made, held, among=FEW, seed=0):
     """What a search among a few terms comes to, whatever the catalogue says."""
     fit = fitted_base(made)
     first = disagreement(fit, seed)
-    at = fit.bench.coordinates
-    bare = refit(fit.bench, first.noise, [((), at.without_faults(first.fit.unit, ()))], faults=())[0]
+    at = fit.context.coordinates
+    bare = refit(fit.context, first.noise, [((), at.without_faults(first.fit.unit, ()))], faults=())[0]
     return propose(fit, first, bare, first.noise, held, seed, among)
 
 
 @pytest.fixture(scope="module")
 def ground():
     fit = fitted_base(events(count=2))
-    bench = context_of_terms(fit.bench)
-    return Ground.at(bench, carried_over(bench, fit.bench, fit.fit.unit), fit.noise)
+    bench = context_of_terms(fit.context)
+    return Ground.at(bench, carried_over(bench, fit.context, fit.fit.unit), fit.noise)
 
 
 @pytest.fixture(scope="module")
@@ -83,12 +83,12 @@ def stepped():
 )
 def test_a_column_is_the_difference_of_two_simulations(ground, name):
     """Central differences of a tenth of the relevant size, against the one-sided ones of the screen."""
-    chosen, at = term(name), ground.bench.coordinates
+    chosen, at = term(name), ground.context.coordinates
     setting = chosen.signal.settings[len(chosen.signal.settings) // 2]
     (size, _), zeros = sizes_of(chosen)[0], [0.0] * (len(sizes_of(chosen)) - 1)
     up, down, small = (place(at, ground.unit, chosen, setting, [k * size.relevant, *zeros]) for k in (0.1, -0.1, 0.02))
-    raw = ground.bench.residuals(np.array([up, down]), (chosen.signal.kind,))
-    central = ground.bench.whiten(ground.noise, (raw[:1] - raw[1:]) / (0.2 * size.relevant))
+    raw = ground.context.residuals(np.array([up, down]), (chosen.signal.kind,))
+    central = ground.context.whiten(ground.noise, (raw[:1] - raw[1:]) / (0.2 * size.relevant))
     column = ground.columns(small[None], np.array([0.02 * size.relevant]), chosen.signal.kind)
     assert np.linalg.norm(central) > 0
     assert np.linalg.norm(column - central) < 0.01 * np.linalg.norm(central)
@@ -96,8 +96,8 @@ def test_a_column_is_the_difference_of_two_simulations(ground, name):
 
 def test_the_linear_drop_is_that_of_a_refit_where_the_term_is_small():
     fit = fitted_base(events("load_step", 0.15, count=2))
-    bench = context_of_terms(fit.bench)
-    there = Ground.at(bench, carried_over(bench, fit.bench, fit.fit.unit), fit.noise)
+    bench = context_of_terms(fit.context)
+    there = Ground.at(bench, carried_over(bench, fit.context, fit.fit.unit), fit.noise)
     made = fitted(screen(there, [term(STEP)], 0, 20), [])
     (found,) = scores(there, [(term(STEP), {"instant": made.values(made.fits[0])["instant"]})])
     lowered = made.bare.deviance - made.fits[0].deviance
@@ -107,18 +107,18 @@ def test_the_linear_drop_is_that_of_a_refit_where_the_term_is_small():
 
 def test_equal_bits_of_the_base_model_on_both_benches():
     fit = fitted_base(events(count=2))
-    bench = context_of_terms(fit.bench)
-    mine = bench.residuals(carried_over(bench, fit.bench, fit.fit.unit)[None], ())
-    assert np.array_equal(mine, fit.bench.residuals(fit.fit.unit[None], ()))
+    bench = context_of_terms(fit.context)
+    mine = bench.residuals(carried_over(bench, fit.context, fit.fit.unit)[None], ())
+    assert np.array_equal(mine, fit.context.residuals(fit.fit.unit[None], ()))
 
 
 @pytest.mark.parametrize(("clock", "begins"), [("of_record", 0.0), ("of_dip", "start"), ("of_return", "end")])
 def test_a_clock_counts_from_where_it_says(ground, clock, begins):
     chosen = term(f"timed:power_P:step:{clock}")
-    point = place(ground.bench.coordinates, ground.unit, chosen, {"instant": 0.1}, [1.0])
-    added = ground.bench.residuals(point[None], (chosen.signal.kind,))[0, 0] - ground.raw[0]
-    for e, event in enumerate(ground.bench.events):
-        own, t = added[ground.bench.drive.part(e)], event.record.t - event.record.t[0]
+    point = place(ground.context.coordinates, ground.unit, chosen, {"instant": 0.1}, [1.0])
+    added = ground.context.residuals(point[None], (chosen.signal.kind,))[0, 0] - ground.raw[0]
+    for e, event in enumerate(ground.context.events):
+        own, t = added[ground.context.drive.part(e)], event.record.t - event.record.t[0]
         assert np.all((np.abs(own) < 1e-9) | (np.abs(own - 1) < 1e-6) | (np.abs(np.gradient(own)) > 0))
         first = t[np.flatnonzero(own > 0.5)[0]] - 0.1
         if begins == 0.0:
@@ -168,7 +168,7 @@ def test_the_plugin_file_reproduces_the_fit(stepped, tmp_path, monkeypatch):
     made, found = stepped
     found.write(tmp_path)
     module = _loaded(tmp_path / "proposed_effect.py", monkeypatch)
-    proposal, bench = found.steps.proposed.proposal, found.steps.proposed.proposal.train.bench
+    proposal, bench = found.steps.proposed.proposal, found.steps.proposed.proposal.train.context
     chosen = found.steps.proposed.tried[0][1].fit
     faults = [bench.catalogue[n].effect for n in bench.catalogue.of_measurement]
     model = base(module.ProposedEffect(), *faults)
@@ -199,7 +199,7 @@ def test_what_a_right_term_closes_does_not_hang_on_the_level_of_the_noise(seed, 
     found = searched(made[:2], made[2:])
     held = found.proposal.validate
     gained = held.without.deviance - held.with_it.deviance
-    assert gained / (held.without.deviance - held.bench.samples) == pytest.approx(measured, abs=0.1)
+    assert gained / (held.without.deviance - held.context.samples) == pytest.approx(measured, abs=0.1)
     assert 0.8 < held.closed <= 1.0
     assert found.proposal.term.name == STEP
 
@@ -210,13 +210,13 @@ def test_nothing_is_proposed_where_nothing_is_missing(seed):
     found = searched(made[:2], made[2:])
     assert found.proposal is None
     assert found.why
-    assert told(found, "x.py") is None
+    assert to_dict(found, "x.py") is None
 
 
 def test_without_a_held_out_event_or_on_waveforms_nothing_is_proposed():
-    anything = SimpleNamespace(bench=SimpleNamespace(domain=PHASORS))
+    anything = SimpleNamespace(context=SimpleNamespace(domain=PHASORS))
     assert "none was held out" in propose(anything, None, None, None, (), 0).why
-    anything.bench.domain = WAVES
+    anything.context.domain = WAVES
     assert "of phasors" in propose(anything, None, None, None, ("an event",), 0).why
     assert proposed_in_words(None, "why not") == ["no term is proposed: why not"]
     assert proposed_in_words(None, None) == []
@@ -288,6 +288,6 @@ def test_the_library_has_a_name_for_each_term():
 
 
 def test_terms_become_candidates_with_their_own_parameters_only(ground):
-    bench = with_terms(ground.bench, [term(TRIP), term(TRIP)])
+    bench = with_terms(ground.context, [term(TRIP), term(TRIP)])
     own = [bench.coordinates.names[k] for k in bench.coordinates.parameters([TRIP])]
     assert own == ["answer_static_size", *(f"answer_relay_{n}" for n in ("level", "margin", "delay", "wait", "ramp"))]

@@ -20,7 +20,7 @@ SEED = 5
 def judged(case):
     """The judgement of the first two events of a case of the independent generator, and the truth."""
     dips = [detect(Record(f"event{k}", **r).check()) for k, r in enumerate(make(case, SEED))]
-    return with_rivals(polished(Problem(study.model(), dips)).known), truth(case, SEED)["load"]
+    return with_rivals(polished(Problem(study.model(), dips)).uncertainty), truth(case, SEED)["load"]
 
 
 @pytest.fixture(scope="module")

@@ -107,7 +107,7 @@ def test_the_page_shows_the_currents_of_the_phases_before_and_after(planted):
 
 def test_an_event_that_would_decide_is_found_in_waveforms(planted):
     steps = planted.steps
-    bench, noise, kept = steps.bench, steps.held_out.noise, steps.survivors.kept[0].fit
+    bench, noise, kept = steps.context, steps.held_out.noise, steps.survivors.retained[0].fit
     other = next(r.fit for r in steps.survivors.rivals if r.fit.names != kept.names)
     chosen = next_event(bench, noise, steps.bare, [kept, other], ["a", "b"])
     assert 0.04 <= chosen.best.event.duration <= 0.32
@@ -132,10 +132,10 @@ def test_a_push_of_waveforms_is_the_terminal_current(given):
 
 
 def test_what_is_left_of_a_current_is_told_by_its_shape(silent):
-    (event,), noise = silent.steps.bench.events, silent.steps.last.noise
+    (event,), noise = silent.steps.context.events, silent.steps.last.noise
     t = event.record.t - event.t_end
     ring = np.where(t >= 0, 0.1 * np.exp(-np.maximum(t, 0) / 0.03) * np.cos(2 * np.pi * 180 * t), 0.0)
-    residual = noise.draw(np.random.default_rng(1), 1, [event.record.samples])[0] * silent.steps.bench.known
+    residual = noise.draw(np.random.default_rng(1), 1, [event.record.samples])[0] * silent.steps.context.known
     residual[1] += ring
     told = remainders(residual, [event], noise)[0]
     assert (told.channel, told.kind) == ("current beta", "ringing")

@@ -341,7 +341,7 @@ def _estimated(question: Question, steps: "Steps") -> Result:
     from tractexp.identification.result import conclude
     from tractexp.identification.search import History, SearchResult
 
-    base, bench, unit = question.model, steps.bench, steps.extended.unit
+    base, bench, unit = question.model, steps.context, steps.extended.unit
     model = base.with_(effects=sorted({*base.effects, *steps.names}))
     problem = Problem(model.model, question.train, base.bounds, base.fixed, int(bench.problem.step.substeps.max()))
     values = np.array([bench.coordinates.value(name, unit) for name in problem.space.names])
@@ -350,7 +350,7 @@ def _estimated(question: Question, steps: "Steps") -> Result:
     status = f"ended with the verdict {steps.verdict.word}"
     found = SearchResult(values, objective, bench.effort.simulations, 0, 0, 0.0, status, history)
     result, _ = conclude(problem, found, question.validate, question.seed, model.node, "descent")
-    return replace(result, adequacy=adequacy(steps).told())
+    return replace(result, adequacy=adequacy(steps).to_dict())
 
 
 @plugin

@@ -159,7 +159,7 @@ def _searched(
             tell(progress, [f"{optimizer.name}, seed {seed}"])
             found = setup.search(optimizer, seed, progress)
             if (optimizer, seed) == (optimizers[0], setup.seed):
-                likely = estimate(problem, found.values).known.values
+                likely = estimate(problem, found.values).uncertainty.values
                 result, fits = conclude(problem, found, setup.validate, seed, node, ESTIMATE, likely)
                 yield result, fits[fitted:]
             result, fits = conclude(problem, found, setup.validate, seed, node, optimizer.name)

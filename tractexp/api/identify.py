@@ -369,7 +369,7 @@ def _judge(setup: Asked, found: "SearchResult") -> tuple[Result, Judged]:
     problem = setup.problem
     refuse_nothing_found(problem, found)
     estimated = estimate(problem, found.values)
-    known = estimated.known
+    known = estimated.uncertainty
     if setup.check_intervals:
         known = with_rivals(checked(known))
     result, fits = conclude(
@@ -380,12 +380,12 @@ def _judge(setup: Asked, found: "SearchResult") -> tuple[Result, Judged]:
     fields = known.fields()
     fields["uncertainty"] |= together.fields() if together else {"gains": {}, "odd_events": []}
     fields["uncertainty"]["notes"] += together.notes if together else []
-    starts = [s.told(problem.space.names) for s in estimated.starts]
+    starts = [s.to_dict(problem.space.names) for s in estimated.starts]
     structures = [rival.to_dict() for rival in known.rivals]
     data = set_holding(tuple(event.record.where for event in problem.events))
     advice = advise(known, adequacy, together.odd if together else (), data=data)
     result = replace(
-        result, **fields, adequacy=adequacy.told(), starts=starts, rival_structures=structures, advice=advice
+        result, **fields, adequacy=adequacy.to_dict(), starts=starts, rival_structures=structures, advice=advice
     )
     return result, Judged(fits, estimated, known, together, adequacy)
 

@@ -76,7 +76,7 @@ def recommended(setup: Setup, rivals: Any, progress: Progress = None) -> Recomme
     """Choose the event that tells `rivals` apart. Raises `UserError` for rivals that cannot be planned for."""
     sets = sets_of(rivals)
     event = _event(setup, sets, progress)
-    return Recommended(setup, sets, files.plain(event.told()), event)
+    return Recommended(setup, sets, files.plain(event.to_dict()), event)
 
 
 def sets_of(rivals: Any) -> list[list[str]]:

@@ -218,7 +218,7 @@ def _guess(setup: Setup, event: Event, values: Any) -> "tuple[np.ndarray, str, N
         origin = f"the estimate of {event.record.name}"
         if not fit.surprise.adequate:
             origin += ", though more than noise is left there, which the forecast counts as noise"
-        return fit.known.values, origin, fit.known.likelihood.noise.of(0)
+        return fit.uncertainty.values, origin, fit.uncertainty.likelihood.noise.of(0)
     if values == DEFAULT:
         defaults = [p.default for p in problem.parameters if p.name in problem.space.names]
         return np.array(defaults), "the model's default values", None

@@ -103,9 +103,9 @@ def profile(fit: Identification, *, points: int = 24) -> Profiled:
     content = _content(made, time.perf_counter() - started)
     verdicts = {name: str(verdict) for name, verdict in made.verdicts.items()}
     intervals = {p.name: list(p.interval) for p in made.profiles}
-    fields = made.known.fields() | {"verdicts": verdicts, "intervals": intervals}
+    fields = made.uncertainty.fields() | {"verdicts": verdicts, "intervals": intervals}
     fields["uncertainty"]["notes"] += made.notes
-    ends = zip(made.known.names, made.known.values, made.known.half, strict=True)
+    ends = zip(made.uncertainty.names, made.uncertainty.values, made.uncertainty.half, strict=True)
     curvature = {name: (float(value - half), float(value + half)) for name, value, half in ends}
     return Profiled(fit, points, content, replace(fit.result, **fields), curvature, made)
 

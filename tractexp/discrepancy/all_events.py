@@ -44,7 +44,7 @@ class JointFit:
 
 @dataclass(frozen=True, eq=False)
 class AllEvents:
-    """The bench of fitted and held-out events beside that of the fitted ones, `noise` and the base model `bare` there.
+    """The context of all events beside that of the fitted ones, with the `noise` and the base model `bare` there.
 
     `faults` are those of the measurement in every explanation.
     """
@@ -56,59 +56,59 @@ class AllEvents:
     bare: Refit
 
     @functools.cached_property
-    def bench(self) -> Context:
+    def context(self) -> Context:
         records = self.fitted.records
         return self.fitted.on(Records.of((*records.recorded, *self.events), records.window))
 
     @functools.cached_property
     def quiet(self) -> QuietNoise:
-        return QuietNoise.at(self.bench, self.bench.coordinates.widened(self.bare.unit))
+        return QuietNoise.at(self.context, self.context.coordinates.widened(self.bare.unit))
 
     @functools.cached_property
     def level(self) -> Noise:
         """The noise of all events."""
-        return self.noise.on(self.bench.power, self.quiet.blur)
+        return self.noise.on(self.context.power, self.quiet.input_modes)
 
     @functools.cached_property
     def plain(self) -> Refit:
         """The base model, fitted to all events."""
-        return refit(self.bench, self.level, [((), self.bench.coordinates.widened(self.bare.unit))], faults=())[0]
+        return refit(self.context, self.level, [((), self.context.coordinates.widened(self.bare.unit))], faults=())[0]
 
     def together(self, alone: Sequence[Refit], seed: int, *, anew: bool = False) -> list[JointFit]:
         """Explanations as fitted to the fitted events `alone`, fitted to all: from there, or from every setting."""
         by_name = {fit.names: fit for fit in alone}
         fits = best_of(better for fit in alone for better in self._refitted(fit, anew=anew))
-        return each_apart(lambda fit: self._told(fit, by_name[fit.names], seed), fits)
+        return each_apart(lambda fit: self._joint_fit(fit, by_name[fit.names], seed), fits)
 
-    def searched(self, valleys: Sequence[np.ndarray], seed: int) -> Survivors:
-        """What explains all events, searched for as in the fitted ones; `valleys` (D,) of the base model there."""
-        bench = self.bench
-        bench.effort.say("searching again, fitted to all events")
-        wide = [bench.coordinates.widened(valley) for valley in (self.bare.unit, *valleys)]
-        base = fitted_from(bench, wide, wide[1:])
+    def searched(self, local_minima: Sequence[np.ndarray], seed: int) -> Survivors:
+        """What explains all events, searched for as in the fitted ones; `local_minima` (D,) of the base model there."""
+        context = self.context
+        context.effort.say("searching again, fitted to all events")
+        wide = [context.coordinates.widened(minimum) for minimum in (self.bare.unit, *local_minima)]
+        base = fitted_from(context, wide, wide[1:])
         return survivors(explanations(base, disagreement(base, seed), seed), seed)
 
     def carried_back(self, fits: Sequence[Refit], seed: int) -> list[tuple[Refit, JointFit]]:
         """Explanations (D of all events) as fitted to the fitted events alone, and to all."""
         there = {f.names: self._narrowed(f) for f in fits}
         alone = {names: refit(self.fitted, self.noise, [(names, u)], self.faults)[0] for names, u in there.items()}
-        again = refit(self.bench, self.level, [(f.names, f.unit) for f in fits], self.faults)
-        return each_apart(lambda f: (alone[f.names], self._told(f, alone[f.names], seed)), again)
+        again = refit(self.context, self.level, [(f.names, f.unit) for f in fits], self.faults)
+        return each_apart(lambda f: (alone[f.names], self._joint_fit(f, alone[f.names], seed)), again)
 
     def _refitted(self, alone: Refit, *, anew: bool) -> list[Refit]:
-        at, settings = self.bench.coordinates, _settings(self.bench, alone.names) if anew else [{}]
+        at, settings = self.context.coordinates, _settings(self.context, alone.names) if anew else [{}]
         wanted = [(alone.names, at.placed(at.widened(alone.unit), setting)) for setting in settings]
-        return (wide_refit if anew else refit)(self.bench, self.level, wanted, self.faults)
+        return (wide_refit if anew else refit)(self.context, self.level, wanted, self.faults)
 
     def _narrowed(self, fit: Refit) -> np.ndarray:
         return fit.unit[: self.fitted.coordinates.dimension]
 
-    def _told(self, fit: Refit, alone: Refit, seed: int) -> JointFit:
+    def _joint_fit(self, fit: Refit, alone: Refit, seed: int) -> JointFit:
         louder = (self.plain.deviance - fit.deviance) - (self.bare.deviance - alone.deviance)
         p_left = examined(self.quiet, fit, self.level, seed, plain=True).p_left
         return JointFit(replace(fit, unit=self._narrowed(fit)), louder, p_left)
 
 
-def _settings(bench: Context, names: Sequence[str]) -> list[Mapping[str, float]]:
+def _settings(context: Context, names: Sequence[str]) -> list[Mapping[str, float]]:
     """No change, and every setting of the scanned parameters of one of the effects."""
-    return [{}, *itertools.chain.from_iterable(bench.catalogue[name].settings for name in names)]
+    return [{}, *itertools.chain.from_iterable(context.catalogue[name].settings for name in names)]

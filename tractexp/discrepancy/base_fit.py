@@ -19,40 +19,40 @@ ROUNDS = 2  # of noise and fit in turn
 class BaseFit:
     """The fit, its noise, and the valleys of the base model: its best fits (D,) from all over its box."""
 
-    bench: Context
+    context: Context
     fit: Refit
     noise: Noise
     quiet: QuietNoise
-    valleys: tuple[np.ndarray, ...]
+    local_minima: tuple[np.ndarray, ...]
 
-    def valleys_but(self, unit: np.ndarray) -> list[np.ndarray]:
+    def minima_but(self, unit: np.ndarray) -> list[np.ndarray]:
         """The valleys but the one nearest to coordinates (D,)."""
-        base = self.bench.coordinates.base
-        far = [float(np.linalg.norm((valley - unit)[base])) for valley in self.valleys]
-        return [valley for valley, distance in zip(self.valleys, far, strict=True) if distance > min(far)]
+        base = self.context.coordinates.base
+        far = [float(np.linalg.norm((minimum - unit)[base])) for minimum in self.local_minima]
+        return [minimum for minimum, distance in zip(self.local_minima, far, strict=True) if distance > min(far)]
 
 
-def base_fit(bench: Context) -> BaseFit:
+def base_fit(context: Context) -> BaseFit:
     """Fit the base model from all over its box."""
-    valleys = _valleys(bench)
-    return fitted_from(bench, valleys, valleys)
+    local_minima = _local_minima(context)
+    return fitted_from(context, local_minima, local_minima)
 
 
-def fitted_from(bench: Context, starts: Sequence[np.ndarray], valleys: Sequence[np.ndarray]) -> BaseFit:
+def fitted_from(context: Context, starts: Sequence[np.ndarray], local_minima: Sequence[np.ndarray]) -> BaseFit:
     """Fit the base model from these starts (D,): noise and fit in turn, the first time with what precedes the dips."""
-    noise = white(bench)
-    fit = refit(bench, noise, [((), start) for start in starts])[0]
-    quiet = QuietNoise.at(bench, fit.unit)
+    noise = white(context)
+    fit = refit(context, noise, [((), start) for start in starts])[0]
+    quiet = QuietNoise.at(context, fit.unit)
     for _ in range(ROUNDS):
         noise = quiet.of_fit(fit.unit)
-        fit = refit(bench, noise, [((), fit.unit)])[0]
-    return BaseFit(bench, fit, noise, quiet, tuple(valleys))
+        fit = refit(context, noise, [((), fit.unit)])[0]
+    return BaseFit(context, fit, noise, quiet, tuple(local_minima))
 
 
-def _valleys(bench: Context) -> list[np.ndarray]:
+def _local_minima(context: Context) -> list[np.ndarray]:
     """The best fits (D,) of the base model alone, by its own fast kernel."""
-    at = bench.coordinates
-    ends = best_fits(Likelihood.of(bench.kernels.bare))
+    at = context.coordinates
+    ends = best_fits(Likelihood.of(context.kernels.bare))
     starts = np.tile(at.null, (len(ends), 1))
     starts[:, [*at.base, *at.before]] = ends
     return list(starts)

@@ -35,10 +35,10 @@ class Chance:
         """The p a single candidate must undercut so that chance names any with probability `alpha`."""
         return float(np.quantile(self.least_p, alpha, method="lower"))
 
-    def surprises(self, projection: ScoreTest, bench: Context) -> dict[str, float]:
+    def surprises(self, projection: ScoreTest, context: Context) -> dict[str, float]:
         """How often chance leaves as much as a fit does, by each test of adequacy."""
-        found = projection.statistics(bench)
-        return {name: tail(self.left[name], value, self.scales.get(name)) for name, value in found.items()}
+        by_test = projection.statistics(context)
+        return {name: tail(self.left[name], value, self.scales.get(name)) for name, value in by_test.items()}
 
 
 def chance_at(
@@ -50,18 +50,18 @@ def chance_at(
 
     Draws that estimate their noise anew are kept, as for a run that was stopped; others cost less than keeping them.
     """
-    bench = t.bench
-    plain = plain or noise_known(bench, noise)
+    context = t.context
+    plain = plain or noise_known(context, noise)
 
-    def made() -> tuple[np.ndarray, ...]:
+    def draw() -> tuple[np.ndarray, ...]:
         chance = _drawn(t, own, noise, quiet, seed, plain, draws)
         return chance.least_p, np.array([*chance.left]), *chance.left.values()
 
-    if plain or not bench.told:
+    if plain or not context.digest:
         return _drawn(t, own, noise, quiet, seed, plain, draws)
-    fit = {part.name: getattr(t, part.name) for part in fields(t) if part.name != "bench"}
-    key = store.key("chance", bench.told, fit, noise, quiet.blur, seed, draws)
-    least, names, *left = store.DRAWS.arrays(key, made)
+    fit = {part.name: getattr(t, part.name) for part in fields(t) if part.name != "context"}
+    key = store.key("chance", context.digest, fit, noise, quiet.input_modes, seed, draws)
+    least, names, *left = store.DRAWS.arrays(key, draw)
     return Chance(least, dict(zip(names.tolist(), left, strict=True)))
 
 
@@ -73,9 +73,9 @@ def scales(t: Linearization, own: ScoreTest, noise: Noise, seed: int) -> dict[st
     """
 
     def part(k: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        drawn = own.of(t.bench.whiten(noise, _noise(t, noise, np.random.default_rng((seed, k)), DRAWS)))
-        found = surprises.statistics(drawn.channels(t.bench), t.bench)
-        return {name: (values.mean(axis=0), (values**2).mean(axis=0)) for name, values in found.items()}
+        drawn = own.of(t.context.whiten(noise, _noise(t, noise, np.random.default_rng((seed, k)), DRAWS)))
+        by_test = surprises.statistics(drawn.channels(t.context), t.context)
+        return {name: (values.mean(axis=0), (values**2).mean(axis=0)) for name, values in by_test.items()}
 
     parts = each_apart(part, range(1, MORE + 1))
     moments = {name: np.mean([p[name] for p in parts], axis=0) for name in parts[0]}
@@ -87,12 +87,12 @@ def _drawn(
 ) -> Chance:  # fmt: skip
     drawn = _noise(t, noise, np.random.default_rng(seed), draws)
     if plain:
-        return _told(t, own.of(t.bench.whiten(noise, drawn)), noise)
+        return _chance(t, own.of(t.context.whiten(noise, drawn)), noise)
     rest = rich_residuals(t, drawn)
 
     def anew(b: int) -> Chance:
         seen = quiet.of(t.unit, rest[b])
-        return _told(t, t.whitened(seen).of(t.bench.whiten(seen, drawn[b : b + 1])), noise)
+        return _chance(t, t.whitened(seen).of(t.context.whiten(seen, drawn[b : b + 1])), noise)
 
     each = each_apart(anew, range(draws))
     left = {name: np.concatenate([one.left[name] for one in each]) for name in each[0].left}
@@ -101,18 +101,18 @@ def _drawn(
 
 def _noise(t: Linearization, noise: Noise, rng: np.random.Generator, draws: int) -> np.ndarray:
     """Noise (b, C, N) [pu] where the events have samples that count."""
-    return noise.draw(rng, draws, np.diff(t.bench.drive.first).tolist()) * t.bench.known
+    return noise.draw(rng, draws, np.diff(t.context.drive.first).tolist()) * t.context.valid
 
 
-def noise_known(bench: Context, noise: Noise) -> bool:
+def noise_known(context: Context, noise: Noise) -> bool:
     """Whether quiet stretches tell the noise exactly enough; of one that follows from the model, its size alone."""
-    samples = sum(part.stop - part.start for part in bench.quiet)
-    return bench.domain.noise_from_model or bench.criteria.knows_noise(noise.worth(samples))
+    samples = sum(part.stop - part.start for part in context.quiet)
+    return context.domain.noise_from_model or context.criteria.knows_noise(noise.worth(samples))
 
 
-def _told(t: Linearization, projection: ScoreTest, noise: Noise) -> Chance:
+def _chance(t: Linearization, projection: ScoreTest, noise: Noise) -> Chance:
     p = projection.least_p
-    if noise.loudest_blur <= t.bench.criteria.blurred:
+    if noise.loudest_input_mode <= t.context.criteria.blurred:
         faults = np.array(list(projection.fault_p().values())).reshape(-1, len(p))
         p = np.maximum(np.minimum(p, faults.min(axis=0, initial=1.0)), SMALLEST_P)
-    return Chance(p, projection.statistics(t.bench))
+    return Chance(p, projection.statistics(t.context))

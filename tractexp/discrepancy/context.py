@@ -43,7 +43,7 @@ class Context:
         fixed: Mapping[str, float], criteria: Criteria, effort: Effort, substeps: int | None = None,
         family: type[Family] = Family,
     ) -> "Context":  # fmt: skip
-        """A bench for these records; the load is simulated behind the recorder's window, where there is one."""
+        """A context for these records; the load is simulated behind the recorder's window, where there is one."""
         kernels = Kernels(family(load.behind(records.window), catalogue), records.events, bounds, fixed, substeps)
         coordinates = Coordinates.of(kernels.bare, kernels.whole, catalogue, criteria.measurement_prior)
         return cls(load, catalogue, records, kernels, coordinates, criteria, effort)
@@ -51,8 +51,8 @@ class Context:
     def on(self, records: Records) -> "Context":
         """The same model and catalogue on other records, with the same Runge-Kutta steps and a count of its own."""
         kernels, criteria, effort = self.kernels, self.criteria, self.effort.anew()
-        known = kernels.bounds, kernels.fixed, criteria, effort, kernels.substeps
-        return Context.of(self.load, self.catalogue, records, *known, type(kernels.family))
+        same = kernels.bounds, kernels.fixed, criteria, effort, kernels.substeps
+        return Context.of(self.load, self.catalogue, records, *same, type(kernels.family))
 
     @property
     def model(self) -> Model:
@@ -60,14 +60,14 @@ class Context:
         return self.kernels.family.model
 
     @functools.cached_property
-    def told(self) -> str:
-        """SHA-256 of all that a fit on this bench depends on beside noise and starts; "" where that cannot be told."""
+    def digest(self) -> str:
+        """SHA-256 of all that a fit here depends on beside noise and starts; "" where that is not known."""
         load, at = self.load, self.coordinates
         parts = (load.motor, load.static, *load.effects, *self.catalogue.effects)
         if not all(map(store.installed, parts)):
             return ""
-        known = self.problem.digest(), self.kernels.bare.digest(), self.criteria, at.null, at.prior_deviation
-        return store.key(store.environment(), repr(parts), self.records.window, *known)
+        content = self.problem.digest(), self.kernels.bare.digest(), self.criteria, at.null, at.prior_deviation
+        return store.key(store.environment(), repr(parts), self.records.window, *content)
 
     @property
     def waves(self) -> bool:
@@ -93,19 +93,19 @@ class Context:
         return self.problem.drive
 
     @functools.cached_property
-    def known(self) -> np.ndarray:
+    def valid(self) -> np.ndarray:
         """Which samples count, (C, N)."""
         return self.drive.weights > 0
 
     @property
     def samples(self) -> int:
         """Values that count: of P and Q, or of the currents."""
-        return int(np.count_nonzero(self.known))
+        return int(np.count_nonzero(self.valid))
 
     def describe(self, noise: Noise) -> str:
         """Level and color of the noise of what is compared, as a run prints them."""
-        told = noise.describe(self.drive.spoken).split(", ")
-        return ", ".join(part for part, there in zip(told, [*np.any(self.known, axis=1), True], strict=True) if there)
+        labels = noise.describe(self.drive.spoken).split(", ")
+        return ", ".join(part for part, there in zip(labels, [*np.any(self.valid, axis=1), True], strict=True) if there)
 
     @functools.cached_property
     def power(self) -> Load:
@@ -140,11 +140,11 @@ class Context:
 
     def whiten(self, noise: Noise, residuals: np.ndarray) -> np.ndarray:
         """Residuals (n, C, N) as rows (n, C N) of independent unit variance."""
-        return noise.whiten(residuals, self.drive, self.known)
+        return noise.whiten(residuals, self.drive, self.valid)
 
     def whiten_many(self, noise: Noise, residuals: np.ndarray) -> np.ndarray:
         """As `whiten`, of many residuals on all cores; not for what itself runs beside others."""
-        noise.prepare(self.drive, self.known)
+        noise.prepare(self.drive, self.valid)
         return in_same_parts(lambda part: self.whiten(noise, part), residuals)
 
     def rows(self, unit: np.ndarray, noise: Noise, faults: Sequence[int], sets: Sequence[Sequence[str]]) -> np.ndarray:

@@ -124,6 +124,6 @@ class Coordinates:
         """
         return np.r_[unit, self.null[len(unit) :]]
 
-    def without_faults(self, unit: np.ndarray, kept: Sequence[str]) -> np.ndarray:
-        """Coordinates (D,) with the faults of the measurement that are not `kept` back at their nulls."""
-        return self.without(unit, [name for name in self.catalogue.of_measurement if name not in kept])
+    def without_faults(self, unit: np.ndarray, free: Sequence[str]) -> np.ndarray:
+        """Coordinates (D,) with the faults of the measurement that are not `free` back at their nulls."""
+        return self.without(unit, [name for name in self.catalogue.of_measurement if name not in free])

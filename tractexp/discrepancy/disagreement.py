@@ -29,17 +29,17 @@ class Disagreement:
     scores: list[Score]  # of the candidates outside the fit, the rarest by chance first
 
     @property
-    def bench(self) -> Context:
-        return self.tangent.bench
+    def context(self) -> Context:
+        return self.tangent.context
 
     @property
     def criteria(self) -> Criteria:
-        return self.bench.criteria
+        return self.context.criteria
 
     @functools.cached_property
     def left(self) -> dict[str, float]:
         """How often chance leaves as much as this fit does, by each test."""
-        return self.chance.surprises(self.projection, self.bench)
+        return self.chance.surprises(self.projection, self.context)
 
     @property
     def p_left(self) -> float:
@@ -65,7 +65,7 @@ class Disagreement:
     @property
     def resting(self) -> list[str]:
         """Parameters that rest on a bound: better values lie beyond it."""
-        names = {k: name for name, k in self.bench.coordinates.column.items()}
+        names = {k: name for name, k in self.context.coordinates.column.items()}
         return [names[k] for k in self.tangent.held]
 
     @property
@@ -94,7 +94,7 @@ class Disagreement:
 
         None where the voltage is noisy: whatever smooths the calculated power would seem to be there.
         """
-        if self.noise.loudest_blur > self.criteria.blurred:
+        if self.noise.loudest_input_mode > self.criteria.blurred:
             return ()
         level = self.chance.critical_p(self.criteria.naming)
         if self.fit.names:
@@ -113,18 +113,18 @@ def examined(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int, plain: bool
     Taken as known the noise makes every test sharper: what even those do not doubt needs no draws that estimate it
     anew, which cost a hundred times as much.
     """
-    bench = quiet.bench
-    t = tangent(bench, fit, noise)
+    context = quiet.context
+    t = tangent(context, fit, noise)
     noise = quiet.of(fit.unit, rich_residuals(t, t.residual[None])[0], t.residual, t.explaining)
-    fit = refit(bench, noise, [(fit.names, fit.unit)])[0]
-    t = tangent(bench, fit, noise)
+    fit = refit(context, noise, [(fit.names, fit.unit)])[0]
+    t = tangent(context, fit, noise)
     projection = t.whitened(noise)
     scores = projection.scores()
     chance = chance_at(t, projection, noise, quiet, seed, plain=True)
-    found = Disagreement(fit, noise, t, projection, chance, scores)
-    plain = plain or noise_known(bench, noise) or (bool(scores) and scores[0].p < PLAIN)
-    if not plain and found.doubtful:
-        found = replace(found, chance=chance_at(t, projection, noise, quiet, seed, plain=False))
-    if found.undecided:
-        found = replace(found, chance=replace(found.chance, scales=scales(t, projection, noise, seed)))
-    return found
+    result = Disagreement(fit, noise, t, projection, chance, scores)
+    plain = plain or noise_known(context, noise) or (bool(scores) and scores[0].p < PLAIN)
+    if not plain and result.doubtful:
+        result = replace(result, chance=chance_at(t, projection, noise, quiet, seed, plain=False))
+    if result.undecided:
+        result = replace(result, chance=replace(result.chance, scales=scales(t, projection, noise, seed)))
+    return result

@@ -8,13 +8,13 @@ import numpy as np
 
 from tractexp import files
 from tractexp.discrepancy import recommended
-from tractexp.discrepancy.forms import forms, told_by_name
+from tractexp.discrepancy.forms import by_name, forms
 from tractexp.discrepancy.gap import Curves, GapTest
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import ParameterEstimate, estimates, own_parameters
 from tractexp.discrepancy.proposal import generate
-from tractexp.discrepancy.proposal.propose import told as told_of_proposal
+from tractexp.discrepancy.proposal.propose import to_dict as proposal_dict
 from tractexp.discrepancy.verdict import NAMED, TIED, UNEXPLAINED
 from tractexp.domain import DOMAINS
 from tractexp.identification.adequacy import Grade
@@ -25,13 +25,13 @@ PLUGIN = f"{generate.NAME}.py"  # of a proposal, beside the page
 
 def content(investigation: Findings) -> dict[str, Any]:
     """The content of `discrepancy.json`."""
-    window = investigation.bench.records.window
+    window = investigation.context.records.window
     return {
         "verdict": investigation.verdict.word,
         "reason": investigation.verdict.reason,
         "effects": list(dict.fromkeys(investigation.catalogue.textbook(investigation.names))),
         "name_sets": [list(investigation.catalogue.textbook(names)) for names in investigation.verdict.sets],
-        "forms": told_by_name(forms(investigation)),
+        "forms": by_name(forms(investigation)),
         "where": [asdict(place) for place in investigation.places],
         "gap": {
             "train": _gap(investigation.train),
@@ -42,18 +42,18 @@ def content(investigation: Findings) -> dict[str, Any]:
         "nearest": _nearest(investigation),
         "candidates": [*sets(investigation), *_singles(investigation)],
         "remainder": _remainder(investigation),
-        "proposal": told_of_proposal(investigation.proposed, PLUGIN),
+        "proposal": proposal_dict(investigation.proposed, PLUGIN),
         "no_proposal": investigation.proposed.why or None,
         "recommendation": recommendation(investigation),
-        "next_event": None if investigation.next_event is None else investigation.next_event.told(),
-        "adequacy": recommended.adequacy(investigation).told(),
+        "next_event": None if investigation.next_event is None else investigation.next_event.to_dict(),
+        "adequacy": recommended.adequacy(investigation).to_dict(),
         "held": recommended.held(investigation),
         "extended": "conf/model/extended.yaml" if investigation.names else None,
-        "noise": investigation.bench.describe(investigation.last.noise),
+        "noise": investigation.context.describe(investigation.last.noise),
         "phasor_window": None if window is None else window.window,
-        "false_alarm_rate": investigation.bench.criteria.false_alarms,
+        "false_alarm_rate": investigation.context.criteria.false_alarms,
         "parameters": parameters(investigation),
-        "simulations": investigation.bench.effort.simulations,
+        "simulations": investigation.context.effort.simulations,
     }
 
 
@@ -62,18 +62,20 @@ def recommendation(investigation: Findings) -> str:
     chosen = investigation.next_event
     if chosen is not None and investigation.verdict.word == TIED:
         return chosen.sentence()
-    if (made := investigation.proposed.proposal) is not None:
-        told = f"ask what on site acts like {made.term.words}; {PLUGIN} adds it to a model (docs/missing-effects.md)"
-        return told if chosen is None else f"{told}; {chosen.sentence()}"
+    if (proposal := investigation.proposed.proposal) is not None:
+        sentence = (
+            f"ask what on site acts like {proposal.term.words}; {PLUGIN} adds it to a model (docs/missing-effects.md)"
+        )
+        return sentence if chosen is None else f"{sentence}; {chosen.sentence()}"
     if investigation.verdict.word == UNEXPLAINED:
         return "look at what is left (unexplained.csv) and at what switched at that time"
     if investigation.verdict.word == NAMED:
         grade = recommended.adequacy(investigation).grade
         if grade is not Grade.ADEQUATE:
             return "find what is missing still: investigate further events, or the extended model as the base model"
-        kept = recommended.held(investigation)
-        told = f"; these events cannot tell {joined(list(kept))}, which it holds" if kept else ""
-        return f"use the extended model{told}; judge it on further events as they come"
+        held = recommended.held(investigation)
+        rest = f"; these events cannot tell {joined(list(held))}, which it holds" if held else ""
+        return f"use the extended model{rest}; judge it on further events as they come"
     return "use the base model; what is missing, if anything, is below the limits given for each effect"
 
 
@@ -92,17 +94,17 @@ def _nearest(investigation: Findings) -> dict[str, Any] | None:
     if near is None:
         return None
     assert near.rival.tests is not None
-    unit, own = near.rival.fit.unit, own_parameters(investigation.bench, near.names)
-    known = {e.parameter.name: e for e in estimates(near.rival.tests, unit, near.names)}
-    on = {"train": near.curves, "validate": near.carried} if investigation.bench.domain.nearest_gap else {}
-    told = {role: both and {"before": _curves(both[0]), "after": _curves(both[1])} for role, both in on.items()}
+    unit, own = near.rival.fit.unit, own_parameters(investigation.context, near.names)
+    by_name = {e.parameter.name: e for e in estimates(near.rival.tests, unit, near.names)}
+    on = {"train": near.curves, "validate": near.carried} if investigation.context.domain.nearest_gap else {}
+    gaps = {role: both and {"before": _curves(both[0]), "after": _curves(both[1])} for role, both in on.items()}
     return {
         "effects": list(near.names),
         "explained": _number(near.fitted),
         "explained_held_out": _number(near.held_out),
-        **({"gap": told} if told else {}),
+        **({"gap": gaps} if gaps else {}),
         "others": [{"effects": list(names), "explained": _number(share)} for names, share in near.others],
-        "parameters": {name: _estimate(known[name]) for name in own},
+        "parameters": {name: _estimate(by_name[name]) for name in own},
     }
 
 
@@ -117,17 +119,17 @@ def _remainder(investigation: Findings) -> dict[str, Any] | None:
     }
 
 
-def _estimate(known: ParameterEstimate) -> dict[str, Any]:
-    interval = [_number(end) for end in known.interval]
-    return {"value": known.value, "standard_error": _number(known.error), "interval": interval}
+def _estimate(by_name: ParameterEstimate) -> dict[str, Any]:
+    interval = [_number(end) for end in by_name.interval]
+    return {"value": by_name.value, "standard_error": _number(by_name.error), "interval": interval}
 
 
 def write_left(investigation: Findings, path: Path) -> Path:
     """Write what the nearest candidates leave, measured less calculated [pu], as CSV: event, t [s], each channel."""
-    drive, nearest = investigation.bench.drive, investigation.verdict.nearest
+    drive, nearest = investigation.context.drive, investigation.verdict.nearest
     near = investigation.train.before.calculated if nearest is None else nearest.calculated
     lines = [",".join(["event", "t", *drive.names])]
-    for e, event in enumerate(investigation.bench.events):
+    for e, event in enumerate(investigation.context.events):
         left = drive.measured[:, drive.part(e)] - near[:, drive.part(e)]
         rows = list(zip(event.record.t, *left, strict=True))[event.first :]
         lines += [",".join([event.record.name, *(f"{x:.9g}" for x in row)]) for row in rows]
@@ -136,9 +138,9 @@ def write_left(investigation: Findings, path: Path) -> Path:
 
 def write_plugin(investigation: Findings, path: Path) -> Path:
     """Write the plugin file of a proposal."""
-    made = investigation.proposed.proposal
-    assert made is not None
-    return files.write(path, made.source)
+    proposal = investigation.proposed.proposal
+    assert proposal is not None
+    return files.write(path, proposal.source)
 
 
 def _curves(curves: Curves) -> dict[str, float]:
@@ -149,7 +151,7 @@ def _curves(curves: Curves) -> dict[str, float]:
 
 def sets(investigation: Findings) -> list[dict[str, Any]]:
     """The refitted sets of the chosen size."""
-    rows, at = [], investigation.bench.coordinates
+    rows, at = [], investigation.context.coordinates
     for rival in investigation.survivors.rivals:
         names = rival.fit.names
         if not names:
@@ -202,6 +204,6 @@ def write_model(investigation: Findings, node: dict[str, Any], path: Path) -> Pa
         "bounds": {n: list(b) for n, b in node["bounds"].items()},
         "fixed": {**node["fixed"], **recommended.held(investigation)},
     } | {part: chosen for part, chosen in settings.items() if chosen}
-    told = use_of(investigation.bench.load.domain, "<this conf>")
-    head = f"# The base model and what was found missing: {told}\n"
+    command = use_of(investigation.context.load.domain, "<this conf>")
+    head = f"# The base model and what was found missing: {command}\n"
     return files.write(path, head + yaml.safe_dump(extended, sort_keys=False))

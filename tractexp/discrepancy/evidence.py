@@ -48,45 +48,45 @@ class Evidence:
         return {CHOSEN: 0, KEPT: 1}.get(self.status, 2)
 
 
-def evidence(found: Findings) -> list[Evidence]:
+def evidence(findings: Findings) -> list[Evidence]:
     """All candidates: what was added first, then what is tied with it, then the others; the most helpful first."""
-    sets = [_of_set(found, rival) for rival in found.survivors.rivals if _names(found, rival)]
-    known = {row.names for row in sets}  # of the chosen size
-    rows = [*sets, *(row for row in _singles(found) if row.names not in known)]
+    sets = [_of_set(findings, rival) for rival in findings.survivors.rivals if _names(findings, rival)]
+    tested = {row.names for row in sets}  # of the chosen size
+    rows = [*sets, *(row for row in _singles(findings) if row.names not in tested)]
     return sorted(rows, key=lambda row: (row.standing, -np.nan_to_num(row.drop, nan=-1.0), row.names))
 
 
-def chance_level(found: Findings) -> float:
+def chance_level(findings: Findings) -> float:
     """The drop of the deviance that chance gives to the most helpful candidate as often as false alarms are allowed."""
     from scipy.special import chdtri
 
-    return float(chdtri(1, found.first.chance.critical_p(found.bench.criteria.false_alarms)))
+    return float(chdtri(1, findings.first.chance.critical_p(findings.context.criteria.false_alarms)))
 
 
-def why_not_the_most_helpful(found: Findings) -> str:
+def why_not_the_most_helpful(findings: Findings) -> str:
     """Where the verdict is not the effect that a single linear step favours: one sentence why; "" otherwise."""
-    scores = found.first.scores
-    if not scores or scores[0].drop < chance_level(found) or found.names == (scores[0].name,):
+    scores = findings.first.scores
+    if not scores or scores[0].drop < chance_level(findings) or findings.names == (scores[0].name,):
         return ""
     best = scores[0]
     promise = f"{best.name} promises most in one linear step from the base model"
-    row = next((r for r in evidence(found) if r.names == (best.name,) and r.how == FITTED), None)
+    row = next((r for r in evidence(findings) if r.names == (best.name,) and r.how == FITTED), None)
     if row is not None:
         promise += f" (deviance lowered by {best.drop:.0f}; refitted, by {row.drop:.0f})"
-    if found.verdict.word == TIED and (best.name,) in found.verdict.sets:
+    if findings.verdict.word == TIED and (best.name,) in findings.verdict.sets:
         return f"{promise}, and is one of the tied explanations."
-    if found.verdict.word in (NONE, UNEXPLAINED):
-        return f"{promise}, but that does not make it an explanation: {_verdict_on(found, best.name)}."
-    chosen = next(r for r in evidence(found) if r.standing == 0)
+    if findings.verdict.word in (NONE, UNEXPLAINED):
+        return f"{promise}, but that does not make it an explanation: {_verdict_on(findings, best.name)}."
+    chosen = next(r for r in evidence(findings) if r.standing == 0)
     return (
-        f"{promise}, yet the verdict is {joined(found.names)}, which lowers the deviance by {chosen.drop:.0f}:"
-        f" {_verdict_on(found, best.name)}."
+        f"{promise}, yet the verdict is {joined(findings.names)}, which lowers the deviance by {chosen.drop:.0f}:"
+        f" {_verdict_on(findings, best.name)}."
     )
 
 
-def beside(found: Findings) -> str:
+def beside(findings: Findings) -> str:
     """Why an effect that helps the base model may be called not testable: one sentence; "" where nothing is added."""
-    chosen = found.last.fit.names
+    chosen = findings.last.fit.names
     if not chosen:
         return ""
     return (
@@ -95,41 +95,41 @@ def beside(found: Findings) -> str:
     )
 
 
-def _verdict_on(found: Findings, name: str) -> str:
+def _verdict_on(findings: Findings, name: str) -> str:
     """What became of one effect, as the end of a sentence."""
-    row = next((r for r in evidence(found) if r.names == (name,)), None)
+    row = next((r for r in evidence(findings) if r.names == (name,)), None)
     if row is None:
         return "it was not refitted alone"
     return f"it is {row.why}" if row.status == "relevant" else f"it is {row.status}: {row.why}"
 
 
-def _names(found: Findings, rival: Rival) -> tuple[str, ...]:
-    return tuple(sorted((*rival.fit.names, *found.held_out.faults)))
+def _names(findings: Findings, rival: Rival) -> tuple[str, ...]:
+    return tuple(sorted((*rival.fit.names, *findings.held_out.faults)))
 
 
-def _of_set(found: Findings, rival: Rival) -> Evidence:
+def _of_set(findings: Findings, rival: Rival) -> Evidence:
     """A refitted set of the chosen size; the faults of the measurement where they alone explain."""
-    weighed, names = found.held_out, rival.fit.names or found.held_out.faults
+    weighed, names = findings.held_out, rival.fit.names or findings.held_out.faults
     drop = rival.lowered if rival.fit.names else weighed.bare.deviance - weighed.extended[()].deviance
-    status, why = _fate(found, rival)
+    status, why = _fate(findings, rival)
     unit = weighed.extended.get(rival.fit.names, rival.fit).unit
     errors = {} if rival.tests is None else standard_errors(rival.tests)
-    at = found.bench.coordinates
-    own = [p for name in names for p in found.catalogue[name].sizes]
+    at = findings.context.coordinates
+    own = [p for name in names for p in findings.catalogue[name].sizes]
     sizes = tuple(EffectSize(p.name, at.value(p.name, unit), errors.get(p.name, np.nan), p.unit) for p in own)
     return Evidence(names, max(drop, 0.0), FITTED, status, sizes, why)
 
 
-def _fate(found: Findings, rival: Rival) -> tuple[str, str]:
+def _fate(findings: Findings, rival: Rival) -> tuple[str, str]:
     """What became of a refitted set, and why."""
-    names = _names(found, rival)
-    judged = found.held_out.judged.get(rival.fit.names)
-    if names in found.verdict.sets:
-        helps = " and helps on the held-out events" if judged is not None and judged.gap.gain > 0 else ""
+    names = _names(findings, rival)
+    assessment = findings.held_out.assessments.get(rival.fit.names)
+    if names in findings.verdict.sets:
+        helps = " and helps on the held-out events" if assessment is not None and assessment.gap.gain > 0 else ""
         left = f"leaves no more than chance does{helps}"
-        return (CHOSEN, left) if names == found.names else (KEPT, left)
+        return (CHOSEN, left) if names == findings.names else (KEPT, left)
     if rival.rejected:
-        names = _names(found, found.survivors.rivals[0])
+        names = _names(findings, findings.survivors.rivals[0])
         best = names[0] if len(names) == 1 else "the best set"
         return "rejected", f"were it true, {best} would not fit better by {rival.behind:.0f}"
     if rival.tests is None:
@@ -140,21 +140,21 @@ def _fate(found: Findings, rival: Rival) -> tuple[str, str]:
     return "denied", "does not hold on the held-out events"
 
 
-def _singles(found: Findings) -> list[Evidence]:
+def _singles(findings: Findings) -> list[Evidence]:
     """Every effect of the catalogue by itself: refitted where it was, else in one linear step from the base model."""
-    refits, scores = found.explanations.refits, {s.name: s for s in found.first.scores}
-    base, at = found.first.fit.deviance, found.bench.coordinates
+    refits, scores = findings.explanations.refits, {s.name: s for s in findings.first.scores}
+    base, at = findings.first.fit.deviance, findings.context.coordinates
     rows = []
-    for j in judgements(found):
+    for j in judgements(findings):
         score, fit = scores.get(j.name), refits.get((j.name,))
         drop = base - fit.deviance if fit else score.drop if score else np.nan
         sizes: list[EffectSize] = []
-        for p in found.catalogue[j.name].sizes if fit or score else ():
+        for p in findings.catalogue[j.name].sizes if fit or score else ():
             if fit:
                 sizes.append(EffectSize(p.name, at.value(p.name, fit.unit), np.nan, p.unit))
             elif score and score.deviation[p.name] < np.ptp(p.bounds):  # else these events say nothing of it
                 sizes.append(EffectSize(p.name, p.absent + score.size[p.name], score.deviation[p.name], p.unit))
         how = FITTED if fit else ONE_STEP if score else ""
-        status = CHOSEN if j.name in found.names else j.status
+        status = CHOSEN if j.name in findings.names else j.status
         rows.append(Evidence((j.name,), max(drop, 0.0), how, status, tuple(sizes), j.why))
     return rows

@@ -16,8 +16,8 @@ from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.disagreement import Disagreement, examined
 from tractexp.discrepancy.families import against_members
 from tractexp.discrepancy.fitting import (
-    CLOSE,
-    NESTED,
+    NEAR_BEST,
+    NESTED_TOLERANCE,
     Refit,
     Start,
     best_of,
@@ -81,7 +81,7 @@ def explanations(base: BaseFit, first: Disagreement, seed: int) -> Explanations:
     refits: dict[Names, Refit] = {(): first.fit}
     while steps[-1].asks_for_more and worth_another(steps) and len(steps) < MOST_STEPS:
         size = len(steps[-1].fit.names) + 1
-        fits = searched([ground, *steps[1:]], refits, size, base.bench.effort.say)
+        fits = searched([ground, *steps[1:]], refits, size, base.context.effort.say)
         refits |= {f.names: f for f in fits}
         tests = sufficient(base, fits, steps[-1].noise, seed + size)
         for further in (searched_widely, from_other_valleys) if size == 1 else ():
@@ -108,7 +108,7 @@ def worth_another(steps: Sequence[Disagreement]) -> bool:
     the first 1,121 data sets that were judged was named by three.
     """
     first, last = steps[0], steps[-1]
-    size, samples = len(last.fit.names), first.bench.samples
+    size, samples = len(last.fit.names), first.context.samples
     explained = first.fit.deviance - last.fit.deviance
     if len(steps) > 1 and steps[-2].fit.names == last.fit.names:
         return False
@@ -120,14 +120,14 @@ def without_needless(base: BaseFit, tests: Disagreement, refits: dict[Names, Ref
 
     A larger set may have led to a better place of its own subset than any start of that. Adds to `refits`.
     """
-    fit, bench = tests.fit, base.bench
-    at = bench.coordinates
+    fit, context = tests.fit, base.context
+    at = context.coordinates
     if len(fit.names) < 2:
         return tests
     wanted = [(tuple(n for n in fit.names if n != left), at.without(fit.unit, [left])) for left in fit.names]
-    fewer = refit(bench, tests.noise, wanted)[0]
+    fewer = refit(context, tests.noise, wanted)[0]
     gained, parameters = max(fewer.deviance - fit.deviance, 0.0), max(fit.parameters - fewer.parameters, 1)
-    if chdtrc(parameters, gained) < bench.criteria.further_name(len(fewer.names)):
+    if chdtrc(parameters, gained) < context.criteria.further_name(len(fewer.names)):
         return tests
     refits[fewer.names] = fewer
     return without_needless(base, examined(base.quiet, fewer, tests.noise, seed), refits, seed)
@@ -138,7 +138,7 @@ def with_families(base: BaseFit, tests: Disagreement, refits: dict[Names, Refit]
 
     None is tried unless `family_p` asks for them, and none of waveforms: no criterion was calibrated with members.
     """
-    if not base.bench.domain.calibrated or not base.bench.criteria.family_p:
+    if not base.context.domain.calibrated or not base.context.criteria.family_p:
         return tests
     tests, fits = against_members(base, tests, refits, seed + FAMILIES)
     refits |= {f.names: f for f in fits}
@@ -147,15 +147,15 @@ def with_families(base: BaseFit, tests: Disagreement, refits: dict[Names, Refit]
 
 def searched(steps: Sequence[Disagreement], refits: Refits, size: int, say: Callable[[str], None]) -> list[Refit]:
     """The most promising sets of one size refitted, the best first. `steps` begin with one without effects."""
-    bench, noise = steps[0].bench, steps[-1].noise
+    context, noise = steps[0].context, steps[-1].noise
     wanted = shortlist(steps, size)
     one, many = ("effect", "effects") if size == 1 else (f"set of {size}", f"sets of {size}")
     say(f"refitting {len(wanted)} {one if len(wanted) == 1 else many}")
-    fits = rough_refit(bench, noise, [s for n in wanted for s in starts(steps, refits, n)])
-    near = [f for f in fits if f.cost < fits[0].cost + CLOSE]
-    exact = {f.names: f for f in refit(bench, noise, [(f.names, f.unit) for f in near])}
+    fits = rough_refit(context, noise, [s for n in wanted for s in starts(steps, refits, n)])
+    near = [f for f in fits if f.cost < fits[0].cost + NEAR_BEST]
+    exact = {f.names: f for f in refit(context, noise, [(f.names, f.unit) for f in near])}
     fits = [exact.get(f.names, f) for f in fits]
-    return best_of(no_worse_than_subsets(bench, noise, {**refits, **{f.names: f for f in fits}}, fits))
+    return best_of(no_worse_than_subsets(context, noise, {**refits, **{f.names: f for f in fits}}, fits))
 
 
 def searched_widely(
@@ -167,20 +167,20 @@ def searched_widely(
     """
     if best.suffices:
         return first, []
-    bench, bare = base.bench, refits[()].unit
+    context, bare = base.context, refits[()].unit
     singles: Refits = {f.names: f for f in best_of(refits.values()) if len(f.names) == 1}
-    unlike = [f for f in singles.values() if len(bench.catalogue[f.names[0]].settings) > 1]
-    grounds = bare, *off_bounds(bench, bare)
-    wanted = [[(f.names, f.unit), *(s for unit in grounds for s in _every_setting(bench, f, unit))] for f in unlike]
-    found = wide_refits(bench, first.noise, wanted, WIDELY)
-    return first, [f for f in found if f.deviance < singles[f.names].deviance - NESTED]
+    unlike = [f for f in singles.values() if len(context.catalogue[f.names[0]].settings) > 1]
+    grounds = bare, *off_bounds(context, bare)
+    wanted = [[(f.names, f.unit), *(s for unit in grounds for s in _every_setting(context, f, unit))] for f in unlike]
+    fits = wide_refits(context, first.noise, wanted, WIDELY)
+    return first, [f for f in fits if f.deviance < singles[f.names].deviance - NESTED_TOLERANCE]
 
 
-def _every_setting(bench: Context, fit: Refit, unit: np.ndarray) -> list[Start]:
+def _every_setting(context: Context, fit: Refit, unit: np.ndarray) -> list[Start]:
     """Starts for a single effect at coordinates (D,): of the size that it was fitted with, at all its settings."""
-    at, sized = bench.coordinates, unit.copy()
+    at, sized = context.coordinates, unit.copy()
     sized[at.sizes(fit.names)] = fit.unit[at.sizes(fit.names)]
-    return [(fit.names, at.placed(sized, setting)) for setting in bench.catalogue[fit.names[0]].settings]
+    return [(fit.names, at.placed(sized, setting)) for setting in context.catalogue[fit.names[0]].settings]
 
 
 def from_other_valleys(
@@ -191,22 +191,22 @@ def from_other_valleys(
     Where an effect is missing, a wrong valley may fit better than the right one. Where the best so far leaves nothing,
     only valleys in which a linear step promises nearly as much.
     """
-    bench, explained = base.bench, first.fit.deviance - best.fit.deviance
+    context, explained = base.context, first.fit.deviance - best.fit.deviance
     ground, singles = first, best_of(refits.values())
-    for valley in base.valleys_but(first.fit.unit):
-        fit = refit(bench, first.noise, [((), valley)])[0]
-        if np.linalg.norm((fit.unit - first.fit.unit)[bench.coordinates.base]) < DISTINCT:
+    for minimum in base.minima_but(first.fit.unit):
+        fit = refit(context, first.noise, [((), minimum)])[0]
+        if np.linalg.norm((fit.unit - first.fit.unit)[context.coordinates.base]) < DISTINCT:
             continue
-        t = tangent(bench, fit, first.noise)
+        t = tangent(context, fit, first.noise)
         projection = t.whitened(first.noise)
         there = replace(first, fit=fit, tangent=t, projection=projection, scores=projection.scores())
         if best.suffices:
             nearer = first.fit.deviance - fit.deviance
-            promising = [(s.name,) for s in there.scores if bench.criteria.promises(nearer + s.drop, explained)]
+            promising = [(s.name,) for s in there.scores if context.criteria.promises(nearer + s.drop, explained)]
             begun = [start for names in promising for start in starts([there], {(): fit}, names)]
-            fits = refit(bench, first.noise, begun) if begun else []
+            fits = refit(context, first.noise, begun) if begun else []
         else:
-            say = lambda line: bench.effort.say(f"{line} from another valley of the base model")  # noqa: E731
+            say = lambda line: context.effort.say(f"{line} from another valley of the base model")  # noqa: E731
             fits = searched([there], {(): fit}, 1, say)
         if fits and fits[0].cost < singles[0].cost:
             ground = there
@@ -222,7 +222,7 @@ def sufficient(base: BaseFit, ranked: Sequence[Refit], noise: Noise, seed: int) 
     best = examined(base.quiet, ranked[0], noise, seed)
     if not best.asks_for_more:
         return best
-    for other in [f for f in ranked[1:PATCHED] if f.cost < ranked[0].cost + CLOSE]:
+    for other in [f for f in ranked[1:PATCHED] if f.cost < ranked[0].cost + NEAR_BEST]:
         there = examined(base.quiet, other, noise, seed)
         if not there.asks_for_more and there.p_left > best.p_left:
             return there
@@ -270,7 +270,7 @@ def starts(steps: Sequence[Disagreement], refits: Refits, names: Names) -> list[
 
 def _placed(at: Disagreement, name: str, rank: int, unit: np.ndarray) -> np.ndarray:
     """Coordinates (D,) with a candidate at its one-step size and its `rank`-th best setting."""
-    ranked, to = ranked_settings(at, name), at.bench.coordinates
+    ranked, to = ranked_settings(at, name), at.context.coordinates
     column, sizes = ranked[min(rank, len(ranked) - 1)]
     values = dict(column.setting)
     for p, size in zip(column.candidate.sizes, sizes, strict=True):

@@ -32,29 +32,29 @@ def against_members(
 
     With the fits of the members that are held against it: none where neither leaves nothing.
     """
-    bench, noise, family = base.bench, tests.noise, base.bench.kernels.family
-    wanted = near(bench, tests.fit, refits) if tests.suffices else bench.catalogue.members
+    context, noise, family = base.context, tests.noise, base.context.kernels.family
+    wanted = near(context, tests.fit, refits) if tests.suffices else context.catalogue.members
     if not wanted:
         return tests, []
-    bench.effort.say(f"trying {len(wanted)} other places and laws")
-    family.compile_members([m.name for m in wanted], bench.effort.say)
-    fits = wide_refits(bench, noise, [starts(bench, member, refits) for member in wanted], NEAREST)
+    context.effort.say(f"trying {len(wanted)} other places and laws")
+    family.compile_members([m.name for m in wanted], context.effort.say)
+    fits = wide_refits(context, noise, [starts(context, member, refits) for member in wanted], NEAREST)
     for k, fit in enumerate(fits[:EXAMINED]):
-        if not worth(fit, tests.fit, bench.criteria.family_p) or not family.joins(fit.names[0]):
+        if not worth(fit, tests.fit, context.criteria.family_p) or not family.joins(fit.names[0]):
             continue
-        family.compile_members(fit.names, bench.effort.say, whole=True)
+        family.compile_members(fit.names, context.effort.say, whole=True)
         there = examined(base.quiet, fit, noise, seed + k)
         if there.suffices:
             return there, [there.fit, *(f for f in fits if f is not fit and family.joins(f.names[0]))]
     return tests, [f for f in fits if family.joins(f.names[0])] if tests.suffices else []
 
 
-def near(bench: Context, best: Refit, refits: Mapping[Names, Refit]) -> list[Candidate]:
+def near(context: Context, best: Refit, refits: Mapping[Names, Refit]) -> list[Candidate]:
     """Members of families whose textbook effect comes near the best single one, that one's own left out."""
     bare = refits[()].deviance
-    least = bare - bench.criteria.near_family * (bare - best.deviance)
+    least = bare - context.criteria.near_family * (bare - best.deviance)
     families = {f.names[0] for f in refits.values() if len(f.names) == 1 and f.deviance < least} - {*best.names}
-    return [m for m in bench.catalogue.members if m.effect.family in families] if len(best.names) == 1 else []
+    return [m for m in context.catalogue.members if m.effect.family in families] if len(best.names) == 1 else []
 
 
 def worth(member: Refit, textbook: Refit, p: float) -> bool:
@@ -64,40 +64,43 @@ def worth(member: Refit, textbook: Refit, p: float) -> bool:
     return gained > 0 and float(chdtrc(further, gained)) < p
 
 
-def starts(bench: Context, member: Candidate, refits: Mapping[Names, Refit]) -> list[Start]:
+def starts(context: Context, member: Candidate, refits: Mapping[Names, Refit]) -> list[Start]:
     """Starts of a member: from the textbook's fit, with every setting that it leaves open and its size told whole or
     shared, and where the member does not nest that, from the base model's with every setting, since the textbook's fit
     may have gone astray."""
-    at, effect, bare = bench.coordinates, member.effect, refits[()].unit
+    at, effect, bare = context.coordinates, member.effect, refits[()].unit
     textbook = refits.get((effect.family,)) if effect.as_textbook else None
     begun: list[tuple[np.ndarray, dict[str, float]]] = []
     if textbook is not None:
         ground = at.without(textbook.unit, [effect.family])
-        told = {own: at.value(theirs, textbook.unit) for own, theirs in effect.as_textbook.items()}
-        begun += [(ground, told), *((ground, told | shared) for shared in _shared(member, told))]
+        textbook_values = {own: at.value(theirs, textbook.unit) for own, theirs in effect.as_textbook.items()}
+        begun += [
+            (ground, textbook_values),
+            *((ground, textbook_values | shared) for shared in _shared(member, textbook_values)),
+        ]
     if textbook is None or not effect.nests_textbook:
-        begun += [(unit, {}) for unit in (bare, *off_bounds(bench, bare))]
-    made = []
-    for ground, told in begun:
-        known = dict(told)
+        begun += [(unit, {}) for unit in (bare, *off_bounds(context, bare))]
+    wanted = []
+    for ground, textbook_values in begun:
+        start = dict(textbook_values)
         for size in member.sizes:
             low, high = size.bounds
-            known.setdefault(size.name, float(np.clip(size.absent + BEGUN * member.relevant(size), low, high)))
-        for setting in open_settings(member, tuple(known)):
-            values = {p.name: (setting | known).get(p.name, p.default) for p in effect.parameters}
-            made.append(((member.name,), at.placed(ground, values)))
-    return made
+            start.setdefault(size.name, float(np.clip(size.absent + BEGUN * member.relevant(size), low, high)))
+        for setting in open_settings(member, tuple(start)):
+            values = {p.name: (setting | start).get(p.name, p.default) for p in effect.parameters}
+            wanted.append(((member.name,), at.placed(ground, values)))
+    return wanted
 
 
-def _shared(member: Candidate, told: Mapping[str, float]) -> list[dict[str, float]]:
+def _shared(member: Candidate, textbook_values: Mapping[str, float]) -> list[dict[str, float]]:
     """The textbook's size in equal parts, where a member has further sizes: a small second one beside the whole first
     may end as a patch of it. None where it has no further one."""
-    mine = [told[p.name] for p in member.sizes if p.name in told]
+    mine = [textbook_values[p.name] for p in member.sizes if p.name in textbook_values]
     part = sum(mine) / len(member.sizes)
     return [{p.name: part for p in member.sizes}] if 0 < len(mine) < len(member.sizes) else []
 
 
-def open_settings(member: Candidate, known: Sequence[str]) -> list[dict[str, float]]:
+def open_settings(member: Candidate, start: Sequence[str]) -> list[dict[str, float]]:
     """Every combination of the scanned values of the parameters that the textbook's fit does not tell."""
-    grid = {name: values for name, values in member.effect.grid.items() if name not in known}
+    grid = {name: values for name, values in member.effect.grid.items() if name not in start}
     return [dict(zip(grid, choice, strict=True)) for choice in itertools.product(*grid.values())]

@@ -29,56 +29,60 @@ class EffectForm:
 
     name: str
     effect: Effect
-    found: FittedLaw | None
+    law_fit: FittedLaw | None
 
     @property
     def law(self) -> str:
         """Whether it is the catalogue's place and formula, or another."""
         return OTHER if self.effect.family else CATALOGUE
 
-    def told(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """As `discrepancy.json` holds it."""
-        found = self.found
+        law = self.law_fit
         return {
             "place": list(self.effect.places),
             "kind": self.effect.kind,
             "law": self.law,
             "differs": self.effect.differs,
             "effect": self.effect.name,
-            "curve": found and {
-                "x": found.curve.x.tolist(), "y": found.curve.y.tolist(), "lower": found.band[0].tolist(),
-                "upper": found.band[1].tolist(), "textbook": found.textbook.tolist(),
-                "x_label": found.curve.x_label, "y_label": found.curve.y_label,
+            "curve": law and {
+                "x": law.curve.x.tolist(), "y": law.curve.y.tolist(), "lower": law.band[0].tolist(),
+                "upper": law.band[1].tolist(), "textbook": law.textbook.tolist(),
+                "x_label": law.curve.x_label, "y_label": law.curve.y_label,
             },
         }  # fmt: skip
 
 
-def forms(found: Findings) -> list[EffectForm]:
+def forms(findings: Findings) -> list[EffectForm]:
     """The form of each effect of the verdict."""
-    at = found.catalogue
-    return [EffectForm(at.family(name), at[name].effect, _curve(found, at[name].effect)) for name in found.names]
+    at = findings.catalogue
+    return [EffectForm(at.family(name), at[name].effect, _curve(findings, at[name].effect)) for name in findings.names]
 
 
-def told_by_name(found: Sequence[EffectForm]) -> dict[str, dict[str, Any]]:
+def by_name(forms: Sequence[EffectForm]) -> dict[str, dict[str, Any]]:
     """Forms by the catalogue's names; a second one of a family by its own."""
-    told: dict[str, dict[str, Any]] = {}
-    for form in found:
-        told[form.effect.name if form.name in told else form.name] = form.told()
-    return told
+    rows: dict[str, dict[str, Any]] = {}
+    for form in forms:
+        rows[form.effect.name if form.name in rows else form.name] = form.to_dict()
+    return rows
 
 
-def _curve(found: Findings, effect: Effect) -> FittedLaw | None:
+def _curve(findings: Findings, effect: Effect) -> FittedLaw | None:
     """The law found with its band, by the slopes of the curve along the parameters; None of what is no curve."""
-    at, unit, tests = found.bench.coordinates, found.extended.unit, found.verdict.chosen.tests or found.last
+    at, unit, tests = (
+        findings.context.coordinates,
+        findings.extended.unit,
+        findings.verdict.chosen.tests or findings.last,
+    )
     values = {p.name: at.value(p.name, unit) for p in effect.parameters}
     curve = effect.curve(**values)
     if curve is None:
         return None
     names, spread = covariance(tests, list(values))
-    told = [k for k in range(len(names)) if spread[k, k] > 0]
-    J = np.array([_slope(effect, values, names[k], spread[k, k] ** 0.5) for k in told]).reshape(-1, len(curve.y))
-    half = WIDE * np.sqrt(np.einsum("kn,kl,ln->n", J, spread[np.ix_(told, told)], J))
-    return FittedLaw(curve, np.stack([curve.y - half, curve.y + half]), _textbook(found, effect, values, curve))
+    free = [k for k in range(len(names)) if spread[k, k] > 0]
+    J = np.array([_slope(effect, values, names[k], spread[k, k] ** 0.5) for k in free]).reshape(-1, len(curve.y))
+    half = WIDE * np.sqrt(np.einsum("kn,kl,ln->n", J, spread[np.ix_(free, free)], J))
+    return FittedLaw(curve, np.stack([curve.y - half, curve.y + half]), _textbook(findings, effect, values, curve))
 
 
 def _slope(effect: Effect, values: Mapping[str, float], name: str, error: float) -> np.ndarray:
@@ -90,12 +94,12 @@ def _slope(effect: Effect, values: Mapping[str, float], name: str, error: float)
     return (up.y - down.y) / (2 * h)
 
 
-def _textbook(found: Findings, effect: Effect, values: Mapping[str, float], curve: Curve) -> np.ndarray:
+def _textbook(findings: Findings, effect: Effect, values: Mapping[str, float], curve: Curve) -> np.ndarray:
     """The textbook's law (n,) as it fitted these events, beside the curve found; the shapes at their defaults."""
     default = {p.name: p.default for p in effect.parameters}
-    at, fit = found.bench.coordinates, found.explanations.refits.get((effect.family or effect.name,))
-    known = dict(values)
+    at, fit = findings.context.coordinates, findings.explanations.refits.get((effect.family or effect.name,))
+    start = dict(values)
     if effect.as_textbook and fit is not None:
-        known |= {own: at.value(theirs, fit.unit) for own, theirs in effect.as_textbook.items()}
-    drawn = effect.curve(**(default | known | {name: default[name] for name in effect.likely}))
+        start |= {own: at.value(theirs, fit.unit) for own, theirs in effect.as_textbook.items()}
+    drawn = effect.curve(**(default | start | {name: default[name] for name in effect.likely}))
     return curve.y if drawn is None else drawn.y

@@ -64,20 +64,22 @@ class GapTest:
         return self.gain > 0 or not self.telling
 
 
-def curves(bench: Context, unit: np.ndarray, noise: Noise, names: Sequence[str] | None = None) -> Curves:
+def curves(context: Context, unit: np.ndarray, noise: Noise, names: Sequence[str] | None = None) -> Curves:
     """What a fit with the named effects (by default any) leaves; beyond all measure where it has no steady state."""
-    residual = bench.residuals(unit[None], names)
-    white = bench.whiten(noise, residual)[0]
-    measured = bench.drive.measured
+    residual = context.residuals(unit[None], names)
+    white = context.whiten(noise, residual)[0]
+    measured = context.drive.measured
     calculated = residual[0] + measured
     deviance = float(np.nan_to_num(white @ white, nan=np.inf))
-    P, Q, error, i = _errors(bench, calculated)
-    return Curves(calculated, P, Q, deviance, deviance / max(bench.samples, 1), error, i)
+    P, Q, error, i = _errors(context, calculated)
+    return Curves(calculated, P, Q, deviance, deviance / max(context.samples, 1), error, i)
 
 
-def _errors(bench: Context, calculated: np.ndarray) -> tuple[float, float, ModelError, float | None]:
+def _errors(context: Context, calculated: np.ndarray) -> tuple[float, float, ModelError, float | None]:
     """epsilon_p, epsilon_q, the model's error and, of waveforms, epsilon_i of what is calculated (C, N) [pu]."""
-    each = [bench.domain.comparison(event, calculated[:, bench.drive.part(e)]) for e, event in enumerate(bench.events)]
+    each = [
+        context.domain.comparison(event, calculated[:, context.drive.part(e)]) for e, event in enumerate(context.events)
+    ]
     measured = np.concatenate([np.stack([one.event.record.P, one.event.record.Q]) for one in each], axis=1)
     power = np.concatenate([np.stack([one.P, one.Q]) for one in each], axis=1)
     P, Q = (relative_error(measured[c], power[c]) for c in (0, 1))
@@ -86,42 +88,42 @@ def _errors(bench: Context, calculated: np.ndarray) -> tuple[float, float, Model
 
 
 def gap(
-    bench: Context, base: np.ndarray, extended: np.ndarray, names: Sequence[str], noise: Noise,
+    context: Context, base: np.ndarray, extended: np.ndarray, names: Sequence[str], noise: Noise,
     fitted: Sequence[int] | np.ndarray,
 ) -> GapTest:  # fmt: skip
-    """Compare the base model's fit and that with the named effects on the events of `bench`.
+    """Compare the base model's fit and that with the named effects on the events of `context`.
 
     Coordinates `fitted` were fitted to these events in the extended model.
     """
-    before, after = curves(bench, base, noise, ()), curves(bench, extended, noise, names)
+    before, after = curves(context, base, noise, ()), curves(context, extended, noise, names)
     gained = before.deviance - after.deviance
-    explainable = gained + max(left_over(bench, extended, names, noise, fitted), 0.0)
+    explainable = gained + max(left_over(context, extended, names, noise, fitted), 0.0)
     closed = gained / explainable if explainable > 0 else float("nan")
-    apart = (after.calculated - before.calculated)[None] * bench.known
-    rows = bench.whiten(noise, apart)[0]
+    apart = (after.calculated - before.calculated)[None] * context.valid
+    rows = context.whiten(noise, apart)[0]
     expected = float(np.nan_to_num(rows @ rows, nan=np.inf))
-    return GapTest(before, after, float(closed), float(gained), expected, bench.criteria.shown, noise)
+    return GapTest(before, after, float(closed), float(gained), expected, context.criteria.shown, noise)
 
 
 def left_over(
-    bench: Context, unit: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int] | np.ndarray
+    context: Context, unit: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int] | np.ndarray
 ) -> float:
     """How much more than chance pushes into all balances would still lower the deviance at coordinates (D,).
 
     What is `fitted` is projected out.
     """
-    return beyond_chance(bench, unit, names, noise, fitted, pushed(bench, unit, names, noise))
+    return beyond_chance(context, unit, names, noise, fitted, pushed(context, unit, names, noise))
 
 
-def pushed(bench: Context, unit: np.ndarray, names: Sequence[str], noise: Noise) -> np.ndarray:
+def pushed(context: Context, unit: np.ndarray, names: Sequence[str], noise: Noise) -> np.ndarray:
     """What pushes into all balances in all windows change at coordinates (D,), whitened (c, C N)."""
-    pushes, _ = perturbations(bench, unit)
-    raw = bench.residuals_of(np.concatenate([unit[None], pushes]), [(names, True)] * (1 + len(pushes)))
-    return bench.whiten(noise, np.nan_to_num(raw[1:] - raw[0]))
+    points, _ = perturbations(context, unit)
+    raw = context.residuals_of(np.concatenate([unit[None], points]), [(names, True)] * (1 + len(points)))
+    return context.whiten(noise, np.nan_to_num(raw[1:] - raw[0]))
 
 
 def beyond_chance(
-    bench: Context, unit: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int] | np.ndarray,
+    context: Context, unit: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int] | np.ndarray,
     changes: np.ndarray,
 ) -> float:  # fmt: skip
     """How much more than chance `changes` (c, C N) would still lower the deviance at coordinates (D,).
@@ -129,11 +131,11 @@ def beyond_chance(
     Unbiased: the energy in their space less its dimension, what is `fitted` projected out.
     """
     up, down = two_sided(unit, fitted)
-    raw = bench.residuals(np.concatenate([unit[None], up, down]), names)
-    rows = np.nan_to_num(bench.whiten(noise, raw))
+    raw = context.residuals(np.concatenate([unit[None], up, down]), names)
+    rows = np.nan_to_num(context.whiten(noise, raw))
     r, k = rows[0], len(fitted)
     nuisance = rows[1 : 1 + k] - rows[1 + k :]
-    nuisance = nuisance[~resting(bench, unit, fitted, nuisance @ r)]
+    nuisance = nuisance[~resting(context, unit, fitted, nuisance @ r)]
     Q = np.linalg.qr(nuisance.T)[0]
     basis = spanned(changes - (changes @ Q) @ Q.T, SAME)
     return float(np.sum((basis @ r) ** 2) - len(basis))

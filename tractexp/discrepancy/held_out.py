@@ -30,33 +30,33 @@ class Assessment:
     """
 
     gap: GapTest
-    bench: Context
+    context: Context
     units: tuple[np.ndarray, np.ndarray]
     p_left: float = 1.0
 
     @property
     def helps(self) -> bool:
         """Whether the explanation is worth having beyond the events it was fitted to."""
-        criteria = self.bench.criteria
+        criteria = self.context.criteria
         least = criteria.stands if self.gap.telling else criteria.adequate_p  # a mild event denies nothing
         return self.gap.helps and self.p_left >= least
 
     @property
     def convincing(self) -> bool:
         """Whether it closes as much of the gap there as a true explanation does."""
-        return self.gap.closed >= self.bench.criteria.convincing
+        return self.gap.closed >= self.context.criteria.convincing
 
     @property
     def tolerable(self) -> bool:
         """Whether it is kept beside one that helps: what would not do for a name is not enough to deny a rival."""
-        return self.convincing and self.gap.helps and self.p_left >= self.bench.criteria.adequate_p
+        return self.convincing and self.gap.helps and self.p_left >= self.context.criteria.adequate_p
 
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
     """The explanations that remain, as fitted without the faults of the measurement that do not help.
 
-    `bare` is the base model alone, `extended` each explanation, `judged` what the held-out events say of it. Where none
+    `bare` is the base model alone, `extended` each explanation, `assessments` are of held-out events. Where none
     helped as it was fitted, `together` are those that were fitted to all events instead.
     """
 
@@ -65,19 +65,19 @@ class HeldOut:
     faults: Names  # of the measurement, in every explanation
     bare: Refit
     extended: Mapping[Names, Refit]
-    judged: Mapping[Names, Assessment] = field(default_factory=dict)
+    assessments: Mapping[Names, Assessment] = field(default_factory=dict)
     together: tuple[Refit, ...] = ()
 
     @property
-    def kept(self) -> tuple[Rival, ...]:
+    def retained(self) -> tuple[Rival, ...]:
         """The adequate explanations that the held-out events do not deny."""
-        judged, adequate = self.judged, self.survivors.adequate
-        helping = [s for s in adequate if s.fit.names not in judged or judged[s.fit.names].helps]
+        assessments, adequate = self.assessments, self.survivors.adequate
+        helping = [s for s in adequate if s.fit.names not in assessments or assessments[s.fit.names].helps]
         if helping:
-            helping += [s for s in adequate if s not in helping and judged[s.fit.names].tolerable]
+            helping += [s for s in adequate if s not in helping and assessments[s.fit.names].tolerable]
         of_family: dict[Names, Rival] = {}
         for rival in helping:  # the best first: places and laws of one family are told by one name
-            of_family.setdefault(self.survivors.explanations.base.bench.catalogue.textbook(rival.fit.names), rival)
+            of_family.setdefault(self.survivors.explanations.base.context.catalogue.textbook(rival.fit.names), rival)
         return tuple(of_family.values())
 
     def fitted_to_all(self, fits: Sequence[Refit]) -> "HeldOut":
@@ -88,21 +88,23 @@ class HeldOut:
 def held_out(surviving: Survivors, events: Sequence[Event], seed: int) -> HeldOut:
     """Refit the survivors without needless faults of the measurement, and judge them on held-out events, if any."""
     explained = surviving.explanations
-    bench, noise = explained.base.bench, explained.last.noise
-    at = bench.coordinates
-    bare = refit(bench, noise, [((), at.without_faults(explained.steps[0].fit.unit, ()))], faults=())[0]
+    context, noise = explained.base.context, explained.last.noise
+    at = context.coordinates
+    bare = refit(context, noise, [((), at.without_faults(explained.steps[0].fit.unit, ()))], faults=())[0]
     faults = telling(explained, bare)
-    wanted = [(s.fit.names, at.without_faults(s.fit.unit, faults)) for s in (surviving.adequate or surviving.kept[:1])]
-    exact = {f.names: f for f in refit(bench, noise, wanted, faults=faults)}
+    wanted = [
+        (s.fit.names, at.without_faults(s.fit.unit, faults)) for s in (surviving.adequate or surviving.retained[:1])
+    ]
+    exact = {f.names: f for f in refit(context, noise, wanted, faults=faults)}
     as_fitted = HeldOut(surviving, noise, faults, bare, {names: exact[names] for names, _ in wanted})
     if not events or not any(s.fit.names or faults for s in surviving.adequate):
         return as_fitted
     count, doubted = len(surviving.adequate), not explained.steps[0].adequate
-    bench.effort.say(f"judging {count} explanation{'s' * (count > 1)} on the held-out events")
-    both = AllEvents(bench, events, noise, faults, bare)
-    judged, again = weighed(both, as_fitted.extended, seed, doubted=doubted)
-    made = replace(as_fitted, judged=judged).fitted_to_all(again)
-    return searched_again(made, both, seed) if doubted and not made.kept else made
+    context.effort.say(f"judging {count} explanation{'s' * (count > 1)} on the held-out events")
+    both = AllEvents(context, events, noise, faults, bare)
+    assessments, again = weighed(both, as_fitted.extended, seed, doubted=doubted)
+    result = replace(as_fitted, assessments=assessments).fitted_to_all(again)
+    return searched_again(result, both, seed) if doubted and not result.retained else result
 
 
 def telling(explained: Explanations, bare: Refit) -> Names:
@@ -111,18 +113,18 @@ def telling(explained: Explanations, bare: Refit) -> Names:
     Beside an effect of the load they must explain more, together with those left out before, than the part of all that
     is explained to which no formula is exact (`alike`).
     """
-    bench, noise, fit, faults = explained.base.bench, explained.last.noise, explained.chosen, explained.faults
+    context, noise, fit, faults = explained.base.context, explained.last.noise, explained.chosen, explained.faults
     if not fit.names:
         return faults
 
-    def left(kept: Names) -> float:
-        unit = bench.coordinates.without_faults(fit.unit, kept)
-        return refit(bench, noise, [(fit.names, unit)], faults=kept)[0].deviance
+    def left(retained: Names) -> float:
+        unit = context.coordinates.without_faults(fit.unit, retained)
+        return refit(context, noise, [(fit.names, unit)], faults=retained)[0].deviance
 
     most = left(faults) if faults else 0.0
     while faults:
         fewer = {left(rest): rest for rest in itertools.combinations(faults, len(faults) - 1)}
-        if min(fewer) - most > bench.criteria.alike * (bare.deviance - most):
+        if min(fewer) - most > context.criteria.alike * (bare.deviance - most):
             break
         faults = fewer[min(fewer)]
     return faults
@@ -138,58 +140,60 @@ def weighed(
     a single one that closes less of the gap there than a true one does, and one of another place or law. What leaves
     something where that fit began is fitted anew from every setting.
     """
-    bench, events, fits = both.fitted, both.events, list(extended.values())
-    judged = judged_on(bench, events, both.bare, fits)
-    helping = [fit for fit in fits if judged[fit.names].gap.helps]
+    context, events, fits = both.fitted, both.events, list(extended.values())
+    assessments = judged_on(context, events, both.bare, fits)
+    helping = [fit for fit in fits if assessments[fit.names].gap.helps]
     if not helping:
-        again = [t.fit for t in both.together(fits, seed, anew=True) if t.confirmed(bench.criteria, doubted)]
-        return judged | (judged_on(bench, events, both.bare, again) if again else {}), again
-    textbook = bench.catalogue.textbook
+        again = [t.fit for t in both.together(fits, seed, anew=True) if t.confirmed(context.criteria, doubted)]
+        return assessments | (judged_on(context, events, both.bare, again) if again else {}), again
+    textbook = context.catalogue.textbook
     doubtful = [
         f for f in helping
-        if len(f.names) + len(both.faults) > 1 or f.names != textbook(f.names) or not judged[f.names].convincing
+        if len(f.names) + len(both.faults) > 1 or f.names != textbook(f.names) or not assessments[f.names].convincing
     ]  # fmt: skip
     p_left: dict[Names, float] = {}
     for anew in (False, True):
         for fitted in both.together(doubtful, seed, anew=anew):
             names = fitted.fit.names
             p_left[names] = max(fitted.p_left, p_left.get(names, 0.0))
-            judged[names] = replace(judged[names], p_left=p_left[names])
-        doubtful = [fit for fit in doubtful if not judged[fit.names].helps]
-    return judged, []
+            assessments[names] = replace(assessments[names], p_left=p_left[names])
+        doubtful = [fit for fit in doubtful if not assessments[fit.names].helps]
+    return assessments, []
 
 
-def searched_again(made: HeldOut, both: AllEvents, seed: int) -> HeldOut:
+def searched_again(result: HeldOut, both: AllEvents, seed: int) -> HeldOut:
     """With what a search in all events finds, where the held-out ones deny all that the fitted ones had shown.
 
     The fitted events may show only a part of what is there, such as the first of two stages of a relay, or one of two
     effects. What all events confirm is taken, unless it comes to what was denied, which was fitted to all events, too.
     Of waveforms nothing is, for no criterion was calibrated with it.
     """
-    bench, surviving = both.fitted, made.survivors
-    if not bench.domain.calibrated or not np.isfinite(both.plain.deviance):  # there the base model has no steady state
-        return made
-    found = both.searched(surviving.explanations.base.valleys, seed)
-    of_all = {s.fit.names: s for s in found.adequate if s.fit.names}
-    if not of_all or found.explanations.chosen.names in made.judged:
-        return made
-    plain = refit(both.bench, found.explanations.last.noise, [((), both.plain.unit)], faults=())[0]
-    both = replace(both, faults=telling(found.explanations, plain))
+    context, surviving = both.fitted, result.survivors
+    if not context.domain.calibrated or not np.isfinite(
+        both.plain.deviance
+    ):  # there the base model has no steady state
+        return result
+    search = both.searched(surviving.explanations.base.local_minima, seed)
+    of_all = {s.fit.names: s for s in search.adequate if s.fit.names}
+    if not of_all or search.explanations.chosen.names in result.assessments:
+        return result
+    plain = refit(both.context, search.explanations.last.noise, [((), both.plain.unit)], faults=())[0]
+    both = replace(both, faults=telling(search.explanations, plain))
     tried = both.carried_back([s.fit for s in of_all.values()], seed)
-    fits = [(alone, fitted.fit) for alone, fitted in tried if _borne_out(fitted, bench.criteria)]
+    fits = [(alone, fitted.fit) for alone, fitted in tried if _borne_out(fitted, context.criteria)]
     if not fits:
-        return made
+        return result
     quiet = surviving.explanations.base.quiet
 
     def on_fitted_events(alone: Refit) -> Rival:  # as the others are told
-        tests = examined(quiet, alone, made.noise, seed, plain=True)
-        return replace(of_all[alone.names], fit=alone, lowered=made.bare.deviance - alone.deviance, tests=tests)
+        tests = examined(quiet, alone, result.noise, seed, plain=True)
+        return replace(of_all[alone.names], fit=alone, lowered=result.bare.deviance - alone.deviance, tests=tests)
 
     rivals = tuple(on_fitted_events(alone) for alone, _ in fits)
-    surviving = replace(surviving, kept=rivals, rivals=(*rivals, *surviving.rivals))
-    judged = {**made.judged, **judged_on(bench, both.events, both.bare, [fit for _, fit in fits])}
-    made = replace(made, survivors=surviving, judged=judged, faults=both.faults)
-    return made.fitted_to_all([fit for _, fit in fits])
+    surviving = replace(surviving, retained=rivals, rivals=(*rivals, *surviving.rivals))
+    assessments = {**result.assessments, **judged_on(context, both.events, both.bare, [fit for _, fit in fits])}
+    result = replace(result, survivors=surviving, assessments=assessments, faults=both.faults)
+    return result.fitted_to_all([fit for _, fit in fits])
 
 
 def _borne_out(fitted: JointFit, criteria: Criteria) -> bool:
@@ -200,23 +204,25 @@ def _borne_out(fitted: JointFit, criteria: Criteria) -> bool:
 
 
 def judged_on(
-    bench: Context, events: Sequence[Event], bare: Refit, extended: Sequence[Refit]
+    context: Context, events: Sequence[Event], bare: Refit, extended: Sequence[Refit]
 ) -> dict[Names, Assessment]:
     """Compare the base model and extended ones, as they were fitted, on held-out events."""
-    other, units, noise = carried(bench, events, [bare, *extended])
+    other, units, noise = carried(context, events, [bare, *extended])
     return {
         fit.names: Assessment(gap(other, units[0], u, fit.names, noise, other.coordinates.before), other, (units[0], u))
         for fit, u in zip(extended, units[1:], strict=True)
     }
 
 
-def carried(bench: Context, events: Sequence[Event], fits: Sequence[Refit]) -> tuple[Context, list[np.ndarray], Noise]:
+def carried(
+    context: Context, events: Sequence[Event], fits: Sequence[Refit]
+) -> tuple[Context, list[np.ndarray], Noise]:
     """Carry fits over to held-out events: everything keeps its trained value but P0 and Q0 of each event.
 
-    Returns the bench of those events, the coordinates of each fit there, and the noise of the last one that has a
+    Returns the context of those events, the coordinates of each fit there, and the noise of the last one that has a
     steady state there.
     """
-    other, d = bench.on(Records.of(events, bench.records.window)), len(bench.coordinates.names)
+    other, d = context.on(Records.of(events, context.records.window)), len(context.coordinates.names)
     units = []
     for fit in fits:
         unit = other.coordinates.null.copy()

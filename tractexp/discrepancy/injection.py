@@ -62,10 +62,10 @@ PERTURBATIONS = tuple(p.name for p in Injection.parameters[:5])
 PUSH = 1e-3  # how hard
 
 
-def perturbations(bench: "Context", unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def perturbations(context: "Context", unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Points (c, D) with a push into one balance in one window of the union of the events', and which balance."""
-    at = bench.coordinates
-    spans = sorted({w for e in range(len(bench.events)) for w in windows(bench, e)})
+    at = context.coordinates
+    spans = sorted({w for e in range(len(context.events)) for w in windows(context, e)})
     points, groups = [], []
     for g, push in enumerate(PERTURBATIONS):
         for a, b in spans:

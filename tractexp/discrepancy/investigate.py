@@ -46,12 +46,12 @@ class Findings:
     proposed: Proposed  # the term that an unexplained disagreement asks for
 
     @property
-    def bench(self) -> Context:
-        return self.base.bench
+    def context(self) -> Context:
+        return self.base.context
 
     @property
     def catalogue(self) -> Catalogue:
-        return self.bench.catalogue
+        return self.context.catalogue
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -76,18 +76,18 @@ class Findings:
     @property
     def next_event(self) -> NextEvent | None:
         """What to record next, where explanations are tied or the proposed term has near-synonyms."""
-        made = self.proposed.proposal
-        return self.verdict.next_event or (made and made.next_event)
+        proposal = self.proposed.proposal
+        return self.verdict.next_event or (proposal and proposal.next_event)
 
     @property
-    def judged(self) -> Assessment | None:
+    def assessment(self) -> Assessment | None:
         """What the held-out events say of the names."""
-        return self.held_out.judged.get(self.verdict.chosen.fit.names) if self.names else None
+        return self.held_out.assessments.get(self.verdict.chosen.fit.names) if self.names else None
 
     @property
     def validate(self) -> GapTest | None:
         """The gap on the held-out events."""
-        return None if self.judged is None else self.judged.gap
+        return None if self.assessment is None else self.assessment.gap
 
     @functools.cached_property
     def before(self) -> list[ParameterEstimate]:
@@ -104,8 +104,8 @@ class Findings:
         """Measured, before and after of every event, the fitted ones first."""
         near, extended = self.verdict.nearest, bool(self.names)
         return [
-            *on_fitted(self.bench, self.train, near, self.places, extended=extended),
-            *on_held_out(self.bench, self.withheld, self.judged, self.bare, near),
+            *on_fitted(self.context, self.train, near, self.places, extended=extended),
+            *on_held_out(self.context, self.withheld, self.assessment, self.bare, near),
         ]
 
     @functools.cached_property
@@ -126,24 +126,26 @@ class Findings:
     @property
     def headline(self) -> str:
         """What is left in one sentence: the loudest shape of the model whose remainder shapes describe best."""
-        told = [(shapes, base) for shapes, base in ((self.remainder, False), (self.remainder_of_base, True)) if shapes]
-        if not told:
+        remainders_left = [
+            (shapes, base) for shapes, base in ((self.remainder, False), (self.remainder_of_base, True)) if shapes
+        ]
+        if not remainders_left:
             return ""
-        shapes, base = max(told, key=lambda item: sum(shape.share for shape in item[0]))
+        shapes, base = max(remainders_left, key=lambda item: sum(shape.share for shape in item[0]))
         held_out = shapes[0].event in {event.record.name for event in self.withheld}
         base |= self.verdict.nearest is None
         whose = "the base model misses this" if base else "the nearest candidates miss this"
         return f"{whose}{' on the held-out events' * held_out}: {shapes[0]}"
 
     def _left(self, overlays: Sequence[Overlay]) -> list[Remainder]:
-        noise, level = self.last.noise, self.bench.criteria.false_alarms
+        noise, level = self.last.noise, self.context.criteria.false_alarms
         fitted, beyond = ([o for o in overlays if o.held_out == there] for there in (False, True))
-        return left(fitted, noise, level) or left(beyond, replace(noise, blur=None), level)
+        return left(fitted, noise, level) or left(beyond, replace(noise, input_modes=None), level)
 
     @property
     def fitted_to_both(self) -> bool:
         """Whether the extended model was fitted to the held-out events, too."""
-        return bool(self.held_out.together and self.held_out.kept)
+        return bool(self.held_out.together and self.held_out.retained)
 
 
 def investigate(
@@ -195,16 +197,16 @@ def investigate(
             survivors=weighed.survivors,
             held_out=weighed,
             verdict=said,
-            train=_gap(base.bench, weighed, said),
+            train=_gap(base.context, weighed, said),
             withheld=tuple(validate),
             proposed=proposed,
         )
 
 
-def _gap(bench: Context, weighed: HeldOut, said: Verdict) -> GapTest:
+def _gap(context: Context, weighed: HeldOut, said: Verdict) -> GapTest:
     """The gap on the fitted events before and after."""
-    at = bench.coordinates
+    at = context.coordinates
     after = weighed.extended[said.chosen.fit.names] if said.names else weighed.bare
     noise = (said.chosen.tests or weighed.survivors.explanations.last).noise
     fitted = [*at.base, *at.before, *at.parameters(said.names)]
-    return gap(bench, weighed.bare.unit, after.unit, after.names, noise, fitted)
+    return gap(context, weighed.bare.unit, after.unit, after.names, noise, fitted)

@@ -25,7 +25,7 @@ class Judgement:
 
 def judgements(investigation: Findings) -> list[Judgement]:
     """Every effect of the catalogue classified (Saris, Satorra and van der Veld 2009), at the chosen model."""
-    criteria = investigation.bench.criteria
+    criteria = investigation.context.criteria
     critical = investigation.first.chance.critical_p(criteria.false_alarms)
     scores = {s.name: s for s in investigation.last.scores}
     judged_effects = [Judgement(name, "not testable", why) for name, why in investigation.catalogue.untestable.items()]
@@ -38,11 +38,11 @@ def judgements(investigation: Findings) -> list[Judgement]:
         elif score is None:
             judged_effects.append(Judgement(name, "irrelevant", "in the fit as a nuisance, not above its noise"))
         else:
-            judged_effects.append(Judgement(name, *judged(candidate, score, critical, criteria.testable), score))
+            judged_effects.append(Judgement(name, *assessment(candidate, score, critical, criteria.testable), score))
     return sorted(judged_effects, key=lambda j: j.name)
 
 
-def judged(candidate: Candidate, score: Score, critical: float, testable: float) -> tuple[str, str]:
+def assessment(candidate: Candidate, score: Score, critical: float, testable: float) -> tuple[str, str]:
     """Status and reason of an effect outside the chosen model."""
     main = candidate.sizes[0]
     unit = "" if main.unit == "1" else f" {main.unit}"

@@ -19,32 +19,32 @@ SPREAD = 1.0  # of how far a sample lies off its neighbors: what may be wrong wi
 ABRUPT = 0.02  # of the most that the effects change: from there a sample off its neighbors is a jump
 
 
-def jumps(bench: Context, unit: np.ndarray) -> np.ndarray | None:
+def jumps(context: Context, unit: np.ndarray) -> np.ndarray | None:
     """What may be wrong at the jumps that effects make at coordinates (D,), one standard deviation: (k, C, N) [pu].
 
     None where samples are averages over a window, in which no jump stays.
     """
-    return None if bench.domain.windowed else _jumps(bench, unit.tobytes())
+    return None if context.domain.windowed else _jumps(context, unit.tobytes())
 
 
-@functools.lru_cache(maxsize=2)  # of the two fits that are examined side by side; it holds their bench
-def _jumps(bench: Context, told: bytes) -> np.ndarray:
-    at, unit = bench.coordinates, np.frombuffer(told)
-    there = tuple(n for n in bench.catalogue.of_load if (unit != at.null)[at.sizes([n])].any())
+@functools.lru_cache(maxsize=2)  # of the two fits that are examined side by side; it holds their context
+def _jumps(context: Context, key: bytes) -> np.ndarray:
+    at, unit = context.coordinates, np.frombuffer(key)
+    there = tuple(n for n in context.catalogue.of_load if (unit != at.null)[at.sizes([n])].any())
     if not there:
-        return np.empty((0, *bench.drive.measured.shape))
+        return np.empty((0, *context.drive.measured.shape))
     without = unit.copy()
     columns = at.sizes(there)
     without[columns] = at.null[columns]
-    added = bench.residuals(unit[None], there)[0] - bench.residuals(without[None], there)[0]
+    added = context.residuals(unit[None], there)[0] - context.residuals(without[None], there)[0]
     shapes = []
-    for e in range(len(bench.events)):
-        part = bench.drive.part(e)
+    for e in range(len(context.events)):
+        part = context.drive.part(e)
         for c, change in enumerate(np.nan_to_num(added[:, part])):
             for k, size in _at_jumps(change):
-                shapes.append(np.zeros(bench.drive.measured.shape))
+                shapes.append(np.zeros(context.drive.measured.shape))
                 shapes[-1][c, part.start + k] = size
-    return np.array(shapes).reshape(-1, *bench.drive.measured.shape)
+    return np.array(shapes).reshape(-1, *context.drive.measured.shape)
 
 
 def _at_jumps(added: np.ndarray) -> list[tuple[int, float]]:

@@ -20,19 +20,19 @@ def two_sided(unit: np.ndarray, columns: Sequence[int] | np.ndarray) -> tuple[np
 
 
 def linearised(
-    bench: Context, unit: np.ndarray, noise: Noise, columns: Sequence[int], names: Sequence[str]
+    context: Context, unit: np.ndarray, noise: Noise, columns: Sequence[int], names: Sequence[str]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Residuals (C, N) of a fit with the named effects, and rows (1 + k, R): they and their differences, whitened.
 
     R = C N rows of the records, then those of the priors of the faults of the measurement.
     """
-    at = bench.coordinates
+    at = context.coordinates
     up, down = two_sided(unit, columns)
-    raw = bench.residuals(np.concatenate([unit[None], up, down]), names)
+    raw = context.residuals(np.concatenate([unit[None], up, down]), names)
     k = len(columns)
     width = np.array([u[c] - d[c] for u, d, c in zip(up, down, columns, strict=True)])
     moved = np.nan_to_num((raw[1 : 1 + k] - raw[1 + k :]) / width[:, None, None])
-    white = bench.whiten(noise, np.concatenate([raw[:1], moved]))
+    white = context.whiten(noise, np.concatenate([raw[:1], moved]))
     held = [(i, c) for i, c in enumerate(columns) if c in at.prior_deviation]
     prior = np.zeros((1 + k, len(held)))
     for row, (i, c) in enumerate(held):

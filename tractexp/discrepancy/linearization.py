@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.fitting import ON_BOUND, Refit
+from tractexp.discrepancy.fit_effort import BOUND_MARGIN
+from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.injection import perturbations
 from tractexp.discrepancy.linear import two_sided
 from tractexp.discrepancy.score_test import CandidateColumn, ScoreTest
@@ -23,7 +24,7 @@ LEAST_KEPT = 0.2  # of a residual's variance: where columns explain more, it tel
 class Linearization:
     """Raw residuals and differences at a fit; `whitened` turns them into a `ScoreTest` under a noise model."""
 
-    bench: Context
+    context: Context
     unit: np.ndarray  # (D,) coordinates of the fit
     residual: np.ndarray  # (C, N)
     nuisance: np.ndarray  # (k, C, N)
@@ -32,7 +33,7 @@ class Linearization:
     faults: dict[str, list[int]]  # which nuisances belong to which fault of the measurement
     columns: tuple[CandidateColumn, ...]
     split: np.ndarray  # (e, C, N) differences of the fitted parameters but thresholds and times, each in one event only
-    cells: np.ndarray  # (c, C, N) responses to injections
+    perturbed: np.ndarray  # (c, C, N) responses to injections
     groups: np.ndarray  # (c,) which balance an injection pushes
     held: tuple[int, ...]  # columns of the base model's parameters that rest on a wall
 
@@ -43,9 +44,9 @@ class Linearization:
 
     def whitened(self, noise: Noise) -> ScoreTest:
         """Project under this noise; `Projection.of` puts other residuals in place of the fit's own."""
-        raw = [self.nuisance, self.residual[None], *(c.raw for c in self.columns), self.split, self.cells]
+        raw = [self.nuisance, self.residual[None], *(c.raw for c in self.columns), self.split, self.perturbed]
         ends = np.cumsum([len(part) for part in raw])
-        white = self.bench.whiten(noise, np.concatenate(raw))
+        white = self.context.whiten(noise, np.concatenate(raw))
         rows = np.concatenate([white, np.zeros((len(white), len(self.prior)))], axis=1)
         size = white.shape[1]
         rows[: ends[0], size:] = self.prior.T
@@ -54,40 +55,40 @@ class Linearization:
         rest = rows[ends[0] :]
         along = rest @ Q
         rest -= along @ Q.T
-        r, *blocks, split, cells = np.split(rest, ends[1:-1] - ends[0])
+        r, *blocks, split, perturbed = np.split(rest, ends[1:-1] - ends[0])
         return ScoreTest(
-            self.columns, self.faults, self.groups, Q, R, r, along[:1], self.estimate, blocks, split, cells
+            self.columns, self.faults, self.groups, Q, R, r, along[:1], self.estimate, blocks, split, perturbed
         )
 
 
-def tangent(bench: Context, fit: Refit, noise: Noise) -> Linearization:
+def tangent(context: Context, fit: Refit, noise: Noise) -> Linearization:
     """Differences of everything at a fit, in one batch. What is fitted, and faults of the measurement, are nuisances.
 
     A parameter of the base model on a wall that would leave the box is held there: what only values beyond its bounds
     explain is left. Those of effects are not: they belong to a formula, not to the load.
     """
-    at = bench.coordinates
+    at = context.coordinates
     inside = [*at.base, *at.before, *at.parameters(fit.names)]
-    faults = {name: at.sizes([name]) for name in bench.catalogue.of_measurement}
+    faults = {name: at.sizes([name]) for name in context.catalogue.of_measurement}
     nuisances = [*inside, *(k for members in faults.values() for k in members)]
     up, down = two_sided(fit.unit, nuisances)
-    points, spans, labels = _candidate_points(bench, fit)
-    injected, groups = perturbations(bench, fit.unit)
+    points, spans, labels = _candidate_points(context, fit)
+    injected, groups = perturbations(context, fit.unit)
     k, m = len(nuisances), len(points)
     sets = [(fit.names, False)] * (1 + 2 * k)
     sets += [((*fit.names, c.name), False) for c, _, first, last in labels for _ in range(first, last)]
     sets += [(fit.names, True)] * len(injected)
-    raw = bench.residuals_of(np.concatenate([fit.unit[None], up, down, points, injected]), sets)
+    raw = context.residuals_of(np.concatenate([fit.unit[None], up, down, points, injected]), sets)
     base = raw[0]
     up_rows, down_rows = raw[1 : 1 + k], raw[1 + k : 1 + 2 * k]
     width = np.array([u[c] - d[c] for u, d, c in zip(up, down, nuisances, strict=True)])
     nuisance = np.nan_to_num((up_rows - down_rows) / width[:, None, None])
     moved = np.nan_to_num((raw[1 + 2 * k : 1 + 2 * k + m] - base) / spans[:, None, None])
-    cells = np.nan_to_num(raw[1 + 2 * k + m :] - base)
+    perturbed = np.nan_to_num(raw[1 + 2 * k + m :] - base)
     columns = [CandidateColumn(c, s, moved[a:b]) for c, s, a, b in labels]
     members = {name: [nuisances.index(c) for c in cols] for name, cols in faults.items()}
-    white = bench.whiten(noise, np.concatenate([nuisance, base[None]]))
-    held = set(np.flatnonzero(resting(bench, fit.unit, nuisances, white[:k] @ white[k])).tolist())
+    white = context.whiten(noise, np.concatenate([nuisance, base[None]]))
+    held = set(np.flatnonzero(resting(context, fit.unit, nuisances, white[:k] @ white[k])).tolist())
     rows = sorted({*held, *(i for i, c in enumerate(nuisances) if c in at.prior_deviation)})
     prior = np.zeros((len(rows), k))
     departure = np.zeros(k)
@@ -95,37 +96,50 @@ def tangent(bench: Context, fit: Refit, noise: Noise) -> Linearization:
         prior[row, i] = 1 / (HELD if i in held else at.prior_deviation[nuisances[i]])
         departure[i] = 0.0 if i in held else fit.unit[nuisances[i]] - at.null[nuisances[i]]
     fitted = {*at.base, *at.sizes(fit.names)}  # a relay's instants hang on the voltage's noise, which no draw has
-    split = _by_event(bench, nuisance[[i for i, c in enumerate(nuisances) if c in fitted and i not in held]])
-    walls = tuple(nuisances[i] for i in sorted(held))
+    split = _by_event(context, nuisance[[i for i, c in enumerate(nuisances) if c in fitted and i not in held]])
+    active_bounds = tuple(nuisances[i] for i in sorted(held))
     return Linearization(
-        bench, fit.unit, base, nuisance, prior, departure, members, tuple(columns), split, cells, groups, walls
+        context,
+        fit.unit,
+        base,
+        nuisance,
+        prior,
+        departure,
+        members,
+        tuple(columns),
+        split,
+        perturbed,
+        groups,
+        active_bounds,
     )
 
 
-def resting(bench: Context, unit: np.ndarray, columns: Sequence[int] | np.ndarray, gradient: np.ndarray) -> np.ndarray:
+def resting(
+    context: Context, unit: np.ndarray, columns: Sequence[int] | np.ndarray, gradient: np.ndarray
+) -> np.ndarray:
     """Which of the columns are parameters of the base model on a wall beyond which the deviance falls.
 
     `gradient` of the deviance is needed for its sign only.
     """
     x = unit[list(columns)]
-    leaving = ((x <= ON_BOUND) & (gradient > 0)) | ((x >= 1 - ON_BOUND) & (gradient < 0))
-    return leaving & np.isin(columns, bench.coordinates.base)
+    leaving = ((x <= BOUND_MARGIN) & (gradient > 0)) | ((x >= 1 - BOUND_MARGIN) & (gradient < 0))
+    return leaving & np.isin(columns, context.coordinates.base)
 
 
-def _by_event(bench: Context, columns: np.ndarray) -> np.ndarray:
+def _by_event(context: Context, columns: np.ndarray) -> np.ndarray:
     """Columns (k, C, N) cut into one for each event, (k E, C, N)."""
-    split = np.zeros((len(bench.events), *columns.shape))
+    split = np.zeros((len(context.events), *columns.shape))
     for e in range(len(split)):
-        part = bench.drive.part(e)
+        part = context.drive.part(e)
         split[e, ..., part] = columns[..., part]
     return split.reshape(-1, *columns.shape[1:])
 
 
-def _candidate_points(bench: Context, fit: Refit) -> tuple[np.ndarray, np.ndarray, list]:
+def _candidate_points(context: Context, fit: Refit) -> tuple[np.ndarray, np.ndarray, list]:
     """One point per size and setting of each candidate outside the fit, and how far it steps [unit of the size]."""
-    at = bench.coordinates
+    at = context.coordinates
     points, spans, labels = [], [], []
-    for candidate in bench.catalogue.candidates:
+    for candidate in context.catalogue.candidates:
         if candidate.measurement or candidate.name in fit.names:
             continue
         for setting in candidate.settings:
@@ -145,5 +159,5 @@ def rich_residuals(t: Linearization, residuals: np.ndarray) -> np.ndarray:
     """
     right = spanned(t.explaining.reshape(-1, residuals[0].size), 1e-6)
     flat = residuals.reshape(len(residuals), -1)
-    kept = np.maximum(1 - np.einsum("kn,kn->n", right, right), LEAST_KEPT)
-    return ((flat - (flat @ right.T) @ right) / np.sqrt(kept)).reshape(residuals.shape)
+    rest = np.maximum(1 - np.einsum("kn,kn->n", right, right), LEAST_KEPT)
+    return ((flat - (flat @ right.T) @ right) / np.sqrt(rest)).reshape(residuals.shape)

@@ -41,42 +41,44 @@ class Overlay:
 
 
 def on_fitted(
-    bench: Context, gap: GapTest, nearest: Nearest | None, places: Sequence[DisagreementInterval], *, extended: bool
+    context: Context, gap: GapTest, nearest: Nearest | None, places: Sequence[DisagreementInterval], *, extended: bool
 ) -> list[Overlay]:  # fmt: skip
     """The fitted events; `extended` tells whether there is an extended model."""
     after = gap.after.calculated if extended else None
     near = None if nearest is None else nearest.calculated
-    return _each(bench, gap.noise, (gap.before.calculated, after, near), places, held_out=False)
+    return _each(context, gap.noise, (gap.before.calculated, after, near), places, held_out=False)
 
 
 def on_held_out(
-    bench: Context, withheld: Sequence[Event], judged: Assessment | None, bare: Refit, nearest: Nearest | None
+    context: Context, withheld: Sequence[Event], assessment: Assessment | None, bare: Refit, nearest: Nearest | None
 ) -> list[Overlay]:  # fmt: skip
-    """The held-out events: as the names were `judged` on them or, without any, the base model carried over."""
+    """The held-out events: by the `assessment` of the names on them or, without any, the base model carried over."""
     if not withheld:
         return []
-    if judged is not None:
-        gap = judged.gap
-        return _each(judged.bench, gap.noise, (gap.before.calculated, gap.after.calculated, None), (), held_out=True)
-    other, units, noise = carried(bench, withheld, [bare, *([nearest.rival.fit] if nearest else [])])
+    if assessment is not None:
+        gap = assessment.gap
+        return _each(
+            assessment.context, gap.noise, (gap.before.calculated, gap.after.calculated, None), (), held_out=True
+        )
+    other, units, noise = carried(context, withheld, [bare, *([nearest.rival.fit] if nearest else [])])
     sets = [(), *([nearest.names] if nearest else [])]
-    made = [
+    curves = [
         other.residuals(unit[None], names)[0] + other.drive.measured for unit, names in zip(units, sets, strict=True)
     ]
-    return _each(other, noise, (made[0], None, made[1] if nearest else None), (), held_out=True)
+    return _each(other, noise, (curves[0], None, curves[1] if nearest else None), (), held_out=True)
 
 
 def left(overlays: Sequence[Overlay], noise: Noise, false_alarms: float) -> list[Remainder]:
     """What the model that comes nearest leaves of these events, the loudest shape first."""
     if not overlays:
         return []
-    made = [next(m for m in (o.nearest, o.after, o.before) if m is not None) for o in overlays]
-    rest = np.concatenate([np.nan_to_num(o.measured - m) for o, m in zip(overlays, made, strict=True)], axis=1)
+    curves = [next(m for m in (o.nearest, o.after, o.before) if m is not None) for o in overlays]
+    rest = np.concatenate([np.nan_to_num(o.measured - m) for o, m in zip(overlays, curves, strict=True)], axis=1)
     return remainders(rest, [o.event for o in overlays], noise, false_alarms)
 
 
 def _each(
-    bench: Context,
+    context: Context,
     noise: Noise,
     curves: tuple[np.ndarray, np.ndarray | None, np.ndarray | None],
     places: Sequence[DisagreementInterval],
@@ -84,12 +86,12 @@ def _each(
     held_out: bool,
 ) -> list[Overlay]:
     """Curves (C, N) of events end to end, cut into events."""
-    deviation, made = noise.deviation(bench.drive), []
-    for e, event in enumerate(bench.records.recorded):
-        part = bench.drive.part(e)
+    deviation, overlays = noise.deviation(context.drive), []
+    for e, event in enumerate(context.records.recorded):
+        part = context.drive.part(e)
         before, after, nearest = (None if c is None else c[:, part] for c in curves)
         assert before is not None
-        driving = bench.events[e].record.U
+        driving = context.events[e].record.U
         here = tuple(p for p in places if p.event == event.record.name)
-        made.append(Overlay(event, held_out, driving, before, after, nearest, deviation[:, part], here))
-    return made
+        overlays.append(Overlay(event, held_out, driving, before, after, nearest, deviation[:, part], here))
+    return overlays

@@ -21,29 +21,29 @@ class DisagreementInterval:
 
 def places(at: Disagreement) -> list[DisagreementInterval]:
     """Intervals that stand out at the family-wise error of `false_alarms`, adjacent ones joined, the largest first."""
-    bench = at.bench
-    cells = residual_windows(bench)
+    context = at.context
+    windows = residual_windows(context)
     (mean, spread), highest = extremes(at.chance.left[LOUDEST])
-    excess = energies(at.projection.channels(bench), bench)[0] - mean
+    excess = energies(at.projection.channels(context), context)[0] - mean
     loud = excess / spread > np.quantile(highest, 1 - at.criteria.false_alarms)
     total = np.maximum(excess, 0.0).sum()
     standing_out = [
         DisagreementInterval(
-            bench.events[group[0].event].record.name, group[0].channel, group[0].start, group[-1].end,
-            float(sum(excess[cells.index(c)] for c in group) / total),
+            context.events[group[0].event].record.name, group[0].channel, group[0].start, group[-1].end,
+            float(sum(excess[windows.index(c)] for c in group) / total),
         )
-        for group in _joined([c for c, yes in zip(cells, loud, strict=True) if yes])
+        for group in _joined([c for c, yes in zip(windows, loud, strict=True) if yes])
     ]  # fmt: skip
     return sorted(standing_out, key=lambda p: -p.share)
 
 
-def _joined(cells: list[ResidualWindow]) -> list[list[ResidualWindow]]:
+def _joined(windows: list[ResidualWindow]) -> list[list[ResidualWindow]]:
     """Cells of one channel that follow each other, together."""
     groups: list[list[ResidualWindow]] = []
-    for cell in sorted(cells, key=lambda c: (c.event, c.channel, c.part.start)):
+    for window in sorted(windows, key=lambda c: (c.event, c.channel, c.part.start)):
         last = groups[-1][-1] if groups else None
-        if last and (last.event, last.channel, last.part.stop) == (cell.event, cell.channel, cell.part.start):
-            groups[-1].append(cell)
+        if last and (last.event, last.channel, last.part.stop) == (window.event, window.channel, window.part.start):
+            groups[-1].append(window)
         else:
-            groups.append([cell])
+            groups.append([window])
     return groups

@@ -42,7 +42,7 @@ def standard_errors(tests: Disagreement) -> dict[str, float]:
 
     A parameter that rests on its bound has none.
     """
-    at = tests.bench.coordinates
+    at = tests.context.coordinates
     inverse = np.linalg.pinv(tests.projection.R, rcond=1e-10)
     spread = np.sqrt(np.einsum("ij,ij->i", inverse, inverse))
     labels = {k: name for name, k in at.column.items() if k not in tests.tangent.held}
@@ -52,12 +52,12 @@ def standard_errors(tests: Disagreement) -> dict[str, float]:
 
 def covariance(tests: Disagreement, names: Sequence[str]) -> tuple[list[str], np.ndarray]:
     """Covariance (k, k) of those of the named parameters that the fit tells, and which they are."""
-    at, columns = tests.bench.coordinates, _columns(tests)
+    at, columns = tests.context.coordinates, _columns(tests)
     inverse = np.linalg.pinv(tests.projection.R, rcond=1e-10)
-    known = [n for n in names if at.column[n] in columns]
-    rows = inverse[[columns.index(at.column[n]) for n in known]]
-    width = np.array([at.width(n) for n in known])
-    return known, (rows @ rows.T) * np.outer(width, width)
+    identified = [n for n in names if at.column[n] in columns]
+    rows = inverse[[columns.index(at.column[n]) for n in identified]]
+    width = np.array([at.width(n) for n in identified])
+    return identified, (rows @ rows.T) * np.outer(width, width)
 
 
 def estimates(tests: Disagreement, unit: np.ndarray, effects: Sequence[str]) -> list[ParameterEstimate]:
@@ -65,11 +65,11 @@ def estimates(tests: Disagreement, unit: np.ndarray, effects: Sequence[str]) -> 
 
     The words are those of an identification.
     """
-    bench = tests.bench
-    at, errors = bench.coordinates, standard_errors(tests)
-    own = [p for name in effects for p in bench.catalogue[name].effect.parameters]
-    declared = {p.name: p for p in (*bench.problem.parameters, *own)}
-    names = [*(at.names[k] for k in at.base), *own_parameters(bench, effects)]
+    context = tests.context
+    at, errors = context.coordinates, standard_errors(tests)
+    own = [p for name in effects for p in context.catalogue[name].effect.parameters]
+    declared = {p.name: p for p in (*context.problem.parameters, *own)}
+    names = [*(at.names[k] for k in at.base), *own_parameters(context, effects)]
     seen = [n for n in names if n in errors]
     values = {n: at.value(n, unit) for n in names}
     words = _words(tests, seen, [values[n] for n in seen], [errors[n] for n in seen])
@@ -78,14 +78,14 @@ def estimates(tests: Disagreement, unit: np.ndarray, effects: Sequence[str]) -> 
     return [ParameterEstimate(declared[n], values[n], errors.get(n, np.nan), words.get(n, "not judged")) for n in names]
 
 
-def own_parameters(bench: Context, effects: Sequence[str]) -> list[str]:
+def own_parameters(context: Context, effects: Sequence[str]) -> list[str]:
     """Names of the parameters that effects bring with them."""
-    return [p.name for name in effects for p in bench.catalogue[name].effect.parameters]
+    return [p.name for name in effects for p in context.catalogue[name].effect.parameters]
 
 
 def _columns(tests: Disagreement) -> list[int]:
     """The coordinates of the nuisances, in the order of the projection's columns."""
-    at = tests.bench.coordinates
+    at = tests.context.coordinates
     inside = [*at.base, *at.before, *at.parameters(tests.fit.names)]
     return inside + [k for name in at.catalogue.of_measurement for k in at.sizes([name])]
 
@@ -94,10 +94,10 @@ def _words(
     tests: Disagreement, names: Sequence[str], values: Sequence[float], errors: Sequence[float]
 ) -> dict[str, str]:
     """The verdict of each parameter, with all other coordinates left free beside them."""
-    at, R, columns = tests.bench.coordinates, tests.projection.R, _columns(tests)
+    at, R, columns = tests.context.coordinates, tests.projection.R, _columns(tests)
     own = [columns.index(at.column[n]) for n in names]
     others = [i for i in range(len(columns)) if i not in own]
     lower, upper = (np.array([bound[at.column[n]] for n in names]) for bound in (at.lower, at.upper))
     information = Information.of(names, np.array(values), upper - lower, R[:, own], R[:, others])
-    judged = judge(information, lower, upper, WIDE * np.array(errors), np.full(len(errors), WIDE))
-    return {name: str(verdict) for name, verdict in judged.items()}
+    assessment = judge(information, lower, upper, WIDE * np.array(errors), np.full(len(errors), WIDE))
+    return {name: str(verdict) for name, verdict in assessment.items()}

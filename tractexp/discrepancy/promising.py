@@ -17,7 +17,7 @@ LEAST = 1e-9  # of the deviance: a change below that is none
 
 
 def promising(
-    bench: Context, noise: Noise, names: Sequence[str], units: np.ndarray, nuisances: Sequence[int], most: int
+    context: Context, noise: Noise, names: Sequence[str], units: np.ndarray, nuisances: Sequence[int], most: int
 ) -> np.ndarray:
     """The starts (n, D) of one set of effects that promise most, at most so many, in their order.
 
@@ -25,22 +25,27 @@ def promising(
     """
     if len(units) <= most:
         return units
-    grounds = np.array([bench.coordinates.without(unit, names) for unit in units])
+    grounds = np.array([context.coordinates.without(unit, names) for unit in units])
     expected = np.empty(len(units))
     for ground in np.unique(grounds, axis=0):
         mine = (grounds == ground).all(axis=1)
-        expected[mine] = _expected(bench, noise, names, ground, units[mine], nuisances)
+        expected[mine] = _expected(context, noise, names, ground, units[mine], nuisances)
     return units[np.sort(np.argsort(expected, kind="stable")[:most])]
 
 
 def _expected(
-    bench: Context, noise: Noise, names: Sequence[str], ground: np.ndarray, units: np.ndarray, nuisances: Sequence[int]
+    context: Context,
+    noise: Noise,
+    names: Sequence[str],
+    ground: np.ndarray,
+    units: np.ndarray,
+    nuisances: Sequence[int],
 ) -> np.ndarray:
     """The deviance (n,) of a linear step from each start, which differ from `ground` (D,) by their effects alone."""
-    raw, rows = linearised(bench, ground, noise, nuisances, ())
+    raw, rows = linearised(context, ground, noise, nuisances, ())
     Q = np.linalg.qr(rows[1:].T)[0]
     r = rows[0] - Q @ (rows[0] @ Q)
-    white = bench.whiten(noise, np.nan_to_num(bench.residuals(units, names) - raw))
+    white = context.whiten(noise, np.nan_to_num(context.residuals(units, names) - raw))
     changes = np.concatenate([white, np.zeros((len(white), len(r) - white.shape[1]))], axis=1)
     changes -= (changes @ Q) @ Q.T
     power = np.einsum("nr,nr->n", changes, changes)

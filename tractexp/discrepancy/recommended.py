@@ -13,25 +13,25 @@ from tractexp.identification.adequacy import Adequacy, Surprise, graded, loudest
 from tractexp.identification.verdict import UNIDENTIFIED, size
 
 
-def adequacy(found: Findings) -> Adequacy:
+def adequacy(findings: Findings) -> Adequacy:
     """The grade of the extended model, or of the base model where nothing is named, on all events."""
-    tests: Disagreement = (found.verdict.chosen.tests or found.last) if found.names else found.first
-    ratio, where = loudest_stretch(tests.projection.channels(found.bench)[0], found.bench)
-    p = 1.0 if found.verdict.word == NONE else tests.p_left  # no disagreement: by the same false-alarm rate
+    tests: Disagreement = (findings.verdict.chosen.tests or findings.last) if findings.names else findings.first
+    ratio, where = loudest_stretch(tests.projection.channels(findings.context)[0], findings.context)
+    p = 1.0 if findings.verdict.word == NONE else tests.p_left  # no disagreement: by the same false-alarm rate
     surprise = Surprise(p, tests.loudest, ratio, where)
-    held_out = found.validate and found.validate.after.error
-    grade = graded(surprise, found.train.after.error, held_out, least_p=found.bench.criteria.adequate_p)
-    if grade.good and found.verdict.word == TIED:
+    held_out = findings.validate and findings.validate.after.error
+    grade = graded(surprise, findings.train.after.error, held_out, least_p=findings.context.criteria.adequate_p)
+    if grade.good and findings.verdict.word == TIED:
         return replace(grade, sentence="it describes these events with any of the sets named; which is missing is open")
     return grade
 
 
-def held(found: Findings) -> dict[str, float]:
+def held(findings: Findings) -> dict[str, float]:
     """Parameters of the extended model that the events cannot tell (to half their size), at the values found."""
-    if not found.names:
+    if not findings.names:
         return {}
     return {
         e.parameter.name: e.value
-        for e in found.after
+        for e in findings.after
         if e.verdict.startswith(UNIDENTIFIED) or e.half > size(e.value, *e.parameter.bounds) / 2
     }

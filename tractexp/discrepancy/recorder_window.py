@@ -18,19 +18,19 @@ class RecorderWindow(Measurement):
     """A recorder that forms phasors over a window [s]: a plain mean, or what the records say it was."""
 
     window: float
-    known: Window | None = None
+    recorded: Window | None = None
 
     def __repr__(self) -> str:
-        return f"RecorderWindow({self.window}{f', {self.known.name}' if self.known else ''})"
+        return f"RecorderWindow({self.window}{f', {self.recorded.name}' if self.recorded else ''})"
 
     def describe(self) -> str:
         """The window, as a run tells it."""
-        said = f", as the record says ({self.known.name})" if self.known else ""
+        said = f", as the record says ({self.recorded.name})" if self.recorded else ""
         return f"the recorder averages phasors over {1000 * self.window:.0f} ms{said}"
 
     def weights(self, step: float) -> np.ndarray:
         """What each sample, `step` [s] apart, counts around the middle one, (odd,)."""
-        return _weights(self.window / step) if self.known is None else self.known.on(step)
+        return _weights(self.window / step) if self.recorded is None else self.recorded.on(step)
 
     def observe(self, power: np.ndarray, drive: Drive, values: dict[str, np.ndarray]) -> np.ndarray:
         shown = np.empty_like(power)
@@ -68,6 +68,6 @@ def windows_of(events: Sequence[Event]) -> list[RecorderWindow]:
     cycle, step = 1 / events[0].record.base.frequency, events[0].record.step
     before = min(e.start * e.record.step for e in events)
     said = {e.record.window.name if e.record.window else "": e.record.window for e in events}
-    (known, *others) = said.values()
-    lengths = [known.length] if known and not others else [k * cycle for k in CYCLES]
-    return [RecorderWindow(w, None if others else known) for w in lengths if 2 * step <= w < before]
+    (recorded, *others) = said.values()
+    lengths = [recorded.length] if recorded and not others else [k * cycle for k in CYCLES]
+    return [RecorderWindow(w, None if others else recorded) for w in lengths if 2 * step <= w < before]

@@ -120,16 +120,16 @@ class _Stretch:
     drive: Drive
 
     @classmethod
-    def of(cls, event: Event, residual: np.ndarray, noise: Noise, blur: np.ndarray | None) -> "_Stretch":
+    def of(cls, event: Event, residual: np.ndarray, noise: Noise, input_modes: np.ndarray | None) -> "_Stretch":
         """The color of the noise is that before the dip, where that tells it: what is left would color its own.
 
         Of waveforms it stays what it is, for what is left cannot color that.
         """
         drive, domain = Drive.of([domain_of(event).excitation(event)]), domain_of(event)
-        known, before = drive.weights > 0, slice(0, event.start)
-        if not domain.noise_from_model and np.count_nonzero(np.all(known, axis=0)[before]) >= FEWEST:
-            noise = estimate(_level(residual[:, before]), known[:, before], [before])
-        return cls(event, residual, replace(noise, wander=None, blur=blur), drive)
+        valid, before = drive.weights > 0, slice(0, event.start)
+        if not domain.noise_from_model and np.count_nonzero(np.all(valid, axis=0)[before]) >= FEWEST:
+            noise = estimate(_level(residual[:, before]), valid[:, before], [before])
+        return cls(event, residual, replace(noise, random_walk=None, input_modes=input_modes), drive)
 
     @property
     def size(self) -> int:
@@ -169,19 +169,21 @@ def remainders(
     ends = np.cumsum([0, *(event.record.samples for event in events)])
     parts = [slice(a, b) for a, b in itertools.pairwise(ends.tolist())]
     stretches = [
-        _Stretch.of(event, residual[:, part], noise.of(e), None if noise.blur is None else noise.blur[:, :, part])
+        _Stretch.of(
+            event, residual[:, part], noise.of(e), None if noise.input_modes is None else noise.input_modes[:, :, part]
+        )
         for e, (event, part) in enumerate(zip(events, parts, strict=True))
     ]
     excess = sum(float(np.sum(s.white(s.residual[None]) ** 2)) - s.size for s in stretches)
     loudest = [_loudest(s, false_alarms / len(stretches)) for s in stretches]
-    told: list[Remainder] = []
-    while len(told) < MOST and (found := [(one, e) for e, one in enumerate(loudest) if one]):
-        (gain, shape, channel), e = max(found, key=lambda f: f[0][0])
+    shapes: list[Remainder] = []
+    while len(shapes) < MOST and (candidates := [(one, e) for e, one in enumerate(loudest) if one]):
+        (gain, shape, channel), e = max(candidates, key=lambda f: f[0][0])
         _, sizes, curve = stretches[e].fitted(shape, channel)
-        told.append(_told(stretches[e], shape, channel, sizes, gain / max(excess, gain)))
+        shapes.append(_described(stretches[e], shape, channel, sizes, gain / max(excess, gain)))
         stretches[e] = replace(stretches[e], residual=stretches[e].residual - curve)
         loudest[e] = _loudest(stretches[e], false_alarms / len(stretches))
-    return told
+    return shapes
 
 
 def _loudest(stretch: _Stretch, false_alarms: float) -> tuple[float, _Shape, int] | None:
@@ -190,9 +192,9 @@ def _loudest(stretch: _Stretch, false_alarms: float) -> tuple[float, _Shape, int
     The bound on chance is that of as many independent tries as there are starts, decays and frequencies.
     """
     white = stretch.white(stretch.residual[None])[0]
-    tried, found = _searched(white, max(stretch.event.start - 2, 0))
+    tried, candidates = _searched(white, max(stretch.event.start - 2, 0))
     sparing = SPARING * np.log(white.size)
-    best = max(found, key=lambda f: f[0] - sparing * bool(f[1].frequency))
+    best = max(candidates, key=lambda f: f[0] - sparing * bool(f[1].frequency))
     limit = 2 * np.log(tried / false_alarms)
     if best[0] < HOPELESS * limit:
         return None
@@ -247,8 +249,8 @@ def _polished(stretch: _Stretch, shape: _Shape, channel: int) -> tuple[float, _S
     n = stretch.residual.shape[1]
 
     def gain(shape: _Shape) -> float:
-        told = shape.rings(n) or not shape.frequency
-        return stretch.fitted(shape, channel)[0] if told else 0.0
+        visible = shape.rings(n) or not shape.frequency
+        return stretch.fitted(shape, channel)[0] if visible else 0.0
 
     for _ in range(ROUNDS):
         if np.isfinite(shape.decay):
@@ -269,7 +271,7 @@ def _polished(stretch: _Stretch, shape: _Shape, channel: int) -> tuple[float, _S
     return gain(shape), shape, channel
 
 
-def _told(stretch: _Stretch, shape: _Shape, channel: int, sizes: np.ndarray, share: float) -> Remainder:
+def _described(stretch: _Stretch, shape: _Shape, channel: int, sizes: np.ndarray, share: float) -> Remainder:
     """A shape as a person reads it."""
     event, step = stretch.event, stretch.event.record.step
     ringing = bool(shape.frequency)

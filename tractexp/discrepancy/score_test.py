@@ -52,7 +52,7 @@ class ScoreTest:
     departure: np.ndarray  # (k,) where the nuisances stand, off their prior mean
     blocks: list[np.ndarray]  # per column (k, R)
     split: np.ndarray  # (e, R)
-    cells: np.ndarray  # (c, R)
+    perturbed: np.ndarray  # (c, R)
 
     def of(self, white: np.ndarray) -> "ScoreTest":
         """The same columns with other whitened residuals (b, C N) in place of the fit's own, off no prior mean."""
@@ -105,13 +105,13 @@ class ScoreTest:
             result[name] = chdtrc(len(members), np.einsum("bi,ij,bj->b", whole, inner, whole))
         return result
 
-    def unrest(self) -> np.ndarray:
+    def variance_component(self) -> np.ndarray:
         """How much injections of all balances and windows still find, (b,): the structured test of adequacy."""
-        power = np.einsum("cr,cr->c", self.cells, self.cells)
-        kept = power > 1e-8 * power.max(initial=1e-300)
-        z = (self.r @ self.cells[kept].T) ** 2
-        groups = self.groups[kept]
-        scale = np.array([power[kept][groups == g].mean() for g in groups])
+        power = np.einsum("cr,cr->c", self.perturbed, self.perturbed)
+        counted = power > 1e-8 * power.max(initial=1e-300)
+        z = (self.r @ self.perturbed[counted].T) ** 2
+        groups = self.groups[counted]
+        scale = np.array([power[counted][groups == g].mean() for g in groups])
         return (z / scale).sum(axis=1)
 
     @property
@@ -127,7 +127,7 @@ class ScoreTest:
     def statistics(self, layout: Layout) -> dict[str, np.ndarray]:
         """What no candidate accounts for, by what each test looks for: a sum (b,), or the largest of many (b, k)."""
         by_test = {
-            "pushes into the balances": self.unrest(),
+            "pushes into the balances": self.variance_component(),
             "a further effect": -np.log(self.least_p)[:, None],
             **surprises.statistics(self.channels(layout), layout),
         }

@@ -42,46 +42,46 @@ class Survivors:
     """The sets that are not rejected, their adequacy tested, and all rivals; the chosen one first, then the best."""
 
     explanations: Explanations
-    kept: tuple[Rival, ...]
+    retained: tuple[Rival, ...]
     rivals: tuple[Rival, ...]
 
     @property
     def adequate(self) -> tuple[Rival, ...]:
         """Those that leave nothing; none where the chosen one does not."""
-        return tuple(s for s in self.kept if s.adequate) if self.kept[0].adequate else ()
+        return tuple(s for s in self.retained if s.adequate) if self.retained[0].adequate else ()
 
 
 def survivors(explained: Explanations, seed: int) -> Survivors:
     """Test every refitted set of the chosen size against the chosen one."""
-    everyone, last, bench = rivals(explained), explained.last, explained.base.bench
+    everyone, last, context = rivals(explained), explained.last, explained.base.context
     left = [r for r in everyone if not r.rejected][:MOST]
-    members = [n for r in left[1:] for n in r.fit.names if n not in bench.catalogue.of_load]
+    members = [n for r in left[1:] for n in r.fit.names if n not in context.catalogue.of_load]
     if members:
-        bench.kernels.family.compile_members(members, bench.effort.say, whole=True)
+        context.kernels.family.compile_members(members, context.effort.say, whole=True)
 
     def tested(k: int) -> Rival:
         fit = left[k].fit
         tests = last if k == 0 else examined(explained.base.quiet, fit, last.noise, seed + 100 + k, plain=True)
         return replace(left[k], tests=tests)
 
-    kept = each_apart(tested, range(len(left)))
-    by_name = {r.fit.names: r for r in kept}
-    return Survivors(explained, tuple(kept), tuple(by_name.get(r.fit.names, r) for r in everyone))
+    retained = each_apart(tested, range(len(left)))
+    by_name = {r.fit.names: r for r in retained}
+    return Survivors(explained, tuple(retained), tuple(by_name.get(r.fit.names, r) for r in everyone))
 
 
 def rivals(explained: Explanations) -> list[Rival]:
     """Every refitted set of the chosen size under the noise of the last tests: the chosen one, then the best first."""
-    bench, noise, chosen = explained.base.bench, explained.last.noise, explained.chosen.names
+    context, noise, chosen = explained.base.context, explained.last.noise, explained.chosen.names
     wanted = [(f.names, f.unit) for f in explained.refits.values() if len(f.names) == len(chosen)]
-    fits = sorted(refit(bench, noise, wanted), key=lambda fit: fit.names != chosen)
-    base = refit(bench, noise, [((), explained.steps[0].fit.unit)])[0]
+    fits = sorted(refit(context, noise, wanted), key=lambda fit: fit.names != chosen)
+    base = refit(context, noise, [((), explained.steps[0].fit.unit)])[0]
     best = fits[0]
-    faults = bench.coordinates.parameters(bench.catalogue.of_measurement)
-    rows = bench.rows(np.array([f.unit for f in fits]), noise, faults, [f.names for f in fits])
+    faults = context.coordinates.parameters(context.catalogue.of_measurement)
+    rows = context.rows(np.array([f.unit for f in fits]), noise, faults, [f.names for f in fits])
     distances = ((rows - rows[0]) ** 2).sum(axis=1)
     ranked = []
     for fit, distance in zip(fits, distances.tolist(), strict=True):
         behind, parameters = fit.cost - best.cost, fit.parameters + best.parameters
-        rejected = fit is not best and bench.criteria.rejects(behind, distance, parameters, base.cost - best.cost)
+        rejected = fit is not best and context.criteria.rejects(behind, distance, parameters, base.cost - best.cost)
         ranked.append(Rival(fit, base.deviance - fit.deviance, behind, distance, rejected))
     return ranked

@@ -59,16 +59,16 @@ def verdict(weighed: HeldOut, validate: Sequence[Event]) -> Verdict:
     """Weigh what remains."""
     left = weighed.survivors
     explained = left.explanations
-    bench, first = explained.base.bench, explained.steps[0]
+    context, first = explained.base.context, explained.steps[0]
     word = _word(explained, left, weighed)
-    nearest = _nearest(bench, weighed.bare, left.rivals, weighed.noise, validate) if word == UNEXPLAINED else None
+    nearest = _nearest(context, weighed.bare, left.rivals, weighed.noise, validate) if word == UNEXPLAINED else None
     sets = _sets(weighed) if word in (NAMED, TIED) else ()
     reason = _reason(word, weighed, sets, nearest)
-    if weighed.together and weighed.kept:
+    if weighed.together and weighed.retained:
         reason += "; what the fitted events leave open of it was fitted to the held-out ones, too"
-    if (window := bench.records.window) is not None:
+    if (window := context.records.window) is not None:
         reason += f"; {window.describe()}, which is taken into account"
-    chosen = (weighed.kept or left.adequate or left.kept)[0]
+    chosen = (weighed.retained or left.adequate or left.retained)[0]
     names = sets[0] if sets else ()
     at = (chosen.tests or explained.last) if names else first
     if at.resting:
@@ -86,10 +86,10 @@ def verdict(weighed: HeldOut, validate: Sequence[Event]) -> Verdict:
 
 def _next_event(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> NextEvent:
     """What to record to tell all explanations apart that are kept."""
-    bench = weighed.survivors.explanations.base.bench
-    fits = [weighed.extended.get(rival.fit.names, rival.fit) for rival in weighed.kept]
+    context = weighed.survivors.explanations.base.context
+    fits = [weighed.extended.get(rival.fit.names, rival.fit) for rival in weighed.retained]
     labels = [joined(_spoken(names, weighed)) for names in sets]
-    return next_event(bench, weighed.noise, weighed.bare, fits, labels)
+    return next_event(context, weighed.noise, weighed.bare, fits, labels)
 
 
 def _word(explained: Explanations, left: Survivors, weighed: HeldOut) -> str:
@@ -98,20 +98,20 @@ def _word(explained: Explanations, left: Survivors, weighed: HeldOut) -> str:
         return NONE
     if not left.adequate:
         return UNEXPLAINED
-    if not weighed.kept:
+    if not weighed.retained:
         return NONE if first.adequate else UNEXPLAINED
-    return NAMED if len(weighed.kept) == 1 else TIED
+    return NAMED if len(weighed.retained) == 1 else TIED
 
 
 def _sets(weighed: HeldOut) -> tuple[tuple[str, ...], ...]:
     """The effects of each explanation that is kept, with the faults of the measurement beside it."""
-    return tuple(_with_faults(s, weighed) for s in weighed.kept)
+    return tuple(_with_faults(s, weighed) for s in weighed.retained)
 
 
 def _spoken(names: Sequence[str], weighed: HeldOut) -> list[str]:
     """Effects as a sentence tells them: by the names of the catalogue, and what differs from its law or place."""
-    found = weighed.survivors.explanations.base.bench.catalogue
-    return [found.spoken(name) for name in names]
+    catalogue = weighed.survivors.explanations.base.context.catalogue
+    return [catalogue.spoken(name) for name in names]
 
 
 def _with_faults(rival: Rival, weighed: HeldOut) -> tuple[str, ...]:
@@ -123,12 +123,12 @@ def _reason(word: str, weighed: HeldOut, sets: Sequence[Sequence[str]], nearest:
     left = weighed.survivors
     first = left.explanations.steps[0]
     if word == NAMED:
-        return _named(_spoken(sets[0], weighed), len(first.bench.catalogue.candidates))
+        return _named(_spoken(sets[0], weighed), len(first.context.catalogue.candidates))
     if word == TIED:
         return _tied([_spoken(names, weighed) for names in sets])
     if word == UNEXPLAINED and not left.adequate:
         return _unexplained(weighed, nearest)
-    if not weighed.kept and left.adequate and not left.explanations.empty:
+    if not weighed.retained and left.adequate and not left.explanations.empty:
         seemed = " or ".join(joined(_spoken(_with_faults(s, weighed), weighed)) for s in left.adequate)
         if word == UNEXPLAINED:
             return f"what explains the fitted events, {seemed}, does not hold on the held-out ones: {_denied(weighed)}"
@@ -149,16 +149,16 @@ def _named(names: Sequence[str], tested: int) -> str:
 def _tied(sets: Sequence[Sequence[str]]) -> str:
     """Several explanations, told as the alternatives they are."""
     each = "either" if len(sets) == 2 else "each"
-    told = joined([joined(names) for names in sets], "or")
-    return f"{told}: {each} explains the disagreement, and these events cannot tell them apart"
+    sentence = joined([joined(names) for names in sets], "or")
+    return f"{sentence}: {each} explains the disagreement, and these events cannot tell them apart"
 
 
 def _unexplained(weighed: HeldOut, nearest: Nearest | None) -> str:
     """What was tried, how far the nearest of it gets, and what stands out in what it leaves."""
     left = weighed.survivors
-    best, explained = left.kept[0], left.explanations
+    best, explained = left.retained[0], left.explanations
     assert best.tests is not None
-    tested = f"none of the {len(best.tests.bench.catalogue.candidates)} effects tested"
+    tested = f"none of the {len(best.tests.context.catalogue.candidates)} effects tested"
     chance = f"would come about by chance with a probability of {in_words(best.tests.p_left)}"
     loudest = f"the most surprised of the tests looks for {best.tests.loudest}"
     if nearest is None and not explained.faults:
@@ -169,13 +169,13 @@ def _unexplained(weighed: HeldOut, nearest: Nearest | None) -> str:
     most = len(best.fit.names)
     together = f", alone or up to {most} together," if most > 1 else ""
     names, faults = _spoken(best.fit.names, weighed), _spoken(weighed.faults, weighed)
-    told = f"{joined(names)} beside {joined(faults)}" if names and faults else joined(names or faults)
+    sentence = f"{joined(names)} beside {joined(faults)}" if names and faults else joined(names or faults)
     share = (
         f"explain{'s' * (len(names or faults) == 1)} {percent(nearest.fitted)} of what exceeds the noise, and what"
         if nearest
         else ""
     )
-    comes = f"{told}, the nearest, {share or 'helps, but what'}"
+    comes = f"{sentence}, the nearest, {share or 'helps, but what'}"
     return (
         f"the model and the records disagree, and {tested}{together} explains it all: {comes} is left {chance};"
         f" {loudest}"
@@ -184,26 +184,26 @@ def _unexplained(weighed: HeldOut, nearest: Nearest | None) -> str:
 
 def _denied(weighed: HeldOut) -> str:
     """What the held-out events have against the best explanation of the fitted ones."""
-    judged = weighed.judged[weighed.survivors.adequate[0].fit.names]
-    if not judged.gap.helps:
+    assessment = weighed.assessments[weighed.survivors.adequate[0].fit.names]
+    if not assessment.gap.helps:
         return "there it fits no better than the base model"
     return (
         "what a fit to all events together leaves would come about by chance with a probability of"
-        f" {in_words(judged.p_left)}"
+        f" {in_words(assessment.p_left)}"
     )
 
 
 def _nearest(
-    bench: Context, bare: Refit, rivals: Sequence[Rival], noise: Noise, validate: Sequence[Event]
+    context: Context, bare: Refit, rivals: Sequence[Rival], noise: Noise, validate: Sequence[Event]
 ) -> Nearest | None:  # fmt: skip
     best = rivals[0].fit
     if not best.names:
         return None
-    before, after = curves(bench, bare.unit, noise), curves(bench, best.unit, noise, best.names)
-    excess = max(before.deviance - bench.samples, 1e-300)
+    before, after = curves(context, bare.unit, noise), curves(context, best.unit, noise, best.names)
+    excess = max(before.deviance - context.samples, 1e-300)
     held, there = float("nan"), None
     if validate:
-        other, (plain, near), level = carried(bench, validate, [bare, best])
+        other, (plain, near), level = carried(context, validate, [bare, best])
         there = curves(other, plain, level), curves(other, near, level, best.names)
         held = (there[0].deviance - there[1].deviance) / max(there[0].deviance - other.samples, 1e-300)
         if not np.isfinite(held):  # no steady state there

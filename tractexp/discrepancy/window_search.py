@@ -22,7 +22,7 @@ FAR = 2.0  # times the deviance that a window explains: no effect that only imit
 
 @dataclass(frozen=True, eq=False)
 class WindowFit:
-    """A window: the bench behind it, the base model's fit there, and by how much it lowers the deviance."""
+    """A window: the context behind it, the base model's fit there, and by how much it lowers the deviance."""
 
     behind: Context
     fit: Refit
@@ -31,28 +31,28 @@ class WindowFit:
 
 def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[BaseFit, Disagreement]:
     """The base model's fit and tests behind the recorder's window, where there is one; else those given."""
-    bench, noise = base.bench, first.noise
-    if not bench.domain.windowed:
+    context, noise = base.context, first.noise
+    if not context.domain.windowed:
         return base, first
-    if bench.drive.windows:  # the model is of a kind that is always looked at through what the records say
+    if context.drive.windows:  # the model is of a kind that is always looked at through what the records say
         return base, first
-    if noise.loudest_blur > bench.criteria.blurred:  # noise of the voltage would pass for a window
+    if noise.loudest_input_mode > context.criteria.blurred:  # noise of the voltage would pass for a window
         return base, first
     tried: list[WindowFit] = []
-    for window in windows_of(bench.events):
-        behind = bench.on(Records.of(bench.records.recorded, window))
-        valleys = (first.fit.unit, *base.valleys)  # the load's: no window moves them far
-        begun = rough_refit(behind, noise, [((), start) for start in valleys])[0]
+    for window in windows_of(context.events):
+        behind = context.on(Records.of(context.records.recorded, window))
+        local_minima = (first.fit.unit, *base.local_minima)  # the load's: no window moves them far
+        begun = rough_refit(behind, noise, [((), start) for start in local_minima])[0]
         fit = refit(behind, noise, [((), begun.unit)])[0]
         tried.append(WindowFit(behind, fit, first.fit.deviance - fit.deviance))
         if tried[0].gained <= 0:
             return base, first  # an average over several cycles is one of averages over one
-    found = _believed(tried, first) if tried else None
-    if found is None:
+    believed = _believed(tried, first) if tried else None
+    if believed is None:
         return base, first
-    assert found.behind.records.window is not None
-    bench.effort.say(f"{found.behind.records.window.describe()}: taken into account from here on")
-    base = fitted_from(found.behind, [found.fit.unit], base.valleys)
+    assert believed.behind.records.window is not None
+    context.effort.say(f"{believed.behind.records.window.describe()}: taken into account from here on")
+    base = fitted_from(believed.behind, [believed.fit.unit], base.local_minima)
     return base, disagreement(base, seed)
 
 
@@ -65,12 +65,12 @@ def _believed(tried: Sequence[WindowFit], first: Disagreement) -> WindowFit | No
     best = max(tried, key=lambda one: one.gained)
     most, criteria = max((s.drop for s in first.scores), default=0.0), first.criteria
     window = best.behind.records.window
-    if window is not None and window.known:  # that the recorder has a window it says is no guess
+    if window is not None and window.recorded:  # that the recorder has a window it says is no guess
         return best if best.gained > 0 else None
     if most < FAR * best.gained:
         return best if best.gained > criteria.least_window(most) else None
     begun = starts([first], {}, (max(first.scores, key=lambda s: s.drop).name,))
-    without = refit(first.bench, first.noise, begun)[0].deviance
+    without = refit(first.context, first.noise, begun)[0].deviance
     beside = [replace(one, gained=without - refit(one.behind, first.noise, begun)[0].deviance) for one in tried]
     best = max(beside, key=lambda one: one.gained)
     return best if best.gained > criteria.window_clear else None

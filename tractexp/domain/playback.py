@@ -98,8 +98,8 @@ def as_phasors(event: WaveEvent, currents: np.ndarray) -> tuple[Event, np.ndarra
     )  # fmt: skip
     start, end = np.searchsorted(measured.t, [was.t_start, was.t_end]).tolist()
     last = len(measured.t) - 1
-    made = replace(was, record=record, start=min(start, last), end=min(end, last), steady=slice(0, max(start, 1)))
-    return made, calculated.S.real, calculated.S.imag
+    phasors = replace(was, record=record, start=min(start, last), end=min(end, last), steady=slice(0, max(start, 1)))
+    return phasors, calculated.S.real, calculated.S.imag
 
 
 def _phasors(event: WaveEvent, currents: np.ndarray) -> Phasors:

@@ -64,10 +64,10 @@ def _of_voltage(problem: "Problem", values: np.ndarray, event: int) -> np.ndarra
     assert isinstance(plain, WaveEvent)
     one = Drive.of([waveforms(e) for e in (plain, *_shifted(plain), *_between(plain))])
     own = np.tile(problem.by_event(values)[[event]], (one.events, 1, 1))
-    made = problem.model.simulate(one, own, np.tile(problem.step.substeps[[event]], one.events)).outputs[:, 0]
-    made = made.reshape(one.channels, one.events, -1).swapaxes(0, 1)
-    shapes = np.zeros((len(made) - 1, *drive.measured.shape))
-    shapes[:, :, part] = _finite(made[1:] - made[0]) * (drive.weights[:, part] > 0)
+    outputs = problem.model.simulate(one, own, np.tile(problem.step.substeps[[event]], one.events)).outputs[:, 0]
+    outputs = outputs.reshape(one.channels, one.events, -1).swapaxes(0, 1)
+    shapes = np.zeros((len(outputs) - 1, *drive.measured.shape))
+    shapes[:, :, part] = _finite(outputs[1:] - outputs[0]) * (drive.weights[:, part] > 0)
     return shapes
 
 
@@ -92,12 +92,12 @@ def _between(event: WaveEvent) -> list[WaveEvent]:
     off[: event.lead + 3] = 0.0
     seen = np.argsort(-off)[:MOST_BETWEEN]
     seen = np.sort(seen[off[seen] > max(ROUGH * event.noise_U, SMALLEST)])
-    made = []
+    variants = []
     for k in seen.tolist():
         bump = np.zeros(len(event.v), dtype=complex)
         bump[k] = off[k] / SMOOTHER * event.turn[k].conj()
-        made += [replace(event, v=event.v + way * bump) for way in (1.0, 1j)[: event.phases]]
-    return made
+        variants += [replace(event, v=event.v + way * bump) for way in (1.0, 1j)[: event.phases]]
+    return variants
 
 
 def off_neighbors(v: np.ndarray) -> np.ndarray:

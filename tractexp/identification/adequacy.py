@@ -71,7 +71,7 @@ class Adequacy:
     def good(self) -> bool:
         return self.grade is Grade.ADEQUATE
 
-    def told(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """As `result.json` has it."""
         return {"grade": str(self.grade), "sentence": self.sentence, "p": self.p}
 
@@ -91,7 +91,7 @@ def surprise(
     steady = _linear(likelihood)[inside[: likelihood.free]]
     J = J[:, inside]
     rng = np.random.default_rng(seed)
-    drawn = likelihood.noise.draw(rng, DRAWS, np.diff(observed.drive.first).tolist()) * likelihood.known
+    drawn = likelihood.noise.draw(rng, DRAWS, np.diff(observed.drive.first).tolist()) * likelihood.valid
     drawn /= _level(likelihood, observed, rng)[:, None, None]
     white = likelihood.whiten(drawn)
     Q, _ = np.linalg.qr(J)
@@ -122,9 +122,9 @@ def given_up(
     raw = plain.whiten(drawn)
     inside = (unit > WALL) & (unit < 1 - WALL)
     likely = raw - np.linalg.lstsq(J, white.T, rcond=None)[0].T @ columns[:, inside].T
-    known = raw + _means(plain, drawn) @ columns[:, free:].T
+    shifted = raw + _means(plain, drawn) @ columns[:, free:].T
     Q, _ = np.linalg.qr(columns[:, :free][:, inside[:free]])
-    rest = known - (known @ Q) @ Q.T
+    rest = shifted - (shifted @ Q) @ Q.T
     ratio = (likely**2).sum(axis=1) / np.maximum((rest**2).sum(axis=1), 1e-300)
     return np.concatenate([[rows @ rows / max(least, 1e-300)], ratio])
 
@@ -163,13 +163,13 @@ def _of_each_event(likelihood: Likelihood, J: np.ndarray, Q: np.ndarray) -> np.n
 
 def loudest_stretch(channels: np.ndarray, layout: Layout) -> tuple[float, str]:
     """The loudest window of the whitened residual (2, N): how many times the noise, and where it is."""
-    cells = surprises.residual_windows(layout)
+    windows = surprises.residual_windows(layout)
     row = layout.drive.spoken.index
-    level = [float(np.sqrt(np.mean(channels[row(c.channel), c.part] ** 2))) for c in cells]
+    level = [float(np.sqrt(np.mean(channels[row(c.channel), c.part] ** 2))) for c in windows]
     k = int(np.argmax(level))
-    cell = cells[k]
-    name = layout.events[cell.event].record.name
-    return level[k], f"{cell.channel} of {name} from {cell.start:.3f} to {cell.end:.3f} s"
+    window = windows[k]
+    name = layout.events[window.event].record.name
+    return level[k], f"{window.channel} of {name} from {window.start:.3f} to {window.end:.3f} s"
 
 
 def graded(
@@ -183,7 +183,7 @@ def graded(
     errors = [fitted, *([held_out] if held_out else [])]
     noise = surprise.p is not None and surprise.p >= least_p
     sure = max(e.interval[0] if noise else e.value for e in errors)
-    held = "".join(f"; a bound holds {told}" for told in active_bounds)
+    held = "".join(f"; a bound holds {bound}" for bound in active_bounds)
     if sure >= WRONG:
         size = f"it leaves {fitted}" + (f", and of the held-out dips {held_out}" if held_out else "")
         return Adequacy(Grade.WRONG_MODEL, f"this model does not describe this load: {size}{held}", surprise.p)

@@ -14,37 +14,37 @@ from tractexp.identification.verdict import BOUND, EDGE, UNIDENTIFIED, WEAK, WIT
 from tractexp.noise.color import runs
 
 
-def advise(known: Uncertainty, adequacy: Adequacy, odd: Sequence[str] = (), data: str = "") -> list[str]:
+def advise(uncertainty: Uncertainty, adequacy: Adequacy, odd: Sequence[str] = (), data: str = "") -> list[str]:
     """Sentences, the most pressing first. `odd` events do not fit with the rest; `data` is the choice of data that
     holds further events of the load, where one is known.
 
     Of a model that does not describe the load nothing is said that would only hold if it did.
     """
-    better = better_domain(known.likelihood.problem)
-    said = [f"leave {name} out, or free what differs there by model.per_event" for name in odd]
+    better = better_domain(uncertainty.likelihood.problem)
+    sentences = [f"leave {name} out, or free what differs there by model.per_event" for name in odd]
     search = f"task=discrepancy data={data}" if data else "task=discrepancy"
     if adequacy.grade is Grade.WRONG_MODEL:
         missing = f"find what is missing: {search}; or choose another model: tractexp list model"
-        return [*better, missing, *said]
+        return [*better, missing, *sentences]
     if adequacy.grade is Grade.EFFECT_MISSING:
-        said.insert(0, f"find the missing effect: {search}")
-    said += [
+        sentences.insert(0, f"find the missing effect: {search}")
+    sentences += [
         f"widen model.bounds.{name}, or ask whether the model is the right one"
-        for name, verdict in known.verdicts.items()
+        for name, verdict in uncertainty.verdicts.items()
         if verdict.word == BOUND
     ]
-    for direction in known.information.unseen:
-        tied = [n for n, share in zip(known.names, direction, strict=True) if abs(share) > SHARE]
+    for direction in uncertainty.information.unseen:
+        tied = [n for n, share in zip(uncertainty.names, direction, strict=True) if abs(share) > SHARE]
         if len(tied) > 1:
-            said.append(f"fix one of {', '.join(tied)} by model.fixed: no record of this kind can tell them apart")
+            sentences.append(f"fix one of {', '.join(tied)} by model.fixed: no record of this kind can tell them apart")
         else:
-            said.append(f"fix {tied[0]} by model.fixed: the record does not change with it")
-    said += _deeper(known)
+            sentences.append(f"fix {tied[0]} by model.fixed: the record does not change with it")
+    sentences += _deeper(uncertainty)
     return (
-        [*better, *said]
+        [*better, *sentences]
         if adequacy.grade is Grade.EFFECT_MISSING
-        else [*said, *better]
-        if said
+        else [*sentences, *better]
+        if sentences
         else ["nothing: every parameter is identified"]
     )
 
@@ -54,15 +54,15 @@ def better_domain(problem: Problem) -> list[str]:
     return [why for why in map(problem.domain.better, problem.events) if why][:1]
 
 
-def _deeper(known: Uncertainty) -> list[str]:
+def _deeper(uncertainty: Uncertainty) -> list[str]:
     """Which further dip would identify what is open but not structurally so."""
-    identifiable = known.information.identifiable
+    identifiable = uncertainty.information.identifiable
     poor = [
         name
-        for name, fine in zip(known.names, identifiable, strict=True)
-        if fine and known.verdicts[name].word in (WEAK, UNIDENTIFIED)
+        for name, fine in zip(uncertainty.names, identifiable, strict=True)
+        if fine and uncertainty.verdicts[name].word in (WEAK, UNIDENTIFIED)
     ]
-    problem = known.likelihood.problem
+    problem = uncertainty.likelihood.problem
     if not poor or not identifiable.all():
         return []
     named = ", ".join(poor)
@@ -72,32 +72,32 @@ def _deeper(known: Uncertainty) -> list[str]:
     if problem.per_event:
         return [without_figures]
     deepest = int(np.argmax([e.depth for e in problem.events]))
-    shape, noise = DipShape.of(problem.events[deepest]), known.likelihood.noise.of(deepest)
+    shape, noise = DipShape.of(problem.events[deepest]), uncertainty.likelihood.noise.of(deepest)
     try:
-        forecasts = over_depth(problem, known.values, shape, known.information, noise)
+        forecasts = over_depth(problem, uncertainty.values, shape, uncertainty.information, noise)
     except UserError:  # this model or these values cannot be planned with
         return [without_figures]
     others = "these" if len(problem.events) > 1 else "this one"
     together = f"for {1000 * shape.duration:.0f} ms, fitted together with {others},"
-    return [_further(known, known.names.index(name), forecasts, together) for name in poor]
+    return [_further(uncertainty, uncertainty.names.index(name), forecasts, together) for name in poor]
 
 
-def _further(known: Uncertainty, j: int, forecasts: Sequence[Forecast], together: str) -> str:
+def _further(uncertainty: Uncertainty, j: int, forecasts: Sequence[Forecast], together: str) -> str:
     """The depths of a further dip with which the interval of parameter `j` is narrow enough, in a sentence.
 
     They need not be all beyond one: a dip as deep as those recorded repeats them, a shallower one may tell more.
     """
-    name, low, high = known.names[j], known.lower[j], known.upper[j]
-    goal, bounds = _goal(known, j)
+    name, low, high = uncertainty.names[j], uncertainty.lower[j], uncertainty.upper[j]
+    goal, bounds = _goal(uncertainty, j)
     half = np.array([f.half[j] for f in forecasts])
-    told = lambda x: shown(known.values[j], x, low, high)  # noqa: E731
+    width = lambda x: shown(uncertainty.values[j], x, low, high)  # noqa: E731
     reached = f"; its interval now reaches its bound {' and '.join(f'{b:g}' for b in bounds)}, " if bounds else ""
     if (half <= goal).any():
         depths = _spans(np.array([f.shape.depth for f in forecasts]), half <= goal)
         still = f"{reached}and if it does so then, ask whether model.bounds.{name} is right" if reached else ""
-        return f"for {name}: a further dip of {depths} {together} would give {told(goal)} or better{still}"
+        return f"for {name}: a further dip of {depths} {together} would give {width(goal)} or better{still}"
     best = int(half.argmin())
-    leaves = f"would give {told(half[best])}" if half[best] < (high - low) / 2 else "would leave it open too"
+    leaves = f"would give {width(half[best])}" if half[best] < (high - low) / 2 else "would leave it open too"
     bound = f"{reached}so ask whether model.bounds.{name} is right" if reached else ""
     return (
         f"for {name}: no single further dip {together} will do; the best, of {100 * forecasts[best].shape.depth:.3g} %,"
@@ -105,16 +105,20 @@ def _further(known: Uncertainty, j: int, forecasts: Sequence[Forecast], together
     )
 
 
-def _goal(known: Uncertainty, j: int) -> tuple[float, list[float]]:
+def _goal(uncertainty: Uncertainty, j: int) -> tuple[float, list[float]]:
     """Half an interval that is narrow enough, and the bounds that the present one reaches.
 
     Where it reaches one, half of what is inside the bounds is asked for. Where curvature calls it narrow enough
     already, it is the profile that does not, and half of what curvature says is asked for.
     """
-    low, high = known.lower[j], known.upper[j]
-    (a, b), enough = known.intervals[j], WITHIN * size(known.values[j], low, high)
+    low, high = uncertainty.lower[j], uncertainty.upper[j]
+    (a, b), enough = uncertainty.intervals[j], WITHIN * size(uncertainty.values[j], low, high)
     bounds = [bound for end, bound in ((a, low), (b, high)) if abs(end - bound) < EDGE * (high - low)]
-    asked = [enough, *([(b - a) / 4] if bounds else []), *([known.half[j] / 2] if known.half[j] <= enough else [])]
+    asked = [
+        enough,
+        *([(b - a) / 4] if bounds else []),
+        *([uncertainty.half[j] / 2] if uncertainty.half[j] <= enough else []),
+    ]
     return min(asked), bounds
 
 

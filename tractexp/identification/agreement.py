@@ -24,32 +24,32 @@ class EventAgreement:
 
     def fields(self) -> dict[str, Any]:
         """What `result.json` gains; None where a parameter is not identifiable without the event."""
-        kept = lambda ratio: ratio if np.isfinite(ratio) else None  # noqa: E731
-        gains = {event: {name: kept(ratio) for name, ratio in gain.items()} for event, gain in self.gains.items()}
+        finite = lambda ratio: ratio if np.isfinite(ratio) else None  # noqa: E731
+        gains = {event: {name: finite(ratio) for name, ratio in gain.items()} for event, gain in self.gains.items()}
         return {"gains": gains, "odd_events": self.odd}
 
 
-def compare_events(known: Uncertainty) -> EventAgreement:
+def compare_events(uncertainty: Uncertainty) -> EventAgreement:
     """Each event's share in the precision, and the events that do not fit with the rest (deviance test)."""
-    likelihood = known.likelihood
-    _, J = likelihood.jacobian(known.unit)
-    free, width = likelihood.free, known.upper - known.lower
+    likelihood = uncertainty.likelihood
+    _, J = likelihood.jacobian(uncertainty.unit)
+    free, width = likelihood.free, uncertainty.upper - uncertainty.lower
 
     def errors(rows: np.ndarray) -> np.ndarray:
         own, nuisances = rows[:, :free], rows[:, free:]
-        return Information.of(known.names, known.values, width, own, nuisances).standard_errors
+        return Information.of(uncertainty.names, uncertainty.values, width, own, nuisances).standard_errors
 
     whole = errors(J)
     gains: dict[str, dict[str, float]] = {}
     for e, event in enumerate(likelihood.problem.events):
         with np.errstate(invalid="ignore"):  # what is not identifiable with the event is not without it either
             ratio = errors(J * ~likelihood.part_of(e)[:, None]) / whole
-        gains[event.record.name] = dict(zip(known.names, ratio.tolist(), strict=True))
-    odd, notes = disagreeing(known)
+        gains[event.record.name] = dict(zip(uncertainty.names, ratio.tolist(), strict=True))
+    odd, notes = disagreeing(uncertainty)
     return EventAgreement(gains, odd, notes)
 
 
-def disagreeing(known: Uncertainty) -> tuple[list[str], list[str]]:
+def disagreeing(uncertainty: Uncertainty) -> tuple[list[str], list[str]]:
     """Events that separate parameters fit much better than shared ones do, the worst first, one at a time.
 
     Compares the deviance of all events fitted together with that of the rest plus that of the event alone; the
@@ -57,13 +57,13 @@ def disagreeing(known: Uncertainty) -> tuple[list[str], list[str]]:
     """
     from scipy.special import chdtri
 
-    likelihood = known.likelihood
+    likelihood = uncertainty.likelihood
     left, odd, notes = list(range(likelihood.problem.drive.events)), [], []
-    freedom = max(int(np.count_nonzero(known.information.identifiable)), 1)
+    freedom = max(int(np.count_nonzero(uncertainty.information.identifiable)), 1)
     name = lambda e: likelihood.problem.events[e].record.name  # noqa: E731
     while len(left) > 1:
         groups = [left, *([o for o in left if o != e] for e in left), *([e] for e in left)]
-        deviance = descend(only(likelihood, groups), np.tile(known.unit, (len(groups), 1))).deviance
+        deviance = descend(only(likelihood, groups), np.tile(uncertainty.unit, (len(groups), 1))).deviance
         n = len(left)
         excess = deviance[0] - deviance[1 : n + 1] - deviance[n + 1 :]
         worst = int(excess.argmax())

@@ -26,13 +26,13 @@ def blocks_of(events: Sequence[Event], drive: Drive, parameters: int = 1, *, fro
     first = starts if from_dip else [part.start for part in parts]
     seconds = sum((p.stop - a) * e.record.step for p, a, e in zip(parts, first, events, strict=True))
     length = min(LENGTH, seconds / (FEWEST * max(parameters, 1)))
-    made = []
+    pieces = []
     for part, begin, start, event in zip(parts, first, starts, events, strict=True):
         n = max(1, round(length / event.record.step))
         edges = [begin, *range(start - (start - begin - 1) // n * n, start, n), *range(start, part.stop - n // 2, n)]
         edges = sorted({*edges, part.stop})
-        made += [slice(a, b) for a, b in itertools.pairwise(edges)]
-    return made
+        pieces += [slice(a, b) for a, b in itertools.pairwise(edges)]
+    return pieces
 
 
 def exceeds(squares: np.ndarray, others: np.ndarray, blocks: Sequence[slice]) -> bool:

@@ -51,7 +51,7 @@ class Start:
     values: np.ndarray
     above: float
 
-    def told(self, names: Sequence[str]) -> dict[str, Any]:
+    def to_dict(self, names: Sequence[str]) -> dict[str, Any]:
         """As `result.json` has it."""
         return {
             "from": self.origin,
@@ -64,7 +64,7 @@ class Start:
 class EstimationResult:
     """An estimate, how surprising what it leaves is, and the valleys it was chosen from, the best first."""
 
-    known: Uncertainty
+    uncertainty: Uncertainty
     surprise: Surprise
     starts: tuple[Start, ...]
 
@@ -176,8 +176,8 @@ def _of_box(problem: Problem) -> tuple[DescentEnds, EstimationResult | None]:
         observed = Observed.of(problem)
         points, least = screened(observed.problem)
         likelihood = Likelihood.of_squares(observed.problem, max(float(np.sqrt(least)), SMALLEST))
-        found = explored(likelihood, points)
-        ends = DescentEnds(observed, likelihood, found, ("box",) * len(found.unit))
+        result = explored(likelihood, points)
+        ends = DescentEnds(observed, likelihood, result, ("box",) * len(result.unit))
         if not np.isfinite(ends.lowest):
             return ends, None
         ends = _in_own_units(ends)
@@ -208,7 +208,7 @@ def _without_offsets(ends: DescentEnds) -> DescentEnds:
     if offsets is None:
         return ends
     squares = ends.likelihood
-    likelihood = replace(squares, noise=replace(squares.noise, blur=offsets))
+    likelihood = replace(squares, noise=replace(squares.noise, input_modes=offsets))
     return replace(ends, likelihood=likelihood, descent=descend(likelihood.rows, ends.descent.unit))
 
 
@@ -221,47 +221,49 @@ def _finished(ends: DescentEnds, *, robust: bool = False) -> EstimationResult:
         return _of_squares(ends, likelihood, seen)
     whole = noise_at(observed, likelihood, units[0], observed.input_errors(likelihood.values(units[0])), whole=True)
     likelihood = replace(likelihood, noise=whole)  # nothing but noise is left: all of it tells
-    found = descend(likelihood.rows, units, apart=likelihood.apart)
-    best = int(found.deviance.argmin())
-    if not ends.no_worse(found.unit[best]):
+    result = descend(likelihood.rows, units, apart=likelihood.apart)
+    best = int(result.deviance.argmin())
+    if not ends.no_worse(result.unit[best]):
         return _of_squares(ends, likelihood, seen)
-    others = found.unit[np.arange(len(units)) != best]
-    return EstimationResult(with_local_minima(conclude(likelihood, found.unit[best]), others), seen, ends.starts)
+    others = result.unit[np.arange(len(units)) != best]
+    return EstimationResult(with_local_minima(conclude(likelihood, result.unit[best]), others), seen, ends.starts)
 
 
 def _of_squares(ends: DescentEnds, noise: Likelihood, seen: Surprise) -> EstimationResult:
     """The minimum of Eq. (8) as the estimate."""
-    known = conclude(ends.likelihood, ends.best, noise)
-    return EstimationResult(with_local_minima(known, ends.near), seen, ends.starts)
+    uncertainty = conclude(ends.likelihood, ends.best, noise)
+    return EstimationResult(with_local_minima(uncertainty, ends.near), seen, ends.starts)
 
 
 def _under_noise(ends: DescentEnds, *, robust: bool) -> tuple[Likelihood, np.ndarray]:
     """The likelihood of the noise that the fit leaves in quiet, and its maxima (n, D), the best first."""
     observed, likelihood = ends.observed, ends.likelihood.with_initial_power
     units = likelihood.placed(ends.near)
-    blur = observed.input_errors(likelihood.values(units[0]))
+    input_modes = observed.input_errors(likelihood.values(units[0]))
     for _ in range(ROUNDS):
         if robust:
             likelihood = cleaned(likelihood, units[:1])
-        likelihood = replace(likelihood, noise=noise_at(observed, likelihood, units[0], blur))
-        found = descend(likelihood.rows, units, apart=likelihood.apart)
-        order = np.argsort(found.deviance, kind="stable")
-        units = found.unit[order[found.deviance[order] <= found.deviance.min() + BEHIND]]
+        likelihood = replace(likelihood, noise=noise_at(observed, likelihood, units[0], input_modes))
+        result = descend(likelihood.rows, units, apart=likelihood.apart)
+        order = np.argsort(result.deviance, kind="stable")
+        units = result.unit[order[result.deviance[order] <= result.deviance.min() + BEHIND]]
     return likelihood, units
 
 
 def noise_at(
-    observed: Observed, likelihood: Likelihood, unit: np.ndarray, blur: np.ndarray | None, whole: bool = False
+    observed: Observed, likelihood: Likelihood, unit: np.ndarray, input_modes: np.ndarray | None, whole: bool = False
 ) -> Noise:
     """The noise that a fit at coordinates (D,) leaves in quiet; of the `whole` residual where too little is quiet.
 
-    The whole tells more, too, where what is left is nothing but noise. `blur` is that of `Observed.input_errors`.
+    The whole tells more, too, where only noise is left. `input_modes` is that of `Observed.input_errors`.
     """
     measured = likelihood.problem.drive.measured
     rows, J = replace(likelihood, noise=Noise.white(*[1.0] * len(measured))).jacobian(unit)
     residual, columns = rows.reshape(measured.shape), J.T.reshape(-1, *measured.shape)
     values = likelihood.values(unit)
-    return observed.noise(residual, likelihood.known, columns, values, blur, whole) or noise_of(likelihood, residual)
+    return observed.noise(residual, likelihood.valid, columns, values, input_modes, whole) or noise_of(
+        likelihood, residual
+    )
 
 
 def noise_of(likelihood: Likelihood, residuals: np.ndarray) -> Noise:
@@ -273,7 +275,7 @@ def noise_of(likelihood: Likelihood, residuals: np.ndarray) -> Noise:
     for e in range(drive.events):
         part, pair = drive.part(e), []
         for c in range(drive.channels):
-            pieces = stretches(residuals[c, part], likelihood.known[c, part])
+            pieces = stretches(residuals[c, part], likelihood.valid[c, part])
             enough = sum(map(len, pieces)) >= FEWEST
             pair.append(fit_autoregression(pieces).scaled(back) if enough else white_noise(1.0))
         pairs.append(tuple(pair))
@@ -283,29 +285,29 @@ def noise_of(likelihood: Likelihood, residuals: np.ndarray) -> Noise:
 def cleaned(likelihood: Likelihood, unit: np.ndarray) -> Likelihood:
     """The likelihood without the samples beyond `OUTLIER` robust standard deviations of the fit at `unit` (1, D)."""
     drive = likelihood.problem.drive
-    known = drive.weights > 0
-    residuals = np.abs(replace(likelihood, known=known).residuals(unit)[0])
+    valid = drive.weights > 0
+    residuals = np.abs(replace(likelihood, valid=valid).residuals(unit)[0])
     for e in range(drive.events):
         for c in range(drive.channels):
             part = drive.part(e)
-            seen = residuals[c, part][known[c, part]]
+            seen = residuals[c, part][valid[c, part]]
             if len(seen):
-                known[c, part] &= residuals[c, part] <= max(OUTLIER * 1.4826 * float(np.median(seen)), 1e-12)
-    return replace(likelihood, known=known)
+                valid[c, part] &= residuals[c, part] <= max(OUTLIER * 1.4826 * float(np.median(seen)), 1e-12)
+    return replace(likelihood, valid=valid)
 
 
-def with_local_minima(known: Uncertainty, units: np.ndarray) -> Uncertainty:
+def with_local_minima(uncertainty: Uncertainty, units: np.ndarray) -> Uncertainty:
     """The judgement with other valleys (n, D) that the records do not rule out: intervals reach over them.
 
     A parameter that has another value in another valley is not identified, however narrow either valley is.
     """
-    rows = known.likelihood.rows(units) if len(units) else np.empty((0, 1))
-    above = (rows**2).sum(axis=1) - known.deviance
-    apart = np.abs(units - known.unit).max(axis=1, initial=0.0) > SAME
-    valleys = [LocalMinimum(unit, known.likelihood.values(unit), float(a))
+    rows = uncertainty.likelihood.rows(units) if len(units) else np.empty((0, 1))
+    above = (rows**2).sum(axis=1) - uncertainty.deviance
+    apart = np.abs(units - uncertainty.unit).max(axis=1, initial=0.0) > SAME
+    local_minima = [LocalMinimum(unit, uncertainty.likelihood.values(unit), float(a))
                for unit, a in zip(units[apart], above[apart], strict=True) if a < threshold()]  # fmt: skip
-    said, own = dict(known.verdicts), known.intervals
-    for valley in valleys:
-        for j in np.flatnonzero((valley.values < own[:, 0]) | (valley.values > own[:, 1])):
-            said[known.names[j]] = elsewhere(said[known.names[j]], float(valley.values[j]))
-    return replace(known, verdicts=said, valleys=tuple(valleys))
+    verdicts, own = dict(uncertainty.verdicts), uncertainty.intervals
+    for minimum in local_minima:
+        for j in np.flatnonzero((minimum.values < own[:, 0]) | (minimum.values > own[:, 1])):
+            verdicts[uncertainty.names[j]] = elsewhere(verdicts[uncertainty.names[j]], float(minimum.values[j]))
+    return replace(uncertainty, verdicts=verdicts, local_minima=tuple(local_minima))

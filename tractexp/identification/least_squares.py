@@ -88,11 +88,11 @@ def least_squares_from(
     unit = np.clip(box.to_unit(start), EDGE, 1 - EDGE)
     if not np.isfinite(residuals(unit)).all():
         return start, objective
-    found = least_squares(
+    result = least_squares(
         residuals, unit, residuals.jacobian,  # pyright: ignore[reportArgumentType]
         (0.0, 1.0), ftol=tolerance, xtol=tolerance, gtol=tolerance, max_nfev=trials,
     )  # fmt: skip
-    return box.from_unit(found.x), float(2 * found.cost / residuals.scale**2)
+    return box.from_unit(result.x), float(2 * result.cost / residuals.scale**2)
 
 
 def race(

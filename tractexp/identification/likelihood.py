@@ -25,28 +25,28 @@ def before_the_event(event: Event) -> Pair:
     """Level and color of each channel's noise before the dip: what is known of it before anything is fitted."""
     pair = []
     for quiet, level in zip(event.calm, event.levels, strict=True):
-        made = fit_autoregression(stretches(quiet, np.isfinite(quiet)), domain_of(event).quiet_order)
-        pair.append(made.scaled(max(level, SMALLEST) / made.deviation[0]))
+        color = fit_autoregression(stretches(quiet, np.isfinite(quiet)), domain_of(event).quiet_order)
+        pair.append(color.scaled(max(level, SMALLEST) / color.deviation[0]))
     return tuple(pair)
 
 
 @dataclass(frozen=True, eq=False)
 class Likelihood:
-    """Whitened residuals of a problem. `known` (2, N) marks the samples of P and Q that count.
+    """Whitened residuals of a problem. `valid` (2, N) marks the samples of P and Q that count.
 
     With `initial_power` P0 and Q0 of each event are coordinates beside the parameters; else they are the means before.
     """
 
     problem: Problem
     noise: Noise
-    known: np.ndarray
+    valid: np.ndarray
     initial_power: bool = True
 
     @classmethod
     def of(cls, problem: Problem, noise: Noise | None = None) -> "Likelihood":
         """The likelihood under `noise`, by default that of the samples before each dip; gaps do not count."""
-        found = noise or Noise(tuple(before_the_event(e) for e in problem.events))
-        return cls(problem, found, problem.drive.weights > 0)
+        noise = noise or Noise(tuple(before_the_event(e) for e in problem.events))
+        return cls(problem, noise, problem.drive.weights > 0)
 
     @classmethod
     def of_squares(cls, problem: Problem, deviation: float) -> "Likelihood":
@@ -72,7 +72,7 @@ class Likelihood:
     @property
     def samples(self) -> int:
         """Values of P and Q that count."""
-        return int(np.count_nonzero(self.known))
+        return int(np.count_nonzero(self.valid))
 
     @property
     def lower(self) -> np.ndarray:
@@ -113,13 +113,13 @@ class Likelihood:
         response = problem.model.simulate(drive, problem.candidates(self.values(unit)), problem.step.substeps, before)
         rows = response.by_candidate - drive.measured
         with np.errstate(invalid="ignore"):  # what diverged is no number in gaps either
-            rows *= self.known
+            rows *= self.valid
         rows[response.miss.max(axis=0) > 0] = np.nan
         return rows
 
     def whiten(self, residuals: np.ndarray) -> np.ndarray:
         """Residuals (n, 2, N) as rows (n, 2 N) of independent unit variance; samples that do not count are 0."""
-        return self.noise.whiten(residuals, self.problem.drive, self.known)
+        return self.noise.whiten(residuals, self.problem.drive, self.valid)
 
     def rows(self, unit: np.ndarray, lanes: np.ndarray | None = None) -> np.ndarray:
         """Whitened residuals (n, 2 N); their sum of squares is the deviance. Does not depend on the lane."""

@@ -78,9 +78,9 @@ def _sums(played: Playback) -> np.ndarray:
     S, S_0 = record.P + 1j * record.Q, event.P0 + 1j * event.Q0
     squares = np.stack([np.abs(played.P + 1j * played.Q - S) ** 2, np.abs(S - S_0) ** 2, np.abs(S) ** 2])
     squares[:2] -= noise_variance(event)
-    known = np.isfinite(S)
-    squares[0, known & ~np.isfinite(squares[0])] = np.inf  # what diverged
-    squares = np.where(known, squares, 0.0)[:, event.start :]
+    valid = np.isfinite(S)
+    squares[0, valid & ~np.isfinite(squares[0])] = np.inf  # what diverged
+    squares = np.where(valid, squares, 0.0)[:, event.start :]
     return np.add.reduceat(squares, np.arange(0, squares.shape[1], max(1, round(LENGTH / record.step))), axis=1).T
 
 

@@ -79,15 +79,15 @@ class Observed:
         except UserError:
             return None
 
-    def _noisy(self, residuals: np.ndarray, known: np.ndarray) -> list[slice]:
+    def _noisy(self, residuals: np.ndarray, valid: np.ndarray) -> list[slice]:
         """The quiet stretches whose residual (C, N) is noise: those after a dip only where no louder than before it.
 
         Where a record has less noise than the model has error, what is left at its end is the model's.
         """
         before = [part for part, calm in self._stretches if calm]
         after = [part for part, calm in self._stretches if not calm]
-        for c in np.flatnonzero(known.any(axis=1)):
-            calm, late = ([without_slow(residuals[c, p][known[c, p]]) for p in parts] for parts in (before, after))
+        for c in np.flatnonzero(valid.any(axis=1)):
+            calm, late = ([without_slow(residuals[c, p][valid[c, p]]) for p in parts] for parts in (before, after))
             if louder(late, calm):
                 return before
         return self.quiet

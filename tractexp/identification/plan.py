@@ -122,21 +122,25 @@ def like(problem: Problem, events: Sequence[Event]) -> Problem:
 
 
 def forecast(
-    problem: Problem, values: np.ndarray, shape: DipShape, known: Information | None = None, noise: Noise | None = None
+    problem: Problem,
+    values: np.ndarray,
+    shape: DipShape,
+    earlier: Information | None = None,
+    noise: Noise | None = None,
 ) -> Forecast:
-    """The intervals that `shape` would give at free `values` (d,), added to what is `known` already.
+    """The intervals that `shape` would give at free `values` (d,), added to what is `earlier` already.
 
     `noise` replaces the shape's. Raises `UserError` where the values have no steady state, and for a model that
     reads more than a planned dip has.
     """
     if reads := problem.model.reads:
-        told = ", ".join(f"{part.group} '{part.name}' reads {channel}" for channel, part in reads.items())
+        readers = ", ".join(f"{part.group} '{part.name}' reads {channel}" for channel, part in reads.items())
         raise UserError(
-            f"a planned dip is a voltage alone, but of this model the {told}: nothing can be planned with it"
+            f"a planned dip is a voltage alone, but of this model the {readers}: nothing can be planned with it"
         )
     planned = like(problem, [shape.event()])
     informations = each(planned, values, noise or shape.noise)
-    total = combined([*([known] if known else []), *informations])
+    total = combined([*([earlier] if earlier else []), *informations])
     return Forecast(shape, total.names, total.values, normal_quantile() * total.standard_errors)
 
 
@@ -190,10 +194,14 @@ def column(names: Sequence[str], parameter: str) -> int:
 
 
 def over_depth(
-    problem: Problem, values: np.ndarray, shape: DipShape, known: Information | None = None, noise: Noise | None = None
+    problem: Problem,
+    values: np.ndarray,
+    shape: DipShape,
+    earlier: Information | None = None,
+    noise: Noise | None = None,
 ) -> list[Forecast]:
     """Forecasts for dips of every depth, otherwise of this `shape`."""
-    return [forecast(problem, values, replace(shape, depth=float(d)), known, noise) for d in DEPTHS]
+    return [forecast(problem, values, replace(shape, depth=float(d)), earlier, noise) for d in DEPTHS]
 
 
 def depth_needed(forecasts: Sequence[Forecast], parameter: str, within: float) -> Needed:
@@ -257,5 +265,5 @@ def alone(problem: Problem, values: np.ndarray) -> Information:
 
     Of an archive, event by event: their Jacobian together, with P0 and Q0 of each, would not fit into memory.
     """
-    (made,) = each(problem, values)
-    return replace(made, J=np.linalg.qr(made.J, mode="r"))
+    (information,) = each(problem, values)
+    return replace(information, J=np.linalg.qr(information.J, mode="r"))

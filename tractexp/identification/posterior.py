@@ -33,7 +33,7 @@ class Posterior:
         return self.steps >= ENOUGH * self.autocorrelation
 
 
-def sample(known: Uncertainty, walkers: int, steps: int, seed: int) -> Posterior:
+def sample(uncertainty: Uncertainty, walkers: int, steps: int, seed: int) -> Posterior:
     """Goodman and Weare's affine-invariant ensemble (emcee), all walkers of a half-step in one simulation call.
 
     P0 and Q0 of each event are sampled along. Raises `UserError` where emcee is not installed.
@@ -42,7 +42,7 @@ def sample(known: Uncertainty, walkers: int, steps: int, seed: int) -> Posterior
         import emcee
     except ImportError:
         raise UserError("task=posterior needs emcee; install it by: pip install 'tractexp[posterior]'") from None
-    likelihood, d = known.likelihood, len(known.unit)
+    likelihood, d = uncertainty.likelihood, len(uncertainty.unit)
     if walkers < 2 * d:
         raise UserError(f"task.walkers={walkers} is too few: {d} coordinates need at least {2 * d}")
 
@@ -53,20 +53,22 @@ def sample(known: Uncertainty, walkers: int, steps: int, seed: int) -> Posterior
         return np.where(outside | ~np.isfinite(value), -np.inf, value)
 
     rng = np.random.default_rng(seed)
-    start = np.clip(known.unit + _spread(known) * rng.standard_normal((walkers, d)), 1e-6, 1 - 1e-6)
-    start[~np.isfinite(log_probability(start))] = np.clip(known.unit, 1e-6, 1 - 1e-6)
+    start = np.clip(uncertainty.unit + _spread(uncertainty) * rng.standard_normal((walkers, d)), 1e-6, 1 - 1e-6)
+    start[~np.isfinite(log_probability(start))] = np.clip(uncertainty.unit, 1e-6, 1 - 1e-6)
     start = np.clip(start + 1e-7 * rng.standard_normal(start.shape), 0, 1)
     sampler = emcee.EnsembleSampler(walkers, d, log_probability, vectorize=True)
     sampler.random_state = np.random.RandomState(seed).get_state()
     sampler.run_mcmc(start, steps)
-    kept = np.asarray(sampler.get_chain(discard=int(BURN * steps), flat=True))
+    chain = np.asarray(sampler.get_chain(discard=int(BURN * steps), flat=True))
     time = float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))
-    draws = likelihood.values(kept)
-    return Posterior(known.names, draws, steps, time, float(sampler.acceptance_fraction.mean()), walkers * (steps + 2))
+    draws = likelihood.values(chain)
+    return Posterior(
+        uncertainty.names, draws, steps, time, float(sampler.acceptance_fraction.mean()), walkers * (steps + 2)
+    )
 
 
-def _spread(known: Uncertainty) -> np.ndarray:
+def _spread(uncertainty: Uncertainty) -> np.ndarray:
     """Standard deviation of the start (D,), in ranges: that of the information matrix, at most a tenth."""
-    wide = known.information.standard_errors / (known.upper - known.lower)
-    rest = np.full(len(known.unit) - len(wide), 1e-3)
+    wide = uncertainty.information.standard_errors / (uncertainty.upper - uncertainty.lower)
+    rest = np.full(len(uncertainty.unit) - len(wide), 1e-3)
     return np.concatenate((np.clip(wide, 1e-6, 0.1), rest))

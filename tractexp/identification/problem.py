@@ -23,22 +23,22 @@ PROBES = 64  # candidates across the box on which the Runge-Kutta step is judged
 
 def narrowed(parameters: Sequence[Parameter], bounds: Mapping[str, Sequence[float]]) -> tuple[Parameter, ...]:
     """Parameters with some bounds replaced. Raises `UserError` for an unknown name or reversed bounds."""
-    known = {p.name: p for p in parameters}
+    by_name = {p.name: p for p in parameters}
     for name, pair in bounds.items():
-        _known(name, known, "model.bounds")
+        _check_name(name, by_name, "model.bounds")
         if len(pair) != 2:
             raise UserError(f"model.bounds.{name}={list(pair)} must be two numbers, [lower, upper]")
         low, high = map(float, pair)
-        old = known[name]
+        old = by_name[name]
         inside = min(max(old.default, low), high) if low < high else old.default
-        known[name] = replace(old, default=inside, bounds=(low, high))
-        known[name].check(f"model.bounds.{name}")
-    return tuple(known.values())
+        by_name[name] = replace(old, default=inside, bounds=(low, high))
+        by_name[name].check(f"model.bounds.{name}")
+    return tuple(by_name.values())
 
 
-def _known(name: str, known: Mapping[str, object], where: str) -> None:
-    if name not in known:
-        raise UserError(f"{where}.{name}: this model has no parameter '{name}'{among(name, known, 'Parameters')}")
+def _check_name(name: str, by_name: Mapping[str, object], where: str) -> None:
+    if name not in by_name:
+        raise UserError(f"{where}.{name}: this model has no parameter '{name}'{among(name, by_name, 'Parameters')}")
 
 
 def _check_channels(model: Model, events: Sequence[Event]) -> None:
@@ -108,9 +108,9 @@ class Problem:
         self.parameters = narrowed(model.parameters, bounds or {})
         self.fixed = {name: float(value) for name, value in (fixed or {}).items()}
         for name in self.fixed:
-            _known(name, {p.name: p for p in self.parameters}, "model.fixed")
+            _check_name(name, {p.name: p for p in self.parameters}, "model.fixed")
         for name in per_event:
-            _known(name, {p.name: p for p in self.parameters}, "model.per_event")
+            _check_name(name, {p.name: p for p in self.parameters}, "model.per_event")
             if name in self.fixed:
                 raise UserError(f"model.per_event names {name}, which model.fixed fixes; it can be only one of them")
         own = set(per_event) if len(self.events) > 1 else set()
@@ -135,14 +135,14 @@ class Problem:
 
     def digest(self) -> str:
         """SHA-256 of the equations, the records and what is known of the parameters: of equal problems the same."""
-        drive, known = self.drive, (self.space.names, sorted(self.fixed.items()), self.per_event)
-        told = self.model.source, [repr(effect) for effect in self.model.measurements], known
-        made = hashlib.sha256(repr(told).encode())
+        drive, free = self.drive, (self.space.names, sorted(self.fixed.items()), self.per_event)
+        content = self.model.source, [repr(effect) for effect in self.model.measurements], free
+        sha = hashlib.sha256(repr(content).encode())
         arrays = drive.inputs, drive.measured, drive.weights, drive.first, drive.event, drive.before
         arrays += tuple(window for window in drive.windows if window is not None)
         for array in (*arrays, self.lower, self.upper, self.step.substeps):
-            made.update(np.ascontiguousarray(array).tobytes())
-        return made.hexdigest()
+            sha.update(np.ascontiguousarray(array).tobytes())
+        return sha.hexdigest()
 
     def driven_by(self, events: Sequence[Event]) -> "Problem":
         """The same problem with other voltages of the same lengths; Runge-Kutta steps and scales stay."""

@@ -54,20 +54,20 @@ class Profile:
     @property
     def verdict(self) -> str:
         """What the profile adds to the verdict, or ""."""
-        said = []
+        sentences = []
         for end, side in zip(self.ends, ("downwards", "upwards"), strict=True):
             if end is not End.CLOSED:
-                said.append(f"open {side}")
+                sentences.append(f"open {side}")
         if self.minima:
-            said.append(f"two minima, another at {', '.join(f'{m:.4g}' for m in self.minima)}")
-        return ", ".join(said)
+            sentences.append(f"two minima, another at {', '.join(f'{m:.4g}' for m in self.minima)}")
+        return ", ".join(sentences)
 
 
 @dataclass(frozen=True, eq=False)
 class Profiles:
     """All profiles, the judgement they are drawn around, and what turned up on the way."""
 
-    known: Uncertainty
+    uncertainty: Uncertainty
     profiles: tuple[Profile, ...]
     threshold: float
     simulations: int
@@ -83,11 +83,11 @@ class Profiles:
     @property
     def verdicts(self) -> dict[str, ParameterVerdict]:
         """The verdicts of the information matrix, corrected by what the profiles show."""
-        known = self.known
-        bounds = dict(zip(known.names, zip(known.lower, known.upper, strict=True), strict=True))
-        other = dict(zip(known.names, known.elsewhere, strict=True))
-        return known.verdicts | {
-            p.name: revised(known.verdicts[p.name], p, *bounds[p.name], elsewhere=bool(other[p.name]))
+        uncertainty = self.uncertainty
+        bounds = dict(zip(uncertainty.names, zip(uncertainty.lower, uncertainty.upper, strict=True), strict=True))
+        other = dict(zip(uncertainty.names, uncertainty.elsewhere, strict=True))
+        return uncertainty.verdicts | {
+            p.name: revised(uncertainty.verdicts[p.name], p, *bounds[p.name], elsewhere=bool(other[p.name]))
             for p in self.profiles
         }
 
@@ -116,51 +116,51 @@ def revised(
     return ParameterVerdict(word, f"{verdict.detail}; {detail}")
 
 
-def checked(known: Uncertainty) -> Uncertainty:
+def checked(uncertainty: Uncertainty) -> Uncertainty:
     """The judgement with profiles in place of curvature wherever the curvature may mislead.
 
     That is for intervals wider than `DOUBTFUL` of the value, and for parameters that have another value in another
     valley; a narrow one is a parabola anyway. Parameters that are not identifiable by structure have no profile.
     """
-    bounds = zip(known.lower, known.upper, strict=True)
-    sizes = np.array([size(v, *pair) for v, pair in zip(known.values, bounds, strict=True)])
-    doubtful = known.information.identifiable & (known.half > DOUBTFUL * sizes)
-    doubtful |= known.information.identifiable & known.elsewhere
+    bounds = zip(uncertainty.lower, uncertainty.upper, strict=True)
+    sizes = np.array([size(v, *pair) for v, pair in zip(uncertainty.values, bounds, strict=True)])
+    doubtful = uncertainty.information.identifiable & (uncertainty.half > DOUBTFUL * sizes)
+    doubtful |= uncertainty.information.identifiable & uncertainty.elsewhere
     if not doubtful.any():
-        return known
-    made = profiles(known, names=[n for n, d in zip(known.names, doubtful, strict=True) if d])
+        return uncertainty
+    result = profiles(uncertainty, names=[n for n, d in zip(uncertainty.names, doubtful, strict=True) if d])
     return replace(
-        made.known,
-        verdicts=made.verdicts,
-        profiled={p.name: p.interval for p in made.profiles},
-        notes=[*made.known.notes, *made.notes],
+        result.uncertainty,
+        verdicts=result.verdicts,
+        profiled={p.name: p.interval for p in result.profiles},
+        notes=[*result.uncertainty.notes, *result.notes],
     )
 
 
-def profiles(known: Uncertainty, points: int = 24, names: Sequence[str] | None = None) -> Profiles:
-    """Profiles of every free parameter (or of `names`) around `known`, of at most `points` points a side.
+def profiles(uncertainty: Uncertainty, points: int = 24, names: Sequence[str] | None = None) -> Profiles:
+    """Profiles of every free parameter (or of `names`) around `uncertainty`, of at most `points` points a side.
 
     Where a point fits better than the optimum did, everything starts again from there.
     """
-    simulations, restarts, names = 0, 0, names or known.names
+    simulations, restarts, names = 0, 0, names or uncertainty.names
     while True:
-        column = np.array([known.names.index(name) for name in names])
-        lanes = _Lanes(known, column, np.tile(known.unit, (len(names), 1)), np.zeros(len(names)))
+        column = np.array([uncertainty.names.index(name) for name in names])
+        lanes = _Lanes(uncertainty, column, np.tile(uncertainty.unit, (len(names), 1)), np.zeros(len(names)))
         simulations += lanes.run(points)
-        made = [lanes.profile(k) for k in range(len(names))]
+        curves = [lanes.profile(k) for k in range(len(names))]
         better = lanes.better
         if better is None:
-            places, spent = _elsewhere(known, column, made)
-            further = _Lanes(known, places.column, places.unit, places.rise)
+            places, spent = _elsewhere(uncertainty, column, curves)
+            further = _Lanes(uncertainty, places.column, places.unit, places.rise)
             simulations += spent + further.run(points)
             better = further.better
-            made = [_joined(p, [further.profile(int(k)) for k in np.flatnonzero(places.column == c)])
-                    for p, c in zip(made, column, strict=True)]  # fmt: skip
+            curves = [_joined(p, [further.profile(int(k)) for k in np.flatnonzero(places.column == c)])
+                    for p, c in zip(curves, column, strict=True)]  # fmt: skip
         if better is None or restarts == RESTARTS:
-            return Profiles(known, tuple(made), threshold(), simulations, restarts)
-        found = descend(known.likelihood.rows, better[None], apart=known.likelihood.apart)
-        simulations += found.simulations
-        known = known.at(found.unit[0])
+            return Profiles(uncertainty, tuple(curves), threshold(), simulations, restarts)
+        descent = descend(uncertainty.likelihood.rows, better[None], apart=uncertainty.likelihood.apart)
+        simulations += descent.simulations
+        uncertainty = uncertainty.at(descent.unit[0])
         restarts += 1
 
 
@@ -173,28 +173,28 @@ class _Places:
     rise: np.ndarray
 
 
-def _elsewhere(known: Uncertainty, column: np.ndarray, made: Sequence[Profile]) -> tuple[_Places, int]:
+def _elsewhere(uncertainty: Uncertainty, column: np.ndarray, curves: Sequence[Profile]) -> tuple[_Places, int]:
     """The best place of each range beyond the profile's interval that fits as well, and the simulations spent."""
-    begin = np.array([known.unit, *(valley.unit for valley in known.valleys)])
-    width = known.upper - known.lower
+    begin = np.array([uncertainty.unit, *(minimum.unit for minimum in uncertainty.local_minima)])
+    width = uncertainty.upper - uncertainty.lower
     wanted = []  # (column, value in the range)
-    for c, profile in zip(column, made, strict=True):
-        low, high = (np.array(profile.interval) - known.lower[c]) / width[c]
+    for c, profile in zip(column, curves, strict=True):
+        low, high = (np.array(profile.interval) - uncertainty.lower[c]) / width[c]
         values = np.concatenate([GRID, begin[1:, c]])
         wanted += [(c, v) for v in values[(values < low - SEEN) | (values > high + SEEN)]]
     if not wanted:
-        return _Places(np.empty(0, dtype=int), np.empty((0, len(known.unit))), np.empty(0)), 0
+        return _Places(np.empty(0, dtype=int), np.empty((0, len(uncertainty.unit))), np.empty(0)), 0
     columns = np.repeat([c for c, _ in wanted], len(begin))
     start = np.tile(begin, (len(wanted), 1))
     rows = np.arange(len(start))
     start[rows, columns] = np.repeat([v for _, v in wanted], len(begin))
     frozen = np.zeros(start.shape, dtype=bool)
     frozen[rows, columns] = True
-    found = descend(known.likelihood.rows, start, frozen, tolerance=0.05, apart=known.likelihood.apart)
-    rise = (found.deviance - known.deviance) * threshold() / known.limits[columns]
+    descent = descend(uncertainty.likelihood.rows, start, frozen, tolerance=0.05, apart=uncertainty.likelihood.apart)
+    rise = (descent.deviance - uncertainty.deviance) * threshold() / uncertainty.limits[columns]
     best = [rows[columns == c][rise[columns == c].argmin()] for c in np.unique(columns)]
     best = np.array([k for k in best if rise[k] < threshold()], dtype=int)
-    return _Places(columns[best], found.unit[best], rise[best]), found.simulations
+    return _Places(columns[best], descent.unit[best], rise[best]), descent.simulations
 
 
 def _joined(profile: Profile, others: Sequence[Profile]) -> Profile:
@@ -217,15 +217,15 @@ def _joined(profile: Profile, others: Sequence[Profile]) -> Profile:
 class _Lanes:
     """The state of all lanes: lane 2 k goes down, lane 2 k + 1 up from the k-th place, in its parameter."""
 
-    def __init__(self, known: Uncertainty, column: np.ndarray, unit: np.ndarray, rise: np.ndarray):
+    def __init__(self, uncertainty: Uncertainty, column: np.ndarray, unit: np.ndarray, rise: np.ndarray):
         """From coordinates `unit` (k, D), where the deviance is up by `rise` (k,)."""
-        self.known, self.limit = known, threshold()
+        self.uncertainty, self.limit = uncertainty, threshold()
         self.origin, self.risen = unit, rise
         self.column, self.unit = np.repeat(column, 2), np.repeat(unit, 2, axis=0)
         self.sign = np.tile([-1.0, 1.0], len(column))
-        self.scale = self.limit / known.limits[self.column]
+        self.scale = self.limit / uncertainty.limits[self.column]
         self.slope = np.zeros_like(self.unit)  # how the others move with the profiled one
-        errors = known.information.standard_errors / (known.upper - known.lower)
+        errors = uncertainty.information.standard_errors / (uncertainty.upper - uncertainty.lower)
         self.step = np.clip(STEP * errors, SMALLEST_STEP, LARGEST_STEP)[self.column]
         self.rise = np.repeat(rise, 2)
         self.open = np.ones(len(self.column), dtype=bool)
@@ -253,19 +253,21 @@ class _Lanes:
         start[pick, column] = target
         frozen = np.zeros(start.shape, dtype=bool)
         frozen[pick, column] = True
-        found = descend(self.known.likelihood.rows, start, frozen, tolerance=0.01, apart=self.known.likelihood.apart)
-        self.simulations += found.simulations
-        rise = (found.deviance - self.known.deviance) * self.scale[lanes]
+        descent = descend(
+            self.uncertainty.likelihood.rows, start, frozen, tolerance=0.01, apart=self.uncertainty.likelihood.apart
+        )
+        self.simulations += descent.simulations
+        rise = (descent.deviance - self.uncertainty.deviance) * self.scale[lanes]
         moved = target - here
         if (over := self._overshoots(rise, lanes) & (np.abs(moved) > 2 * SMALLEST_STEP)).any():
             self.step[lanes[over]] = np.abs(moved[over]) / 3
             fine = ~over
             lanes, rise, moved, target = lanes[fine], rise[fine], moved[fine], target[fine]
-            found = replace(found, unit=found.unit[fine], deviance=found.deviance[fine])
+            descent = replace(descent, unit=descent.unit[fine], deviance=descent.deviance[fine])
         with np.errstate(divide="ignore", invalid="ignore"):
-            slope = (found.unit - self.unit[lanes]) / moved[:, None]
+            slope = (descent.unit - self.unit[lanes]) / moved[:, None]
         self.slope[lanes] = np.where(np.isfinite(slope), slope, 0.0)
-        self.unit[lanes] = found.unit
+        self.unit[lanes] = descent.unit
         self._adapt(lanes, rise, moved)
         self.rise[lanes] = rise
         for lane, value, height in zip(lanes, target, rise, strict=True):
@@ -274,7 +276,7 @@ class _Lanes:
         ended = (rise > BEYOND * self.limit) | (target <= 0) | (target >= 1) | ~np.isfinite(rise)
         self.open[lanes[ended]] = False
         if rise.min(initial=0.0) < -BETTER:
-            self.better = found.unit[rise.argmin()]
+            self.better = descent.unit[rise.argmin()]
         return True
 
     def _overshoots(self, rise: np.ndarray, lanes: np.ndarray) -> np.ndarray:
@@ -300,10 +302,10 @@ class _Lanes:
             ends.append(end)
             limits.append(limit)
         joined = np.concatenate((sides[0][:0:-1], sides[1]))
-        low = self.known.lower[j]
-        scale = self.known.upper[j] - low
+        low = self.uncertainty.lower[j]
+        scale = self.uncertainty.upper[j] - low
         return Profile(
-            name=self.known.names[j],
+            name=self.uncertainty.names[j],
             values=low + scale * joined[:, 0],
             deviance=joined[:, 1],
             interval=(float(low + scale * limits[0]), float(low + scale * limits[1])),
@@ -325,9 +327,9 @@ class _Lanes:
     def _minima(self, path: np.ndarray) -> list[float]:
         """Places of local minima below the threshold, beyond a rise that is no ripple."""
         heights = path[:, 1]
-        found = []
+        minima = []
         for k in range(1, len(heights) - 1):
             crest = heights[:k].max()
             if heights[k] <= min(heights[k - 1], heights[k + 1], self.limit) and crest - heights[k] > RISE:
-                found.append(float(path[k, 0]))
-        return found
+                minima.append(float(path[k, 0]))
+        return minima

@@ -39,13 +39,12 @@ class Fit(Playback):
 
     role: str  # TRAIN or VALIDATE
 
-    @property
-    def told(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """As `result.json` has it."""
         record = self.event.record
-        made: dict[str, Any] = {"name": record.name, "role": self.role}
-        made |= {"epsilon_p": self.epsilon_p, "epsilon_q": self.epsilon_q, "Q_over_S": reactive_share(record)}
-        return made if self.epsilon_i is None else made | {"epsilon_i": self.epsilon_i, "unsettled": self.unsettled}
+        row: dict[str, Any] = {"name": record.name, "role": self.role}
+        row |= {"epsilon_p": self.epsilon_p, "epsilon_q": self.epsilon_q, "Q_over_S": reactive_share(record)}
+        return row if self.epsilon_i is None else row | {"epsilon_i": self.epsilon_i, "unsettled": self.unsettled}
 
 
 def by_event(values: Mapping[str, float], per_event: Mapping[str, Sequence[float]]) -> dict[str, float]:
@@ -75,7 +74,7 @@ def respond(model: Model, values: np.ndarray, event: Event, role: str) -> Fit:
 class Result:
     """The content of `result.json`. `model` and `before` are what it takes to simulate it again.
 
-    Parameters, errors, intervals and verdicts belong to the estimate; `search` is where the optimizer itself ended, and
+    Parameters, errors, intervals and verdicts belong to the estimate; `search` is where the optimizer itself end, and
     simulations, iterations, seconds and status are what it took to get there. Everything is on the record's own base;
     `own_base` says which that is, and `parameters_on_given_base` are the parameters on that of the file where it
     differs.
@@ -132,8 +131,8 @@ class Result:
     def on_given_base(self) -> str:
         """The parameters whose values are others on the file's base, in one line; "" where it is the record's own."""
         own = by_event(self.parameters, self.per_event)
-        told = [f"{n} = {v:.5g}" for n, v in self.parameters_on_given_base.items() if v != own[n]]
-        return f"on {self.base.file}: {', '.join(told)}" if told else ""
+        values = [f"{n} = {v:.5g}" for n, v in self.parameters_on_given_base.items() if v != own[n]]
+        return f"on {self.base.file}: {', '.join(values)}" if values else ""
 
     @property
     def free(self) -> dict[str, float]:
@@ -155,11 +154,11 @@ class Result:
     def acceptance(self) -> str:
         """Whether Eq. (20) accepts the model, in a sentence; where Q is small, what its error is divided by."""
         holds = "holds" if self.acceptable else "does NOT hold"
-        said = f"acceptance of Eq. (20), epsilon_p and epsilon_q below {in_percent(ACCEPTED)}: {holds}"
+        sentence = f"acceptance of Eq. (20), epsilon_p and epsilon_q below {in_percent(ACCEPTED)}: {holds}"
         shares = [e["Q_over_S"] for e in self.events if e["role"] == TRAIN and "Q_over_S" in e]
         if shares and min(shares) < SMALL_Q and self.epsilon_q >= ACCEPTED > self.epsilon_p:
-            said += f" (epsilon_q divides by Q alone, here {in_percent(min(shares))} of S)"
-        return said
+            sentence += f" (epsilon_q divides by Q alone, here {in_percent(min(shares))} of S)"
+        return sentence
 
     def write(self, path: Path) -> Path:
         """Write the file in one move, so that no half-written one is ever seen."""
@@ -187,8 +186,8 @@ class Result:
         nominal = 2 * np.pi * self.before["frequency"]
         omega_s = None if f is None else 2 * np.pi * np.asarray(f, dtype=float) - nominal
         ratio = self.base.ratio
-        known = {key: value / ratio for key, value in {"P0": P0, "Q0": Q0}.items() if value is not None}
-        before = self.before | known | {"U0": float(U[steady].mean())}
+        powers = {key: value / ratio for key, value in {"P0": P0, "Q0": Q0}.items() if value is not None}
+        before = self.before | powers | {"U0": float(U[steady].mean())}
         values = np.array([self.parameters[name] for name in model.names])
         omega_s0 = 0.0 if omega_s is None else float(omega_s[steady].mean())
         P, Q = domain_of(model).play(model, values, t, U, before, omega_s, omega_s0)
@@ -215,20 +214,20 @@ def load(path: Path) -> Result:
 
 def conclude(
     problem: Problem,
-    found: SearchResult,
+    end: SearchResult,
     validate: Sequence[Event],
     seed: int,
     settings: Mapping[str, Any],
     optimizer: str,
     estimate: np.ndarray | None = None,
 ) -> tuple[Result, list[Fit]]:
-    """Judge the free values `estimate` (d,) on the fitted and the held-out events, by default where the search ended.
+    """Judge the free values `estimate` (d,) on the fitted and the held-out events, by default where the search end.
 
     Raises `UserError` where no candidate at all had a steady state.
     """
-    refuse_nothing_found(problem, found)
+    refuse_nothing_found(problem, end)
     model = problem.model
-    free = found.values if estimate is None else estimate
+    free = end.values if estimate is None else estimate
     fits, epsilon_p, epsilon_q = fitted(problem, free)
     fits += [respond(model, problem.full(free)[0], event, VALIDATE) for event in validate]
     first, found_values = problem.events[0], _values(problem, free)
@@ -239,13 +238,13 @@ def conclude(
         objective=float(problem.objective(free[None])[0]),
         epsilon_p=epsilon_p,
         epsilon_q=epsilon_q,
-        simulations=found.simulations,
-        refused=found.refused,
-        iterations=found.iterations,
-        seconds=found.seconds,
-        status=found.status,
+        simulations=end.simulations,
+        refused=end.refused,
+        iterations=end.iterations,
+        seconds=end.seconds,
+        status=end.status,
         seed=seed,
-        events=[f.told for f in fits],
+        events=[f.to_dict() for f in fits],
         model_error=_model_error(fits),
         at_bound=at_bound(problem, free),
         units={p.name: p.unit for p in problem.parameters},
@@ -253,7 +252,7 @@ def conclude(
         model=dict(settings),
         before={"U0": first.U0, "P0": first.P0, "Q0": first.Q0, "frequency": first.record.base.frequency},
         optimizer=optimizer,
-        search=searched(problem, found),
+        search=searched(problem, end),
         notes=[note for f in fits for note in f.event.record.notes],
         records=[{"name": f.event.record.name, "role": f.role} | provenance.identity(f.event.record) for f in fits],
         own_base=asdict(own),
@@ -272,12 +271,12 @@ def _model_error(fits: Sequence[Fit]) -> dict[str, Any]:
     return {**fitted, "held_out": model_error(held_out).to_dict() if held_out else None, "events": each}
 
 
-def refuse_nothing_found(problem: Problem, found: SearchResult) -> None:
+def refuse_nothing_found(problem: Problem, end: SearchResult) -> None:
     """Raise `UserError` where no candidate at all had a steady state."""
-    if found.objective >= REFUSED:
-        why = problem.model.refusal(problem.full(found.values)[0], problem.drive) or "all diverged"
+    if end.objective >= REFUSED:
+        why = problem.model.refusal(problem.full(end.values)[0], problem.drive) or "all diverged"
         raise UserError(
-            f"none of the {found.simulations} parameter sets tried could be simulated: {why};"
+            f"none of the {end.simulations} parameter sets tried could be simulated: {why};"
             f" widen model.bounds or free model.fixed{_meant(problem)}"
         )
 
@@ -297,20 +296,20 @@ def fitted(problem: Problem, free: np.ndarray) -> tuple[list[Fit], float, float]
     return fits, relative_error(measured["P"], calculated["P"]), relative_error(measured["Q"], calculated["Q"])
 
 
-def searched(problem: Problem, found: SearchResult) -> dict[str, Any]:
-    """Where the optimizer itself ended, and what that took: what optimizers are compared by."""
-    _, epsilon_p, epsilon_q = fitted(problem, found.values)
+def searched(problem: Problem, end: SearchResult) -> dict[str, Any]:
+    """Where the optimizer itself end, and what that took: what optimizers are compared by."""
+    _, epsilon_p, epsilon_q = fitted(problem, end.values)
     return {
-        **_values(problem, found.values),
-        "objective": found.objective,
+        **_values(problem, end.values),
+        "objective": end.objective,
         "epsilon_p": epsilon_p,
         "epsilon_q": epsilon_q,
-        "simulations": found.simulations,
-        "seconds": found.seconds,
-        "refused": found.refused,
-        "iterations": found.iterations,
-        "status": found.status,
-        "at_bound": at_bound(problem, found.values),
+        "simulations": end.simulations,
+        "seconds": end.seconds,
+        "refused": end.refused,
+        "iterations": end.iterations,
+        "status": end.status,
+        "at_bound": at_bound(problem, end.values),
     }
 
 

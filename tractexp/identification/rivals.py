@@ -39,22 +39,27 @@ class RivalStructure:
         return {"name": self.name, "objective_ratio": self.squares, "parameters": self.values}
 
 
-def with_rivals(known: Uncertainty) -> Uncertainty:
+def with_rivals(uncertainty: Uncertainty) -> Uncertainty:
     """The judgement with the rival structures that fit as well as the model, or better."""
-    made = (_fitted(known, name, model) for name, model in _structures(known.likelihood.problem.model))
-    found = tuple(rival for rival in made if rival is not None)
-    return replace(known, rivals=found, verdicts=known.verdicts | dict(_moved(known, found)))
+    candidates = (
+        _fitted(uncertainty, name, model) for name, model in _structures(uncertainty.likelihood.problem.model)
+    )
+    fits = tuple(rival for rival in candidates if rival is not None)
+    return replace(uncertainty, rivals=fits, verdicts=uncertainty.verdicts | dict(_moved(uncertainty, fits)))
 
 
-def _moved(known: Uncertainty, rivals: Sequence[RivalStructure]) -> Iterator[tuple[str, ParameterVerdict]]:
+def _moved(uncertainty: Uncertainty, rivals: Sequence[RivalStructure]) -> Iterator[tuple[str, ParameterVerdict]]:
     """Verdicts of the parameters that a rival structure moves beyond their interval: the farthest is told."""
-    own = known.intervals
-    for j, (name, value) in enumerate(zip(known.names, known.values, strict=True)):
+    own = uncertainty.intervals
+    for j, (name, value) in enumerate(zip(uncertainty.names, uncertainty.values, strict=True)):
         there = [(rival.values[name], rival.name) for rival in rivals if name in rival.values]
         far, by = max(there, key=lambda one: abs(one[0] - value), default=(value, ""))
         if own[j, 0] <= far <= own[j, 1]:
             continue
-        verdict, narrow = known.verdicts[name], abs(far - value) <= WITHIN * size(value, known.lower[j], known.upper[j])
+        verdict, narrow = (
+            uncertainty.verdicts[name],
+            abs(far - value) <= WITHIN * size(value, uncertainty.lower[j], uncertainty.upper[j]),
+        )
         word = WEAK if verdict.word == IDENTIFIED and not narrow else verdict.word
         yield name, ParameterVerdict(word, f"{verdict.detail}; with {by} it is {far:.4g}")
 
@@ -72,9 +77,9 @@ def _structures(model: Model) -> Iterator[tuple[str, Model]]:
             yield name, compose(model.motor, model.static, [*model.effects, cls()], model.integration, model.domain)
 
 
-def _fitted(known: Uncertainty, name: str, model: Model) -> RivalStructure | None:
+def _fitted(uncertainty: Uncertainty, name: str, model: Model) -> RivalStructure | None:
     """A rival fitted from where the model's own fit ended; None where it cannot be, or fits worse."""
-    problem = known.likelihood.problem
+    problem = uncertainty.likelihood.problem
     own = {p.name: p.bounds for p in problem.parameters if p.name in model.names}
     fixed = {n: value for n, value in problem.fixed.items() if n in model.names}
     per_event = [n for n in problem.per_event if n in model.names]
@@ -83,23 +88,25 @@ def _fitted(known: Uncertainty, name: str, model: Model) -> RivalStructure | Non
         other = Problem(model, problem.events, own, fixed, substeps, per_event, problem.loss)
     except UserError:
         return None
-    likelihood = Likelihood(other, known.likelihood.noise, known.likelihood.known, known.likelihood.initial_power)
-    start = likelihood.placed(_starts(known, other))
-    if known.exact:
-        start[:, likelihood.free :] = known.unit[known.likelihood.free :]
+    likelihood = Likelihood(
+        other, uncertainty.likelihood.noise, uncertainty.likelihood.valid, uncertainty.likelihood.initial_power
+    )
+    start = likelihood.placed(_starts(uncertainty, other))
+    if uncertainty.exact:
+        start[:, likelihood.free :] = uncertainty.unit[uncertainty.likelihood.free :]
     ended = descend(likelihood.rows, start, iterations=ITERATIONS, tolerance=0.01, apart=likelihood.apart)
     best = int(ended.deviance.argmin())
-    if not ended.deviance[best] < known.deviance + threshold():
+    if not ended.deviance[best] < uncertainty.deviance + threshold():
         return None
     values = dict(zip(other.space.names, likelihood.values(ended.unit[best]).tolist(), strict=True))
-    shared = {n: value for n, value in values.items() if n in known.names}
-    return RivalStructure(name, float(ended.deviance[best] / max(known.deviance, 1e-30)), shared)
+    shared = {n: value for n, value in values.items() if n in uncertainty.names}
+    return RivalStructure(name, float(ended.deviance[best] / max(uncertainty.deviance, 1e-30)), shared)
 
 
-def _starts(known: Uncertainty, other: Problem) -> np.ndarray:
+def _starts(uncertainty: Uncertainty, other: Problem) -> np.ndarray:
     """Points (n, free) of a rival's box: the shared parameters as estimated, its own as usual and all over."""
     names, parameters = other.space.names, {p.name: p for p in other.parameters}
-    shared = dict(zip(known.names, known.values, strict=True))
+    shared = dict(zip(uncertainty.names, uncertainty.values, strict=True))
     alone = [k for k, n in enumerate(names) if n not in shared]
     usual = np.array([shared.get(n, parameters[n.partition("[")[0]].default) for n in names])
     start = np.tile(other.space.to_unit(usual), (STARTS + 1, 1))

@@ -97,12 +97,12 @@ def _influences(
     flat = own.reshape(-1, len(columns))
     whole, cross = flat.T @ flat, flat.T @ before.reshape(len(flat), -1)
     scale = np.sqrt(np.maximum(np.diag(whole), 1e-300))
-    made = []
+    moves = []
     for block, change in zip(blocks, power, strict=True):
         a, r = own[:, block].reshape(-1, len(columns)), rows[:, block].ravel()
         rest = (whole - a.T @ a) / np.outer(scale, scale)
-        made.append(np.linalg.pinv(rest, STRUCTURAL**2, hermitian=True) @ ((a.T @ r - cross @ change) / scale) / scale)
-    return np.clip(made, -1.0, 1.0)  # no estimate leaves its box
+        moves.append(np.linalg.pinv(rest, STRUCTURAL**2, hermitian=True) @ ((a.T @ r - cross @ change) / scale) / scale)
+    return np.clip(moves, -1.0, 1.0)  # no estimate leaves its box
 
 
 def _root(J: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:

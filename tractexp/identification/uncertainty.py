@@ -53,13 +53,13 @@ class Uncertainty:
     of_noise: Likelihood
     notes: list[str]
     profiled: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # intervals that replace the curvature's
-    valleys: tuple[LocalMinimum, ...] = ()  # others that fit as well
+    local_minima: tuple[LocalMinimum, ...] = ()  # others that fit as well
     rivals: "tuple[RivalStructure, ...]" = ()  # structures that fit as well
 
     @property
     def elsewhere(self) -> np.ndarray:
         """(d,) Whether another valley has another value than the interval by curvature holds."""
-        values = np.array([valley.values for valley in self.valleys]).reshape(-1, len(self.names))
+        values = np.array([minimum.values for minimum in self.local_minima]).reshape(-1, len(self.names))
         return np.any(np.abs(values - self.values) > self.half, axis=0)
 
     @property
@@ -110,8 +110,8 @@ class Uncertainty:
         ends = self.values[:, None] + self.half[:, None] * [-1.0, 1.0]
         for name, interval in self.profiled.items():
             ends[self.names.index(name)] = interval
-        for valley in self.valleys:
-            ends = np.stack([np.minimum(ends[:, 0], valley.values), np.maximum(ends[:, 1], valley.values)], axis=1)
+        for minimum in self.local_minima:
+            ends = np.stack([np.minimum(ends[:, 0], minimum.values), np.maximum(ends[:, 1], minimum.values)], axis=1)
         own = ends.copy()
         for rival in () if self.exact else self.rivals:
             there = [rival.values.get(n, value) for n, value in zip(self.names, self.values.tolist(), strict=True)]
@@ -198,7 +198,7 @@ def test(likelihood: Likelihood, rows: np.ndarray) -> list[dict[str, Any]]:
     for e, event in enumerate(likelihood.problem.events):
         part = drive.part(e)
         for c, channel in enumerate(drive.names):
-            seen = white[c, part][likelihood.known[c, part]]
+            seen = white[c, part][likelihood.valid[c, part]]
             if len(seen) < FEWEST:
                 continue
             order = likelihood.noise.pair(e)[c].order
@@ -224,8 +224,8 @@ def describe_noise(likelihood: Likelihood) -> list[dict[str, Any]]:
                     "order": pair[c].order,
                     "correlation": 0.0 if pair[c].white else float(pair[c].coefficients[1, 0].real),
                     "between_P_and_Q": float(cross),
-                    "wanders": noise.wander is not None,
-                    "of_the_voltage": float(np.sqrt(noise.loudest_blur)),
+                    "wanders": noise.random_walk is not None,
+                    "of_the_voltage": float(np.sqrt(noise.loudest_input_mode)),
                 }
             )
     return rows

@@ -87,16 +87,16 @@ def _trade(information: Information, j: int, factor: float) -> list[str]:
     if not partners:
         return []
     named = " and ".join(f"{information.names[k]} (correlation {_number(correlation[k])})" for k in partners)
-    said, k = [f"trades against {named}"], partners[0]
+    sentence, k = [f"trades against {named}"], partners[0]
     covariance, values = information.covariance, information.values
     if values[j] > 0 and values[k] > 0:
         exponents = np.zeros(len(values))
         exponents[j], exponents[k] = 1.0, -covariance[j, k] / covariance[k, k] * values[k] / values[j]
-        known = factor * information.relative_error(exponents)
-        if known > WITHIN or abs(exponents[k]) > STEEPEST or abs(exponents[k]) < 1 / STEEPEST:
-            return said  # a combination that is hardly known, or that nobody would think in
-        said.append(f"{combination(information.names, exponents)} is known to ± {100 * known:.2g} %")
-    return said
+        error = factor * information.relative_error(exponents)
+        if error > WITHIN or abs(exponents[k]) > STEEPEST or abs(exponents[k]) < 1 / STEEPEST:
+            return sentence  # a combination that is hardly known, or that nobody would think in
+        sentence.append(f"{combination(information.names, exponents)} is known to ± {100 * error:.2g} %")
+    return sentence
 
 
 def _number(correlation: float) -> str:
@@ -113,14 +113,14 @@ def _structural(information: Information, unseen: np.ndarray, j: int) -> str:
     if len(members) == 1:
         return "the record does not change with it at all"
     moves = ", ".join(f"{names[k]} {direction[k]:+.3g} %" for k in members)
-    said = f"{moves}, changed together, leave the record unchanged"
+    sentence = f"{moves}, changed together, leave the record unchanged"
     seen = []
     for k in members[members != pivot]:
         exponents = np.zeros(len(names))
         exponents[pivot], exponents[k] = -direction[k], 1.0
         if np.abs(unseen @ exponents).max() < SHARE:
             seen.append(combination(names, exponents))
-    return said + (f"; what it sees is {', '.join(seen)}" if seen else "")
+    return sentence + (f"; what it sees is {', '.join(seen)}" if seen else "")
 
 
 def combination(names: Sequence[str], exponents: np.ndarray) -> str:

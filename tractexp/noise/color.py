@@ -37,17 +37,17 @@ class Autoregression:
         """The same color, `factor` times as loud."""
         return Autoregression(self.coefficients, self.deviation * factor)
 
-    def whiten(self, rows: np.ndarray, known: np.ndarray) -> np.ndarray:
-        """Rows (..., N) to prediction errors of unit variance (..., N); 0 where `known` (N,) is False.
+    def whiten(self, rows: np.ndarray, valid: np.ndarray) -> np.ndarray:
+        """Rows (..., N) to prediction errors of unit variance (..., N); 0 where `valid` (N,) is False.
 
         A gap ends the memory: the samples after it are predicted from fewer predecessors.
         """
         if self.white:
-            return np.where(known, rows, 0.0) / self.deviation[0]
-        history = np.minimum(_run_lengths(known), self.order)
+            return np.where(valid, rows, 0.0) / self.deviation[0]
+        history = np.minimum(_run_lengths(valid), self.order)
         white = np.zeros_like(rows)
         for k in range(self.order + 1):
-            at = np.flatnonzero(known & (history == k))
+            at = np.flatnonzero(valid & (history == k))
             if not len(at):
                 continue
             whole = len(at) == at[-1] - at[0] + 1  # consecutive samples are read without a copy
@@ -102,9 +102,9 @@ def fit_autoregression(
     return Autoregression(coefficients, np.sqrt(variance[: order + 1]))
 
 
-def stretches(values: np.ndarray, known: np.ndarray) -> list[np.ndarray]:
+def stretches(values: np.ndarray, valid: np.ndarray) -> list[np.ndarray]:
     """The unbroken parts of `values` (N,)."""
-    return [values[part] for part in runs(known)]
+    return [values[part] for part in runs(valid)]
 
 
 def runs(mask: np.ndarray) -> list[slice]:
@@ -113,9 +113,9 @@ def runs(mask: np.ndarray) -> list[slice]:
     return [slice(a, b) for a, b in edges.reshape(-1, 2)]
 
 
-def _run_lengths(known: np.ndarray) -> np.ndarray:
+def _run_lengths(valid: np.ndarray) -> np.ndarray:
     """How many known samples directly precede each sample, (N,)."""
-    index = np.arange(len(known))
-    last_gap = np.maximum.accumulate(np.where(known, -1, index))
+    index = np.arange(len(valid))
+    last_gap = np.maximum.accumulate(np.where(valid, -1, index))
     before = np.concatenate(([-1], last_gap[:-1]))
     return index - 1 - before

@@ -33,8 +33,8 @@ class Noise:
     pairs: tuple[Pair, ...]
     mix: np.ndarray | None = None  # (C, C)
     shocks: tuple[np.ndarray, ...] | None = None  # of unit variance, as they were seen; None: normal
-    wander: RandomWalk | None = None  # of the mixed channels
-    blur: np.ndarray | None = None  # (k, C, N) pu: what errors of the voltage do, each of one standard deviation
+    random_walk: RandomWalk | None = None  # of the mixed channels
+    input_modes: np.ndarray | None = None  # (k, C, N) pu: what errors of the voltage do, each of one standard deviation
     vector: bool = False  # the first two channels are a space vector, whose autoregression is complex
     _shrunk: dict[int, Shrunk] = field(default_factory=dict, init=False)
 
@@ -56,52 +56,57 @@ class Noise:
         return Noise((self.pair(event),), self.mix, vector=self.vector)
 
     @functools.cached_property
-    def loudest_blur(self) -> float:
+    def loudest_input_mode(self) -> float:
         """The largest variance that noise of the voltage causes at any sample, over that of the power."""
-        return 0.0 if self.blur is None else float((self._mixed(self.blur) ** 2).sum(axis=0).max())
+        return 0.0 if self.input_modes is None else float((self._mixed(self.input_modes) ** 2).sum(axis=0).max())
 
     def scaled(self, factor: float) -> "Noise":
         """The same noise, `factor` times as loud."""
-        wander = self.wander and replace(self.wander, intensity=self.wander.intensity * factor**2)
+        random_walk = self.random_walk and replace(self.random_walk, intensity=self.random_walk.intensity * factor**2)
         pairs = tuple(tuple(channel.scaled(factor) for channel in pair) for pair in self.pairs)
-        made = replace(self, pairs=pairs, wander=wander, blur=None if self.blur is None else self.blur * factor)
-        made._shrunk.update(self._shrunk)  # shapes and noise keep their ratio
-        return made
+        louder = replace(
+            self,
+            pairs=pairs,
+            random_walk=random_walk,
+            input_modes=None if self.input_modes is None else self.input_modes * factor,
+        )
+        louder._shrunk.update(self._shrunk)  # shapes and noise keep their ratio
+        return louder
 
-    def on(self, load: Load, blur: np.ndarray | None = None) -> "Noise":
+    def on(self, load: Load, input_modes: np.ndarray | None = None) -> "Noise":
         """The same noise on other events: their power, and what errors of their voltage do."""
-        wander = None if self.wander is None else replace(self.wander, load=load)
-        return replace(self, wander=wander, blur=blur)
+        random_walk = None if self.random_walk is None else replace(self.random_walk, load=load)
+        return replace(self, random_walk=random_walk, input_modes=input_modes)
 
-    def whiten(self, residuals: np.ndarray, drive: Drive, known: np.ndarray) -> np.ndarray:
-        """(n, C, N) to rows (n, C N) of independent unit variance; samples that are not `known` (C, N) are 0."""
-        known = self._together(known, drive)
+    def whiten(self, residuals: np.ndarray, drive: Drive, valid: np.ndarray) -> np.ndarray:
+        """(n, C, N) to rows (n, C N) of independent unit variance; samples that are not `valid` (C, N) are 0."""
+        valid = self._together(valid, drive)
         rows = np.empty_like(residuals)
         with np.errstate(over="ignore", invalid="ignore"):  # what diverges has a deviance that is not finite
             mixed = self._mixed(residuals)
             for e in range(drive.events):
                 part = drive.part(e)
-                white = self._fast(mixed[:, :, part], known[:, part], e)
-                rows[:, :, part] = self._without_shapes(white, known[:, part], part, e)
+                white = self._fast(mixed[:, :, part], valid[:, part], e)
+                rows[:, :, part] = self._without_shapes(white, valid[:, part], part, e)
         return rows.reshape(len(rows), -1)
 
-    def prepare(self, drive: Drive, known: np.ndarray) -> None:
+    def prepare(self, drive: Drive, valid: np.ndarray) -> None:
         """Make ready what `whiten` keeps of the shapes, once, where many threads are about to call it."""
-        known = self._together(known, drive)
+        valid = self._together(valid, drive)
         for e in range(drive.events):
-            self._kept(known[:, drive.part(e)], drive.part(e), e)
+            self._shrinkage(valid[:, drive.part(e)], drive.part(e), e)
 
-    def _together(self, known: np.ndarray, drive: Drive) -> np.ndarray:
+    def _together(self, valid: np.ndarray, drive: Drive) -> np.ndarray:
         """Samples (C, N) that count where channels are mixed: those at which all count that are measured.
 
         The mixing of currents is triangular, so that an event without the last, of zero sequence, has the others.
         """
         if self.mix is None:
-            return known
+            return valid
         if self.channels > 2 and drive.events > 1:
-            parts = [known[:, drive.part(e)] for e in range(drive.events)]
+            parts = [valid[:, drive.part(e)] for e in range(drive.events)]
             return np.concatenate([_all_measured(part) for part in parts], axis=1)
-        return _all_measured(known)
+        return _all_measured(valid)
 
     def draw(self, rng: np.random.Generator, count: int, lengths: Sequence[int]) -> np.ndarray:
         """Noise of events of these lengths end to end, (count, C, N) [pu]."""
@@ -165,41 +170,41 @@ class Noise:
         """Channels (n, C, N) mixed so that their noise is independent."""
         return rows if self.mix is None else self.mix @ rows
 
-    def _fast(self, mixed: np.ndarray, known: np.ndarray, event: int) -> np.ndarray:
+    def _fast(self, mixed: np.ndarray, valid: np.ndarray, event: int) -> np.ndarray:
         """Mixed channels (n, C, samples) of one event without the color of the fast noise."""
         pair, rows = self.pair(event), []
         if self.vector:
-            white = pair[0].whiten(mixed[:, 0] + 1j * mixed[:, 1], known[0])
+            white = pair[0].whiten(mixed[:, 0] + 1j * mixed[:, 1], valid[0])
             rows = [np.real(white), np.imag(white)]
-        rows += [channel.whiten(mixed[:, c], known[c]) for c, channel in enumerate(pair) if c >= len(rows)]
+        rows += [channel.whiten(mixed[:, c], valid[c]) for c, channel in enumerate(pair) if c >= len(rows)]
         return np.stack(rows, axis=1)
 
-    def _without_shapes(self, white: np.ndarray, known: np.ndarray, part: slice, event: int) -> np.ndarray:
+    def _without_shapes(self, white: np.ndarray, valid: np.ndarray, part: slice, event: int) -> np.ndarray:
         """Whitened rows (n, C, samples) of an event without the excess variance of its shapes.
 
         With B the whitened shapes, (I + B'B)^(-1/2) by their singular vectors.
         """
-        if (kept := self._kept(known, part, event)) is None:
+        if (shrinkage := self._shrinkage(valid, part, event)) is None:
             return white
-        basis, share = kept
+        basis, share = shrinkage
         flat = white.reshape(len(white), -1)
         return (flat - ((flat @ basis.T) * share) @ basis).reshape(white.shape)
 
-    def _kept(self, known: np.ndarray, part: slice, event: int) -> Shrunk | None:
+    def _shrinkage(self, valid: np.ndarray, part: slice, event: int) -> Shrunk | None:
         """The shapes of an event as whitening takes them out, decomposed once; None where there are none."""
-        if self.wander is None and self.blur is None:
+        if self.random_walk is None and self.input_modes is None:
             return None
         if event not in self._shrunk:
-            self._shrunk[event] = _shrunk(self._fast(self._shapes(part, event), known, event))
+            self._shrunk[event] = _shrunk(self._fast(self._shapes(part, event), valid, event))
         return self._shrunk[event]
 
     def _shapes(self, part: slice, event: int) -> np.ndarray:
         """Shapes (k, C, samples) of the mixed channels in one event, of one standard deviation each, in their order."""
         shapes = [np.empty((0, self.channels, part.stop - part.start))]
-        if self.wander is not None:
-            shapes.append(self.wander.modes(event, part, np.eye(self.channels) if self.mix is None else self.mix))
-        if self.blur is not None:
-            shapes.append(self._mixed(self.blur[:, :, part]))
+        if self.random_walk is not None:
+            shapes.append(self.random_walk.modes(event, part, np.eye(self.channels) if self.mix is None else self.mix))
+        if self.input_modes is not None:
+            shapes.append(self._mixed(self.input_modes[:, :, part]))
         return np.concatenate(shapes)
 
     def _drawn(self, rng: np.random.Generator, count: int, part: slice, event: int) -> np.ndarray:
@@ -218,10 +223,10 @@ class Noise:
         return np.stack(colored, axis=1) + np.einsum("bk,kct->bct", rng.standard_normal((count, len(shapes))), shapes)
 
 
-def _all_measured(known: np.ndarray) -> np.ndarray:
+def _all_measured(valid: np.ndarray) -> np.ndarray:
     """Samples (C, n) at which every channel counts that counts at all."""
-    measured = np.any(known, axis=1)
-    return np.all(known[measured], axis=0) & measured[:, None]
+    measured = np.any(valid, axis=1)
+    return np.all(valid[measured], axis=0) & measured[:, None]
 
 
 def _shrunk(shapes: np.ndarray) -> Shrunk:

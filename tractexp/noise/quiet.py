@@ -34,18 +34,18 @@ def quiet_stretches(events: Sequence[Event], drive: Drive) -> list[slice]:
 
 def estimate(
     residuals: np.ndarray,
-    known: np.ndarray,
+    valid: np.ndarray,
     quiet: Sequence[slice],
-    wander: Callable[[np.ndarray], RandomWalk | None] = lambda mix: None,
-    blur: np.ndarray | None = None,
+    random_walk: Callable[[np.ndarray], RandomWalk | None] = lambda mix: None,
+    input_modes: np.ndarray | None = None,
     highest: int = HIGHEST,
 ) -> Noise:
-    """Noise from residuals (C, N) in quiet stretches; `wander` tells how the load wanders in channels mixed by `mix`.
+    """Noise from residuals (C, N) in quiet stretches; `random_walk` is that of the load in channels mixed by `mix`.
 
     Raises `UserError` where too few samples are quiet.
     """
-    measured = np.any(known, axis=1)
-    both = np.all(known[measured], axis=0)
+    measured = np.any(valid, axis=1)
+    both = np.all(valid[measured], axis=0)
     pieces = [residuals[measured, part][:, both[part]] for part in quiet]
     count = sum(p.shape[1] for p in pieces)
     if count < FEWEST:
@@ -60,17 +60,17 @@ def estimate(
     fast = [[(own @ p)[c] for p in pieces] for c in range(len(own))]
     mix = np.eye(len(measured))
     mix[np.ix_(measured, measured)] = own
-    slow = wander(mix)
+    slow = random_walk(mix)
     if slow is not None:
         fast = [[without_slow(p) for p in channel] for channel in fast]
     # Sparing, because a color that is not there changes the weight of slow differences, which every effect makes.
-    found = [fit_autoregression(channel, highest, sparing=True) for channel in fast]
+    fitted = [fit_autoregression(channel, highest, sparing=True) for channel in fast]
     shocks = None
     if count >= MANY and measured.all():
-        shocks = tuple(map(_shocks, found, fast))
-    colors = iter(found)
+        shocks = tuple(map(_shocks, fitted, fast))
+    colors = iter(fitted)
     pair = tuple(next(colors) if there else white_noise(1.0) for there in measured)
-    return Noise((pair,), mix, shocks, slow, blur)
+    return Noise((pair,), mix, shocks, slow, input_modes)
 
 
 def louder(late: Sequence[np.ndarray], calm: Sequence[np.ndarray], level: float = LOUDER) -> bool:

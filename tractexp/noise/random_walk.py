@@ -123,13 +123,13 @@ def find(
     total = np.array([_likelihood([s[c] for s in stretches], fast[c], step) for c in (0, 1)])
     total -= total[:, :1]
     most = [_last(row, less) for row in total]
-    found = RandomWalk(GRID[most], step, load)
+    walk = RandomWalk(GRID[most], step, load)
     if 2 * total.max() >= seen:
-        return found
+        return walk
     rest = np.array([sum(_within(r, c, fast[c], step) for r in rests) * np.ones(len(GRID)) for c in (0, 1)])
     both = total + rest - rest[:, :1]
     gained = max(2 * row[: last + 1].max() for row, last in zip(both, most, strict=True))
-    return found if gained - within >= seen else None
+    return walk if gained - within >= seen else None
 
 
 def walk_of_load(

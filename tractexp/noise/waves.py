@@ -24,18 +24,18 @@ FINER = np.geomspace(FLOORS[1], 1 / FLOORS[1], 15)  # times the best of these
 
 def of_waves(
     residuals: np.ndarray,
-    known: np.ndarray,
+    valid: np.ndarray,
     quiet: Sequence[slice],
     answers: Sequence[np.ndarray],
     phases: int,
-    blur: np.ndarray | None = None,
+    input_modes: np.ndarray | None = None,
 ) -> Noise:
     """Noise from residuals (3, N) in quiet stretches.
 
     `answers` has, for the space vector and for the zero sequence, the currents (L,) [pu] that one standard deviation of
     a voltage's sample causes at the samples from then on. Raises `UserError` where too few samples are quiet.
     """
-    measured = np.any(known, axis=1)
+    measured = np.any(valid, axis=1)
     count = sum(part.stop - part.start for part in quiet)
     if count < FEWEST:
         raise UserError(
@@ -43,11 +43,11 @@ def of_waves(
             " needed; give records that start earlier"
         )
     vector = residuals[0] + 1j * residuals[1] if phases == 3 else residuals[0]
-    first = _fitted([vector[part][known[0, part]] for part in quiet], answers[0])
+    first = _fitted([vector[part][valid[0, part]] for part in quiet], answers[0])
     pair = [first, first if phases == 3 else white_noise(1.0), white_noise(1.0)]
     if measured[2]:
-        pair[2] = _fitted([residuals[2, part][known[2, part]] for part in quiet], answers[1])
-    return Noise((tuple(pair),), np.eye(3), blur=blur, vector=phases == 3)
+        pair[2] = _fitted([residuals[2, part][valid[2, part]] for part in quiet], answers[1])
+    return Noise((tuple(pair),), np.eye(3), input_modes=input_modes, vector=phases == 3)
 
 
 def _fitted(pieces: Sequence[np.ndarray], answer: np.ndarray) -> Autoregression:
@@ -62,9 +62,9 @@ def _fitted(pieces: Sequence[np.ndarray], answer: np.ndarray) -> Autoregression:
     def of(share: float, floor: float) -> tuple[float, float, float, Autoregression]:
         whole = share**2 * passed
         whole[0] += (floor * level) ** 2
-        made = predicted(whole)
-        price = sum(_surprise(made, piece, per) for piece in pieces) - CLEARLY * (share == 1.0)
-        return price, share, floor, made
+        color = predicted(whole)
+        price = sum(_surprise(color, piece, per) for piece in pieces) - CLEARLY * (share == 1.0)
+        return price, share, floor, color
 
     tried = [of(share, floor) for share in shares for floor in (FLOORS if share else (1.0,))]
     best = min(tried, key=lambda t: t[:3])
@@ -73,10 +73,10 @@ def _fitted(pieces: Sequence[np.ndarray], answer: np.ndarray) -> Autoregression:
     return best[3]
 
 
-def _surprise(made: Autoregression, piece: np.ndarray, per: int) -> float:
+def _surprise(color: Autoregression, piece: np.ndarray, per: int) -> float:
     """Minus twice the log-likelihood of a stretch (n,)."""
-    white = made.whiten(piece, np.ones(len(piece), dtype=bool))
-    errors = np.log(made.deviation[np.minimum(np.arange(len(piece)), made.order)])
+    white = color.whiten(piece, np.ones(len(piece), dtype=bool))
+    errors = np.log(color.deviation[np.minimum(np.arange(len(piece)), color.order)])
     return float(np.sum(np.abs(white) ** 2) + 2 * per * errors.sum())
 
 

@@ -2,7 +2,7 @@
 
 With a window h, U = h * u and I = h * i are recorded, and P + jQ = U conj(I). A load whose current is linear in the
 voltage would not show it; any other does wherever the voltage bends. u is computed back from U near the edges of the
-dip, where it is free to bend; the current a model draws at u is then average as the recorder does.
+dip, where it is free to bend; the current a model draws at u is then averaged as the recorder does.
 
 Source: IEC/IEEE 60255-118-1. Departures: the angle of the voltage is taken as steady over a window.
 """
@@ -39,11 +39,11 @@ class Window:
     def on(self, step: float) -> np.ndarray:
         """Weights (odd,) of samples `step` [s] apart, for what is linear between them."""
         reach = int(np.ceil(np.abs(self.at).max() / step - 1e-9))
-        weights = np.zeros(2 * reach + 2)
+        made = np.zeros(2 * reach + 2)
         whole, part = np.divmod(self.at / step, 1)
-        np.add.at(weights, whole.astype(int) + reach, (1 - part) * self.weights)
-        np.add.at(weights, whole.astype(int) + reach + 1, part * self.weights)
-        return weights[:-1]
+        np.add.at(made, whole.astype(int) + reach, (1 - part) * self.weights)
+        np.add.at(made, whole.astype(int) + reach + 1, part * self.weights)
+        return made[:-1]
 
     def to_dict(self) -> dict[str, Any]:
         """As plain data."""
@@ -51,7 +51,7 @@ class Window:
 
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> "Window":
-        """From the content of `to_dict`; any other raises `ValueError`, `TypeError`, `KeyError` or `OverflowError`."""
+        """What `to_dict` told; of anything else a `ValueError`, `TypeError`, `KeyError` or `OverflowError`."""
         at, weights = (np.array(content[key], dtype=float) for key in ("at", "weights"))
         if at.ndim != 1 or at.shape != weights.shape or len(at) < 2 or not np.isfinite(weights).all():
             raise ValueError("times and weights are two lists of as many numbers")

@@ -102,8 +102,8 @@ def report(outcome: "Outcome") -> Report:
     """The investigation, for a reader who was not there."""
     found = outcome.steps
     title = ", ".join(e.record.name for e in outcome.question.train)
-    events = len(found.bench.events)
-    lead = f"{found.bench.model.title}, {events} event{'s' * (events > 1)} fitted, {len(found.withheld)} held out"
+    events = len(found.context.events)
+    lead = f"{found.context.model.title}, {events} event{'s' * (events > 1)} fitted, {len(found.withheld)} held out"
     made = Report(f"Missing effect: {title}", lead)
     spoken = [joined([found.catalogue.spoken(name) for name in names]) for names in found.verdict.sets]
     head = f"{found.verdict.word.upper()} {' or '.join(spoken)}".strip()
@@ -140,7 +140,7 @@ def _smaller(made: Report, outcome: "Outcome") -> None:
     found = outcome.steps
     made.heading("How large the gap is" if not found.names else "How much smaller the gap is")
     table, near = gap(outcome), found.verdict.nearest
-    made.add(replace(table, rows=_with_nearest(near)) if found.bench.waves and near else table)
+    made.add(replace(table, rows=_with_nearest(near)) if found.context.waves and near else table)
     if found.fitted_to_both:
         made.text("The extended model was fitted to the held-out events, too: what they say of it is no test of it.")
 
@@ -234,9 +234,9 @@ def _forms(made: Report, found: Findings) -> None:
         words=(1, 2, 3, 4),
     )  # fmt: skip
     for form in told:
-        if form.found is not None:
+        if form.law_fit is not None:
             made.chart(
-                _curve(form.found),
+                _curve(form.law_fit),
                 f"{form.name}: the law found, with its 95 % band, beside the catalogue's as it fits these events best.",
             )
 
@@ -308,7 +308,7 @@ def _bars_caption(found: Findings, rows: Sequence[Evidence]) -> str:
     chance = f"{chance_level(found):.1f}, what chance gives to the most helpful of all in"
     return (
         f"By how much each alone lowers the deviance of the base model ({', '.join(colors)}). Dashed: {chance}"
-        f" {found.bench.criteria.false_alarms:.0%} of cases."
+        f" {found.context.criteria.false_alarms:.0%} of cases."
     )
 
 
@@ -380,10 +380,10 @@ def _equations(made: Report, found: Findings) -> None:
     if others := [joined(names) for names in found.verdict.sets[1:]]:
         made.text(f"It has {joined(found.names)}; {joined(others, 'or')} instead would fit these events as well.")
     made.text(
-        f"conf/model/extended.yaml beside this page: {use_of(found.bench.load.domain, 'conf')}. Its equations"
+        f"conf/model/extended.yaml beside this page: {use_of(found.context.load.domain, 'conf')}. Its equations"
         " that changed or came in:"
     )
-    base = found.bench.load
+    base = found.context.load
     effects = [found.catalogue[n].effect for n in found.names]
     extended = compose(base.motor, base.static, [*base.effects, *effects], domain=base.domain)
     for was, line in changed(base.latex(), extended.latex()):
@@ -402,7 +402,7 @@ def _disagreement(made: Report, found: Findings) -> None:
     text = f"What the base model leaves would come about by chance with a probability of {in_words(first.p_left)}"
     text += "." if first.adequate else f"; the most surprised of the tests looks for {first.loudest}."
     if first.scores:
-        best, alpha = first.scores[0], found.bench.criteria.false_alarms
+        best, alpha = first.scores[0], found.context.criteria.false_alarms
         text += (
             f" The effect that promises most in one linear step, {best.name}, would lower the deviance by"
             f" {best.drop:.1f}, with a probability of {in_words(best.p)} by chance; chance gives less than"
@@ -416,14 +416,14 @@ def _disagreement(made: Report, found: Findings) -> None:
         ["event", "channel", "from [s]", "to [s]", "share of the excess"],
         [[p.event, p.channel, f"{p.start:.3f}", f"{p.end:.3f}", f"{p.share:.0%}"] for p in found.places],
         "Intervals in which the base model leaves more than chance does, at a family-wise error of"
-        f" {found.bench.criteria.false_alarms:.0%}; shaded in the charts.", words=(1,),
+        f" {found.context.criteria.false_alarms:.0%}; shaded in the charts.", words=(1,),
     )  # fmt: skip
 
 
 def _noise(made: Report, found: Findings) -> None:
-    level, free = found.bench.describe(found.last.noise), joined(found.catalogue.of_measurement)
-    if found.bench.waves:
-        unjudged = found.last.noise.loudest_blur > found.bench.criteria.blurred
+    level, free = found.context.describe(found.last.noise), joined(found.catalogue.of_measurement)
+    if found.context.waves:
+        unjudged = found.last.noise.loudest_input_mode > found.context.criteria.blurred
         how = (
             "and not judged: these offsets and edges would pass for them" if unjudged else "each held by what is likely"
         )
@@ -435,7 +435,7 @@ def _noise(made: Report, found: Findings) -> None:
         " so contains what smoothing leaves of the voltage's noise. Time skew, measurement window and load drift are"
         " free in every fit, each held by what is physically likely."
     )
-    if (window := found.bench.records.window) is not None:
+    if (window := found.context.records.window) is not None:
         model = " The extended configuration does not do so." if found.names else ""
         made.text(
             f"{window.describe().capitalize()}, of voltage and current alike: any other window would"

@@ -258,11 +258,11 @@ def _left(made: Report, known: Uncertainty) -> None:
     made.text(_conclusion(colored, len(tests)))
     for e, event in enumerate(events[:SHOWN]):
         part = drive.part(e)
-        compared = [c for c in range(drive.channels) if likelihood.known[c, part].any()]
+        compared = [c for c in range(drive.channels) if likelihood.valid[c, part].any()]
         chart = Chart("t [s]", [f"{drive.names[c]} [σ]" for c in compared], pixels=320)
         lags = Chart("lag [samples]", ["autocorrelation"], pixels=320)
         for panel, c in enumerate(compared):
-            name, color, seen = drive.names[c], CHANNELS[c], likelihood.known[c, part]
+            name, color, seen = drive.names[c], CHANNELS[c], likelihood.valid[c, part]
             rows = white[c, part][seen]
             chart.line(name, event.record.t[seen], rows, color, panel, width=0.8)
             x = np.arange(1, min(LAGS, len(rows) // 4) + 1)

@@ -5,7 +5,7 @@ import numpy as np
 from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import PALETTE
-from tractexp.discrepancy.next_event.choose import NextEvent, TestedEvent
+from tractexp.discrepancy.next_event.choose import EventTrial, NextEvent
 from tractexp.discrepancy.next_event.separation import Chances
 from tractexp.wording import as_sentence
 
@@ -72,12 +72,12 @@ def _chart(found: NextEvent) -> Chart:
     return chart.level(100 * found.criteria.decided).limits(0, -3, 103)
 
 
-def _chances(found: NextEvent, tried: TestedEvent) -> Chances:
+def _chances(found: NextEvent, tried: EventTrial) -> Chances:
     """By the rule, or where that is not sure to decide, by the noise alone."""
     return tried.chances if found.by_noise is None else tried.exact
 
 
-def _kind(tried: TestedEvent) -> str:
+def _kind(tried: EventTrial) -> str:
     event = tried.event
     if event.unbalance:
         return KINDS[3]
@@ -88,12 +88,12 @@ def _kind(tried: TestedEvent) -> str:
     return KINDS[2] if event.jump else KINDS[0]
 
 
-def _best(found: NextEvent, kind: str) -> list[TestedEvent]:
+def _best(found: NextEvent, kind: str) -> list[EventTrial]:
     ranked = sorted(
         (t for t in found.tried if _kind(t) == kind), key=lambda t: (-t.chances.least, -t.exact.least, t.event.burden)
     )
     return ranked[:LISTED]
 
 
-def _row(tried: TestedEvent) -> list[str]:
+def _row(tried: EventTrial) -> list[str]:
     return [tried.event.words, f"{100 * tried.chances.least:.0f}", f"{100 * tried.exact.least:.0f}"]

@@ -35,7 +35,7 @@ def report(found: Profiles, grade: str = "") -> Report:
 
     `grade` is the sentence that grades the identification.
     """
-    known, verdicts = found.known, found.verdicts
+    known, verdicts = found.uncertainty, found.verdicts
     names = ", ".join(e.record.name for e in known.likelihood.problem.events)
     made = Report(
         f"Profile likelihood: {names}",
@@ -68,7 +68,7 @@ def report(found: Profiles, grade: str = "") -> Report:
 def _row(found: Profiles, profile: Profile, says: str) -> list[str]:
     """A line of the table of intervals."""
     value, half = _curvature(found, profile.name)
-    about = declared(found.known, profile.name)
+    about = declared(found.uncertainty, profile.name)
     by_curvature = span(value - half, value + half) if np.isfinite(half) else "none"
     return [profile.name, about.about, f"{value:.4g}", about.unit, by_curvature, span(*profile.interval), says]
 
@@ -101,7 +101,7 @@ def _compared(found: Profiles, profile: Profile) -> str:
         return "the curvature gives no interval, the profile does"
     off = np.array([low - (value - half), high - (value + half)]) / half
     if np.abs(off).max() <= ALIKE:
-        return f"{shown(value, half, *declared(found.known, profile.name).bounds)} {ENOUGH}"
+        return f"{shown(value, half, *declared(found.uncertainty, profile.name).bounds)} {ENOUGH}"
     if off[0] > ALIKE and off[1] < -ALIKE:
         return "narrower than by curvature"
     if off[0] < -ALIKE and off[1] > ALIKE:
@@ -136,8 +136,8 @@ def _poor(verdicts: Mapping[str, ParameterVerdict]) -> list[str]:
 
 def _curvature(found: Profiles, name: str) -> tuple[float, float]:
     """Estimate and half of the interval by curvature."""
-    j = found.known.names.index(name)
-    return float(found.known.values[j]), float(found.known.half[j])
+    j = found.uncertainty.names.index(name)
+    return float(found.uncertainty.values[j]), float(found.uncertainty.half[j])
 
 
 def _chart(found: Profiles, profile: Profile, title: str) -> Chart:
@@ -146,7 +146,7 @@ def _chart(found: Profiles, profile: Profile, title: str) -> Chart:
     top = ABOVE * found.threshold
     x, y = _smooth(profile)
     chart = Chart(
-        axis(found.known, profile.name), ["deviance"], pixels=290,
+        axis(found.uncertainty, profile.name), ["deviance"], pixels=290,
         title=title, legend=False,
     )  # fmt: skip
     chart.shade(*profile.interval, SHADE, opacity=0.25)

@@ -10,7 +10,7 @@ from tractexp.discrepancy.discrepancy_json import PLUGIN
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.proposal.judge import Before, Weighed
 from tractexp.discrepancy.proposal.library import Term
-from tractexp.discrepancy.proposal.propose import Proposal, told
+from tractexp.discrepancy.proposal.propose import Proposal, to_dict
 from tractexp.discrepancy.proposal.wording import chance, proposed_in_words
 from tractexp.wording import as_sentence, in_words, joined, percent, with_error
 
@@ -20,7 +20,7 @@ EVENTS = 4  # whose charts are shown at once
 
 def headlines(found: Findings) -> list[str]:
     """What the box at the top says of a proposal."""
-    return [as_sentence(s) for s in proposed_in_words(told(found.proposed, PLUGIN), None)[:2]]
+    return [as_sentence(s) for s in proposed_in_words(to_dict(found.proposed, PLUGIN), None)[:2]]
 
 
 def proposed(made: Report, found: Findings) -> None:
@@ -56,7 +56,7 @@ def _numbers(made: Report, proposal: Proposal) -> None:
             with_error(k.value, k.error),
             _interval(*k.interval),
         ]
-        for k in proposal.known
+        for k in proposal.estimates
     ]
     made.table(
         ["parameter", "in the equation", "meaning", "unit", "value", "95 % interval"], rows,
@@ -86,14 +86,14 @@ def _drawn(made: Report, proposal: Proposal) -> None:
     """What the base model misses in each event, and what the term makes of it."""
     for role, before in (("fitted", proposal.train), ("held out", proposal.validate)):
         made.text(f"What the base model misses, and what the model with the term draws beyond it ({role}):")
-        made.charts([_missed(before, e) for e in range(min(len(before.bench.events), EVENTS))])
+        made.charts([_missed(before, e) for e in range(min(len(before.context.events), EVENTS))])
 
 
 def _missed(before: Before, e: int) -> Chart:
-    bench, event = before.bench, before.bench.events[e]
+    bench, event = before.context, before.context.events[e]
     part = bench.drive.part(e)
     base = before.without.calculated[:, part]
-    missed = np.where(bench.known[:, part], bench.drive.measured[:, part] - base, np.nan)
+    missed = np.where(bench.valid[:, part], bench.drive.measured[:, part] - base, np.nan)
     more = before.with_it.calculated[:, part] - base
     t = event.record.t[event.record.samples - base.shape[1] :]
     made = Chart(f"t [s], {event.record.name}", [f"{c} [pu]" for c in bench.drive.names])

@@ -24,11 +24,11 @@ WORTH = 0.1  # chance below which no refit is worth its time
 REPEATED = (2, 3, 5, 10, 20)  # events of one kind together
 NEARLY = 0.02  # of the chance: of events as sure as this the mildest is the surest
 
-Rule = Callable[["TestedEvent"], Chances]
+Rule = Callable[["EventTrial"], Chances]
 
 
 @dataclass(frozen=True)
-class TestedEvent:
+class EventTrial:
     """An event and how surely it leaves one rival: by the product's own rule, and where formulas are `exact`.
 
     The rule rejects no rival whose curves differ by less than `Criteria.alike` of what the best explains.
@@ -51,9 +51,9 @@ class NextEvent:
     """
 
     rivals: tuple[str, ...]
-    best: TestedEvent
-    by_noise: TestedEvent | None
-    tried: tuple[TestedEvent, ...]
+    best: EventTrial
+    by_noise: EventTrial | None
+    tried: tuple[EventTrial, ...]
     criteria: Criteria
     same: tuple[tuple[int, int, Same], ...] = field(default=())
     hopeless: tuple[tuple[int, int, float], ...] = field(default=())
@@ -65,26 +65,26 @@ class NextEvent:
 
     def sentence(self) -> str:
         """What to record, or why nothing need be."""
-        told = [
-            f"{self.rivals[a]} and {self.rivals[b]} cannot be told apart by any dip at this bus: {found.reason}"
-            for a, b, found in self.same
+        sentences = [
+            f"{self.rivals[a]} and {self.rivals[b]} cannot be told apart by any dip at this bus: {proof.reason}"
+            for a, b, proof in self.same
         ]
-        told += [
+        sentences += [
             f"none of the {len(self.tried)} events tried tells {self.rivals[a]} from {self.rivals[b]}, the surest with"
             f" a probability of {p:.0%}"
             for a, b, p in self.hopeless
         ]
-        if told and len(self.rivals) == 2:
-            return told[0]
-        return "; ".join([self._recommended(), *told])
+        if sentences and len(self.rivals) == 2:
+            return sentences[0]
+        return "; ".join([self._recommended(), *sentences])
 
-    def told(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """As `discrepancy.json` and `plan.json` have it."""
         return {
             "sentence": self.sentence(),
             "rivals": list(self.rivals),
-            "recommended": self._told(self.best),
-            "by_noise_alone": self.by_noise and self._told(self.by_noise),
+            "recommended": self._row(self.best),
+            "by_noise_alone": self.by_noise and self._row(self.by_noise),
             "indistinguishable": [
                 {"pair": [self.rivals[a], self.rivals[b]], "rank": s.rank, "off": s.off, "reason": s.reason}
                 for a, b, s in self.same
@@ -103,7 +103,7 @@ class NextEvent:
             ],
         }
 
-    def _told(self, tried: TestedEvent) -> dict[str, Any]:
+    def _row(self, tried: EventTrial) -> dict[str, Any]:
         chances = tried.exact if tried is self.by_noise else tried.chances
         return {
             **asdict(tried.event),
@@ -131,25 +131,25 @@ class NextEvent:
         )
 
 
-def _together(tried: TestedEvent) -> str:
+def _together(tried: EventTrial) -> str:
     """How many such events are sure to."""
     return f", {tried.repeated} of them are sure to" if tried.repeated else ""
 
 
 def next_event(
-    bench: Context, noise: Noise, bare: Refit, rivals: Sequence[Refit], labels: Sequence[str], seed: int = 0
+    context: Context, noise: Noise, bare: Refit, rivals: Sequence[Refit], labels: Sequence[str], seed: int = 0
 ) -> NextEvent:
     """Choose what to record to tell two rivals or more apart.
 
     `bare` is the base model's fit, `noise` that under which all were fitted.
     """
-    bench.effort.say(f"choosing what to record next, to tell {len(rivals)} explanations apart")
-    sides = [sided(bench, noise, fit) for fit in (bare, *rivals)]
-    separation, truths = Separation(sides, bench.criteria, FEW, seed), range(1, len(sides))
-    reads = {channel for fit in rivals for name in fit.names for channel in bench.catalogue[name].effect.reads}
+    context.effort.say(f"choosing what to record next, to tell {len(rivals)} explanations apart")
+    sides = [sided(context, noise, fit) for fit in (bare, *rivals)]
+    separation, truths = Separation(sides, context.criteria, FEW, seed), range(1, len(sides))
+    reads = {channel for fit in rivals for name in fit.names for channel in context.catalogue[name].effect.reads}
     events, denied = [], []
-    for group in _alike(imagined(bench, sorted(reads))):
-        for event, views in zip(group, zip(*(seen(bench, noise, s, group) for s in sides), strict=True), strict=True):
+    for group in _alike(imagined(context, sorted(reads))):
+        for event, views in zip(group, zip(*(seen(context, noise, s, group) for s in sides), strict=True), strict=True):
             events.append(event)
             denied.append(np.stack([separation.denied(views, truth) for truth in truths], axis=1))
     most = np.max([d[1].mean(axis=2) for d in denied], axis=0)  # (a, a), by the noise alone
@@ -160,27 +160,26 @@ def next_event(
         for a, b, _ in open_pairs:
             ignored[a, b] = ignored[b, a] = True
     tried = [
-        TestedEvent(e, Chances.of(d[0], ignored), Chances.of(d[1], ignored))
-        for e, d in zip(events, denied, strict=True)
+        EventTrial(e, Chances.of(d[0], ignored), Chances.of(d[1], ignored)) for e, d in zip(events, denied, strict=True)
     ]
-    best = _held(bench, noise, sides, tried, ignored, seed, _by_rule)
-    sure = best.chances.least >= bench.criteria.decided
-    by_noise = None if sure else _held(bench, noise, sides, tried, ignored, seed, _by_noise)
-    found = [(a, b, same(bench, rivals[a], rivals[b])) for a, b, _ in open_pairs]
-    proved = tuple((a, b, s) for a, b, s in found if s is not None)
-    hopeless = tuple(pair for pair, (*_, s) in zip(open_pairs, found, strict=True) if s is None)
-    return NextEvent(tuple(labels), best, by_noise, tuple(tried), bench.criteria, proved, hopeless)
+    best = _held(context, noise, sides, tried, ignored, seed, _by_rule)
+    sure = best.chances.least >= context.criteria.decided
+    by_noise = None if sure else _held(context, noise, sides, tried, ignored, seed, _by_noise)
+    pairs = [(a, b, same(context, rivals[a], rivals[b])) for a, b, _ in open_pairs]
+    proved = tuple((a, b, s) for a, b, s in pairs if s is not None)
+    hopeless = tuple(pair for pair, (*_, s) in zip(open_pairs, pairs, strict=True) if s is None)
+    return NextEvent(tuple(labels), best, by_noise, tuple(tried), context.criteria, proved, hopeless)
 
 
-def _by_rule(tried: TestedEvent) -> Chances:
+def _by_rule(tried: EventTrial) -> Chances:
     return tried.chances
 
 
-def _by_noise(tried: TestedEvent) -> Chances:
+def _by_noise(tried: EventTrial) -> Chances:
     return tried.exact
 
 
-def mildest(tried: Sequence[TestedEvent], decided: float, by: Rule) -> TestedEvent:
+def mildest(tried: Sequence[EventTrial], decided: float, by: Rule) -> EventTrial:
     """Of the events that are sure enough the one that asks for least, or else of the surest."""
     enough = [t for t in tried if by(t).least >= min(decided, max(by(t).least for t in tried) - NEARLY)]
     return min(enough, key=lambda t: t.event.burden)
@@ -193,59 +192,61 @@ def _alike(events: Sequence[ImaginedDip]) -> list[list[ImaginedDip]]:
 
 
 def _held(
-    bench: Context, noise: Noise, sides: Sequence[Side], tried: Sequence[TestedEvent], ignored: np.ndarray, seed: int,
+    context: Context, noise: Noise, sides: Sequence[Side], tried: Sequence[EventTrial], ignored: np.ndarray, seed: int,
     by: Rule,
-) -> TestedEvent:  # fmt: skip
+) -> EventTrial:  # fmt: skip
     """The mildest event that is sure enough after refits, too."""
     left, checked = list(tried), []
     while left and len(checked) < CHECKED:
-        best = mildest(left, bench.criteria.decided, by)
+        best = mildest(left, context.criteria.decided, by)
         if checked and by(best).least < min(HOPELESS, max(by(t).least for t in checked)):
             break
         left.remove(best)
-        checked.append(_refitted(bench, noise, sides, best, ignored, seed, by) if by(best).least >= WORTH else best)
-        if by(checked[-1]).least >= bench.criteria.decided:
+        checked.append(_refitted(context, noise, sides, best, ignored, seed, by) if by(best).least >= WORTH else best)
+        if by(checked[-1]).least >= context.criteria.decided:
             return checked[-1]
     return max(checked, key=lambda t: by(t).least)
 
 
 def _refitted(
-    bench: Context, noise: Noise, sides: Sequence[Side], best: TestedEvent, ignored: np.ndarray, seed: int, by: Rule
-) -> TestedEvent:  # fmt: skip
+    context: Context, noise: Noise, sides: Sequence[Side], best: EventTrial, ignored: np.ndarray, seed: int, by: Rule
+) -> EventTrial:  # fmt: skip
     """The chances of one event with rivals linearised where they fit it best, each in turn the truth.
 
-    Only of phasors without further channels or rates, which the bench has no records of: others stay linearised about
+    Only of phasors without further channels or rates, which the context has no records of: others stay linearised about
     their fits.
     """
     event = best.event
-    plain = bench.domain.recordable and bench.records.window is None and not event.burden[0]
+    plain = context.domain.recordable and context.records.window is None and not event.burden[0]
     places = []
     for a in range(1, len(sides)):
-        moved = _fitted_to(bench, noise, sides, sides[a], event) if plain else []
-        there = [side if k == a or not moved else sided(bench, noise, moved[k]) for k, side in enumerate(sides)]
-        views = [seen(bench, noise, side, [event])[0] for side in there]
-        places.append((Separation(there, bench.criteria, seed=seed), views))
+        moved = _fitted_to(context, noise, sides, sides[a], event) if plain else []
+        there = [side if k == a or not moved else sided(context, noise, moved[k]) for k, side in enumerate(sides)]
+        views = [seen(context, noise, side, [event])[0] for side in there]
+        places.append((Separation(there, context.criteria, seed=seed), views))
 
-    def again(times: int) -> TestedEvent:
+    def again(times: int) -> EventTrial:
         denied = np.stack([s.denied(views, a, times) for a, (s, views) in enumerate(places, 1)], axis=1)
-        return TestedEvent(event, *(Chances.of(rule, ignored) for rule in denied), refitted=plain)
+        return EventTrial(event, *(Chances.of(rule, ignored) for rule in denied), refitted=plain)
 
     once = again(1)
-    if by(once).least >= bench.criteria.decided:
+    if by(once).least >= context.criteria.decided:
         return once
-    enough = (n for n in REPEATED if by(again(n)).least >= bench.criteria.decided)
+    enough = (n for n in REPEATED if by(again(n)).least >= context.criteria.decided)
     return replace(once, repeated=next(enough, None))
 
 
-def _fitted_to(bench: Context, noise: Noise, sides: Sequence[Side], truth: Side, event: ImaginedDip) -> list[Refit]:
-    """Every side fitted to the records and one event more, in which `truth` holds exactly; coordinates of the bench."""
-    at = bench.coordinates
+def _fitted_to(context: Context, noise: Noise, sides: Sequence[Side], truth: Side, event: ImaginedDip) -> list[Refit]:
+    """Every side fitted to the records and one event more, in which `truth` holds exactly."""
+    at = context.coordinates
     middle = at.without_faults(truth.fit.unit, ())
-    power = bench.kernels.simulate(truth.fit.names, middle[None], Drive.of([driven(bench, event)]))[0]
-    whole = bench.on(Records.of((*bench.records.recorded, as_recorded(bench, event, power))))
+    power = context.kernels.simulate(truth.fit.names, middle[None], Drive.of([driven(context, event)]))[0]
+    whole = context.on(Records.of((*context.records.recorded, as_recorded(context, event, power))))
     wide = [whole.coordinates.widened(side.fit.unit) for side in sides]
-    blur = None if noise.blur is None else QuietNoise.at(whole, wide[0]).blur
-    both = noise.on(whole.power, blur)
-    made = {f.names: f for f in refit(whole, both, [(s.fit.names, u) for s, u in zip(sides, wide, strict=True)])}
-    fits = [made[s.fit.names] for s in sides]
+    input_modes = None if noise.input_modes is None else QuietNoise.at(whole, wide[0]).input_modes
+    both = noise.on(whole.power, input_modes)
+    fits_by_name = {
+        f.names: f for f in refit(whole, both, [(s.fit.names, u) for s, u in zip(sides, wide, strict=True)])
+    }
+    fits = [fits_by_name[s.fit.names] for s in sides]
     return [replace(f, unit=f.unit[: at.dimension]) for f in fits]

@@ -41,12 +41,12 @@ class ImaginedDip:
     def words(self) -> str:
         """The event, as a sentence goes on after "record"."""
         if self.switched:
-            told = (
+            sentence = (
                 f"the switching of a tap or a capacitor bank that lowers the voltage by {self.depth:.0%} for"
                 f" {self.duration:g} s"
             )
         else:
-            told = f"a dip of {self.depth:.0%} or more lasting {1000 * self.duration:.0f} ms"
+            sentence = f"a dip of {self.depth:.0%} or more lasting {1000 * self.duration:.0f} ms"
         more = []
         if self.jump:
             more.append(f"in which the voltage's phase jumps by {self.jump:+.0f} degrees{self._channel('jump')}")
@@ -55,7 +55,7 @@ class ImaginedDip:
             more.append(f"unbalanced (negative sequence {self.unbalance:.0%} of the depth){channel}")
         if self.rate > 1:
             more.append(f"sampled {self.rate} times as fast")
-        return ", ".join([told, *more])
+        return ", ".join([sentence, *more])
 
     def _channel(self, what: str) -> str:
         """The channel that it has to be recorded with, as the sentence goes on."""
@@ -68,32 +68,32 @@ class ImaginedDip:
         return bool(self.jump) + bool(self.unbalance) + (self.rate > 1), self.depth * self.duration
 
 
-def imagined(bench: Context, reads: Sequence[str] = ()) -> list[ImaginedDip]:
-    """What is tried on this bench; unbalanced dips that need the channel U2 where one of the rivals `reads` it."""
-    domain, durations = bench.domain, bench.domain.dips.durations
+def imagined(context: Context, reads: Sequence[str] = ()) -> list[ImaginedDip]:
+    """What is tried on this context; unbalanced dips that need the channel U2 where one of the rivals `reads` it."""
+    domain, durations = context.domain, context.domain.dips.durations
     if not domain.further:
         turned = itertools.product(DEPTHS, durations, (0.0, *JUMPS))
         unbalanced = itertools.product(DEPTHS[::2], durations[::2])
-        made = [ImaginedDip(*pair, jump=j, domain=domain) for *pair, j in turned]
-        return made + [ImaginedDip(*pair, unbalance=UNBALANCED, domain=domain) for pair in unbalanced]
-    made = [ImaginedDip(*pair) for pair in itertools.product(DEPTHS, durations)]
-    made += [ImaginedDip(depth, LASTING, switched=True) for depth in SWITCHED]
-    made += [ImaginedDip(*p, jump=j) for *p, j in itertools.product(DEPTHS[::2], durations[::2], JUMPS)]
-    made += [ImaginedDip(SWITCHED[1], LASTING, jump=j, switched=True) for j in (-TURNED_BY_BANK, TURNED_BY_BANK)]
+        dips = [ImaginedDip(*pair, jump=j, domain=domain) for *pair, j in turned]
+        return dips + [ImaginedDip(*pair, unbalance=UNBALANCED, domain=domain) for pair in unbalanced]
+    dips = [ImaginedDip(*pair) for pair in itertools.product(DEPTHS, durations)]
+    dips += [ImaginedDip(depth, LASTING, switched=True) for depth in SWITCHED]
+    dips += [ImaginedDip(*p, jump=j) for *p, j in itertools.product(DEPTHS[::2], durations[::2], JUMPS)]
+    dips += [ImaginedDip(SWITCHED[1], LASTING, jump=j, switched=True) for j in (-TURNED_BY_BANK, TURNED_BY_BANK)]
     if "U2" in reads:
-        made += [ImaginedDip(*pair, unbalance=UNBALANCED) for pair in itertools.product(DEPTHS[::2], durations[::2])]
-    if FASTER / bench.events[0].record.step <= FASTEST:
-        made += [ImaginedDip(depth, durations[1], rate=FASTER) for depth in DEPTHS[2::2]]
-    return made
+        dips += [ImaginedDip(*pair, unbalance=UNBALANCED) for pair in itertools.product(DEPTHS[::2], durations[::2])]
+    if FASTER / context.events[0].record.step <= FASTEST:
+        dips += [ImaginedDip(depth, durations[1], rate=FASTER) for depth in DEPTHS[2::2]]
+    return dips
 
 
-def driven(bench: Context, event: ImaginedDip) -> Excitation | Waveforms:
+def driven(context: Context, event: ImaginedDip) -> Excitation | Waveforms:
     """The voltage of an imagined event, at the power before the first recorded one."""
-    like, dips = bench.events[0], bench.domain.dips
+    like, dips = context.events[0], context.domain.dips
     step = like.record.step / event.rate
     t = np.arange(round((dips.lead + dips.length) / step)) * step
     course = _course(t - dips.lead, event.duration, dips.edge)
-    return bench.domain.dip(like, step, course, event.depth, event.jump, event.unbalance)
+    return context.domain.dip(like, step, course, event.depth, event.jump, event.unbalance)
 
 
 def _course(since: np.ndarray, duration: float, edge: float) -> np.ndarray:
@@ -112,9 +112,9 @@ def noise_of(noise: Noise, drive: Drive, rate: int, step: float) -> Noise:
     return Noise((tuple(Autoregression(color, level * np.array([1.0, shock])) for level in noise.levels),))
 
 
-def as_recorded(bench: Context, event: ImaginedDip, power: np.ndarray) -> Event:
+def as_recorded(context: Context, event: ImaginedDip, power: np.ndarray) -> Event:
     """An imagined dip as if it had been recorded without noise, with this power (2, N) [pu]."""
-    like, dips, drive = bench.events[0], bench.domain.dips, driven(bench, event)
+    like, dips, drive = context.events[0], context.domain.dips, driven(context, event)
     assert isinstance(drive, Excitation)
     t = np.arange(len(drive.U)) * drive.step
     start, end = (int(np.searchsorted(t, s)) for s in (dips.lead, dips.lead + event.duration + dips.edge))

@@ -47,16 +47,16 @@ def event_for(
     _check(missing, named)
     with Effort(tell).audible() as effort:
         Family(model, missing).compile(effort.say)
-        bench = Context.of(model, missing, Records.of(events), bounds, fixed, criteria, effort, substeps)
-        base = base_fit(bench)
+        context = Context.of(model, missing, Records.of(events), bounds, fixed, criteria, effort, substeps)
+        base = base_fit(context)
         effort.say(f"fitting {len(sets)} explanations")
-        noise, begin = base.noise, [start for names in sets for start in _starts(bench, base.fit.unit, names)]
+        noise, begin = base.noise, [start for names in sets for start in _starts(context, base.fit.unit, names)]
         for _ in range(2):  # the second time under the noise that the best of them leaves
-            fits = refit(bench, noise, begin)
+            fits = refit(context, noise, begin)
             noise = base.quiet.of_fit(fits[0].unit, fits[0].names)
             begin = [(fit.names, fit.unit) for fit in fits]
-        bare, *fits = sorted(refit(bench, noise, [((), base.fit.unit), *begin]), key=lambda fit: bool(fit.names))
-        return next_event(bench, noise, bare, fits, [joined(list(fit.names)) for fit in fits], seed)
+        bare, *fits = sorted(refit(context, noise, [((), base.fit.unit), *begin]), key=lambda fit: bool(fit.names))
+        return next_event(context, noise, bare, fits, [joined(list(fit.names)) for fit in fits], seed)
 
 
 def _check(missing: Catalogue, named: Sequence[str]) -> None:
@@ -71,18 +71,18 @@ def _check(missing: Catalogue, named: Sequence[str]) -> None:
             )
 
 
-def _starts(bench: Context, unit: np.ndarray, names: Names) -> list[Start]:
+def _starts(context: Context, unit: np.ndarray, names: Names) -> list[Start]:
     """The base fit with every setting of each effect and its sizes at what matters least, either way."""
-    at, found = bench.coordinates, []
+    at, result = context.coordinates, []
     for name in names:
-        candidate = bench.catalogue[name]
+        candidate = context.catalogue[name]
         for setting in candidate.settings:
             for sign in (1, -1):
                 point = at.placed(unit, setting)
-                for p in (p for other in names for p in bench.catalogue[other].sizes):
+                for p in (p for other in names for p in context.catalogue[other].sizes):
                     step = candidate.relevant(p) * (candidate.sign(p) or sign)
                     point[at.column[p.name]] = np.clip(at.to_unit(p.name, p.absent + step), 0.0, 1.0)
-                found.append((names, point))
+                result.append((names, point))
                 if all(candidate.sign(p) for p in candidate.sizes):
                     break
-    return found
+    return result

@@ -41,42 +41,42 @@ class Same:
         )
 
 
-def same(bench: Context, one: Refit, other: Refit) -> Same | None:
+def same(context: Context, one: Refit, other: Refit) -> Same | None:
     """The proof that two explanations are the same function of the voltage, None where they are not."""
-    events = [ImaginedDip(*made) for made in itertools.product(RICH, bench.domain.dips.durations[::2], TURNED)]
-    drive = Drive.of([driven(bench, event) for event in events])
-    told = []
+    events = [ImaginedDip(*shape) for shape in itertools.product(RICH, context.domain.dips.durations[::2], TURNED)]
+    drive = Drive.of([driven(context, event) for event in events])
+    pairs = []
     for truth, rival in ((one, other), (other, one)):
         for size in (1.0, 0.5):
-            pair = _followed(bench, drive, _shrunk(bench, truth, size), truth.names, rival)
+            pair = _followed(context, drive, _shrunk(context, truth, size), truth.names, rival)
             if pair is None:
                 return None
-            told.append(pair)
-    return Same(max(rank for rank, _ in told), len(events), max(off for _, off in told))
+            pairs.append(pair)
+    return Same(max(rank for rank, _ in pairs), len(events), max(off for _, off in pairs))
 
 
-def _shrunk(bench: Context, fit: Refit, size: float) -> np.ndarray:
+def _shrunk(context: Context, fit: Refit, size: float) -> np.ndarray:
     """Coordinates (D,) of a fit with the sizes of its effects at this share, without faults of the measurement."""
-    at = bench.coordinates
+    at = context.coordinates
     unit, sizes = at.without_faults(fit.unit, ()), at.sizes(fit.names)
     unit[sizes] = at.null[sizes] + size * (unit[sizes] - at.null[sizes])
     return unit
 
 
 def _followed(
-    bench: Context, drive: Drive, point: np.ndarray, names: Sequence[str], rival: Refit
+    context: Context, drive: Drive, point: np.ndarray, names: Sequence[str], rival: Refit
 ) -> tuple[int, float] | None:  # fmt: skip
     """Rank and distance where the rival follows the truth at coordinates (D,); None where it does not."""
-    answer = bench.kernels.simulate(names, point[None], drive)[0]
-    known = (drive.weights > 0) & _recovering(answer, drive)
-    truth = answer[known]
-    columns = _of_load(bench, rival.names)
-    start = _shrunk(bench, rival, 1.0)
+    answer = context.kernels.simulate(names, point[None], drive)[0]
+    valid = (drive.weights > 0) & _recovering(answer, drive)
+    truth = answer[valid]
+    columns = _of_load(context, rival.names)
+    start = _shrunk(context, rival, 1.0)
 
     def drawn(points: np.ndarray, whose: Sequence[str]) -> np.ndarray:
-        made = bench.kernels.simulate(whose, points, drive)
-        bench.effort.spend(len(points))
-        return np.nan_to_num(made[:, known])
+        outputs = context.kernels.simulate(whose, points, drive)
+        context.effort.spend(len(points))
+        return np.nan_to_num(outputs[:, valid])
 
     def whole(x: np.ndarray) -> np.ndarray:
         unit = start.copy()
@@ -98,15 +98,15 @@ def _followed(
             bounds=(0.0, 1.0), xtol=1e-14, ftol=DONE, gtol=1e-14, max_nfev=60,
         )  # fmt: skip
 
-    mild = np.zeros(known.shape, bool)  # first: near a stall a descent from afar goes astray
+    mild = np.zeros(valid.shape, bool)  # first: near a stall a descent from afar goes astray
     mild[:, : drive.first[drive.events // 2]] = True
-    found, off = start[columns], np.inf
-    for rows in (mild[known], np.ones(len(truth), bool)):
-        ended = nearest(found, rows)
-        found, off = ended.x, float(np.abs(ended.fun).max())
+    nearest_point, off = start[columns], np.inf
+    for rows in (mild[valid], np.ones(len(truth), bool)):
+        ended = nearest(nearest_point, rows)
+        nearest_point, off = ended.x, float(np.abs(ended.fun).max())
         if off > FOLLOWS:
             return None
-    own = slopes(point, names, _of_load(bench, names)), slopes(whole(found), rival.names, columns)
+    own = slopes(point, names, _of_load(context, names)), slopes(whole(nearest_point), rival.names, columns)
     ranks = [_rank(rows) for rows in (*own, np.concatenate(own))]
     return (ranks[2], off) if len(set(ranks)) == 1 else None
 
@@ -121,15 +121,15 @@ def _recovering(answer: np.ndarray, drive: Drive) -> np.ndarray:
     return alive
 
 
-def _of_load(bench: Context, names: Sequence[str]) -> list[int]:
+def _of_load(context: Context, names: Sequence[str]) -> list[int]:
     """Columns of the base model's and the effects' parameters."""
-    at = bench.coordinates
+    at = context.coordinates
     return [*at.base, *at.parameters(names)]
 
 
 def _rank(rows: np.ndarray) -> int:
     """How many directions rows (k, R) span, each of size one."""
     size = np.linalg.norm(rows, axis=1)
-    kept = rows[size > DIRECTION * size.max()]
-    values = np.linalg.svd(kept / np.linalg.norm(kept, axis=1)[:, None], compute_uv=False)
+    large = rows[size > DIRECTION * size.max()]
+    values = np.linalg.svd(large / np.linalg.norm(large, axis=1)[:, None], compute_uv=False)
     return int((values > DIRECTION * values[0]).sum())

@@ -43,7 +43,7 @@ class Side:
     box: np.ndarray  # (k,) precision of each by its range alone
 
     @property
-    def known(self) -> np.ndarray:
+    def precision(self) -> np.ndarray:
         """Precision (k, k) of the parameters by the recorded events."""
         return self.J @ self.J.T + self.own @ self.own.T + np.diag(self.box)
 
@@ -81,54 +81,54 @@ class Chances:
         return float(self.alone.min())
 
 
-def sided(bench: Context, noise: Noise, fit: Refit) -> Side:
+def sided(context: Context, noise: Noise, fit: Refit) -> Side:
     """Linearise an explanation at its fit."""
-    at = bench.coordinates
-    faults = at.sizes(bench.catalogue.of_measurement)
+    at = context.coordinates
+    faults = at.sizes(context.catalogue.of_measurement)
     own = [k for k in at.parameters(fit.names) if k not in faults]
     columns = [*at.base, *faults, *own, *at.before]
-    _, rows = linearised(bench, fit.unit, noise, columns, fit.names)
-    shared = bench.drive.measured.size + len(faults)
-    free = ~resting(bench, fit.unit, columns, rows[1:] @ rows[0])
+    _, rows = linearised(context, fit.unit, noise, columns, fit.names)
+    shared = context.drive.measured.size + len(faults)
+    free = ~resting(context, fit.unit, columns, rows[1:] @ rows[0])
     J = rows[1:, :shared] * free[:, None]
     box = np.where(np.isin(columns, faults), 0.0, BOX)
     return Side(fit, tuple(columns), free, rows[0, :shared], J, rows[1:, shared:], rows[0, shared:], box)
 
 
-def seen(bench: Context, noise: Noise, side: Side, events: Sequence[ImaginedDip]) -> list[EventView]:
+def seen(context: Context, noise: Noise, side: Side, events: Sequence[ImaginedDip]) -> list[EventView]:
     """What an explanation predicts of events that are sampled alike, with the faults of the measurement at their null.
 
     What the recorder did to earlier events says nothing of the load, but it may go on.
     """
-    at, names = bench.coordinates, side.fit.names
-    drives = [driven(bench, event) for event in events]
+    at, names = context.coordinates, side.fit.names
+    drives = [driven(context, event) for event in events]
     inside = list(side.columns[: -len(at.before)])
     middle = at.without_faults(side.fit.unit, ())
     up, down = two_sided(middle, inside)
     width = np.array([u[k] - d[k] for u, d, k in zip(up, down, inside, strict=True)])
-    moved = _simulated(bench, names, np.concatenate([middle[None], up, down]), drives)  # (E, n, C, N)
+    moved = _simulated(context, names, np.concatenate([middle[None], up, down]), drives)  # (E, n, C, N)
     before = [
-        _simulated(bench, names, middle[None], [_drawing(d, channel, sign * MOVED) for d in drives])
+        _simulated(context, names, middle[None], [_drawing(d, channel, sign * MOVED) for d in drives])
         for channel in ("P0", "Q0")
         for sign in (1, -1)
     ]
     one, k = Drive.of(drives[:1]), len(inside)
-    white = noise_of(noise, one, events[0].rate, bench.events[0].record.step)
-    told = []
+    white = noise_of(noise, one, events[0].rate, context.events[0].record.step)
+    chances = []
     for e in range(len(events)):
         rows = np.concatenate([moved[e], *(b[e] for b in before)])
         rows = white.whiten(np.where(one.weights > 0, rows, 0.0), one, one.weights > 0)
         K = np.zeros((len(side.columns) + 2, rows.shape[1]))
         K[:k] = (rows[1 : 1 + k] - rows[1 + k : 1 + 2 * k]) / width[:, None] * side.free[:k, None]
         K[-2:] = (rows[[-4, -2]] - rows[[-3, -1]]) / (2 * MOVED)
-        told.append(EventView(rows[0], K))
-    return told
+        chances.append(EventView(rows[0], K))
+    return chances
 
 
-def _simulated(bench: Context, names: Sequence[str], points: np.ndarray, drives: Sequence) -> np.ndarray:
+def _simulated(context: Context, names: Sequence[str], points: np.ndarray, drives: Sequence) -> np.ndarray:
     """What is compared (E, n, C, N) of drives of equal length."""
-    power = bench.kernels.simulate(names, points, Drive.of(drives))
-    bench.effort.spend(len(points))
+    power = context.kernels.simulate(names, points, Drive.of(drives))
+    context.effort.spend(len(points))
     return np.moveaxis(power.reshape(len(points), power.shape[1], len(drives), -1), 2, 0)
 
 
@@ -144,7 +144,7 @@ class Separation:
         self.sides, self.criteria, self.draws, self.seed = sides, criteria, draws, seed
         rows = _reduced([np.vstack([x.r, x.J]) for x in sides])
         self.r, self.J = [x[0] for x in rows], [x[1:] for x in rows]
-        self.known = [x.known for x in sides]
+        self.precision = [x.precision for x in sides]
 
     def denied(self, seen: Sequence[EventView], truth: int, times: int = 1) -> np.ndarray:
         """Which rivals (2, a, b) each of b draws denies by one new event, or `times` its like, with `truth` the truth.
@@ -161,7 +161,7 @@ class Separation:
         rng = np.random.default_rng([self.seed, truth])
         side = self.sides[truth]
         k, here = len(side.columns), side.fit.unit[list(side.columns)]
-        h = rng.standard_normal((self.draws, k)) @ np.linalg.cholesky(np.linalg.inv(self.known[truth])).T
+        h = rng.standard_normal((self.draws, k)) @ np.linalg.cholesky(np.linalg.inv(self.precision[truth])).T
         h = np.clip(h, -here, 1 - here)
         y = f[truth] + h @ K[truth][:k] + rng.standard_normal((self.draws, len(f[truth])))
         fits = [self._fitted(x, f[x] - y, K[x]) for x in range(len(self.sides))]
@@ -182,7 +182,7 @@ class Separation:
         side, r, J = self.sides[x], self.r[x], self.J[x]
         k = len(J)
         whole = np.zeros((k + 2, k + 2))
-        whole[:k, :k] = self.known[x]
+        whole[:k, :k] = self.precision[x]
         whole[k:, k:] += 1e-9 * np.eye(2)
         whole += K @ K.T
         slope = off @ K.T

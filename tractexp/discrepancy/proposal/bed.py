@@ -1,4 +1,4 @@
-"""A bench on which terms are simulated and fitted: the investigation's own, with the library in place of the catalogue.
+"""A context in which terms are simulated and fitted: the investigation's, with the library in place of the catalogue.
 
 A term is a candidate like any other. All of a kind share one kernel, in which parameters choose what acts.
 """
@@ -61,31 +61,32 @@ def choice_of(chosen: Term) -> list[str]:
     return [f"{chosen.signal.kind}_pick_{name}" for name in picked]
 
 
-def context_of_terms(found: Context) -> Context:
+def context_of_terms(original: Context) -> Context:
     """The same events, base model and faults of the measurement with the library."""
-    faults = tuple(c for c in found.catalogue.candidates if c.measurement)
+    faults = tuple(c for c in original.catalogue.candidates if c.measurement)
     whole = tuple(Candidate(kind, effect, (), ({},)) for kind, effect in ((k, Library(k)) for k in KINDS))
-    kernels = found.kernels
-    bench = Context.of(
-        found.load, Catalogue((*faults, *whole), {}), found.records, kernels.bounds, kernels.fixed, found.criteria,
-        found.effort, kernels.substeps, Terms,
+    kernels = original.kernels
+    context = Context.of(
+        original.load, Catalogue((*faults, *whole), {}), original.records, kernels.bounds, kernels.fixed,
+        original.criteria,
+        original.effort, kernels.substeps, Terms,
     )  # fmt: skip
-    terms = bench.kernels.family
+    terms = context.kernels.family
     assert isinstance(terms, Terms)
-    terms.compile_kinds(lambda: found.effort.say("compiling the library of terms, once for this model"))
-    return bench
+    terms.compile_kinds(lambda: original.effort.say("compiling the library of terms, once for this model"))
+    return context
 
 
-def with_terms(bench: Context, chosen: Sequence[Term]) -> Context:
-    """A bench of the library on which these terms are candidates, each with its own parameters free."""
-    there = {c.name for c in bench.catalogue.candidates}
-    more = tuple(_candidate(bench, t) for t in dict.fromkeys(chosen) if t.name not in there)
-    catalogue = replace(bench.catalogue, candidates=(*bench.catalogue.candidates, *more))
-    return replace(bench, catalogue=catalogue, coordinates=replace(bench.coordinates, catalogue=catalogue))
+def with_terms(context: Context, chosen: Sequence[Term]) -> Context:
+    """A context of the library on which these terms are candidates, each with its own parameters free."""
+    there = {c.name for c in context.catalogue.candidates}
+    more = tuple(_candidate(context, t) for t in dict.fromkeys(chosen) if t.name not in there)
+    catalogue = replace(context.catalogue, candidates=(*context.catalogue.candidates, *more))
+    return replace(context, catalogue=catalogue, coordinates=replace(context.coordinates, catalogue=catalogue))
 
 
-def _candidate(bench: Context, chosen: Term) -> Candidate:
-    declared = {p.name: p for p in bench.problem.parameters}
+def _candidate(context: Context, chosen: Term) -> Candidate:
+    declared = {p.name: p for p in context.problem.parameters}
     sizes = tuple(declared[label] for _, label in sizes_of(chosen))
     shapes = tuple(declared[label] for label in shapes_of(chosen).values())
     relevant = {label: size.relevant for size, label in sizes_of(chosen)}
@@ -120,9 +121,9 @@ def values_of(at: Coordinates, unit: np.ndarray, chosen: Term) -> dict[str, floa
     return sizes | {name: at.value(label, unit) for name, label in shapes_of(chosen).items()}
 
 
-def carried_over(other: Context, found: Context, unit: np.ndarray) -> np.ndarray:
-    """Coordinates (D',) of the bench of terms with base model, faults and power before as at coordinates (D,)."""
-    to, old = other.coordinates, found.coordinates
+def carried_over(other: Context, original: Context, unit: np.ndarray) -> np.ndarray:
+    """Coordinates (D',) of the context of terms with base model, faults and power before as at coordinates (D,)."""
+    to, old = other.coordinates, original.coordinates
     moved = to.null.copy()
     faults = [p.name for n in to.catalogue.of_measurement for p in to.catalogue[n].effect.parameters]
     for name in (*(to.names[k] for k in to.base), *faults):

@@ -81,20 +81,22 @@ def _copied(function: Callable[..., object], name: str) -> str:
 
 
 def _declared(term: Term, values: Mapping[str, float]) -> list[str]:
-    made = [s.parameter(s.name, f"size in {s.where or term.balance.words}", values[s.name]) for s in term.balance.sizes]
-    made += [s.parameter(s.name, values[s.name]) for s in term.signal.shapes]
+    parameters = [
+        s.parameter(s.name, f"size in {s.where or term.balance.words}", values[s.name]) for s in term.balance.sizes
+    ]
+    parameters += [s.parameter(s.name, values[s.name]) for s in term.signal.shapes]
     lines = []
-    for p in made:
+    for p in parameters:
         null = "" if p.null is None else f", null={p.null}"
         null += f", power_exponent={p.power_exponent}" if p.power_exponent else ""
-        told = f'"{p.unit}", "{p.about}", SOURCE, r"{p.symbol}"{null}'
-        lines.append(f"    {PREFIX}{p.name} = Parameter({p.default!r}, {p.bounds!r}, {told})")
+        text = f'"{p.unit}", "{p.about}", SOURCE, r"{p.symbol}"{null}'
+        lines.append(f"    {PREFIX}{p.name} = Parameter({p.default!r}, {p.bounds!r}, {text})")
     return lines
 
 
 def _relevant(term: Term) -> str:
-    told = ", ".join(f'"{PREFIX}{s.name}": {s.relevant!r}' for s in term.balance.sizes)
-    return f"{{{told}}}"
+    text = ", ".join(f'"{PREFIX}{s.name}": {s.relevant!r}' for s in term.balance.sizes)
+    return f"{{{text}}}"
 
 
 def _body(term: Term) -> list[str]:

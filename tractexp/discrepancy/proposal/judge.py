@@ -28,7 +28,7 @@ JUDGED = 5  # terms that held-out events are asked about
 class Before:
     """A model on some events without a term and with it, and how much more than chance explains what is left."""
 
-    bench: Context  # of the events
+    context: Context  # of the events
     without: Curves
     with_it: Curves
     explainable: float  # beside the term, of the deviance
@@ -67,62 +67,64 @@ class Weighed:
         """Why it is not proposed, each as the end of a sentence."""
         left, closed = max(self.train.left, self.validate.left), self.validate.closed
         little = f"it closes {closed:.0%} of the gap on the held-out events, less than {criteria.proposal_closed:.0%}"
-        told = {
+        rows = {
             (little if closed >= 0 else "it makes the held-out events worse"): closed < criteria.proposal_closed,
             f"it leaves {left:.2g} times the variance of the noise": left > criteria.proposal_left,
             "chance gives the best of the library as much": self.p > criteria.proposal_p,
         }
-        return [why for why, true in told.items() if true]
+        return [why for why, true in rows.items() if true]
 
 
-def weighed(found: Context, made: Fitted, events: Sequence[Event], p: Sequence[float]) -> list[Weighed]:
+def weighed(original: Context, result: Fitted, events: Sequence[Event], p: Sequence[float]) -> list[Weighed]:
     """The best fits weighed on held-out events, in their order; `p` of each by chance.
 
-    `found` is the bench of the investigation, by which the balances are pushed.
+    `original` is the context of the investigation, by which the balances are pushed.
     """
-    fits = made.fits[:JUDGED]
-    other, units, noise = carried(made.bench, events, [made.bare, *reversed(fits)])
+    fits = result.fits[:JUDGED]
+    other, units, noise = carried(result.context, events, [result.bare, *reversed(fits)])
     bare, held = units[0], list(reversed(units[1:]))
-    fitted = [*made.bench.coordinates.base, *made.bench.coordinates.before]
-    train = _compared(found, made.bench, made.noise, fitted, made.bare.unit, fits, [fit.unit for fit in fits])
-    there = found.on(Records.of(events, found.records.window))
+    fitted = [*result.context.coordinates.base, *result.context.coordinates.before]
+    train = _compared(
+        original, result.context, result.noise, fitted, result.bare.unit, fits, [fit.unit for fit in fits]
+    )
+    there = original.on(Records.of(events, original.records.window))
     validate = _compared(there, other, noise, [*other.coordinates.before], bare, fits, held)
     return [Weighed(*each) for each in zip(fits, train, validate, p, held, strict=False)]
 
 
 def _compared(
-    found: Context, bench: Context, noise: Noise, fitted: Sequence[int], bare: np.ndarray, fits: Sequence[Refit],
+    original: Context, context: Context, noise: Noise, fitted: Sequence[int], bare: np.ndarray, fits: Sequence[Refit],
     units: Sequence[np.ndarray],
 ) -> list[Before]:  # fmt: skip
-    """Models with a term, at coordinates `units` (D,), beside the base model at `bare` (D,) on the events of `bench`.
+    """Models with a term, at coordinates `units` (D,), beside the base model at `bare` (D,) on the events of `context`.
 
-    `found` has the same events; coordinates `fitted` were fitted to them.
+    `original` has the same events; coordinates `fitted` were fitted to them.
     """
-    without = curves(bench, bare, noise, ())
-    made = [curves(bench, unit, noise, fit.names) for fit, unit in zip(fits, units, strict=True)]
-    terms = bench.whiten(noise, np.array([(m.calculated - without.calculated) * bench.known for m in made]))
-    told = []
-    for fit, unit, with_it in zip(fits, units, made, strict=True):
-        pushes = pushed(found, carried_over(found, bench, unit), (), noise)
-        changes = np.nan_to_num(np.concatenate([terms, pushes]))
-        told.append(Before(bench, without, with_it, beyond_chance(bench, unit, fit.names, noise, fitted, changes)))
-    return told
+    without = curves(context, bare, noise, ())
+    result = [curves(context, unit, noise, fit.names) for fit, unit in zip(fits, units, strict=True)]
+    terms = context.whiten(noise, np.array([(m.calculated - without.calculated) * context.valid for m in result]))
+    rows = []
+    for fit, unit, with_it in zip(fits, units, result, strict=True):
+        perturbations = pushed(original, carried_over(original, context, unit), (), noise)
+        changes = np.nan_to_num(np.concatenate([terms, perturbations]))
+        rows.append(Before(context, without, with_it, beyond_chance(context, unit, fit.names, noise, fitted, changes)))
+    return rows
 
 
-def tied(made: Fitted, chosen: Weighed, others: Sequence[Weighed]) -> list[Weighed]:
+def tied(result: Fitted, chosen: Weighed, others: Sequence[Weighed]) -> list[Weighed]:
     """Those that neither held-out events nor, were they true, the fit of the chosen one denies."""
-    bench, criteria = made.bench, made.bench.criteria
-    rows = _rows(bench, made, [chosen.fit, *(o.fit for o in others)])
+    context, criteria = result.context, result.context.criteria
+    rows = _rows(context, result, [chosen.fit, *(o.fit for o in others)])
     distances = ((rows[1:] - rows[0]) ** 2).sum(axis=1)
-    explained = made.bare.deviance - chosen.fit.deviance
-    kept = []
+    explained = result.bare.deviance - chosen.fit.deviance
+    distinct = []
     for other, distance in zip(others, distances.tolist(), strict=True):
         behind, parameters = other.fit.cost - chosen.fit.cost, other.fit.parameters + chosen.fit.parameters
         if other.stands(criteria) and not criteria.rejects(behind, distance, parameters, explained):
-            kept.append(other)
-    return kept
+            distinct.append(other)
+    return distinct
 
 
-def _rows(bench: Context, made: Fitted, fits: Sequence[Refit]) -> np.ndarray:
-    faults = bench.coordinates.sizes(bench.catalogue.of_measurement)
-    return bench.rows(np.array([f.unit for f in fits]), made.noise, faults, [f.names for f in fits])
+def _rows(context: Context, result: Fitted, fits: Sequence[Refit]) -> np.ndarray:
+    faults = context.coordinates.sizes(context.catalogue.of_measurement)
+    return context.rows(np.array([f.unit for f in fits]), result.noise, faults, [f.names for f in fits])

@@ -132,8 +132,8 @@ class Term:
 
     @property
     def words(self) -> str:
-        told = self.signal.words + (f" {self.clock.words}" if self.clock else "")
-        return f"{told}, in {self.balance.words}"
+        text = self.signal.words + (f" {self.clock.words}" if self.clock else "")
+        return f"{text}, in {self.balance.words}"
 
     @property
     def latex(self) -> str:

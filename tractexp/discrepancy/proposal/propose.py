@@ -58,7 +58,7 @@ class Proposal:
     """A term that held-out events confirm."""
 
     term: Term
-    known: tuple[TermEstimate, ...]
+    estimates: tuple[TermEstimate, ...]
     train: Before
     validate: Before
     p: float
@@ -70,7 +70,7 @@ class Proposal:
 
     @property
     def values(self) -> dict[str, float]:
-        return {k.name: k.value for k in self.known}
+        return {k.name: k.value for k in self.estimates}
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,81 +90,83 @@ def propose(
 
     `among` are the terms that are tried, by default the whole library.
     """
-    bench = base.bench
-    if not bench.domain.calibrated:
+    context = base.context
+    if not context.domain.calibrated:
         return Proposed(why="proposals are of phasors: what waveforms lack is told by where and what is left")
     if not validate:
         return Proposed(why="a term is proposed only where a held-out event confirms it, and none was held out")
-    under = context_of_terms(bench)
-    ground = Ground.at(under, carried_over(under, bench, bare.unit), noise)
-    bench.effort.say("screening a library of terms")
+    under = context_of_terms(context)
+    ground = Ground.at(under, carried_over(under, context, bare.unit), noise)
+    context.effort.say("screening a library of terms")
     screened = screen(ground, among or terms(), seed, DRAWS)
-    bench.effort.say("refitting the most promising terms")
-    made = fitted(screened, [carried_over(under, bench, v) for v in base.valleys_but(bare.unit)[:1]])
-    bench.effort.say("judging terms on the held-out events")
-    lowered = [made.bare.deviance - fit.deviance for fit in made.fits]
-    told = weighed(bench, made, validate, [screened.p(drop) for drop in lowered])
-    tried = tuple((made.term(w.fit), w) for w in told)
-    standing = [w for w in told if w.stands(bench.criteria)]
+    context.effort.say("refitting the most promising terms")
+    result = fitted(screened, [carried_over(under, context, v) for v in base.minima_but(bare.unit)[:1]])
+    context.effort.say("judging terms on the held-out events")
+    lowered = [result.bare.deviance - fit.deviance for fit in result.fits]
+    ranked = weighed(context, result, validate, [screened.p(drop) for drop in lowered])
+    tried = tuple((result.term(w.fit), w) for w in ranked)
+    standing = [w for w in ranked if w.stands(context.criteria)]
     if not standing:
-        objections = joined(told[0].objections(bench.criteria))
-        return Proposed(None, f"of the terms tried the best is {made.term(told[0].fit).words}, but {objections}", tried)
-    return Proposed(_proposal(made, first, standing, screened.ground), "", tried)
+        objections = joined(ranked[0].objections(context.criteria))
+        return Proposed(
+            None, f"of the terms tried the best is {result.term(ranked[0].fit).words}, but {objections}", tried
+        )
+    return Proposed(_proposal(result, first, standing, screened.ground), "", tried)
 
 
-def _proposal(made: Fitted, first: Disagreement, standing: Sequence[Weighed], ground: Ground) -> Proposal:
+def _proposal(result: Fitted, first: Disagreement, standing: Sequence[Weighed], ground: Ground) -> Proposal:
     chosen, *others = standing
-    term, values = made.term(chosen.fit), made.values(chosen.fit)
-    errors = standard_errors(made, chosen.fit)
+    term, values = result.term(chosen.fit), result.values(chosen.fit)
+    errors = standard_errors(result, chosen.fit)
     declared = {s.name: (s.unit, f"size in {s.where or term.balance.words}", s.latex) for s in term.balance.sizes}
     declared |= {s.name: (s.unit, s.about, s.latex) for s in term.signal.shapes}
-    known = tuple(TermEstimate(n, v, errors[n], *declared[n]) for n, v in values.items())
-    records = joined([e.record.name for e in made.bench.events])
-    alternatives = tied(made, chosen, others)
+    estimates = tuple(TermEstimate(n, v, errors[n], *declared[n]) for n, v in values.items())
+    records = joined([e.record.name for e in result.context.events])
+    alternatives = tied(result, chosen, others)
     return Proposal(
-        term=term, known=known, train=chosen.train, validate=chosen.validate, p=chosen.p,
-        acting=tuple(_acting(made, chosen.fit)),
-        ties=tuple((made.term(o.fit), o.train.closed, o.validate.closed) for o in alternatives),
-        alike=tuple(alike(made, chosen.fit, first)),
+        term=term, estimates=estimates, train=chosen.train, validate=chosen.validate, p=chosen.p,
+        acting=tuple(_acting(result, chosen.fit)),
+        ties=tuple((result.term(o.fit), o.train.closed, o.validate.closed) for o in alternatives),
+        alike=tuple(alike(result, chosen.fit, first)),
         source=generate.source(term, values, records),
-        next_event=_next_event(made, [chosen.fit, *(o.fit for o in alternatives)]),
+        next_event=_next_event(result, [chosen.fit, *(o.fit for o in alternatives)]),
     )  # fmt: skip
 
 
-def _next_event(made: Fitted, fits: Sequence[Refit]) -> NextEvent | None:
+def _next_event(result: Fitted, fits: Sequence[Refit]) -> NextEvent | None:
     """What to record to tell a term from its near-synonyms."""
     if len(fits) == 1:
         return None
-    return next_event(made.bench, made.noise, made.bare, fits, [made.term(fit).words for fit in fits])
+    return next_event(result.context, result.noise, result.bare, fits, [result.term(fit).words for fit in fits])
 
 
-def change(made: Fitted, fit: Refit) -> np.ndarray:
+def change(result: Fitted, fit: Refit) -> np.ndarray:
     """What a term adds to the calculated power (C, N) [pu], all else as it was fitted with it."""
-    without = made.bench.coordinates.placed(fit.unit, {label: 0.0 for _, label in sizes_of(made.term(fit))})
-    with_it, alone = made.bench.residuals(np.array([fit.unit, without]), fit.names)
+    without = result.context.coordinates.placed(fit.unit, {label: 0.0 for _, label in sizes_of(result.term(fit))})
+    with_it, alone = result.context.residuals(np.array([fit.unit, without]), fit.names)
     return with_it - alone
 
 
-def _acting(made: Fitted, fit: Refit) -> list[Acting]:
+def _acting(result: Fitted, fit: Refit) -> list[Acting]:
     """Where in each event a term changes the power by more than a tenth of the most it does."""
-    bench, added, told = made.bench, change(made, fit), []
-    for e, event in enumerate(bench.events):
-        own = added[:, bench.drive.part(e)]
+    context, added, terms = result.context, change(result, fit), []
+    for e, event in enumerate(context.events):
+        own = added[:, context.drive.part(e)]
         channel, _ = np.unravel_index(np.abs(own).argmax(), own.shape)
         seen = np.flatnonzero((np.abs(own) > SEEN * np.abs(added).max()).any(axis=0))
         if len(seen):
             t = event.record.t[event.record.samples - own.shape[1] :]
             most = float(own[channel][np.abs(own[channel]).argmax()])
-            told.append(
-                Acting(event.record.name, float(t[seen[0]]), float(t[seen[-1]]), bench.drive.names[channel], most)
+            terms.append(
+                Acting(event.record.name, float(t[seen[0]]), float(t[seen[-1]]), context.drive.names[channel], most)
             )
-    return told
+    return terms
 
 
-def alike(made: Fitted, fit: Refit, first: Disagreement) -> list[tuple[str, float]]:
+def alike(result: Fitted, fit: Refit, first: Disagreement) -> list[tuple[str, float]]:
     """Textbook effects that could make most of what a term changes, the base model giving way: best first."""
-    bench = made.bench
-    rows = bench.whiten(made.noise, change(made, fit)[None])
+    context = result.context
+    rows = context.whiten(result.noise, change(result, fit)[None])
     projection = first.projection
     size = rows.shape[1]
     wide = np.concatenate([rows, np.zeros((1, projection.Q.shape[0] - size))], axis=1)
@@ -179,21 +181,24 @@ def alike(made: Fitted, fit: Refit, first: Disagreement) -> list[tuple[str, floa
     return sorted(((n, v) for n, v in shares.items() if v >= LOOKS_LIKE), key=lambda pair: -pair[1])[:4]
 
 
-def told(proposed: Proposed, plugin: str) -> Mapping[str, object] | None:
+def to_dict(proposed: Proposed, plugin: str) -> Mapping[str, object] | None:
     """The proposal as `discrepancy.json` has it; `plugin` is the path of its file."""
-    if (made := proposed.proposal) is None:
+    if (proposal := proposed.proposal) is None:
         return None
     return {
         "terms": [
-            _named(made.term)
-            | {"function_of_voltage": not made.term.exogenous, "parameters": {k.name: _number(k) for k in made.known}}
+            _named(proposal.term)
+            | {
+                "function_of_voltage": not proposal.term.exogenous,
+                "parameters": {k.name: _number(k) for k in proposal.estimates},
+            }
         ],
-        "closed": {"train": made.train.closed, "validate": made.validate.closed},
-        "left": {"train": made.train.left, "validate": made.validate.left},
-        "p": made.p,
-        "when": [vars(a) for a in made.acting],
-        "ties": [_named(t) | {"closed": {"train": near, "validate": held}} for t, near, held in made.ties],
-        "alike": dict(made.alike),
+        "closed": {"train": proposal.train.closed, "validate": proposal.validate.closed},
+        "left": {"train": proposal.train.left, "validate": proposal.validate.left},
+        "p": proposal.p,
+        "when": [vars(a) for a in proposal.acting],
+        "ties": [_named(t) | {"closed": {"train": near, "validate": held}} for t, near, held in proposal.ties],
+        "alike": dict(proposal.alike),
         "plugin": plugin,
     }
 
@@ -205,9 +210,9 @@ def _named(term: Term) -> dict[str, object]:
     return {**names, "words": term.words, "latex": term.latex}
 
 
-def _number(known: TermEstimate) -> dict[str, object]:
-    interval = [_finite(end) for end in known.interval]
-    return {"value": known.value, "standard_error": _finite(known.error), "interval": interval}
+def _number(estimates: TermEstimate) -> dict[str, object]:
+    interval = [_finite(end) for end in estimates.interval]
+    return {"value": estimates.value, "standard_error": _finite(estimates.error), "interval": interval}
 
 
 def _finite(value: float) -> float | None:

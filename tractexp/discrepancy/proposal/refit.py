@@ -36,7 +36,7 @@ AGAIN = 10  # terms that start from the other fits of the base model, too
 class Fitted:
     """Terms fitted under one noise, the best first, and the base model alone."""
 
-    bench: Context  # with these terms as candidates
+    context: Context  # with these terms as candidates
     noise: Noise
     bare: Refit
     fits: tuple[Refit, ...]
@@ -46,22 +46,22 @@ class Fitted:
 
     def values(self, fit: Refit) -> dict[str, float]:
         """Sizes and setting of a fit's term, by their own names."""
-        return values_of(self.bench.coordinates, fit.unit, self.term(fit))
+        return values_of(self.context.coordinates, fit.unit, self.term(fit))
 
 
 def shortlist(screened: Screened) -> list[Scored]:
     """The most promising terms, each at its best setting, so that no kind of signal crowds out the others."""
     best: dict[str, Scored] = {}
-    for found in screened.scored:
-        if found.drop > 0:
-            best.setdefault(found.term.name, found)
+    for scored in screened.scored:
+        if scored.drop > 0:
+            best.setdefault(scored.term.name, scored)
     alike: dict[tuple, int] = {}
     diverse = []
-    for found in best.values():
-        key = found.term.signal.name, found.term.clock
+    for scored in best.values():
+        key = scored.term.signal.name, scored.term.clock
         alike[key] = alike.get(key, 0) + 1
         if alike[key] <= ALIKE:
-            diverse.append(found)
+            diverse.append(scored)
     answers = [f for f in diverse if f.term.signal.kind == ANSWER][:ANSWERS]
     rest = [f for f in diverse if f not in answers][: MOST - len(answers)]
     return sorted([*answers, *rest], key=lambda f: -f.drop)
@@ -70,10 +70,10 @@ def shortlist(screened: Screened) -> list[Scored]:
 def further(screened: Screened, listed: Sequence[Scored]) -> list[Scored]:
     """Further settings of terms, far from those listed on the grid of some parameter: peaks of their own."""
     more: dict[str, list[Scored]] = {f.term.name: [f] for f in listed}
-    for found in screened.scored:
-        there = more.get(found.term.name)
-        if there and len(there) < PEAKS and all(_far(found, f) for f in there):
-            there.append(found)
+    for scored in screened.scored:
+        there = more.get(scored.term.name)
+        if there and len(there) < PEAKS and all(_far(scored, f) for f in there):
+            there.append(scored)
     return [f for there in more.values() for f in there[1:] if f.drop > PROMISING * there[0].drop]
 
 
@@ -87,9 +87,9 @@ def _far(a: Scored, b: Scored) -> bool:
     return any(places(s) >= 2 for s in a.term.signal.shapes if s.name != "phase")
 
 
-def zoomed(ground: Ground, found: Sequence[Scored]) -> list[Scored]:
+def zoomed(ground: Ground, scored: Sequence[Scored]) -> list[Scored]:
     """The same terms at better settings, each parameter moved by itself on ever finer grids."""
-    best = list(found)
+    best = list(scored)
     for turn in range(ROUNDS):
         for k in range(max((len(f.term.signal.shapes) for f in best), default=0)):
             tried = [(i, setting) for i, f in enumerate(best) for setting in _finer(f, k, 4.0**-turn)]
@@ -100,50 +100,50 @@ def zoomed(ground: Ground, found: Sequence[Scored]) -> list[Scored]:
     return sorted(best, key=lambda f: -f.drop)
 
 
-def _finer(found: Scored, which: int, scale: float) -> list[dict[str, float]]:
+def _finer(scored: Scored, which: int, scale: float) -> list[dict[str, float]]:
     """Settings between a setting and its neighbors on the grid, one parameter moved."""
-    shapes = found.term.signal.shapes
+    shapes = scored.term.signal.shapes
     if which >= len(shapes) or shapes[which].name == "phase":
         return []
     shape = shapes[which]
-    grid, now = np.array(shape.grid), found.setting[shape.name]
+    grid, now = np.array(shape.grid), scored.setting[shape.name]
     near = np.sort(np.abs(grid - now))
     reach = scale * (near[near > 0][0] if (near > 0).any() else 0.1 * np.ptp(shape.bounds))
     moved = (float(np.clip(now + part * reach, *shape.bounds)) for part in FINER)
-    return [{**found.setting, shape.name: value} for value in dict.fromkeys(moved) if value != now]
+    return [{**scored.setting, shape.name: value} for value in dict.fromkeys(moved) if value != now]
 
 
-def fitted(screened: Screened, valleys: Sequence[np.ndarray]) -> Fitted:
-    """Refit the shortlist; `valleys` (D,) are other fits of the base model in the coordinates of the terms' bench."""
+def fitted(screened: Screened, local_minima: Sequence[np.ndarray]) -> Fitted:
+    """Refit the shortlist; `local_minima` (D,) are other fits of the base model, in the terms' coordinates."""
     ground = screened.ground
     listed = shortlist(screened)
     chosen = zoomed(ground, [*listed, *further(screened, listed[:AGAIN])])
     likely = [f.term for f in chosen]
-    bench, noise = with_terms(ground.bench, [*likely, *(s for t in likely for s in siblings(t))]), ground.noise
-    bare = refit(bench, noise, [((), ground.unit)])[0]
-    fits = rough_refit(bench, noise, _starts(bench, chosen, [ground.unit]))
+    context, noise = with_terms(ground.context, [*likely, *(s for t in likely for s in siblings(t))]), ground.noise
+    bare = refit(context, noise, [((), ground.unit)])[0]
+    fits = rough_refit(context, noise, _starts(context, chosen, [ground.unit]))
     best = {f.names[0] for f in fits[:AGAIN]}
-    others = [*off_bounds(bench, ground.unit, MIDDLE), *valleys]
-    again = _starts(bench, [f for f in chosen if f.term.name in best], others)
-    fits = best_of([*fits, *(rough_refit(bench, noise, again) if again else [])])
-    fits = _searched_anew(bench, noise, fits, REGRIDDED)
-    moved = [start for f in fits[:MOVED] for start in elsewhere(bench, noise, f)]
-    fits = best_of([*fits, *(rough_refit(bench, noise, moved) if moved else [])])
-    fits = _searched_anew(bench, noise, fits, 1, scattered=True)
+    others = [*off_bounds(context, ground.unit, MIDDLE), *local_minima]
+    again = _starts(context, [f for f in chosen if f.term.name in best], others)
+    fits = best_of([*fits, *(rough_refit(context, noise, again) if again else [])])
+    fits = _searched_anew(context, noise, fits, REGRIDDED)
+    moved = [start for f in fits[:MOVED] for start in elsewhere(context, noise, f)]
+    fits = best_of([*fits, *(rough_refit(context, noise, moved) if moved else [])])
+    fits = _searched_anew(context, noise, fits, 1, scattered=True)
     near = fits[0].cost + max(CLOSE * (bare.deviance - fits[0].deviance), 20.0)
-    exact = {f.names: f for f in refit(bench, noise, [(f.names, f.unit) for f in fits[:EXACT] if f.cost <= near])}
+    exact = {f.names: f for f in refit(context, noise, [(f.names, f.unit) for f in fits[:EXACT] if f.cost <= near])}
     ranked = sorted((exact.get(f.names, f) for f in fits), key=lambda f: f.cost)
-    return Fitted(bench, noise, bare, tuple(ranked))
+    return Fitted(context, noise, bare, tuple(ranked))
 
 
 def _searched_anew(
-    bench: Context, noise: Noise, fits: Sequence[Refit], most: int, *, scattered: bool = False
+    context: Context, noise: Noise, fits: Sequence[Refit], most: int, *, scattered: bool = False
 ) -> list[Refit]:  # fmt: skip
     """The fits, with the shapes of the best terms searched over their grids and moved across their ranges."""
     again = ROUND_ABOUT if scattered else 0
 
     def anew(fit: Refit) -> list[Refit]:
-        return wide_refit(bench, noise, [regridded(bench, noise, fit), (fit.names, fit.unit)], again=again)
+        return wide_refit(context, noise, [regridded(context, noise, fit), (fit.names, fit.unit)], again=again)
 
     shaped = [f for f in fits[:most] if term(f.names[0]).signal.shapes]
     return best_of([*fits, *itertools.chain(*each_apart(anew, shaped))])
@@ -154,49 +154,49 @@ def siblings(of: Term) -> list[Term]:
     return [t for t in terms() if (t.signal, t.clock) == (of.signal, of.clock) and t != of]
 
 
-def elsewhere(bench: Context, noise: Noise, fit: Refit) -> list[Start]:
+def elsewhere(context: Context, noise: Noise, fit: Refit) -> list[Start]:
     """Starts of a term's siblings at its setting, where the base model is that of its own refit.
 
     At the first fit of the base model they may have ranked far behind, or at another setting.
     """
-    chosen, at = term(fit.names[0]), bench.coordinates
+    chosen, at = term(fit.names[0]), context.coordinates
     values = values_of(at, fit.unit, chosen)
     setting = {s.name: values[s.name] for s in chosen.signal.shapes}
-    there = Ground.at(bench, place(at, fit.unit, chosen, values, [0.0] * len(chosen.balance.sizes)), noise)
-    return _starts(bench, scores(there, [(t, setting) for t in siblings(chosen)]), [there.unit])
+    there = Ground.at(context, place(at, fit.unit, chosen, values, [0.0] * len(chosen.balance.sizes)), noise)
+    return _starts(context, scores(there, [(t, setting) for t in siblings(chosen)]), [there.unit])
 
 
-def regridded(bench: Context, noise: Noise, fit: Refit) -> Start:
+def regridded(context: Context, noise: Noise, fit: Refit) -> Start:
     """A start for a term at the best setting of its whole grid where the base model is that of its own refit.
 
     At the first fit of the base model, which something missing bends, another setting may have seemed the best.
     """
-    chosen, at = term(fit.names[0]), bench.coordinates
+    chosen, at = term(fit.names[0]), context.coordinates
     sizes = [0.0] * len(chosen.balance.sizes)
     values = values_of(at, fit.unit, chosen)
-    there = Ground.at(bench, place(at, fit.unit, chosen, values, sizes), noise)
+    there = Ground.at(context, place(at, fit.unit, chosen, values, sizes), noise)
     tried = [(chosen, s) for s in chosen.signal.settings if s.get("phase", 0.0) == 0.0]
     best = max(scores(there, tried), key=lambda f: f.drop)
     (best,) = zoomed(there, [best])
     return fit.names, place(at, fit.unit, chosen, best.setting, best.sizes)
 
 
-def _starts(bench: Context, chosen: Sequence[Scored], units: Sequence[np.ndarray]) -> list[Start]:
+def _starts(context: Context, chosen: Sequence[Scored], units: Sequence[np.ndarray]) -> list[Start]:
     """Each term at its one-step size on each of the base model's fits (D,)."""
-    at = bench.coordinates
+    at = context.coordinates
     return [((f.term.name,), place(at, unit, f.term, f.setting, f.sizes)) for f in chosen for unit in units]
 
 
-def standard_errors(made: Fitted, fit: Refit) -> dict[str, float]:
+def standard_errors(result: Fitted, fit: Refit) -> dict[str, float]:
     """Of a term's parameters, by their own names, all else free beside them; infinite where nothing is known."""
-    bench, chosen = made.bench, made.term(fit)
-    at = bench.coordinates
-    faults = [k for n in bench.catalogue.of_measurement for k in at.sizes([n])]
+    context, chosen = result.context, result.term(fit)
+    at = context.coordinates
+    faults = [k for n in context.catalogue.of_measurement for k in at.sizes([n])]
     own = at.parameters(fit.names)
     columns = [*at.base, *at.before, *faults, *own]
-    _, rows = linearised(bench, fit.unit, made.noise, columns, fit.names)
+    _, rows = linearised(context, fit.unit, result.noise, columns, fit.names)
     covariance = np.linalg.pinv(rows[1:] @ rows[1:].T, rcond=1e-14, hermitian=True)
     spread = np.sqrt(np.diag(covariance))[-len(own) :] * [at.width(at.names[k]) for k in own]
-    known = np.linalg.norm(rows[1:], axis=1)[-len(own) :] > 0
+    determined = np.linalg.norm(rows[1:], axis=1)[-len(own) :] > 0
     names = values_of(at, fit.unit, chosen)
-    return {n: float(s) if seen else float("inf") for n, s, seen in zip(names, spread, known, strict=True)}
+    return {n: float(s) if seen else float("inf") for n, s, seen in zip(names, spread, determined, strict=True)}

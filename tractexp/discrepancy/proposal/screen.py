@@ -31,7 +31,7 @@ Batch = list[Members]
 class Ground:
     """A fit with all that may give way projected out. R = C N rows of the records, then those of the priors."""
 
-    bench: Context  # of terms
+    context: Context  # of terms
     unit: np.ndarray  # (D,)
     noise: Noise
     raw: np.ndarray  # (C, N) residuals of the fit
@@ -39,14 +39,14 @@ class Ground:
     r: np.ndarray  # (R,) the fit's residual, projected
 
     @classmethod
-    def at(cls, bench: Context, unit: np.ndarray, noise: Noise) -> "Ground":
+    def at(cls, context: Context, unit: np.ndarray, noise: Noise) -> "Ground":
         """At coordinates (D,). The base model's parameters give way though they rest on their bounds."""
-        at = bench.coordinates
-        faults = [k for n in bench.catalogue.of_measurement for k in at.sizes([n])]
-        raw, rows = linearised(bench, unit, noise, [*at.base, *at.before, *faults], ())
+        at = context.coordinates
+        faults = [k for n in context.catalogue.of_measurement for k in at.sizes([n])]
+        raw, rows = linearised(context, unit, noise, [*at.base, *at.before, *faults], ())
         Q = np.linalg.qr(rows[1:].T)[0]
-        made = cls(bench, unit, noise, raw, Q, rows[0])
-        return replace(made, r=made.off(rows[:1])[0])
+        ground = cls(context, unit, noise, raw, Q, rows[0])
+        return replace(ground, r=ground.off(rows[:1])[0])
 
     def off(self, rows: np.ndarray) -> np.ndarray:
         """Rows (n, R) without what the nuisances explain."""
@@ -54,16 +54,16 @@ class Ground:
 
     def columns(self, points: np.ndarray, spans: np.ndarray, kind: str) -> np.ndarray:
         """What points (n, D) of one kind of terms change for each unit of their size, whitened (n, C N)."""
-        raw = self.bench.residuals(points, (kind,))
+        raw = self.context.residuals(points, (kind,))
         raw -= self.raw
         raw /= spans[:, None, None]
-        return self.bench.whiten(self.noise, np.nan_to_num(raw, copy=False))
+        return self.context.whiten(self.noise, np.nan_to_num(raw, copy=False))
 
     def drawn(self, seed: int, draws: int) -> np.ndarray:
         """Noise (draws, R), whitened and projected as the fit's residual is."""
-        bench = self.bench
-        noise = self.noise.draw(np.random.default_rng(seed), draws, np.diff(bench.drive.first).tolist())
-        white = bench.whiten(self.noise, noise * bench.known)
+        context = self.context
+        noise = self.noise.draw(np.random.default_rng(seed), draws, np.diff(context.drive.first).tolist())
+        white = context.whiten(self.noise, noise * context.valid)
         return self.off(np.concatenate([white, np.zeros((draws, len(self.r) - white.shape[1]))], axis=1))
 
 
@@ -97,16 +97,16 @@ def screen(ground: Ground, terms: Sequence[Term], seed: int, draws: int) -> Scre
     noise = ground.drawn(seed, draws)
     best = np.zeros(draws)
     scored = []
-    for found, drops in _scores(ground, [(t, s) for t in terms for s in t.signal.settings if _first(s)], noise):
-        scored.append(found)
+    for score, drops in _scores(ground, [(t, s) for t in terms for s in t.signal.settings if _first(s)], noise):
+        scored.append(score)
         best = np.maximum(best, drops)
     return Screened(ground, sorted(scored, key=lambda s: -s.drop), best)
 
 
 def scores(ground: Ground, wanted: Sequence[tuple[Term, Setting]]) -> list[Scored]:
     """Score terms at settings of their own, in this order; a phase is found, not given."""
-    made = {(s.term.name, _key(s.setting)): s for s, _ in _scores(ground, wanted, np.zeros((0, len(ground.r))))}
-    return [made[t.name, _key({k: v for k, v in s.items() if k != "phase"})] for t, s in wanted]
+    by_key = {(s.term.name, _key(s.setting)): s for s, _ in _scores(ground, wanted, np.zeros((0, len(ground.r))))}
+    return [by_key[t.name, _key({k: v for k, v in s.items() if k != "phase"})] for t, s in wanted]
 
 
 def _first(setting: Setting) -> bool:
@@ -122,7 +122,7 @@ def _scores(
     ground: Ground, wanted: Sequence[tuple[Term, Setting]], noise: np.ndarray
 ) -> Iterator[tuple[Scored, np.ndarray]]:
     """Each term with its score, and what noise (b, R) would give it (b,). Balances of a signal share columns."""
-    ground.noise.prepare(ground.bench.drive, ground.bench.known)
+    ground.noise.prepare(ground.context.drive, ground.context.valid)
     return itertools.chain(*each_apart(lambda batch: _batch(ground, batch, noise), _batches(wanted)))
 
 
@@ -145,7 +145,7 @@ def _kind(members: Members) -> str:
 
 
 def _batch(ground: Ground, batch: Batch, noise: np.ndarray) -> list[tuple[Scored, np.ndarray]]:
-    at, index = ground.bench.coordinates, {}
+    at, index = ground.context.coordinates, {}
     points, spans = [], []
     blocks = []
     for members in batch:
@@ -166,14 +166,14 @@ def _batch(ground: Ground, batch: Batch, noise: np.ndarray) -> list[tuple[Scored
     seen = columns.shape[1]
     side, drawn = columns @ ground.r[:seen], columns @ noise[:, :seen].T
     along = columns @ ground.Q[:seen]
-    told = []
+    pairs = []
     for t, s, rows in blocks:
         gram = columns[rows] @ columns[rows].T - along[rows] @ along[rows].T  # what the nuisances explain taken away
         inverse = _inverse(gram, np.einsum("nr,nr->n", columns[rows], columns[rows]).max())
         sizes, chance = -inverse @ side[rows], drawn[rows]
         drops = (chance * (inverse @ chance)).sum(axis=0)
-        told.append((_told(t, s, sizes, float(-sizes @ side[rows])), drops))
-    return told
+        pairs.append((_scored(t, s, sizes, float(-sizes @ side[rows])), drops))
+    return pairs
 
 
 def _inverse(gram: np.ndarray, whole: float) -> np.ndarray:
@@ -181,11 +181,11 @@ def _inverse(gram: np.ndarray, whole: float) -> np.ndarray:
     if len(gram) == 1:
         return 1 / gram if gram[0, 0] > LEAST * whole + 1e-12 else np.zeros((1, 1))
     values, vectors = np.linalg.eigh(gram)
-    kept = values > max(LEAST * whole, 1e-12)
-    return (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
+    large = values > max(LEAST * whole, 1e-12)
+    return (vectors[:, large] / values[large]) @ vectors[:, large].T
 
 
-def _told(t: Term, setting: Setting, sizes: np.ndarray, drop: float) -> Scored:
+def _scored(t: Term, setting: Setting, sizes: np.ndarray, drop: float) -> Scored:
     """A score; of two phases the amplitude, and the phase of the larger balance."""
     if "phase" not in setting:
         return _within(Scored(t, dict(setting), drop, tuple(sizes.tolist())))
@@ -196,10 +196,10 @@ def _told(t: Term, setting: Setting, sizes: np.ndarray, drop: float) -> Scored:
     return _within(Scored(t, {**setting, "phase": phase}, drop, tuple(amplitudes.tolist())))
 
 
-def _within(found: Scored) -> Scored:
+def _within(score: Scored) -> Scored:
     """A score with sizes that its bounds allow: a column of nearly nothing needs a size beyond all of them."""
-    over = max(abs(k) / size.bound for k, size in zip(found.sizes, found.term.balance.sizes, strict=True))
+    over = max(abs(k) / size.bound for k, size in zip(score.sizes, score.term.balance.sizes, strict=True))
     if over <= 1:
-        return found
+        return score
     c = 1 / over
-    return replace(found, drop=found.drop * (2 * c - c**2), sizes=tuple(c * k for k in found.sizes))
+    return replace(score, drop=score.drop * (2 * c - c**2), sizes=tuple(c * k for k in score.sizes))

@@ -6,23 +6,23 @@ from typing import Any
 from tractexp.wording import in_words, joined, percent, with_error
 
 
-def proposed_in_words(told: Mapping[str, Any] | None, why: str | None) -> list[str]:
+def proposed_in_words(proposal: Mapping[str, Any] | None, why: str | None) -> list[str]:
     """The proposal, or why there is none; nothing where none was asked for."""
-    if not told:
+    if not proposal:
         return [f"no term is proposed: {why}"] if why else []
-    (term,) = told["terms"]
-    closed = told["closed"]
+    (term,) = proposal["terms"]
+    closed = proposal["closed"]
     sentences = [
         f"proposed: {term['words']}, which closes {percent(closed['train'])} of the gap on the fitted events and"
         f" {percent(closed['validate'])} on the held-out ones; {_numbers(term['parameters'])}",
     ]
     if not term["function_of_voltage"]:
         sentences.append("it is not a function of the voltage: something happened by itself")
-    if told["ties"]:
-        names = joined([t["words"] for t in told["ties"]], "or")
+    if proposal["ties"]:
+        names = joined([t["words"] for t in proposal["ties"]], "or")
         sentences.append(f"these events cannot tell it from {names}")
-    if told["alike"]:
-        sentences.append(f"looks like it: {joined([f'{n} ({percent(v)})' for n, v in told['alike'].items()])}")
+    if proposal["alike"]:
+        sentences.append(f"looks like it: {joined([f'{n} ({percent(v)})' for n, v in proposal['alike'].items()])}")
     return sentences
 
 

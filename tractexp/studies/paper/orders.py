@@ -87,7 +87,7 @@ def fit(node: Mapping[str, Any], motor: str, train: Sequence[Event], held_out: S
         parameters,
         result.objective,
         tuple(fits),
-        estimate(problem, result.values).known,
+        estimate(problem, result.values).uncertainty,
         duration(problem),
         substeps,
         count(model.source),

@@ -12,7 +12,7 @@ import numpy as np
 
 from tractexp import files, store
 from tractexp.identification.problem import Problem
-from tractexp.identification.search import Found, History, Limits
+from tractexp.identification.search import History, Limits, SearchResult
 from tractexp.plugin import build
 from tractexp.store import DAMAGED, SEARCHES
 
@@ -31,16 +31,16 @@ class SearchStore:
         stored = on and limits.seconds is None and all(map(store.installed, (*_parts(problem), problem.loss)))
         self.problem = _key(problem, limits) if stored else ""
 
-    def get(self, settings: Mapping[str, Any], seed: int) -> Found | None:
+    def get(self, settings: Mapping[str, Any], seed: int) -> SearchResult | None:
         """The search of an entry; None where there is none, or it is damaged."""
         if (entry := SEARCHES.read_arrays(self._key(settings, seed))) is None:
             return None
         with contextlib.suppress(*DAMAGED):
             history = History(**{name: entry[name] for name in ARRAYS})
-            return Found(**json.loads(str(entry["ending"])), values=entry["found"], history=history)
+            return SearchResult(**json.loads(str(entry["ending"])), values=entry["found"], history=history)
         return None
 
-    def put(self, settings: Mapping[str, Any], seed: int, found: Found) -> None:
+    def put(self, settings: Mapping[str, Any], seed: int, found: SearchResult) -> None:
         """Write the entry of a search."""
         ending = {k: v for k, v in vars(found).items() if k not in ("values", "history")}
         arrays = {name: getattr(found.history, name) for name in ARRAYS}
