@@ -1,8 +1,8 @@
-"""Rows of judgement sets as the tables and figures of the docs. Shares come with exact 95 % intervals."""
+"""Rows of the judgement set as the tables and figures of docs/judgement.md. Shares come with exact 95 % intervals."""
 
 import itertools
 import json
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import marked
@@ -13,11 +13,12 @@ from hidden_effects.laws import MEMBERS_LAW
 
 Rows = list[dict]
 VERDICTS = ("none", "named", "tied", "unexplained")
-FITTED = 3  # events, where nothing else is said
 OTHERS = ("rotor_skin_effect", "stator_transients")  # orders of the model, which have no law of their own
-BINS = ((0, 20), (20, 40), (40, 80), (80, np.inf))  # of the non-centrality that the best single effect leaves
+CHAIN = {"time_skew", "measurement_window", "load_drift"}  # nuisances may be named where they are there
+MULTIPLES = (2.0, 4.0, 8.0)  # of the detection limit
+FAR = {"outside": 80.0, "left out": 40.0}  # non-centrality left by the best single effect: no effect comes near
 MARK = "benchmarks/hidden_effects_study.py --docs"  # what makes the tables
-NEWEST, EARLIER = "missing-effects.md", "earlier-judgements.md"  # the pages that hold them
+PAGE = "judgement.md"
 _POWER, _STATIC = {"power", "power_P", "power_Q", "whole"}, {"static", "static_P", "static_Q"}
 RIGHT = {  # of a stranger: balances and signals of a proposal that are called right, fixed before any seed was drawn;
     # "voltage" was no balance of the library before the set with near rivals
@@ -32,15 +33,6 @@ RIGHT = {  # of a stranger: balances and signals of a proposal that are called r
     "phase_jump": ({"angle"}, {"power", "knee", "knee_squared", "below", "lag"}),
     "voltage_rate": (_POWER | _STATIC, {"rate"}),
 }
-_FIRST = ("of the first", "frozen anew")  # no member had a law of its own
-_TWO = (*_FIRST, "with more members", "ten of each")
-SINCE = {  # laws of members that came after these sets
-    "thermostat_recovery": _TWO,
-    "switched_capacitors": _TWO,
-    "staged_power_limit": (*_TWO, "nearby families"),
-    "link_voltage_control": (*_TWO, "nearby families"),
-}
-CLOSES = 0.8  # of the gap on the held-out event, by a proposal
 
 
 def read(path: Path) -> Rows:
@@ -48,59 +40,35 @@ def read(path: Path) -> Rows:
     return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
 
 
-def mark(what: str = "") -> str:
-    """Where the tables of a set stand: of the newest, or of that in which `what` is new."""
-    return f"{MARK}, {what}" if what else MARK
-
-
-def tables(rows: Rows, what: str = "") -> str:
-    """The tables of a set, Markdown: of the newest with times and figures, or of that in which `what` is new.
-
-    Laws that a member of a family was built to tell stand apart from others.
-    """
-    known = {law for law in MEMBERS_LAW if what not in SINCE.get(law, _FIRST)}
-    good, usual = [r for r in rows if "failed" not in r], _usual(rows)
-    failed, when = len(rows) - len(good), what and f", {what}"
+def tables(rows: Rows) -> str:
+    """The tables of the set, Markdown, and its figures."""
+    good = [r for r in rows if "failed" not in r]
+    failed = len(rows) - len(good)
     parts = [
-        f"{len(rows)} data sets" + (f", of which {failed} could not be made or investigated." if failed else "."),
-        *(_table(title + when, head, lines) for title, head, lines in (
-            _false_alarms(usual), _singles(usual), _laws(usual, known), _each_law(usual), _events(good),
-            _abstention(usual), _proposals(usual), _pairs(usual), _sizes(usual), _seconds([] if what else usual),
-        ) if lines),
-        *(() if what else (f"![{told}]({_path(name)})" for name, told in _figures(usual).items())),
+        f"{len(rows)} data sets" + (f", of which {failed} could not be simulated or investigated." if failed else "."),
+        *(_table(head, lines) for head, lines in (_answers(good), _strangers(good), _pairs(good)) if lines),
+        _partly(good), _proposals(good), _table(*_seconds(good)),
+        *(f"![{what}]({_path(name)})" for name, what in FIGURES.items()),
     ]  # fmt: skip
-    return "\n\n".join(parts)
+    return "\n\n".join(filter(None, parts))
 
 
-def _usual(rows: Rows) -> Rows:
-    """What was investigated with the usual number of events."""
-    return [r for r in rows if "failed" not in r and fitted(r) == FITTED]
+FIGURES = {
+    "detection": "Share of data sets in which a disagreement was found",
+    "confusion": "Verdict for each hidden effect",
+}
 
 
 def _path(name: str) -> str:
     return f"images/missing-effects-{name}.svg"
 
 
-def _figures(rows: Rows) -> dict[str, str]:
-    """The figures that these rows give, with what they show."""
-    shown = {"detection": "Share of data sets in which something was found"} if len(_multiples(rows)) > 1 else {}
-    return shown | {"confusion": "What was said of what was hidden"}
-
-
-def _multiples(rows: Rows) -> list[float]:
-    """Detection limits at which single effects of the catalogue are hidden."""
-    return [m for m in (0.5, 1.0, 2.0, 4.0, 8.0) if any(r["group"] == f"{m:g} x" and reached(r, m) for r in rows)]
-
-
-def write(sets: Mapping[str, Rows], docs: Path) -> None:
-    """Put the tables of all sets between their marks, the figures of the newest, which is the last, into images/."""
-    *earlier, newest = sets
-    for what in earlier:
-        marked.replace(docs / EARLIER, mark(what), tables(sets[what], what))
-    marked.replace(docs / NEWEST, mark(), tables(sets[newest]))
-    usual = _usual(sets[newest])
-    for name in _figures(usual):
-        {"detection": _draw_detection, "confusion": _draw_confusion}[name](usual, docs / _path(name))
+def write(rows: Rows, docs: Path) -> None:
+    """Put the tables between their marks and the figures into images/."""
+    marked.replace(docs / PAGE, MARK, tables(rows))
+    good = [r for r in rows if "failed" not in r]
+    for name, draw in (("detection", _draw_detection), ("confusion", _draw_confusion)):
+        draw(good, docs / _path(name))
 
 
 def share(right: int, of: int) -> str:
@@ -113,22 +81,8 @@ def share(right: int, of: int) -> str:
     return f"{right / of:.1%} ({low:.0%}-{high:.0%})" if of < 1000 else f"{right / of:.1%}"
 
 
-def fitted(row: dict) -> int:
-    """Number of events fitted."""
-    return row["events"] - row["held"]
-
-
-def _table(title: str, head: Sequence[str], lines: Sequence[Sequence[object]]) -> str:
-    rows = ["| " + " | ".join(map(str, line)) + " |" for line in (head, ["---"] * len(head), *lines)]
-    return f"### {title}\n\n" + "\n".join(rows)
-
-
-def _groups(rows: Rows, start: str) -> dict[str, Rows]:
-    found: dict[str, Rows] = {}
-    for row in rows:
-        if row["group"].startswith(start):
-            found.setdefault(row["group"], []).append(row)
-    return found
+def _table(head: Sequence[str], lines: Sequence[Sequence[object]]) -> str:
+    return "\n".join("| " + " | ".join(map(str, line)) + " |" for line in (head, ["---"] * len(head), *lines))
 
 
 def _rank(row: dict, price: Callable[[int, int], float]) -> str:
@@ -176,110 +130,70 @@ def in_set(row: dict) -> bool:
     return row["truth"] in [sorted(s) for s in row["sets"]]
 
 
-def _false_alarms(rows: Rows) -> tuple[str, list[str], list]:
-    lines, everything = [], []
-    for group, members in _groups(rows, "null").items():
-        if "nuisances" not in group:
-            everything += members
-        lines.append([group.removeprefix("null, "), *_alarms(members)])
-    if everything:
-        lines.append(["all but those with nuisances", *_alarms(everything)])
-    head = ["noise", "data sets", "anything said", "a name among it", *(f"{pick} names one" for pick in PICKS)]
-    return "Nothing is missing", head, lines
+def reached(row: dict, multiple: float) -> bool:
+    """Whether the effect could be made this many limits large."""
+    return all(m >= 0.9 * multiple for m in row["multiples"]) and not set(row["untestable"]) & set(row["truth"])
 
 
-def _alarms(members: Rows) -> list[str]:
-    """Nuisances that are there may be named: they are the truth of their data sets."""
-    n, chain = len(members), {"time_skew", "measurement_window", "load_drift"}
-    allowed = chain if members[0]["group"] == "null with nuisances" else set()
-    said = [r for r in members if r["verdict"] != "none" and not (r["names"] and set(r["names"]) <= allowed)]
-    named = sum(r["verdict"] in ("named", "tied") for r in said)
-    picks = [share(sum(bool(pick(r)) for r in members), n) for pick in PICKS.values()]
-    return [str(n), share(len(said), n), share(named, n), *picks]
+def _count(rows: Rows, verdict: str) -> int:
+    return sum(r["verdict"] == verdict for r in rows)
 
 
-def _singles(rows: Rows) -> tuple[str, list[str], list]:
-    lines = []
-    for multiple in (0.5, 1.0, 2.0, 4.0, 8.0):
-        members = [r for r in _groups(rows, f"{multiple:g} x").get(f"{multiple:g} x", []) if reached(r, multiple)]
-        if not members:
-            continue
-        n = len(members)
-        found = [r for r in members if r["verdict"] in ("named", "tied")]
-        said = [r for r in members if r["verdict"] != "none"]
-        unique = [r for r in members if r["verdict"] == "named"]
-        held = np.array([r["closed_true"] for r in members if right(r) and r.get("closed_true") is not None])
-        placed = [r for r in said if r["places"]]
-        lines.append([
-            f"{multiple:g}", n, share(len(said), n), share(len(unique), n), share(sum(map(right, unique)), len(unique)),
-            share(sum(map(in_set, found)), len(found)), share(len(said) - len(found), n),
-            *(share(sum([pick(r)] == r["truth"] for r in members), n) for pick in PICKS.values()),
-            f"{np.median(held):.1%}, {np.mean(held >= 0.95):.0%}" if len(held) else "-",
-            share(sum(r["places_true"] > 0 for r in placed), len(placed)),
-        ])  # fmt: skip
-    head = [
-        "times the limit", "data sets", "disagreement found", "one name", "of these right", "truth among the names",
-        "unexplained", *(f"{pick} right" for pick in PICKS),
-        "gap closed on the held-out event: median, at least 95 %", "a place found is true",
-    ]  # fmt: skip
-    return "One effect is missing", head, lines
-
-
-def _laws(rows: Rows, known: Container[str]) -> tuple[str, list[str], list]:
-    lines = []
-    full = [r for r in rows if reached(r, 4.0) and r["label"] not in OTHERS]
-    by_law = {
-        "the catalogue's": [r for r in full if r["group"] == "4 x"],
-        "that of a member": [r for r in full if r["group"] == "law 4 x" and r["label"] in known],
-        "another": [r for r in full if r["group"] == "law 4 x" and r["label"] not in known],
+def _groups(rows: Rows) -> dict[str, Rows]:
+    """What is hidden, by the lines of the first table."""
+    nulls = [r for r in rows if r["group"].startswith("null")]
+    groups = {
+        "nothing": [r for r in nulls if "nuisances" not in r["group"]],
+        "faults of the measurement only": [r for r in nulls if "nuisances" in r["group"]],
     }
-    for law, members in by_law.items():
-        if members:
-            n, unique = len(members), [r for r in members if r["verdict"] == "named"]
-            told = [r for r in members if r["verdict"] in ("named", "tied")]
-            lines.append([
-                law, n, share(len(unique), n), share(sum(map(right, unique)), len(unique)),
-                share(sum(map(in_set, told)), len(told)),
-                *(share(sum(r["verdict"] == v for r in members), n) for v in ("tied", "unexplained", "none")),
-                *(share(sum([pick(r)] == r["truth"] for r in members), n) for pick in PICKS.values()),
-            ])  # fmt: skip
-    head = ["law", "data sets", "one name", "of these right", "truth among the names", "tied", "unexplained", "none",
-            *(f"{pick} right" for pick in PICKS)]  # fmt: skip
-    return "The same effect by another law, 4 times the limit", head, lines
+    for m in MULTIPLES:
+        groups[f"one effect, {m:g} x its limit"] = [r for r in rows if r["group"] == f"{m:g} x" and reached(r, m)]
+    laws = [r for r in rows if r["group"] == "law 4 x" and reached(r, 4.0)]
+    groups["4 x, the catalogue's law"] = [r for r in rows if r["group"] == "4 x" and reached(r, 4.0)]
+    groups["4 x, the catalogue's law"] = [r for r in groups["4 x, the catalogue's law"] if r["label"] not in OTHERS]
+    groups["4 x, a member's law"] = [r for r in laws if r["label"] in MEMBERS_LAW]
+    groups["4 x, another law"] = [r for r in laws if r["label"] not in MEMBERS_LAW]
+    return {what: members for what, members in groups.items() if members}
 
 
-def _each_law(rows: Rows) -> tuple[str, list[str], list]:
+def _answers(rows: Rows) -> tuple[list[str], list[list]]:
+    """Verdicts, beside what AIC, BIC, the error alone and sparse regression pick among the same candidates."""
     lines = []
-    for label in dict.fromkeys(r["label"] for r in rows if r["group"].startswith("law")):
-        members = [r for r in rows if r["group"].startswith("law") and r["label"] == label]
-        others = sorted({" + ".join(r["names"]) for r in members if wrong(r)})
+    for what, members in _groups(rows).items():
+        named = [r for r in members if r["verdict"] == "named"]
+        tied = [r for r in members if r["verdict"] == "tied"]
+        allowed = CHAIN if what.startswith("faults") else set()
+        good = [right(r) or (bool(allowed) and {*r["names"]} <= allowed) for r in named]
+        held = [r["closed_true"] for r in members if right(r) and r.get("closed_true") is not None]
+        picked = (sum([*filter(None, [pick(r)])] == r["truth"] for r in members) for pick in PICKS.values())
         lines.append([
-            label, members[0]["truth"][0], len(members), sum(map(right, members)), ", ".join(others) or "-",
-            *(sum(r["verdict"] == v for r in members) for v in ("tied", "unexplained", "none")),
+            what, len(members), len(named), share(sum(good), len(named)), f"{sum(map(in_set, tied))} of {len(tied)}",
+            _count(members, "unexplained"), _count(members, "none"),
+            f"{np.median(held):.0%}" if held else "-", ", ".join(map(str, picked)),
         ])  # fmt: skip
-    head = ["hidden", "its family", "data sets", "family named", "another name", "tied", "unexplained", "none"]
-    return "Each of those laws", head, lines
+    head = ["hidden", "data sets", "one name", "of these right", "tied with the truth", "unexplained", "none",
+            "gap closed", f"right by {', '.join(PICKS)}"]  # fmt: skip
+    return head, lines
 
 
-def _proposals(rows: Rows) -> tuple[str, list[str], list]:
-    def line(what: str, members: Rows) -> list:
-        made = [r for r in members if r["proposal"]]
-        true = [r for r in made if r["label"] in RIGHT and _is_right(r)]
-        closing = [r for r in true if r["proposal"]["closed"]["validate"] >= CLOSES]
-        n = len(members)
-        return [what, n, share(len(made), n), share(len(true), n) if what.startswith("outside") else "-",
-                share(len(closing), n) if what.startswith("outside") else "-"]  # fmt: skip
-
-    strangers = [r for r in rows if r["group"].startswith("outside") and "lambda_left" in r]
-    sorts = {
-        "outside the catalogue, above 80": [r for r in strangers if r["lambda_left"] >= 80],
-        "outside the catalogue, below 80": [r for r in strangers if r["lambda_left"] < 80],
-        "another law, not named": [r for r in rows if r["group"].startswith("law") and r["verdict"] != "named"],
-        "nothing, or one name": [r for r in rows if r["group"].startswith("null") or r["verdict"] == "named"],
-    }
-    head = ["hidden", "data sets", "a term is proposed", "in the right balance, by the right signal",
-            f"and closes {CLOSES:.0%} on the held-out event"]  # fmt: skip
-    return "Terms proposed", head, [line(what, members) for what, members in sorts.items() if members]
+def _strangers(rows: Rows) -> tuple[list[str], list[list]]:
+    """What the catalogue does not hold: the verdicts, and the terms proposed."""
+    lines = []
+    for start, far in FAR.items():
+        members = [r for r in rows if r["group"].startswith(start) and "lambda_left" in r]
+        for what, own in (
+            (f"above {far:g}", [r for r in members if r["lambda_left"] >= far]),
+            (f"below {far:g}", [r for r in members if r["lambda_left"] < far]),
+        ):
+            if own:
+                made = [r for r in own if r["proposal"]]
+                true = sum(_is_right(r) for r in made) if start == "outside" else "-"
+                sort = "outside the catalogue" if start == "outside" else "left out of it"
+                lines.append([f"{sort}, {what}", len(own), share(_count(own, "unexplained"), len(own)),
+                              *(_count(own, v) for v in ("tied", "named", "none")), len(made), true])  # fmt: skip
+    head = ["hidden, non-centrality left by the best effect", "data sets", "unexplained", "tied", "one name", "none",
+            "a term proposed", "the right term"]  # fmt: skip
+    return head, lines
 
 
 def _is_right(row: dict) -> bool:
@@ -287,81 +201,47 @@ def _is_right(row: dict) -> bool:
     return row["proposal"]["balance"] in balances and row["proposal"]["signal"] in signals
 
 
-def _events(rows: Rows, multiple: float = 4.0) -> tuple[str, list[str], list]:
+def _pairs(rows: Rows) -> tuple[list[str], list[list]]:
     lines = []
-    for count in sorted({fitted(r) for r in rows}):
-        members = [r for r in rows if r["group"] == f"{multiple:g} x" and fitted(r) == count and reached(r, multiple)]
-        if members:
-            n, unique = len(members), [r for r in members if r["verdict"] == "named"]
-            verdicts = [share(sum(r["verdict"] == v for r in members), n) for v in ("named", "tied", "unexplained")]
-            known = [r for r in members if r["verdict"] in ("named", "tied")]
-            lines.append([
-                count, n, verdicts[0], share(sum(map(right, unique)), len(unique)), verdicts[1],
-                share(sum(map(in_set, known)), len(known)), verdicts[2],
-            ])  # fmt: skip
-    head = ["events fitted", "data sets", "one name", "of these right", "tied", "truth among the names", "unexplained"]
-    return f"Fewer events, {multiple:g} times the limit of their own", head, lines
-
-
-def reached(row: dict, multiple: float) -> bool:
-    """Whether the effect could be made this many limits large."""
-    return all(m >= 0.9 * multiple for m in row["multiples"]) and not set(row["untestable"]) & set(row["truth"])
-
-
-def _abstention(rows: Rows) -> tuple[str, list[str], list]:
-    lines = []
-    for what, start in (("outside the catalogue", "outside"), ("left out of it", "left out")):
-        members = [r for rs in _groups(rows, start).values() for r in rs if "lambda_left" in r]
-        for low, high in BINS:
-            inside = [r for r in members if low <= r["lambda_left"] < high]
-            if inside:
-                span = f"{low:g} to {high:g}" if np.isfinite(high) else f"above {low:g}"
-                counts = [share(sum(r["verdict"] == v for r in inside), len(inside)) for v in VERDICTS]
-                lines.append([what, span, len(inside), counts[3], counts[0], counts[2], counts[1]])
-    head = ["effect", "non-centrality left by the best single effect", "data sets", "unexplained", "none", "tied",
-            "one wrong name"]  # fmt: skip
-    return "The missing effect is not in the catalogue", head, lines
-
-
-def _pairs(rows: Rows) -> tuple[str, list[str], list]:
-    lines = []
-    for group, members in _groups(rows, "pairs").items():
-        multiple = float(group.split()[1])
-        full = [r for r in members if reached(r, multiple)]
+    for multiple in MULTIPLES:
+        full = [r for r in rows if r["group"] == f"pairs {multiple:g} x" and reached(r, multiple)]
         if full:
-            n = len(full)
-            partly = sum(r["verdict"] == "named" and set(r["names"]) < set(r["truth"]) for r in full)
+            partly = [r for r in full if r["verdict"] == "named" and {*r["names"]} < {*r["truth"]}]
             lines.append([
-                group.split()[1], n, share(sum(map(right, full)), n), share(sum(map(in_set, full)), n),
-                share(partly, n), share(sum(r["verdict"] == "unexplained" for r in full), n),
-                share(sum(wrong(r) and not set(r["names"]) < set(r["truth"]) for r in full), n),
+                f"two effects, {multiple:g} x", len(full), sum(map(right, full)), sum(map(in_set, full)), len(partly),
+                _count(full, "unexplained"), sum(map(wrong, full)) - len(partly),
             ])  # fmt: skip
-    head = ["times their joint limit", "data sets", "exactly the pair", "the pair among the sets", "one of the two",
-            "unexplained", "another name"]  # fmt: skip
-    return "Two effects are missing", head, lines
+    head = ["hidden", "data sets", "exactly the pair", "the pair among the sets", "one of the two", "unexplained",
+            "another name"]  # fmt: skip
+    return head, lines
 
 
-def _sizes(rows: Rows) -> tuple[str, list[str], list]:
+def _partly(rows: Rows) -> str:
+    """The laws that are no plugin's of which not every data set got the right name."""
+    laws = [r for r in rows if r["group"].startswith("law") and r["label"] not in MEMBERS_LAW]
     lines = []
-    for name in sorted({r["label"] for r in rows if "estimate" in r}):
-        members = [r for r in rows if r["label"] == name and "estimate" in r and r["error"]]
-        off = np.array([(r["estimate"] - r["amount"]) / r["error"] for r in members])
-        relative = np.array([r["estimate"] / r["amount"] - 1 for r in members])
-        if len(off) >= 5:
-            lines.append([name, len(off), f"{np.sqrt(np.mean(off**2)):.2f}", f"{np.median(off):+.2f}",
-                          share(int(np.sum(np.abs(off) < 1.96)), len(off)), f"{np.median(relative):+.1%}"])  # fmt: skip
-    head = ["effect", "data sets", "RMSE over standard error", "median of error over standard error",
-            "95 % interval holds the truth", "median relative error"]  # fmt: skip
-    return "How large it is", head, lines
+    for label in dict.fromkeys(r["label"] for r in laws):
+        members = [r for r in laws if r["label"] == label]
+        others = [" + ".join(r["names"]) if wrong(r) else r["verdict"] for r in members if not right(r)]
+        if others:
+            missed = ", ".join(f"`{o}`" if o not in VERDICTS else o for o in dict.fromkeys(others))
+            lines.append(f"`{label}` {sum(map(right, members))} of {len(members)} ({missed})")
+    return f"Other laws with a data set that did not get the right name alone: {'; '.join(lines)}." if lines else ""
 
 
-def _seconds(rows: Rows) -> tuple[str, list[str], list]:
+def _proposals(rows: Rows) -> str:
+    named = [r for r in rows if r["group"].startswith("null") or r["verdict"] == "named"]
+    made = sum(bool(r["proposal"]) for r in named)
+    return f"A term was proposed in {made} of the {len(named)} data sets with nothing missing or with one name."
+
+
+def _seconds(rows: Rows) -> tuple[list[str], list[list]]:
     lines = []
     for verdict in VERDICTS:
         spent = np.array([r["seconds"] - r.get("generated", 0.0) for r in rows if r["verdict"] == verdict])
         if len(spent):
             lines.append([verdict, len(spent), f"{np.median(spent):.1f}", f"{np.quantile(spent, 0.9):.1f}"])
-    return "Seconds of an investigation, one core each", ["verdict", "data sets", "median", "90 %"], lines
+    return ["verdict", "data sets", "median [s], one core", "90 % [s]"], lines
 
 
 def _draw_detection(rows: Rows, path: Path) -> None:
@@ -371,7 +251,7 @@ def _draw_detection(rows: Rows, path: Path) -> None:
 
     from tractexp.blocks import style
 
-    x = _multiples(rows)
+    x = [m for m in MULTIPLES if any(r["group"] == f"{m:g} x" and reached(r, m) for r in rows)]
     with rc_context(style.SETTINGS):
         figure = Figure(figsize=(6.4, 3.4), layout="constrained")
         axes = figure.subplots()

@@ -8,9 +8,8 @@ AIC, BIC, RMSE and sparse regression (PySINDy) choose among the same candidates 
 JSON-lines file, so that a study can be stopped and taken up.
 
 The judgement set's seeds follow from the hash of the commit that froze product and generator, so that nobody could look
-at them before; it is refused where either is not what that commit holds. `--docs` writes the newest set's tables and
-figures into docs/missing-effects.md, those of earlier ones into docs/earlier-judgements.md. What was drawn before a
-mend stays; `--frozen LATER --out judgement_LATER.jsonl` draws anew, and `SETS` names it.
+at them before; it is refused where either is not what that commit holds. `--docs` writes its tables and figures into
+docs/judgement.md. A later set is drawn by `--frozen LATER --out judgement_LATER.jsonl` and takes the place of `NEWEST`.
 """
 
 import argparse
@@ -43,17 +42,7 @@ LEFT_OUT = "left out "  # the group of trials whose effect is taken from the cat
 PAIRED, LARGE = (2.0, 4.0), (2.0, 4.0, 8.0)  # multiples of the detection limit
 FROZEN = ("tractexp", "plugins", "tests/oracle/hidden_effects", "tests/oracle/independent")  # what judges and is judged
 ROOT, HERE = Path(__file__).parents[1], Path(__file__).parent
-SETS = {  # judgement sets by what is new to them, the newest last
-    "of the first": HERE / "judgement_first.jsonl",
-    "frozen anew": HERE / "judgement_anew.jsonl",  # nulls, with mends that the first set led to
-    "with more members": HERE / "judgement_members.jsonl",  # of families, and all sizes
-    "ten of each": HERE / "judgement_ten.jsonl",  # with exact scales of open decisions
-    "nearby families": HERE / "judgement_nearby.jsonl",  # tried beside a name that suffices
-    "near rivals": HERE / "judgement_rivals.jsonl",  # of other families, and other valleys
-    "walks in common": HERE / "judgement_wander.jsonl",  # P and Q of a load wander together; heavy tails
-    "all events searched": HERE / "judgement_search.jsonl",  # again, where held-out ones deny all
-    "exact saturation": HERE / "judgement_branch.jsonl",  # the curve is a branch between two leakages
-}
+NEWEST = HERE / "judgement_branch.jsonl"  # the judgement set
 KNOWN = {"rotor_skin_effect": "second_cage", "stator_transients": "stator_transients"}  # the catalogue has them, too
 HIDDEN = {  # one effect is hidden: group of trials, multiples, effects
     "single": ("", cases.MULTIPLES, (*CATALOG, *KNOWN)),
@@ -252,13 +241,13 @@ def main() -> None:
     parser.add_argument("--events", type=int, default=3, help="events fitted")
     parser.add_argument("--held", type=int, default=1, help="events held out beside them")
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--out", type=Path, help="default: the newest set, or outputs/hidden_effects.jsonl")
+    parser.add_argument("--out", type=Path, help="default: the judgement set, or outputs/hidden_effects.jsonl")
     parser.add_argument("--minutes", type=float, default=1e9, help="begin no further trial after so long")
-    parser.add_argument("--docs", action="store_true", help="write tables and figures of all judgement sets, and stop")
+    parser.add_argument("--docs", action="store_true", help="write tables and figures of the judgement set, and stop")
     chosen = parser.parse_args()
-    out = chosen.out or ([*SETS.values()][-1] if chosen.frozen else Path("outputs/hidden_effects.jsonl"))
+    out = chosen.out or (NEWEST if chosen.frozen else Path("outputs/hidden_effects.jsonl"))
     if chosen.docs:
-        evidence.write({what: evidence.read(path) for what, path in SETS.items()}, ROOT / "docs")
+        evidence.write(evidence.read(NEWEST), ROOT / "docs")
         return
     from joblib import Parallel, delayed
 

@@ -162,10 +162,8 @@ def documented(rows: Sequence[dict[str, Any]]) -> list[str]:
     lines = []
     for label, some in groups.items():
         held = [coverage(some, name)[:2] for name in TOLD]
-        cells = [f"{inside} of {count}" if count else "" for inside, count in held]
-        lines.append(
-            f"| {label} | {' | '.join(cells)} | {sum(r['grade'] == 'adequate' for r in some)} of {len(some)} |"
-        )
+        cells = [f"{inside}/{count}" if count else "" for inside, count in held]
+        lines.append(f"| {label} | {' | '.join(cells)} | {sum(r['grade'] == 'adequate' for r in some)}/{len(some)} |")
     return lines
 
 

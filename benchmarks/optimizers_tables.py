@@ -77,7 +77,7 @@ def over_floor(excess: float) -> str:
 
 def cells(of: Kind, optimizer: str, told: Callable[[int], str]) -> str:
     """One cell with a figure for each budget, a dash where the optimizer was not run."""
-    return " / ".join(told(b) if optimizer in of.at(b) else "–" for b in of.budgets)
+    return "/".join(told(b) if optimizer in of.at(b) else "–" for b in of.budgets)
 
 
 def compared(of: Kind, optimizer: str) -> str:
@@ -194,7 +194,6 @@ def blocks(stored: Stored) -> dict[str, str]:
         "answer": answer(final),
         "records": f"{caption(final, of)}\n\n{records(of)}",
         "bbob": f"{caption(final, on)}\n\n{functions(on)}",
-        "choice": f"{records(Kind(stored['choice'], 'record'))}\n\n{functions(Kind(stored['choice'], 'bbob'))}",
         "readings": readings(stored["readings"]),
     }
 

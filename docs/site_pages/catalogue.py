@@ -61,8 +61,10 @@ def _section(cls: type[Plugin], folder: Path) -> str:
 def _picture(cls: type[Part], folder: Path) -> str:
     path = folder / "pictures" / f"{_anchor(cls)}.svg"
     path.parent.mkdir(parents=True, exist_ok=True)
-    told = pictures.draw(cls, path)
-    return f"```{{figure}} pictures/{path.name}\n:alt: what {cls.name} does in a dip\n\n{told}\n```" if told else ""
+    caption = pictures.draw(cls, path)
+    return (
+        f"```{{figure}} pictures/{path.name}\n:alt: what {cls.name} does in a dip\n\n{caption}\n```" if caption else ""
+    )
 
 
 def _facts(cls: type[Part]) -> str:
@@ -99,7 +101,7 @@ def _parameters(cls: type[Part]) -> str:
         columns["looked for at"] = lambda p: ", ".join(f"{v:g}" for v in cls.grid.get(p.name, ()))
     if len(sources := {p.source for p in cls.parameters}) > 1:
         columns["source"] = lambda p: plain(p.source)
-    used = {name: [tell(p) for p in cls.parameters] for name, tell in columns.items()}
+    used = {name: [cell(p) for p in cls.parameters] for name, cell in columns.items()}
     used = {name: cells for name, cells in used.items() if any(cells)}
     below = f"\nDefaults and bounds: {plain(*sources)}." if len(sources) == 1 else ""
     return table([*used], [list(row) for row in zip(*used.values(), strict=True)]) + below
@@ -109,13 +111,13 @@ def _equations(cls: type[Part]) -> str:
     """The equations of a motor by itself; of any other part those that it changes or brings in."""
     base, of = pictures.pair(cls)
     if issubclass(cls, Motor):
-        told = [(None, line) for line in motor_alone(cls()).latex()] if not cls.waves_only else changed([], of.latex())
+        edits = [(None, line) for line in motor_alone(cls()).latex()] if not cls.waves_only else changed([], of.latex())
     elif issubclass(cls, Effect):
-        told = changed(base.latex(), of.latex())
+        edits = changed(base.latex(), of.latex())
     else:
-        told = [(was, line) for was, line in changed(motor_alone(of.motor).latex(), of.latex()) if was is None]
-    if not told:
+        edits = [(was, line) for was, line in changed(motor_alone(of.motor).latex(), of.latex()) if was is None]
+    if not edits:
         return ""
-    lines = [line if was is None else rf"{line} \quad \text{{instead of}} \quad {was}" for was, line in told]
+    lines = [line if was is None else rf"{line} \quad \text{{instead of}} \quad {was}" for was, line in edits]
     summary = "Equations" if not issubclass(cls, Effect) else "Equations that changed or came in"
     return folded(summary, "\n\n".join(f"$$\n{line}\n$$" for line in lines))

@@ -23,7 +23,7 @@ class Command:
 
     @property
     def arguments(self) -> list[str] | None:
-        """What `tractexp` is given; None where the line runs something else."""
+        """The arguments of `tractexp`; None where the line runs something else."""
         words = self.words
         return words[words.index("tractexp") + 1 :] if "tractexp" in words else None
 

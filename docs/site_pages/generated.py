@@ -1,12 +1,18 @@
-"""Everything generated, written into one folder; what is no longer made is deleted."""
+"""Everything generated, written into one folder; stale pages are deleted."""
 
 from pathlib import Path
 
-from site_pages import api, catalogue, tasks
+from site_pages import api, catalogue, criteria, sites, tasks
 
 
 def write(folder: Path) -> None:
-    """Write the catalogues, the pages of the tasks and the list of public calls."""
-    made = [*catalogue.write(folder / "catalogue"), *tasks.write(folder / "tasks"), api.write(folder)]
-    for stale in set(folder.rglob("*.md")) - set(made):
+    """Write the catalogues, the pages of the tasks, the lists of calls, criteria and sites."""
+    pages = [
+        *catalogue.write(folder / "catalogue"),
+        *tasks.write(folder / "tasks"),
+        api.write(folder),
+        criteria.write(folder),
+        sites.write(folder),
+    ]
+    for stale in set(folder.rglob("*.md")) - set(pages):
         stale.unlink()

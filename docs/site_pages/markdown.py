@@ -6,6 +6,7 @@ import inspect
 import re
 import textwrap
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 SPECIAL = re.compile(r"([\\*\[\]<>|$])")
 
@@ -29,9 +30,9 @@ def folded(summary: str, inside: str) -> str:
     return f"<details><summary>{summary}</summary>\n\n{inside}\n\n</details>\n"
 
 
-def docstring(cls: type) -> str:
-    """A docstring: paragraphs, indented lines as they stand, `Source:` and `Departures:` with their words marked."""
-    blocks = re.split(r"\n\s*\n", inspect.cleandoc(cls.__doc__ or ""))
+def docstring(what: Any) -> str:
+    """The docstring of a class or a call: paragraphs, indented lines, and `Source:` and `Departures:` marked."""
+    blocks = re.split(r"\n\s*\n", inspect.cleandoc(what.__doc__ or ""))
     return "\n\n".join(filter(None, map(_block, blocks)))
 
 
@@ -39,16 +40,16 @@ def _block(block: str) -> str:
     if block.startswith("    "):
         return f"```text\n{textwrap.dedent(block).rstrip()}\n```"
     marked = re.split(r"(?m)^(Source|Departures): ", block)
-    told = [plain(marked[0])] if marked[0].strip() else []
-    told += [f"**{word}:** {plain(text)}" for word, text in zip(marked[1::2], marked[2::2], strict=True)]
-    return "\n\n".join(told)
+    parts = [plain(marked[0])] if marked[0].strip() else []
+    parts += [f"**{word}:** {plain(text)}" for word, text in zip(marked[1::2], marked[2::2], strict=True)]
+    return "\n\n".join(parts)
 
 
 def settings(cls: type) -> list[list[str]]:
     """A row for each setting: its name, its default, and what the comment beside it says."""
-    said = dict(_comments(cls))
+    comments = dict(_comments(cls))
     return [
-        [f"`{item.name}`", f"`{_default(item)}`", plain(said.get(item.name, ""))]
+        [f"`{item.name}`", f"`{_default(item)}`", plain(comments.get(item.name, ""))]
         for item in dataclasses.fields(cls)
         if item.init
     ]
@@ -70,5 +71,5 @@ def _comments(cls: type) -> Iterator[tuple[str, str]]:
             lines = source.splitlines()
             (node,) = ast.parse(textwrap.dedent(source)).body
             for item in node.body:
-                if isinstance(item, ast.AnnAssign) and (found := re.search(r"#\s*(.+)$", lines[item.end_lineno - 1])):
-                    yield item.target.id, found[1]
+                if isinstance(item, ast.AnnAssign) and (comment := re.search(r"#\s*(.+)$", lines[item.end_lineno - 1])):
+                    yield item.target.id, comment[1]

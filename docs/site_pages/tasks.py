@@ -7,6 +7,7 @@ from site_pages import commands, markdown
 from site_pages.commands import Command
 from site_pages.markdown import plain, table
 from tractexp import files
+from tractexp.api.task import Task
 from tractexp.choices import defaults, sentence
 from tractexp.plugin import discover
 
@@ -22,18 +23,20 @@ def write(folder: Path) -> list[Path]:
     pages = [files.write(folder / f"{name}.md", _page(cls, shown)) for name, cls in tasks]
     rows = [[f"[`{name}`]({name}.md)", plain(sentence(cls.__doc__ or ""))] for name, cls in tasks]
     toctree = "```{toctree}\n:hidden:\n\n" + "\n".join(name for name, _ in tasks) + "\n```\n"
-    told = f"Chosen by `task=NAME`; `{defaults()['task']}` where none is named.\n"
+    intro = f"Chosen by `task=NAME`; `{defaults()['task']}` where none is named.\n"
     listed = files.write(
-        folder / "index.md", "\n".join(["# Tasks\n", told, table(["task", "what it does"], rows), toctree])
+        folder / "index.md", "\n".join(["# Tasks\n", intro, table(["task", "what it does"], rows), toctree])
     )
     return [listed, *pages]
 
 
-def _page(cls: type, shown: Iterable[Command]) -> str:
+def _page(cls: type[Task], shown: Iterable[Command]) -> str:
     parts = [f"# task={cls.name}", markdown.docstring(cls)]
     if rows := markdown.settings(cls):
         rows = [[f"`task.{name[1:]}", *rest] for name, *rest in rows]
         parts += ["## Settings", table(["setting", "default", "meaning"], rows)]
+    if cls.function is not None:  # settings without a comment of their own are arguments of the call
+        parts += [f"## The call `tractexp.{cls.function.__name__}`", markdown.docstring(cls.function)]
     used = {(c.page, c.heading): c for c in shown if _task(c) == cls.name}  # the last of a section
     if used:
         parts += ["## Shown in", "\n\n".join(map(_example, [*used.values()][:MOST]))]
@@ -52,6 +55,6 @@ def _task(command: Command) -> str:
 def _example(command: Command) -> str:
     anchor = "-".join("".join(c for c in command.heading.lower() if c.isalnum() or c in " -_").split())
     title = command.page.read_text(encoding="utf-8").partition("\n")[0].lstrip("# ")
-    told = title if title == command.heading else f"{title}: {command.heading}"
-    where = f"[{plain(told)}](../../{command.page.name}#{anchor})"
+    label = title if title == command.heading else f"{title}: {command.heading}"
+    where = f"[{plain(label)}](../../{command.page.name}#{anchor})"
     return f"{where}:\n\n```sh\n{command.line}\n```"

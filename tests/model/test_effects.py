@@ -111,11 +111,11 @@ def test_no_two_effects_share_a_parameter():
     assert len(names) == len(set(names))
 
 
-def test_the_documentation_lists_every_effect_and_parameter():
-    text = (Path(__file__).parents[2] / "docs" / "effects.md").read_text()
+def test_the_documentation_lists_every_effect():
+    """Its parameters are in the catalogue: test_site.py."""
+    text = (Path(__file__).parents[2] / "docs" / "effects.md").read_text(encoding="utf-8")
     for name in discover()["effect"]:
         assert f"`{name}`" in text
-        assert all(f"`{p.name}`" in text for p in effect(name).parameters)
 
 
 # which models take them

@@ -80,7 +80,7 @@ STRANGERS = """
 import pytest
 
 import tractexp.testing
-from tractexp.discrepancy.injection import PUSHES, Injection
+from tractexp.discrepancy.injection import PERTURBATIONS, Injection
 from tractexp.model.model import compose
 from tractexp.plugin import discover, get
 
@@ -115,7 +115,7 @@ def test_a_motor_takes_what_its_sites_allow_and_says_why_not():
 def test_every_motor_is_pushed_in_each_flux_and_its_speed(motor):
     eq = compose(get("model/motor", motor)(), get("model/static", "exponential")(), [Injection()]).equations
     for state in eq.states.values():
-        pushed = {s.name for s in state.derivative.free_symbols} & set(PUSHES)
+        pushed = {s.name for s in state.derivative.free_symbols} & set(PERTURBATIONS)
         assert pushed == {"flux": {"push_flux_d", "push_flux_q"}, "speed": {"push_speed"}}[state.role]
 """
 
@@ -145,7 +145,8 @@ def test_the_package_of_the_documentation_is_the_one_that_is_installed_here():
     assert tomllib.loads(told) == tomllib.loads((TESTS / "acme" / "pyproject.toml").read_text(encoding="utf-8"))
 
 
-def test_the_documentation_tells_every_word_of_the_equations_and_every_site():
+def test_the_documentation_tells_every_word_of_the_equations_and_every_site(tmp_path):
+    from site_pages import sites
     from tractexp.model.equations import Equations
     from tractexp.model.sites import SITES
 
@@ -157,8 +158,9 @@ def test_the_documentation_tells_every_word_of_the_equations_and_every_site():
         "real", "latex", "outputs",
     }  # fmt: skip
     assert told == {w for w in (*dir(Equations), *vars(Equations())) if not w.startswith("_")} - framework
+    listed = sites.write(tmp_path).read_text(encoding="utf-8")
     for site in SITES.values():
-        assert f"| `{site.name}` | {site.owner} | {site.kind} | {site.unit} | {site.about} |" in text
+        assert f"| `{site.name}` | {site.owner} | {site.kind} | {site.unit} | {site.about} |" in listed
 
 
 def test_without_the_package_its_names_are_unknown(tmp_path):

@@ -1,13 +1,15 @@
 """What the site generates, and what its pages say about the code; .ci/run builds it with warnings as errors."""
 
 import ast
+import dataclasses
 import re
 from pathlib import Path
 
 import pytest
 
-from site_pages import api, catalogue, commands, markdown, tasks
+from site_pages import api, catalogue, commands, criteria, markdown, tasks
 from tractexp import PUBLIC
+from tractexp.discrepancy.criteria import Criteria
 from tractexp.extend import Effect, Parameter
 from tractexp.model.printed import changed
 from tractexp.plugin import discover, get
@@ -110,7 +112,9 @@ def test_changed_equations_are_those_that_differ_or_came_in():
 def test_every_task_has_a_page_with_its_settings_and_the_commands_that_pages_show(tmp_path):
     made = {path.stem: path.read_text(encoding="utf-8") for path in tasks.write(tmp_path)}
     assert made.keys() == {"index", *discover()["task"]}
-    assert "| `task.within` | `0.05` | half of the 95 % interval, as a share of the value |" in made["plan"]
+    assert "| `task.within` | `0.05` |" in made["plan"]
+    assert "with half of its 95 % interval `within` a share of the value" in " ".join(made["plan"].split())
+    assert "null: in single runs, not in sweeps" in made["identify"]
     assert "task=discrepancy data=contactors" in made["discrepancy"]
     assert "[The missing effect: The order of the model](" in made["discrepancy"]
     assert "](../../missing-effects.md#the-order-of-the-model)" in made["discrepancy"]
@@ -124,6 +128,13 @@ def test_every_public_call_and_every_base_is_on_the_page_of_calls(tmp_path):
         assert f":: tractexp.{name}\n" in page
     for cls in (Effect, Parameter):
         assert f".. autoclass:: tractexp.extend.{cls.__name__}\n" in page
+
+
+def test_every_criterion_is_on_its_page_with_its_origin(tmp_path):
+    page = criteria.write(tmp_path).read_text(encoding="utf-8")
+    for field in dataclasses.fields(Criteria):
+        assert f"| `{field.name}` | {field.default:g} |" in page
+        assert f"| {field.metadata['origin']} |" in page
 
 
 def test_every_page_is_in_the_contents():

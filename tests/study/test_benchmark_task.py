@@ -248,9 +248,3 @@ def test_ours_against_the_same_with_other_settings_has_a_name_of_its_own(ioh):
 def test_a_function_has_the_name_that_ioh_gives_it(ioh):
     assert Bbob(8, 2, 1, TARGETS).name == "Rosenbrock"
     assert bbob.package() is ioh
-
-
-def test_the_deep_dip_of_the_noise_floor_stalls_its_motor():
-    import noise_floor
-
-    assert noise_floor.stalled("deep dip with stall")

@@ -1,10 +1,7 @@
 """Families of effects: another place or another law is named where the catalogue's leaves something, and only there."""
 
-import json
 from types import SimpleNamespace
 
-import families as benchmark
-import marked
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -396,10 +393,3 @@ def test_every_curve_is_monotone_whatever_its_bends(name):
         law = effect.curve(**{p.name: rng.uniform(*p.bounds) for p in effect.parameters})
         slopes = np.diff(law.y)
         assert (slopes <= 1e-9).all() or (slopes >= -1e-9).all()
-
-
-def test_the_page_is_what_the_stored_rows_give():
-    rows = [json.loads(line) for line in benchmark.ROWS.read_text(encoding="utf-8").splitlines()]
-    _, made, _ = marked.parted(benchmark.DOCS.read_text(encoding="utf-8"), benchmark.MARK)
-    assert made.strip() == "\n".join(benchmark.table(rows))
-    assert "\n".join(benchmark.table(rows[1:])) != made.strip()

@@ -1,90 +1,29 @@
-"""What docs/records.md says of the way from a recorder to parameters: its tables, its claims, the shipped COMTRADE."""
+"""From a recorder to parameters: the window that a record was seen through, and the shipped dips as COMTRADE."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
-import field_chain
 import make_tibet_comtrade
-import marked
 import numpy as np
 import pytest
 
 import tractexp
+from tractexp.api.compose import model_of
 from tractexp.filetypes import comtrade
 from tractexp.identification.problem import Problem
 from tractexp.identification.result import respond
 from tractexp.record.window import average, sharpened
 
-STORED = json.loads(field_chain.STORED.read_text(encoding="utf-8"))
-PAGE = field_chain.DOCS.read_text(encoding="utf-8")
 DATA = Path(tractexp.__file__).parent / "data"
 NAMES = ("tibet_30pct", "tibet_50pct", "tibet_65pct")
-
-
-@pytest.mark.parametrize("part", field_chain.PARTS)
-def test_the_page_has_the_table_of_what_is_stored(part):
-    _, made, _ = marked.parted(PAGE, f"{field_chain.MAKER} {part}")
-    assert made.strip() == field_chain.PARTS[part][1](STORED[part])
-
-
-def test_the_chain_is_as_accurate_and_quick_as_was_asked():
-    """Issue 17: magnitude within 0.2 %, P and Q within 0.5 % of S0; ten minutes in 5 s of CPU and 600 MB."""
-    assert {r["estimator"] for r in STORED["phasors"]} == set(field_chain.ESTIMATORS)
-    for row in STORED["phasors"]:
-        assert row["U"] < 0.2
-        assert max(row["P"], row["Q"]) < 0.5
-    for row in STORED["speed"]:
-        assert row["cpu"] < 5
-        assert row["memory"] < 600
-
-
-def of(way, **what):
-    """Rows of the study of windows, in one order."""
-    return [r for r in STORED["windows"] if r["way"] == way and all(r[k] == v for k, v in what.items())]
-
-
-def test_what_the_page_says_of_windows_is_what_was_measured():
-    nothing, output, both = map(of, field_chain.WAYS)
-    assert all(o["misfit"] > n["misfit"] for o, n in zip(output, nothing, strict=True))
-    assert all(b["misfit"] < n["misfit"] for b, n in zip(both, nothing, strict=True))
-    assert max(r["error"] for r in of("both", model=field_chain.FIFTH)) < 1.7
-    assert 19 < max(r["error"] for r in of("nothing", model=field_chain.FIFTH)) < 20
-    third = [(n, b) for n, b in zip(nothing, both, strict=True) if n["model"] == field_chain.THIRD]
-    pairs = [(n, b) for n, b in third if n["truth"] != "the fitted model"]
-    assert all(b["misfit"] > 7 / 8 * n["misfit"] for n, b in pairs)
-    assert [round(np.mean([pair[k]["error"] for pair in pairs])) for k in (0, 1)] == [13, 17]
-
-
-def test_what_the_page_says_of_the_chain_is_what_was_measured():
-    rows = {(r["record"], r["model"], r["from"], r["stage"]): r for r in STORED["chain"]}
-    third, fifth = field_chain.THIRD, field_chain.FIFTH
-    assert {(r["model"], r["from"]) for r in STORED["chain"] if r["trusted"]} == {(fifth, "COMTRADE")}
-    best = rows["all three", fifth, "COMTRADE", "search"]
-    assert max(abs(best[name]) for name in field_chain.LOAD.truth()) < 1
-    for record in (*NAMES, "all three"):
-        csv, other = (rows[record, third, source, "search"] for source in ("CSV", "COMTRADE"))
-        for key in ("epsilon_p", "epsilon_q"):
-            assert other[key] == pytest.approx(csv[key], abs=2e-4)
-
-
-@pytest.mark.parametrize("model", [field_chain.THIRD, field_chain.FIFTH])
-def test_the_study_is_what_its_script_does(model):
-    """One cell made again."""
-    truth = "a machine with stator resistance" if model == field_chain.FIFTH else "the fitted model"
-    [stored] = of("both", truth=truth, model=model, dip="slow", estimator="p_class")
-    load = field_chain.TRUTHS[truth]
-    event = field_chain.seen(field_chain.waves_of(load, field_chain.SHAPES["slow"]), "p_class")
-    again = field_chain.fitted(event, model, "both", field_chain.truth_of(load))
-    assert again["misfit"] == pytest.approx(stored["misfit"], rel=0.02)
 
 
 def test_a_model_is_looked_at_through_the_window_where_it_follows_what_happens_within():
     """Simulate, a problem and its least squares alike; the third order and a record without window are left alone."""
     [event] = tractexp.read("tibet_50pct_comtrade")
     bare = replace(event, record=replace(event.record, window=None))
-    for name, looked in ((field_chain.THIRD, False), (field_chain.FIFTH, True)):
-        model = field_chain.model_of(name).model
+    for name, looked in (("third_order_exponential", False), ("fifth_order_stator_flux", True)):
+        model = model_of(name).model
         values = np.array([p.default for p in model.parameters])
         seen, plain = (respond(model, values, e, "train").P for e in (event, bare))
         assert bool(Problem(model, [event], substeps=4).drive.windows) == looked

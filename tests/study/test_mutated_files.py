@@ -41,7 +41,7 @@ def test_words_of_python_are_found(words):
 def test_the_page_tells_what_the_stored_run_of_ten_thousand_gave():
     stored = json.loads((BENCHMARKS / "mutated_files.json").read_text(encoding="utf-8"))
     told = {key: sum(c.get(key, 0) for c in stored["counts"].values()) for key in next(iter(stored["counts"].values()))}
-    page = (BENCHMARKS.parent / "docs" / "records.md").read_text(encoding="utf-8")
+    page = " ".join((BENCHMARKS.parent / "docs" / "records.md").read_text(encoding="utf-8").split())
     assert stored["files"] == sum(told.values()) == 10_000
     assert stored["bad"] == []
     assert (

@@ -7,11 +7,8 @@ import sys
 import zlib
 from types import SimpleNamespace
 
-import marked
 import numpy as np
-import proposals
 import pytest
-from proposals import OWN
 
 import tractexp
 from hidden_effects import EFFECTS, Case, Noise, make
@@ -36,7 +33,6 @@ from tractexp.model.model import compose
 from tractexp.plugin import get
 from tractexp.record import Record, detect
 
-EFFECTS.update(OWN)
 STEP, TRIP = "timed:power:step:of_return", "answer:static:relay"
 FEW = tuple(
     term(n)
@@ -295,8 +291,3 @@ def test_terms_become_candidates_with_their_own_parameters_only(ground):
     bench = with_terms(ground.context, [term(TRIP), term(TRIP)])
     own = [bench.coordinates.names[k] for k in bench.coordinates.parameters([TRIP])]
     assert own == ["answer_static_size", *(f"answer_relay_{n}" for n in ("level", "margin", "delay", "wait", "ramp"))]
-
-
-def test_the_page_is_what_the_stored_rows_give():
-    _, made, _ = marked.parted(proposals.DOCS.read_text(encoding="utf-8"), proposals.MARK)
-    assert made.strip() == "\n".join(proposals.told_in_docs(proposals.kept()))

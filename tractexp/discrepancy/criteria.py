@@ -2,7 +2,7 @@
 
 Two kinds of origin are told apart. *Derived* values follow from the false-alarm rate or from a quantile and need no
 data. *Chosen* ones were set while the development set of `benchmarks/hidden_effects_study.py` was looked at, whose
-seeds are the CRC-32 series of `hidden_effects.cases.seeds`. The figures of docs/missing-effects.md are of the judgement
+seeds are the CRC-32 series of `hidden_effects.cases.seeds`. The figures of docs/judgement.md are of the judgement
 set, whose seeds follow from the hash of a later commit.
 
 Tolerances of fits, sizes of shortlists and numbers of draws are not decisions and stand where they are used.

@@ -105,7 +105,7 @@ def worth_another(steps: Sequence[Disagreement]) -> bool:
     """Whether one more effect is tried beside those of the last tests; not again where that led back to the same set.
 
     A third patches up what two do not explain: it is tried where they explain most of what exceeds the noise. None of
-    the first 1,121 data sets of docs/earlier-judgements.md was told by three.
+    the first 1,121 data sets that were judged was named by three.
     """
     first, last = steps[0], steps[-1]
     size, samples = len(last.fit.names), first.context.samples

@@ -22,7 +22,7 @@ from tractexp.identification.observed import Observed
 from tractexp.identification.surprises import PER_EVENT, SMALLEST_P, Layout, tail
 
 DRAWS = 199
-# p of what a fit leaves, below which it leaves something. Chosen on the calibration series of benchmarks/adequacy.py:
+# p of what a fit leaves, below which it leaves something. Chosen on calibration seeds:
 # where nothing is missing one set in fifty has a smaller one, with an effect of four detection limits nearly all have.
 ADEQUATE_P = 0.001
 WALL = 1e-3  # of a range: what rests on a bound takes nothing from the residual

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Events:
-    """The recorded events of one run, fitted and held out: as records, or as `Event`s."""
+    """The recorded events of one run, fitted and held out: each a record or an `Event`."""
 
     train: Sequence[Any]
     validate: Sequence[Any] = ()
