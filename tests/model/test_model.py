@@ -381,7 +381,7 @@ def test_the_sites_of_a_model_are_a_table_of_what_stands_there(model):
     assert rows["load_torque"]["could be edited by"] == "speed_dependent_torque, torque_curve"
     assert "undervoltage_trip" in rows["P"]["could be edited by"].split(", ")
     assert not any(row["edited by"] for row in rows.values())
-    assert "phasor" in next(line for line in str(table).splitlines() if line.startswith("stator_impedance"))
+    assert "phasor" in next(line for line in str(table).splitlines() if line.lstrip().startswith("stator_impedance"))
     slowed = compose(model.motor, model.static, [get("effect", "speed_dependent_torque")()])
     (torque,) = (row for row in tractexp.sites(slowed).rows if row[0] == "load_torque")
     assert torque[-2:] == ("speed_dependent_torque", "torque_curve")

@@ -53,7 +53,7 @@ def _table(table: Table, console: Any) -> None:
     last = len(table.columns) - 1
     for i, column in enumerate(table.columns):
         left = i == 0 or i in table.words
-        grid.add_column(str(column), justify="left" if left else "right", no_wrap=i < last)
+        grid.add_column(str(column), justify="left" if left else "right", no_wrap=i < last and i not in table.words)
     for row in table.cells:
         grid.add_row(*row)
     console.print(grid, markup=False)

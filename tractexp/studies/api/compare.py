@@ -3,7 +3,6 @@
 import functools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -80,7 +79,7 @@ class ComparisonResult(Written):
         if several:
             report.text(f"{self.source}: {', '.join(self.content['problems'])}").add(*self._over_all())
         else:
-            report.add(self._of_one())
+            report.add(self.table())
             target = min(self.content["targets"])
             terms = "objectives in pu² at the end of the search; at floor: within 1 %; ERT: simulations to"
             report.text(f"{terms} {target:g} x floor", self.answer)
@@ -89,24 +88,6 @@ class ComparisonResult(Written):
         if (more := len(self.sentences) - len(shown)) > 0:
             report.text(f"- and {more} more sentences in {self.page}")
         return report
-
-    def _of_one(self) -> Table:
-        """The table of one problem, as a person reads it."""
-        from tractexp.studies.comparison.claims import number
-
-        rows = [
-            [
-                name,
-                str(failures),
-                number(median),
-                number(worst),
-                f"{at_floor:.0%}",
-                number(inf if ert is None else ert),
-            ]
-            for name, failures, median, worst, at_floor, ert in self.table().rows
-        ]
-        columns = ["variant", "failed", "median", "worst", "at floor", "ERT"]
-        return Table(columns, rows, f"{self.source}: {self.content['problem']}")
 
     def _over_all(self) -> Iterator[Table]:
         """What several problems come to under each of the terms, the best variants first."""

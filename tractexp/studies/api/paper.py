@@ -58,16 +58,10 @@ class PaperResult(Written):
         from tractexp.studies.paper.claims import counted
 
         rows = [[claim.part, claim.text, claim.verdict, claim.measured] for claim in self.claims]
-        return Table(["where", "the paper's claim", "verdict", "measured"], rows, counted(self.claims))
+        return Table(["where", "the paper's claim", "verdict", "measured"], rows, counted(self.claims), words=(1, 2, 3))
 
     def summary(self) -> Report:
-        from tractexp.studies.paper.claims import counted
-
-        report = Report()
-        for claim in self.claims:
-            report.text(f"  {claim.verdict}: {claim.text}", f"    {claim.measured}")
-        report.text(*[counted(self.claims)] * bool(self.claims))
-        return report.text(*[f"in {self.seconds:.0f} s"] * bool(self.seconds))
+        return Report().add(self.table()).text(*[f"in {self.seconds:.0f} s"] * bool(self.seconds))
 
     def report(self) -> Report:
         return self._report
