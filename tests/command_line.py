@@ -47,13 +47,14 @@ def as_it_was(environment):
     root, thresholds, handler = logging.getLogger(), gc.get_threshold(), signal.getsignal(signal.SIGTERM)
     handlers, level = root.handlers[:], root.level
     surroundings = mock.patch.dict(os.environ, COLUMNS | environment)
+    hydra = GlobalHydra.instance().hydra
     GlobalHydra.instance().clear()
     try:
         with surroundings, mock.patch.object(sys, "argv", ["tractexp"]), warnings.catch_warnings():
             yield
     finally:
         process._end_ahead()
-        GlobalHydra.instance().clear()
+        GlobalHydra.instance().hydra = hydra
         HydraConfig.instance().cfg = None
         provenance._started.clear()
         signal.signal(signal.SIGTERM, handler)
