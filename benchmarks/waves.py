@@ -48,7 +48,7 @@ def judged(fit, truth: dict[str, float]) -> dict:
         row["z"][name] = (result.parameters[name] - true) / error if error else None
         row["off"][name] = result.parameters[name] / true - 1
         row["wide"][name] = (high - low) / 2 / true
-    row |= {"grade": str(fit.grade), "p": result.adequacy["p"], "loudest": fit.judged.estimated.surprise.loudest}
+    row |= {"grade": str(fit.grade), "p": result.adequacy["p"], "loudest": fit.details.estimation.surprise.loudest}
     return row | {"epsilon_i": result.events[0]["epsilon_i"]}
 
 

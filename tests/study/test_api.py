@@ -126,7 +126,7 @@ def test_what_is_saved_is_json_and_comes_back_the_same(fit, found, dips, tmp_pat
     again = tractexp.load(tmp_path / "fit.json")
     assert again.result == fit.result
     assert np.array_equal(again.predict(dips[1]).P, fit.predict(dips[1]).P)
-    assert again.judged.known.values == pytest.approx(fit.judged.known.values, rel=1e-12)
+    assert again.details.uncertainty.values == pytest.approx(fit.details.uncertainty.values, rel=1e-12)
     assert again.advice == fit.advice
     assert np.array_equal(tractexp.load(tmp_path / "found.json").predict(dips[2]).Q, found.predict(dips[2]).Q)
     assert np.array_equal(tractexp.load(tmp_path / "simulation.json").P, made["simulation"].P)
@@ -197,7 +197,7 @@ def test_the_command_and_the_call_give_the_same_numbers(resistive_dips, tmp_path
     assert same(told, call)
     assert call.parameters["T_m[1]"].value != call.parameters["T_m[2]"].value
     assert (call.parameters["q_v"].verdict, call.parameters["q_v"].interval) == ("fixed", None)
-    assert told.predict(call.asked.train[0]).epsilon == call.predict(call.asked.train[0]).epsilon
+    assert told.predict(call.spec.train[0]).epsilon == call.predict(call.spec.train[0]).epsilon
     with pytest.raises(UserError, match=r"a result\.json holds no records"):
         told.report()
 

@@ -703,7 +703,7 @@ def test_whitened_bits_do_not_depend_on_the_number_of_cores(planted, monkeypatch
     bench = planted.context
     wander = RandomWalk(np.array([1.0, 0.3]), 0.002, bench.power)
     noise = replace(planted.last.noise, mix=np.eye(2), random_walk=wander)
-    residuals = np.random.default_rng(1).normal(size=(150, *bench.known.shape))
+    residuals = np.random.default_rng(1).normal(size=(150, *bench.valid.shape))
     rows = []
     for number in (1, 3):
         monkeypatch.setattr(cores, "cores", lambda number=number: number)

@@ -214,9 +214,9 @@ def test_what_is_left_is_told_with_channel_start_and_size(unexplained, tmp_path)
 def test_faults_of_the_measurement_are_not_counted_among_the_effects_together(names, faults, told):
     catalogue = SimpleNamespace(spoken=lambda name: name, candidates=range(19))
     bench = SimpleNamespace(catalogue=catalogue)
-    tests = SimpleNamespace(bench=bench, p_left=0.001, loudest="pushes into the balances")
+    tests = SimpleNamespace(context=bench, p_left=0.001, loudest="pushes into the balances")
     best = SimpleNamespace(fit=SimpleNamespace(names=names), tests=tests)
-    explained = SimpleNamespace(faults=faults, base=SimpleNamespace(bench=bench))
+    explained = SimpleNamespace(faults=faults, base=SimpleNamespace(context=bench))
     weighed = SimpleNamespace(survivors=SimpleNamespace(retained=[best], explanations=explained), faults=faults)
     assert told in verdict._unexplained(weighed, SimpleNamespace(fitted=0.66))
 

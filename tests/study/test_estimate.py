@@ -59,7 +59,7 @@ def test_the_estimate_does_not_depend_on_the_search(fit):
 
 
 def test_the_estimate_fits_no_worse_than_any_search_by_its_own_likelihood(fit):
-    known = fit.judged.known
+    known = fit.details.uncertainty
     likelihood = known.likelihood
     ended = np.array([fit.result.search["parameters"][n] for n in known.names])
     rows = likelihood.rows(likelihood.to_unit(ended))[0]
@@ -137,7 +137,7 @@ def test_two_dips_whose_loads_differ_are_told_by_parameters_of_each_event():
 
 
 def test_what_is_judged_is_the_estimate_against_all_draws(fit, monkeypatch):
-    known, judged = fit.judged.known, []
+    known, judged = fit.details.uncertainty, []
     monkeypatch.setattr(adequacy, "tail", lambda draws, value: judged.append((len(draws), len(value))) or 1.0)
     adequacy.surprise(Observed.of(known.likelihood.problem), known.likelihood, known.unit)
     assert {*judged} == {(adequacy.DRAWS, 1)}
@@ -233,7 +233,7 @@ def test_a_search_that_found_a_better_valley_leads_to_the_estimate(monkeypatch):
     monkeypatch.setattr(module, "along_least_known", lambda likelihood, unit: unit[None])
     monkeypatch.setattr(module, "_remembered", type(module._remembered)())
     found = estimate(problem, TRUTH)
-    np.testing.assert_allclose(found.known.values, whole.values, rtol=1e-3)
+    np.testing.assert_allclose(found.uncertainty.values, whole.values, rtol=1e-3)
     assert found.starts[0].origin in ("search", "beside the best")
 
 

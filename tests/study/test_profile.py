@@ -92,7 +92,7 @@ def test_a_better_optimum_restarts_the_profiles_and_is_said(quiet):
     found = profiles(conclude(quiet.likelihood, off))
     assert found.restarts >= 1
     assert "a better optimum turned up along a profile" in found.notes[0]
-    np.testing.assert_allclose(found.known.values, quiet.values, atol=0.1 * quiet.half.min())
+    np.testing.assert_allclose(found.uncertainty.values, quiet.values, atol=0.1 * quiet.half.min())
     assert found.uncertainty.deviance == pytest.approx(quiet.deviance, abs=0.05)
 
 

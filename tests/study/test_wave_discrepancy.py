@@ -135,7 +135,7 @@ def test_what_is_left_of_a_current_is_told_by_its_shape(silent):
     (event,), noise = silent.steps.context.events, silent.steps.last.noise
     t = event.record.t - event.t_end
     ring = np.where(t >= 0, 0.1 * np.exp(-np.maximum(t, 0) / 0.03) * np.cos(2 * np.pi * 180 * t), 0.0)
-    residual = noise.draw(np.random.default_rng(1), 1, [event.record.samples])[0] * silent.steps.context.known
+    residual = noise.draw(np.random.default_rng(1), 1, [event.record.samples])[0] * silent.steps.context.valid
     residual[1] += ring
     told = remainders(residual, [event], noise)[0]
     assert (told.channel, told.kind) == ("current beta", "ringing")

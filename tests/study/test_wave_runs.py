@@ -77,7 +77,7 @@ def test_the_page_shows_currents_spectra_and_the_power_of_the_same_estimator(fit
 
 
 def test_currents_are_drawn_whole_and_the_dip_is_in_view(fit):
-    (one,) = fit.judged.fits
+    (one,) = fit.details.fits
     drawn = wave_chart(one.waves, [Drawn("estimate", one.currents, "#000000")]).plain()
     low, high = drawn["layout"]["xaxis"]["range"]
     assert low < one.waves.t_start < one.waves.t_end < high
@@ -111,7 +111,7 @@ def test_a_spectrum_tells_frequency_and_size_of_what_is_left(dip):
 
 
 def test_the_periodic_steady_state_is_measured_by_what_still_changes(fit):
-    (one,) = fit.judged.fits
+    (one,) = fit.details.fits
     event = one.waves
     assert one.unsettled == fit.result.events[0]["unsettled"] < 1e-3
     decay = np.exp(-(np.arange(len(event.record.t)) / event.rate) * event.f0)  # to 1/e in a cycle
@@ -129,7 +129,7 @@ def test_a_fit_in_waveforms_is_saved_and_read_back(fit, tmp_path):
     first, second = fit.predict(dip), again.predict(dip)
     assert np.array_equal(first.P, second.P)
     assert first.epsilon_i == second.epsilon_i < 0.04
-    assert again.judged.fits[0].epsilon_i == fit.result.events[0]["epsilon_i"]
+    assert again.details.fits[0].epsilon_i == fit.result.events[0]["epsilon_i"]
 
 
 def test_a_simulated_record_gives_currents(fit, tmp_path):
@@ -167,7 +167,7 @@ def test_a_result_of_waveforms_predicts_from_a_voltage(fit):
 
 
 def test_a_forecast_in_waveforms_narrows_with_depth_and_with_a_jump_of_the_phase(fit):
-    problem, values = fit.asked.problem, fit.judged.known.values
+    problem, values = fit.spec.problem, fit.details.uncertainty.values
     shape = DipShape.of(problem.events[0])
     assert shape.waves
     assert shape.jump == pytest.approx(0, abs=1)
@@ -201,7 +201,7 @@ def test_a_planned_dip_has_the_sequences_that_were_asked_for():
 
 def test_an_unbalanced_dip_tells_more_of_the_locked_rotor(fit):
     """The negative sequence sees the machine at a slip of nearly two: its leakages, whatever its flux does."""
-    problem, values = fit.asked.problem, fit.judged.known.values
+    problem, values = fit.spec.problem, fit.details.uncertainty.values
     shape = replace(
         DipShape.of(problem.events[0]), depth=0.2, duration=0.2, jump=0.0, unbalance=0.0, noise_P=0.005, noise_Q=0.005
     )

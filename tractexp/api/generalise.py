@@ -70,15 +70,7 @@ class Generalised(Written):
         return Table(columns, [[row[c] for c in columns] for row in self.medians], "on dips not fitted", CAPTION)
 
     def summary(self) -> Report:
-        """A table for each held-out dip, medians over the seeds."""
-        report, medians = Report(), self.medians
-        for event, kind in dict.fromkeys((row["event"], row["kind"]) for row in medians):
-            rows = [
-                [row["optimizer"], *(f"{row[e]:.3e}" if e in RESIDUALS else f"{row[e]:.3%}" for e in self.errors)]
-                for row in medians if row["event"] == event
-            ]  # fmt: skip
-            report.table(["optimizer", *self.errors], rows, title=f"{kind}: {event}")
-        return report.text(CAPTION)
+        return Report().add(self.table()).text(CAPTION)
 
     def report(self) -> Report:
         """The summary, and a figure of each optimizer and dip."""

@@ -35,7 +35,7 @@ MOVED = 2.0  # standard errors from which a rival structure's move is told
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Asked(Setup):
+class FitSpec(Setup):
     """What an identification was asked."""
 
     optimizer: Choice
@@ -95,13 +95,13 @@ class Estimates(dict[str, Estimate]):
         return "\n".join(map(repr, self.values()))
 
 
-class Judged(NamedTuple):
-    """What stands behind a result: heavy, and reckoned again from a loaded one."""
+class FitDetails(NamedTuple):
+    """What stands behind a result: heavy, and computed again from a loaded one."""
 
     fits: "list[Fit]"
-    estimated: "EstimationResult"
-    known: "Uncertainty"  # with the intervals that profiles gave
-    together: "EventAgreement | None"
+    estimation: "EstimationResult"
+    uncertainty: "Uncertainty"  # with the intervals that profiles gave
+    agreement: "EventAgreement | None"
     adequacy: "Adequacy"
 
 
@@ -113,23 +113,23 @@ class Identification(Written):
     page = "report.html"
 
     result: Result
-    setup: Asked | None = None  # None where only a result.json is known
+    setup: FitSpec | None = None  # None where only a result.json is known
     found: "SearchResult | None" = None
-    behind: "Judged | None" = None  # None where it was loaded
+    behind: "FitDetails | None" = None  # None where it was loaded
 
     @classmethod
-    def of(cls, setup: Asked, found: "SearchResult") -> "Identification":
+    def of(cls, setup: FitSpec, found: "SearchResult") -> "Identification":
         """Judge what a search found."""
-        result, judged = _judge(setup, found)
-        return cls(result, setup, found, judged)
+        result, details = _concluded(setup, found)
+        return cls(result, setup, found, details)
 
     @functools.cached_property
-    def judged(self) -> Judged:
+    def details(self) -> FitDetails:
         """What stands behind the result: computed again where this was loaded."""
-        return self.behind or _judge(self.asked, self.ended)[1]
+        return self.behind or _concluded(self.spec, self.ended)[1]
 
     @property
-    def asked(self) -> Asked:
+    def spec(self) -> FitSpec:
         """The call. Raises `UserError` where only a `result.json` was read."""
         if self.setup is None:
             raise UserError(
@@ -141,7 +141,7 @@ class Identification(Written):
     @property
     def ended(self) -> "SearchResult":
         """Where the search ended."""
-        _ = self.asked
+        _ = self.spec
         assert self.found is not None
         return self.found
 
@@ -295,7 +295,7 @@ class Identification(Written):
         if found is not None:
             history = History(**{key: np.array(v, dtype=float) for key, v in found["history"].items()})
             found = SearchResult(**found | {"values": np.array(found["values"], dtype=float), "history": history})
-        return cls(Result(**content["result"]), setup and Asked.from_dict(setup), found)
+        return cls(Result(**content["result"]), setup and FitSpec.from_dict(setup), found)
 
     def write_results(self, folder: Path) -> list[Path]:
         from tractexp.identification.result import write_history
@@ -343,7 +343,7 @@ def identify(
     simulated. Ctrl-C raises `tractexp.errors.Stopped`, a KeyboardInterrupt whose `result` holds what was found so far.
     """
     known = {"bounds": bounds, "fixed": fixed, "per_event": per_event, "substeps": substeps, "domain": domain}
-    setup = Asked.of(
+    setup = FitSpec.of(
         records, model, validate, objective, known, seed=seed, budget=budget, time_limit=time_limit, target=target,
         optimizer=Choice.of("optimizer", optimizer), check_intervals=check_intervals,
     )  # fmt: skip
@@ -355,7 +355,7 @@ def identify(
         raise Stopped.of(stop, result=setup.so_far(found or getattr(stop, "state", None))) from None
 
 
-def _judge(setup: Asked, found: "SearchResult") -> tuple[Result, Judged]:
+def _concluded(setup: FitSpec, found: "SearchResult") -> tuple[Result, FitDetails]:
     """The estimate that a search led to, and what stands behind it."""
     from tractexp.choices import set_holding
     from tractexp.identification.adequacy import graded
@@ -387,7 +387,7 @@ def _judge(setup: Asked, found: "SearchResult") -> tuple[Result, Judged]:
     result = replace(
         result, **fields, adequacy=adequacy.to_dict(), starts=starts, rival_structures=structures, advice=advice
     )
-    return result, Judged(fits, estimated, known, together, adequacy)
+    return result, FitDetails(fits, estimated, known, together, adequacy)
 
 
 @plugin

@@ -40,7 +40,7 @@ class Sampled(Written):
         """The sample; of a loaded result it is drawn again, from the same seed."""
         from tractexp.identification.posterior import sample
 
-        return self.behind or sample(self.fit.judged.known, **self.settings)
+        return self.behind or sample(self.fit.details.uncertainty, **self.settings)
 
     @property
     def draws(self) -> dict[str, np.ndarray]:
@@ -68,7 +68,7 @@ class Sampled(Written):
     def report(self) -> Report:
         from tractexp.report import posterior
 
-        return posterior.report(self.fit.judged.known, self.drawn, self.fit.headline)
+        return posterior.report(self.fit.details.uncertainty, self.drawn, self.fit.headline)
 
     def to_dict(self) -> dict[str, Any]:
         return {"fit": self.fit.to_dict(), "settings": dict(self.settings), "content": dict(self.content)}
@@ -82,7 +82,7 @@ class Sampled(Written):
         np.savez_compressed(packed, **self.draws)  # type: ignore[arg-type]
         path = files.write_json(folder / "posterior.json", self.content)
         draws = files.write(folder / "posterior.npz", packed.getvalue())
-        result = replace(self.fit.result, **self.fit.judged.known.fields())
+        result = replace(self.fit.result, **self.fit.details.uncertainty.fields())
         return [path, draws, *replace(self.fit, result=result).write_results(folder)]
 
 
@@ -98,8 +98,8 @@ def posterior(fit: Identification, *, walkers: int = 48, steps: int = 2000, seed
 
     check_range("task.walkers", walkers, 4)
     check_range("task.steps", steps, 100)
-    settings = {"walkers": walkers, "steps": steps, "seed": fit.asked.seed if seed is None else seed}
-    known = fit.judged.known
+    settings = {"walkers": walkers, "steps": steps, "seed": fit.spec.seed if seed is None else seed}
+    known = fit.details.uncertainty
     started = time.perf_counter()
     drawn = sample(known, **settings)
     content = {

@@ -40,7 +40,7 @@ class Profiled(Written):
         """What stands behind the page; of a loaded result it is computed again."""
         from tractexp.identification.profile import profiles
 
-        return self.behind or profiles(self.fit.judged.known, self.points)
+        return self.behind or profiles(self.fit.details.uncertainty, self.points)
 
     @property
     def identification(self) -> Identification:
@@ -97,7 +97,7 @@ def profile(fit: Identification, *, points: int = 24) -> Profiled:
     from tractexp.identification.profile import profiles
 
     check_range("task.points", points, 3, 1000)
-    known = fit.judged.known
+    known = fit.details.uncertainty
     started = time.perf_counter()
     made = profiles(known, points)
     content = _content(made, time.perf_counter() - started)

@@ -74,8 +74,8 @@ def starts_at_rest(event: dict[str, Any]) -> str:
 
 def report(fit: "Identification") -> Report:
     """The page: what the summary says, and what one sees of it."""
-    result, judged = fit.result, fit.judged
-    known, together = judged.known, judged.together
+    result, details = fit.result, fit.details
+    known, together = details.uncertainty, details.agreement
     names = ", ".join(e["name"] for e in result.events if e["role"] == "train")
     made = Report(f"Identification of {names}", f"{result.optimizer}, seed {result.seed}.")
     made.verdict(
@@ -85,7 +85,7 @@ def report(fit: "Identification") -> Report:
         kind=KIND[fit.grade],
     )
     made.heading("Measured and calculated")
-    _curves(made, judged.fits, known)
+    _curves(made, details.fits, known)
     made.heading("Parameters").add(parameters(fit))
     _parameters(made, fit, known)
     made.heading("How well it fits").add(errors(fit))
@@ -94,7 +94,7 @@ def report(fit: "Identification") -> Report:
         _events(made, known, together)
     made.heading("The search and the estimate").text(as_sentence(fit.end_of_search))
     made.chart(_fitness(fit.ended.history, result), "Best objective of the search; dashed: the estimate's.")
-    _starts(made, judged.estimated, known)
+    _starts(made, details.estimation, known)
     made.heading("What the fit leaves")
     _left(made, known)
     made.heading("How the estimates depend on each other")

@@ -43,7 +43,7 @@ class BenchmarkResult(Written):
         return sentences(self.bbob)
 
     def table(self) -> Table:
-        from tractexp.studies.bbob.page import scale
+        from tractexp.studies.bbob.page import scale, span
 
         bbob = self.bbob
         rows = [
@@ -51,13 +51,14 @@ class BenchmarkResult(Written):
              bbob.solved(name, d)]
             for d in bbob.plan.dimensions for name in bbob.optimizers
         ]  # fmt: skip
-        columns = ["optimizer", "dimension", "all", *bbob.groups(), "solved"]
+        columns = ["optimizer", "dimension", "all", *map(span, bbob.groups().values()), "solved"]
         return Table(columns, rows, f"share of targets met, functions solved: {scale(bbob)}")
 
     def summary(self) -> Report:
         from tractexp.studies.bbob import page
 
-        return page.summary(self.bbob)
+        sentences = [page.answer(self.bbob, d) for d in self.bbob.plan.dimensions]
+        return Report().add(self.table()).text(*sentences, *(f"- {sentence}" for sentence in self.sentences))
 
     def report(self) -> Report:
         from tractexp.studies.bbob import page

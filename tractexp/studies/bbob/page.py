@@ -98,18 +98,7 @@ def charts(benchmark: BbobRuns, dimension: int) -> dict[str, tuple[Chart, list[C
     return drawn
 
 
-def summary(benchmark: BbobRuns) -> Report:
-    """The shares of targets met, and the sentences."""
-    page = Report().text(scale(benchmark))
-    columns = ["optimizer", "all", *map(_span, benchmark.groups().values()), "solved"]
-    for dimension in benchmark.plan.dimensions:
-        _, rows = shares(benchmark, dimension)
-        page.table(columns, rows, title=f"dimension {dimension}: share of targets met, functions solved")
-    page.text(*(answer(benchmark, dimension) for dimension in benchmark.plan.dimensions))
-    return page.text(*(f"- {sentence}" for sentence in sentences(benchmark)))
-
-
-def _span(functions: list[int]) -> str:
+def span(functions: list[int]) -> str:
     """The functions of a group in short: f1-5."""
     first, last = min(functions), max(functions)
     return f"f{first}" if first == last else f"f{first}-{last}"
