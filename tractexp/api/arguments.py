@@ -141,12 +141,12 @@ class Choice:
         A mapping that has the key `name` is one choice with settings. Raises `UserError` for none and for doubles.
         """
         if isinstance(chosen, Mapping) and "name" not in chosen:
-            made = [dataclasses.replace(cls.of(group, one), name=name) for name, one in chosen.items()]
+            several = [dataclasses.replace(cls.of(group, one), name=name) for name, one in chosen.items()]
         else:
             listed = chosen if isinstance(chosen, Sequence) and not isinstance(chosen, str) else [chosen]
-            made = [cls.of(group, one) for one in listed]
-        check_distinct(f"{group}s", [one.name for one in made])
-        return made
+            several = [cls.of(group, one) for one in listed]
+        check_distinct(f"{group}s", [one.name for one in several])
+        return several
 
     def build(self, group: str) -> Any:
         return plugin.build(group, self.node)

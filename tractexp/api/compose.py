@@ -47,7 +47,7 @@ class LoadModel(Portable, Tabulated):
         """The parts, as `result.json` keeps them; integration and domain where they are not the usual ones."""
         parts = {"motor": dict(self.motor), "static": dict(self.static), "effects": list(self.effects)}
         usual = {"integration": "classical", "domain": "phasors"}
-        return parts | {key: told for key, plain in usual.items() if (told := getattr(self, key)) != plain}
+        return parts | {key: parts_of for key, plain in usual.items() if (parts_of := getattr(self, key)) != plain}
 
     @functools.cached_property
     def model(self) -> "Model":
@@ -114,7 +114,7 @@ def compose(
     Raises `UserError` for an unknown name or an effect that does not fit the equations; the values are checked where
     the model is used.
     """
-    made = model_of(model, domain)
+    composed = model_of(model, domain)
     chosen_parts = {"motor": motor, "static": static}
     parts = {
         part: Choice.of(f"model/{part}", chosen).node for part, chosen in chosen_parts.items() if chosen is not None
@@ -122,13 +122,13 @@ def compose(
     given = {
         "effects": effects, "substeps": substeps, "per_event": per_event, "integration": integration, "domain": domain,
     }  # fmt: skip
-    made = made.with_(bounds=bounds, fixed=fixed, **given, **parts)
-    _ = made.parameters
-    for key in made.fixed:
-        if key not in made.parameters:
-            known = among(key, made.parameters, "Parameters")
+    composed = composed.with_(bounds=bounds, fixed=fixed, **given, **parts)
+    _ = composed.parameters
+    for key in composed.fixed:
+        if key not in composed.parameters:
+            known = among(key, composed.parameters, "Parameters")
             raise UserError(f"fixed.{key}: this model has no parameter '{key}'{known}")
-    return made
+    return composed
 
 
 def model_of(given: Any, domain: str | None = None) -> LoadModel:
@@ -151,19 +151,19 @@ def model_of(given: Any, domain: str | None = None) -> LoadModel:
             raise UserError(f"model.{key}: there is no such key{among(key, known, 'Keys')}")
     if missing := [part for part in PARTS if not given.get(part)]:
         raise UserError(f"model lacks {' and '.join(missing)}; name a motor and a static load ('none' for without)")
-    made: dict[str, Any] = dict(given) | {part: Choice.of(f"model/{part}", given[part]).node for part in PARTS}
+    composed: dict[str, Any] = dict(given) | {part: Choice.of(f"model/{part}", given[part]).node for part in PARTS}
     for item in dataclasses.fields(LoadModel):
-        if item.name in made:
-            check_kind(f"model.{item.name}", made[item.name], item.type)
-    return LoadModel(**made)
+        if item.name in composed:
+            check_kind(f"model.{item.name}", composed[item.name], item.type)
+    return LoadModel(**composed)
 
 
 def _node(model: Any) -> dict[str, Any]:
     """The parts of a model composed of plugins."""
     try:
         motor, static = ({"name": p.name, **dataclasses.asdict(p)} for p in (model.motor, model.static))
-        told = {"motor": motor, "static": static, "effects": [effect.name for effect in model.effects]}
-        return told | {"integration": model.integration, "domain": model.domain}
+        parts_of = {"motor": motor, "static": static, "effects": [effect.name for effect in model.effects]}
+        return parts_of | {"integration": model.integration, "domain": model.domain}
     except AttributeError:
         kind = type(model).__name__
         raise UserError(f"model is of type {kind}; give a name, or what tractexp.compose makes") from None

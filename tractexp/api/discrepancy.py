@@ -131,11 +131,11 @@ class Investigation(Written):
     @property
     def remainder(self) -> Table:
         """Where nothing explains the disagreement: the shapes in what the base model leaves, the loudest first."""
-        told = self.content["remainder"]
-        shapes = told["of_base"] if told else []
+        entry = self.content["remainder"]
+        shapes = entry["of_base"] if entry else []
         columns = [*shapes[0]] if shapes else []
         rows = [[shape[key] for key in columns] for shape in shapes]
-        return Table(columns, rows, "what is left", told["sentence"] if told else "")
+        return Table(columns, rows, "what is left", entry["sentence"] if entry else "")
 
     @property
     def proposal(self) -> Mapping[str, Any] | None:
@@ -176,12 +176,12 @@ class Investigation(Written):
     def gap(self) -> Gaps:
         """How far off the model is before and after."""
 
-        def gap(told: Mapping[str, Any]) -> Gap:
-            return Gap(Misfit(**told["before"]), Misfit(**told["after"]), told["closed"])
+        def gap(entry: Mapping[str, Any]) -> Gap:
+            return Gap(Misfit(**entry["before"]), Misfit(**entry["after"]), entry["closed"])
 
-        told = self.content["gap"]
-        held = told["validate"] and gap(told["validate"])
-        return Gaps(gap(told["train"]), held, told["fitted_to_both"])
+        entry = self.content["gap"]
+        held = entry["validate"] and gap(entry["validate"])
+        return Gaps(gap(entry["train"]), held, entry["fitted_to_both"])
 
     @functools.cached_property
     def extended(self) -> LoadModel:

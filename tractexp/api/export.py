@@ -50,8 +50,8 @@ class Exported(Outcome):
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        told = {key: content[key] for key in ("format", "suffix", "title", "text")}
-        return cls(**told, notes=tuple(content["notes"]))
+        recorded = {key: content[key] for key in ("format", "suffix", "title", "text")}
+        return cls(**recorded, notes=tuple(content["notes"]))
 
 
 @public
@@ -71,21 +71,24 @@ def export(
         if value is not None:
             check_range(f"task.{name}", value, least)
     check_choice("task.base", base, BASES)
-    own, told = fit.result.base, fit.result.records[0].get("base", {}) if fit.result.records else {}
+    own, recorded = fit.result.base, fit.result.records[0].get("base", {}) if fit.result.records else {}
     file_power = power or (own.file_power if own.in_mva else POWER)
     on_file = base == FILE
     identified = Identified(
-        fit.result, bus, file_power * (1.0 if on_file else own.ratio), voltage or told.get("voltage_kV") or VOLTAGE,
+        fit.result, bus, file_power * (1.0 if on_file else own.ratio), voltage or recorded.get("voltage_kV") or VOLTAGE,
         own.ratio if on_file else 1.0,
     )  # fmt: skip
     form = build("format", {"name": format})
     form.check_parts(identified)
     text = form.text(identified)
-    notes = [_told(identified, base, own.ratio, guessed=power is None and not own.in_mva), *form.notes(identified)]
+    notes = [
+        _base_sentence(identified, base, own.ratio, guessed=power is None and not own.in_mva),
+        *form.notes(identified),
+    ]
     return Exported(format, form.suffix, identified.model.title, text, tuple(notes))
 
 
-def _told(load: "Identified", base: str, ratio: float, guessed: bool) -> str:
+def _base_sentence(load: "Identified", base: str, ratio: float, guessed: bool) -> str:
     """On which base the values of an export are, in a sentence."""
     which = "" if ratio == 1 else ", the base of the record's file" if base == FILE else ", the record's own base"
     said = f"per unit of {load.power:.6g} MVA and {load.voltage:.6g} kV{which}"

@@ -82,12 +82,12 @@ class Generalised(Written):
         return report
 
     def write_results(self, folder: Path) -> list[Path]:
-        told = {"residuals": self.residuals, "identified": self.identified}
-        return [files.write_json(folder / "generalise.json", told)]
+        curve = {"residuals": self.residuals, "identified": self.identified}
+        return [files.write_json(folder / "generalise.json", curve)]
 
     def drawings(self) -> Mapping[str, Drawing]:
         """A figure for each optimizer and held-out dip, of curves and residuals: issa_interpolation.svg, ..."""
-        return {told["file"]: functools.partial(_draw, told) for told in self.curves}
+        return {curve["file"]: functools.partial(_draw, curve) for curve in self.curves}
 
     def to_dict(self) -> dict[str, Any]:
         return {"residuals": self.residuals, "identified": self.identified, "curves": self.curves}
@@ -125,9 +125,9 @@ def generalise(
     Raises `UserError` for wrong names or values, and where no dip is held out.
     """
     check_range("task.seeds", seeds, 1)
-    known = {"bounds": bounds, "fixed": fixed, "per_event": per_event, "substeps": substeps}
+    model_settings = {"bounds": bounds, "fixed": fixed, "per_event": per_event, "substeps": substeps}
     limits = {"budget": budget, "time_limit": time_limit, "target": target}
-    setup = Setup.of(records, model, validate, objective, known, seed=seed, **limits)
+    setup = Setup.of(records, model, validate, objective, model_settings, seed=seed, **limits)
     if not setup.validate:
         raise UserError(
             "task=generalise needs dips that are not fitted: name them in data.validate, a milder one to"
@@ -135,7 +135,7 @@ def generalise(
         )
     chosen = Choice.several("optimizer", optimizers)
     tell(progress, setup.lines())
-    return _told(setup, list(_searched(setup, chosen, seeds, progress)))
+    return _generalised(setup, list(_searched(setup, chosen, seeds, progress)))
 
 
 def _searched(
@@ -149,16 +149,16 @@ def _searched(
     for optimizer in optimizers:
         for seed in range(setup.seed, setup.seed + seeds):
             tell(progress, [f"{optimizer.name}, seed {seed}"])
-            found = setup.search(optimizer, seed, progress)
+            end = setup.search(optimizer, seed, progress)
             if (optimizer, seed) == (optimizers[0], setup.seed):
-                likely = estimate(problem, found.values).uncertainty.values
-                result, fits = conclude(problem, found, setup.validate, seed, node, ESTIMATE, likely)
+                likely = estimate(problem, end.values).uncertainty.values
+                result, fits = conclude(problem, end, setup.validate, seed, node, ESTIMATE, likely)
                 yield result, fits[fitted:]
-            result, fits = conclude(problem, found, setup.validate, seed, node, optimizer.name)
+            result, fits = conclude(problem, end, setup.validate, seed, node, optimizer.name)
             yield result, fits[fitted:]
 
 
-def _told(setup: Setup, searched: "Sequence[tuple[Result, list[Fit]]]") -> Generalised:
+def _generalised(setup: Setup, searched: "Sequence[tuple[Result, list[Fit]]]") -> Generalised:
     """The searches as plain data."""
     from tractexp.identification.generalization import by_depth
 
@@ -207,14 +207,14 @@ def _curve(result: "Result", fits: "Sequence[Fit]", kinds: Sequence[str], k: int
     }
 
 
-def _draw(told: Mapping[str, Any], path: Path) -> Path:
+def _draw(curve: Mapping[str, Any], path: Path) -> Path:
     from tractexp.report import figures
 
-    t, U, P, Q, *calculated = (np.array(told[key], dtype=float) for key in ARRAYS)
-    epsilon_p, epsilon_q = told["epsilon"]
+    t, U, P, Q, *calculated = (np.array(curve[key], dtype=float) for key in ARRAYS)
+    epsilon_p, epsilon_q = curve["epsilon"]
     return figures.fit(
-        path, t, U, (P, Q), (calculated[0], calculated[1]), title=told["title"], epsilon=(epsilon_p, epsilon_q),
-        notes=told["notes"],
+        path, t, U, (P, Q), (calculated[0], calculated[1]), title=curve["title"], epsilon=(epsilon_p, epsilon_q),
+        notes=curve["notes"],
     )  # fmt: skip
 
 

@@ -342,9 +342,10 @@ def identify(
     Raises `UserError` for wrong names or values, records that lack what the model reads, and where nothing tried can be
     simulated. Ctrl-C raises `tractexp.errors.Stopped`, a KeyboardInterrupt whose `result` holds what was found so far.
     """
-    known = {"bounds": bounds, "fixed": fixed, "per_event": per_event, "substeps": substeps, "domain": domain}
+    model_settings = {"bounds": bounds, "fixed": fixed, "per_event": per_event, "substeps": substeps, "domain": domain}
     setup = FitSpec.of(
-        records, model, validate, objective, known, seed=seed, budget=budget, time_limit=time_limit, target=target,
+        records, model, validate, objective, model_settings, seed=seed, budget=budget, time_limit=time_limit,
+        target=target,
         optimizer=Choice.of("optimizer", optimizer), check_intervals=check_intervals,
     )  # fmt: skip
     found = None
@@ -369,25 +370,25 @@ def _concluded(setup: FitSpec, found: "SearchResult") -> tuple[Result, FitDetail
     problem = setup.problem
     refuse_nothing_found(problem, found)
     estimated = estimate(problem, found.values)
-    known = estimated.uncertainty
+    model_settings = estimated.uncertainty
     if setup.check_intervals:
-        known = with_rivals(checked(known))
+        model_settings = with_rivals(checked(model_settings))
     result, fits = conclude(
-        problem, found, setup.validate, setup.seed, setup.model.node, setup.optimizer.name, known.values
+        problem, found, setup.validate, setup.seed, setup.model.node, setup.optimizer.name, model_settings.values
     )
-    adequacy = graded(estimated.surprise, *errors_of(result), active_bounds(problem, known.values))
-    together = compare_events(known) if len(problem.events) > 1 else None
-    fields = known.fields()
+    adequacy = graded(estimated.surprise, *errors_of(result), active_bounds(problem, model_settings.values))
+    together = compare_events(model_settings) if len(problem.events) > 1 else None
+    fields = model_settings.fields()
     fields["uncertainty"] |= together.fields() if together else {"gains": {}, "odd_events": []}
     fields["uncertainty"]["notes"] += together.notes if together else []
     starts = [s.to_dict(problem.space.names) for s in estimated.starts]
-    structures = [rival.to_dict() for rival in known.rivals]
+    structures = [rival.to_dict() for rival in model_settings.rivals]
     data = set_holding(tuple(event.record.where for event in problem.events))
-    advice = advise(known, adequacy, together.odd if together else (), data=data)
+    advice = advise(model_settings, adequacy, together.odd if together else (), data=data)
     result = replace(
         result, **fields, adequacy=adequacy.to_dict(), starts=starts, rival_structures=structures, advice=advice
     )
-    return result, FitDetails(fits, estimated, known, together, adequacy)
+    return result, FitDetails(fits, estimated, model_settings, together, adequacy)
 
 
 @plugin

@@ -92,14 +92,14 @@ def sets_of(rivals: Any) -> list[list[str]]:
             f"task.rivals={rivals}: there is no such file; give names of effects, [a,b] or [a,b+c], or the"
             " discrepancy.json of an investigation that ended tied"
         )
-    told = json.loads(path.read_text(encoding="utf-8"))
-    if told.get("verdict") != "tied":
+    investigation = json.loads(path.read_text(encoding="utf-8"))
+    if investigation.get("verdict") != "tied":
         raise UserError(
-            f"task.rivals={rivals}: that investigation ended {told.get('verdict')}, not tied, so that there is nothing"
-            " to tell apart; of a proposal the terms that are like it, and what to record for them, are in that file"
-            " itself, as next_event"
+            f"task.rivals={rivals}: that investigation ended {investigation.get('verdict')}, not tied, so that there is"
+            " nothing to tell apart; of a proposal the terms that are like it, and what to record for them, are in that"
+            " file itself, as next_event"
         )
-    return told["name_sets"]
+    return investigation["name_sets"]
 
 
 def _event(setup: Setup, rivals: Sequence[Sequence[str]], progress: Progress) -> "NextEvent":

@@ -132,16 +132,16 @@ def plan(
     """
     rivals = rivals if isinstance(rivals, str) else [*rivals]
     if rivals:
-        known = {"bounds": bounds, "fixed": fixed, "substeps": substeps, "domain": domain}
-        return recommended(Setup.of(records, model, (), None, known), rivals, progress)
+        model_settings = {"bounds": bounds, "fixed": fixed, "substeps": substeps, "domain": domain}
+        return recommended(Setup.of(records, model, (), None, model_settings), rivals, progress)
     check_range("task.within", within, 1e-6, 10.0)
     check_range("task.least", least, 0.0, 1.0)
     if events is not None:
         check_range("task.events", events, 1)
     if noise is not None:
         check_range("task.noise", noise, 1e-9, 1.0)
-    known = {"bounds": bounds, "fixed": fixed, "substeps": substeps, "domain": domain}
-    setup = Setup.of(records, model, (), None, known)
+    model_settings = {"bounds": bounds, "fixed": fixed, "substeps": substeps, "domain": domain}
+    setup = Setup.of(records, model, (), None, model_settings)
     if isinstance(values, Identification):
         values = values.result.on_base_of(setup.train[0].record)
     asked = {
@@ -223,11 +223,11 @@ def _guess(setup: Setup, event: Event, values: Any) -> "tuple[np.ndarray, str, N
         defaults = [p.default for p in problem.parameters if p.name in problem.space.names]
         return np.array(defaults), "the model's default values", None
     given = isinstance(values, Mapping)
-    known = values if given else load(Path(values)).on_base_of(setup.train[0].record)
-    if missing := [name for name in problem.space.names if name not in known]:
+    model_settings = values if given else load(Path(values)).on_base_of(setup.train[0].record)
+    if missing := [name for name in problem.space.names if name not in model_settings]:
         raise UserError(f"task.values={values}: that result has no {', '.join(missing)}; it is of another model")
     origin = f"the values of {'an identification' if given else values}"
-    return np.array([known[n] for n in problem.space.names]), origin, None
+    return np.array([model_settings[n] for n in problem.space.names]), origin, None
 
 
 def _scans(problem: Any, values: np.ndarray, shape: "DipShape") -> dict[str, Any]:

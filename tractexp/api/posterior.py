@@ -99,9 +99,9 @@ def posterior(fit: Identification, *, walkers: int = 48, steps: int = 2000, seed
     check_range("task.walkers", walkers, 4)
     check_range("task.steps", steps, 100)
     settings = {"walkers": walkers, "steps": steps, "seed": fit.spec.seed if seed is None else seed}
-    known = fit.details.uncertainty
+    uncertainty = fit.details.uncertainty
     started = time.perf_counter()
-    drawn = sample(known, **settings)
+    drawn = sample(uncertainty, **settings)
     content = {
         "intervals": dict(zip(drawn.names, drawn.intervals.tolist(), strict=True)),
         "autocorrelation": drawn.autocorrelation,

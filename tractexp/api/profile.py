@@ -97,28 +97,28 @@ def profile(fit: Identification, *, points: int = 24) -> Profiled:
     from tractexp.identification.profile import profiles
 
     check_range("task.points", points, 3, 1000)
-    known = fit.details.uncertainty
+    uncertainty = fit.details.uncertainty
     started = time.perf_counter()
-    made = profiles(known, points)
-    content = _content(made, time.perf_counter() - started)
-    verdicts = {name: str(verdict) for name, verdict in made.verdicts.items()}
-    intervals = {p.name: list(p.interval) for p in made.profiles}
-    fields = made.uncertainty.fields() | {"verdicts": verdicts, "intervals": intervals}
-    fields["uncertainty"]["notes"] += made.notes
-    ends = zip(made.uncertainty.names, made.uncertainty.values, made.uncertainty.half, strict=True)
+    scan = profiles(uncertainty, points)
+    content = _content(scan, time.perf_counter() - started)
+    verdicts = {name: str(verdict) for name, verdict in scan.verdicts.items()}
+    intervals = {p.name: list(p.interval) for p in scan.profiles}
+    fields = scan.uncertainty.fields() | {"verdicts": verdicts, "intervals": intervals}
+    fields["uncertainty"]["notes"] += scan.notes
+    ends = zip(scan.uncertainty.names, scan.uncertainty.values, scan.uncertainty.half, strict=True)
     curvature = {name: (float(value - half), float(value + half)) for name, value, half in ends}
-    return Profiled(fit, points, content, replace(fit.result, **fields), curvature, made)
+    return Profiled(fit, points, content, replace(fit.result, **fields), curvature, scan)
 
 
-def _content(made: "Profiles", seconds: float) -> dict[str, Any]:
+def _content(scan: "Profiles", seconds: float) -> dict[str, Any]:
     """What `profile.json` holds."""
     return files.plain(
         {
-            "threshold": made.threshold,
-            "simulations": made.simulations,
+            "threshold": scan.threshold,
+            "simulations": scan.simulations,
             "seconds": seconds,
-            "restarts": made.restarts,
-            "notes": made.notes,
+            "restarts": scan.restarts,
+            "notes": scan.notes,
             "profiles": {
                 p.name: {
                     "values": p.values,
@@ -126,9 +126,9 @@ def _content(made: "Profiles", seconds: float) -> dict[str, Any]:
                     "interval": p.interval,
                     "ends": [str(end) for end in p.ends],
                     "minima": p.minima,
-                    "verdict": str(made.verdicts[p.name]),
+                    "verdict": str(scan.verdicts[p.name]),
                 }
-                for p in made.profiles
+                for p in scan.profiles
             },
         }
     )

@@ -35,8 +35,8 @@ class Response:
     @property
     def columns(self) -> dict[str, np.ndarray]:
         """What response.csv holds, by name."""
-        made = {"t": self.t, "U": self.U, "P": self.P, "Q": self.Q}
-        return made | ({"P_measured": self.measured[0], "Q_measured": self.measured[1]} if self.measured else {})
+        columns = {"t": self.t, "U": self.U, "P": self.P, "Q": self.Q}
+        return columns | ({"P_measured": self.measured[0], "Q_measured": self.measured[1]} if self.measured else {})
 
     @property
     def row(self) -> list[str]:
@@ -64,19 +64,19 @@ class Response:
 
     def write(self, stem: Path) -> list[Path]:
         """Write columns to `stem`.csv; of waveforms currents, too."""
-        made = [_csv(stem.with_suffix(".csv"), self.columns)]
-        return made + ([_csv(stem.with_name(f"{stem.name}_currents.csv"), self.currents)] if self.currents else [])
+        columns = [_csv(stem.with_suffix(".csv"), self.columns)]
+        return columns + ([_csv(stem.with_name(f"{stem.name}_currents.csv"), self.currents)] if self.currents else [])
 
     def draw(self, path: Path) -> Path:
         """Draw the response, against the measurement where there is one."""
         from tractexp.report import figures
 
-        made = self.P, self.Q
+        columns = self.P, self.Q
         if self.measured and self.epsilon:
             return figures.fit(
-                path, self.t, self.U, self.measured, made, title=self.title, epsilon=self.epsilon, notes=self.notes
+                path, self.t, self.U, self.measured, columns, title=self.title, epsilon=self.epsilon, notes=self.notes
             )
-        return figures.response(path, self.t, self.U, made, title=self.title, notes=self.notes)
+        return figures.response(path, self.t, self.U, columns, title=self.title, notes=self.notes)
 
 
 def _csv(path: Path, columns: Mapping[str, np.ndarray]) -> Path:
@@ -110,8 +110,8 @@ def _currents(fit: "Fit", ratio: float) -> dict[str, np.ndarray]:
     if fit.waves is None or fit.currents is None:
         return {}
     kept, event = slice(fit.waves.lead, None), fit.waves
-    made = {"t": event.record.t[kept]}
+    columns = {"t": event.record.t[kept]}
     for end, currents in (("", fit.currents), ("_measured", np.nan_to_num(event.currents))):
         names = [f"i_{n}{end}" for n in "abc"] if event.phases == 3 else [f"i{end}"]
-        made |= dict(zip(names, ratio * event.of_phases(currents)[:, kept], strict=True))
-    return made
+        columns |= dict(zip(names, ratio * event.of_phases(currents)[:, kept], strict=True))
+    return columns

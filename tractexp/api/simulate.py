@@ -92,14 +92,14 @@ class Simulation(Written):
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        def response(told: Mapping[str, Any]) -> Response:
-            arrays: Any = {key: np.array(told[key], dtype=float) for key in ("t", "U", "P", "Q")}
-            arrays["notes"] = tuple(told["notes"])
-            if told["measured"]:
-                P, Q = (np.array(values, dtype=float) for values in told["measured"])
-                arrays |= {"measured": (P, Q), "epsilon": tuple(told["epsilon"]), "epsilon_i": told.get("epsilon_i")}
-                arrays["currents"] = {k: np.array(x, dtype=float) for k, x in told.get("currents", {}).items()}
-            return Response(told["title"], **arrays)
+        def response(entry: Mapping[str, Any]) -> Response:
+            arrays: Any = {key: np.array(entry[key], dtype=float) for key in ("t", "U", "P", "Q")}
+            arrays["notes"] = tuple(entry["notes"])
+            if entry["measured"]:
+                P, Q = (np.array(values, dtype=float) for values in entry["measured"])
+                arrays |= {"measured": (P, Q), "epsilon": tuple(entry["epsilon"]), "epsilon_i": entry.get("epsilon_i")}
+                arrays["currents"] = {k: np.array(x, dtype=float) for k, x in entry.get("currents", {}).items()}
+            return Response(entry["title"], **arrays)
 
         responses = tuple(map(response, content["responses"]))
         return cls(LoadModel(**content["model"]), content["values"], responses)

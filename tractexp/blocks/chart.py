@@ -176,42 +176,42 @@ class Chart:
 
         Of what is shown each stretch has its lowest and highest sample, and zoomed in every sample is drawn.
         """
-        known = np.isfinite(y)
-        low, high = (float(y[known].min()), float(y[known].max())) if known.any() else (0.0, 0.0)
+        finite = np.isfinite(y)
+        low, high = (float(y[finite].min()), float(y[finite].max())) if finite.any() else (0.0, 0.0)
         offset, scale = (low + high) / 2, max((high - low) / (2 * HELD), 1e-300)
-        held = np.where(known, np.round((np.where(known, y, offset) - offset) / scale), -HELD - 1).astype("<i2")
-        kept = {"bdata": base64.b64encode(held.tobytes()).decode(), "start": start, "step": step}
-        kept |= {"offset": offset, "scale": scale}
+        held = np.where(finite, np.round((np.where(finite, y, offset) - offset) / scale), -HELD - 1).astype("<i2")
+        retained = {"bdata": base64.b64encode(held.tobytes()).decode(), "start": start, "step": step}
+        retained |= {"offset": offset, "scale": scale}
         line = {"color": color, "width": width, "dash": dash}
-        return self._add(name, panel, mode="lines", line=line, samples=kept)
+        return self._add(name, panel, mode="lines", line=line, samples=retained)
 
     def points(
         self, name: str, x: Sequence[Any] | np.ndarray, y: Sequence[Any] | np.ndarray, color: str, panel: int = 0, *,
-        size: float = 7, symbol: str = "circle", told: Sequence[str] = (), spans: np.ndarray | None = None,
+        size: float = 7, symbol: str = "circle", hover: Sequence[str] = (), spans: np.ndarray | None = None,
     ) -> "Chart":  # fmt: skip
-        """Marks; `told` is what each says when pointed at, `spans` (n, 2) are the ends of intervals along x."""
-        made: dict[str, Any] = {"marker": {"color": color, "size": size, "symbol": symbol}}
+        """Marks; `hover` is what each says when pointed at, `spans` (n, 2) are the ends of intervals along x."""
+        trace: dict[str, Any] = {"marker": {"color": color, "size": size, "symbol": symbol}}
         if spans is not None:
             middle = np.asarray(x, dtype=float)
-            made["error_x"] = {
+            trace["error_x"] = {
                 "type": "data", "symmetric": False, "color": color, "thickness": 2, "width": 5,
                 "array": (spans[:, 1] - middle).tolist(), "arrayminus": (middle - spans[:, 0]).tolist(),
             }  # fmt: skip
-        if told:
-            made |= {"text": [html.escape(t) for t in told], "hovertemplate": "%{text}<extra></extra>"}
-        return self._add(name, panel, mode="markers", x=_listed(x), y=_listed(y), **made)
+        if hover:
+            trace |= {"text": [html.escape(t) for t in hover], "hovertemplate": "%{text}<extra></extra>"}
+        return self._add(name, panel, mode="markers", x=_listed(x), y=_listed(y), **trace)
 
     def bars(
         self, name: str, labels: Sequence[str], values: Sequence[float], color: str | Sequence[str], panel: int = 0, *,
-        told: Sequence[str] = (),
+        hover: Sequence[str] = (),
     ) -> "Chart":  # fmt: skip
         """Horizontal bars, the first label on top."""
         self._axes[_key(panel)] |= {"autorange": "reversed", "type": "category"}
-        made: dict[str, Any] = {"text": [html.escape(t) for t in told], "textposition": "auto"} if told else {}
+        trace: dict[str, Any] = {"text": [html.escape(t) for t in hover], "textposition": "auto"} if hover else {}
         return self._add(
             name, panel, kind="bar", orientation="h", x=_listed(values), y=_listed(labels),
             marker={"color": color if isinstance(color, str) else list(color)},
-            hovertemplate="%{y}: %{x:.4g}<extra></extra>", **made,
+            hovertemplate="%{y}: %{x:.4g}<extra></extra>", **trace,
         )  # fmt: skip
 
     def band(
@@ -307,10 +307,10 @@ class Chart:
 
     def element(self, label: str) -> str:
         """The chart as an element of a page."""
-        told = json.dumps(self.plain(), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+        data = json.dumps(self.plain(), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
         return (
             f'<div class="chart" role="img" aria-label="{html.escape(label)}" style="height:{self._pixels}px"></div>'
-            f'<script type="application/json">{told}</script>'
+            f'<script type="application/json">{data}</script>'
         )
 
     def _add(self, name: str, panel: int, kind: str = "scatter", silent: bool = False, **more: Any) -> "Chart":

@@ -54,13 +54,13 @@ CURRENTS = (
 )
 
 
-def summary(found: "Outcome") -> Report:
+def summary(findings: "Outcome") -> Report:
     """The verdict first, then how large the gap is and how much of it is closed, where, and what to do next."""
-    content, left = found.content, found.remainder.caption
+    content, left = findings.content, findings.remainder.caption
     names = " or ".join(map(joined, content["name_sets"]))
-    report = Report().text(f"verdict: {found.verdict.upper()} {names}".rstrip())
-    grade, which = content["adequacy"], "extended" if found.names else "base"
-    report.items([found.reason, *found.sizes, *[left] * bool(left), *found.proposed])
+    report = Report().text(f"verdict: {findings.verdict.upper()} {names}".rstrip())
+    grade, which = content["adequacy"], "extended" if findings.names else "base"
+    report.items([findings.reason, *findings.sizes, *[left] * bool(left), *findings.proposed])
     report.items([f"the {which} model is graded {grade['grade'].replace('_', ' ')}: {grade['sentence']}"])
     report.add(gap(content))
     if places := content["where"]:
@@ -74,9 +74,9 @@ def summary(found: "Outcome") -> Report:
         held = near["explained_held_out"]
         beyond = "" if held is None else f" and {percent(held)} on the held-out events"
         share = f"{percent(near['explained'])} of what exceeds the noise{beyond}"
-        sizes = ", ".join(found.sizes_of_nearest)
+        sizes = ", ".join(findings.sizes_of_nearest)
         report.text(f"nearest, not accepted: {joined(near['effects'])}, {share}; {sizes}")
-    return report.text(f"noise: {content['noise']}", f"next: {found.recommendation}")
+    return report.text(f"noise: {content['noise']}", f"next: {findings.recommendation}")
 
 
 def gap(content: Mapping[str, Any]) -> Table:
@@ -97,48 +97,52 @@ def gap(content: Mapping[str, Any]) -> Table:
     return Table(columns, [row[: len(columns)] for row in rows], "", caption, words=(1,))
 
 
-def report(found: Findings, content: Mapping[str, Any], title: str) -> Report:
+def report(findings: Findings, content: Mapping[str, Any], title: str) -> Report:
     """The investigation, for a reader who was not there; `content` is that of `discrepancy.json`."""
-    events = len(found.context.events)
-    lead = f"{found.context.model.title}, {events} event{'s' * (events > 1)} fitted, {len(found.withheld)} held out"
-    made = Report(f"Missing effect: {title}", lead)
-    spoken = [joined([found.catalogue.spoken(name) for name in names]) for names in found.verdict.sets]
-    head = f"{found.verdict.word.upper()} {' or '.join(spoken)}".strip()
-    left = [as_sentence(found.headline)] if found.headline else []
-    sentences = [as_sentence(found.verdict.reason), *left, *headlines(found), _graded(found)]
-    made.verdict(head, *sentences, f"Next: {recommendation(found)}.", kind=KIND[found.verdict.word])
-    overlaid(made.heading("Measured, before, after" if found.names else "Measured and calculated"), found.overlays)
-    _smaller(made, found, content)
-    if found.verdict.word == UNEXPLAINED:
-        proposed(made, found)
-        _left(made, found)
-    if (chosen := found.next_event) is not None:
-        made.heading("What to record next").text(as_sentence(chosen.sentence()))
-        section(made, chosen)
-    _forms(made, found)
-    _candidates(made, found)
-    _parameters(made, found)
-    if found.names:
-        _equations(made, found)
-    _disagreement(made, found)
-    _noise(made, found)
-    return made
+    events = len(findings.context.events)
+    lead = (
+        f"{findings.context.model.title}, {events} event{'s' * (events > 1)} fitted, {len(findings.withheld)} held out"
+    )
+    page = Report(f"Missing effect: {title}", lead)
+    spoken = [joined([findings.catalogue.spoken(name) for name in names]) for names in findings.verdict.sets]
+    head = f"{findings.verdict.word.upper()} {' or '.join(spoken)}".strip()
+    left = [as_sentence(findings.headline)] if findings.headline else []
+    sentences = [as_sentence(findings.verdict.reason), *left, *headlines(findings), _graded(findings)]
+    page.verdict(head, *sentences, f"Next: {recommendation(findings)}.", kind=KIND[findings.verdict.word])
+    overlaid(
+        page.heading("Measured, before, after" if findings.names else "Measured and calculated"), findings.overlays
+    )
+    _smaller(page, findings, content)
+    if findings.verdict.word == UNEXPLAINED:
+        proposed(page, findings)
+        _left(page, findings)
+    if (chosen := findings.next_event) is not None:
+        page.heading("What to record next").text(as_sentence(chosen.sentence()))
+        section(page, chosen)
+    _forms(page, findings)
+    _candidates(page, findings)
+    _parameters(page, findings)
+    if findings.names:
+        _equations(page, findings)
+    _disagreement(page, findings)
+    _noise(page, findings)
+    return page
 
 
-def _graded(found: Findings) -> str:
+def _graded(findings: Findings) -> str:
     """What the model that the investigation ends with is good for."""
-    which = "extended" if found.names else "base"
-    grade = adequacy(found)
+    which = "extended" if findings.names else "base"
+    grade = adequacy(findings)
     return f"The {which} model is graded {grade.grade.replace('_', ' ')}: {grade.sentence}."
 
 
-def _smaller(made: Report, found: Findings, content: Mapping[str, Any]) -> None:
+def _smaller(page: Report, findings: Findings, content: Mapping[str, Any]) -> None:
     """The gap; of waveforms that nothing explains, that of the nearest candidates beside it."""
-    made.heading("How large the gap is" if not found.names else "How much smaller the gap is")
-    table, near = gap(content), found.verdict.nearest
-    made.add(replace(table, rows=_with_nearest(near)) if found.context.waves and near else table)
-    if found.fitted_to_both:
-        made.text("The extended model was fitted to the held-out events, too: what they say of it is no test of it.")
+    page.heading("How large the gap is" if not findings.names else "How much smaller the gap is")
+    table, near = gap(content), findings.verdict.nearest
+    page.add(replace(table, rows=_with_nearest(near)) if findings.context.waves and near else table)
+    if findings.fitted_to_both:
+        page.text("The extended model was fitted to the held-out events, too: what they say of it is no test of it.")
 
 
 def _with_nearest(near: Nearest) -> list[list[str]]:
@@ -156,32 +160,32 @@ def _off(misfit: Mapping[str, Any]) -> list[str]:
     return [*(f"{e:.3%}" for e in errors if e is not None), f"{misfit['chi2_per_sample']:.3f}"]
 
 
-def _left(made: Report, found: Findings) -> None:
+def _left(page: Report, findings: Findings) -> None:
     """What nothing explains, in words."""
-    made.heading("What is left")
-    shapes, near = found.remainder, found.verdict.nearest
+    page.heading("What is left")
+    shapes, near = findings.remainder, findings.verdict.nearest
     whose = "the base model" if near is None else f"{joined(near.names)}, the nearest candidates,"
-    _shapes(made, found, shapes, whose)
+    _shapes(page, findings, shapes, whose)
     if near is not None:
-        _shapes(made, found, found.remainder_of_base, "the base model alone")
+        _shapes(page, findings, findings.remainder_of_base, "the base model alone")
     if near is not None:
-        _nearest(made, found)
+        _nearest(page, findings)
 
 
-def _shapes(made: Report, found: Findings, shapes: Sequence[Remainder], whose: str) -> None:
+def _shapes(page: Report, findings: Findings, shapes: Sequence[Remainder], whose: str) -> None:
     """The shapes in what one model leaves."""
     if not shapes:
-        made.text(f"Missed by {whose}: nothing of a simple shape, no ringing, decay, step or pulse.")
+        page.text(f"Missed by {whose}: nothing of a simple shape, no ringing, decay, step or pulse.")
         return
-    beyond = {event.record.name for event in found.withheld}
+    beyond = {event.record.name for event in findings.withheld}
     where = "held-out" if shapes[0].event in beyond else "fitted"
-    made.text(f"Missed by {whose} on the {where} events, the loudest first: {shapes[0]}.")
+    page.text(f"Missed by {whose} on the {where} events, the loudest first: {shapes[0]}.")
     rows = [
         [s.event, s.channel, s.kind, f"{s.start:.3f}", s.when, _number(s.frequency), _number(s.time_constant),
          _number(s.damping), f"{s.size:.2g}", s.times, f"{s.share:.0%}"]
         for s in shapes
     ]  # fmt: skip
-    made.table(
+    page.table(
         ["event", "channel", "kind", "from t [s]", "when", "frequency [Hz]", "time constant [s]", "damping ratio",
          "size [pu]", "of the noise", "of the excess"], rows,
         "Shapes c exp(-t/tau) cos(2 pi f t + phi) fitted to what is left; the noise is that before the dip.",
@@ -189,24 +193,24 @@ def _shapes(made: Report, found: Findings, shapes: Sequence[Remainder], whose: s
     )  # fmt: skip
 
 
-def _nearest(made: Report, found: Findings) -> None:
+def _nearest(page: Report, findings: Findings) -> None:
     """The candidates that come nearest, with their shares and sizes."""
-    near = found.verdict.nearest
+    near = findings.verdict.nearest
     assert near is not None
     assert near.rival.tests is not None
-    known = {e.parameter.name: e for e in estimates(near.rival.tests, near.rival.fit.unit, near.names)}
-    own = [known[p.name] for name in near.names for p in found.catalogue[name].effect.parameters]
+    by_name = {e.parameter.name: e for e in estimates(near.rival.tests, near.rival.fit.unit, near.names)}
+    own = [by_name[p.name] for name in near.names for p in findings.catalogue[name].effect.parameters]
     held = percent(near.held_out) if np.isfinite(near.held_out) else ""
     rows = [[joined(near.names), percent(near.fitted), held]]
     rows += [[joined(names), percent(share), ""] for names, share in near.others]
-    made.text("The candidates that come nearest, none of which is accepted:")
-    made.table(
+    page.text("The candidates that come nearest, none of which is accepted:")
+    page.table(
         ["nearest candidates", "explain on the fitted events", "on the held-out events"], rows,
         "Shares of the deviance in excess of the noise. A large share is no explanation as long as what is left could"
         " not come about by chance.", words=(0,),
     )  # fmt: skip
-    with made.folded(f"How large {joined(near.names)} would be"):
-        made.table(
+    with page.folded(f"How large {joined(near.names)} would be"):
+        page.table(
             ["parameter", "meaning", "unit", "value", "95 % interval", "verdict"],
             [[e.parameter.name, e.parameter.about, e.parameter.unit, _value(e), _interval(e), e.verdict] for e in own],
             "As if they were right; something else is missing, so that the intervals may miss the truth.",
@@ -214,53 +218,53 @@ def _nearest(made: Report, found: Findings) -> None:
         )  # fmt: skip
 
 
-def _forms(made: Report, found: Findings) -> None:
+def _forms(page: Report, findings: Findings) -> None:
     """Where each effect named acts, what it does there and by which law; curves that were found."""
-    if not found.names:
+    if not findings.names:
         return
-    told = forms(found)
-    made.heading("Where it acts, and by which law")
+    entries = forms(findings)
+    page.heading("Where it acts, and by which law")
     rows = [
         [f.name, joined(f.effect.places), KINDS[f.effect.kind] if f.effect.kind else "",
          f"the {f.law}'s" if f.law == CATALOGUE else f.effect.differs, f.effect.name]
-        for f in told
+        for f in entries
     ]  # fmt: skip
-    made.table(
+    page.table(
         ["effect", "where", "what it does there", "law", "effect in the model"], rows,
         "The catalogue's laws are tried first; other laws and places where the best of them leaves something, or where"
         " their own comes near it.",
         words=(1, 2, 3, 4),
     )  # fmt: skip
-    for form in told:
+    for form in entries:
         if form.law_fit is not None:
-            made.chart(
+            page.chart(
                 _curve(form.law_fit),
                 f"{form.name}: the law found, with its 95 % band, beside the catalogue's as it fits these events best.",
             )
 
 
-def _curve(found: FittedLaw) -> Chart:
+def _curve(findings: FittedLaw) -> Chart:
     """A law with its band, and the textbook's."""
-    law = found.curve
-    made = Chart(law.x_label, [law.y_label], pixels=320)
-    made.band("", law.x, found.band[0], found.band[1], CURVE)
-    made.line("the law found", law.x, law.y, CURVE, width=2.2)
-    made.line("the catalogue's law", law.x, found.textbook, TEXTBOOK, dash="dash")
-    shown = np.concatenate([law.y, found.textbook])
+    law = findings.curve
+    page = Chart(law.x_label, [law.y_label], pixels=320)
+    page.band("", law.x, findings.band[0], findings.band[1], CURVE)
+    page.line("the law found", law.x, law.y, CURVE, width=2.2)
+    page.line("the catalogue's law", law.x, findings.textbook, TEXTBOOK, dash="dash")
+    shown = np.concatenate([law.y, findings.textbook])
     room = 0.25 * max(float(np.ptp(shown)), 1e-6)
-    return made.limits(0, float(shown.min()) - room, float(shown.max()) + room)
+    return page.limits(0, float(shown.min()) - room, float(shown.max()) + room)
 
 
-def _candidates(made: Report, found: Findings) -> None:
-    rows = evidence(found)
+def _candidates(page: Report, findings: Findings) -> None:
+    rows = evidence(findings)
     labels = _labels(rows)
-    made.heading("Candidates by their evidence")
+    page.heading("Candidates by their evidence")
     seen = [row for row in rows if np.isfinite(row.drop)]
     if seen:
-        made.chart(_bars(found, seen, labels), _bars_caption(found, seen))
-    for sentence in (why_not_the_most_helpful(found), beside(found)):
-        made.text(*[sentence] * bool(sentence))
-    told = [
+        page.chart(_bars(findings, seen, labels), _bars_caption(findings, seen))
+    for sentence in (why_not_the_most_helpful(findings), beside(findings)):
+        page.text(*[sentence] * bool(sentence))
+    entries = [
         [
             f"{labels[r]}: {joined(r.names)}" if len(r.names) > 1 else labels[r],
             "" if np.isnan(r.drop) else f"{r.drop:.1f}",
@@ -270,16 +274,16 @@ def _candidates(made: Report, found: Findings) -> None:
         ]
         for r in rows
     ]
-    chosen = found.last.fit.names
+    chosen = findings.last.fit.names
     single = f"; that of an effect outside of it is what the events say with {joined(chosen)} in the model"
-    made.table(
-        ["candidate", "deviance lowered by", "status", "size", "why"], told,
+    page.table(
+        ["candidate", "deviance lowered by", "status", "size", "why"], entries,
         f"Status of a refitted set is that among the sets of its size{single if chosen else ''}. Sizes have their"
         " standard error where it was reckoned.", words=(0, 2, 3, 4),
     )  # fmt: skip
-    _sets(made, found)
+    _sets(page, findings)
     if chosen:
-        _further(made, found)
+        _further(page, findings)
 
 
 def _labels(rows: Sequence[Evidence]) -> dict[Evidence, str]:
@@ -288,80 +292,80 @@ def _labels(rows: Sequence[Evidence]) -> dict[Evidence, str]:
     return {row: f"set {sets.index(row) + 1}" if row in sets else row.names[0] for row in rows}
 
 
-def _bars(found: Findings, rows: Sequence[Evidence], labels: Mapping[Evidence, str]) -> Chart:
+def _bars(findings: Findings, rows: Sequence[Evidence], labels: Mapping[Evidence, str]) -> Chart:
     """How much each candidate explains by itself."""
     colors = [COLORS.get(r.status, REFITTED if r.how == FITTED else ESTIMATED) for r in rows]
-    told = [f"{r.drop:.{int(r.drop < 100)}f}{f', {r.status}' * (r.standing < 2)}" for r in rows]
-    chance = chance_level(found)
-    made = Chart("deviance", [""], pixels=130 + BAR * len(rows))
-    made.bars("", [labels[r] for r in rows], [r.drop for r in rows], colors, told=told)
-    return made.edge(chance, dash="dash").limits(None, 0.0, ROOM * max(chance, *(r.drop for r in rows)))
+    entries = [f"{r.drop:.{int(r.drop < 100)}f}{f', {r.status}' * (r.standing < 2)}" for r in rows]
+    chance = chance_level(findings)
+    page = Chart("deviance", [""], pixels=130 + BAR * len(rows))
+    page.bars("", [labels[r] for r in rows], [r.drop for r in rows], colors, hover=entries)
+    return page.edge(chance, dash="dash").limits(None, 0.0, ROOM * max(chance, *(r.drop for r in rows)))
 
 
-def _bars_caption(found: Findings, rows: Sequence[Evidence]) -> str:
-    colors = ["green: added"] * bool(found.names)
+def _bars_caption(findings: Findings, rows: Sequence[Evidence]) -> str:
+    colors = ["green: added"] * bool(findings.names)
     colors += ["orange: tied with it"] * any(r.status == KEPT for r in rows)
     colors += ["blue: refitted"] * any(r.how == FITTED and r.standing == 2 for r in rows)
     colors += ["gray: estimated in one linear step"] * any(r.how == ONE_STEP for r in rows)
-    chance = f"{chance_level(found):.1f}, what chance gives to the most helpful of all in"
+    chance = f"{chance_level(findings):.1f}, what chance gives to the most helpful of all in"
     return (
         f"By how much each alone lowers the deviance of the base model ({', '.join(colors)}). Dashed: {chance}"
-        f" {found.context.criteria.false_alarms:.0%} of cases."
+        f" {findings.context.criteria.false_alarms:.0%} of cases."
     )
 
 
-def _sets(made: Report, found: Findings) -> None:
+def _sets(page: Report, findings: Findings) -> None:
     """How the refitted sets of the chosen size compare."""
     rows = [
         [joined(r.fit.names) or "the base model", f"{r.fit.deviance:.1f}", f"{r.behind:.1f}", f"{r.distance:.1f}",
          "rejected" if r.rejected else "adequate" if r.adequate else "not adequate",
          "" if r.tests is None else in_words(r.tests.p_left)]
-        for r in found.survivors.rivals[:MOST_SETS]
+        for r in findings.survivors.rivals[:MOST_SETS]
     ]  # fmt: skip
-    with made.folded("How the refitted sets compare"):
-        made.table(
+    with page.folded("How the refitted sets compare"):
+        page.table(
             ["set", "deviance", "behind", "distance of the curves", "verdict", "chance leaves as much"], rows,
             "Every set of this size that was refitted. A set is rejected when, were it true, the best would not fit so"
             " well; it is adequate when chance may leave as much as it does.", words=(4, 5),
         )  # fmt: skip
 
 
-def _further(made: Report, found: Findings) -> None:
+def _further(page: Report, findings: Findings) -> None:
     """What the others would add once the chosen effects are in the model."""
     rows = []
-    for j in judgements(found):
+    for j in judgements(findings):
         size = ""
         if j.score is not None:
             size = ", ".join(f"{n} {v:.3g} ± {j.score.deviation[n]:.2g}" for n, v in j.score.size.items())
         rows.append([j.name, j.status, "" if j.score is None else f"{j.score.drop:.1f}", size, j.why])
-    names = joined(found.last.fit.names)
-    with made.folded(f"What each effect would add to a model that has {names}"):
-        made.table(
+    names = joined(findings.last.fit.names)
+    with page.folded(f"What each effect would add to a model that has {names}"):
+        page.table(
             ["effect", "status", "deviance lowered by", "one-step size", "why"], rows,
             "Scores with all nuisances projected out; sizes are departures from the null.", words=(1, 3, 4),
         )  # fmt: skip
 
 
-def _parameters(made: Report, found: Findings) -> None:
+def _parameters(page: Report, findings: Findings) -> None:
     """The base model's parameters before and after, and those that came in."""
-    made.heading("Parameters before and after" if found.names else "Parameters of the base model")
-    before = {e.parameter.name: e for e in found.before}
-    rows, known = [], found.after if found.names else found.before
-    for e in known:
+    page.heading("Parameters before and after" if findings.names else "Parameters of the base model")
+    before = {e.parameter.name: e for e in findings.before}
+    rows, by_name = [], findings.after if findings.names else findings.before
+    for e in by_name:
         p, was = e.parameter, before.get(e.parameter.name)
-        told = [_value(was) if was else "not in it"] if found.names else []
-        rows.append([p.name, p.about, p.unit, *told, _value(e), _interval(e), _brief(e.verdict)])
-    stages = ["before", "after"] if found.names else ["value"]
+        entries = [_value(was) if was else "not in it"] if findings.names else []
+        rows.append([p.name, p.about, p.unit, *entries, _value(e), _interval(e), _brief(e.verdict)])
+    stages = ["before", "after"] if findings.names else ["value"]
     columns = ["parameter", "meaning", "unit", *stages, "95 % interval", "verdict"]
-    made.table(
+    page.table(
         columns, rows, "± one standard error, from the curvature at the fit to the fitted events.",
         words=(1, 2, len(columns) - 1),
     )  # fmt: skip
-    if kept := held(found):
-        made.text(f"These events cannot tell {joined(list(kept))}: the extended model holds what was found.")
-    if why := [f"{e.parameter.name} is {e.verdict}." for e in known if _brief(e.verdict) != e.verdict]:
-        with made.folded("Why some are known badly, and what of them is known"):
-            made.items(why)
+    if retained := held(findings):
+        page.text(f"These events cannot tell {joined(list(retained))}: the extended model holds what was found.")
+    if why := [f"{e.parameter.name} is {e.verdict}." for e in by_name if _brief(e.verdict) != e.verdict]:
+        with page.folded("Why some are known badly, and what of them is known"):
+            page.items(why)
 
 
 def _brief(verdict: str) -> str:
@@ -369,86 +373,86 @@ def _brief(verdict: str) -> str:
     return verdict.split("; ")[0] if ": " in verdict.split(" (")[0] else verdict
 
 
-def _equations(made: Report, found: Findings) -> None:
+def _equations(page: Report, findings: Findings) -> None:
     """The equations that changed or came in, and how the extended model is used."""
     from tractexp.model.model import compose
     from tractexp.model.printed import changed
 
-    made.heading("The extended model")
-    if others := [joined(names) for names in found.verdict.sets[1:]]:
-        made.text(f"It has {joined(found.names)}; {joined(others, 'or')} instead would fit these events as well.")
-    made.text(
-        f"conf/model/extended.yaml beside this page: {use_of(found.context.load.domain, 'conf')}. Its equations"
+    page.heading("The extended model")
+    if others := [joined(names) for names in findings.verdict.sets[1:]]:
+        page.text(f"It has {joined(findings.names)}; {joined(others, 'or')} instead would fit these events as well.")
+    page.text(
+        f"conf/model/extended.yaml beside this page: {use_of(findings.context.load.domain, 'conf')}. Its equations"
         " that changed or came in:"
     )
-    base = found.context.load
-    effects = [found.catalogue[n].effect for n in found.names]
+    base = findings.context.load
+    effects = [findings.catalogue[n].effect for n in findings.names]
     extended = compose(base.motor, base.static, [*base.effects, *effects], domain=base.domain)
     for was, line in changed(base.latex(), extended.latex()):
         if was is not None:
-            made.text("before").equation(was).text("after")
-        made.equation(line)
-    with made.folded("All equations of the extended model"):
+            page.text("before").equation(was).text("after")
+        page.equation(line)
+    with page.folded("All equations of the extended model"):
         for line in extended.latex():
-            made.equation(line)
+            page.equation(line)
 
 
-def _disagreement(made: Report, found: Findings) -> None:
+def _disagreement(page: Report, findings: Findings) -> None:
     """Whether and where the base model disagrees with the records."""
-    first = found.first
-    made.heading("Is there a disagreement, and where?")
+    first = findings.first
+    page.heading("Is there a disagreement, and where?")
     text = f"What the base model leaves would come about by chance with a probability of {in_words(first.p_left)}"
     text += "." if first.adequate else f"; the most surprised of the tests looks for {first.loudest}."
     if first.scores:
-        best, alpha = first.scores[0], found.context.criteria.false_alarms
+        best, alpha = first.scores[0], findings.context.criteria.false_alarms
         text += (
             f" The effect that promises most in one linear step, {best.name}, would lower the deviance by"
             f" {best.drop:.1f}, with a probability of {in_words(best.p)} by chance; chance gives less than"
             f" {in_words(first.chance.critical_p(alpha))} to the best of all candidates in {alpha:.0%} of cases."
         )
-    made.text(text)
-    if not found.places:
-        made.text("No interval holds more energy than chance leaves there.")
+    page.text(text)
+    if not findings.places:
+        page.text("No interval holds more energy than chance leaves there.")
         return
-    made.table(
+    page.table(
         ["event", "channel", "from [s]", "to [s]", "share of the excess"],
-        [[p.event, p.channel, f"{p.start:.3f}", f"{p.end:.3f}", f"{p.share:.0%}"] for p in found.places],
+        [[p.event, p.channel, f"{p.start:.3f}", f"{p.end:.3f}", f"{p.share:.0%}"] for p in findings.places],
         "Intervals in which the base model leaves more than chance does, at a family-wise error of"
-        f" {found.context.criteria.false_alarms:.0%}; shaded in the charts.", words=(1,),
+        f" {findings.context.criteria.false_alarms:.0%}; shaded in the charts.", words=(1,),
     )  # fmt: skip
 
 
-def _noise(made: Report, found: Findings) -> None:
-    level, free = found.context.describe(found.last.noise), joined(found.catalogue.of_measurement)
-    if found.context.waves:
-        unjudged = found.last.noise.loudest_input_mode > found.context.criteria.blurred
+def _noise(page: Report, findings: Findings) -> None:
+    level, free = findings.context.describe(findings.last.noise), joined(findings.catalogue.of_measurement)
+    if findings.context.waves:
+        unjudged = findings.last.noise.loudest_input_mode > findings.context.criteria.blurred
         how = (
             "and not judged: these offsets and edges would pass for them" if unjudged else "each held by what is likely"
         )
         faults = f" Faults of the measurement ({free}) are free in every fit, {how}." * bool(free)
-        made.heading("Noise").text(f"{level}. {NOISE_OF_WAVES}{faults}")
+        page.heading("Noise").text(f"{level}. {NOISE_OF_WAVES}{faults}")
         return
-    made.heading("Noise").text(
+    page.heading("Noise").text(
         f"{level}. It is estimated where nothing happens, from what the fit leaves there, and"
         " so contains what smoothing leaves of the voltage's noise. Time skew, measurement window and load drift are"
         " free in every fit, each held by what is physically likely."
     )
-    if (window := found.context.records.window) is not None:
-        model = " The extended configuration does not do so." if found.names else ""
-        made.text(
+    if (window := findings.context.records.window) is not None:
+        model = " The extended configuration does not do so." if findings.names else ""
+        page.text(
             f"{window.describe().capitalize()}, of voltage and current alike: any other window would"
             " make the voltage bend where the power does not. The voltage that the load saw is reckoned back from the"
             f" record, and the current of the model is averaged as the recorder does.{model}"
         )
 
 
-def _value(known: ParameterEstimate) -> str:
-    bound = "" if np.isfinite(known.error) else ", at its bound"
-    return f"{with_error(known.value, known.error)}{bound}"
+def _value(by_name: ParameterEstimate) -> str:
+    bound = "" if np.isfinite(by_name.error) else ", at its bound"
+    return f"{with_error(by_name.value, by_name.error)}{bound}"
 
 
-def _interval(known: ParameterEstimate) -> str:
-    low, high = known.interval
+def _interval(by_name: ParameterEstimate) -> str:
+    low, high = by_name.interval
     return f"{low:.4g} to {high:.4g}" if np.isfinite(low) else ""
 
 

@@ -75,32 +75,32 @@ def starts_at_rest(event: dict[str, Any]) -> str:
 def report(fit: "Identification") -> Report:
     """The page: what the summary says, and what one sees of it."""
     result, details = fit.result, fit.details
-    known, together = details.uncertainty, details.agreement
+    uncertainty, together = details.uncertainty, details.agreement
     names = ", ".join(e["name"] for e in result.events if e["role"] == "train")
-    made = Report(f"Identification of {names}", f"{result.optimizer}, seed {result.seed}.")
-    made.verdict(
+    page = Report(f"Identification of {names}", f"{result.optimizer}, seed {result.seed}.")
+    page.verdict(
         as_sentence(fit.headline),
         f"{as_sentence(result.acceptance)}{_of_currents(result)}",
         headline(result),
         kind=KIND[fit.grade],
     )
-    made.heading("Measured and calculated")
-    _curves(made, details.fits, known)
-    made.heading("Parameters").add(parameters(fit))
-    _parameters(made, fit, known)
-    made.heading("How well it fits").add(errors(fit))
-    made.heading("What to do next").items(fit.advice)
+    page.heading("Measured and calculated")
+    _curves(page, details.fits, uncertainty)
+    page.heading("Parameters").add(parameters(fit))
+    _parameters(page, fit, uncertainty)
+    page.heading("How well it fits").add(errors(fit))
+    page.heading("What to do next").items(fit.advice)
     if together is not None:
-        _events(made, known, together)
-    made.heading("The search and the estimate").text(as_sentence(fit.end_of_search))
-    made.chart(_fitness(fit.ended.history, result), "Best objective of the search; dashed: the estimate's.")
-    _starts(made, details.estimation, known)
-    made.heading("What the fit leaves")
-    _left(made, known)
-    made.heading("How the estimates depend on each other")
-    _correlation(made, known)
-    made.heading("How this page was made")
-    return made.table(["", ""], _origin(result, command()), words=(1,))
+        _events(page, uncertainty, together)
+    page.heading("The search and the estimate").text(as_sentence(fit.end_of_search))
+    page.chart(_fitness(fit.ended.history, result), "Best objective of the search; dashed: the estimate's.")
+    _starts(page, details.estimation, uncertainty)
+    page.heading("What the fit leaves")
+    _left(page, uncertainty)
+    page.heading("How the estimates depend on each other")
+    _correlation(page, uncertainty)
+    page.heading("How this page was made")
+    return page.table(["", ""], _origin(result, command()), words=(1,))
 
 
 def _of_currents(result: Any) -> str:
@@ -119,35 +119,35 @@ def headline(result: Any) -> str:
     )
 
 
-def _curves(made: Report, fits: Sequence[Any], known: Uncertainty) -> None:
+def _curves(page: Report, fits: Sequence[Any], uncertainty: Uncertainty) -> None:
     """The charts of each event; of many the later ones are folded away."""
-    likelihood = known.likelihood
+    likelihood = uncertainty.likelihood
     waves = likelihood.problem.model.waves
-    made.text(*[IN_WAVES] * waves)
-    deviation = known.of_noise.noise.deviation(likelihood.problem.drive)
+    page.text(*[IN_WAVES] * waves)
+    deviation = uncertainty.of_noise.noise.deviation(likelihood.problem.drive)
     parts = [likelihood.problem.drive.part(e) for e in range(likelihood.problem.drive.events)]
-    made.text(CAPTION)
+    page.text(CAPTION)
     for k, fit in enumerate(fits):
         noise = deviation[:, parts[k]] if fit.role == "train" else None
-        with made.folded(f"{fit.event.record.name}, {ROLES[fit.role]}") if k >= SHOWN else nullcontext():
-            _event(made, fit, noise)
+        with page.folded(f"{fit.event.record.name}, {ROLES[fit.role]}") if k >= SHOWN else nullcontext():
+            _event(page, fit, noise)
     if waves:
-        made.heading("What was done to the records", level=3).items(prepared(likelihood.problem, fits))
+        page.heading("What was done to the records", level=3).items(prepared(likelihood.problem, fits))
 
 
-def _event(made: Report, fit: Any, noise: np.ndarray | None) -> None:
+def _event(page: Report, fit: Any, noise: np.ndarray | None) -> None:
     """The currents of an event in waveforms and their spectra, then P and Q; `noise` (2, N) is that of phasors."""
     record, power = fit.event.record, np.stack((fit.P, fit.Q))
     about, notes = f"{record.name}, {ROLES[fit.role]}", [f"{note}." for note in record.notes]
     if fit.waves is not None:
-        made.chart(
+        page.chart(
             wave_chart(fit.waves, [Drawn("estimate", fit.currents, style.PALETTE[0])]),
             " ".join([f"{about}: epsilon_i {fit.epsilon_i:.3%}.", WAVE_CAPTION, *notes]),
         )
-        made.chart(*spectrum_chart(fit.waves, fit.currents))
+        page.chart(*spectrum_chart(fit.waves, fit.currents))
         noise, notes = None, ["Measured and calculated are phasors of the currents above, by the same estimator."]
     chart = event_chart(fit.event, [Curve("estimate", power, style.PALETTE[0])], deviation=noise, around=power)
-    made.chart(chart, " ".join([f"{about}: epsilon_p {fit.epsilon_p:.3%}, epsilon_q {fit.epsilon_q:.3%}.", *notes]))
+    page.chart(chart, " ".join([f"{about}: epsilon_p {fit.epsilon_p:.3%}, epsilon_q {fit.epsilon_q:.3%}.", *notes]))
 
 
 def parameters(fit: "Identification") -> Table:
@@ -164,19 +164,19 @@ def parameters(fit: "Identification") -> Table:
     )
 
 
-def _parameters(made: Report, fit: "Identification", known: Uncertainty) -> None:
+def _parameters(page: Report, fit: "Identification", uncertainty: Uncertainty) -> None:
     """The base of the values, a picture against the bounds, and what rivals make of the parameters."""
     result = fit.result
     if on_given_base := result.on_given_base():
         base = f"Values and bounds in the table are on the record's own base of {result.base}."
-        made.text(f"{as_sentence(on_given_base)} {base}")
-    made.chart(
-        _forest(known, by_event(result.search["parameters"], result.search["per_event"])),
+        page.text(f"{as_sentence(on_given_base)} {base}")
+    page.chart(
+        _forest(uncertainty, by_event(result.search["parameters"], result.search["per_event"])),
         "Estimates and 95 % intervals within the bounds of each parameter (0 is the lower, 1 the upper bound); cross:"
         " where the search ended.",
     )
-    poor = [f"{name}: {v}." for name, v in known.verdicts.items() if v.word != IDENTIFIED]
-    made.items([*map(as_sentence, fit.structures), *poor])
+    poor = [f"{name}: {v}." for name, v in uncertainty.verdicts.items() if v.word != IDENTIFIED]
+    page.items([*map(as_sentence, fit.structures), *poor])
 
 
 def errors(fit: "Identification") -> Table:
@@ -199,31 +199,33 @@ def brief(verdict: str) -> str:
     return first + ")" * (first.count("(") - first.count(")"))
 
 
-def _forest(known: Uncertainty, search: dict[str, float]) -> Chart:
+def _forest(uncertainty: Uncertainty, search: dict[str, float]) -> Chart:
     """Every interval on the range between its bounds."""
-    lower, width = known.lower, known.upper - known.lower
-    at, spans = (known.values - lower) / width, (known.intervals - lower[:, None]) / width[:, None]
-    told = [
+    lower, width = uncertainty.lower, uncertainty.upper - uncertainty.lower
+    at, spans = (uncertainty.values - lower) / width, (uncertainty.intervals - lower[:, None]) / width[:, None]
+    sentences = [
         f"{n}: {digits(v)}, {digits(a)} .. {digits(b)}"
-        for n, v, (a, b) in zip(known.names, known.values, known.intervals, strict=True)
+        for n, v, (a, b) in zip(uncertainty.names, uncertainty.values, uncertainty.intervals, strict=True)
     ]
-    ended = (np.array([search[n] for n in known.names]) - lower) / width
-    chart = Chart("between the bounds", [""], pixels=110 + 34 * len(known.names))
-    chart.points("estimate and 95 % interval", at, known.names, style.PALETTE[0], size=9, told=told, spans=spans)
-    chart.points("search", ended, known.names, style.PALETTE[1], symbol="x", size=8,
-                 told=[f"{n}: search ended at {digits(search[n])}" for n in known.names])  # fmt: skip
-    return chart.limits(None, -0.02, 1.02).limits(0, len(known.names) - 0.5, -0.5)
+    ended = (np.array([search[n] for n in uncertainty.names]) - lower) / width
+    chart = Chart("between the bounds", [""], pixels=110 + 34 * len(uncertainty.names))
+    chart.points(
+        "estimate and 95 % interval", at, uncertainty.names, style.PALETTE[0], size=9, hover=sentences, spans=spans
+    )
+    chart.points("search", ended, uncertainty.names, style.PALETTE[1], symbol="x", size=8,
+                 hover=[f"{n}: search ended at {digits(search[n])}" for n in uncertainty.names])  # fmt: skip
+    return chart.limits(None, -0.02, 1.02).limits(0, len(uncertainty.names) - 0.5, -0.5)
 
 
 def _fitness(history: History, result: Any) -> Chart:
-    found = history.objective < REFUSED
+    valid = history.objective < REFUSED
     chart = Chart("simulations", ["best objective [pu²]"], log_y=True, pixels=300)
-    best = np.maximum(history.objective[found], 1e-30)
-    chart.line(result.optimizer or "search", history.simulations[found], best, style.PALETTE[0], step=True)
+    best = np.maximum(history.objective[valid], 1e-30)
+    chart.line(result.optimizer or "search", history.simulations[valid], best, style.PALETTE[0], step=True)
     return chart.level(max(result.objective, 1e-30), "estimate")
 
 
-def _starts(made: Report, estimated: EstimationResult, known: Uncertainty) -> None:
+def _starts(page: Report, estimated: EstimationResult, uncertainty: Uncertainty) -> None:
     """Where each descent to the estimate ended."""
     starts = estimated.starts
     above = np.maximum([s.above for s in starts], SMALLEST)
@@ -232,30 +234,31 @@ def _starts(made: Report, estimated: EstimationResult, known: Uncertainty) -> No
              "beside the best": ("diamond", style.PALETTE[2])}  # fmt: skip
     for origin, (symbol, color) in looks.items():
         at = [k for k, s in enumerate(starts) if s.origin == origin]
-        told = [
-            f"{origin}: " + ", ".join(f"{n} {digits(v)}" for n, v in zip(known.names, starts[k].values, strict=True))
+        sentences = [
+            f"{origin}: "
+            + ", ".join(f"{n} {digits(v)}" for n, v in zip(uncertainty.names, starts[k].values, strict=True))
             for k in at
         ]
         if at:
-            chart.points(origin, [k + 1 for k in at], above[at], color, symbol=symbol, told=told)
+            chart.points(origin, [k + 1 for k in at], above[at], color, symbol=symbol, hover=sentences)
     valleys = sum(1 for k, s in enumerate(starts) if k == 0 or s.above - starts[k - 1].above > 1.0)
-    made.chart(
+    page.chart(
         chart,
         f"Descents of the likelihood from {len(starts)} starts ended at {valleys} heights; those at the lowest are the"
         " estimate's valley. A difference of 3.8 is what a 95 % interval spans.",
     )
-    with made.folded("where each start ended"):
-        made.table(["from", "above the best", *known.names],
+    with page.folded("where each start ended"):
+        page.table(["from", "above the best", *uncertainty.names],
                    [[s.origin, f"{s.above:.3g}", *map(digits, s.values)] for s in starts])  # fmt: skip
 
 
-def _left(made: Report, known: Uncertainty) -> None:
+def _left(page: Report, uncertainty: Uncertainty) -> None:
     """Whitened residuals, their autocorrelation, and what the tests of them say."""
-    likelihood, tests = known.of_noise, known.tests
+    likelihood, tests = uncertainty.of_noise, uncertainty.tests
     drive, events = likelihood.problem.drive, likelihood.problem.events
-    white = known.whitened.reshape(drive.channels, -1)
+    white = uncertainty.whitened.reshape(drive.channels, -1)
     colored = [t for t in tests if t["p"] < REJECTED]
-    made.text(_conclusion(colored, len(tests)))
+    page.text(_conclusion(colored, len(tests)))
     for e, event in enumerate(events[:SHOWN]):
         part = drive.part(e)
         compared = [c for c in range(drive.channels) if likelihood.valid[c, part].any()]
@@ -269,21 +272,21 @@ def _left(made: Report, known: Uncertainty) -> None:
             lags.points(name, x + 0.2 * c, autocorrelation(rows, len(x)), color, size=5)
             limit = 1.96 / np.sqrt(max(len(rows), 1))
             lags.level(limit).level(-limit)
-        told = f"{event.record.name}: the whitened residual, in standard deviations of the noise."
-        made.chart(chart.edge(event.t_start).edge(event.t_end), told)
-        made.chart(lags, "Autocorrelation of the whitened residual; between the dashed lines is chance.")
-    with made.folded("tests of the residuals, and the noise"):
-        made.table(
+        sentences = f"{event.record.name}: the whitened residual, in standard deviations of the noise."
+        page.chart(chart.edge(event.t_start).edge(event.t_end), sentences)
+        page.chart(lags, "Autocorrelation of the whitened residual; between the dashed lines is chance.")
+    with page.folded("tests of the residuals, and the noise"):
+        page.table(
             ["event", "channel", "test", "statistic", "p", "says"],
             [[t["event"], t["channel"], t["name"], digits(t["statistic"]), in_words(t["p"]), t["says"]]
              for t in tests],
             caption=f"Of the residuals after whitening; below p = {REJECTED} a test speaks.", words=(1, 2, 4, 5),
         )  # fmt: skip
-        made.table(
+        page.table(
             ["event", "channel", "noise [pu]", "before the dip [pu]", "order", "neighbors' correlation",
              f"correlation of {drive.names[0]} and {drive.names[1]}"],
             [[n["event"], n["channel"], digits(n["deviation"]), digits(n["before"]), str(n["order"]),
-              f"{n['correlation']:.2f}", f"{n['between_P_and_Q']:.2f}"] for n in known.noise],
+              f"{n['correlation']:.2f}", f"{n['between_P_and_Q']:.2f}"] for n in uncertainty.noise],
             caption="Noise of each channel, told from what the fit leaves before the dips and at the end of the"
                     " records: an autoregression of the channels mixed until they are independent.", words=(1,),
         )  # fmt: skip
@@ -298,39 +301,39 @@ def _conclusion(speaking: Sequence[dict[str, Any]], tests: int) -> str:
     return f"{len(speaking)} of {tests} tests find more than noise in what is left: {'; '.join(said)}."
 
 
-def _correlation(made: Report, known: Uncertainty) -> None:
+def _correlation(page: Report, uncertainty: Uncertainty) -> None:
     """The strongest correlations in words, all of them as a table."""
-    names, matrix = known.names, known.information.correlation
+    names, matrix = uncertainty.names, uncertainty.information.correlation
     pairs = [(abs(matrix[i, j]), i, j) for i in range(len(names)) for j in range(i)]
     strong = [
         f"{names[j]} and {names[i]} ({matrix[i, j]:+.3f})" for r, i, j in sorted(pairs, reverse=True) if r >= TRADES
     ]
-    made.text(
+    page.text(
         f"These trade against each other, so that the record knows a combination of them: {', '.join(strong)}."
         if strong else "No two parameters trade against each other."
     )  # fmt: skip
-    with made.folded("all correlations"):
-        made.table(["", *names], [[n, *(f"{r:+.2f}" for r in row)] for n, row in zip(names, matrix, strict=True)])
+    with page.folded("all correlations"):
+        page.table(["", *names], [[n, *(f"{r:+.2f}" for r in row)] for n, row in zip(names, matrix, strict=True)])
 
 
 def _origin(result: Any, command: str) -> list[list[str]]:
-    told = [["command", command]] if command else []
-    told.append(["tractexp", f"{result.tractexp_version}{f', commit {result.commit}' if result.commit else ''}"])
-    told += [
+    sentences = [["command", command]] if command else []
+    sentences.append(["tractexp", f"{result.tractexp_version}{f', commit {result.commit}' if result.commit else ''}"])
+    sentences += [
         [f"record {r['name']} ({r['role']})", "; ".join(filter(None, [identity_in_words(r), f"SHA-256 {r['sha256']}"]))]
         for r in result.records
     ]
-    return told
+    return sentences
 
 
-def _events(made: Report, known: Uncertainty, together: EventAgreement) -> None:
+def _events(page: Report, uncertainty: Uncertainty, together: EventAgreement) -> None:
     """What each event of a joint fit adds, and which does not belong."""
-    made.heading("What each event adds")
+    page.heading("What each event adds")
     if together.notes:
-        made.verdict(*(f"{note}." for note in together.notes), kind="bad")
-    made.table(
-        ["without", *known.names],
-        [[event, *(_wider(gain[n]) for n in known.names)] for event, gain in together.gains.items()],
+        page.verdict(*(f"{note}." for note in together.notes), kind="bad")
+    page.table(
+        ["without", *uncertainty.names],
+        [[event, *(_wider(gain[n]) for n in uncertainty.names)] for event, gain in together.gains.items()],
         caption="How many times as wide each 95 % interval would be without the event.",
     )
 

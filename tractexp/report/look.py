@@ -37,71 +37,71 @@ CAPTION = (
 
 def summary(content: Mapping[str, Any]) -> Report:
     """What files hold: channels, loads, events, commands."""
-    made = Report()
-    for known in content["files"]:
-        rates = ", ".join(f"{rate:g} Hz" for rate in dict.fromkeys(known["rates"]))
-        about = [known["station"], known["device"], str(known["start"] or ""), f"{known['seconds']:.3f} s at {rates}",
-                 _frequency(known)]  # fmt: skip
-        made.text(f"{known['file']}: {'; '.join(filter(None, about))}", *(f"  note: {n}" for n in known["notes"]))
-        made.add(*[channels(known)] * bool(known["channels"]))
-        for feeder in known["feeders"]:
+    page = Report()
+    for entry in content["files"]:
+        rates = ", ".join(f"{rate:g} Hz" for rate in dict.fromkeys(entry["rates"]))
+        about = [entry["station"], entry["device"], str(entry["start"] or ""), f"{entry['seconds']:.3f} s at {rates}",
+                 _frequency(entry)]  # fmt: skip
+        page.text(f"{entry['file']}: {'; '.join(filter(None, about))}", *(f"  note: {n}" for n in entry["notes"]))
+        page.add(*[channels(entry)] * bool(entry["channels"]))
+        for feeder in entry["feeders"]:
             numbers = ", ".join(map(str, (*feeder["voltages"], *feeder["currents"])))
             wired = f" (channels {numbers}, {feeder['connection']})" if numbers else ""
-            made.text(f"load {feeder['name']}{wired}: {_size(feeder) or 'nothing measured'}")
-            made.items([*feeder["why"], *feeder["said"]])
-            made.add(*[events(feeder)] * bool(feeder["events"])).items([NOTHING] * (not feeder["events"]))
+            page.text(f"load {feeder['name']}{wired}: {_size(feeder) or 'nothing measured'}")
+            page.items([*feeder["why"], *feeder["said"]])
+            page.add(*[events(feeder)] * bool(feeder["events"])).items([NOTHING] * (not feeder["events"]))
             if feeder["command"]:
-                made.text("  to fit it:").code(feeder["command"])
-        if not known["feeders"]:
-            made.text(
+                page.text("  to fit it:").code(feeder["command"])
+        if not entry["feeders"]:
+            page.text(
                 "  no voltages and currents of one load were recognised; name them: voltages=[...] currents=[...]"
             )
-    return made
+    return page
 
 
 def report(views: Sequence[View], content: Mapping[str, Any]) -> Report:
     """The page."""
-    told = content["files"]
-    made = Report(f"A look at {', '.join(Path(f['file']).name for f in told)}", _lead(told))
-    for view, known in zip(views, told, strict=True):
-        if len(told) > 1:
-            made.heading(known["file"])
-        _conclusion(made, known)
-        made.table(["", ""], _facts(known), words=(1,))
-        if known["notes"]:
-            made.items(known["notes"])
-        if len(known["feeders"]) > 1:
-            made.table(
+    sentences = content["files"]
+    page = Report(f"A look at {', '.join(Path(f['file']).name for f in sentences)}", _lead(sentences))
+    for view, entry in zip(views, sentences, strict=True):
+        if len(sentences) > 1:
+            page.heading(entry["file"])
+        _conclusion(page, entry)
+        page.table(["", ""], _facts(entry), words=(1,))
+        if entry["notes"]:
+            page.items(entry["notes"])
+        if len(entry["feeders"]) > 1:
+            page.table(
                 ["load", "connected as", "channels", "U", "P", "Q", "events", "worth fitting"],
-                [_summary(f) for f in known["feeders"]], words=(1, 2), caption="At the beginning; P and Q consumed.",
+                [_summary(f) for f in entry["feeders"]], words=(1, 2), caption="At the beginning; P and Q consumed.",
             )  # fmt: skip
-        for k, (shown, feeder) in enumerate(zip(view.sights, known["feeders"], strict=True)):
-            _load(made, view, shown, feeder, folded=k >= OPEN)
-        if known["channels"]:
-            made.heading("Channels").add(channels(known))
-    return made
+        for k, (shown, feeder) in enumerate(zip(view.sights, entry["feeders"], strict=True)):
+            _load(page, view, shown, feeder, folded=k >= OPEN)
+        if entry["channels"]:
+            page.heading("Channels").add(channels(entry))
+    return page
 
 
-def channels(known: Mapping[str, Any]) -> Table:
+def channels(entry: Mapping[str, Any]) -> Table:
     """The channels of a file, with their quality in detail."""
     caption = (
         "Numbers count from 0, as data.voltages and data.currents do. RMS of the fundamental; noise about fundamental"
         " and harmonics in the quietest ten cycles, as a share of it."
     )
     columns = ["number", "name", "phase", "unit", "primary RMS", "noise", "colour", "THD", "bits", "fit for what"]
-    rows = [_channel(c) for c in known["channels"]]
+    rows = [_channel(c) for c in entry["channels"]]
     return Table(columns, rows, "", caption, words=(1, 2, 3, 6, 9), detail=(5, 6, 7, 8))
 
 
-def events(known: Mapping[str, Any]) -> Table:
+def events(entry: Mapping[str, Any]) -> Table:
     """What happened to a load."""
-    _, P, Q = known["units"]
+    _, P, Q = entry["units"]
     columns = ["dip", "kind", "starts [s]", "lasts [ms]", "depth", "jump [°]", "U2", f"P [{P}]", f"Q [{Q}]", "fit it?"]
     caption = (
         "Depth, U2 and jump against the voltage before. P and Q before and after. Dips are numbered as data.train and"
         " data.validate take them."
     )
-    return Table(columns, [event_row(e) for e in known["events"]], "", caption, words=(1, 9))
+    return Table(columns, [event_row(e) for e in entry["events"]], "", caption, words=(1, 9))
 
 
 def _lead(files: Sequence[Mapping[str, Any]]) -> str:
@@ -111,38 +111,38 @@ def _lead(files: Sequence[Mapping[str, Any]]) -> str:
     return f"{_count(loads, 'load')}, {_count(len(events), 'event')}, {worth} worth fitting."
 
 
-def _conclusion(made: Report, known: Mapping[str, Any]) -> None:
-    commands = [(f["name"], f["command"]) for f in known["feeders"] if f["command"]]
-    if not known["feeders"]:
-        made.verdict("No three voltages and currents of one load were recognised; the channels are listed below.")
+def _conclusion(page: Report, entry: Mapping[str, Any]) -> None:
+    commands = [(f["name"], f["command"]) for f in entry["feeders"] if f["command"]]
+    if not entry["feeders"]:
+        page.verdict("No three voltages and currents of one load were recognised; the channels are listed below.")
     elif not commands:
-        made.verdict("Nothing here is worth fitting: the events below say why.", kind="bad")
+        page.verdict("Nothing here is worth fitting: the events below say why.", kind="bad")
     else:
-        made.verdict(f"To fit {'what is worth it' if len(commands) > 1 else commands[0][0]}:", kind="good")
+        page.verdict(f"To fit {'what is worth it' if len(commands) > 1 else commands[0][0]}:", kind="good")
         for name, command in commands:
             if len(commands) > 1:
-                made.text(f"{name}:")
-            made.code(command)
+                page.text(f"{name}:")
+            page.code(command)
 
 
-def _facts(known: Mapping[str, Any]) -> list[list[str]]:
-    segments = [f"{s['samples']} samples at {s['rate']:g} Hz from {s['start']:.3f} s" for s in known["segments"]]
-    rows = [["path", known["file"]], ["read by", known["reader"]], ["station", known["station"]],
-            ["recorder", known["device"]], ["starts", str(known["start"] or "")], ["sampled", "; ".join(segments)],
-            ["lasts", f"{known['seconds']:.3f} s"], ["frequency", _frequency(known)]]  # fmt: skip
+def _facts(entry: Mapping[str, Any]) -> list[list[str]]:
+    segments = [f"{s['samples']} samples at {s['rate']:g} Hz from {s['start']:.3f} s" for s in entry["segments"]]
+    rows = [["path", entry["file"]], ["read by", entry["reader"]], ["station", entry["station"]],
+            ["recorder", entry["device"]], ["starts", str(entry["start"] or "")], ["sampled", "; ".join(segments)],
+            ["lasts", f"{entry['seconds']:.3f} s"], ["frequency", _frequency(entry)]]  # fmt: skip
     return [row for row in rows if row[1]]
 
 
-def _frequency(known: Mapping[str, Any]) -> str:
-    measured = known["measured_frequency"]
-    return f"{known['frequency']:g} Hz nominal" + ("" if measured is None else f", {measured:.3f} Hz measured")
+def _frequency(entry: Mapping[str, Any]) -> str:
+    measured = entry["measured_frequency"]
+    return f"{entry['frequency']:g} Hz nominal" + ("" if measured is None else f", {measured:.3f} Hz measured")
 
 
-def _size(known: Mapping[str, Any]) -> str:
+def _size(entry: Mapping[str, Any]) -> str:
     """U, P and Q of a load at the beginning; "" where they are not known."""
-    if known["U"] is None:
+    if entry["U"] is None:
         return ""
-    return ", ".join(figure(known[key], 4, unit) for key, unit in zip("UPQ", known["units"], strict=True))
+    return ", ".join(figure(entry[key], 4, unit) for key, unit in zip("UPQ", entry["units"], strict=True))
 
 
 def _channel(c: Mapping[str, Any]) -> list[str]:
@@ -153,55 +153,55 @@ def _channel(c: Mapping[str, Any]) -> list[str]:
     ]  # fmt: skip
 
 
-def _summary(known: Mapping[str, Any]) -> list[str]:
+def _summary(entry: Mapping[str, Any]) -> list[str]:
     """A load in one row."""
-    size = [figure(known[key], 4, unit) for key, unit in zip("UPQ", known["units"], strict=True)]
-    channels = ", ".join(map(str, (*known["voltages"], *known["currents"])))
-    worth = [e for e in known["events"] if e["worth"]]
-    return [known["name"], known["connection"], channels, *size, str(len(known["events"])), str(len(worth))]
+    size = [figure(entry[key], 4, unit) for key, unit in zip("UPQ", entry["units"], strict=True)]
+    channels = ", ".join(map(str, (*entry["voltages"], *entry["currents"])))
+    worth = [e for e in entry["events"] if e["worth"]]
+    return [entry["name"], entry["connection"], channels, *size, str(len(entry["events"])), str(len(worth))]
 
 
-def _load(made: Report, view: View, shown: Sight, known: Mapping[str, Any], folded: bool) -> None:
+def _load(page: Report, view: View, shown: Sight, entry: Mapping[str, Any], folded: bool) -> None:
     """One load: what it is, what happened, and charts to look into."""
-    made.heading(known["name"])
-    made.items([*_described(known), *known["why"], *known["said"]])
-    if known["events"]:
-        made.add(events(known))
+    page.heading(entry["name"])
+    page.items([*_described(entry), *entry["why"], *entry["said"]])
+    if entry["events"]:
+        page.add(events(entry))
     else:
-        made.text(as_sentence(NOTHING))
+        page.text(as_sentence(NOTHING))
     if folded:
-        with made.folded(f"Charts of {known['name']}"):
-            _charts(made, view, shown)
+        with page.folded(f"Charts of {entry['name']}"):
+            _charts(page, view, shown)
     else:
-        _charts(made, view, shown)
+        _charts(page, view, shown)
 
 
-def _charts(made: Report, view: View, shown: Sight) -> None:
+def _charts(page: Report, view: View, shown: Sight) -> None:
     """Charts to look into."""
     if shown.record is not None:
-        made.chart(_of_record(shown), "As recorded. Drag to zoom, double-click for the whole.")
+        page.chart(_of_record(shown), "As recorded. Drag to zoom, double-click for the whole.")
     elif shown.phasors and view.recording is not None:
         every, coarse = _every(view)
-        made.chart(_of_waves(view.recording, shown, every, coarse), CAPTION)
-        with made.folded("Spectrum before anything happened"):
-            made.chart(_spectrum(view.recording, shown), f"{CYCLES} cycles, Hann window, of phase a.")
+        page.chart(_of_waves(view.recording, shown, every, coarse), CAPTION)
+        with page.folded("Spectrum before anything happened"):
+            page.chart(_spectrum(view.recording, shown), f"{CYCLES} cycles, Hann window, of phase a.")
         if max(every, coarse) > 1:
-            _details(made, view.recording, shown)
+            _details(page, view.recording, shown)
 
 
-def _described(known: Mapping[str, Any]) -> list[str]:
-    told = []
-    if known["channels"]:
-        numbers = [*known["voltages"], *known["currents"]]
-        named = ", ".join(f"{n} {c}" for n, c in zip(numbers, known["channels"], strict=True))
-        reverse = ", current reversed" * known["reverse_current"]
-        told.append(f"Channels: {named}; connected as {known['connection']}{reverse}.")
-    if size := _size(known):
-        told.append(f"At first {size}.")
-    if known["sum_V"] is not None:
-        current = "" if known["sum_I"] is None else f", the currents to {known['sum_I']:.2%}"
-        told.append(f"The voltages of the three phases sum to {known['sum_V']:.2%} of one{current}.")
-    return told
+def _described(entry: Mapping[str, Any]) -> list[str]:
+    sentences = []
+    if entry["channels"]:
+        numbers = [*entry["voltages"], *entry["currents"]]
+        named = ", ".join(f"{n} {c}" for n, c in zip(numbers, entry["channels"], strict=True))
+        reverse = ", current reversed" * entry["reverse_current"]
+        sentences.append(f"Channels: {named}; connected as {entry['connection']}{reverse}.")
+    if size := _size(entry):
+        sentences.append(f"At first {size}.")
+    if entry["sum_V"] is not None:
+        current = "" if entry["sum_I"] is None else f", the currents to {entry['sum_I']:.2%}"
+        sentences.append(f"The voltages of the three phases sum to {entry['sum_V']:.2%} of one{current}.")
+    return sentences
 
 
 def event_row(e: Mapping[str, Any]) -> list[str]:
@@ -232,13 +232,13 @@ def _of_record(shown: Sight) -> Chart:
     panels = {"U": ("U", "U2"), "P, Q": ("P", "Q"), "f [Hz]": ("f",)}
     colors = {"U": VOLTAGE, "U2": PALETTE[3], "P": ACTIVE, "Q": REACTIVE, "f": PALETTE[2]}
     units = {"U": record.base.voltage, "U2": record.base.voltage, "P": record.base.power, "Q": record.base.power}
-    kept = {label: [n for n in names if n in record.channels] for label, names in panels.items()}
-    told = {"U": "[pu]" if record.base.voltage == 1 else "[kV]", "P, Q": "[pu]" if record.base.power == 1 else
+    panels_of = {label: [n for n in names if n in record.channels] for label, names in panels.items()}
+    sentences = {"U": "[pu]" if record.base.voltage == 1 else "[kV]", "P, Q": "[pu]" if record.base.power == 1 else
             "[MW, Mvar]"}  # fmt: skip
-    used = [label for label, names in kept.items() if names]
-    chart = Chart("t [s]", [f"{label} {told.get(label, '')}".strip() for label in used])
+    used = [label for label, names in panels_of.items() if names]
+    chart = Chart("t [s]", [f"{label} {sentences.get(label, '')}".strip() for label in used])
     for panel, label in enumerate(used):
-        for name in kept[label]:
+        for name in panels_of[label]:
             values = record.channels[name] * units.get(name, 1.0)
             chart.samples(name, float(record.t[0]), record.step, values, colors[name], panel)
     return _marked(chart, shown)
@@ -246,11 +246,11 @@ def _of_record(shown: Sight) -> Chart:
 
 def _every(view: View) -> tuple[int, int]:
     """How many samples and how many phasors become one on a page, so that all loads of a file have room."""
-    made = view.recording
-    assert made is not None
+    page = view.recording
+    assert page is not None
     lines = sum(len(s.feeder.voltages) + len(s.feeder.currents) for s in view.sights if s.feeder is not None)
     phasors = LINES * sum(len(p.t) for s in view.sights for p in s.phasors)
-    return max(1, -(-lines * made.samples // MOST)), max(1, -(-phasors // MOST_PHASORS))
+    return max(1, -(-lines * page.samples // MOST)), max(1, -(-phasors // MOST_PHASORS))
 
 
 def _of_waves(
@@ -309,8 +309,8 @@ def _phasors(chart: Chart, p: Any, part: slice, nominal: float, every: int) -> N
     alive = np.abs(p.f / nominal - 1) < BOUND
     lines.append(("f", np.where(alive, p.f, np.nan), PALETTE[2], 6))
     for name, values, color, panel in lines:
-        made = values[part] if every == 1 else envelope(values[part], every)
-        chart.samples(name, float(t[0]), step * every, made, color, panel)
+        page = values[part] if every == 1 else envelope(values[part], every)
+        chart.samples(name, float(t[0]), step * every, page, color, panel)
 
 
 def envelope(wave: np.ndarray, every: int) -> np.ndarray:
@@ -341,15 +341,15 @@ def _spectrum(recording: Recording, shown: Sight) -> Chart:
     return chart
 
 
-def _details(made: Report, recording: Recording, shown: Sight) -> None:
+def _details(page: Report, recording: Recording, shown: Sight) -> None:
     """A chart with every sample for each event, where the chart of the whole has not all of them."""
     for seen in shown.events[:DETAILED]:
         what = seen.what
         span = (what.start - AROUND[0], min(what.end, what.start + LONGEST) + AROUND[1])
-        with made.folded(f"Every sample of the {what.kind} at {what.start:.3f} s"):
-            made.chart(_of_waves(recording, shown, span=span), "As above, not thinned.")
+        with page.folded(f"Every sample of the {what.kind} at {what.start:.3f} s"):
+            page.chart(_of_waves(recording, shown, span=span), "As above, not thinned.")
     if len(shown.events) > DETAILED:
-        made.text(f"The {len(shown.events) - DETAILED} events after the first {DETAILED} have no such chart.")
+        page.text(f"The {len(shown.events) - DETAILED} events after the first {DETAILED} have no such chart.")
 
 
 def _count(n: int, what: str) -> str:

@@ -13,41 +13,41 @@ LISTED = 2  # events of each kind that a table has
 KINDS = ("dip", "tap or capacitor bank", "dip with a phase jump and f", "unbalanced dip with U2", "dip sampled faster")
 
 
-def report(found: NextEvent, title: str) -> Report:
+def report(choice: NextEvent, title: str) -> Report:
     """The page of a plan for rivals."""
-    made = Report("What to record next", f"For {title}, to tell {' from '.join(found.rivals)}.")
-    sure = found.probability >= found.criteria.decided
-    made.verdict(as_sentence(found.sentence()), kind="good" if sure else "bad" if found.same else "plain")
-    section(made, found)
-    return made
+    page = Report("What to record next", f"For {title}, to tell {' from '.join(choice.rivals)}.")
+    sure = choice.probability >= choice.criteria.decided
+    page.verdict(as_sentence(choice.sentence()), kind="good" if sure else "bad" if choice.same else "plain")
+    section(page, choice)
+    return page
 
 
-def section(made: Report, found: NextEvent) -> None:
+def section(page: Report, choice: NextEvent) -> None:
     """The chances by dip as charts, the best events of each kind, and which pair each tells apart."""
-    rule = f"the rule of this investigation, which trusts no formula to {found.criteria.alike:.0%} of what it explains"
-    if not found.same or len(found.rivals) > 2:
-        made.chart(_chart(found), _caption(found))
-    made.heading("What each kind of event would do", 3)
-    made.table(
+    rule = f"the rule of this investigation, which trusts no formula to {choice.criteria.alike:.0%} of what it explains"
+    if not choice.same or len(choice.rivals) > 2:
+        page.chart(_chart(choice), _caption(choice))
+    page.heading("What each kind of event would do", 3)
+    page.table(
         ["event", "by the rule [%]", "by noise [%]"],
-        [_row(t) for kind in KINDS for t in _best(found, kind)],
+        [_row(t) for kind in KINDS for t in _best(choice, kind)],
         f"Probability that all rivals but the true one are rejected, the least over all of them as the truth: by"
         f" {rule}; and by noise, with formulas taken as exact. The best events of each kind.",
         words=(0,),
     )
-    best = found.by_noise or found.best
-    chances = _chances(found, best)
-    made.heading("Rival by rival", 3)
-    made.table(
-        ["if the truth is", *(f"{name} is rejected [%]" for name in found.rivals)],
+    best = choice.by_noise or choice.best
+    chances = _chances(choice, best)
+    page.heading("Rival by rival", 3)
+    page.table(
+        ["if the truth is", *(f"{name} is rejected [%]" for name in choice.rivals)],
         [
             [name, *("" if a == b else f"{100 * p:.0f}" for b, p in enumerate(chances.pairs[a]))]
-            for a, name in enumerate(found.rivals)
+            for a, name in enumerate(choice.rivals)
         ],
         f"By {best.event.words}.",
         words=(0,),
     )
-    made.text(
+    page.text(
         "Each rival in turn is taken as the truth with its fitted parameters, as uncertain as the records leave them;"
         " all others are fitted to the records and the new event together, under the records' own noise"
         + (", by a refit of every parameter." if best.refitted else ", linearised about their fits.")
@@ -55,26 +55,26 @@ def section(made: Report, found: NextEvent) -> None:
     )
 
 
-def _caption(found: NextEvent) -> str:
-    exact = ", where formulas are exact" * (found.by_noise is not None)
-    decided = f"Dashed: the {found.criteria.decided:.0%} from which an event is recommended as sure."
+def _caption(choice: NextEvent) -> str:
+    exact = ", where formulas are exact" * (choice.by_noise is not None)
+    decided = f"Dashed: the {choice.criteria.decided:.0%} from which an event is recommended as sure."
     return f"Probability that one dip more tells all rivals apart{exact}, by its depth and duration. {decided}"
 
 
-def _chart(found: NextEvent) -> Chart:
+def _chart(choice: NextEvent) -> Chart:
     """Probability by depth, a line for each duration: by the rule, or by noise where that is not sure to decide."""
     chart = Chart("depth of the dip [%]", ["probability [%]"], pixels=360)
-    plain = [t for t in found.tried if _kind(t) == KINDS[0]]
+    plain = [t for t in choice.tried if _kind(t) == KINDS[0]]
     for color, duration in zip(PALETTE, sorted({t.event.duration for t in plain}), strict=False):
-        line = sorted((t.event.depth, _chances(found, t).least) for t in plain if t.event.duration == duration)
+        line = sorted((t.event.depth, _chances(choice, t).least) for t in plain if t.event.duration == duration)
         x, y = 100 * np.array(line).T
         chart.line(f"{1000 * duration:.0f} ms", x, y, color, width=2.0)
-    return chart.level(100 * found.criteria.decided).limits(0, -3, 103)
+    return chart.level(100 * choice.criteria.decided).limits(0, -3, 103)
 
 
-def _chances(found: NextEvent, tried: EventTrial) -> Chances:
+def _chances(choice: NextEvent, tried: EventTrial) -> Chances:
     """By the rule, or where that is not sure to decide, by the noise alone."""
-    return tried.chances if found.by_noise is None else tried.exact
+    return tried.chances if choice.by_noise is None else tried.exact
 
 
 def _kind(tried: EventTrial) -> str:
@@ -88,9 +88,9 @@ def _kind(tried: EventTrial) -> str:
     return KINDS[2] if event.jump else KINDS[0]
 
 
-def _best(found: NextEvent, kind: str) -> list[EventTrial]:
+def _best(choice: NextEvent, kind: str) -> list[EventTrial]:
     ranked = sorted(
-        (t for t in found.tried if _kind(t) == kind), key=lambda t: (-t.chances.least, -t.exact.least, t.event.burden)
+        (t for t in choice.tried if _kind(t) == kind), key=lambda t: (-t.chances.least, -t.exact.least, t.event.burden)
     )
     return ranked[:LISTED]
 

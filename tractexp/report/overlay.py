@@ -65,7 +65,7 @@ def currents(event: WaveEvent, overlay: Overlay) -> Chart:
 
 def in_phasors(event: WaveEvent, overlay: Overlay) -> Chart:
     """What the record's estimator sees in the currents, calculated and recorded."""
-    seen = [(name, as_phasors(event, made), *look) for name, made, *look in _models(overlay)]
+    seen = [(name, as_phasors(event, calculated), *look) for name, calculated, *look in _models(overlay)]
     return event_chart(seen[0][1][0], [Curve(name, np.stack(power), *look) for name, (_, *power), *look in seen])
 
 
@@ -76,7 +76,7 @@ def _models(overlay: Overlay) -> list[tuple[str, np.ndarray, str, str]]:
         ("nearest candidates", overlay.nearest, NEAREST, "dot"),
         ("extended model", overlay.after, EXTENDED, "solid"),
     )
-    return [(name, made, color, dash) for name, made, color, dash in models if made is not None]
+    return [(name, calculated, color, dash) for name, calculated, color, dash in models if calculated is not None]
 
 
 def _best(overlay: Overlay) -> np.ndarray:

@@ -80,22 +80,22 @@ def report(planned: Planned, content: Mapping[str, Any]) -> Report:
     needed, waves = planned.needed, planned.problem.model.waves
     answer = str(needed)
     title = f"How deep a dip tells {needed.parameter}"
-    made = Report(title, f"A plan for {planned.problem.model.title}, before anything more is recorded.")
-    made.verdict(as_sentence(answer), kind="bad" if needed.depth is None else "good")
+    page = Report(title, f"A plan for {planned.problem.model.title}, before anything more is recorded.")
+    page.verdict(as_sentence(answer), kind="bad" if needed.depth is None else "good")
     by_depth, *others = [_chart(planned, label, legend=label == DEPTH) for label in planned.scans]
-    made.chart(by_depth, _caption(needed))
-    _asked(made, planned)
-    made.heading("What another kind of dip would tell")
-    made.text(
+    page.chart(by_depth, _caption(needed))
+    _asked(page, planned)
+    page.heading("What another kind of dip would tell")
+    page.text(
         "One property of the dip is varied at a time, the others stay as planned. Each curve is half of the 95 %"
         " interval in percent of the value, in the colors above; it ends where that is ten times the value,"
         " or the record cannot tell it."
     )
-    made.charts(others)
-    with made.folded("The same in numbers"):
-        made.add(*(scan(content, label) for label in planned.scans))
-    _events(made, planned)
-    made.heading("What it rests on").items(
+    page.charts(others)
+    with page.folded("The same in numbers"):
+        page.add(*(scan(content, label) for label in planned.scans))
+    _events(page, planned)
+    page.heading("What it rests on").items(
         [
             f"Intervals follow from the sensitivity of {planned.problem.domain.compared} to each parameter at"
             " the values above. Where the interval is wide, or the values are far off, so is the forecast.",
@@ -104,7 +104,7 @@ def report(planned: Planned, content: Mapping[str, Any]) -> Report:
             "Noise of the recorded voltage, and effects that the model lacks, are not in it.",
         ]
     )
-    return made
+    return page
 
 
 def _caption(needed: Needed) -> str:
@@ -144,18 +144,18 @@ def marks(low: float, high: float) -> list[float]:
     return [float(f"{digit}e{power}") for power in powers for digit in digits]
 
 
-def _asked(made: Report, planned: Planned) -> None:
+def _asked(page: Report, planned: Planned) -> None:
     """The question, the dip and the parameters it is planned at."""
     needed, problem = planned.needed, planned.problem
     stands = ", which is known as well as M," * (needed.parameter == INERTIA)
-    made.heading("What was asked").items(
+    page.heading("What was asked").items(
         [
             f"How deep must a dip be for {needed.parameter}{stands} to be known within ± {100 * needed.within:g} %?",
             as_sentence(planned.dip),
             f"Recorded already: {', '.join(e.record.name for e in problem.events)}.",
         ]
     )
-    made.table(
+    page.table(
         ["symbol", "meaning", "value", "unit", "bounds"],
         [*_symbols(planned)],
         caption=f"Planned at {planned.origin}. P and Q are the active and reactive power; pu is per unit of the"
@@ -182,25 +182,25 @@ def _symbols(planned: Planned) -> Iterator[list[str]]:
         ]  # fmt: skip
 
 
-def _events(made: Report, planned: Planned) -> None:
+def _events(page: Report, planned: Planned) -> None:
     """The best events of the archive, in the order in which they are worth fitting."""
-    made.heading("Which events of the archive to fit")
+    page.heading("Which events of the archive to fit")
     if not planned.chosen:
-        made.text("There is one event. With several in data.train, the page names those that tell most together.")
+        page.text("There is one event. With several in data.train, the page names those that tell most together.")
         return
     names, values = planned.problem.space.names, np.maximum(np.abs(planned.values), 1e-12)
     rows = [
         [str(k), c.name, "" if k == 1 else f"{c.gain:.0%}", *map(percent, np.asarray(c.half) / values)]
         for k, c in enumerate(planned.chosen, start=1)
     ]
-    made.table(
+    page.table(
         ["", "event", "narrower by", *names],
         rows,
         caption="Half of the 95 % interval of a joint fit of this event and those above it, in percent of the value.",
         words=(1,),
     )
     if left_out := rest(planned):
-        made.text(f"{left_out}.")
+        page.text(f"{left_out}.")
 
 
 def rest(planned: Planned) -> str:

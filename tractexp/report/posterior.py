@@ -18,37 +18,50 @@ CAPTION = (
 )
 
 
-def report(known: Uncertainty, drawn: Posterior, grade: str = "") -> Report:
+def report(uncertainty: Uncertainty, drawn: Posterior, grade: str = "") -> Report:
     """The page. `grade` as on the page of the profiles."""
-    names = ", ".join(e.record.name for e in known.likelihood.problem.events)
-    made = Report(
+    names = ", ".join(e.record.name for e in uncertainty.likelihood.problem.events)
+    page = Report(
         f"Posterior: {names}",
         f"A flat prior within the bounds; {len(drawn.draws)} draws of {drawn.steps} steps of emcee's ensemble.",
     )
-    told = [as_sentence(grade)] * bool(grade) + [_agreement(known, drawn)] + [SCATTER] * (not known.exact)
-    made.verdict(*told, _settled(drawn), kind="good" if known.exact and drawn.converged else "plain")
-    made.charts([_chart(known, drawn, j) for j in range(len(drawn.names))])
-    made.text(CAPTION)
-    made.heading("Intervals")
-    made.table(
+    sentences = (
+        [as_sentence(grade)] * bool(grade) + [_agreement(uncertainty, drawn)] + [SCATTER] * (not uncertainty.exact)
+    )
+    page.verdict(*sentences, _settled(drawn), kind="good" if uncertainty.exact and drawn.converged else "plain")
+    page.charts([_chart(uncertainty, drawn, j) for j in range(len(drawn.names))])
+    page.text(CAPTION)
+    page.heading("Intervals")
+    page.table(
         ["parameter", "meaning", "estimate", "unit", "95 % by the fit", "95 % by the posterior"],
         [
-            [name, declared(known, name).about, f"{value:.4g}", declared(known, name).unit, span(*own), span(*found)]
-            for name, value, own, found in zip(drawn.names, known.values, known.intervals, drawn.intervals, strict=True)
+            [
+                name,
+                declared(uncertainty, name).about,
+                f"{value:.4g}",
+                declared(uncertainty, name).unit,
+                span(*own),
+                span(*interval),
+            ]
+            for name, value, own, interval in zip(
+                drawn.names, uncertainty.values, uncertainty.intervals, drawn.intervals, strict=True
+            )
         ],
         words=(1,),
     )
     a, b = _closest(drawn)
-    made.heading(f"{drawn.names[a]} and {drawn.names[b]} depend on each other most")
+    page.heading(f"{drawn.names[a]} and {drawn.names[b]} depend on each other most")
     r = np.corrcoef(drawn.draws[:, [a, b]].T)[0, 1]
-    made.chart(_pair(known, drawn, a, b), f"{min(DOTS, len(drawn.draws))} of the draws; their correlation is {r:+.2f}.")
-    return made
+    page.chart(
+        _pair(uncertainty, drawn, a, b), f"{min(DOTS, len(drawn.draws))} of the draws; their correlation is {r:+.2f}."
+    )
+    return page
 
 
-def _agreement(known: Uncertainty, drawn: Posterior) -> str:
+def _agreement(uncertainty: Uncertainty, drawn: Posterior) -> str:
     """Whose intervals the posterior confirms."""
-    off = np.abs(drawn.intervals - known.intervals).max(axis=1) / np.maximum(
-        np.ptp(known.intervals, axis=1) / 2, 1e-300
+    off = np.abs(drawn.intervals - uncertainty.intervals).max(axis=1) / np.maximum(
+        np.ptp(uncertainty.intervals, axis=1) / 2, 1e-300
     )
     moved = [name for name, far in zip(drawn.names, off, strict=True) if not far <= ALIKE]
     if not moved:
@@ -62,15 +75,15 @@ def _settled(drawn: Posterior) -> str:
     return f"{lasts}." if drawn.converged else f"{lasts}; {ENOUGH:.0f} are asked for: raise steps."
 
 
-def _chart(known: Uncertainty, drawn: Posterior, j: int) -> Chart:
+def _chart(uncertainty: Uncertainty, drawn: Posterior, j: int) -> Chart:
     """The density of one parameter's draws."""
-    draws, value, half = drawn.draws[:, j], known.values[j], known.half[j]
+    draws, value, half = drawn.draws[:, j], uncertainty.values[j], uncertainty.half[j]
     low, high = drawn.intervals[j]
     density, edges = np.histogram(draws, BINS, density=True)
-    chart = Chart(axis(known, drawn.names[j]), ["density"], pixels=250, legend=False)
+    chart = Chart(axis(uncertainty, drawn.names[j]), ["density"], pixels=250, legend=False)
     chart.shade(float(low), float(high), PALETTE[5], opacity=0.25)
     if np.isfinite(half):
-        at, error = np.linspace(edges[0], edges[-1], 151), known.information.standard_errors[j]
+        at, error = np.linspace(edges[0], edges[-1], 151), uncertainty.information.standard_errors[j]
         normal = np.exp(-(((at - value) / error) ** 2) / 2) / (error * np.sqrt(2 * np.pi))
         chart.line("curvature", at, normal, FAINT, dash="dash")
     chart.line("posterior", edges, np.append(density, density[-1]), PALETTE[0], step=True)
@@ -85,9 +98,9 @@ def _closest(drawn: Posterior) -> tuple[int, int]:
     return int(min(a, b)), int(max(a, b))
 
 
-def _pair(known: Uncertainty, drawn: Posterior, a: int, b: int) -> Chart:
+def _pair(uncertainty: Uncertainty, drawn: Posterior, a: int, b: int) -> Chart:
     """Draws of two parameters against each other."""
     some = drawn.draws[:: max(1, len(drawn.draws) // DOTS)][:DOTS]
-    chart = Chart(axis(known, drawn.names[a]), [axis(known, drawn.names[b])], pixels=420)
+    chart = Chart(axis(uncertainty, drawn.names[a]), [axis(uncertainty, drawn.names[b])], pixels=420)
     chart.points("draws", some[:, a], some[:, b], PALETTE[5], size=3)
-    return chart.points("estimate", [known.values[a]], [known.values[b]], ACTIVE, size=10)
+    return chart.points("estimate", [uncertainty.values[a]], [uncertainty.values[b]], ACTIVE, size=10)

@@ -30,50 +30,52 @@ CAPTION = (
 )
 
 
-def report(found: Profiles, grade: str = "") -> Report:
+def report(scan: Profiles, grade: str = "") -> Report:
     """The page.
 
     `grade` is the sentence that grades the identification.
     """
-    known, verdicts = found.uncertainty, found.verdicts
-    names = ", ".join(e.record.name for e in known.likelihood.problem.events)
-    made = Report(
+    uncertainty, verdicts = scan.uncertainty, scan.verdicts
+    names = ", ".join(e.record.name for e in uncertainty.likelihood.problem.events)
+    page = Report(
         f"Profile likelihood: {names}",
         "One parameter is held at value after value, all others are fitted again each time.",
     )
-    says = {profile.name: meaning(found, profile) for profile in found.profiles}
-    told = [*[SCATTER] * (not known.exact), *_where(says), *_poor(verdicts)]
+    says = {profile.name: meaning(scan, profile) for profile in scan.profiles}
+    sentences = [*[SCATTER] * (not uncertainty.exact), *_where(says), *_poor(verdicts)]
     graded = [as_sentence(grade)] * bool(grade)
-    made.verdict(*graded, *told, *(as_sentence(note) for note in found.notes), kind=_kind(verdicts, known.exact))
+    page.verdict(
+        *graded, *sentences, *(as_sentence(note) for note in scan.notes), kind=_kind(verdicts, uncertainty.exact)
+    )
     titles = {name: f"{name}: {verdict.word}" for name, verdict in verdicts.items()}
-    made.charts([_chart(found, profile, titles[profile.name]) for profile in found.profiles])
-    made.text(CAPTION.format(threshold=found.threshold))
-    made.heading("Intervals")
-    made.table(
+    page.charts([_chart(scan, profile, titles[profile.name]) for profile in scan.profiles])
+    page.text(CAPTION.format(threshold=scan.threshold))
+    page.heading("Intervals")
+    page.table(
         ["parameter", "meaning", "estimate", "unit", "95 % by curvature", "95 % by profile", "what the profile says"],
-        [_row(found, profile, says[profile.name]) for profile in found.profiles],
+        [_row(scan, profile, says[profile.name]) for profile in scan.profiles],
         words=(1, 6),
     )
-    made.heading("What it rests on").items(
+    page.heading("What it rests on").items(
         [
             "The interval by curvature is right where the deviance is a parabola; the profile is right wherever the"
             " model and the noise are, and needs no parabola.",
-            f"{found.simulations} simulations beyond the identification.",
+            f"{scan.simulations} simulations beyond the identification.",
             "An effect that the model lacks moves the estimates and is in neither interval.",
         ]
     )
-    return made
+    return page
 
 
-def _row(found: Profiles, profile: Profile, says: str) -> list[str]:
+def _row(scan: Profiles, profile: Profile, says: str) -> list[str]:
     """A line of the table of intervals."""
-    value, half = _curvature(found, profile.name)
-    about = declared(found.uncertainty, profile.name)
+    value, half = _curvature(scan, profile.name)
+    about = declared(scan.uncertainty, profile.name)
     by_curvature = span(value - half, value + half) if np.isfinite(half) else "none"
     return [profile.name, about.about, f"{value:.4g}", about.unit, by_curvature, span(*profile.interval), says]
 
 
-def meaning(found: Profiles, profile: Profile) -> str:
+def meaning(scan: Profiles, profile: Profile) -> str:
     """What a profile says beside the interval of the curvature, in a sentence."""
     names = ("downwards", "upwards")
     open_sides = [side for end, side in zip(profile.ends, names, strict=True) if end is End.BOUND]
@@ -90,18 +92,18 @@ def meaning(found: Profiles, profile: Profile) -> str:
     if profile.minima:
         said.append(f"{' and '.join(f'{m:.4g}' for m in profile.minima)} fits about as well as the estimate")
     if not said:
-        said.append(_compared(found, profile))
+        said.append(_compared(scan, profile))
     return as_sentence("; ".join(said))
 
 
-def _compared(found: Profiles, profile: Profile) -> str:
+def _compared(scan: Profiles, profile: Profile) -> str:
     """Both sides closed, one minimum: whether ± half is enough."""
-    (low, high), (value, half) = profile.interval, _curvature(found, profile.name)
+    (low, high), (value, half) = profile.interval, _curvature(scan, profile.name)
     if not np.isfinite(half):
         return "the curvature gives no interval, the profile does"
     off = np.array([low - (value - half), high - (value + half)]) / half
     if np.abs(off).max() <= ALIKE:
-        return f"{shown(value, half, *declared(found.uncertainty, profile.name).bounds)} {ENOUGH}"
+        return f"{shown(value, half, *declared(scan.uncertainty, profile.name).bounds)} {ENOUGH}"
     if off[0] > ALIKE and off[1] < -ALIKE:
         return "narrower than by curvature"
     if off[0] < -ALIKE and off[1] > ALIKE:
@@ -115,13 +117,13 @@ def _where(says: Mapping[str, str]) -> list[str]:
     """Where curvature is enough, and where it misleads."""
     enough = [name for name, said in says.items() if said.endswith(f"{ENOUGH}.")]
     rest = [name for name in says if name not in enough]
-    told = []
+    sentences = []
     if enough:
         every = "every parameter" if not rest else ", ".join(enough)
-        told.append(f"For {every} the curvature's interval is enough: the likelihood is a parabola there.")
+        sentences.append(f"For {every} the curvature's interval is enough: the likelihood is a parabola there.")
     if rest:
-        told.append(f"For {', '.join(rest)} it misleads: there the profile's interval is the right one.")
-    return told
+        sentences.append(f"For {', '.join(rest)} it misleads: there the profile's interval is the right one.")
+    return sentences
 
 
 def _kind(verdicts: Mapping[str, ParameterVerdict], exact: bool) -> str:
@@ -134,29 +136,29 @@ def _poor(verdicts: Mapping[str, ParameterVerdict]) -> list[str]:
     return [as_sentence("; ".join(poor)) if poor else "Every parameter is identified."]
 
 
-def _curvature(found: Profiles, name: str) -> tuple[float, float]:
+def _curvature(scan: Profiles, name: str) -> tuple[float, float]:
     """Estimate and half of the interval by curvature."""
-    j = found.uncertainty.names.index(name)
-    return float(found.uncertainty.values[j]), float(found.uncertainty.half[j])
+    j = scan.uncertainty.names.index(name)
+    return float(scan.uncertainty.values[j]), float(scan.uncertainty.half[j])
 
 
-def _chart(found: Profiles, profile: Profile, title: str) -> Chart:
+def _chart(scan: Profiles, profile: Profile, title: str) -> Chart:
     """One profile, with the parabola, the threshold, the interval and the estimate."""
-    value, half = _curvature(found, profile.name)
-    top = ABOVE * found.threshold
+    value, half = _curvature(scan, profile.name)
+    top = ABOVE * scan.threshold
     x, y = _smooth(profile)
     chart = Chart(
-        axis(found.uncertainty, profile.name), ["deviance"], pixels=290,
+        axis(scan.uncertainty, profile.name), ["deviance"], pixels=290,
         title=title, legend=False,
     )  # fmt: skip
     chart.shade(*profile.interval, SHADE, opacity=0.25)
     if np.isfinite(half):
-        parabola = found.threshold * ((x - value) / half) ** 2
+        parabola = scan.threshold * ((x - value) / half) ** 2
         chart.line("curvature", x, np.where(parabola < 2 * top, parabola, np.nan), PARABOLA, dash="dash")
     chart.line("profile", x, y, CURVE).points("", profile.values, profile.deviance, CURVE, size=4)
-    chart.points("", [value], [0.0], ACTIVE, size=9, told=[f"estimate {value:.5g}"])
-    chart.level(found.threshold).ticks(0, [0.0, found.threshold, 2 * found.threshold], _marks(found.threshold))
-    return chart.limits(0, -BELOW * found.threshold, top).limits(None, x.min(), x.max())
+    chart.points("", [value], [0.0], ACTIVE, size=9, hover=[f"estimate {value:.5g}"])
+    chart.level(scan.threshold).ticks(0, [0.0, scan.threshold, 2 * scan.threshold], _marks(scan.threshold))
+    return chart.limits(0, -BELOW * scan.threshold, top).limits(None, x.min(), x.max())
 
 
 def _marks(threshold: float) -> list[str]:
@@ -172,14 +174,14 @@ def _smooth(profile: Profile) -> tuple[np.ndarray, np.ndarray]:
     return x, np.interp(x, profile.values, root) ** 2
 
 
-def declared(known: Uncertainty, name: str) -> Any:
+def declared(uncertainty: Uncertainty, name: str) -> Any:
     """The parameter (a `Parameter`) of a name, which may say its event."""
-    return next(p for p in known.likelihood.problem.parameters if p.name == name.partition("[")[0])
+    return next(p for p in uncertainty.likelihood.problem.parameters if p.name == name.partition("[")[0])
 
 
-def axis(known: Uncertainty, name: str) -> str:
+def axis(uncertainty: Uncertainty, name: str) -> str:
     """A parameter and its unit, as an axis says them."""
-    unit = declared(known, name).unit
+    unit = declared(uncertainty, name).unit
     return name if unit == "1" else f"{name} [{unit}]"
 
 

@@ -18,35 +18,35 @@ MISSED, TERM = "#9A9A9A", "#0072B2"
 EVENTS = 4  # whose charts are shown at once
 
 
-def headlines(found: Findings) -> list[str]:
+def headlines(findings: Findings) -> list[str]:
     """What the box at the top says of a proposal."""
-    return [as_sentence(s) for s in proposed_in_words(to_dict(found.proposed, PLUGIN), None)[:2]]
+    return [as_sentence(s) for s in proposed_in_words(to_dict(findings.proposed, PLUGIN), None)[:2]]
 
 
-def proposed(made: Report, found: Findings) -> None:
+def proposed(page: Report, findings: Findings) -> None:
     """The term, its size, where and when it acts, what it closes, and what looks like it."""
-    made.heading("Proposal")
-    proposal = found.proposed.proposal
+    page.heading("Proposal")
+    proposal = findings.proposed.proposal
     if proposal is None:
-        made.text(f"No term is proposed: {found.proposed.why}.")
-        _tried(made, found.proposed.tried)
+        page.text(f"No term is proposed: {findings.proposed.why}.")
+        _tried(page, findings.proposed.tried)
         return
-    made.text(f"{as_sentence(proposal.term.words)} No effect of the catalogue has this term; it was found by a screen.")
-    made.equation(proposal.term.latex)
+    page.text(f"{as_sentence(proposal.term.words)} No effect of the catalogue has this term; it was found by a screen.")
+    page.equation(proposal.term.latex)
     if proposal.term.exogenous:
-        made.text("It is not a function of the voltage: something happened by itself, and need not happen again.")
-    _numbers(made, proposal)
-    _closed(made, proposal)
-    _drawn(made, proposal)
-    _rivals(made, proposal)
-    made.text(f"The file {PLUGIN} beside this page is the term as an effect:")
-    made.code(f"cp {PLUGIN} <your package>/effects/ && python -m tractexp 'model.effects=[proposed_effect]' ...")
-    with made.folded("The plugin file"):
-        made.code(proposal.source)
-    _tried(made, found.proposed.tried)
+        page.text("It is not a function of the voltage: something happened by itself, and need not happen again.")
+    _numbers(page, proposal)
+    _closed(page, proposal)
+    _drawn(page, proposal)
+    _rivals(page, proposal)
+    page.text(f"The file {PLUGIN} beside this page is the term as an effect:")
+    page.code(f"cp {PLUGIN} <your package>/effects/ && python -m tractexp 'model.effects=[proposed_effect]' ...")
+    with page.folded("The plugin file"):
+        page.code(proposal.source)
+    _tried(page, findings.proposed.tried)
 
 
-def _numbers(made: Report, proposal: Proposal) -> None:
+def _numbers(page: Report, proposal: Proposal) -> None:
     rows = [
         [
             k.name,
@@ -58,35 +58,35 @@ def _numbers(made: Report, proposal: Proposal) -> None:
         ]
         for k in proposal.estimates
     ]
-    made.table(
+    page.table(
         ["parameter", "in the equation", "meaning", "unit", "value", "95 % interval"], rows,
         "Intervals by the curvature of the fit to the fitted events, the base model and the faults of the measurement"
         " left free beside it.", words=(1, 2, 3),
     )  # fmt: skip
-    made.table(
+    page.table(
         ["event", "from t [s]", "to t [s]", "channel", "largest change [pu]"],
         [[a.event, f"{a.start:.3f}", f"{a.end:.3f}", a.channel, f"{a.most:+.3g}"] for a in proposal.acting],
         "When it acts: where it changes the calculated power by more than a tenth of the most it does.", words=(3,),
     )  # fmt: skip
 
 
-def _closed(made: Report, proposal: Proposal) -> None:
+def _closed(page: Report, proposal: Proposal) -> None:
     rows = [
         [role, f"{b.without.chi2_per_sample:.3f}", f"{b.left:.3f}", percent(b.closed)]
         for role, b in (("fitted", proposal.train), ("held out", proposal.validate))
     ]
-    made.table(
+    page.table(
         ["events", "chi2 per sample without it", "with it", "share of the gap closed"], rows,
         "Of what the term gains and what pushes into the balances or the other terms tried would gain beside it, beyond"
         f" chance; {chance(proposal.p)}.",
     )  # fmt: skip
 
 
-def _drawn(made: Report, proposal: Proposal) -> None:
+def _drawn(page: Report, proposal: Proposal) -> None:
     """What the base model misses in each event, and what the term makes of it."""
     for role, before in (("fitted", proposal.train), ("held out", proposal.validate)):
-        made.text(f"What the base model misses, and what the model with the term draws beyond it ({role}):")
-        made.charts([_missed(before, e) for e in range(min(len(before.context.events), EVENTS))])
+        page.text(f"What the base model misses, and what the model with the term draws beyond it ({role}):")
+        page.charts([_missed(before, e) for e in range(min(len(before.context.events), EVENTS))])
 
 
 def _missed(before: Before, e: int) -> Chart:
@@ -96,36 +96,36 @@ def _missed(before: Before, e: int) -> Chart:
     missed = np.where(bench.valid[:, part], bench.drive.measured[:, part] - base, np.nan)
     more = before.with_it.calculated[:, part] - base
     t = event.record.t[event.record.samples - base.shape[1] :]
-    made = Chart(f"t [s], {event.record.name}", [f"{c} [pu]" for c in bench.drive.names])
+    page = Chart(f"t [s], {event.record.name}", [f"{c} [pu]" for c in bench.drive.names])
     for c in range(len(base)):
-        made.line("measured less base model", t, missed[c], MISSED, c, width=1.0)
-        made.line("with the term less base model", t, more[c], TERM, c)
-    return made
+        page.line("measured less base model", t, missed[c], MISSED, c, width=1.0)
+        page.line("with the term less base model", t, more[c], TERM, c)
+    return page
 
 
-def _rivals(made: Report, proposal: Proposal) -> None:
+def _rivals(page: Report, proposal: Proposal) -> None:
     if proposal.ties:
-        made.table(
+        page.table(
             ["also possible", "closed on the fitted events", "on the held-out events"],
             [[t.words, percent(a), percent(b)] for t, a, b in proposal.ties],
             "These events cannot tell them from the term proposed.",
         )  # fmt: skip
     if proposal.alike:
         names = joined([f"{name} ({share:.0%})" for name, share in proposal.alike])
-        made.text(
+        page.text(
             f"Textbook effects that look like it, with the share of its change each could have made: {names}. None of"
             " them is adequate by itself."
         )
     else:
-        made.text("No textbook effect of the catalogue could have made half of its change.")
+        page.text("No textbook effect of the catalogue could have made half of its change.")
 
 
-def _tried(made: Report, tried: Sequence[tuple[Term, Weighed]]) -> None:
+def _tried(page: Report, tried: Sequence[tuple[Term, Weighed]]) -> None:
     """The best of the library as held-out events judged them."""
     if not tried:
         return
-    with made.folded("The best terms of the library, judged"):
-        made.table(
+    with page.folded("The best terms of the library, judged"):
+        page.table(
             ["term", "closed, fitted", "closed, held out", "left, fitted", "left, held out", "chance"],
             [[t.words, percent(w.train.closed), percent(w.validate.closed), f"{w.train.left:.2f}",
               f"{w.validate.left:.2f}", in_words(w.p)] for t, w in tried],

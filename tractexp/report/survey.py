@@ -188,11 +188,11 @@ SIEVE = (
 
 
 def _heads() -> str:
-    made = []
+    heads = []
     for key, label, kind, _ in COLUMNS:
         left = ' class="words"' if kind in ("name", "words", "why") else ""
-        made.append(f"<th{left}{'' if kind == 'picture' else f' data-key={key}'}>{html.escape(label)}</th>")
-    return "".join(made)
+        heads.append(f"<th{left}{'' if kind == 'picture' else f' data-key={key}'}>{html.escape(label)}</th>")
+    return "".join(heads)
 
 
 def _best(report: Report, content: Mapping[str, Any]) -> Report:

@@ -62,15 +62,15 @@ def wave_chart(
     band around the currents `around` (3, N) and about zero; `places` have `start` and `end` [s]: where more than chance
     is left of some current.
     """
-    (kV, kA), kept = event.peaks, slice(event.lead, None)
+    (kV, kA), part = event.peaks, slice(event.lead, None)
     names = PHASES[: event.phases] if event.phases > 1 else ("",)
-    measured = event.of_phases(np.nan_to_num(event.currents))[:, kept]
+    measured = event.of_phases(np.nan_to_num(event.currents))[:, part]
     unit, one = ("kA", kA) if kA * np.abs(measured).max() >= KILO else ("A", 1000 * kA)
     start, step = float(event.record.t[event.lead]), event.record.step
     panels = ["u [kV]", *(f"i{f'_{n}' if n else ''} [{unit}]" for n in names), f"Δi [{unit}]"]
     made = Chart("t [s]", panels, heights=[1.0, *[1.3] * len(names), 1.0], pixels=170 + 130 * len(panels))
     colors = COLORS if event.phases > 1 else (style.VOLTAGE,)
-    for name, u, color in zip(names, event.of_phases(_voltage(event))[:, kept], colors, strict=False):
+    for name, u, color in zip(names, event.of_phases(_voltage(event))[:, part], colors, strict=False):
         made.samples(f"phase {name}" if name else "voltage", start, step, kV * u, color)
     if deviation is not None and around is not None:
         _noise_bands(made, event, one * deviation, one * around)
@@ -79,7 +79,7 @@ def wave_chart(
     for k in range(event.phases):
         made.samples("measured", start, step, one * measured[k], style.MEASURED, 1 + k, width=3)
     for name, currents, color, dash in curves:
-        calculated = event.of_phases(currents)[:, kept]
+        calculated = event.of_phases(currents)[:, part]
         for k, phase in enumerate(names):
             made.samples(name, start, step, one * calculated[k], color, 1 + k, width=1.3, dash=dash)
             rest = one * (measured[k] - calculated[k])
@@ -91,8 +91,8 @@ def wave_chart(
 def _noise_bands(made: Chart, event: WaveEvent, deviation: np.ndarray, around: np.ndarray) -> None:
     """Where noise alone would let a sample lie: about each phase's current and, the widest of them, about zero."""
     t = event.record.t[event.lead :]
-    known = np.array(event.compared)[:, None]
-    half = WITHIN * np.sqrt(event.of_phases(np.eye(3)) ** 2 @ (deviation * known) ** 2)[:, event.lead :]
+    compared = np.array(event.compared)[:, None]
+    half = WITHIN * np.sqrt(event.of_phases(np.eye(3)) ** 2 @ (deviation * compared) ** 2)[:, event.lead :]
     middle, name = event.of_phases(around)[:, event.lead :], f"± {WITHIN:g} σ of the noise"
     for k in range(event.phases):
         made.band(name, t, middle[k] - half[k], middle[k] + half[k], style.FAINT, 1 + k)
@@ -136,8 +136,8 @@ def spectra(event: WaveEvent, currents: np.ndarray) -> tuple[Spectrum, Spectrum]
 
     Unweighted, the squares of all of it add up to the residual's energy, a decay at its beginning included.
     """
-    known = np.array(event.compared)[:, None]
-    left = event.of_phases((np.nan_to_num(event.currents) - currents) * known)
+    compared = np.array(event.compared)[:, None]
+    left = event.of_phases((np.nan_to_num(event.currents) - currents) * compared)
     cycle = event.rate / event.f0
     after = min(AFTER * event.rate, left.shape[1] - event.start)
     size = abs(event.P0 + 1j * event.Q0) / event.U0  # of the fundamental's peak [pu]
@@ -167,8 +167,8 @@ def spectrum_chart(event: WaveEvent, currents: np.ndarray) -> tuple[Chart, str]:
         if order * event.f0 < highest:
             made.edge(order * event.f0)
     marks = [order * round(event.f0, 1) for order in HARMONICS if order * event.f0 < highest and order != 9]
-    told = SPECTRUM.format(after=1000 * after.seconds, before=1000 * before.seconds)
-    return made.ticks(None, marks).limits(None, 0.0, highest), told
+    notes = SPECTRUM.format(after=1000 * after.seconds, before=1000 * before.seconds)
+    return made.ticks(None, marks).limits(None, 0.0, highest), notes
 
 
 def prepared(problem: Problem, fits: Sequence[Fit]) -> list[str]:

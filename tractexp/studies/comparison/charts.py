@@ -115,12 +115,12 @@ def spread(variants: Sequence[Variant], floor: Floor) -> Chart:
     dots = [(run, row + shift) for row, v in enumerate(variants) for run, shift in _scattered(v)]
     labels = [f"{run.optimizer}, seed {run.seed}: {number(run.objective, 4)} pu²" for run, _ in dots]
     ends = np.array([run.objective for run, _ in dots])
-    chart.points("every run", ends, [y for _, y in dots], style.FAINT, size=4, told=labels)
+    chart.points("every run", ends, [y for _, y in dots], style.FAINT, size=4, hover=labels)
     ended = [[run.objective for run in v.finished] for v in variants]
     lower, middle, upper = np.array([np.quantile(values, (0.25, 0.5, 0.75)) for values in ended]).T
     labels = [f"{v.name}: median {number(m, 4)} pu²" for v, m in zip(variants, middle, strict=True)]
     chart.points(
-        "median and quartiles", middle, np.arange(len(variants)), style.PALETTE[0], told=labels,
+        "median and quartiles", middle, np.arange(len(variants)), style.PALETTE[0], hover=labels,
         spans=np.column_stack((lower, upper)), symbol="diamond", size=9,
     )  # fmt: skip
     margin = max(ends.max() / floor.value, 1.2) ** 0.04
@@ -157,7 +157,7 @@ def mean_ranks(ranks: Ranks, label: str = "mean rank over the seeds (1 is best)"
     chart = _rows(label, names)
     labels = [f"{name}: {rank:.2f}" for name, rank in zip(names, mean, strict=True)]
     spans = np.column_stack((mean - half, mean + half))
-    chart.points("", mean, np.arange(len(names)), style.PALETTE[0], told=labels, spans=spans)
+    chart.points("", mean, np.arange(len(names)), style.PALETTE[0], hover=labels, spans=spans)
     return chart.limits(None, min(1, spans.min()) - 0.1, max(len(names), spans.max()) + 0.1)
 
 
@@ -175,7 +175,7 @@ def parameters(variants: Sequence[Variant], polished: Polished) -> Chart:
             some = [(run, x) for run, x in dots if polished.in_valley(run) is inside]
             labels = [f"{run.optimizer}, seed {run.seed}: {name} {run.parameters[name]:.4g}" for run, _ in some]
             values = [run.parameters[name] for run, _ in some]
-            chart.points(label, [x for _, x in some], values, color, panel, size=5, told=labels)
+            chart.points(label, [x for _, x in some], values, color, panel, size=5, hover=labels)
         low, high = polished.bounds[name]
         edge = 0.03 * (high - low)
         chart.level(polished.parameters[name], panel=panel, color=INSIDE).limits(panel, low - edge, high + edge)

@@ -86,7 +86,7 @@ def effects(overall: Overall) -> Chart:
         spans = np.array([(effect.low, effect.high) for _, effect, _ in own])
         labels = [f"{label}: {claims.of_effect(effect)}" for _, effect, label in own]
         x, y = [effect.factor for _, effect, _ in own], [row for row, *_ in own]
-        chart.points(switch, x, y, style.PALETTE[k % len(style.PALETTE)], told=labels, spans=spans)
+        chart.points(switch, x, y, style.PALETTE[k % len(style.PALETTE)], hover=labels, spans=spans)
     chart.ticks(0, range(len(rows)), [label for _, label, _ in rows])
     ends = [bound for effect, *_ in rows for bound in (effect.low, effect.high)]
     low, high = min(0.9, *ends) / 1.02, max(1.1, *ends) * 1.02

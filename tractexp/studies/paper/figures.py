@@ -28,7 +28,7 @@ def evenness(spread: Mapping[str, np.ndarray]) -> Chart:
     labels = [
         f"{way}: {m:.3g}, 5 to 95 % {a:.3g} .. {b:.3g}" for way, a, m, b in zip(spread, low, middle, high, strict=True)
     ]
-    chart.points("", middle, rows, PALETTE[0], told=labels, spans=np.stack((low, high), axis=1))
+    chart.points("", middle, rows, PALETTE[0], hover=labels, spans=np.stack((low, high), axis=1))
     chart.ticks(None, [k * 10.0**n for n in range(-4, 1) for k in (1, 2, 5)])
     return chart.ticks(0, rows.tolist(), list(spread)).limits(0, rows[-1] - 0.6, 0.6)
 
@@ -77,5 +77,5 @@ def along(
         if end > start:
             chart.shade(start, end, FAINT, opacity=0.12)
     labels = [f"valley at {name} = {x:.3g}: {y:.3g} times the lowest objective" for x, y in valleys]
-    chart.points("", [x for x, _ in valleys], [y for _, y in valleys], ACTIVE, size=9, told=labels)
+    chart.points("", [x for x, _ in valleys], [y for _, y in valleys], ACTIVE, size=9, hover=labels)
     return chart.limits(None, low, high)
