@@ -8,7 +8,7 @@ BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "
 
 def drawn(page, folder, *options):
     """What a browser that reaches no other computer makes of a page: its elements, and what it complains of."""
-    path = page.write(folder / "page.html")
+    path = page.save(folder / "page.html")
     command = [
         BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking",
         f"--user-data-dir={folder / 'browser'}", "--host-resolver-rules=MAP * ~NOTFOUND", "--enable-logging=stderr",
@@ -24,7 +24,7 @@ class Worked:
     def __init__(self, page, script):
         self.page, self.script = page, script
 
-    def write(self, path):
-        text = self.page.write(path).read_text(encoding="utf-8")
+    def save(self, path):
+        text = self.page.save(path).read_text(encoding="utf-8")
         path.write_text(text.replace("</body>", f"<p id=told></p><script>{self.script}</script></body>"))
         return path

@@ -8,6 +8,7 @@ import pytest
 from browser import BROWSER, Worked, drawn
 
 from tractexp.blocks import Report
+from tractexp.blocks.block import Markup
 from tractexp.blocks.chart import Chart
 
 BLUE = "#0072B2"
@@ -21,7 +22,7 @@ def test_a_folded_chart_is_drawn_when_it_is_opened(tmp_path, opened):
     with page.folded("more"):
         page.chart(chart, "folded")
     if opened:
-        page._add("<script>setTimeout(() => document.querySelector('details').open = true, 500)</script>")
+        page.add(Markup("<script>setTimeout(() => document.querySelector('details').open = true, 500)</script>"))
     dom, complaints = drawn(page, tmp_path, "--virtual-time-budget=3000")
     assert complaints == []
     assert dom.count('class="chart js-plotly-plot"') == 1 + opened

@@ -212,7 +212,7 @@ def test_a_page_of_ten_seconds_of_twenty_channels_is_small(tmp_path):
 def test_the_command_line_prints_all_of_it_and_says_where(station, tmp_path):
     done = run_command("look", str(station), cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    for part in ("North", "3200 Hz", "UA", "Q2", "dip", "worth fitting", "to fit it:", "data=comtrade", "look.html"):
+    for part in ("North", "3200 Hz", "UA", "Q2", "dip", "fit it?", "yes: ", "to fit it:", "data=comtrade", "look.html"):
         assert part in done.stdout, part
     (page,) = (tmp_path / "outputs" / "looks").rglob("look.html")
     assert str(page.relative_to(tmp_path)) in done.stdout

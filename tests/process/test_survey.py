@@ -113,7 +113,7 @@ def test_the_page_is_sorted_and_filtered_where_it_is_read(surveyed, tmp_path):
     from tractexp.report import survey
 
     class Whole:
-        def write(self, path):
+        def save(self, path):
             return survey.report(surveyed.content).save(path)
 
     script = """

@@ -272,7 +272,9 @@ def test_what_the_reactive_power_of_customers_does_after_a_dip_follows_their_act
     recorded = clean * walk + 0.05 * rng.normal(size=(count, 2, n))
     load = Load.of(clean, np.array([[1.0, 0.4]]), np.array([0, n]))
     mix = np.array([[20.0, 0.0], [-8.0, 20.0]])  # in which what goes together in P and Q before the dip is P's alone
-    noise = PowerNoise(PowerNoise.white(1.0, 1.1).pairs, mix, wander=RandomWalk(np.array([20.0, 0.0]), 0.002, load))
+    noise = PowerNoise(
+        PowerNoise.white(1.0, 1.1).pairs, mix, random_walk=RandomWalk(np.array([20.0, 0.0]), 0.002, load)
+    )
     drive = SimpleNamespace(events=1, samples=n, part=lambda e: slice(0, n))
     rows = noise.whiten(recorded, drive, np.ones((2, n), dtype=bool)).reshape(count, 2, n)
     slow = (np.arange(n) >= 300) / np.sqrt(300)
@@ -438,7 +440,7 @@ def test_only_a_decision_that_is_open_asks_for_exact_scales(silent):
 def test_parameters_of_each_event_are_asked_for_where_there_are_two(events, asked, monkeypatch):
     monkeypatch.setattr(surprises, "statistics", lambda channels, layout: {})
     projection = SimpleNamespace(
-        unrest=lambda: np.zeros(1), least_p=np.ones(1), channels=lambda layout: None, r=np.zeros((1, 3)),
+        variance_component=lambda: np.zeros(1), least_p=np.ones(1), channels=lambda layout: None, r=np.zeros((1, 3)),
         split=np.ones((1, 3)),
     )  # fmt: skip
     made = ScoreTest.statistics(projection, SimpleNamespace(events=("a dip",) * events))

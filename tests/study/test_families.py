@@ -135,7 +135,7 @@ def test_a_name_that_suffices_gives_way_to_a_member_that_explains_more_and_leave
     monkeypatch.setattr(families, "starts", lambda *_: [])
     monkeypatch.setattr(families, "wide_refits", lambda *_: [member])
     monkeypatch.setattr(families, "examined", lambda quiet, fit, *_: SimpleNamespace(fit=fit, suffices=True))
-    tests, held_against = against_members(SimpleNamespace(bench=at, quiet=None), told, refits, 0)
+    tests, held_against = against_members(SimpleNamespace(context=at, quiet=None), told, refits, 0)
     assert tests.fit is (member if named else told.fit)
     assert held_against == [member]
 
@@ -147,7 +147,7 @@ def test_where_neither_leaves_nothing_no_member_is_a_rival(monkeypatch):
     monkeypatch.setattr(families, "starts", lambda *_: [])
     monkeypatch.setattr(families, "wide_refits", lambda *_: [fit(60.0, 4, "saturation_curve")])
     monkeypatch.setattr(families, "examined", lambda quiet, fit, *_: SimpleNamespace(fit=fit, suffices=False))
-    assert against_members(SimpleNamespace(bench=at, quiet=None), told, refits, 0) == (told, [])
+    assert against_members(SimpleNamespace(context=at, quiet=None), told, refits, 0) == (told, [])
 
 
 def test_the_chosen_set_comes_first_with_its_own_tests_though_another_fits_better(monkeypatch):
@@ -165,7 +165,7 @@ def test_the_chosen_set_comes_first_with_its_own_tests_though_another_fits_bette
     monkeypatch.setattr(survivors, "examined", lambda quiet, fit, *_, **__: SimpleNamespace(fit=fit, adequate=False))
     last = SimpleNamespace(fit=chosen, noise=None, adequate=True)
     explained = SimpleNamespace(
-        base=SimpleNamespace(bench=at, quiet=None), last=last, chosen=chosen, steps=[SimpleNamespace(fit=bare)],
+        base=SimpleNamespace(context=at, quiet=None), last=last, chosen=chosen, steps=[SimpleNamespace(fit=bare)],
         refits={f.names: f for f in (bare, better, chosen, far)},
     )  # fmt: skip
     left = survivors.survivors(explained, 0)
@@ -202,7 +202,7 @@ def test_held_out_events_deny_a_rival_only_by_what_it_leaves(chosen, rival, kept
         for names, (p, closed) in told.items()
     }
     adequate = [SimpleNamespace(fit=fit(0.0, 1, *names)) for names in told]
-    surviving = SimpleNamespace(adequate=adequate, explanations=SimpleNamespace(base=SimpleNamespace(bench=at)))
+    surviving = SimpleNamespace(adequate=adequate, explanations=SimpleNamespace(base=SimpleNamespace(context=at)))
     made = HeldOut(surviving, None, (), None, {}, judged)
     assert [r.fit.names[0] for r in made.retained] == kept
 

@@ -28,7 +28,7 @@ SHAPE = DipShape(depth=0.4, duration=0.2, rate=500.0, noise_P=0.004, noise_Q=0.0
 
 
 def recorded(depth, deviation=0.004, seed=5, name="dip"):
-    t, U = study.DipShape(depth).voltage()
+    t, U = study.Shape(depth).voltage()
     clean = study.printed(study.TYPICAL, t, U, 0.35)
     return study.event(t, U, clean + study.noise(np.random.default_rng(seed), len(t), deviation, 0.0), name)
 

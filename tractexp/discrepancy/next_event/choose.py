@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -94,7 +94,7 @@ class NextEvent:
             ],
             "tried": [
                 {
-                    **asdict(t.event),
+                    **t.event.to_dict(),
                     "words": t.event.words,
                     "probability": t.chances.least,
                     "by_noise_alone": t.exact.least,
@@ -106,7 +106,7 @@ class NextEvent:
     def _row(self, tried: EventTrial) -> dict[str, Any]:
         chances = tried.exact if tried is self.by_noise else tried.chances
         return {
-            **asdict(tried.event),
+            **tried.event.to_dict(),
             "words": tried.event.words,
             "probability": chances.least,
             "by_truth": dict(zip(self.rivals, chances.alone.tolist(), strict=True)),

@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -36,6 +37,11 @@ class ImaginedDip:
     unbalance: float = 0.0
     switched: bool = False
     domain: Domain = PHASORS
+
+    def to_dict(self) -> dict[str, Any]:
+        """As `discrepancy.json` and `plan.json` have it."""
+        fields = {key: value for key, value in vars(self).items() if key != "domain"}
+        return fields | {"waves": self.domain.name == "waves"}
 
     @property
     def words(self) -> str:
