@@ -60,7 +60,7 @@ class Equation:
     latex: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Table:
     """Rows under columns: cells are numbers, texts or None.
 
@@ -92,7 +92,7 @@ class Table:
         rows = [[row[k] for k in columns] for row in self.rows]
         return dataclasses.replace(self, columns=[self.columns[k] for k in columns], rows=rows, words=words, detail=())
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         return str(Report().add(self))
 
     def _repr_html_(self) -> str:

@@ -38,8 +38,10 @@ def plain(report: Report) -> str:
     from rich.console import Console
 
     text = io.StringIO()
-    show(report, Console(file=text, highlight=False, soft_wrap=True, width=WIDTH, color_system=None))
-    return text.getvalue().rstrip("\n")
+    show(
+        report, Console(file=text, highlight=False, soft_wrap=True, width=WIDTH, color_system=None, force_jupyter=False)
+    )
+    return "\n".join(line.rstrip() for line in text.getvalue().rstrip().splitlines())
 
 
 def _table(table: Table, console: Any) -> None:
