@@ -64,12 +64,26 @@ def _default(item: dataclasses.Field) -> str:
 
 
 def _comments(cls: type) -> Iterator[tuple[str, str]]:
-    """(setting, comment) of a class, those of its bases first."""
+    """(setting, comment): of the arguments of a task's call, then of the class, those of its bases first."""
+    if call := getattr(cls, "function", None):
+        lines, node = _parsed(call)
+        for item in (*node.args.args, *node.args.kwonlyargs):
+            yield from _beside(lines, item.end_lineno, item.arg)
     for base in reversed(cls.__mro__):
         if dataclasses.is_dataclass(base):
-            source = inspect.getsource(base)
-            lines = source.splitlines()
-            (node,) = ast.parse(textwrap.dedent(source)).body
+            lines, node = _parsed(base)
             for item in node.body:
-                if isinstance(item, ast.AnnAssign) and (comment := re.search(r"#\s*(.+)$", lines[item.end_lineno - 1])):
-                    yield item.target.id, comment[1]
+                if isinstance(item, ast.AnnAssign):
+                    yield from _beside(lines, item.end_lineno, item.target.id)
+
+
+def _parsed(thing: Any) -> tuple[list[str], Any]:
+    """The lines of a class or function, and its node."""
+    source = inspect.getsource(inspect.unwrap(thing))
+    (node,) = ast.parse(textwrap.dedent(source)).body
+    return source.splitlines(), node
+
+
+def _beside(lines: list[str], number: int, name: str) -> Iterator[tuple[str, str]]:
+    if comment := re.search(r"#\s*(.+)$", lines[number - 1]):
+        yield name, comment[1]

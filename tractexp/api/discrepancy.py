@@ -269,9 +269,9 @@ def investigate(
     model: Any = None,
     *,
     validate: Any = (),
-    effects: Sequence[str] = (),
-    false_alarms: float = 0.05,
-    criteria: Mapping[str, float] | None = None,
+    effects: Sequence[str] = (),  # only these effects are tested; empty: the whole catalogue
+    false_alarms: float = 0.05,  # probability of naming anything where nothing is missing
+    criteria: Mapping[str, float] | None = None,  # {name: value} of other thresholds of its decisions
     bounds: Mapping[str, Sequence[float]] | None = None,
     fixed: Mapping[str, float] | None = None,
     substeps: int | None = None,

@@ -56,9 +56,14 @@ class Exported(Outcome):
 
 @public
 def export(
-    fit: Identification, format: str, *, bus: int = 1, power: float | None = None, voltage: float | None = None,
-    base: str = OWN,
-) -> Exported:  # fmt: skip
+    fit: Identification,
+    format: str,
+    *,
+    bus: int = 1,  # number of the bus the load is on
+    power: float | None = None,  # MVA, what 1 pu of the record's file stands for; null: what the record says, else 100
+    voltage: float | None = None,  # kV, line to line; null: what the record says, else 110
+    base: str = OWN,  # own: values on the base of the fit; file: on that of the record's file
+) -> Exported:
     """Turn an identification into the file of another simulator's format ("andes", "psse_dyr", "modelica", ...).
 
     The load is on `bus`; 1 pu of the record's file stands for `power` [MVA] and `voltage` [kV, line to line], by

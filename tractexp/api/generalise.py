@@ -104,7 +104,7 @@ def generalise(
     *,
     validate: Any,
     optimizers: Any = None,
-    seeds: int = 1,
+    seeds: int = 1,  # searches of each optimizer: that seed and the ones after it
     bounds: Mapping[str, Sequence[float]] | None = None,
     fixed: Mapping[str, float] | None = None,
     per_event: Sequence[str] | None = None,

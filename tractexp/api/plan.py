@@ -94,22 +94,22 @@ def plan(
     records: Any,
     model: Any = None,
     *,
-    parameter: str = "H",
-    within: float = 0.05,
-    depth: float | None = None,
-    duration: float | None = None,
-    rate: float | None = None,
-    noise: float | None = None,
-    jump: float | None = None,
-    unbalance: float | None = None,
+    parameter: str = "H",  # how deep a dip is needed for this one (H stands for M)
+    within: float = 0.05,  # half of the 95 % interval, as a share of the value
+    depth: float | None = None,  # of the voltage before; null: as recorded
+    duration: float | None = None,  # s
+    rate: float | None = None,  # Hz
+    noise: float | None = None,  # standard deviation, as a share of P before the event; white
+    jump: float | None = None,  # degrees, of the voltage's phase; in waveforms
+    unbalance: float | None = None,  # negative sequence over the depth, 1 of a fault between two phases; in waveforms
     domain: str | None = None,
-    values: Any = FIT,
-    least: float = 0.05,
-    events: int | None = None,
+    values: Any = FIT,  # fit, default, or the path of a result.json
+    least: float = 0.05,  # another event of the archive must narrow the intervals by this share
+    events: int | None = None,  # at most so many
     bounds: Mapping[str, Sequence[float]] | None = None,
     fixed: Mapping[str, float] | None = None,
     substeps: int | None = None,
-    rivals: Any = (),
+    rivals: Any = (),  # [a,b+c], or a discrepancy.json: what to record to tell these apart
     progress: Any = None,
 ) -> Forecasts | Recommended:
     """Forecast the intervals that a recording would give, without fitting it; or what tells `rivals` apart.

@@ -88,7 +88,10 @@ class Profiled(Written):
 
 
 @public
-def profile(fit: Identification, *, points: int = 24) -> Profiled:
+def profile(
+    fit: Identification, *,
+    points: int = 24,  # at most so many on either side of the optimum
+) -> Profiled:  # fmt: skip
     """Find the best fit for each value of each free parameter of an identification in turn.
 
     `points` (3 to 1000) is how many values are tried on either side of the optimum at most. Raises `UserError` for an

@@ -120,19 +120,19 @@ def _stem(number: int) -> str:
 @public
 def simulate(
     model: Any = None,
-    values: Mapping[str, float] | None = None,
+    values: Mapping[str, float] | None = None,  # {name: value}
     *,
     records: Any = (),
-    depth: float | None = None,
-    duration: float = 0.15,
-    fall: float = 0.02,
-    recovery: float = 0.05,
-    start: float = 0.5,
-    length: float = 3.0,
-    rate: float = 1000.0,
-    U0: float | None = None,
-    P0: float | None = None,
-    Q0: float | None = None,
+    depth: float | None = None,  # of the voltage before; null: play the recorded data
+    duration: float = 0.15,  # s, from the start of the fall to the start of the recovery
+    fall: float = 0.02,  # s
+    recovery: float = 0.05,  # s
+    start: float = 0.5,  # s
+    length: float = 3.0,  # s
+    rate: float = 1000.0,  # samples per second
+    U0: float | None = None,  # pu, voltage before the dip; null: the result's, or 1
+    P0: float | None = None,  # pu, power before the dip; null: the result's, or 1
+    Q0: float | None = None,  # pu; null: the result's, or 0.5
 ) -> Simulation:
     """Calculate the power a load draws in recorded events, or in a dip made by hand.
 

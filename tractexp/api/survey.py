@@ -110,10 +110,10 @@ class Surveyed(Written):
 def survey(
     folder: str | Path,
     *,
-    informative: int | None = None,
+    informative: int | None = None,  # so many events that tell most about the model together
     model: Any = None,
-    values: Any = "fit",
-    cores: int | None = None,
+    values: Any = "fit",  # of the model there: fit, of the deepest event; default; or the path of a result.json
+    cores: int | None = None,  # processes; null: all cores
     keep: str | Path | None = None,
     progress: Progress = None,
     bounds: Mapping[str, Sequence[float]] | None = None,

@@ -30,6 +30,7 @@ from tractexp.blocks.block import (
 )  # fmt: skip
 from tractexp.blocks.chart import script
 
+SHORT = 14  # letters of a word that never needs a second line
 STYLE = """
 :root { --ink: #1d1d1f; --faint: #666; --line: #dcdcdc; --good: #00664a; --bad: #a33b00; }
 * { box-sizing: border-box; }
@@ -50,8 +51,8 @@ figure.table .wide { margin: 0; } figure.table figcaption { font-size: .84rem; p
 caption { text-align: left; font-weight: 600; padding: .2rem 0; }
 th, td { padding: .22rem .6rem; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap; }
 th { vertical-align: bottom; white-space: normal; border-bottom-color: var(--faint); font-weight: 600; }
-th:first-child, td:first-child, .words { text-align: left; }
-td.words { white-space: normal; min-width: 8rem; } td.words:last-child { min-width: 14rem; }
+th:first-child, td:first-child, .words, .short { text-align: left; }
+td.words { white-space: normal; min-width: 8rem; } td.words:last-child { min-width: 11rem; }
 figure { margin: 1rem 0; } figure, tr { break-inside: avoid; }
 figure svg { max-width: 100%; height: auto; }
 figcaption { color: var(--faint); font-size: .88rem; max-width: 46rem; }
@@ -143,7 +144,9 @@ def _below(caption: str) -> str:
 
 def _table(table: Table) -> str:
     """A table; the first column is to the left, the others are figures but for those that hold words."""
-    marks = ['<{0} class="words">' if i in table.words else "<{0}>" for i in range(len(table.columns))]
+    long = [any(len(row[i]) > SHORT for row in table.cells) for i in range(len(table.columns))]
+    kinds = {i: "words" if long[i] else "short" for i in table.words}
+    marks = [f'<{{0}} class="{kinds[i]}">' if i in kinds else "<{0}>" for i in range(len(table.columns))]
 
     def line(cells: Sequence[str], tag: str) -> str:
         marked = zip(marks, cells, strict=True)
