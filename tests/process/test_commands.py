@@ -30,7 +30,7 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").g
 TUTORIALS = ("start.md", "ten-minutes.md")  # followed by tests of their own
 SHOWN = [c for page in PAGES for c in commands.of(page)]
 ALL = SHOWN + [c for page in PAGES for c in commands.inline(page)]
-WORDS = ("ui", "look", "sync", "doctor", "list")  # subcommands
+WORDS = ("ui", "look", "sync", "doctor", "list", "new")  # subcommands
 JOBS = {
     f"{c.page.stem}: {' '.join(c.arguments)}": c.arguments
     for c in ALL
