@@ -6,6 +6,7 @@ with the same records, settings and seed gives the same bits.
 """
 
 import json
+import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -94,8 +95,18 @@ class Written(Outcome):
     page: ClassVar[str] = ""  # file of the page; "" for none
 
     def report(self) -> Report:
-        """The page as a list of blocks: a notebook shows it, `save(path)` writes it. By default the summary."""
-        return self.summary()
+        """The page as a list of blocks: a notebook shows it, `save(path)` writes it.
+
+        Without a page of its own: the summary, and the figures among the drawings.
+        """
+        title, summary = self.table().title or self.kind, self.summary()
+        report = Report(title[:1].upper() + title[1:])
+        report.add(*summary.blocks)
+        with tempfile.TemporaryDirectory() as folder:
+            for name, draw in self.drawings().items():
+                if name.endswith(".svg"):
+                    report.figure(draw(Path(folder) / name))
+        return report
 
     def write_results(self, folder: Path) -> list[Path]:
         """Write what cannot be had again without the computation; the paths. Raises `UserError` where it cannot."""

@@ -1,7 +1,6 @@
 """Identify on some dips, judge on milder and deeper ones, for any optimizers."""
 
 import functools
-import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -71,15 +70,6 @@ class Generalised(Written):
 
     def summary(self) -> Report:
         return Report().add(self.table()).text(CAPTION)
-
-    def report(self) -> Report:
-        """The summary, and a figure of each optimizer and dip."""
-        report = Report("On dips not fitted")
-        report.blocks += self.summary().blocks
-        with tempfile.TemporaryDirectory() as folder:
-            for name, draw in self.drawings().items():
-                report.figure(draw(Path(folder) / name))
-        return report
 
     def write_results(self, folder: Path) -> list[Path]:
         curve = {"residuals": self.residuals, "identified": self.identified}

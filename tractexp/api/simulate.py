@@ -1,6 +1,5 @@
 """Play a voltage through a load model with given parameters."""
 
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -73,15 +72,6 @@ class Simulation(Written):
     def summary(self) -> Report:
         rows = [[p.name, f"{self.values[p.name]:.6g}", p.unit] for p in self.model.model.parameters]
         return Report().add(Table(["parameter", "value", "unit"], rows), self.table())
-
-    def report(self) -> Report:
-        """The summary, and a figure of each response."""
-        report = Report(self.model.model.title)
-        report.blocks += self.summary().blocks
-        with tempfile.TemporaryDirectory() as folder:
-            for name, draw in self.drawings().items():
-                report.figure(draw(Path(folder) / name))
-        return report
 
     def to_dict(self) -> dict[str, Any]:
         return {
