@@ -3,7 +3,7 @@
 Three things joblib cannot do by its public calls. With one worker it runs calls in this process, which a call that
 kills its worker takes along; so one that is to be apart is two, of which `pre_dispatch` keeps one at work.
 Where a worker is killed, `Parallel` ends and does not say whose worker it was; so what was in work is called again,
-one at a time, and only a call that kills a worker by itself is to blame. A loky worker outlives a parent that is
+each in a `Parallel` of its own, and only a call that kills a worker by itself is to blame. A loky worker outlives a parent that is
 killed; so a thread of it watches the parent.
 """
 
@@ -78,9 +78,12 @@ class Workers:
         True where it had, or its result. Raises `UserError` where workers are killed before they begin.
         """
         suspects = yield from self._side_by_side(function, items, trace)
-        for _ in range(tries - 1):
-            suspects = yield from replace(self, n_jobs=1, apart=True)._side_by_side(function, suspects, trace)
-        yield from ((item, None) for item in suspects)
+        alone = replace(self, n_jobs=1, apart=True)
+        for item in suspects:  # each alone, since joblib takes items ahead of those that are in work
+            left = [item]
+            for _ in range(tries - 1):
+                left = yield from alone._side_by_side(function, left, trace)
+            yield from ((item, None) for item in left)
 
     def _side_by_side(
         self, function: Callable[[Item], Any], items: Sequence[Item], trace: Callable[[Item], Any]

@@ -58,6 +58,18 @@ def test_a_call_that_kills_its_worker_is_blamed_and_no_other(n_jobs, tmp_path):
         assert {begun[k] for k in (0, 1, 3, 4)} == {1}
 
 
+def killed_between(k):
+    """The second of three calls that are in work together kills its worker."""
+    time.sleep(0.3 if k == 1 else 0.8)
+    if k == 1:
+        os._exit(9)
+    return k
+
+
+def test_a_call_that_joblib_takes_ahead_with_the_one_that_kills_is_not_blamed():
+    assert sorted(Workers(3).results(killed_between, range(3))) == [(0, 0), (1, None), (2, 2)]
+
+
 class Killed(Workers):
     """Workers that are killed as soon as they start, as where there is no memory for them."""
 
