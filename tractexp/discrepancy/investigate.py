@@ -24,7 +24,7 @@ from tractexp.discrepancy.records import Records, check_events
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.survivors import Survivors, survivors
 from tractexp.discrepancy.verdict import NONE, UNEXPLAINED, Verdict, verdict
-from tractexp.discrepancy.window_search import behind_recorder
+from tractexp.discrepancy.window_search import behind_recorder, beside_explanation
 from tractexp.domain import domain_of
 from tractexp.model.model import Model
 from tractexp.record import Event
@@ -181,8 +181,9 @@ def investigate(
         records = Records.of(train)
         base = base_fit(Context.of(model, missing, records, bounds or {}, fixed or {}, criteria, effort, substeps))
         base, first = behind_recorder(base, disagreement(base, seed), seed)
+        explained = beside_explanation(explanations(base, first, seed), seed)
+        base, first = explained.base, explained.steps[0]
         standing_out = places(first)
-        explained = explanations(base, first, seed)
         surviving = survivors(explained, seed)
         weighed = held_out(surviving, validate, seed)
         said = verdict(weighed, validate)

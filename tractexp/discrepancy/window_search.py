@@ -1,19 +1,22 @@
-"""Whether what the base model leaves is the work of the recorder: phasors averaged over whole cycles.
+"""Whether what a model leaves is the work of the recorder: phasors averaged over whole cycles.
 
 It is looked for before any effect is, among whole cycles where the records do not say what it is. A window that the
 recorder does not have makes the voltage bend where the power does not: that costs much, with effects in the load or
 without. So one is believed that helps clearly, or at least as much as the best effect does; one that the records say,
-where it helps at all, for a model may lack what a sharper voltage calls for.
+where it helps at all. A model that lacks something large may gain nothing by the right window. So where an explanation
+has faults of the measurement beside it, it is fitted behind each window, too: one that leaves no such fault takes
+their place.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from tractexp.discrepancy.base_fit import BaseFit, fitted_from
 from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.disagreement import Disagreement, disagreement
-from tractexp.discrepancy.explanations import starts
+from tractexp.discrepancy.disagreement import Disagreement, disagreement, examined
+from tractexp.discrepancy.explanations import Explanations, explanations
 from tractexp.discrepancy.fitting import Refit, refit, rough_refit
+from tractexp.discrepancy.noise_in_quiet import QuietNoise
 from tractexp.discrepancy.recorder_window import windows_of
 from tractexp.discrepancy.records import Records
 
@@ -59,18 +62,33 @@ def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[Base
 def _believed(tried: Sequence[WindowFit], first: Disagreement) -> WindowFit | None:
     """The window that helps most, where it helps enough.
 
-    Where an effect explains far more than any window does, they are judged with it in the model: what lacks something
-    large takes a wrong window for a part of it. Without stator transients one of two cycles fits better than the right.
+    None where an effect explains far more than any window does: what lacks something large takes a wrong window for a
+    part of it. Without stator transients one of two cycles fits better than the right one.
     """
     best = max(tried, key=lambda one: one.gained)
     most, criteria = max((s.drop for s in first.scores), default=0.0), first.criteria
     window = best.behind.records.window
     if window is not None and window.recorded:  # that the recorder has a window it says is no guess
         return best if best.gained > 0 else None
-    if most < FAR * best.gained:
-        return best if best.gained > criteria.least_window(most) else None
-    begun = starts([first], {}, (max(first.scores, key=lambda s: s.drop).name,))
-    without = refit(first.context, first.noise, begun)[0].deviance
-    beside = [replace(one, gained=without - refit(one.behind, first.noise, begun)[0].deviance) for one in tried]
-    best = max(beside, key=lambda one: one.gained)
-    return best if best.gained > criteria.window_clear else None
+    return best if most < FAR * best.gained and best.gained > criteria.least_window(most) else None
+
+
+def beside_explanation(explained: Explanations, seed: int) -> Explanations:
+    """The explanations behind the recorder's window, where one does away with the faults of the measurement that the
+    chosen set has beside it; else those given. Windows are tried as long as they leave less than a shorter one."""
+    base, last, context = explained.base, explained.last, explained.base.context
+    if not last.faults or not context.domain.windowed or context.drive.windows:
+        return explained
+    least = last.p_left
+    for window in windows_of(context.events):
+        behind = context.on(Records.of(context.records.recorded, window))
+        fit = refit(behind, last.noise, [(last.fit.names, last.fit.unit)])[0]
+        tests = examined(QuietNoise.at(behind, fit.unit), fit, last.noise, seed, plain=True)
+        if tests.adequate and not tests.faults:
+            context.effort.say(f"{window.describe()}: taken into account from here on")
+            base = fitted_from(behind, [explained.steps[0].fit.unit], base.local_minima)
+            return explanations(base, disagreement(base, seed), seed)
+        if tests.p_left < least:
+            break
+        least = tests.p_left
+    return explained
