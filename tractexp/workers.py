@@ -3,8 +3,8 @@
 Three things joblib cannot do by its public calls. With one worker it runs calls in this process, which a call that
 kills its worker takes along; so one that is to be apart is two, of which `pre_dispatch` keeps one at work.
 Where a worker is killed, `Parallel` ends and does not say whose worker it was; so what was in work is called again,
-each in a `Parallel` of its own, and only a call that kills a worker by itself is to blame. A loky worker outlives a parent that is
-killed; so a thread of it watches the parent.
+each in a `Parallel` of its own, and only a call that kills a worker by itself is to blame. A loky worker outlives a
+parent that is killed; so a thread of it watches the parent.
 """
 
 import contextlib

@@ -45,11 +45,13 @@ class Question(Given):
 
 @dataclass(frozen=True)
 class Misfit:
-    """How far a model is from some events: relative errors of Eq. (20), and chi-squared per sample.
+    """How far a model is from some events: the model's error {value, interval} of the response, relative errors of
+    Eq. (20), and chi-squared per sample.
 
     `epsilon_i` is that of the currents, where those are compared.
     """
 
+    model_error: Mapping[str, Any]
     epsilon_p: float
     epsilon_q: float
     chi2_per_sample: float
@@ -58,7 +60,7 @@ class Misfit:
 
 @dataclass(frozen=True)
 class Gap:
-    """The misfit of the base model and of the extended one; `closed` is the explainable share that went, or None."""
+    """The misfit of the base model and of the extended one; `closed` is the share of the squared error that went."""
 
     before: Misfit
     after: Misfit
@@ -90,6 +92,11 @@ class Investigation(Written):
     def verdict(self) -> str:
         """`none`, `named`, `tied` or `unexplained`."""
         return self.content["verdict"]
+
+    @property
+    def complete(self) -> bool:
+        """Whether nothing but noise is left."""
+        return self.content["complete"]
 
     @property
     def reason(self) -> str:
@@ -250,7 +257,7 @@ class Investigation(Written):
         ]
         if self.names:
             paths.append(discrepancy_json.write_model(self.steps, base, folder / "conf" / "model" / "extended.yaml"))
-        if self.verdict == "unexplained":
+        if not self.complete:
             paths.append(discrepancy_json.write_left(self.steps, folder / "unexplained.csv"))
         if self.content["proposal"]:
             paths.append(discrepancy_json.write_plugin(self.steps, folder / self.content["proposal"]["plugin"]))
@@ -397,7 +404,8 @@ class Discrepancy(Task, call=investigate):
             if (gap := getattr(result.gap, role)) is None:
                 continue
             for stage in ("before", "after"):
-                off = {key: value for key, value in vars(getattr(gap, stage)).items() if value is not None}
+                off = {key: value for key, value in vars(getattr(gap, stage)).items() if isinstance(value, float)}
+                off["model_error"] = getattr(gap, stage).model_error["value"]
                 metrics |= {f"{role}_{stage}_{key}": value for key, value in off.items()}
             if gap.closed is not None:
                 metrics[f"{role}_gap_closed"] = gap.closed

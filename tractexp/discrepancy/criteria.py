@@ -79,9 +79,15 @@ class Criteria:
         10.8, (0.0, 1e6), "expected gain of the deviance from which held-out events can deny an explanation", DERIVED,
         "(2 x 1.645)^2: a true explanation then fails to gain anything in 5 % of cases",
     )  # fmt: skip
-    convincing: float = _criterion(
-        0.8, (0.0, 1.0), "part of the explainable gap closed on held-out events from which a name is not doubted",
-        CHOSEN, "true explanations of four times the detection limit close nine tenths in the median",
+    divides: float = _criterion(
+        2.25, (1.0, 1e6), "factor by which a name must divide the error on the held-out events not to be doubted, or to"
+        " be named where it leaves more than noise", CHOSEN,
+        "true names divide it by four and more, the best imitation of what no effect has by less than two",
+    )  # fmt: skip
+    ahead: float = _criterion(
+        1.5, (1.0, 1e6), "factor by which the error of a set that leaves more than noise must be below that of every"
+        " other set of its size or smaller", CHOSEN,
+        "a right effect by a wrong formula is no farther from a wrong effect than that, and tied with it",
     )  # fmt: skip
     stands: float = _criterion(
         0.05, (0.0, 1.0), "p that a doubted explanation must leave in a fit to all events", CHOSEN,

@@ -3,6 +3,8 @@
 import functools
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from tractexp.discrepancy.base_fit import BaseFit
 from tractexp.discrepancy.chance import Chance, chance_at, noise_known, scales
 from tractexp.discrepancy.context import Context
@@ -27,6 +29,12 @@ class Disagreement:
     projection: ScoreTest
     chance: Chance
     scores: list[Score]  # of the candidates outside the fit, the rarest by chance first
+    robust: np.ndarray | None = None  # (k, d) as `root`, where what is left is no noise
+
+    @property
+    def root(self) -> np.ndarray:
+        """Rows (k, d) whose inverse products are the covariance of all that is free, in its coordinates."""
+        return self.projection.R if self.robust is None else self.robust
 
     @property
     def context(self) -> Context:

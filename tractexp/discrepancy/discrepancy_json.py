@@ -18,6 +18,7 @@ from tractexp.discrepancy.proposal.propose import to_dict as proposal_dict
 from tractexp.discrepancy.verdict import NAMED, TIED, UNEXPLAINED
 from tractexp.domain import DOMAINS
 from tractexp.identification.adequacy import Grade
+from tractexp.identification.model_error import ModelError, in_percent
 from tractexp.wording import joined
 
 PLUGIN = f"{generate.NAME}.py"  # of a proposal, beside the page
@@ -28,6 +29,7 @@ def content(investigation: Findings) -> dict[str, Any]:
     window = investigation.context.records.window
     return {
         "verdict": investigation.verdict.word,
+        "complete": investigation.verdict.complete,
         "reason": investigation.verdict.reason,
         "effects": list(dict.fromkeys(investigation.catalogue.textbook(investigation.names))),
         "name_sets": [list(investigation.catalogue.textbook(names)) for names in investigation.verdict.sets],
@@ -38,6 +40,7 @@ def content(investigation: Findings) -> dict[str, Any]:
             "validate": None if investigation.validate is None else _gap(investigation.validate),
             "fitted_to_both": investigation.fitted_to_both,
         },
+        "contributions": contributions(investigation),
         "left": investigation.last.left,
         "nearest": _nearest(investigation),
         "candidates": [*sets(investigation), *_singles(investigation)],
@@ -109,14 +112,34 @@ def _nearest(investigation: Findings) -> dict[str, Any] | None:
 
 
 def _remainder(investigation: Findings) -> dict[str, Any] | None:
-    """Shapes in what the nearest candidates leave, and in what the base model alone leaves, and the sentence."""
-    if not investigation.headline:
+    """What is left where it is more than noise: its size, on held-out events where there are any, the share of the
+    base model's squared error that it is, how often chance leaves as much, which test it surprises most, and shapes.
+    """
+    if investigation.verdict.complete:
         return None
+    near, tests = investigation.verdict.nearest, investigation.tests
+    nearest = near and (near.carried or near.curves)[1].error
+    gap = investigation.validate or investigation.train
     return {
+        "model_error": _error(nearest or gap.after.error),
+        "share": _number(gap.after.error.square / gap.before.error.square) if investigation.names else None,
+        "p": tests.p_left,
+        "where": tests.loudest,
         "sentence": investigation.headline,
-        "of_nearest": [asdict(shape) for shape in investigation.remainder if investigation.verdict.nearest],
+        "of_names": [asdict(shape) for shape in investigation.remainder if investigation.names],
+        "of_nearest": [asdict(shape) for shape in investigation.remainder if near],
         "of_base": [asdict(shape) for shape in investigation.remainder_of_base],
     }
+
+
+def contributions(investigation: Findings) -> list[dict[str, Any]]:
+    """The model's error with the names added one at a time, the one that helps most first; on held-out events."""
+    steps = investigation.contributions
+    return [{"effects": list(names), "model_error": _number(error)} for names, error in steps]
+
+
+def _error(error: ModelError) -> dict[str, Any]:
+    return {"value": _number(error.value), "interval": [_number(end) for end in error.interval]}
 
 
 def _estimate(by_name: ParameterEstimate) -> dict[str, Any]:
@@ -125,9 +148,9 @@ def _estimate(by_name: ParameterEstimate) -> dict[str, Any]:
 
 
 def write_left(investigation: Findings, path: Path) -> Path:
-    """Write what the nearest candidates leave, measured less calculated [pu], as CSV: event, t [s], each channel."""
+    """Write what the best model leaves, measured less calculated [pu], as CSV: event, t [s], each channel."""
     drive, nearest = investigation.context.drive, investigation.verdict.nearest
-    near = investigation.train.before.calculated if nearest is None else nearest.calculated
+    near = investigation.train.after.calculated if nearest is None else nearest.calculated
     lines = [",".join(["event", "t", *drive.names])]
     for e, event in enumerate(investigation.context.events):
         left = drive.measured[:, drive.part(e)] - near[:, drive.part(e)]
@@ -143,10 +166,10 @@ def write_plugin(investigation: Findings, path: Path) -> Path:
     return files.write(path, proposal.source)
 
 
-def _curves(curves: Curves) -> dict[str, float]:
+def _curves(curves: Curves) -> dict[str, Any]:
     own = {} if curves.epsilon_i is None else {"epsilon_i": curves.epsilon_i}
     errors = {"epsilon_p": curves.epsilon_p, "epsilon_q": curves.epsilon_q}
-    return errors | own | {"chi2_per_sample": curves.chi2_per_sample}
+    return {"model_error": _error(curves.error)} | errors | own | {"chi2_per_sample": curves.chi2_per_sample}
 
 
 def sets(investigation: Findings) -> list[dict[str, Any]]:
@@ -206,4 +229,7 @@ def write_model(investigation: Findings, node: dict[str, Any], path: Path) -> Pa
     } | {part: chosen for part, chosen in settings.items() if chosen}
     command = use_of(investigation.context.load.domain, "<this conf>")
     head = f"# The base model and what was found missing: {command}\n"
+    if not investigation.verdict.complete:
+        after = (investigation.validate or investigation.train).after.error
+        head += f"# Something is missing still: it misses {in_percent(after.value)} of the load's response.\n"
     return files.write(path, head + yaml.safe_dump(extended, sort_keys=False))

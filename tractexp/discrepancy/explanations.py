@@ -167,13 +167,18 @@ def searched_widely(
     """
     if best.suffices:
         return first, []
-    context, bare = base.context, refits[()].unit
+    context = base.context
     singles: Refits = {f.names: f for f in best_of(refits.values()) if len(f.names) == 1}
-    unlike = [f for f in singles.values() if len(context.catalogue[f.names[0]].settings) > 1]
-    grounds = bare, *off_bounds(context, bare)
-    wanted = [[(f.names, f.unit), *(s for unit in grounds for s in _every_setting(context, f, unit))] for f in unlike]
-    fits = wide_refits(context, first.noise, wanted, WIDELY)
+    fits = wide_refits(context, first.noise, wide_starts(context, refits[()].unit, singles), WIDELY)
     return first, [f for f in fits if f.deviance < singles[f.names].deviance - NESTED_TOLERANCE]
+
+
+def wide_starts(context: Context, bare: np.ndarray, refits: Refits) -> list[list[Start]]:
+    """Starts for each single effect that has thresholds or times: its fit, and all settings beside the base model."""
+    singles = [f for f in refits.values() if len(f.names) == 1]
+    unlike = [f for f in singles if len(context.catalogue[f.names[0]].settings) > 1]
+    grounds = bare, *off_bounds(context, bare)
+    return [[(f.names, f.unit), *(s for unit in grounds for s in _every_setting(context, f, unit))] for f in unlike]
 
 
 def _every_setting(context: Context, fit: Refit, unit: np.ndarray) -> list[Start]:

@@ -1,4 +1,4 @@
-"""The gap between simulation and measurement before and after an effect is added, fitted and held out."""
+"""The gap between simulation and measurement, the model's error, before and after an effect is added."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -36,22 +36,33 @@ class Curves:
 
 @dataclass(frozen=True, eq=False)
 class GapTest:
-    """Before and after: `closed` is the share of the explainable gap, `gain` the deviance gained.
+    """The model's error before and after, and whether these events bear the extension out.
 
-    `expected` is the gain to be expected of a true explanation, the squared distance of both curves in standard
-    deviations; a true one scatters about it by twice its root.
-
-    Explainable is what was gained and what pushes into the balances would still gain: the deviance itself moves with
-    the level of the noise, which is only estimated, by more than a small gap.
+    `gain` is the deviance gained, `expected` what a true explanation would gain, the squared distance of both curves
+    in standard deviations; a true one scatters about it by twice its root. `left` is what pushes into the balances
+    would still gain beyond chance: a measure sharper than the model's error where the gap is no larger than the noise.
     """
 
     before: Curves
     after: Curves
-    closed: float
     gain: float
+    left: float
     expected: float
     shown: float  # the criterion
     noise: Noise  # by which both are judged
+
+    @property
+    def closed(self) -> float:
+        """The share of the squared model error that is gone; above 1 where less is left than noise leaves in the mean,
+        below 0 where more is left than before, nan where there was none."""
+        before = self.before.error.square
+        return 1 - self.after.error.square / before if 0 < before < np.inf else np.nan
+
+    @property
+    def explained(self) -> float:
+        """The share of what could be explained: of what was gained and what is left."""
+        whole = self.gain + max(self.left, 0.0)
+        return self.gain / whole if whole > 0 else np.nan
 
     @property
     def telling(self) -> bool:
@@ -96,13 +107,11 @@ def gap(
     Coordinates `fitted` were fitted to these events in the extended model.
     """
     before, after = curves(context, base, noise, ()), curves(context, extended, noise, names)
-    gained = before.deviance - after.deviance
-    explainable = gained + max(left_over(context, extended, names, noise, fitted), 0.0)
-    closed = gained / explainable if explainable > 0 else float("nan")
+    gained, left = before.deviance - after.deviance, left_over(context, extended, names, noise, fitted)
     apart = (after.calculated - before.calculated)[None] * context.valid
     rows = context.whiten(noise, apart)[0]
     expected = float(np.nan_to_num(rows @ rows, nan=np.inf))
-    return GapTest(before, after, float(closed), float(gained), expected, context.criteria.shown, noise)
+    return GapTest(before, after, float(gained), left, expected, context.criteria.shown, noise)
 
 
 def left_over(

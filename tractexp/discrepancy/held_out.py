@@ -14,6 +14,7 @@ from tractexp.discrepancy.explanations import Explanations
 from tractexp.discrepancy.fitting import Refit, refit, settled
 from tractexp.discrepancy.gap import GapTest, gap
 from tractexp.discrepancy.noise_in_quiet import QuietNoise, white
+from tractexp.discrepancy.prediction import ErrorPredictions
 from tractexp.discrepancy.records import Records
 from tractexp.discrepancy.survivors import Rival, Survivors
 from tractexp.noise import Noise
@@ -44,7 +45,7 @@ class Assessment:
     @property
     def convincing(self) -> bool:
         """Whether it closes as much of the gap there as a true explanation does."""
-        return self.gap.closed >= self.context.criteria.convincing
+        return self.gap.explained >= 1 - 1 / self.context.criteria.divides**2
 
     @property
     def tolerable(self) -> bool:
@@ -57,7 +58,9 @@ class HeldOut:
     """The explanations that remain, as fitted without the faults of the measurement that do not help.
 
     `bare` is the base model alone, `extended` each explanation, `assessments` are of held-out events. Where none
-    helped as it was fitted, `together` are those that were fitted to all events instead.
+    helped as it was fitted, `together` are those that were fitted to all events instead. Where none leaves noise only,
+    the survivors are those that predict the held-out events well (`leaves_more`), by the `predictions` of all sets
+    where the deviance told none.
     """
 
     survivors: Survivors
@@ -67,10 +70,14 @@ class HeldOut:
     extended: Mapping[Names, Refit]
     assessments: Mapping[Names, Assessment] = field(default_factory=dict)
     together: tuple[Refit, ...] = ()
+    predictions: ErrorPredictions | None = None
+    leaves_more: bool = False
 
     @property
     def retained(self) -> tuple[Rival, ...]:
-        """The adequate explanations that the held-out events do not deny."""
+        """The adequate explanations that the held-out events do not deny, or those that predict them best."""
+        if self.leaves_more:
+            return self.survivors.retained
         assessments, adequate = self.assessments, self.survivors.adequate
         helping = [s for s in adequate if s.fit.names not in assessments or assessments[s.fit.names].helps]
         if helping:

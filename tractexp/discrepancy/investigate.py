@@ -14,6 +14,7 @@ from tractexp.discrepancy.explanations import Explanations, explanations
 from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.gap import GapTest, gap
 from tractexp.discrepancy.held_out import Assessment, HeldOut, held_out
+from tractexp.discrepancy.incomplete import incomplete
 from tractexp.discrepancy.kernels import Family
 from tractexp.discrepancy.next_event.choose import NextEvent
 from tractexp.discrepancy.overlay import Overlay, left, on_fitted, on_held_out
@@ -23,11 +24,12 @@ from tractexp.discrepancy.proposal.propose import Proposed, propose
 from tractexp.discrepancy.records import Records, check_events
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.survivors import Survivors, survivors
-from tractexp.discrepancy.verdict import NONE, UNEXPLAINED, Verdict, verdict
+from tractexp.discrepancy.verdict import NONE, UNEXPLAINED, Verdict, verdict, word_of
 from tractexp.discrepancy.window_search import behind_recorder, beside_explanation
 from tractexp.domain import domain_of
 from tractexp.model.model import Model
 from tractexp.record import Event
+from tractexp.wording import joined
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +64,22 @@ class Findings:
     def last(self) -> Disagreement:
         """The tests once the chosen effects are in."""
         return self.explanations.last
+
+    @property
+    def tests(self) -> Disagreement:
+        """The tests of the model that the investigation ends with."""
+        return (self.verdict.chosen.tests or self.last) if self.names else self.first
+
+    @functools.cached_property
+    def contributions(self) -> list[tuple[tuple[str, ...], float]]:
+        """Names, from none to all of them, one more at a time, and the model's error with them."""
+        predicted = self.held_out.predictions
+        if self.held_out.leaves_more and predicted is not None:
+            return [(one.names, one.error) for one in predicted.contributions(self.names)]
+        if not self.names:
+            return []
+        judged = self.validate or self.train
+        return [((), judged.before.error.value), (self.names, judged.after.error.value)]
 
     @property
     def bare(self) -> Refit:
@@ -110,22 +128,24 @@ class Findings:
 
     @functools.cached_property
     def remainder(self) -> list[Remainder]:
-        """What is left where nothing explains it, the loudest first: shapes in what the nearest model leaves.
+        """What is left where it is more than noise, the loudest first: shapes in what the best model leaves.
 
         On the held-out events only where the fitted ones show none: what explains those may not hold beyond them.
         """
-        return self._left(self.overlays) if self.verdict.word == UNEXPLAINED else []
+        return [] if self.verdict.complete else self._left(self.overlays)
 
     @functools.cached_property
     def remainder_of_base(self) -> list[Remainder]:
         """The same of what the base model alone leaves: the nearest candidates may have patched something up."""
         if self.verdict.nearest is None:
-            return self.remainder
+            return [] if self.names else self.remainder
         return self._left([replace(overlay, nearest=None) for overlay in self.overlays])
 
     @property
     def headline(self) -> str:
         """What is left in one sentence: the loudest shape of the model whose remainder shapes describe best."""
+        if self.names and self.remainder:
+            return f"beside {joined(self.names)} this is left: {self.remainder[0]}"
         remainders_left = [
             (shapes, base) for shapes, base in ((self.remainder, False), (self.remainder_of_base, True)) if shapes
         ]
@@ -186,6 +206,8 @@ def investigate(
         standing_out = places(first)
         surviving = survivors(explained, seed)
         weighed = held_out(surviving, validate, seed)
+        if word_of(weighed) == UNEXPLAINED:
+            weighed = incomplete(weighed, validate, seed)
         said = verdict(weighed, validate)
         proposed = Proposed()
         if said.word == UNEXPLAINED:

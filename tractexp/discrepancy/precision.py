@@ -43,7 +43,7 @@ def standard_errors(tests: Disagreement) -> dict[str, float]:
     A parameter that rests on its bound has none.
     """
     at = tests.context.coordinates
-    inverse = np.linalg.pinv(tests.projection.R, rcond=1e-10)
+    inverse = np.linalg.pinv(tests.root, rcond=1e-10)
     spread = np.sqrt(np.einsum("ij,ij->i", inverse, inverse))
     labels = {k: name for name, k in at.column.items() if k not in tests.tangent.held}
     columns = _columns(tests)
@@ -53,7 +53,7 @@ def standard_errors(tests: Disagreement) -> dict[str, float]:
 def covariance(tests: Disagreement, names: Sequence[str]) -> tuple[list[str], np.ndarray]:
     """Covariance (k, k) of those of the named parameters that the fit tells, and which they are."""
     at, columns = tests.context.coordinates, _columns(tests)
-    inverse = np.linalg.pinv(tests.projection.R, rcond=1e-10)
+    inverse = np.linalg.pinv(tests.root, rcond=1e-10)
     identified = [n for n in names if at.column[n] in columns]
     rows = inverse[[columns.index(at.column[n]) for n in identified]]
     width = np.array([at.width(n) for n in identified])
@@ -94,7 +94,7 @@ def _words(
     tests: Disagreement, names: Sequence[str], values: Sequence[float], errors: Sequence[float]
 ) -> dict[str, str]:
     """The verdict of each parameter, with all other coordinates left free beside them."""
-    at, R, columns = tests.context.coordinates, tests.projection.R, _columns(tests)
+    at, R, columns = tests.context.coordinates, tests.root, _columns(tests)
     own = [columns.index(at.column[n]) for n in names]
     others = [i for i in range(len(columns)) if i not in own]
     lower, upper = (np.array([bound[at.column[n]] for n in names]) for bound in (at.lower, at.upper))

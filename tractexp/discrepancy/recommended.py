@@ -6,7 +6,6 @@ more of them.
 
 from dataclasses import replace
 
-from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.verdict import NONE, TIED
 from tractexp.identification.adequacy import Adequacy, Surprise, graded, loudest_stretch
@@ -15,7 +14,7 @@ from tractexp.identification.verdict import UNIDENTIFIED, size
 
 def adequacy(findings: Findings) -> Adequacy:
     """The grade of the extended model, or of the base model where nothing is named, on all events."""
-    tests: Disagreement = (findings.verdict.chosen.tests or findings.last) if findings.names else findings.first
+    tests = findings.tests
     ratio, where = loudest_stretch(tests.projection.channels(findings.context)[0], findings.context)
     p = 1.0 if findings.verdict.word == NONE else tests.p_left  # no disagreement: by the same false-alarm rate
     surprise = Surprise(p, tests.loudest, ratio, where)

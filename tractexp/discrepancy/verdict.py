@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.explanations import Explanations
 from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.gap import Curves, curves
 from tractexp.discrepancy.held_out import HeldOut, carried
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
-from tractexp.discrepancy.survivors import Rival, Survivors
+from tractexp.discrepancy.survivors import Rival
+from tractexp.identification.model_error import in_percent
 from tractexp.noise import Noise
 from tractexp.record import Event
 from tractexp.wording import in_words, joined, percent
@@ -43,7 +43,8 @@ class Nearest:
 class Verdict:
     """One of four words, the sentence behind it, and what belongs to it.
 
-    `names` are the effects added, `sets` all sets not rejected, `chosen` the set that the extended model has.
+    `names` are the effects added, `sets` all sets not rejected, `chosen` the set that the extended model has. It is
+    `complete` where nothing but noise is left.
     """
 
     word: str
@@ -53,6 +54,7 @@ class Verdict:
     chosen: Rival
     next_event: NextEvent | None  # that would tell tied sets apart
     nearest: Nearest | None  # where nothing explains
+    complete: bool
 
 
 def verdict(weighed: HeldOut, validate: Sequence[Event]) -> Verdict:
@@ -60,7 +62,7 @@ def verdict(weighed: HeldOut, validate: Sequence[Event]) -> Verdict:
     left = weighed.survivors
     explained = left.explanations
     context, first = explained.base.context, explained.steps[0]
-    word = _word(explained, left, weighed)
+    word = word_of(weighed)
     nearest = _nearest(context, weighed.bare, left.rivals, weighed.noise, validate) if word == UNEXPLAINED else None
     sets = _sets(weighed) if word in (NAMED, TIED) else ()
     reason = _reason(word, weighed, sets, nearest)
@@ -81,6 +83,7 @@ def verdict(weighed: HeldOut, validate: Sequence[Event]) -> Verdict:
         chosen=chosen,
         next_event=_next_event(weighed, sets) if word == TIED else None,
         nearest=nearest,
+        complete=word != UNEXPLAINED and not weighed.leaves_more,
     )
 
 
@@ -92,11 +95,13 @@ def _next_event(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> NextEvent:
     return next_event(context, weighed.noise, weighed.bare, fits, labels)
 
 
-def _word(explained: Explanations, left: Survivors, weighed: HeldOut) -> str:
+def word_of(weighed: HeldOut) -> str:
+    """What it comes to."""
+    explained, left = weighed.survivors.explanations, weighed.survivors
     first = explained.steps[0]
     if explained.empty and first.adequate:
         return NONE
-    if not left.adequate:
+    if not left.adequate and not weighed.leaves_more:
         return UNEXPLAINED
     if not weighed.retained:
         return NONE if first.adequate else UNEXPLAINED
@@ -122,8 +127,10 @@ def _reason(word: str, weighed: HeldOut, sets: Sequence[Sequence[str]], nearest:
     """The sentence behind the word."""
     left = weighed.survivors
     first = left.explanations.steps[0]
+    if weighed.leaves_more:
+        return _by_size(weighed, sets)
     if word == NAMED:
-        return _named(_spoken(sets[0], weighed), len(first.context.catalogue.candidates))
+        return _named(_spoken(sets[0], weighed), len(first.context.catalogue.candidates), _fitted(weighed, sets[0]))
     if word == TIED:
         return _tied([_spoken(names, weighed) for names in sets])
     if word == UNEXPLAINED and not left.adequate:
@@ -139,11 +146,52 @@ def _reason(word: str, weighed: HeldOut, sets: Sequence[Sequence[str]], nearest:
     return f"no disagreement above the noise, at a false-alarm rate of {first.criteria.false_alarms:.0%}"
 
 
-def _named(names: Sequence[str], tested: int) -> str:
+def _fitted(weighed: HeldOut, names: Sequence[str]) -> int:
+    """How many other sets of so many effects were fitted."""
+    sets = {r.fit.names for r in weighed.survivors.rivals if len(r.fit.names) == len(names)}
+    return len(sets - {tuple(names)})
+
+
+def _named(names: Sequence[str], tested: int, fitted: int) -> str:
     if len(names) > 1:
-        return f"{joined(names)} explain the disagreement, and no other set of {len(names)} of the {tested} tested does"
+        rest = f"none of the {fitted} other sets of {len(names)} that were fitted does" if fitted else ""
+        return f"{joined(names)} explain the disagreement{', and ' * bool(rest)}{rest}"
     rest = f"none of the {tested - 1} other effects tested does" if tested > 1 else "no other effect was tested"
     return f"{names[0]}{',' * (', ' in names[0])} explains the disagreement, and {rest}"
+
+
+def _by_deviance(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> str:
+    """What the sets explain on the held-out events, and what became of the others."""
+    shares = joined([percent(weighed.assessments[tuple(names)].gap.explained) for names in sets], "and")
+    spoken = joined([joined(_spoken(names, weighed)) for names in sets], "or")
+    others = sum(r.rejected for r in weighed.survivors.rivals)
+    rest = f", and the {others} other sets of its size that were fitted are rejected" * (len(sets) == 1 and others > 0)
+    verb = "explains" if len(sets) == 1 and len(sets[0]) == 1 else "explain"
+    tie = ", and these events cannot tell them apart" * (len(sets) > 1)
+    return (
+        f"{spoken} {verb} {shares} of what exceeds the noise on the held-out events{rest}{tie}; more than noise is left"
+    )
+
+
+def _by_size(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> str:
+    """How far the sets that predict best, the base model and the next set are off on the held-out events."""
+    if (predicted := weighed.predictions) is None:
+        return _by_deviance(weighed, sets)
+    chosen = [predicted.sets[tuple(names)] for names in sets]
+    size = len(chosen[0].names)
+    rest = [p for p in predicted.ranked(size) if p.names not in sets]
+    off = joined([in_percent(p.error) for p in chosen], "and")
+    following = f", the next best of {len(rest)} other sets, {joined(_spoken(rest[0].names, weighed))}," if rest else ""
+    worse = f"the base model misses {in_percent(predicted.bare.error)} of it{' and' * bool(rest)}{following}"
+    worse += f" {in_percent(rest[0].error)}" if rest else ""
+    spoken = joined([joined(_spoken(names, weighed)) for names in sets], "or")
+    if len(sets) > 1:
+        sentence = (
+            f"{spoken}: they predict the held-out events within {off} of the response, which cannot tell them apart"
+        )
+    else:
+        sentence = f"{spoken} predict{'s' * (size == 1)} the held-out events within {off} of the response"
+    return f"{sentence}, where {worse}; what is left is more than noise, and the held-out events were used to choose"
 
 
 def _tied(sets: Sequence[Sequence[str]]) -> str:

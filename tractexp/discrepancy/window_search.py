@@ -83,6 +83,8 @@ def beside_explanation(explained: Explanations, seed: int) -> Explanations:
     for window in windows_of(context.events):
         behind = context.on(Records.of(context.records.recorded, window))
         fit = refit(behind, last.noise, [(last.fit.names, last.fit.unit)])[0]
+        if not fit.deviance < explained.steps[0].fit.deviance:
+            break  # it costs more than the explanation gains
         tests = examined(QuietNoise.at(behind, fit.unit), fit, last.noise, seed, plain=True)
         if tests.adequate and not tests.faults:
             context.effort.say(f"{window.describe()}: taken into account from here on")

@@ -31,11 +31,15 @@ class Playback(Protocol):
 
 @dataclass(frozen=True)
 class ModelError:
-    """A model's error as a share of the response, its 95 % interval, and as a share of the apparent power."""
+    """A model's error as a share of the response, its 95 % interval, and as a share of the apparent power.
+
+    `square` is the square of it as reckoned, below zero where less is left than noise leaves in the mean.
+    """
 
     value: float
     interval: tuple[float, float]
     of_S: float
+    square: float = np.nan
 
     def to_dict(self) -> dict[str, Any]:
         """As `result.json` has it."""
@@ -45,7 +49,7 @@ class ModelError:
     def of(cls, content: Mapping[str, Any]) -> "ModelError":
         """From `to_dict`."""
         low, high = content["interval"]
-        return cls(content["value"], (low, high), content["of_S"])
+        return cls(content["value"], (low, high), content["of_S"], content["value"] ** 2)
 
     def __str__(self) -> str:
         return f"{in_percent(self.value)} of its response ({in_percent(self.of_S)} of S)"
@@ -59,20 +63,20 @@ def in_percent(share: float) -> str:
 
 def model_error(played: Sequence[Playback]) -> ModelError:
     """The error of a model over some events together."""
-    sums = np.concatenate([_sums(one) for one in played])  # (blocks, 3)
+    sums = np.concatenate([block_sums(one) for one in played])  # (blocks, 3)
     left, response, power = sums.sum(axis=0)
     ratio = left / max(response, 1e-30)
     if not np.isfinite(left):
-        return ModelError(np.inf, (np.inf, np.inf), np.inf)
+        return ModelError(np.inf, (np.inf, np.inf), np.inf, np.inf)
     without = (left - sums[:, 0]) / np.maximum(response - sums[:, 1], 1e-30)
     count = len(sums)
     error = float(np.sqrt((count - 1) / count * np.sum((without - ratio) ** 2))) if count > 1 else np.inf
     reach = quantile(count) * error
     root = lambda square: float(np.sqrt(max(square, 0.0)))  # noqa: E731
-    return ModelError(root(ratio), (root(ratio - reach), root(ratio + reach)), root(left / max(power, 1e-30)))
+    return ModelError(root(ratio), (root(ratio - reach), root(ratio + reach)), root(left / max(power, 1e-30)), ratio)
 
 
-def _sums(played: Playback) -> np.ndarray:
+def block_sums(played: Playback) -> np.ndarray:
     """Squares of what is left, of the response, both less those of the noise, and of the power; by block (b, 3)."""
     event, record = played.event, played.event.record
     S, S_0 = record.P + 1j * record.Q, event.P0 + 1j * event.Q0

@@ -59,12 +59,12 @@ def scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
     every = np.arange(free)
     inside = every[(unit[:free] > WALL) & (unit[:free] < 1 - WALL)]
     root, ratio = np.zeros((free, free)), np.ones(free)
-    own, ratio[inside], spread = _root(J[:, inside], influences(inside))
+    own, ratio[inside], spread = robust_root(J[:, inside], influences(inside))
     root[np.ix_(every[: len(own)], inside)] = own
     if len(inside) < free:
         held = np.setdiff1d(every, inside)
         rows = rows - (J[:, :free] @ np.linalg.lstsq(J[:, :free], rows.ravel())[0]).reshape(rows.shape)
-        full, wider, _ = _root(J[:, :free], influences(every))
+        full, wider, _ = robust_root(J[:, :free], influences(every))
         ratio[held] = wider[held]
         errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(full.T @ full))[held], 0.0))
         seen = errors > 0  # what changes nothing has no error, and stays out of what is known
@@ -105,7 +105,7 @@ def _influences(
     return np.clip(moves, -1.0, 1.0)  # no estimate leaves its box
 
 
-def _root(J: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+def robust_root(J: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """Rows (k, d) whose inverse products are the covariance of what J (R, d) sees, and how that compares with J's own.
 
     `moved` (G, d) are the estimates without each block. Along the directions of J, in which independent residuals of

@@ -27,6 +27,7 @@ from tractexp.discrepancy.precision import ParameterEstimate, estimates
 from tractexp.discrepancy.recommended import adequacy, held
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.verdict import UNEXPLAINED, Nearest
+from tractexp.identification.model_error import in_percent
 from tractexp.model.sites import KINDS
 from tractexp.report.next_event import section
 from tractexp.report.overlay import overlaid
@@ -86,14 +87,16 @@ def gap(content: Mapping[str, Any]) -> Table:
         for model, stage in (("base model", "before"), ("extended model", "after"))[: 1 + named]:
             if (one := gaps[role]) is not None:
                 closed = one["closed"] if stage == "after" else None
-                rows.append([label, model, *_off(one[stage]), "" if closed is None else f"{closed:.0%}"])
+                error = _error(one[stage]["model_error"])
+                rows.append([label, model, error, *_off(one[stage]), "" if closed is None else f"{closed:.0%}"])
     waves = "epsilon_i" in gaps["train"]["before"]
-    columns = ["events", "model", "epsilon_p", "epsilon_q", *["epsilon_i"] * waves, "chi2 per sample"]
-    caption = f"epsilon: relative error of P and Q, Eq. (20){CURRENTS * waves}."
+    columns = ["events", "model", "model error", "epsilon_p", "epsilon_q", *["epsilon_i"] * waves, "chi2 per sample"]
+    caption = "Model error: what is left of the load's response, in S, beyond the noise, with its 95 % interval."
+    caption += f" epsilon: relative error of P and Q, Eq. (20){CURRENTS * waves}."
     caption += " chi2 per sample: 1 where only noise is left."
     if named:
         columns.append("gap closed")
-        caption += " Gap closed: the share of what an explanation could gain at all."
+        caption += " Gap closed: the share of the squared model error that is gone."
     return Table(columns, [row[: len(columns)] for row in rows], "", caption, words=(1,))
 
 
@@ -115,6 +118,7 @@ def report(findings: Findings, content: Mapping[str, Any], title: str) -> Report
     _smaller(page, findings, content)
     if findings.verdict.word == UNEXPLAINED:
         proposed(page, findings)
+    if not findings.verdict.complete:
         _left(page, findings)
     if (chosen := findings.next_event) is not None:
         page.heading("What to record next").text(as_sentence(chosen.sentence()))
@@ -141,17 +145,34 @@ def _smaller(page: Report, findings: Findings, content: Mapping[str, Any]) -> No
     page.heading("How large the gap is" if not findings.names else "How much smaller the gap is")
     table, near = gap(content), findings.verdict.nearest
     page.add(replace(table, rows=_with_nearest(near)) if findings.context.waves and near else table)
+    if len(steps := content["contributions"]) > 2:
+        rows = [[joined(s["effects"]) or "the base model", in_percent(s["model_error"])] for s in steps]
+        page.text("What each name contributes:")
+        page.table(["with", "model error, held out"], rows, "One more at a time, the one that helps most first.")
     if findings.fitted_to_both:
         page.text("The extended model was fitted to the held-out events, too: what they say of it is no test of it.")
 
 
 def _with_nearest(near: Nearest) -> list[list[str]]:
     """The base model's gap and that of the candidates which come nearest."""
+    error = lambda curves: _error({"value": curves.error.value, "interval": curves.error.interval})  # noqa: E731
     pairs = (("fitted", near.curves), ("held out", near.carried))
     stages = ("base model", "nearest candidates")
     return [
-        [label, stage, *_off(vars(c))] for label, both in pairs if both for stage, c in zip(stages, both, strict=True)
+        [label, stage, error(c), *_off(vars(c))]
+        for label, both in pairs
+        if both
+        for stage, c in zip(stages, both, strict=True)
     ]
+
+
+def _error(entry: Mapping[str, Any]) -> str:
+    """A model's error with its interval, as a table has it."""
+    ends = [in_percent(end) for end in entry["interval"] if end is not None and np.isfinite(end)]
+    value = entry["value"]
+    if value is None or not np.isfinite(value):
+        return "beyond all measure"
+    return in_percent(value) + (f" ({ends[0].removesuffix(' %')} to {ends[1]})" if len(ends) == 2 else "")
 
 
 def _off(misfit: Mapping[str, Any]) -> list[str]:
@@ -161,10 +182,12 @@ def _off(misfit: Mapping[str, Any]) -> list[str]:
 
 
 def _left(page: Report, findings: Findings) -> None:
-    """What nothing explains, in words."""
+    """What is left beside the names, or what nothing explains, in words."""
     page.heading("What is left")
     shapes, near = findings.remainder, findings.verdict.nearest
     whose = "the base model" if near is None else f"{joined(near.names)}, the nearest candidates,"
+    if findings.names:
+        whose = f"the model with {joined(findings.names)}"
     _shapes(page, findings, shapes, whose)
     if near is not None:
         _shapes(page, findings, findings.remainder_of_base, "the base model alone")

@@ -1,0 +1,137 @@
+"""Explanations that leave more than noise, where none leaves less: named by what they predict of held-out events."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+from tractexp.discrepancy.cores import each_apart
+from tractexp.discrepancy.disagreement import examined
+from tractexp.discrepancy.explanations import Names
+from tractexp.discrepancy.fitting import Refit, refit
+from tractexp.discrepancy.gap import gap
+from tractexp.discrepancy.held_out import Assessment, HeldOut, judged_on
+from tractexp.discrepancy.least_squares import least_squares_tests
+from tractexp.discrepancy.prediction import (
+    ErrorPredictions,
+    Prediction,
+    PredictionError,
+    Predictions,
+    predictions,
+)  # fmt: skip
+from tractexp.discrepancy.survivors import Rival
+from tractexp.record import Event
+
+JUDGED = 10  # sets of the search by likelihood that are judged on the held-out events
+
+
+@dataclass(frozen=True, eq=False)
+class PredictedDeviance(Prediction):
+    """By the deviance on the held-out events: what is left of it, itself, and whether the fitted events reject the set.
+
+    `least` is what chance may leave.
+    """
+
+    left_over: float
+    deviance: float
+    rejected: bool
+    least: float
+
+    @property
+    def left(self) -> float:
+        return max(self.left_over, self.least)
+
+    def clear_of(self, other: Prediction) -> bool:
+        assert isinstance(other, PredictedDeviance)
+        return other.deviance - self.deviance >= self.least or (other.rejected and not self.rejected)
+
+
+def incomplete(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
+    """The sets that predict the held-out events, if any does; what else there is stays as it was.
+
+    None without held-out events: a larger set always fits better what it was fitted to. Nor where those deny what
+    leaves noise only on the fitted ones.
+    """
+    if not events or weighed.survivors.adequate:
+        return weighed
+    weighed.survivors.explanations.base.context.effort.say("judging what leaves something on the held-out events")
+    return _by_deviance(weighed, events, seed) or _by_size(weighed, events, seed)
+
+
+def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut | None:
+    """The sets of the search by likelihood; none beside faults of the measurement, which what is missing looks like."""
+    surviving, noise = weighed.survivors, weighed.survivors.explanations.last.noise
+    explained, context = surviving.explanations, surviving.explanations.base.context
+    least = context.criteria.shown
+    rejected = {r.fit.names: r.rejected for r in surviving.rivals}
+    fits = {names: f for names, f in explained.refits.items() if names and (names in rejected or len(names) == 1)}
+    if weighed.faults or not fits:
+        return None
+    wanted = sorted(fits.values(), key=lambda f: f.cost)[:JUDGED]
+    unit = context.coordinates.without_faults
+    fitted = refit(context, noise, [(f.names, unit(f.unit, ())) for f in wanted], faults=())
+    judged = judged_on(context, events, weighed.bare, fitted)
+    gaps = {f.names: judged[f.names].gap for f in fitted}
+    whole = max(gaps.values(), key=lambda one: one.gain)
+    sets: dict[Names, PredictedDeviance] = {
+        (): PredictedDeviance(weighed.bare, whole.gain + max(whole.left, 0.0), whole.before.deviance, True, least)
+    }
+    for fit in fitted:
+        one = gaps[fit.names]
+        sets[fit.names] = PredictedDeviance(
+            fit, one.left, one.after.deviance, bool(rejected.get(fit.names, False)), least
+        )
+    chosen = [p.fit for p in Predictions(context.catalogue, sets).explaining(context.criteria) if not p.rejected]
+    if not chosen or not all(gaps[f.names].telling and gaps[f.names].helps for f in chosen):
+        return None
+    _compiled(weighed, [f.names for f in chosen])
+
+    def rival(fit: Refit) -> Rival:
+        tests = examined(explained.base.quiet, fit, noise, seed, plain=True)
+        lowered = weighed.bare.deviance - fit.deviance
+        return Rival(fit, lowered, fit.cost - chosen[0].cost, 0.0, rejected=False, tests=tests)
+
+    retained = each_apart(rival, chosen)
+    others = [r for r in surviving.rivals if r.fit.names not in {f.names for f in chosen}]
+    return replace(
+        weighed, survivors=replace(surviving, retained=tuple(retained), rivals=(*retained, *others)), together=(),
+        extended={f.names: f for f in chosen}, assessments={f.names: judged[f.names] for f in chosen},
+        leaves_more=True,
+    )  # fmt: skip
+
+
+def _by_size(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
+    """The sets that predict the held-out events best by the size of the model's error."""
+    explained = weighed.survivors.explanations
+    predicted = predictions(explained, events)
+    explaining = predicted.explaining(explained.base.context.criteria)
+    if not explaining:
+        return replace(weighed, predictions=predicted)
+    best, size = explaining[0], len(explaining[0].names)
+    others = [p for p in predicted.ranked(size) if len(p.names) == size and p not in explaining]
+    bare = predicted.bare.fit
+    _compiled(weighed, [p.names for p in explaining])
+
+    def rival(one: PredictionError, rejected: bool) -> Rival:
+        fit = one.fit
+        tests = None if rejected else least_squares_tests(explained.base.quiet, fit, predicted.noise, seed)
+        return Rival(fit, bare.deviance - fit.deviance, fit.cost - best.fit.cost, 0.0, rejected, tests)
+
+    retained = tuple(rival(one, False) for one in explaining)
+    surviving = replace(weighed.survivors, retained=retained, rivals=(*retained, *(rival(p, True) for p in others)))
+    return replace(
+        weighed, survivors=surviving, noise=predicted.noise, faults=(), bare=bare, together=(), predictions=predicted,
+        extended={p.names: p.fit for p in explaining}, leaves_more=True,
+        assessments={p.names: _assessed(predicted, p) for p in explaining},
+    )  # fmt: skip
+
+
+def _compiled(weighed: HeldOut, sets: Iterable[Names]) -> None:
+    """Compile what the tests of members of families need."""
+    context = weighed.survivors.explanations.base.context
+    members = [name for names in sets for name in names if name not in context.catalogue.of_load]
+    context.kernels.family.compile_members(members, context.effort.say, whole=True)
+
+
+def _assessed(predicted: ErrorPredictions, one: PredictionError) -> Assessment:
+    other, units = predicted.context, (predicted.bare.unit, one.unit)
+    judged = gap(other, *units, one.names, predicted.noise, other.coordinates.before)
+    return Assessment(judged, other, units)

@@ -1,0 +1,54 @@
+"""Fits and tests where what is left is no noise: least squares, each channel weighed by the size of its own residual.
+
+Under a wrong model the likelihood of the noise before the dip is no likelihood: a few samples at the edges, many times
+louder than that noise, bend every parameter. Least squares asks for no noise, and the covariance of its estimates holds
+where residuals are correlated within blocks, and where they are noise.
+
+Source: White 1982; Bell and McCaffrey 2002 (CR3), as in `tractexp.identification.sandwich`.
+"""
+
+import numpy as np
+
+from tractexp.discrepancy.chance import chance_at
+from tractexp.discrepancy.context import Context
+from tractexp.discrepancy.disagreement import Disagreement
+from tractexp.discrepancy.fitting import Refit
+from tractexp.discrepancy.linearization import tangent
+from tractexp.discrepancy.noise_in_quiet import QuietNoise
+from tractexp.discrepancy.score_test import ScoreTest
+from tractexp.identification.blocks import blocks_of
+from tractexp.identification.information import STRUCTURAL
+from tractexp.identification.sandwich import robust_root
+from tractexp.noise import Noise
+
+
+def residual_noise(context: Context, fit: Refit) -> Noise:
+    """White noise of the size of what a fit leaves in each channel: under it the deviance is a sum of squares."""
+    residual = context.residuals(fit.unit[None], fit.names)[0]
+    counts = np.maximum(context.valid.sum(axis=1), 1)
+    levels = np.sqrt((np.where(context.valid, residual, 0.0) ** 2).sum(axis=1) / counts)
+    return Noise(Noise.white(*levels.tolist()).pairs, np.eye(len(levels)))
+
+
+def least_squares_tests(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int) -> Disagreement:
+    """All tests at a fit by least squares, and a covariance of its parameters that holds where what it leaves is no
+    noise. `noise` is that of `residual_noise`."""
+    t = tangent(quiet.context, fit, noise)
+    projection = t.whitened(noise)
+    chance = chance_at(t, projection, noise, quiet, seed, plain=True)
+    root = _robust(quiet.context, projection)
+    return Disagreement(fit, noise, t, projection, chance, projection.scores(), root)
+
+
+def _robust(context: Context, projection: ScoreTest) -> np.ndarray:
+    """Rows (k, d) whose inverse products are the covariance of all that is free, from blocks left out in turn."""
+    J = projection.Q @ projection.R
+    r = projection.r[0] + projection.Q @ projection.along[0]
+    channels, samples = context.drive.measured.shape
+    scale = np.maximum(np.linalg.norm(J, axis=0), 1e-300)
+    whole, moves = (J / scale).T @ (J / scale), []
+    for block in blocks_of(context.events, context.drive, J.shape[1]):
+        rows = np.concatenate([np.arange(block.start, block.stop) + c * samples for c in range(channels)])
+        a = J[rows] / scale
+        moves.append(np.linalg.pinv(whole - a.T @ a, STRUCTURAL**2, hermitian=True) @ (a.T @ r[rows]) / scale)
+    return robust_root(J, np.clip(moves, -1.0, 1.0))[0]

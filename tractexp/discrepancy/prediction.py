@@ -1,0 +1,232 @@
+"""Which sets of effects predict held-out events best, where none of them leaves noise only.
+
+A formula is not the physics. What the right one leaves is often no noise, and then a test of significance rejects it
+as it rejects a wrong one. What can be asked still is how much each set predicts in events that it was not fitted to. A
+set is named that
+
+- divides what the base model leaves of the held-out events (`criteria.divides`),
+- is ahead of every other set of its size or smaller, so that it needs each of its members (`criteria.ahead`),
+- and both by more than chance.
+
+Sets that it is not ahead of are tied with it. What is left has two measures. Where the disagreement is of the noise's
+size it is what pushes into the balances would still gain of the deviance, with the fits of the search by likelihood.
+Where it is far above the noise it is the squared error in S, with every set fitted by least squares (`least_squares`).
+"""
+
+import itertools
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from tractexp.discrepancy.catalogue import Catalogue
+from tractexp.discrepancy.context import Context
+from tractexp.discrepancy.cores import each_apart
+from tractexp.discrepancy.criteria import Criteria
+from tractexp.discrepancy.disagreement import Disagreement
+from tractexp.discrepancy.explanations import Explanations, Names, searched, wide_starts
+from tractexp.discrepancy.families import NEAREST, starts
+from tractexp.discrepancy.fitting import Refit, best_of, refit, settled, wide_refits
+from tractexp.discrepancy.least_squares import residual_noise
+from tractexp.discrepancy.linearization import tangent
+from tractexp.discrepancy.noise_in_quiet import white
+from tractexp.discrepancy.records import Records
+from tractexp.identification.model_error import block_sums, noise_variance
+from tractexp.noise import Noise
+from tractexp.record import Event
+
+WIDELY = 3  # single effects with thresholds or times that are searched to the end
+FAMILIES = 2  # single effects whose families are tried
+CARRIED = 12  # sets of the search by likelihood that are fitted again
+LEAST = 0.1  # of the noise: a model's squared error is told no finer
+CLEAR = 2.0  # standard errors of a jackknife
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction(ABC):
+    """A set of effects as fitted, and what it leaves of held-out events."""
+
+    fit: Refit
+
+    @property
+    def names(self) -> Names:
+        return self.fit.names
+
+    @property
+    @abstractmethod
+    def left(self) -> float:
+        """Squares beyond the noise, no less than can be told of it."""
+
+    @abstractmethod
+    def clear_of(self, other: "Prediction") -> bool:
+        """Whether this one leaves less by more than chance."""
+
+    def ahead_of(self, other: "Prediction", factor: float) -> bool:
+        """Whether it divides what the other leaves, as a root of squares, by a factor, and by more than chance."""
+        return other.left >= factor**2 * self.left and self.clear_of(other)
+
+
+@dataclass(frozen=True, eq=False)
+class PredictionError(Prediction):
+    """By the model's error: `squares` (b,) of what is left in S in each block [pu²], noise included, of which `noise`
+    (b,) is expected, and of the `response` (b,)."""
+
+    unit: np.ndarray  # (D,) coordinates on the held-out events
+    squares: np.ndarray
+    noise: np.ndarray
+    response: np.ndarray
+
+    @property
+    def left(self) -> float:
+        noise = float(self.noise.sum())
+        return max(float(self.squares.sum()) - noise, LEAST * noise, 1e-12)
+
+    @property
+    def error(self) -> float:
+        """The model's error, of the response."""
+        return float(np.sqrt(self.left / max(self.response.sum(), 1e-30)))
+
+    def clear_of(self, other: Prediction) -> bool:
+        """By the logarithm of the ratio of squares without each block: a jackknife."""
+        assert isinstance(other, PredictionError)
+        mine, theirs = self.squares.sum() - self.squares, other.squares.sum() - other.squares
+        if not np.isfinite(theirs).all():
+            return bool(np.isfinite(mine).all())
+        without, count = np.log(np.maximum(theirs, 1e-300) / np.maximum(mine, 1e-300)), len(mine)
+        error = np.sqrt((count - 1) / count * np.sum((without - without.mean()) ** 2))
+        return float(np.log(other.squares.sum() / self.squares.sum())) > CLEAR * error
+
+
+OneSet = TypeVar("OneSet", bound=Prediction)
+
+
+@dataclass(frozen=True, eq=False)
+class Predictions(Generic[OneSet]):
+    """All sets on the held-out events, the base model's among them."""
+
+    catalogue: Catalogue
+    sets: Mapping[Names, OneSet]
+
+    @property
+    def bare(self) -> OneSet:
+        """The base model."""
+        return self.sets[()]
+
+    def ranked(self, most: int) -> list[OneSet]:
+        """Sets of at most so many effects, the best first; of one family the best."""
+        best: dict[Names, OneSet] = {}
+        for one in sorted(self.sets.values(), key=lambda p: (p.left, len(p.names), p.names)):
+            if 0 < len(one.names) <= most:
+                best.setdefault(self.catalogue.textbook(one.names), one)
+        return list(best.values())
+
+    def explaining(self, criteria: Criteria) -> list[OneSet]:
+        """The set that predicts best and those tied with it; none where none divides what the base model leaves."""
+        chosen = self.bare
+        for size in range(1, 1 + max(map(len, self.sets))):
+            best = next((p for p in self.ranked(size) if len(p.names) == size), None)
+            if best is not None and best.ahead_of(chosen, criteria.ahead):
+                chosen = best
+        if not chosen.names or not chosen.ahead_of(self.bare, criteria.divides):
+            return []
+        others = [p for p in self.ranked(len(chosen.names)) if p is not chosen]
+        return [chosen, *(p for p in others if self._rivals(p, chosen, criteria))]
+
+    def _rivals(self, one: OneSet, chosen: OneSet, criteria: Criteria) -> bool:
+        return one.ahead_of(self.bare, criteria.divides) and not chosen.ahead_of(one, criteria.ahead)
+
+    def contributions(self, names: Names) -> list[OneSet]:
+        """The base model, then with one member more at a time, the one that helps most: what each is good for."""
+        steps, left = [self.bare], set(names)
+        while left:
+            wanted = [tuple(sorted((*steps[-1].names, name))) for name in left]
+            step = min((self.sets[w] for w in wanted if w in self.sets), key=lambda p: p.left, default=None)
+            if step is None:
+                break
+            steps.append(step)
+            left -= set(step.names)
+        return steps
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorPredictions(Predictions[PredictionError]):
+    """Those by the model's error; `noise` is that under which they were fitted."""
+
+    context: Context  # of the held-out events
+    noise: Noise
+
+
+def predictions(explained: Explanations, events: Sequence[Event]) -> ErrorPredictions:
+    """Fit single effects and sets of two by least squares, and what the search by likelihood ended with; carry all of
+    them over to the held-out events."""
+    context = explained.base.context
+    noise = residual_noise(context, explained.chosen)
+    there = context.on(Records.of(events, context.records.window))
+    fits = {f.names: f for f in _fits(explained, noise)}
+    sets = dict(zip(fits, each_apart(lambda f: _predicted(there, f), list(fits.values())), strict=True))
+    result = ErrorPredictions(context.catalogue, sets, there, noise)
+    best = result.ranked(max(map(len, fits)))[:1]
+    subsets = [s for p in best for k in range(1, len(p.names)) for s in itertools.combinations(p.names, k)]
+    if missing := [s for s in subsets if s not in sets]:
+        again = refit(context, noise, [(s, fits[best[0].names].unit) for s in missing])
+        sets |= {f.names: _predicted(there, f) for f in again}
+    return ErrorPredictions(context.catalogue, sets, there, noise)
+
+
+def _fits(explained: Explanations, noise: Noise) -> list[Refit]:
+    """The base model and sets of effects, each as it fits best by least squares."""
+    base, context = explained.base, explained.base.context
+    say = lambda line: context.effort.say(f"{line}, by least squares")  # noqa: E731
+    begun = [explained.steps[0].fit.unit, *base.local_minima]
+    bare = refit(context, noise, [((), unit) for unit in begun])[0]
+    ground = _linearized(explained.steps[0], bare, noise)
+    refits: dict[Names, Refit] = {(): bare}
+
+    def add(fits: Iterable[Refit]) -> None:
+        refits.update({f.names: f for f in best_of([*refits.values(), *fits])})
+
+    add(searched([ground], refits, 1, say))
+    add(wide_refits(context, noise, wide_starts(context, bare.unit, refits), WIDELY))
+    carried = sorted((f for f in explained.refits.values() if f.names), key=lambda f: f.cost)[:CARRIED]
+    if carried:
+        add(refit(context, noise, [(f.names, f.unit) for f in carried]))
+    singles = [f for f in best_of(refits.values()) if len(f.names) == 1]
+    add(_members(context, noise, singles[:FAMILIES], refits))
+    add(searched([ground, _linearized(ground, singles[0], noise)], refits, 2, say))
+    return list(refits.values())
+
+
+def _members(context: Context, noise: Noise, best: Sequence[Refit], refits: Mapping[Names, Refit]) -> list[Refit]:
+    """Other places and laws of the best single effects."""
+    families = {context.catalogue.textbook(f.names)[0] for f in best}
+    wanted = [m for m in context.catalogue.members if m.effect.family in families]
+    if not wanted or not context.domain.calibrated:
+        return []
+    context.kernels.family.compile_members([m.name for m in wanted], context.effort.say)
+    return wide_refits(context, noise, [starts(context, member, refits) for member in wanted], NEAREST)
+
+
+def _linearized(like: Disagreement, fit: Refit, noise: Noise) -> Disagreement:
+    """The scores at another fit; chance is not asked of them."""
+    t = tangent(like.context, fit, noise)
+    projection = t.whitened(noise)
+    return Disagreement(fit, noise, t, projection, like.chance, projection.scores())
+
+
+def _predicted(there: Context, fit: Refit) -> PredictionError:
+    """A fit on other events: all keeps its fitted value but P0 and Q0 of each."""
+    unit, d = there.coordinates.null.copy(), len(there.coordinates.names)
+    unit[:d] = fit.unit[:d]
+    unit = settled(there, unit, white(there), fit.names)
+    calculated = there.residuals(unit[None], fit.names)[0] + there.drive.measured
+    left, noise, response = [], [], []
+    for e, event in enumerate(there.events):
+        played = there.domain.comparison(event, calculated[:, there.drive.part(e)])
+        sums, phasors = block_sums(played), played.event
+        own = noise_variance(phasors) * (phasors.record.samples - phasors.start) / len(sums)
+        left.append(sums[:, 0] + own)
+        noise.append(np.full(len(sums), own))
+        response.append(sums[:, 1])
+    return PredictionError(fit, unit, np.concatenate(left), np.concatenate(noise), np.concatenate(response))
