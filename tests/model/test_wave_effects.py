@@ -18,7 +18,7 @@ OMEGA_N, P0, Q0 = 100 * np.pi, drives.P0, drives.Q0
 OMEGA = OMEGA_N - 1.5  # of the frame of the drives
 NAMES = sorted(discover()["effect"])
 PHASORS_ONLY = {"frequency_dependence", "measurement_window", "negative_sequence_braking", "transformer_inrush",
-                 "rotor_flux", "second_cage", "stator_transients"}  # fmt: skip
+                 "polynomial_static_load", "rotor_flux", "second_cage", "stator_transients"}  # fmt: skip
 WAVES_ONLY = {"zero_sequence_path", "transformer_saturation", "negative_sequence_path", "fault_resistance",
               "stuck_pole", "current_transformer_saturation", "transformer_error", "harmonics_source"}  # fmt: skip
 STACK = ("feeder_impedance", "shunt_capacitor", "second_motor_group", "undervoltage_trip", "transformer_saturation",

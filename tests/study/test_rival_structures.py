@@ -10,8 +10,10 @@ from hidden_effects import Case, Noise
 from hidden_effects.generator import make, truth
 from tractexp.identification.estimate import polished
 from tractexp.identification.problem import Problem
-from tractexp.identification.rivals import RivalStructure, with_rivals
+from tractexp.identification.rivals import RivalStructure, _structures, with_rivals
 from tractexp.identification.verdict import IDENTIFIED, WEAK
+from tractexp.model.model import compose
+from tractexp.plugin import get
 from tractexp.record import Record, detect
 
 SEED = 5
@@ -49,6 +51,16 @@ def test_intervals_reach_over_what_a_rival_makes_of_a_parameter_where_more_than_
             assert low <= np.clip(value, known.lower[j], known.upper[j]) <= high
     assert (known.intervals[:, 0] <= alone.intervals[:, 0]).all()
     assert (known.intervals[:, 1] >= alone.intervals[:, 1]).all()
+
+
+def test_a_static_load_that_refuses_an_effect_of_the_model_is_no_rival():
+    """A ZIP load has the share of constant power already."""
+    motor, static = get("model/motor", "electromechanical")(), get("model/static", "exponential")()
+    with_share = compose(motor, static, [get("effect", "polynomial_static_load")()])
+    assert {name for name, _ in _structures(compose(motor, static))} == {
+        "second_cage", "stator_resistance", "stator_transients", "zip",
+    }  # fmt: skip
+    assert {name for name, _ in _structures(with_share)} == {"second_cage", "stator_resistance", "stator_transients"}
 
 
 def test_where_nothing_is_missing_the_interval_is_the_fits_own_and_no_rival_gains():

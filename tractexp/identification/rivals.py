@@ -3,7 +3,8 @@
 A model that lacks a stator resistance, or whose static load follows another law, is fitted again with it, from where
 its own fit ended. Where that fits as well or better, each parameter that both have moves. The move is told beside the
 estimate, and where more than noise is left the interval reaches over it (docs/uncertainty.md has how often that holds).
-Which structures are tried the plugins say (`Part.rival`); an effect that the equations refuse is none.
+Which structures are tried the plugins say (`Part.rival`); an effect that the equations refuse is none, and neither is a
+static load that refuses an effect of the model.
 """
 
 from collections.abc import Iterator, Sequence
@@ -70,11 +71,21 @@ def _structures(model: Model) -> Iterator[tuple[str, Model]]:
     for name in sorted(registered.get("model/static", {})):
         cls = get("model/static", name)
         if cls.rival and type(model.static).rival and name != model.static.name:
-            yield name, compose(model.motor, cls(), model.effects, model.integration, model.domain)
+            other = compose(model.motor, cls(), model.effects, model.integration, model.domain)
+            if _composes(other):
+                yield name, other
     for name in sorted(registered.get("effect", {})):
         cls = get("effect", name)
         if cls.rival and name not in {e.name for e in model.effects} and model.acceptance(cls()).refusal is None:
             yield name, compose(model.motor, model.static, [*model.effects, cls()], model.integration, model.domain)
+
+
+def _composes(model: Model) -> bool:
+    """Whether the equations take all effects of the model: another static load may refuse one."""
+    if not model.effects:
+        return True
+    *others, last = model.effects
+    return compose(model.motor, model.static, others, domain=model.domain).acceptance(last).refusal is None
 
 
 def _fitted(uncertainty: Uncertainty, name: str, model: Model) -> RivalStructure | None:
