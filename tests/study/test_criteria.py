@@ -17,6 +17,7 @@ from tractexp.discrepancy.families import near, worth
 from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.gap import GapTest
 from tractexp.discrepancy.held_out import Assessment
+from tractexp.discrepancy.incomplete import PredictedDeviance
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.judgement import assessment
 from tractexp.discrepancy.next_event.choose import EventTrial, mildest
@@ -53,8 +54,13 @@ def refitted(deviance, parameters):
 
 def judged_by(c, closed=1.0, gain=100.0, expected=100.0, p_left=1.0):
     """What held-out events say of an explanation."""
-    gap = GapTest(None, None, closed, gain, expected, c.shown, None)
+    gap = GapTest(None, None, gain, abs(gain) * (1 / closed - 1), expected, c.shown, None)
     return Assessment(gap, SimpleNamespace(criteria=c), (), p_left)
+
+
+def deviance(left):
+    """What a set leaves of held-out events."""
+    return PredictedDeviance(refitted(0.0, 1), left, 1000.0 + left, False, 10.8)
 
 
 def wandering(c, seed, rests=(), walk=0.0):
@@ -138,7 +144,8 @@ CASES = {  # criterion: a looser value, the decision, what it is by default
     "rejected": (3.0, lambda c: c.rejects(10.0, 1.0, 2, 100.0), False),
     "alike": (0.04, lambda c: c.rejects(45.0, 1e4, 2, 1000.0), False),
     "shown": (12.0, lambda c: judged_by(c, gain=-1.0, expected=11.0).helps, False),
-    "convincing": (0.75, lambda c: judged_by(c, closed=0.78).convincing, False),
+    "divides": (2.0, lambda c: judged_by(c, closed=0.78).convincing, False),
+    "ahead": (1.4, lambda c: deviance(100.0).ahead_of(deviance(200.0), c.ahead), False),
     "stands": (0.04, lambda c: judged_by(c, p_left=0.045).helps, False),
     "quieter": (4.0, lambda c: JointFit(None, -3.5, 1.0).confirmed(c, doubted=True), False),
     "window_least": (9.0, lambda c: c.least_window(best=0.0) < 9.5, False),

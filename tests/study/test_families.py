@@ -70,7 +70,7 @@ def test_a_trip_of_the_static_load_alone_is_told_by_its_family_and_its_place():
     assert (form.effect.name, form.effect.differs) == ("static_trip", "of the static load only")
     at = made.context.coordinates
     assert at.value("static_tripped", made.extended.unit) == pytest.approx(0.2, abs=0.01)
-    assert made.validate.closed > 0.9
+    assert made.validate.explained > 0.9
     there = tangent(made.context, made.extended, made.held_out.noise)  # its instants are no parameters of each event:
     assert len(there.split) == 2 * (len(at.base) - len(there.held) + 1)  # of the relay the share alone
 
@@ -93,7 +93,7 @@ def test_a_law_that_the_textbook_has_not_is_told_by_its_family(hidden, size, see
     assert made.verdict.word == "named"
     (form,) = forms(made)
     assert (form.name, form.effect.name) == (textbook, member)
-    assert made.validate.closed > 0.9
+    assert made.validate.explained > 0.9
 
 
 @pytest.mark.parametrize(("seed", "least"), [(820081, 0.85), (820084, 0.97)])
@@ -104,7 +104,7 @@ def test_a_bounded_flux_is_a_saturation_with_a_round_corner(seed, least):
     (form,) = forms(told)
     assert form.effect.name == "saturation_curve"
     assert told.context.coordinates.value("saturation_rounding", told.extended.unit) > 0.1
-    assert told.validate.closed > least
+    assert told.validate.explained > least
 
 
 def test_members_of_other_families_that_come_near_are_tried_beside_a_name_that_suffices():
@@ -198,7 +198,7 @@ def test_held_out_events_deny_a_rival_only_by_what_it_leaves(chosen, rival, kept
     at = SimpleNamespace(criteria=Criteria(), catalogue=SimpleNamespace(textbook=lambda names: names))
     told = {("chosen",): chosen, ("rival",): rival}
     judged = {
-        names: Assessment(GapTest(None, None, closed, 100.0, 100.0, 10.8, None), at, (), p)
+        names: Assessment(GapTest(None, None, 100.0, 100.0 * (1 / closed - 1), 100.0, 10.8, None), at, (), p)
         for names, (p, closed) in told.items()
     }
     adequate = [SimpleNamespace(fit=fit(0.0, 1, *names)) for names in told]
@@ -285,7 +285,7 @@ def test_a_second_effect_that_the_fitted_dips_do_not_show_is_found_in_all_events
     assert (both.fit.names, one.fit.names) == (pair, pair[1:])
     assert 0 < both.lowered - one.lowered < 20  # on the fitted dips the second hardly shows
     assert told.fitted_to_both
-    assert told.validate.closed > 0.9
+    assert told.validate.explained > 0.9
 
 
 @pytest.mark.parametrize(("names", "deviance"), [(None, 0.0), ((), 0.0), (("denied",), 0.0), (("new",), np.inf)])

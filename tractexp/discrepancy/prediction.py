@@ -91,12 +91,12 @@ class PredictionError(Prediction):
     def clear_of(self, other: Prediction) -> bool:
         """By the logarithm of the ratio of squares without each block: a jackknife."""
         assert isinstance(other, PredictionError)
-        mine, theirs = self.squares.sum() - self.squares, other.squares.sum() - other.squares
-        if not np.isfinite(theirs).all():
-            return bool(np.isfinite(mine).all())
+        if not np.isfinite(total := self.squares.sum()) or not np.isfinite(others := other.squares.sum()):
+            return bool(np.isfinite(total))
+        mine, theirs = total - self.squares, others - other.squares
         without, count = np.log(np.maximum(theirs, 1e-300) / np.maximum(mine, 1e-300)), len(mine)
         error = np.sqrt((count - 1) / count * np.sum((without - without.mean()) ** 2))
-        return float(np.log(other.squares.sum() / self.squares.sum())) > CLEAR * error
+        return float(np.log(others / total)) > CLEAR * error
 
 
 OneSet = TypeVar("OneSet", bound=Prediction)

@@ -164,7 +164,7 @@ def _by_deviance(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> str:
     """What the sets explain on the held-out events, and what became of the others."""
     shares = joined([percent(weighed.assessments[tuple(names)].gap.explained) for names in sets], "and")
     spoken = joined([joined(_spoken(names, weighed)) for names in sets], "or")
-    others = sum(r.rejected for r in weighed.survivors.rivals)
+    others = sum(bool(r.rejected) for r in weighed.survivors.rivals)
     rest = f", and the {others} other sets of its size that were fitted are rejected" * (len(sets) == 1 and others > 0)
     verb = "explains" if len(sets) == 1 and len(sets[0]) == 1 else "explain"
     tie = ", and these events cannot tell them apart" * (len(sets) > 1)
