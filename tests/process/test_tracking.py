@@ -362,14 +362,15 @@ stand_in.load = Model
 sys.modules["tractexp.identification.result"] = stand_in
 import mlflow, pandas as pd
 mlflow.set_tracking_uri(sys.argv[1])
-model = mlflow.pyfunc.load_model(sys.argv[2])
-frame = pd.DataFrame({"t": [0.0, 0.1], "U": [1.0, 0.5]}, index=[7, 8])
-plain, driven = model.predict(frame), model.predict(frame.assign(f=[50.0, 49.0]))
-print(json.dumps([list(plain.columns), list(plain.index), plain.values.tolist(), driven.Q.tolist()]))
-try:
-    model.predict(frame[["t"]])
-except Exception as error:
-    print("U" in str(error))
+for address in sys.argv[2:]:
+    model = mlflow.pyfunc.load_model(address)
+    frame = pd.DataFrame({"t": [0.0, 0.1], "U": [1.0, 0.5]}, index=[7, 8])
+    plain, driven = model.predict(frame), model.predict(frame.assign(f=[50.0, 49.0]))
+    print(json.dumps([list(plain.columns), list(plain.index), plain.values.tolist(), driven.Q.tolist()]))
+    try:
+        model.predict(frame[["t"]])
+    except Exception as error:
+        print("U" in str(error))
 '''
 
 
@@ -380,10 +381,11 @@ def test_the_model_predicts_in_another_process_by_either_address(tmp_path, uri):
     assert logged.status.value == "READY"
     assert logged.source_run_id == run_id
     (tmp_path / "result.json").unlink()
-    for address in (f"runs:/{run_id}/model", f"models:/{logged.model_id}"):
-        done = python(STAND_IN, uri, address)
-        assert done.returncode == 0, done.stderr
-        answer, refused = done.stdout.splitlines()
+    done = python(STAND_IN, uri, f"runs:/{run_id}/model", f"models:/{logged.model_id}")
+    assert done.returncode == 0, done.stderr
+    told = done.stdout.splitlines()
+    assert len(told) == 4
+    for answer, refused in (told[:2], told[2:]):
         assert json.loads(answer) == [["P", "Q"], [7, 8], [[0.8, 1.0], [0.4, 0.5]], [1.0, 0.98]]
         assert refused == "True"
 
