@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import run_command
 
 from tractexp import provenance, tracking
 from tractexp.errors import UserError
@@ -307,8 +308,8 @@ def test_what_mlflow_logs_of_an_error_is_not_shown_but_told_in_the_sentence():
 def test_a_relative_address_counts_from_the_folder_where_the_command_runs(tmp_path, empty_store):
     (tmp_path / "x.db").write_bytes(empty_store.read_bytes())
     values = "T_prime: 0.05, X_prime: 0.2, C: 0.9, M: 0.01, T_m: 0.5, p_v: 1.5, q_v: 2.5"
-    command = [sys.executable, "-m", "tractexp", "task=simulate", f"task.values={{{values}}}", "task.depth=0.4"]
-    done = subprocess.run([*command, "tracking.uri=sqlite:///x.db"], cwd=tmp_path, capture_output=True, text=True)
+    asked = ("task=simulate", f"task.values={{{values}}}", "task.depth=0.4", "tracking.uri=sqlite:///x.db")
+    done = run_command(*asked, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "to see it: tractexp ui --uri sqlite:///x.db" in done.stdout
     reader = client(f"sqlite:///{tmp_path / 'x.db'}")
