@@ -12,7 +12,7 @@ LONG = (
     "process/test_tutorial.py", "process/test_sweep.py", "process/test_commands.py", "process/test_tracking.py",
     "study/test_faults.py", "study/test_docs_run.py", "process/test_ten_minutes.py", "study/test_waves_evidence.py",
     "process/test_lost.py", "oracle/test_hidden_effects_generator.py", "process/test_compare_tracking.py",
-    "study/test_paper.py",
+    "study/test_paper.py", "model/test_uncertainty.py", "process/test_cli.py", "process/test_export.py",
 )  # fmt: skip
 MOTOR = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p_v": 1.4, "q_v": 3.0}
 
