@@ -192,6 +192,13 @@ def jobs(work: Path, chance: random.Random) -> Iterator[Fault]:
     code, said = forked(job(reference))
     assert code == 0, said
     found = result(reference / "run" / "result.json")
+    store = reference / "outputs" / "mlflow.db"  # made once: to make one takes ten times as long as the search
+
+    def fresh(name: str) -> Path:
+        folder = made(work / name)
+        (folder / "outputs").mkdir()
+        shutil.copy(store, folder / "outputs")
+        return folder
 
     def failing(n: int, fails: Callable[[], None], folder: Path) -> Callable[[], int]:
         def act() -> int:
@@ -201,7 +208,7 @@ def jobs(work: Path, chance: random.Random) -> Iterator[Fault]:
         return act
 
     for n in range(1, 6):
-        folder = made(work / f"killed{n}")
+        folder = fresh(f"killed{n}")
         code, said = forked(failing(n, killed, folder))
         kept = sorted(p.name for p in (folder / "run").iterdir() if not p.name.startswith("."))
         wrong = halves(folder)
@@ -213,7 +220,7 @@ def jobs(work: Path, chance: random.Random) -> Iterator[Fault]:
             wrong, had, same(folder, found), trace(more), "" if code < 0 and again == 0 else f"EXIT {code}, {again}",
         )  # fmt: skip
     for n in range(1, 6):
-        folder = made(work / f"full{n}")
+        folder = fresh(f"full{n}")
         code, said = forked(failing(n, full, folder))
         kept = sorted(p.name for p in (folder / "run").glob("*")) if (folder / "run").is_dir() else []
         lost = "" if n == 1 or "result.json" in kept else "THE RESULT IS LOST"
@@ -567,6 +574,9 @@ def ready() -> None:
     import tractexp.identification.estimate
     import tractexp.identification.profile
     import tractexp.report.identify  # noqa: F401
+    from tractexp.plugin import discover
+
+    discover()
 
 
 def main() -> int:

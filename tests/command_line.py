@@ -42,6 +42,7 @@ def as_it_was(environment):
     from hydra.core.hydra_config import HydraConfig
 
     from tractexp import provenance
+    from tractexp.sweep import identity
     from tractexp.tracking import process
 
     root, thresholds, handler = logging.getLogger(), gc.get_threshold(), signal.getsignal(signal.SIGTERM)
@@ -57,6 +58,7 @@ def as_it_was(environment):
         GlobalHydra.instance().hydra = hydra
         HydraConfig.instance().cfg = None
         provenance._started.clear()
+        identity._file.cache_clear()
         signal.signal(signal.SIGTERM, handler)
         root.handlers[:], root.level = handlers, level
         gc.unfreeze()

@@ -1,5 +1,6 @@
 """Fixtures that several test files share."""
 
+import os
 import shutil
 from pathlib import Path
 
@@ -7,7 +8,25 @@ import pytest
 
 import tractexp  # before NumPy: it keeps BLAS to one thread, as every command does
 
+LONG = (
+    "process/test_tutorial.py", "process/test_sweep.py", "process/test_commands.py", "process/test_tracking.py",
+    "study/test_faults.py", "study/test_docs_run.py", "process/test_ten_minutes.py", "study/test_waves_evidence.py",
+    "process/test_lost.py", "oracle/test_hidden_effects_generator.py", "process/test_compare_tracking.py",
+    "study/test_paper.py", "model/test_uncertainty.py", "process/test_cli.py", "process/test_export.py",
+)  # fmt: skip
 MOTOR = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p_v": 1.4, "q_v": 3.0}
+
+
+def pytest_configure(config):
+    """Files begin in the order they are collected in: xdist's own puts those of few tests, long ones, at the end."""
+    if hasattr(config.option, "loadscopereorder"):
+        config.option.loadscopereorder = False
+
+
+def pytest_collection_modifyitems(items):
+    """The files that take longest begin first, so that all workers end at about the same time."""
+    of = {name: k for k, name in enumerate(LONG)}
+    items.sort(key=lambda item: of.get("/".join(item.path.parts[-2:]), len(LONG)))
 
 
 @pytest.fixture
@@ -55,10 +74,11 @@ def shared_data() -> Path:
 
 @pytest.fixture(scope="session")
 def empty_store(tmp_path_factory) -> Path:
-    """One migrated database, copied by the tests that do not care how it came about."""
+    """One migrated database, copied by the tests that do not care how it came about; workers side by side share it."""
     from tractexp import tracking
 
-    folder = tmp_path_factory.mktemp("store")
+    side_by_side = "PYTEST_XDIST_WORKER" in os.environ
+    folder = tmp_path_factory.getbasetemp().parent / "store" if side_by_side else tmp_path_factory.mktemp("store")
     tracking.prepare(tracking.default_uri(folder))
     return folder / "outputs" / "mlflow.db"
 

@@ -38,10 +38,14 @@ DAMAGED = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFil
 
 
 class Store:
-    """Entries of one kind, below the cache folder or in a `folder` of their own; beyond `limit` the oldest go."""
+    """Entries of one kind, below the cache folder or in a `folder` of their own; beyond `limit` the oldest go.
+
+    A process counts the entries of a large store at the first one it writes and at every 64th part of the limit; where
+    they are too many, an eighth goes at once. To list and sort thousands at each takes far longer than to write it.
+    """
 
     def __init__(self, kind: str, limit: int | None = None, folder: Path | None = None):
-        self.kind, self.limit, self.folder = kind, limit, folder
+        self.kind, self.limit, self.folder, self._written = kind, limit, folder, 0
 
     def path(self, key: str) -> Path:
         """The file of an entry."""
@@ -59,7 +63,9 @@ class Store:
             path = self.path(key)
             path.parent.mkdir(mode=0o777 if self.folder else 0o700, parents=True, exist_ok=True)
             files.write(path, _sum(path, content) + content, lasting=False)
-            self._forget(path.parent)
+            if self.limit is not None and self._written % (1 + self.limit // 64) == 0:
+                self._forget(path.parent, self.limit)
+            self._written += 1
 
     def get(self, key: str, compute: Callable[[], bytes]) -> bytes:
         """The content of an entry, computed and written where there is none."""
@@ -91,11 +97,14 @@ class Store:
         np.savez_compressed(packed, **arrays)  # type: ignore[arg-type]
         self.write(key, packed.getvalue())
 
-    def _forget(self, folder: Path) -> None:
-        entries = list(folder.glob(f"*{ENDING}")) if self.limit is not None else []
-        if len(entries) > (self.limit or 0):
-            entries.sort(key=lambda path: path.stat().st_mtime)  # another process forgets, too: one may be gone
-            for path in entries[: len(entries) - (self.limit or 0)]:
+    def _forget(self, folder: Path, limit: int) -> None:
+        entries = list(folder.glob(f"*{ENDING}"))
+        if len(entries) > limit:
+            times = {}
+            for path in entries:  # another process forgets, too: one may be gone
+                with contextlib.suppress(FileNotFoundError):
+                    times[path] = path.stat().st_mtime
+            for path in sorted(times, key=times.__getitem__)[: len(entries) - limit + limit // 8]:
                 path.unlink(missing_ok=True)
 
 

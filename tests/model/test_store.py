@@ -74,6 +74,22 @@ def test_the_oldest_entries_are_forgotten(folder):
     assert sorted(path.stem for path in (folder / "few").iterdir()) == ["c", "d"]
 
 
+def test_a_large_store_stays_near_its_limit_and_is_seldom_listed(folder, monkeypatch):
+    many, listed, forget = store.Store("many", limit=640), [], store.Store._forget
+    monkeypatch.setattr(store.Store, "_forget", lambda self, *given: (listed.append(1), forget(self, *given)))
+    (folder / "many").mkdir()
+    for k in range(640):  # of an earlier process
+        many.path(f"{k:04}").touch()
+        os.utime(many.path(f"{k:04}"), (k, k))
+    for k in range(640, 840):
+        many.write(f"{k:04}", b"content")
+        os.utime(many.path(f"{k:04}"), (k, k))
+        kept = sorted(path.stem for path in (folder / "many").iterdir())
+        assert 560 <= len(kept) <= 650
+        assert kept == [f"{n:04}" for n in range(k + 1 - len(kept), k + 1)]  # the newest, without a gap
+    assert len(listed) == 19
+
+
 def test_arrays_are_read_back_to_the_bit_and_never_for_another_key(folder):
     computed = []
 

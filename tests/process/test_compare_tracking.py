@@ -58,9 +58,11 @@ def log(uri, run, parent=None, variant=None):
 
 
 @pytest.fixture(scope="module")
-def filled(tmp_path_factory):
+def filled(tmp_path_factory, empty_store):
     """A folder with a store: a sweep of two variants and its own run, which is no identification."""
     folder = tmp_path_factory.mktemp("filled")
+    (folder / "outputs").mkdir()
+    shutil.copy(empty_store, folder / "outputs")
     uri = tracking.default_uri(folder)
     parent = tracking.start_parent(tracking.Run(EXPERIMENT, "sweep", tags={"task": "identify"}), uri)
     runs = samples({"issa": 1.0, "ssa": 3.0}, seeds=range(8))
@@ -184,15 +186,13 @@ def test_the_view_groups_by_variant_and_draws_fitness_curves(filled):
         assert f"metrics.`{name}" in columns
 
 
-def test_two_settings_of_one_optimizer_are_two_groups_of_the_view(tmp_path):
-    uri = tracking.default_uri(tmp_path)
+def test_two_settings_of_one_optimizer_are_two_groups_of_the_view(uri):
     for run, variant in zip(samples({"issa": 1.0}, seeds=range(2)), ("issa", "issa population=30"), strict=True):
         log(uri, run, variant=variant)
     assert set(viewed(uri)["groupsExpanded"]) == {"tag.variant.issa", "tag.variant.issa population=30"}
 
 
-def test_runs_logged_before_variants_had_a_tag_are_grouped_by_optimizer_too(tmp_path):
-    uri = tracking.default_uri(tmp_path)
+def test_runs_logged_before_variants_had_a_tag_are_grouped_by_optimizer_too(uri):
     run_id = log(uri, samples({"issa": 1.0}, seeds=range(1))[0])
     log(uri, samples({"ssa": 1.0}, seeds=range(1))[0])
     from mlflow import MlflowClient
@@ -201,9 +201,8 @@ def test_runs_logged_before_variants_had_a_tag_are_grouped_by_optimizer_too(tmp_
     assert [key["groupByData"] for key in viewed(uri)["groupBy"]["groupByKeys"]] == ["variant", "optimizer"]
 
 
-def test_files_of_a_run_tell_what_its_metrics_do_not(tmp_path):
+def test_files_of_a_run_tell_what_its_metrics_do_not(tmp_path, uri):
     """The parameters that the search ended at, and its seconds; without the files the curve stands in."""
-    uri = tracking.default_uri(tmp_path)
     (run,) = samples({"issa": 1.0}, seeds=range(1))
     search = {"parameters": {"C": 0.7}, "per_event": {"T_m": [0.3, 0.4]}}
     (tmp_path / "result.json").write_text(json.dumps({"parameters": {"C": 0.9}, "search": search}))
@@ -230,8 +229,9 @@ def test_files_of_a_run_tell_what_its_metrics_do_not(tmp_path):
     assert bare.history[-1] == run.history[-1]
 
 
-def test_a_page_logged_elsewhere_is_told_how_to_be_seen(tmp_path):
+def test_a_page_logged_elsewhere_is_told_how_to_be_seen(tmp_path, empty_store):
     """The settings that differ name the variants, also where MLflow takes no sign of equality."""
+    shutil.copy(empty_store, tmp_path / "x.db")
     runs = [
         replace(r, config=r.config | {"optimizer.population": n})
         for n in (30, 50) for r in samples({"issa": 1.0}, seeds=range(6))
@@ -244,9 +244,7 @@ def test_a_page_logged_elsewhere_is_told_how_to_be_seen(tmp_path):
     assert set(run.metrics) == {"median issa population:30", "median issa population:50"}
 
 
-def test_a_store_without_runs_opens_on_the_plain_page(tmp_path):
-    uri = tracking.default_uri(tmp_path)
-    tracking.prepare(uri)
+def test_a_store_without_runs_opens_on_the_plain_page(uri):
     assert comparison_view(uri) == ""
 
 

@@ -228,7 +228,7 @@ def test_the_events_that_tell_most_are_the_deep_ones_and_one_command_fits_them(p
     result = json.loads((tmp_path / "run" / "result.json").read_text())
     assert [e["name"] for e in result["events"]] == [each["event"] for each in content["informative"]]
     assert max(e["epsilon_p"] for e in result["events"]) < 0.01
-    again = run_command(*asked, cwd=tmp_path)
+    again = run_command(*(word for word in asked if "informative" not in word), cwd=tmp_path)
     assert "5 files" in again.stdout
     assert "0 new or changed" in again.stdout
 

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import run_command
 
 from tractexp import provenance, tracking
 from tractexp.errors import UserError
@@ -307,8 +308,8 @@ def test_what_mlflow_logs_of_an_error_is_not_shown_but_told_in_the_sentence():
 def test_a_relative_address_counts_from_the_folder_where_the_command_runs(tmp_path, empty_store):
     (tmp_path / "x.db").write_bytes(empty_store.read_bytes())
     values = "T_prime: 0.05, X_prime: 0.2, C: 0.9, M: 0.01, T_m: 0.5, p_v: 1.5, q_v: 2.5"
-    command = [sys.executable, "-m", "tractexp", "task=simulate", f"task.values={{{values}}}", "task.depth=0.4"]
-    done = subprocess.run([*command, "tracking.uri=sqlite:///x.db"], cwd=tmp_path, capture_output=True, text=True)
+    asked = ("task=simulate", f"task.values={{{values}}}", "task.depth=0.4", "tracking.uri=sqlite:///x.db")
+    done = run_command(*asked, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "to see it: tractexp ui --uri sqlite:///x.db" in done.stdout
     reader = client(f"sqlite:///{tmp_path / 'x.db'}")
@@ -362,14 +363,15 @@ stand_in.load = Model
 sys.modules["tractexp.identification.result"] = stand_in
 import mlflow, pandas as pd
 mlflow.set_tracking_uri(sys.argv[1])
-model = mlflow.pyfunc.load_model(sys.argv[2])
-frame = pd.DataFrame({"t": [0.0, 0.1], "U": [1.0, 0.5]}, index=[7, 8])
-plain, driven = model.predict(frame), model.predict(frame.assign(f=[50.0, 49.0]))
-print(json.dumps([list(plain.columns), list(plain.index), plain.values.tolist(), driven.Q.tolist()]))
-try:
-    model.predict(frame[["t"]])
-except Exception as error:
-    print("U" in str(error))
+for address in sys.argv[2:]:
+    model = mlflow.pyfunc.load_model(address)
+    frame = pd.DataFrame({"t": [0.0, 0.1], "U": [1.0, 0.5]}, index=[7, 8])
+    plain, driven = model.predict(frame), model.predict(frame.assign(f=[50.0, 49.0]))
+    print(json.dumps([list(plain.columns), list(plain.index), plain.values.tolist(), driven.Q.tolist()]))
+    try:
+        model.predict(frame[["t"]])
+    except Exception as error:
+        print("U" in str(error))
 '''
 
 
@@ -380,10 +382,11 @@ def test_the_model_predicts_in_another_process_by_either_address(tmp_path, uri):
     assert logged.status.value == "READY"
     assert logged.source_run_id == run_id
     (tmp_path / "result.json").unlink()
-    for address in (f"runs:/{run_id}/model", f"models:/{logged.model_id}"):
-        done = python(STAND_IN, uri, address)
-        assert done.returncode == 0, done.stderr
-        answer, refused = done.stdout.splitlines()
+    done = python(STAND_IN, uri, f"runs:/{run_id}/model", f"models:/{logged.model_id}")
+    assert done.returncode == 0, done.stderr
+    told = done.stdout.splitlines()
+    assert len(told) == 4
+    for answer, refused in (told[:2], told[2:]):
         assert json.loads(answer) == [["P", "Q"], [7, 8], [[0.8, 1.0], [0.4, 0.5]], [1.0, 0.98]]
         assert refused == "True"
 

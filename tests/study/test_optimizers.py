@@ -48,9 +48,14 @@ def name(request):
 
 
 def run(problem, seed=0, simulations=None, **chosen):
-    """15,000 simulations where nothing else is said; a thousand for COBYQA, which takes a millisecond for each."""
-    simulations = simulations or {"cobyqa": 1000}.get(chosen["name"], 15000)
+    """15,000 simulations where nothing else is said; fewer for those that need fewer and take their time for each."""
+    simulations = simulations or {"cobyqa": 600, "cmaes": 5000}.get(chosen["name"], 15000)
     return search(problem, build("optimizer", chosen), seed, Limits(simulations=simulations))
+
+
+def few(name):
+    """Enough for several steps of every optimizer: the scatter of COBYQA and its first descents."""
+    return {"cobyqa": 500, "cmaes": 1000}.get(name, 2000)
 
 
 def test_every_file_of_the_folder_is_a_plugin():
@@ -76,7 +81,7 @@ def test_finds_the_end_of_rosenbrocks_valley(name):
 
 
 def test_one_seed_is_one_history_and_another_is_another(name):
-    first, again, other = (run(Rosenbrock(), seed, 2000, name=name).history for seed in (4, 4, 5))
+    first, again, other = (run(Rosenbrock(), seed, few(name), name=name).history for seed in (4, 4, 5))
     assert first.values.tobytes() == again.values.tobytes()
     assert first.objective.tobytes() == again.objective.tobytes()
     assert first.simulations.tolist() == again.simulations.tolist()
@@ -88,14 +93,14 @@ def test_global_random_state_is_neither_used_nor_touched(name):
     for seed in (1, 2):
         np.random.seed(seed)  # noqa: NPY002 - the global state is what this test is about
         before = np.random.get_state()[1].copy()  # noqa: NPY002
-        histories.append(run(Rosenbrock(), 0, 2000, name=name).history.values.tobytes())
+        histories.append(run(Rosenbrock(), 0, few(name), name=name).history.values.tobytes())
         np.testing.assert_array_equal(before, np.random.get_state()[1])  # noqa: NPY002
     assert histories[0] == histories[1]
 
 
 def test_an_optimizer_keeps_no_state_between_searches(name):
     optimizer = build("optimizer", {"name": name})
-    first, again = (search(Sphere(), optimizer, 1, Limits(simulations=700)) for _ in range(2))
+    first, again = (search(Sphere(), optimizer, 1, Limits(simulations=min(700, few(name)))) for _ in range(2))
     assert first.history.values.tobytes() == again.history.values.tobytes()
 
 
@@ -108,8 +113,8 @@ def test_stops_exactly_at_the_budget(name, budget):
 
 @pytest.mark.parametrize("polish", [False, True])
 def test_ends_by_itself_after_its_iterations(name, polish):
-    few = {"starts": 3} if name == "multistart_least_squares" else {"iterations": 4}
-    found = search(Rosenbrock(), build("optimizer", {"name": name, "polish": polish, **few}), 0)
+    settings = {"multistart_least_squares": {"starts": 3}, "cobyqa": {"iterations": 2}}.get(name, {"iterations": 4})
+    found = search(Rosenbrock(), build("optimizer", {"name": name, "polish": polish, **settings}), 0)
     assert found.status.startswith("finished its ")
     assert found.objective == pytest.approx(Rosenbrock().objective(found.values[None])[0], rel=1e-12)
 
