@@ -120,7 +120,7 @@ def test_a_name_that_leaves_more_than_noise_is_named_and_what_it_leaves_is_told(
     verdict = inexact.verdict
     assert (verdict.word, inexact.names) == ("named", ("undervoltage_trip",)), verdict.reason
     assert not verdict.complete
-    assert inexact.validate.closed > 0.9
+    assert inexact.validate.closed > 1 - 1 / inexact.context.criteria.divides**2
     assert inexact.remainder
     assert "beside undervoltage_trip this is left" in inexact.headline
 
