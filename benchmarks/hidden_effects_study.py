@@ -120,6 +120,7 @@ def _counted(found) -> dict:
     first, at = found.first, found.catalogue
     return {
         "verdict": found.verdict.word,
+        "complete": found.verdict.complete,
         "names": sorted(set(at.textbook(found.names))),
         "members": list(found.names),
         "sets": [sorted(set(at.textbook(names))) for names in found.verdict.sets],
@@ -130,6 +131,8 @@ def _counted(found) -> dict:
         "closed": found.train.closed,
         "refitted": found.fitted_to_both,
         "closed_held": None if found.validate is None else found.validate.closed,
+        "explained": found.train.explained,
+        "explained_held": None if found.validate is None else found.validate.explained,
         "gain_held": None if found.validate is None else [found.validate.gain, found.validate.expected],
         "left_of_all": None if found.assessment is None else found.assessment.p_left,
         "left": [s.p_left for s in found.explanations.steps],

@@ -154,7 +154,7 @@ def test_the_contract_holds_what_machines_read(planted, tmp_path):
     assert made["name_sets"] == [["stator_resistance"]]
     assert {"event", "channel", "start", "end", "share"} == made["where"][0].keys()
     for role in ("train", "validate"):
-        assert {"epsilon_p", "epsilon_q", "chi2_per_sample"} == made["gap"][role]["before"].keys()
+        assert {"model_error", "epsilon_p", "epsilon_q", "chi2_per_sample"} == made["gap"][role]["before"].keys()
     candidate = next(c for c in made["candidates"] if c["effects"] == ["stator_resistance"])
     assert {"status", "likelihood_ratio", "parameters"} <= candidate.keys()
     assert min(made["left"].values()) > 0.001

@@ -18,9 +18,15 @@ from tractexp.discrepancy.score_test import ScoreTest
 from tractexp.identification import surprises
 from tractexp.identification.surprises import SMALLEST_P, Scale, tail
 from tractexp.noise import Noise
+from tractexp.wording import in_words
 
 DRAWS = 199
 MORE = 10  # times as many are drawn for the scales alone
+
+
+def by_draws(p: float) -> str:
+    """A probability as a sentence tells it: no finer than the draws do, though its tail is extrapolated."""
+    return in_words(p) if p >= 1 / (DRAWS + 1) else f"less than {1 / (DRAWS + 1):g}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,12 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tractexp.discrepancy.chance import by_draws
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import standard_errors
 from tractexp.discrepancy.survivors import Rival
 from tractexp.discrepancy.verdict import NONE, TIED, UNEXPLAINED
-from tractexp.wording import in_words, joined, with_error
+from tractexp.wording import joined, with_error
 
 CHOSEN, KEPT = "added", "tied"
 FITTED, ONE_STEP = "refitted", "one step"
@@ -135,7 +136,7 @@ def _fate(findings: Findings, rival: Rival) -> tuple[str, str]:
     if rival.tests is None:
         return "not rejected", "among too many that fit alike to be tested further"
     if not rival.adequate:
-        p = in_words(rival.tests.p_left)
+        p = by_draws(rival.tests.p_left)
         return "not adequate", f"chance leaves as much as it does with a probability of {p}"
     return "denied", "does not hold on the held-out events"
 

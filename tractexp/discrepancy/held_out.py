@@ -14,7 +14,7 @@ from tractexp.discrepancy.explanations import Explanations
 from tractexp.discrepancy.fitting import Refit, refit, settled
 from tractexp.discrepancy.gap import GapTest, gap
 from tractexp.discrepancy.noise_in_quiet import QuietNoise, white
-from tractexp.discrepancy.prediction import ErrorPredictions
+from tractexp.discrepancy.prediction import Predictions
 from tractexp.discrepancy.records import Records
 from tractexp.discrepancy.survivors import Rival, Survivors
 from tractexp.noise import Noise
@@ -59,8 +59,7 @@ class HeldOut:
 
     `bare` is the base model alone, `extended` each explanation, `assessments` are of held-out events. Where none
     helped as it was fitted, `together` are those that were fitted to all events instead. Where none leaves noise only,
-    the survivors are those that predict the held-out events well (`leaves_more`), by the `predictions` of all sets
-    where the deviance told none.
+    the survivors are those that predict the held-out events well (`leaves_more`), by their `predictions`.
     """
 
     survivors: Survivors
@@ -70,7 +69,7 @@ class HeldOut:
     extended: Mapping[Names, Refit]
     assessments: Mapping[Names, Assessment] = field(default_factory=dict)
     together: tuple[Refit, ...] = ()
-    predictions: ErrorPredictions | None = None
+    predictions: Predictions | None = None
     leaves_more: bool = False
 
     @property

@@ -7,7 +7,7 @@ from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.disagreement import examined
 from tractexp.discrepancy.explanations import Names
 from tractexp.discrepancy.fitting import Refit, refit
-from tractexp.discrepancy.gap import gap
+from tractexp.discrepancy.gap import Curves, gap
 from tractexp.discrepancy.held_out import Assessment, HeldOut, judged_on
 from tractexp.discrepancy.least_squares import least_squares_tests
 from tractexp.discrepancy.prediction import (
@@ -31,6 +31,7 @@ class PredictedDeviance(Prediction):
     """
 
     left_over: float
+    model_error: float
     deviance: float
     rejected: bool
     least: float
@@ -38,6 +39,10 @@ class PredictedDeviance(Prediction):
     @property
     def left(self) -> float:
         return max(self.left_over, self.least)
+
+    @property
+    def error(self) -> float:
+        return self.model_error
 
     def clear_of(self, other: Prediction) -> bool:
         assert isinstance(other, PredictedDeviance)
@@ -71,15 +76,18 @@ def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOu
     judged = judged_on(context, events, weighed.bare, fitted)
     gaps = {f.names: judged[f.names].gap for f in fitted}
     whole = max(gaps.values(), key=lambda one: one.gain)
+
+    def predicted_by(fit: Refit, left: float, curves: Curves, *, rejected: bool) -> PredictedDeviance:
+        return PredictedDeviance(fit, left, curves.error.value, curves.deviance, rejected, least)
+
     sets: dict[Names, PredictedDeviance] = {
-        (): PredictedDeviance(weighed.bare, whole.gain + max(whole.left, 0.0), whole.before.deviance, True, least)
+        (): predicted_by(weighed.bare, whole.gain + max(whole.left, 0.0), whole.before, rejected=True)
     }
     for fit in fitted:
         one = gaps[fit.names]
-        sets[fit.names] = PredictedDeviance(
-            fit, one.left, one.after.deviance, bool(rejected.get(fit.names, False)), least
-        )
-    chosen = [p.fit for p in Predictions(context.catalogue, sets).explaining(context.criteria) if not p.rejected]
+        sets[fit.names] = predicted_by(fit, one.left, one.after, rejected=bool(rejected.get(fit.names, False)))
+    predicted = Predictions(context.catalogue, sets)
+    chosen = [p.fit for p in predicted.explaining(context.criteria) if not p.rejected]
     if not chosen or not all(gaps[f.names].telling and gaps[f.names].helps for f in chosen):
         return None
     _compiled(weighed, [f.names for f in chosen])
@@ -94,7 +102,7 @@ def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOu
     return replace(
         weighed, survivors=replace(surviving, retained=tuple(retained), rivals=(*retained, *others)), together=(),
         extended={f.names: f for f in chosen}, assessments={f.names: judged[f.names] for f in chosen},
-        leaves_more=True,
+        predictions=predicted, leaves_more=True,
     )  # fmt: skip
 
 

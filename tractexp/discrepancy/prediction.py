@@ -8,7 +8,7 @@ set is named that
 - is ahead of every other set of its size or smaller, so that it needs each of its members (`criteria.ahead`),
 - and both by more than chance.
 
-Sets that it is not ahead of are tied with it. What is left has two measures. Where the disagreement is of the noise's
+Sets that it is not ahead of are tied with it where they are ahead of the base model. What is left has two measures. Where the disagreement is of the noise's
 size it is what pushes into the balances would still gain of the deviance, with the fits of the search by likelihood.
 Where it is far above the noise it is the squared error in S, with every set fitted by least squares (`least_squares`).
 """
@@ -38,7 +38,7 @@ from tractexp.noise import Noise
 from tractexp.record import Event
 
 WIDELY = 3  # single effects with thresholds or times that are searched to the end
-FAMILIES = 2  # single effects whose families are tried
+FAMILIES = 2  # single effects whose families are tried, and to which a second is added
 CARRIED = 12  # sets of the search by likelihood that are fitted again
 LEAST = 0.1  # of the noise: a model's squared error is told no finer
 CLEAR = 2.0  # standard errors of a jackknife
@@ -58,6 +58,11 @@ class Prediction(ABC):
     @abstractmethod
     def left(self) -> float:
         """Squares beyond the noise, no less than can be told of it."""
+
+    @property
+    @abstractmethod
+    def error(self) -> float:
+        """The model's error, of the response."""
 
     @abstractmethod
     def clear_of(self, other: "Prediction") -> bool:
@@ -85,7 +90,6 @@ class PredictionError(Prediction):
 
     @property
     def error(self) -> float:
-        """The model's error, of the response."""
         return float(np.sqrt(self.left / max(self.response.sum(), 1e-30)))
 
     def clear_of(self, other: Prediction) -> bool:
@@ -132,10 +136,10 @@ class Predictions(Generic[OneSet]):
         if not chosen.names or not chosen.ahead_of(self.bare, criteria.divides):
             return []
         others = [p for p in self.ranked(len(chosen.names)) if p is not chosen]
-        return [chosen, *(p for p in others if self._rivals(p, chosen, criteria))]
+        return [chosen, *(p for p in others if self._rivals(p, chosen, criteria.ahead))]
 
-    def _rivals(self, one: OneSet, chosen: OneSet, criteria: Criteria) -> bool:
-        return one.ahead_of(self.bare, criteria.divides) and not chosen.ahead_of(one, criteria.ahead)
+    def _rivals(self, one: OneSet, chosen: OneSet, factor: float) -> bool:
+        return one.ahead_of(self.bare, factor) and not chosen.ahead_of(one, factor)
 
     def contributions(self, names: Names) -> list[OneSet]:
         """The base model, then with one member more at a time, the one that helps most: what each is good for."""
@@ -194,7 +198,8 @@ def _fits(explained: Explanations, noise: Noise) -> list[Refit]:
         add(refit(context, noise, [(f.names, f.unit) for f in carried]))
     singles = [f for f in best_of(refits.values()) if len(f.names) == 1]
     add(_members(context, noise, singles[:FAMILIES], refits))
-    add(searched([ground, _linearized(ground, singles[0], noise)], refits, 2, say))
+    for single in singles[:FAMILIES]:
+        add(searched([ground, _linearized(ground, single, noise)], refits, 2, say))
     return list(refits.values())
 
 

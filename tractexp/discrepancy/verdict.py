@@ -5,17 +5,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tractexp.discrepancy.chance import by_draws
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.gap import Curves, curves
 from tractexp.discrepancy.held_out import HeldOut, carried
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
+from tractexp.discrepancy.prediction import ErrorPredictions
 from tractexp.discrepancy.survivors import Rival
 from tractexp.identification.model_error import in_percent
 from tractexp.noise import Noise
 from tractexp.record import Event
-from tractexp.wording import in_words, joined, percent
+from tractexp.wording import joined, percent
 
+CHOSEN_BY = "what is left is more than noise, and the held-out events were used to choose"
 NONE, NAMED, TIED, UNEXPLAINED = "none", "named", "tied", "unexplained"
 
 
@@ -175,7 +178,8 @@ def _by_deviance(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> str:
 
 def _by_size(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> str:
     """How far the sets that predict best, the base model and the next set are off on the held-out events."""
-    if (predicted := weighed.predictions) is None:
+    predicted = weighed.predictions
+    if not isinstance(predicted, ErrorPredictions):
         return _by_deviance(weighed, sets)
     chosen = [predicted.sets[tuple(names)] for names in sets]
     size = len(chosen[0].names)
@@ -191,7 +195,7 @@ def _by_size(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> str:
         )
     else:
         sentence = f"{spoken} predict{'s' * (size == 1)} the held-out events within {off} of the response"
-    return f"{sentence}, where {worse}; what is left is more than noise, and the held-out events were used to choose"
+    return f"{sentence}, where {worse}; {CHOSEN_BY}"
 
 
 def _tied(sets: Sequence[Sequence[str]]) -> str:
@@ -207,7 +211,7 @@ def _unexplained(weighed: HeldOut, nearest: Nearest | None) -> str:
     best, explained = left.retained[0], left.explanations
     assert best.tests is not None
     tested = f"none of the {len(best.tests.context.catalogue.candidates)} effects tested"
-    chance = f"would come about by chance with a probability of {in_words(best.tests.p_left)}"
+    chance = f"would come about by chance with a probability of {by_draws(best.tests.p_left)}"
     loudest = f"the most surprised of the tests looks for {best.tests.loudest}"
     if nearest is None and not explained.faults:
         return (
@@ -237,7 +241,7 @@ def _denied(weighed: HeldOut) -> str:
         return "there it fits no better than the base model"
     return (
         "what a fit to all events together leaves would come about by chance with a probability of"
-        f" {in_words(assessment.p_left)}"
+        f" {by_draws(assessment.p_left)}"
     )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from tractexp.blocks import Report, Table
 from tractexp.blocks.chart import Chart
+from tractexp.discrepancy.chance import by_draws
 from tractexp.discrepancy.discrepancy_json import recommendation, use_of
 from tractexp.discrepancy.evidence import (
     CHOSEN,
@@ -342,7 +343,7 @@ def _sets(page: Report, findings: Findings) -> None:
     rows = [
         [joined(r.fit.names) or "the base model", f"{r.fit.deviance:.1f}", f"{r.behind:.1f}", f"{r.distance:.1f}",
          "rejected" if r.rejected else "adequate" if r.adequate else "not adequate",
-         "" if r.tests is None else in_words(r.tests.p_left)]
+         "" if r.tests is None else by_draws(r.tests.p_left)]
         for r in findings.survivors.rivals[:MOST_SETS]
     ]  # fmt: skip
     with page.folded("How the refitted sets compare"):
@@ -424,7 +425,7 @@ def _disagreement(page: Report, findings: Findings) -> None:
     """Whether and where the base model disagrees with the records."""
     first = findings.first
     page.heading("Is there a disagreement, and where?")
-    text = f"What the base model leaves would come about by chance with a probability of {in_words(first.p_left)}"
+    text = f"What the base model leaves would come about by chance with a probability of {by_draws(first.p_left)}"
     text += "." if first.adequate else f"; the most surprised of the tests looks for {first.loudest}."
     if first.scores:
         best, alpha = first.scores[0], findings.context.criteria.false_alarms

@@ -70,6 +70,8 @@ def _followed(
     answer = context.kernels.simulate(names, point[None], drive)[0]
     valid = (drive.weights > 0) & _recovering(answer, drive)
     truth = answer[valid]
+    if not len(truth):
+        return None
     columns = _of_load(context, rival.names)
     start = _shrunk(context, rival, 1.0)
 
@@ -102,6 +104,8 @@ def _followed(
     mild[:, : drive.first[drive.events // 2]] = True
     nearest_point, off = start[columns], np.inf
     for rows in (mild[valid], np.ones(len(truth), bool)):
+        if not rows.any():  # the load stalls in all of them
+            continue
         ended = nearest(nearest_point, rows)
         nearest_point, off = ended.x, float(np.abs(ended.fun).max())
         if off > FOLLOWS:
