@@ -8,9 +8,10 @@ set is named that
 - is ahead of every other set of its size or smaller, so that it needs each of its members (`criteria.ahead`),
 - and both by more than chance.
 
-Sets that it is not ahead of are tied with it where they are ahead of the base model. What is left has two measures. Where the disagreement is of the noise's
-size it is what pushes into the balances would still gain of the deviance, with the fits of the search by likelihood.
-Where it is far above the noise it is the squared error in S, with every set fitted by least squares (`least_squares`).
+Sets that it is not ahead of are tied with it where they are ahead of the base model. What is left has two measures.
+Where the disagreement is of the noise's size it is what pushes into the balances would still gain of the deviance, with
+the fits of the search by likelihood. Where it is far above the noise it is the squared error in S, with every set
+fitted by least squares (`least_squares`).
 """
 
 import itertools
