@@ -212,7 +212,7 @@ def _borne_out(fitted: JointFit, criteria: Criteria) -> bool:
 def judged_on(
     context: Context, events: Sequence[Event], bare: Refit, extended: Sequence[Refit]
 ) -> dict[Names, Assessment]:
-    """Compare the base model and extended ones, as they were fitted, on held-out events."""
+    """Compare the base model and extended ones, as they were fitted, on held-out events, by the noise of the last."""
     other, units, noise = carried(context, events, [bare, *extended])
     return {
         fit.names: Assessment(gap(other, units[0], u, fit.names, noise, other.coordinates.before), other, (units[0], u))

@@ -73,7 +73,7 @@ def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOu
     wanted = sorted(fits.values(), key=lambda f: f.cost)[:JUDGED]
     unit = context.coordinates.without_faults
     fitted = refit(context, noise, [(f.names, unit(f.unit, ())) for f in wanted], faults=())
-    judged = judged_on(context, events, weighed.bare, fitted)
+    judged = judged_on(context, events, weighed.bare, fitted[::-1])  # the best last: there the noise is its
     gaps = {f.names: judged[f.names].gap for f in fitted}
     whole = max(gaps.values(), key=lambda one: one.gain)
 

@@ -168,7 +168,8 @@ def _by_deviance(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> str:
     shares = joined([percent(weighed.assessments[tuple(names)].gap.explained) for names in sets], "and")
     spoken = joined([joined(_spoken(names, weighed)) for names in sets], "or")
     others = sum(bool(r.rejected) for r in weighed.survivors.rivals)
-    rest = f", and the {others} other sets of its size that were fitted are rejected" * (len(sets) == 1 and others > 0)
+    other = "the other set of its size is" if others == 1 else f"the {others} other sets of its size are"
+    rest = f", and {other} rejected" * (len(sets) == 1 and others > 0)
     verb = "explains" if len(sets) == 1 and len(sets[0]) == 1 else "explain"
     tie = ", and these events cannot tell them apart" * (len(sets) > 1)
     return (

@@ -112,7 +112,9 @@ def report(findings: Findings, content: Mapping[str, Any], title: str) -> Report
     head = f"{findings.verdict.word.upper()} {' or '.join(spoken)}".strip()
     left = [as_sentence(findings.headline)] if findings.headline else []
     sentences = [as_sentence(findings.verdict.reason), *left, *headlines(findings), _graded(findings)]
-    page.verdict(head, *sentences, f"Next: {recommendation(findings)}.", kind=KIND[findings.verdict.word])
+    complete = findings.verdict.complete or findings.verdict.word == UNEXPLAINED
+    kind = KIND[findings.verdict.word] if complete else "plain"
+    page.verdict(head, *sentences, f"Next: {recommendation(findings)}.", kind=kind)
     overlaid(
         page.heading("Measured, before, after" if findings.names else "Measured and calculated"), findings.overlays
     )
