@@ -18,6 +18,7 @@ from tractexp.extend.files import (
     check_numbers,
     chosen,
     counted,
+    estimator_of,
     kind_of,
     level,
     numbered,
@@ -55,6 +56,7 @@ class CSV(Tabular, Reader):
     base_power: float | None = None  # MVA, three-phase
     frequency: float = 50.0  # Hz, nominal
     reverse_current: bool = False  # true where P and Q are counted positive out of the load
+    estimator: Any = None  # phasor estimator of the recorder: one_cycle, p_class, m_class; null: not known
 
     @classmethod
     def takes(cls, path: str) -> bool:
@@ -116,7 +118,8 @@ class CSV(Tabular, Reader):
         table, found = self.table_of(path, told)
         given = self.base_voltage or (told.base and told.base.voltage)
         made = powers(table, found, self.frequency, self.reverse_current, kilovolts=given is not None)
-        arrays: Any = {**made.columns, "more": table.numbers(told.more), "window": told.window}
+        window = told.window or (self.estimator and estimator_of(self.estimator).window(self.frequency))
+        arrays: Any = {**made.columns, "more": table.numbers(told.more), "window": window or None}
         raw = Record(name=self._name(path, told), source=path, notes=(*told.notes, *made.notes), **arrays)
         even = raw if told.uniform else raw.uniform(table.place)
         base, note = self._base(even, made, told, base)

@@ -176,10 +176,11 @@ def test_what_it_does_comes_from_another_simulator_s_law():
     assert not set(effect) & {p.name for p in get("effect", effect["name"])().parameters}
 
 
-def test_the_line_of_the_readme_names_the_stator_transients_and_closes_the_gap_on_the_deep_dip(tmp_path):
+@pytest.mark.parametrize("stated", [[], ["data.estimator=one_cycle"]], ids=["window searched", "window stated"])
+def test_the_line_of_the_readme_names_the_stator_transients_and_closes_the_gap_on_the_deep_dip(stated, tmp_path):
     only = "task.effects=[stator_transients,stator_resistance,dc_link_lag]"
     done = run_command(
-        "data=tibet", "task=discrepancy", only, "tracking.enabled=false", "hydra.run.dir=run", cwd=tmp_path
+        "data=tibet", "task=discrepancy", only, *stated, "tracking.enabled=false", "hydra.run.dir=run", cwd=tmp_path
     )
     assert done.returncode == 0, done.stderr
     made = json.loads((tmp_path / "run" / "discrepancy.json").read_text())

@@ -606,6 +606,15 @@ class TestManyDips:
         assert (record.t[0], record.t[-1]) == pytest.approx((67.0, 77.99))
         assert detect(record).depth == pytest.approx(0.11)
 
+    def test_the_window_of_what_recorded_it_is_the_record_s(self, tmp_path):
+        path = tmp_path / "dip.csv"
+        path.write_text(text())
+        (plain,), (event,) = tractexp.read(path), tractexp.read(path, estimator="p_class")
+        assert plain.record.window is None
+        assert (event.record.window.name, event.record.window.length) == ("p_class", pytest.approx(0.04))
+        with pytest.raises(UserError, match="p_clas"):
+            tractexp.read(path, estimator="p_clas")
+
     def test_dips_and_window_can_be_chosen(self):
         events = self.events(train=[3], validate=[5, 1], pre=0.5, post=2.0)
         assert [detect(r).t_start for r in (*events.train, *events.validate)] == pytest.approx([48, 88, 8])

@@ -8,6 +8,7 @@ from tractexp.filetypes.tidy import restored
 from tractexp.record.dips import FileDip, check_numbers, chosen, level, numbered
 from tractexp.record.record import DECLARATION, LOAD, SIZES
 from tractexp.recording.archive import records
+from tractexp.recording.estimator import estimator_of
 from tractexp.wording import counted
 
 __all__ = [
@@ -25,6 +26,7 @@ __all__ = [
     "chosen",
     "comtrade",
     "counted",
+    "estimator_of",
     "kind_of",
     "level",
     "located",
