@@ -33,6 +33,8 @@ from tractexp.model.model import compose
 from tractexp.plugin import get
 from tractexp.record import Record, detect
 
+pytestmark = pytest.mark.usefixtures("registry_as_it_was")
+
 STEP, TRIP = "timed:power:step:of_return", "answer:static:relay"
 FEW = tuple(
     term(n)

@@ -65,7 +65,7 @@ def test_the_gap_shrinks_to_the_noise_on_the_dip_held_out(planted):
         assert gap.closed > 0.9
         assert QUIET < gap.after.chi2_per_sample < LOUD
     told = planted.content["gap"]["validate"]["after"]
-    assert set(told) == {"epsilon_p", "epsilon_q", "epsilon_i", "chi2_per_sample"}
+    assert set(told) == {"model_error", "epsilon_p", "epsilon_q", "epsilon_i", "chi2_per_sample"}
 
 
 def test_nothing_is_said_where_nothing_is_missing(silent):

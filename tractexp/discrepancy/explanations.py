@@ -148,7 +148,8 @@ def with_families(base: BaseFit, tests: Disagreement, refits: dict[Names, Refit]
 def searched(steps: Sequence[Disagreement], refits: Refits, size: int, say: Callable[[str], None]) -> list[Refit]:
     """The most promising sets of one size refitted, the best first. `steps` begin with one without effects."""
     context, noise = steps[0].context, steps[-1].noise
-    wanted = shortlist(steps, size)
+    if not (wanted := shortlist(steps, size)):
+        return []
     one, many = ("effect", "effects") if size == 1 else (f"set of {size}", f"sets of {size}")
     say(f"refitting {len(wanted)} {one if len(wanted) == 1 else many}")
     fits = rough_refit(context, noise, [s for n in wanted for s in starts(steps, refits, n)])
