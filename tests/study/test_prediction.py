@@ -12,7 +12,7 @@ from tractexp.discrepancy.incomplete import PredictedDeviance
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.least_squares import least_squares_tests, residual_noise
 from tractexp.discrepancy.precision import standard_errors
-from tractexp.discrepancy.prediction import PredictionError, Predictions
+from tractexp.discrepancy.prediction import PredictionError, Predictions, predictions
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
 from tractexp.plugin import get
@@ -138,6 +138,15 @@ def test_the_covariance_by_least_squares_is_wider_where_residuals_are_correlated
     object.__setattr__(plain, "robust", None)
     wide, narrow = standard_errors(tests), standard_errors(plain)
     assert np.median([wide[name] / narrow[name] for name in wide]) > 1.5
+
+
+def test_by_the_size_of_the_error_the_same_family_is_chosen(inexact):
+    """By least squares its members fit a swing that none of them has, too; they are told by one name."""
+    predicted = predictions(inexact.explanations, inexact.withheld)
+    best = predicted.explaining(inexact.context.criteria)
+    assert [inexact.catalogue.textbook(one.names) for one in best] == [("undervoltage_trip",)]
+    assert {n for names in predicted.sets for n in names} - set(inexact.catalogue.of_load)
+    assert best[0].error * inexact.context.criteria.divides < predicted.bare.error
 
 
 def test_without_held_out_events_nothing_incomplete_is_named():

@@ -199,7 +199,8 @@ def _fits(explained: Explanations, noise: Noise) -> list[Refit]:
         add(refit(context, noise, [(f.names, f.unit) for f in carried]))
     singles = [f for f in best_of(refits.values()) if len(f.names) == 1]
     add(_members(context, noise, singles[:FAMILIES], refits))
-    for single in singles[:FAMILIES]:
+    of_load = [f for f in singles if f.names[0] in context.catalogue.of_load]  # members of families have no columns
+    for single in of_load[:FAMILIES]:
         add(searched([ground, _linearized(ground, single, noise)], refits, 2, say))
     return list(refits.values())
 
