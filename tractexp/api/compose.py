@@ -47,7 +47,7 @@ class LoadModel(Portable, Tabulated):
         """The parts, as `result.json` keeps them; integration and domain where they are not the usual ones."""
         parts = {"motor": dict(self.motor), "static": dict(self.static), "effects": list(self.effects)}
         usual = {"integration": "classical", "domain": "phasors"}
-        return parts | {key: parts_of for key, plain in usual.items() if (parts_of := getattr(self, key)) != plain}
+        return parts | {key: value for key, plain in usual.items() if (value := getattr(self, key)) != plain}
 
     @functools.cached_property
     def model(self) -> "Model":
@@ -162,8 +162,8 @@ def _node(model: Any) -> dict[str, Any]:
     """The parts of a model composed of plugins."""
     try:
         motor, static = ({"name": p.name, **dataclasses.asdict(p)} for p in (model.motor, model.static))
-        parts_of = {"motor": motor, "static": static, "effects": [effect.name for effect in model.effects]}
-        return parts_of | {"integration": model.integration, "domain": model.domain}
+        parts = {"motor": motor, "static": static, "effects": [effect.name for effect in model.effects]}
+        return parts | {"integration": model.integration, "domain": model.domain}
     except AttributeError:
         kind = type(model).__name__
         raise UserError(f"model is of type {kind}; give a name, or what tractexp.compose makes") from None

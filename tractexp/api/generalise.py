@@ -72,8 +72,8 @@ class Generalised(Written):
         return Report().add(self.table()).text(CAPTION)
 
     def write_results(self, folder: Path) -> list[Path]:
-        curve = {"residuals": self.residuals, "identified": self.identified}
-        return [files.write_json(folder / "generalise.json", curve)]
+        content = {"residuals": self.residuals, "identified": self.identified}
+        return [files.write_json(folder / "generalise.json", content)]
 
     def drawings(self) -> Mapping[str, Drawing]:
         """A figure for each optimizer and held-out dip, of curves and residuals: issa_interpolation.svg, ..."""

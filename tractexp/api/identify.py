@@ -370,25 +370,25 @@ def _concluded(setup: FitSpec, found: "SearchResult") -> tuple[Result, FitDetail
     problem = setup.problem
     refuse_nothing_found(problem, found)
     estimated = estimate(problem, found.values)
-    model_settings = estimated.uncertainty
+    uncertainty = estimated.uncertainty
     if setup.check_intervals:
-        model_settings = with_rivals(checked(model_settings))
+        uncertainty = with_rivals(checked(uncertainty))
     result, fits = conclude(
-        problem, found, setup.validate, setup.seed, setup.model.node, setup.optimizer.name, model_settings.values
+        problem, found, setup.validate, setup.seed, setup.model.node, setup.optimizer.name, uncertainty.values
     )
-    adequacy = graded(estimated.surprise, *errors_of(result), active_bounds(problem, model_settings.values))
-    together = compare_events(model_settings) if len(problem.events) > 1 else None
-    fields = model_settings.fields()
+    adequacy = graded(estimated.surprise, *errors_of(result), active_bounds(problem, uncertainty.values))
+    together = compare_events(uncertainty) if len(problem.events) > 1 else None
+    fields = uncertainty.fields()
     fields["uncertainty"] |= together.fields() if together else {"gains": {}, "odd_events": []}
     fields["uncertainty"]["notes"] += together.notes if together else []
     starts = [s.to_dict(problem.space.names) for s in estimated.starts]
-    structures = [rival.to_dict() for rival in model_settings.rivals]
+    structures = [rival.to_dict() for rival in uncertainty.rivals]
     data = set_holding(tuple(event.record.where for event in problem.events))
-    advice = advise(model_settings, adequacy, together.odd if together else (), data=data)
+    advice = advise(uncertainty, adequacy, together.odd if together else (), data=data)
     result = replace(
         result, **fields, adequacy=adequacy.to_dict(), starts=starts, rival_structures=structures, advice=advice
     )
-    return result, FitDetails(fits, estimated, model_settings, together, adequacy)
+    return result, FitDetails(fits, estimated, uncertainty, together, adequacy)
 
 
 @plugin

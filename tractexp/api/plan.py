@@ -223,11 +223,11 @@ def _guess(setup: Setup, event: Event, values: Any) -> "tuple[np.ndarray, str, N
         defaults = [p.default for p in problem.parameters if p.name in problem.space.names]
         return np.array(defaults), "the model's default values", None
     given = isinstance(values, Mapping)
-    model_settings = values if given else load(Path(values)).on_base_of(setup.train[0].record)
-    if missing := [name for name in problem.space.names if name not in model_settings]:
+    by_parameter = values if given else load(Path(values)).on_base_of(setup.train[0].record)
+    if missing := [name for name in problem.space.names if name not in by_parameter]:
         raise UserError(f"task.values={values}: that result has no {', '.join(missing)}; it is of another model")
     origin = f"the values of {'an identification' if given else values}"
-    return np.array([model_settings[n] for n in problem.space.names]), origin, None
+    return np.array([by_parameter[n] for n in problem.space.names]), origin, None
 
 
 def _scans(problem: Any, values: np.ndarray, shape: "DipShape") -> dict[str, Any]:

@@ -180,10 +180,10 @@ class Chart:
         low, high = (float(y[finite].min()), float(y[finite].max())) if finite.any() else (0.0, 0.0)
         offset, scale = (low + high) / 2, max((high - low) / (2 * HELD), 1e-300)
         held = np.where(finite, np.round((np.where(finite, y, offset) - offset) / scale), -HELD - 1).astype("<i2")
-        retained = {"bdata": base64.b64encode(held.tobytes()).decode(), "start": start, "step": step}
-        retained |= {"offset": offset, "scale": scale}
+        coded = {"bdata": base64.b64encode(held.tobytes()).decode(), "start": start, "step": step}
+        coded |= {"offset": offset, "scale": scale}
         line = {"color": color, "width": width, "dash": dash}
-        return self._add(name, panel, mode="lines", line=line, samples=retained)
+        return self._add(name, panel, mode="lines", line=line, samples=coded)
 
     def points(
         self, name: str, x: Sequence[Any] | np.ndarray, y: Sequence[Any] | np.ndarray, color: str, panel: int = 0, *,

@@ -142,9 +142,9 @@ def _error(error: ModelError) -> dict[str, Any]:
     return {"value": _number(error.value), "interval": [_number(end) for end in error.interval]}
 
 
-def _estimate(by_name: ParameterEstimate) -> dict[str, Any]:
-    interval = [_number(end) for end in by_name.interval]
-    return {"value": by_name.value, "standard_error": _number(by_name.error), "interval": interval}
+def _estimate(estimate: ParameterEstimate) -> dict[str, Any]:
+    interval = [_number(end) for end in estimate.interval]
+    return {"value": estimate.value, "standard_error": _number(estimate.error), "interval": interval}
 
 
 def write_left(investigation: Findings, path: Path) -> Path:

@@ -269,16 +269,16 @@ def _forms(page: Report, findings: Findings) -> None:
             )
 
 
-def _curve(findings: FittedLaw) -> Chart:
+def _curve(fitted: FittedLaw) -> Chart:
     """A law with its band, and the textbook's."""
-    law = findings.curve
-    page = Chart(law.x_label, [law.y_label], pixels=320)
-    page.band("", law.x, findings.band[0], findings.band[1], CURVE)
-    page.line("the law found", law.x, law.y, CURVE, width=2.2)
-    page.line("the catalogue's law", law.x, findings.textbook, TEXTBOOK, dash="dash")
-    shown = np.concatenate([law.y, findings.textbook])
+    law = fitted.curve
+    chart = Chart(law.x_label, [law.y_label], pixels=320)
+    chart.band("", law.x, fitted.band[0], fitted.band[1], CURVE)
+    chart.line("the law found", law.x, law.y, CURVE, width=2.2)
+    chart.line("the catalogue's law", law.x, fitted.textbook, TEXTBOOK, dash="dash")
+    shown = np.concatenate([law.y, fitted.textbook])
     room = 0.25 * max(float(np.ptp(shown)), 1e-6)
-    return page.limits(0, float(shown.min()) - room, float(shown.max()) + room)
+    return chart.limits(0, float(shown.min()) - room, float(shown.max()) + room)
 
 
 def _candidates(page: Report, findings: Findings) -> None:
@@ -323,9 +323,9 @@ def _bars(findings: Findings, rows: Sequence[Evidence], labels: Mapping[Evidence
     colors = [COLORS.get(r.status, REFITTED if r.how == FITTED else ESTIMATED) for r in rows]
     entries = [f"{r.drop:.{int(r.drop < 100)}f}{f', {r.status}' * (r.standing < 2)}" for r in rows]
     chance = chance_level(findings)
-    page = Chart("deviance", [""], pixels=130 + BAR * len(rows))
-    page.bars("", [labels[r] for r in rows], [r.drop for r in rows], colors, hover=entries)
-    return page.edge(chance, dash="dash").limits(None, 0.0, ROOM * max(chance, *(r.drop for r in rows)))
+    chart = Chart("deviance", [""], pixels=130 + BAR * len(rows))
+    chart.bars("", [labels[r] for r in rows], [r.drop for r in rows], colors, hover=entries)
+    return chart.edge(chance, dash="dash").limits(None, 0.0, ROOM * max(chance, *(r.drop for r in rows)))
 
 
 def _bars_caption(findings: Findings, rows: Sequence[Evidence]) -> str:
@@ -376,8 +376,8 @@ def _parameters(page: Report, findings: Findings) -> None:
     """The base model's parameters before and after, and those that came in."""
     page.heading("Parameters before and after" if findings.names else "Parameters of the base model")
     before = {e.parameter.name: e for e in findings.before}
-    rows, by_name = [], findings.after if findings.names else findings.before
-    for e in by_name:
+    rows, parameter_estimates = [], findings.after if findings.names else findings.before
+    for e in parameter_estimates:
         p, was = e.parameter, before.get(e.parameter.name)
         entries = [_value(was) if was else "not in it"] if findings.names else []
         rows.append([p.name, p.about, p.unit, *entries, _value(e), _interval(e), _brief(e.verdict)])
@@ -389,7 +389,7 @@ def _parameters(page: Report, findings: Findings) -> None:
     )  # fmt: skip
     if retained := held(findings):
         page.text(f"These events cannot tell {joined(list(retained))}: the extended model holds what was found.")
-    if why := [f"{e.parameter.name} is {e.verdict}." for e in by_name if _brief(e.verdict) != e.verdict]:
+    if why := [f"{e.parameter.name} is {e.verdict}." for e in parameter_estimates if _brief(e.verdict) != e.verdict]:
         with page.folded("Why some are known badly, and what of them is known"):
             page.items(why)
 
@@ -472,13 +472,13 @@ def _noise(page: Report, findings: Findings) -> None:
         )
 
 
-def _value(by_name: ParameterEstimate) -> str:
-    bound = "" if np.isfinite(by_name.error) else ", at its bound"
-    return f"{with_error(by_name.value, by_name.error)}{bound}"
+def _value(estimate: ParameterEstimate) -> str:
+    bound = "" if np.isfinite(estimate.error) else ", at its bound"
+    return f"{with_error(estimate.value, estimate.error)}{bound}"
 
 
-def _interval(by_name: ParameterEstimate) -> str:
-    low, high = by_name.interval
+def _interval(estimate: ParameterEstimate) -> str:
+    low, high = estimate.interval
     return f"{low:.4g} to {high:.4g}" if np.isfinite(low) else ""
 
 

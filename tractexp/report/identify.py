@@ -272,8 +272,8 @@ def _left(page: Report, uncertainty: Uncertainty) -> None:
             lags.points(name, x + 0.2 * c, autocorrelation(rows, len(x)), color, size=5)
             limit = 1.96 / np.sqrt(max(len(rows), 1))
             lags.level(limit).level(-limit)
-        sentences = f"{event.record.name}: the whitened residual, in standard deviations of the noise."
-        page.chart(chart.edge(event.t_start).edge(event.t_end), sentences)
+        caption = f"{event.record.name}: the whitened residual, in standard deviations of the noise."
+        page.chart(chart.edge(event.t_start).edge(event.t_end), caption)
         page.chart(lags, "Autocorrelation of the whitened residual; between the dashed lines is chance.")
     with page.folded("tests of the residuals, and the noise"):
         page.table(
@@ -317,13 +317,13 @@ def _correlation(page: Report, uncertainty: Uncertainty) -> None:
 
 
 def _origin(result: Any, command: str) -> list[list[str]]:
-    sentences = [["command", command]] if command else []
-    sentences.append(["tractexp", f"{result.tractexp_version}{f', commit {result.commit}' if result.commit else ''}"])
-    sentences += [
+    rows = [["command", command]] if command else []
+    rows.append(["tractexp", f"{result.tractexp_version}{f', commit {result.commit}' if result.commit else ''}"])
+    rows += [
         [f"record {r['name']} ({r['role']})", "; ".join(filter(None, [identity_in_words(r), f"SHA-256 {r['sha256']}"]))]
         for r in result.records
     ]
-    return sentences
+    return rows
 
 
 def _events(page: Report, uncertainty: Uncertainty, together: EventAgreement) -> None:

@@ -61,10 +61,10 @@ def summary(content: Mapping[str, Any]) -> Report:
 
 def report(views: Sequence[View], content: Mapping[str, Any]) -> Report:
     """The page."""
-    sentences = content["files"]
-    page = Report(f"A look at {', '.join(Path(f['file']).name for f in sentences)}", _lead(sentences))
-    for view, entry in zip(views, sentences, strict=True):
-        if len(sentences) > 1:
+    files = content["files"]
+    page = Report(f"A look at {', '.join(Path(f['file']).name for f in files)}", _lead(files))
+    for view, entry in zip(views, files, strict=True):
+        if len(files) > 1:
             page.heading(entry["file"])
         _conclusion(page, entry)
         page.table(["", ""], _facts(entry), words=(1,))
@@ -231,26 +231,26 @@ def _of_record(shown: Sight) -> Chart:
     assert record is not None
     panels = {"U": ("U", "U2"), "P, Q": ("P", "Q"), "f [Hz]": ("f",)}
     colors = {"U": VOLTAGE, "U2": PALETTE[3], "P": ACTIVE, "Q": REACTIVE, "f": PALETTE[2]}
-    units = {"U": record.base.voltage, "U2": record.base.voltage, "P": record.base.power, "Q": record.base.power}
+    sizes = {"U": record.base.voltage, "U2": record.base.voltage, "P": record.base.power, "Q": record.base.power}
     panels_of = {label: [n for n in names if n in record.channels] for label, names in panels.items()}
-    sentences = {"U": "[pu]" if record.base.voltage == 1 else "[kV]", "P, Q": "[pu]" if record.base.power == 1 else
+    units = {"U": "[pu]" if record.base.voltage == 1 else "[kV]", "P, Q": "[pu]" if record.base.power == 1 else
             "[MW, Mvar]"}  # fmt: skip
     used = [label for label, names in panels_of.items() if names]
-    chart = Chart("t [s]", [f"{label} {sentences.get(label, '')}".strip() for label in used])
+    chart = Chart("t [s]", [f"{label} {units.get(label, '')}".strip() for label in used])
     for panel, label in enumerate(used):
         for name in panels_of[label]:
-            values = record.channels[name] * units.get(name, 1.0)
+            values = record.channels[name] * sizes.get(name, 1.0)
             chart.samples(name, float(record.t[0]), record.step, values, colors[name], panel)
     return _marked(chart, shown)
 
 
 def _every(view: View) -> tuple[int, int]:
     """How many samples and how many phasors become one on a page, so that all loads of a file have room."""
-    page = view.recording
-    assert page is not None
+    recording = view.recording
+    assert recording is not None
     lines = sum(len(s.feeder.voltages) + len(s.feeder.currents) for s in view.sights if s.feeder is not None)
     phasors = LINES * sum(len(p.t) for s in view.sights for p in s.phasors)
-    return max(1, -(-lines * page.samples // MOST)), max(1, -(-phasors // MOST_PHASORS))
+    return max(1, -(-lines * recording.samples // MOST)), max(1, -(-phasors // MOST_PHASORS))
 
 
 def _of_waves(
@@ -309,8 +309,8 @@ def _phasors(chart: Chart, p: Any, part: slice, nominal: float, every: int) -> N
     alive = np.abs(p.f / nominal - 1) < BOUND
     lines.append(("f", np.where(alive, p.f, np.nan), PALETTE[2], 6))
     for name, values, color, panel in lines:
-        page = values[part] if every == 1 else envelope(values[part], every)
-        chart.samples(name, float(t[0]), step * every, page, color, panel)
+        drawn = values[part] if every == 1 else envelope(values[part], every)
+        chart.samples(name, float(t[0]), step * every, drawn, color, panel)
 
 
 def envelope(wave: np.ndarray, every: int) -> np.ndarray:

@@ -96,11 +96,11 @@ def _missed(before: Before, e: int) -> Chart:
     missed = np.where(bench.valid[:, part], bench.drive.measured[:, part] - base, np.nan)
     more = before.with_it.calculated[:, part] - base
     t = event.record.t[event.record.samples - base.shape[1] :]
-    page = Chart(f"t [s], {event.record.name}", [f"{c} [pu]" for c in bench.drive.names])
+    chart = Chart(f"t [s], {event.record.name}", [f"{c} [pu]" for c in bench.drive.names])
     for c in range(len(base)):
-        page.line("measured less base model", t, missed[c], MISSED, c, width=1.0)
-        page.line("with the term less base model", t, more[c], TERM, c)
-    return page
+        chart.line("measured less base model", t, missed[c], MISSED, c, width=1.0)
+        chart.line("with the term less base model", t, more[c], TERM, c)
+    return chart
 
 
 def _rivals(page: Report, proposal: Proposal) -> None:
