@@ -6,7 +6,7 @@ look alike; the shortlist is refitted nonlinearly from several starts, side by s
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import chdtrc
@@ -27,7 +27,7 @@ from tractexp.discrepancy.fitting import (
     rough_refit,
     wide_refits,
 )  # fmt: skip
-from tractexp.discrepancy.linearization import CandidateColumn, tangent
+from tractexp.discrepancy.linearization import CandidateColumn
 from tractexp.discrepancy.score_test import Score
 from tractexp.identification.local_minima import DISTINCT
 from tractexp.noise import Noise
@@ -203,9 +203,7 @@ def from_other_valleys(
         fit = refit(context, first.noise, [((), minimum)])[0]
         if np.linalg.norm((fit.unit - first.fit.unit)[context.coordinates.base]) < DISTINCT:
             continue
-        t = tangent(context, fit, first.noise)
-        projection = t.whitened(first.noise)
-        there = replace(first, fit=fit, tangent=t, projection=projection, scores=projection.scores())
+        there = first.at(fit, first.noise)
         if best.suffices:
             nearer = first.fit.deviance - fit.deviance
             promising = [(s.name,) for s in there.scores if context.criteria.promises(nearer + s.drop, explained)]

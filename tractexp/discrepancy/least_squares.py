@@ -17,8 +17,7 @@ from tractexp.discrepancy.linearization import tangent
 from tractexp.discrepancy.noise_in_quiet import QuietNoise
 from tractexp.discrepancy.score_test import ScoreTest
 from tractexp.identification.blocks import blocks_of
-from tractexp.identification.information import STRUCTURAL
-from tractexp.identification.sandwich import robust_root
+from tractexp.identification.sandwich import moves_without_blocks, robust_root
 from tractexp.noise import Noise
 
 
@@ -42,13 +41,9 @@ def least_squares_tests(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int) 
 
 def _robust(context: Context, projection: ScoreTest) -> np.ndarray:
     """Rows (k, d) whose inverse products are the covariance of all that is free, from blocks left out in turn."""
-    J = projection.Q @ projection.R
+    J = projection.Q @ projection.R  # with the rows of the prior
     r = projection.r[0] + projection.Q @ projection.along[0]
-    channels, samples = context.drive.measured.shape
-    scale = np.maximum(np.linalg.norm(J, axis=0), 1e-300)
-    whole, moves = (J / scale).T @ (J / scale), []
-    for block in blocks_of(context.events, context.drive, J.shape[1]):
-        rows = np.concatenate([np.arange(block.start, block.stop) + c * samples for c in range(channels)])
-        a = J[rows] / scale
-        moves.append(np.linalg.pinv(whole - a.T @ a, STRUCTURAL**2, hermitian=True) @ (a.T @ r[rows]) / scale)
-    return robust_root(J, np.clip(moves, -1.0, 1.0))[0]
+    measured = context.drive.measured
+    columns, rows = J[: measured.size].reshape(*measured.shape, -1), r[: measured.size].reshape(measured.shape)
+    blocks = blocks_of(context.events, context.drive, J.shape[1])
+    return robust_root(J, moves_without_blocks(columns, rows, blocks, J.T @ J))[0]

@@ -26,19 +26,16 @@ from tractexp.discrepancy.catalogue import Catalogue
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.disagreement import Disagreement
-from tractexp.discrepancy.explanations import Explanations, Names, searched, wide_starts
+from tractexp.discrepancy.explanations import WIDELY, Explanations, Names, searched, wide_starts
 from tractexp.discrepancy.families import NEAREST, starts
 from tractexp.discrepancy.fitting import Refit, best_of, refit, settled, wide_refits
 from tractexp.discrepancy.least_squares import residual_noise
-from tractexp.discrepancy.linearization import tangent
 from tractexp.discrepancy.noise_in_quiet import white
 from tractexp.discrepancy.records import Records
 from tractexp.identification.model_error import block_sums, noise_variance
 from tractexp.noise import Noise
 from tractexp.record import Event
 
-WIDELY = 3  # single effects with thresholds or times that are searched to the end
 FAMILIES = 2  # single effects whose families are tried, and to which a second is added
 CARRIED = 12  # sets of the search by likelihood that are fitted again
 LEAST = 0.1  # of the noise: a model's squared error is told no finer
@@ -186,7 +183,7 @@ def _fits(explained: Explanations, noise: Noise) -> list[Refit]:
     say = lambda line: context.effort.say(f"{line}, by least squares")  # noqa: E731
     begun = [explained.steps[0].fit.unit, *base.local_minima]
     bare = refit(context, noise, [((), unit) for unit in begun])[0]
-    ground = _linearized(explained.steps[0], bare, noise)
+    ground = explained.steps[0].at(bare, noise)
     refits: dict[Names, Refit] = {(): bare}
 
     def add(fits: Iterable[Refit]) -> None:
@@ -201,7 +198,7 @@ def _fits(explained: Explanations, noise: Noise) -> list[Refit]:
     add(_members(context, noise, singles[:FAMILIES], refits))
     of_load = [f for f in singles if f.names[0] in context.catalogue.of_load]  # members of families have no columns
     for single in of_load[:FAMILIES]:
-        add(searched([ground, _linearized(ground, single, noise)], refits, 2, say))
+        add(searched([ground, ground.at(single, noise)], refits, 2, say))
     return list(refits.values())
 
 
@@ -213,13 +210,6 @@ def _members(context: Context, noise: Noise, best: Sequence[Refit], refits: Mapp
         return []
     context.kernels.family.compile_members([m.name for m in wanted], context.effort.say)
     return wide_refits(context, noise, [starts(context, member, refits) for member in wanted], NEAREST)
-
-
-def _linearized(like: Disagreement, fit: Refit, noise: Noise) -> Disagreement:
-    """The scores at another fit; chance is not asked of them."""
-    t = tangent(like.context, fit, noise)
-    projection = t.whitened(noise)
-    return Disagreement(fit, noise, t, projection, like.chance, projection.scores())
 
 
 def _predicted(there: Context, fit: Refit) -> PredictionError:

@@ -95,13 +95,24 @@ def _influences(
     """The change (G, columns) of the estimate when each block of J (C, N, D) and rows (C, N) is left out."""
     own, before = J[:, :, columns], J[:, :, free:]
     flat = own.reshape(-1, len(columns))
-    whole, cross = flat.T @ flat, flat.T @ before.reshape(len(flat), -1)
-    scale = np.sqrt(np.maximum(np.diag(whole), 1e-300))
+    cross = flat.T @ before.reshape(len(flat), -1)
+    return moves_without_blocks(own, rows, blocks, flat.T @ flat, [cross @ change for change in power])
+
+
+def moves_without_blocks(
+    J: np.ndarray, rows: np.ndarray, blocks: Sequence[slice], whole: np.ndarray,
+    shifts: Sequence[np.ndarray | float] | None = None,
+) -> np.ndarray:  # fmt: skip
+    """The change (G, k) of an estimate when each block of J (C, N, k) and rows (C, N) is left out.
+
+    `whole` (k, k) is J'J with all that is never left out, such as a prior; `shifts` are what else moves J'r then.
+    """
+    k, scale = len(whole), np.sqrt(np.maximum(np.diag(whole), 1e-300))
     moves = []
-    for block, change in zip(blocks, power, strict=True):
-        a, r = own[:, block].reshape(-1, len(columns)), rows[:, block].ravel()
+    for block, shift in zip(blocks, shifts or [0.0] * len(blocks), strict=True):
+        a, r = J[:, block].reshape(-1, k), rows[:, block].ravel()
         rest = (whole - a.T @ a) / np.outer(scale, scale)
-        moves.append(np.linalg.pinv(rest, STRUCTURAL**2, hermitian=True) @ ((a.T @ r - cross @ change) / scale) / scale)
+        moves.append(np.linalg.pinv(rest, STRUCTURAL**2, hermitian=True) @ ((a.T @ r - shift) / scale) / scale)
     return np.clip(moves, -1.0, 1.0)  # no estimate leaves its box
 
 
