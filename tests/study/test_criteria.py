@@ -60,7 +60,7 @@ def judged_by(c, closed=1.0, gain=100.0, expected=100.0, p_left=1.0):
 
 def deviance(left):
     """What a set leaves of held-out events."""
-    return PredictedDeviance(refitted(0.0, 1), left, 0.01, 1000.0 + left, False, 10.8)
+    return PredictedDeviance(refitted(0.0, 1), left, SimpleNamespace(deviance=1000.0 + left), False, 10.8)
 
 
 def wandering(c, seed, rests=(), walk=0.0):

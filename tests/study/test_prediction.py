@@ -1,6 +1,7 @@
 """Names by what they predict of held-out events: the rule by itself, and where a model is never exact."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -80,7 +81,10 @@ def test_contributions_begin_with_the_member_that_helps_most():
 
 
 def test_a_set_that_the_fitted_events_reject_is_clear_of_none_that_they_do_not():
-    one, other = (PredictedDeviance(Refit((n,), np.zeros(0), 0.0, 1), 50.0, 0.01, 900.0, n == "b", 10.8) for n in "ab")
+    one, other = (
+        PredictedDeviance(Refit((n,), np.zeros(0), 0.0, 1), 50.0, SimpleNamespace(deviance=900.0), n == "b", 10.8)
+        for n in "ab"
+    )
     assert one.clear_of(other)
     assert not other.clear_of(one)
 

@@ -404,9 +404,9 @@ class Discrepancy(Task, call=investigate):
             if (gap := getattr(result.gap, role)) is None:
                 continue
             for stage in ("before", "after"):
-                off = {key: value for key, value in vars(getattr(gap, stage)).items() if isinstance(value, float)}
-                off["model_error"] = getattr(gap, stage).model_error["value"]
-                metrics |= {f"{role}_{stage}_{key}": value for key, value in off.items()}
+                misfit = vars(getattr(gap, stage))
+                off = misfit | {"model_error": misfit["model_error"]["value"]}
+                metrics |= {f"{role}_{stage}_{key}": value for key, value in off.items() if value is not None}
             if gap.closed is not None:
                 metrics[f"{role}_gap_closed"] = gap.closed
         children = [

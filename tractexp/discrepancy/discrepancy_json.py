@@ -122,7 +122,7 @@ def _remainder(investigation: Findings) -> dict[str, Any] | None:
     gap = investigation.validate or investigation.train
     return {
         "model_error": _error(nearest or gap.after.error),
-        "share": _number(gap.after.error.square / gap.before.error.square) if investigation.names else None,
+        "share": _number(1 - gap.closed) if investigation.names else None,
         "p": tests.p_left,
         "where": tests.loudest,
         "sentence": investigation.headline,

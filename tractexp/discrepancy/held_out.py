@@ -70,7 +70,11 @@ class HeldOut:
     assessments: Mapping[Names, Assessment] = field(default_factory=dict)
     together: tuple[Refit, ...] = ()
     predictions: Predictions | None = None
-    leaves_more: bool = False
+
+    @property
+    def leaves_more(self) -> bool:
+        """Whether what is retained leaves more than noise."""
+        return self.predictions is not None
 
     @property
     def retained(self) -> tuple[Rival, ...]:

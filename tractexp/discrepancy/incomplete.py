@@ -1,7 +1,8 @@
 """Explanations that leave more than noise, where none leaves less: named by what they predict of held-out events."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.disagreement import examined
@@ -25,14 +26,12 @@ JUDGED = 10  # sets of the search by likelihood that are judged on the held-out 
 
 @dataclass(frozen=True, eq=False)
 class PredictedDeviance(Prediction):
-    """By the deviance on the held-out events: what is left of it, itself, and whether the fitted events reject the set.
-
-    `least` is what chance may leave.
+    """By the deviance: what is left of it on the held-out events beyond chance, the curves there, and whether the
+    fitted events reject the set. `least` is what chance may leave.
     """
 
     left_over: float
-    model_error: float
-    deviance: float
+    curves: Curves
     rejected: bool
     least: float
 
@@ -42,11 +41,12 @@ class PredictedDeviance(Prediction):
 
     @property
     def error(self) -> float:
-        return self.model_error
+        return self.curves.error.value
 
     def clear_of(self, other: Prediction) -> bool:
         assert isinstance(other, PredictedDeviance)
-        return other.deviance - self.deviance >= self.least or (other.rejected and not self.rejected)
+        gain = other.curves.deviance - self.curves.deviance
+        return gain >= self.least or (other.rejected and not self.rejected)
 
 
 def incomplete(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
@@ -76,16 +76,12 @@ def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOu
     judged = judged_on(context, events, weighed.bare, fitted[::-1])  # the best last: there the noise is its
     gaps = {f.names: judged[f.names].gap for f in fitted}
     whole = max(gaps.values(), key=lambda one: one.gain)
-
-    def predicted_by(fit: Refit, left: float, curves: Curves, *, rejected: bool) -> PredictedDeviance:
-        return PredictedDeviance(fit, left, curves.error.value, curves.deviance, rejected, least)
-
     sets: dict[Names, PredictedDeviance] = {
-        (): predicted_by(weighed.bare, whole.gain + max(whole.left, 0.0), whole.before, rejected=True)
+        (): PredictedDeviance(weighed.bare, whole.gain + max(whole.left, 0.0), whole.before, True, least)
     }
     for fit in fitted:
         one = gaps[fit.names]
-        sets[fit.names] = predicted_by(fit, one.left, one.after, rejected=bool(rejected.get(fit.names, False)))
+        sets[fit.names] = PredictedDeviance(fit, one.left, one.after, bool(rejected.get(fit.names, False)), least)
     predicted = Predictions(context.catalogue, sets)
     chosen = [p.fit for p in predicted.explaining(context.criteria) if not p.rejected]
     if not chosen or not all(gaps[f.names].telling and gaps[f.names].helps for f in chosen):
@@ -99,11 +95,7 @@ def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOu
 
     retained = each_apart(rival, chosen)
     others = [r for r in surviving.rivals if r.fit.names not in {f.names for f in chosen}]
-    return replace(
-        weighed, survivors=replace(surviving, retained=tuple(retained), rivals=(*retained, *others)), together=(),
-        extended={f.names: f for f in chosen}, assessments={f.names: judged[f.names] for f in chosen},
-        predictions=predicted, leaves_more=True,
-    )  # fmt: skip
+    return _named(weighed, retained, others, {f.names: judged[f.names] for f in chosen}, predicted)
 
 
 def _by_size(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
@@ -112,7 +104,7 @@ def _by_size(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
     predicted = predictions(explained, events)
     explaining = predicted.explaining(explained.base.context.criteria)
     if not explaining:
-        return replace(weighed, predictions=predicted)
+        return weighed
     best, size = explaining[0], len(explaining[0].names)
     others = [p for p in predicted.ranked(size) if len(p.names) == size and p not in explaining]
     bare = predicted.bare.fit
@@ -123,12 +115,22 @@ def _by_size(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
         tests = None if rejected else least_squares_tests(explained.base.quiet, fit, predicted.noise, seed)
         return Rival(fit, bare.deviance - fit.deviance, fit.cost - best.fit.cost, 0.0, rejected, tests)
 
-    retained = tuple(rival(one, False) for one in explaining)
-    surviving = replace(weighed.survivors, retained=retained, rivals=(*retained, *(rival(p, True) for p in others)))
+    retained, rejected = [rival(p, False) for p in explaining], [rival(p, True) for p in others]
+    assessments = {p.names: _assessed(predicted, p) for p in explaining}
+    own = {"noise": predicted.noise, "faults": (), "bare": bare}
+    return _named(weighed, retained, rejected, assessments, predicted, **own)
+
+
+def _named(
+    weighed: HeldOut, retained: Sequence[Rival], others: Sequence[Rival], assessments: Mapping[Names, Assessment],
+    predicted: Predictions, **own: Any,
+) -> HeldOut:  # fmt: skip
+    """The sets retained in place of those that leave noise only; `own` is what they were fitted with."""
+    surviving = replace(weighed.survivors, retained=tuple(retained), rivals=(*retained, *others))
+    extended = {r.fit.names: r.fit for r in retained}
     return replace(
-        weighed, survivors=surviving, noise=predicted.noise, faults=(), bare=bare, together=(), predictions=predicted,
-        extended={p.names: p.fit for p in explaining}, leaves_more=True,
-        assessments={p.names: _assessed(predicted, p) for p in explaining},
+        weighed, survivors=surviving, extended=extended, assessments=assessments, together=(), predictions=predicted,
+        **own,
     )  # fmt: skip
 
 

@@ -73,8 +73,7 @@ class Findings:
     @functools.cached_property
     def contributions(self) -> list[tuple[tuple[str, ...], float]]:
         """Names, from none to all of them, one more at a time, and the model's error with them."""
-        predicted = self.held_out.predictions
-        if self.held_out.leaves_more and predicted is not None:
+        if (predicted := self.held_out.predictions) is not None:
             return [(one.names, one.error) for one in predicted.contributions(self.names)]
         if not self.names:
             return []

@@ -204,11 +204,12 @@ def _fits(explained: Explanations, noise: Noise) -> list[Refit]:
 
 def _members(context: Context, noise: Noise, best: Sequence[Refit], refits: Mapping[Names, Refit]) -> list[Refit]:
     """Other places and laws of the best single effects."""
-    families = {context.catalogue.textbook(f.names)[0] for f in best}
-    wanted = [m for m in context.catalogue.members if m.effect.family in families]
-    if not wanted or not context.domain.calibrated:
+    families, kernels = {context.catalogue.textbook(f.names)[0] for f in best}, context.kernels.family
+    members = context.catalogue.members if context.domain.calibrated else ()
+    wanted = [m for m in members if m.effect.family in families and kernels.joins(m.name)]
+    if not wanted:
         return []
-    context.kernels.family.compile_members([m.name for m in wanted], context.effort.say)
+    kernels.compile_members([m.name for m in wanted], context.effort.say)
     return wide_refits(context, noise, [starts(context, member, refits) for member in wanted], NEAREST)
 
 

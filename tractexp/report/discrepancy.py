@@ -112,8 +112,7 @@ def report(findings: Findings, content: Mapping[str, Any], title: str) -> Report
     head = f"{findings.verdict.word.upper()} {' or '.join(spoken)}".strip()
     left = [as_sentence(findings.headline)] if findings.headline else []
     sentences = [as_sentence(findings.verdict.reason), *left, *headlines(findings), _graded(findings)]
-    complete = findings.verdict.complete or findings.verdict.word == UNEXPLAINED
-    kind = KIND[findings.verdict.word] if complete else "plain"
+    kind = "plain" if findings.names and not findings.verdict.complete else KIND[findings.verdict.word]
     page.verdict(head, *sentences, f"Next: {recommendation(findings)}.", kind=kind)
     overlaid(
         page.heading("Measured, before, after" if findings.names else "Measured and calculated"), findings.overlays
@@ -149,7 +148,7 @@ def _smaller(page: Report, findings: Findings, content: Mapping[str, Any]) -> No
     table, near = gap(content), findings.verdict.nearest
     page.add(replace(table, rows=_with_nearest(near)) if findings.context.waves and near else table)
     if len(steps := content["contributions"]) > 2:
-        rows = [[joined(s["effects"]) or "the base model", in_percent(s["model_error"])] for s in steps]
+        rows = [[joined(s["effects"]) or "the base model", _size(s["model_error"])] for s in steps]
         page.text("What each name contributes:")
         page.table(["with", "model error, held out"], rows, "One more at a time, the one that helps most first.")
     if findings.fitted_to_both:
@@ -158,11 +157,10 @@ def _smaller(page: Report, findings: Findings, content: Mapping[str, Any]) -> No
 
 def _with_nearest(near: Nearest) -> list[list[str]]:
     """The base model's gap and that of the candidates which come nearest."""
-    error = lambda curves: _error({"value": curves.error.value, "interval": curves.error.interval})  # noqa: E731
     pairs = (("fitted", near.curves), ("held out", near.carried))
     stages = ("base model", "nearest candidates")
     return [
-        [label, stage, error(c), *_off(vars(c))]
+        [label, stage, _error(c.error.to_dict()), *_off(vars(c))]
         for label, both in pairs
         if both
         for stage, c in zip(stages, both, strict=True)
@@ -172,10 +170,12 @@ def _with_nearest(near: Nearest) -> list[list[str]]:
 def _error(entry: Mapping[str, Any]) -> str:
     """A model's error with its interval, as a table has it."""
     ends = [in_percent(end) for end in entry["interval"] if end is not None and np.isfinite(end)]
-    value = entry["value"]
-    if value is None or not np.isfinite(value):
-        return "beyond all measure"
-    return in_percent(value) + (f" ({ends[0].removesuffix(' %')} to {ends[1]})" if len(ends) == 2 else "")
+    return _size(entry["value"]) + (f" ({ends[0].removesuffix(' %')} to {ends[1]})" if len(ends) == 2 else "")
+
+
+def _size(error: float | None) -> str:
+    """A model's error; none where the model diverges."""
+    return "beyond all measure" if error is None or not np.isfinite(error) else in_percent(error)
 
 
 def _off(misfit: Mapping[str, Any]) -> list[str]:
