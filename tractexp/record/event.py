@@ -1,13 +1,15 @@
 """The event inside a record: where the dip is, what came before it, and how noisy the recording is."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from tractexp.errors import UserError
+from tractexp.record.change import voltage_changes
 from tractexp.record.direction import direction
 from tractexp.record.record import DEAD, Record
+from tractexp.record.steadiness import steady_part
 
 SHALLOWEST = 0.03  # of the voltage before: anything less is no dip
 NOISE_FACTOR = 6.0  # standard deviations of noise that a dip must exceed
@@ -129,6 +131,8 @@ def _scan(t: np.ndarray, U: np.ndarray) -> tuple[list[tuple[int, int]], list[tup
             continue
         crossing = k + int(np.argmax(below))
         start = _onset(U, dips[-1][1] if dips else 0, crossing, reference, margin)
+        if crossing - start > block:
+            start = _after_a_step(t, U, start, crossing, margin)
         end = _recovery(U, crossing, reference, margin)
         if dips and t[start] - t[dips[-1][1]] < MERGED:
             start = dips.pop()[0]
@@ -171,6 +175,16 @@ def _onset(U: np.ndarray, first: int, crossing: int, reference: float, margin: f
     return first + int(high[-1]) + 1 if len(high) else crossing
 
 
+def _after_a_step(t: np.ndarray, U: np.ndarray, start: int, crossing: int, margin: float) -> int:
+    """The onset of a dip that comes long after a small step of the voltage, which is none of it."""
+    begin = max(0, 2 * start - crossing)
+    steps = voltage_changes(U[begin:crossing], MERGED * (len(t) - 1) / float(t[-1] - t[0]))
+    if not steps:
+        return start
+    stop = begin + steps[-1].stop
+    return _onset(U, stop, crossing, float(np.median(U[stop:crossing])), margin)
+
+
 def _recovery(U: np.ndarray, crossing: int, reference: float, margin: float) -> int:
     """The first sample that has recovered from the lowest voltage so far, or len(U)."""
     after = U[crossing:]
@@ -182,7 +196,8 @@ def _recovery(U: np.ndarray, crossing: int, reference: float, margin: float) -> 
 def detect(record: Record) -> Event:
     """The first dip of a record; raises `UserError` for none, one that does not end, or one that comes too early.
 
-    An interruption, an open pole and a step are refused by their names.
+    An interruption, an open pole and a step are refused by their names, and so is a load that steps right before. The
+    notes of its record say what was done.
     """
     dips, swells = _scan(record.t, record.U)
     if not dips:
@@ -195,22 +210,24 @@ def detect(record: Record) -> Event:
         )
     if reason := _no_such_dip(record, start, end):
         raise UserError(f"{record.where}: {reason}")
-    before = _steady(record, start, swells)
+    before, notes = steady_part(record, _steady(record, start, swells), _least(record))
     t, U, P, Q = (values[before] for values in (record.t, record.U, record.P, record.Q))
     if np.count_nonzero(np.isfinite(P) & np.isfinite(Q)) < FEWEST_BEFORE:
         raise UserError(
             f"{record.where}: P and Q have fewer than {FEWEST_BEFORE} values in the {before.stop - before.start} "
             f"samples before the dip at t = {record.t[start]:g} s; the steady state cannot be computed"
         )
-    U0 = float(U.mean())
+    U0, P0, Q0 = float(U.mean()), float(np.nanmean(P)), float(np.nanmean(Q))
+    if notes:
+        record = replace(record, notes=tuple(dict.fromkeys([*record.notes, *notes])))
     return Event(
         record=record,
         start=start,
         end=end,
         depth=1 - float(record.U[start:end].min()) / U0,
         U0=U0,
-        P0=float(np.nanmean(P)),
-        Q0=float(np.nanmean(Q)),
+        P0=P0,
+        Q0=Q0,
         f0=record.base.frequency if record.f is None else float(record.f[before].mean()),
         noise_U=noise(t, U),
         noise_P=noise(t, P),
@@ -224,13 +241,20 @@ def steady(record: Record) -> slice:
     """The samples of the steady state before the first dip; all where there is none, or too little before it."""
     dips, swells = _scan(record.t, record.U)
     start = dips[0][0] if dips else 0
-    return _steady(record, start, swells) if start >= FEWEST_BEFORE else slice(0, record.samples)
+    if start < FEWEST_BEFORE:
+        return slice(0, record.samples)
+    return steady_part(record, _steady(record, start, swells), _least(record))[0]
+
+
+def _least(record: Record) -> int:
+    """Samples that a steady state has at least."""
+    return max(FEWEST_BEFORE, round(0.1 * record.rate))
 
 
 def _steady(record: Record, start: int, swells: list[tuple[int, int]]) -> slice:
     """The last second before the dip, or before a swell that leaves too little room behind it."""
     most = max(FEWEST_BEFORE, round(STEADY * record.rate))
-    least = max(FEWEST_BEFORE, round(0.1 * record.rate))
+    least = _least(record)
     stop, first = start, max(0, start - most)
     for begin, end in reversed([swell for swell in swells if swell[0] < start]):
         if end <= first:
