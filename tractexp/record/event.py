@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from tractexp.errors import UserError
+from tractexp.record.aftermath import loss, until_change
 from tractexp.record.change import voltage_changes
 from tractexp.record.direction import direction
 from tractexp.record.record import DEAD, Record
@@ -197,7 +198,7 @@ def detect(record: Record) -> Event:
     """The first dip of a record; raises `UserError` for none, one that does not end, or one that comes too early.
 
     An interruption, an open pole and a step are refused by their names, and so is a load that steps right before. The
-    notes of its record say what was done.
+    record ends where its load changes after the dip for another reason than the voltage; its notes say what was done.
     """
     dips, swells = _scan(record.t, record.U)
     if not dips:
@@ -218,8 +219,9 @@ def detect(record: Record) -> Event:
             f"samples before the dip at t = {record.t[start]:g} s; the steady state cannot be computed"
         )
     U0, P0, Q0 = float(U.mean()), float(np.nanmean(P)), float(np.nanmean(Q))
-    if notes:
+    if notes := [*notes, *loss(record, end, complex(P0, Q0))]:
         record = replace(record, notes=tuple(dict.fromkeys([*record.notes, *notes])))
+    record = until_change(record, start, end, complex(P0, Q0))
     return Event(
         record=record,
         start=start,
