@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from tractexp.provenance import digest
-from tractexp.record.change import CHANGED, clause, load_changes, smear, without_gaps
+from tractexp.record.change import CHANGED, clause, from_to, load_changes, smear, without_gaps
 from tractexp.record.record import Record
 
 LOST = 0.5  # of the apparent power before: what has less left after a dip has lost load in it
@@ -66,9 +66,8 @@ def loss(record: Record, end: int, S: complex) -> list[str]:
     if abs(left) >= LOST * abs(S):
         return []
     return [
-        f"the load loses {100 * (1 - abs(left) / abs(S)):.0f} % of its power in the dip (P {S.real:.4g} to "
-        f"{left.real:.4g}, Q {S.imag:.4g} to {left.imag:.4g}): it trips, which a model without the effect "
-        "undervoltage_trip cannot follow"
+        f"the load loses {100 * (1 - abs(left) / abs(S)):.0f} % of its power in the dip ({from_to(record, S, left)}): "
+        "it trips, which a model without the effect undervoltage_trip cannot follow"
     ]
 
 

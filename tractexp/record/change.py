@@ -99,12 +99,15 @@ def smear(record: Record) -> float:
 
 
 def clause(record: Record, begin: int, change: Change) -> str:
-    """What a step is, a clause; its samples count from `begin`."""
-    P, Q = (f"{x} {a:.4g} to {b:.4g}" for x, a, b in _parts(change))
+    """What a step is; its samples count from `begin`."""
     name = "is switched off" if change.ratio < SMALL else "changes"
-    return f"the load {name} at t = {record.t[begin + change.first]:g} s ({P}, {Q}) while the voltage stays"
+    powers = from_to(record, change.before, change.after)
+    return f"the load {name} at t = {record.t[begin + change.first]:g} s ({powers}) while the voltage stays"
 
 
-def _parts(change: Change) -> Iterator[tuple[str, float, float]]:
-    yield "P", change.before.real, change.after.real
-    yield "Q", change.before.imag, change.after.imag
+def from_to(record: Record, before: complex, after: complex) -> str:
+    """Two powers P + jQ of a record in words, in MW and Mvar where its base says so."""
+    base = record.base
+    size, units = (base.power, (" MW", " Mvar")) if base.in_mva else (1.0, ("", ""))
+    parts = zip("PQ", units, (before.real, before.imag), (after.real, after.imag), strict=True)
+    return ", ".join(f"{name} {size * a:.4g} to {size * b:.4g}{unit}" for name, unit, a, b in parts)

@@ -7,7 +7,7 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.record.aftermath import loss, until_change
-from tractexp.record.change import voltage_changes
+from tractexp.record.change import smear, voltage_changes
 from tractexp.record.direction import direction
 from tractexp.record.record import DEAD, Record
 from tractexp.record.steadiness import steady_part
@@ -19,6 +19,7 @@ FEWEST_BEFORE = 10  # samples before a dip, for the steady state and the noise
 MERGED = 0.02  # s: dips closer than one cycle are one
 OPEN_POLE = 0.25  # of the voltage: negative sequence of an open pole, of a fault as well
 UNCLEARED = 1.5  # s: back-up protection clears a fault within about a second
+SAME_CURRENT = 0.1  # of a current that stays: how far it moves, and for how much of the time it may move farther
 STEP_AT_MOST = 0.15  # of the voltage: a tap changer or a switched line moves it no farther
 STEP_LASTS = 0.3  # s of a new level before it is one
 COARSE, FEWEST_INSIDE = 20.0, 5  # Hz, samples: a dip of fewer samples at a lower rate shows no response
@@ -274,6 +275,11 @@ def _no_such_dip(record: Record, start: int, end: int) -> str:
     before = float(U[:start].mean())
     inside = U[start:end]
     lowest, when = float(inside.min()), f"at t = {t[start]:g} s"
+    if _current_stays(record, start, end):
+        return (
+            f"the voltage falls to {lowest:.3g} {when} while the current stays as it was: a fuse of the voltage "
+            "transformers, or their wiring, and no dip of the network; choose another event"
+        )
     if lowest < DEAD * before:
         if end < len(U):
             return (
@@ -300,6 +306,22 @@ def _no_such_dip(record: Record, start: int, end: int) -> str:
             f"record of at least {COARSE:g} Hz"
         )
     return ""
+
+
+def _current_stays(record: Record, start: int, end: int) -> bool:
+    """Whether a voltage that is gone, or unbalanced for longer than a fault lasts, leaves the current as it was."""
+    edge = round(smear(record))
+    inside, before = slice(start + edge, end - edge * (end < record.samples)), slice(max(0, start - 10 * edge), start)
+    if inside.stop - inside.start < max(3 * edge, FEWEST_INSIDE):
+        return False
+    U = record.U[inside]
+    gone = float(np.median(U)) < DEAD * float(record.U[:start].mean())
+    unbalanced = record.U2 is not None and float(np.median(record.U2[inside] / np.maximum(U, 1e-12))) > OPEN_POLE
+    if not gone and not (unbalanced and (end == record.samples or (end - start) * record.step > UNCLEARED)):
+        return False
+    usual, current = (np.hypot(record.P[at], record.Q[at]) / np.maximum(record.U[at], 1e-12) for at in (before, inside))
+    level = float(np.nanmedian(usual)) if np.isfinite(usual).any() else 0.0
+    return level > 0 and bool((np.abs(current / level - 1) < SAME_CURRENT).mean() > 1 - SAME_CURRENT)
 
 
 def _unfinished(record: Record, start: int, before: float) -> str:
