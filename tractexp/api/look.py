@@ -278,10 +278,11 @@ def _feeder(view: View, shown: Sight) -> dict[str, Any]:
             "connection": _name(feeder.connection), "voltages": list(feeder.voltages),
             "currents": list(feeder.currents),
             "channels": [names[i] for i in (*feeder.voltages, *feeder.currents)],
-            "reverse_current": feeder.reverse_current, "why": list(feeder.why),
+            "reverse_current": feeder.reverse_current, "why": list(feeder.why), "loaded": feeder.loaded,
         }  # fmt: skip
     else:
-        made |= {"connection": "", "voltages": [], "currents": [], "channels": [], "reverse_current": False, "why": []}
+        made |= {"connection": "", "voltages": [], "currents": [], "channels": [], "reverse_current": False, "why": [],
+                 "loaded": True}  # fmt: skip
     U, P, Q = told or (None, None, None)
     units = ("pu", "pu", "pu") if shown.per_unit else ("kV", "MW", "Mvar")
     return made | {

@@ -16,6 +16,7 @@ from tractexp.recording.snapshot import Snapshots, frequency, nearest_nominal, s
 ALIKE = 0.1  # three magnitudes this close, as a share of their mean, may be three phases
 SYMMETRIC = 15.0  # degrees off 120 that three phasors may be
 UNLOADED = 0.005  # of the greatest current in the file: less is an unloaded feeder
+LONG = 25  # windows of a cycle: what a load draws for three quarters of so long (or of a quarter of a short record)
 STEPS_LOADED = 3.0  # quantisation steps that a current must exceed
 CLOSES = 0.03  # of the sum of magnitudes: currents that add up to less belong to one bus
 SYSTEM = 0.75  # of the RMS: what three phases have of one sequence at some time
@@ -197,9 +198,12 @@ def _text(recording: Recording, group: Group) -> set[str]:
 
 
 def _size(phasors: Snapshots, numbers: Sequence[int]) -> float:
-    """Magnitude [kV, kA] where it is large: the upper quartile of the mean over the channels."""
+    """Magnitude [kV, kA], mean over the channels, where it is large for long: no fault's, nor that after a trip."""
     size = np.nan_to_num(np.abs(phasors.of(numbers))).mean(axis=0)
-    return float(np.percentile(size, 75)) if len(size) else 0.0
+    if not len(size):
+        return 0.0
+    spans = np.lib.stride_tricks.sliding_window_view(size, max(1, min(LONG, len(size) // 4)))
+    return float(np.percentile(spans, 25, axis=1).max())
 
 
 def _positive(X: np.ndarray, pairs: bool) -> np.ndarray:
@@ -312,6 +316,9 @@ def _marked(recording: Recording, phasors: Snapshots, feeder: Feeder, level: flo
     if _dead(phasors, feeder.voltages):
         why = strange or "the voltages are no three phases: the line is dead, or they were named otherwise"
         return replace(feeder, why=(*feeder.why, why), loaded=False)
+    if not any(phasors.pure(i) for i in feeder.currents):
+        said = "no load here: the currents are no more than noise or harmonics"
+        return replace(feeder, why=(*feeder.why, said), loaded=False)
     size = _size(phasors, feeder.currents)
     step = max(abs(c.gain * c.ratio * c.factor) for c in (recording.channels[i] for i in feeder.currents))
     integral = all(recording.channels[i].raw.dtype.kind in "iu" for i in feeder.currents)

@@ -68,7 +68,14 @@ class Sight:
         return self.record is not None and self.record.base.voltage == self.record.base.power == 1
 
     def powers(self) -> tuple[float, float, float] | None:
-        """Voltage [kV], P [MW] and Q [Mvar] at the beginning, before the first event; None without measurements."""
+        """Voltage [kV], P [MW] and Q [Mvar] before the dip that is worth fitting, else at the beginning.
+
+        The beginning ends with the first event. None without measurements.
+        """
+        for event in (each.event for each in self.events if each.worth):
+            if event is not None:
+                base = event.record.base
+                return event.U0 * base.voltage, event.P0 * base.power, event.Q0 * base.power
         if self.record is not None:
             first, base = slice(0, max(1, self.record.samples // 20)), self.record.base
             U, P, Q = (float(np.nanmedian(v[first])) for v in (self.record.U, self.record.P, self.record.Q))
@@ -209,11 +216,12 @@ def _numbered(
 
 
 def _event(result: Record | UserError | None, refused: str) -> tuple[Event | None, str]:
-    """The event of a record, or why there is none."""
+    """The event of a record with what the detection noted of it, or why there is none."""
     if not isinstance(result, Record):
         return None, str(result or refused or "it is no dip")
     try:
-        return detect(result), ""
+        event = detect(result)
+        return event, "; ".join(note for note in event.record.notes if note not in result.notes)
     except UserError as error:
         return None, str(error)
 
@@ -234,5 +242,7 @@ def _common(what: Happening, start: float, end: float) -> float:
 
 
 def _why(what: Happening, event: Event | None, refused: str) -> str:
-    """What makes it (not) worth fitting: the event itself, or that it gives no record."""
-    return what.why if event is not None or not what.worth else f"it gives no record: {refused}"
+    """What makes it (not) worth fitting: the event itself, or that it gives no record; what the detection noted."""
+    if not what.worth:
+        return what.why
+    return f"{what.why}; {refused}".removesuffix("; ") if event is not None else f"it gives no record: {refused}"
