@@ -88,7 +88,7 @@ def channels(entry: Mapping[str, Any]) -> Table:
     """The channels of a file, with their quality in detail."""
     caption = (
         "Numbers count from 0, as data.voltages and data.currents do. RMS of the fundamental; noise about fundamental"
-        " and harmonics in the quietest ten cycles, as a share of it."
+        " and harmonics in the quietest ten cycles of the first calm, as a share of it."
     )
     columns = ["number", "name", "phase", "unit", "primary RMS", "noise", "colour", "THD", "bits", "fit for what"]
     rows = [_channel(c) for c in entry["channels"]]
