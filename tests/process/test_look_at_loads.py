@@ -6,6 +6,7 @@ from made_recordings import RATE, constant, recording
 
 import tractexp
 from tractexp.filetypes.comtrade_writer import write
+from tractexp.record.wave_event import in_waves
 
 
 def saved(path, values, **more):
@@ -41,6 +42,13 @@ def test_the_headline_is_the_power_before_the_dip_not_at_the_beginning(tmp_path)
     assert load["P"] == pytest.approx(event.P0 * event.record.base.power)
     assert "the steady state before the dip is that of the" in shown.events.rows[1]["why"]
     assert "Before the dip 110 kV, 40 MW" in shown.report().html
+
+
+def test_the_samples_that_are_fitted_begin_after_the_step_too(tmp_path):
+    path = saved(tmp_path / "shed.cfg", course(constant(start=1.2, end=1.4, length=3.0), (0.0, 3.0), (0.8, 1.0)))
+    event = in_waves(tractexp.read(path)[0])
+    assert 0.8 < event.record.t[event.first] < 0.83
+    assert event.P0 * event.record.base.power == POWER
 
 
 def test_a_load_that_is_lost_in_the_dip_is_worth_it_only_with_that_word(tmp_path):

@@ -5,6 +5,7 @@ import pytest
 
 import tractexp
 from tractexp.errors import UserError
+from tractexp.provenance import digest
 from tractexp.record import Record, detect
 
 BEGIN, END = 2.0, 2.15  # s, of the dip
@@ -27,9 +28,13 @@ def step(at, before, after=1.0):
 @pytest.mark.parametrize("before", [0.0, 0.5, 1.1, 3.0])
 @pytest.mark.parametrize("rate", [50, 200, 1000])
 def test_the_steady_state_is_that_after_the_last_step(rate, before):
-    event = detect(record(step(1.7, before), rate))
+    whole = record(step(1.7, before), rate)
+    event = detect(whole)
     assert 1.7 <= event.record.t[event.steady.start] <= 1.74
     np.testing.assert_allclose([event.P0, event.Q0], [0.8, 0.4], atol=2e-3)
+    assert event.steady.start == 0  # what was before is not fitted
+    assert event.record.digest == digest(whole)
+    assert event.record.t[event.start] == pytest.approx(BEGIN)
     [note] = event.record.notes
     assert "while the voltage stays: the steady state before the dip is that of the 0." in note
 

@@ -51,9 +51,7 @@ def _until_gone(record: Record, first: int, S: complex, U: float) -> Record:
 
 
 def _cut(record: Record, at: int, why: str) -> Record:
-    parts = {name: x[:at] for name, x in record.channels.items()}
-    more = {name: x[:at] for name, x in record.more.items()}
-    return _noted(replace(record, digest=digest(record), more=more, **parts), f"{why}: the record is cut there")
+    return _noted(replace(record.part(slice(0, at)), digest=digest(record)), f"{why}: the record is cut there")
 
 
 def loss(record: Record, end: int, S: complex) -> list[str]:

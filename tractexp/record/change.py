@@ -101,8 +101,8 @@ def smear(record: Record) -> float:
 def clause(record: Record, begin: int, change: Change) -> str:
     """What a step is; its samples count from `begin`."""
     name = "is switched off" if change.ratio < SMALL else "changes"
-    powers = from_to(record, change.before, change.after)
-    return f"the load {name} at t = {record.t[begin + change.first]:g} s ({powers}) while the voltage stays"
+    when = record.t[begin + (change.first + change.stop) // 2]
+    return f"the load {name} at t = {when:g} s ({from_to(record, change.before, change.after)}) while the voltage stays"
 
 
 def from_to(record: Record, before: complex, after: complex) -> str:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -35,14 +34,9 @@ def numbered(wholes: Sequence[Record], where: str, pre: float, post: float) -> l
             early, late = np.searchsorted(t, [t[start] - pre, t[start] + post]).tolist()
             window, number = slice(max(first, early), min(stop, late)), len(file_dips) + 1
             name, source = f"{whole.name}_dip{number}", f"{where} dip {number}"
-            record = _refused(replace(whole, name=name, source=source, **_part(whole, window)))
+            record = _refused(replace(whole.part(window), name=name, source=source))
             file_dips.append(FileDip(number, float(t[start]), float(t[min(end, len(t) - 1)]), record))
     return file_dips
-
-
-def _part(whole: Record, window: slice) -> dict[str, Any]:
-    more = {name: values[window] for name, values in whole.more.items()}
-    return {name: values[window] for name, values in whole.channels.items()} | {"more": more}
 
 
 def _refused(record: Record) -> Record | UserError:

@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from tractexp.errors import UserError
+from tractexp.provenance import digest
 from tractexp.record.aftermath import loss, until_change
 from tractexp.record.change import smear, voltage_changes
 from tractexp.record.direction import direction
@@ -199,7 +200,8 @@ def detect(record: Record) -> Event:
     """The first dip of a record; raises `UserError` for none, one that does not end, or one that comes too early.
 
     An interruption, an open pole and a step are refused by their names, and so is a load that steps right before. The
-    record ends where its load changes after the dip for another reason than the voltage; its notes say what was done.
+    record begins after an earlier step and ends where its load changes after the dip for another reason than the
+    voltage; its notes say what was done.
     """
     dips, swells = _scan(record.t, record.U)
     if not dips:
@@ -212,7 +214,12 @@ def detect(record: Record) -> Event:
         )
     if reason := _no_such_dip(record, start, end):
         raise UserError(f"{record.where}: {reason}")
-    before, notes = steady_part(record, _steady(record, start, swells), _least(record))
+    usual = _steady(record, start, swells)
+    before, notes = steady_part(record, usual, _least(record))
+    if before.start > usual.start:  # what was before is another state, which is not fitted
+        first = before.start
+        start, end, before = start - first, end - first, slice(0, before.stop - first)
+        record = replace(record.part(slice(first, record.samples)), digest=digest(record))
     t, U, P, Q = (values[before] for values in (record.t, record.U, record.P, record.Q))
     if np.count_nonzero(np.isfinite(P) & np.isfinite(Q)) < FEWEST_BEFORE:
         raise UserError(

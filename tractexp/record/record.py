@@ -121,6 +121,11 @@ class Record:
         every = {"t": self.t, "U": self.U, "P": self.P, "Q": self.Q, "f": self.f, "U2": self.U2}
         return {name: values for name, values in every.items() if values is not None}
 
+    def part(self, window: slice) -> "Record":
+        """Some of its samples, as a record."""
+        channels = {name: values[window] for name, values in self.channels.items()}
+        return replace(self, more={name: values[window] for name, values in self.more.items()}, **channels)
+
     def check(self, place: Callable[[int], str] | None = None) -> "Record":
         """Return the record; raise `UserError` with the source, the place and the value of what is wrong.
 

@@ -36,9 +36,9 @@ def steady_part(record: Record, part: slice, least: int) -> tuple[slice, list[st
         notes.append(f"{what}: the steady state before the dip is that of the {lasts:.2g} s after it")
     for change in voltage_changes(U, cycle):
         if begin + change.stop > first and part.stop - begin - change.stop >= least:
-            first = begin + change.stop
+            first, middle = begin + change.stop, begin + (change.first + change.stop) // 2
             notes.append(
-                f"the voltage changes by {100 * (change.ratio - 1):+.2g} % at t = {record.t[first]:g} s, before the "
+                f"the voltage changes by {100 * (change.ratio - 1):+.2g} % at t = {record.t[middle]:g} s, before the "
                 f"dip: the steady state is that of the {(part.stop - first) * record.step:.2g} s after it"
             )
     return _at_rest(record, slice(first, part.stop), least, notes)
