@@ -1,5 +1,7 @@
 """Which state before a dip is taken as steady, and what is said of a load that is not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -48,6 +50,12 @@ def test_of_several_steps_the_last_counts():
 def test_a_step_right_before_the_dip_is_refused():
     with pytest.raises(UserError, match=r"made.csv: the load changes at t = 1.9\d* s \(P 2.* to 0.*: no steady state"):
         detect(record(step(1.94, 3.0)))
+
+
+def test_a_dip_that_p_and_q_show_a_little_earlier_is_no_step_before_it():
+    made = record()
+    early = replace(made, P=np.roll(made.P, -1), Q=np.roll(made.Q, -1))
+    assert detect(early).record is early
 
 
 def test_a_tap_changer_before_the_dip_ends_the_state_before_it():

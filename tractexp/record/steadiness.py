@@ -6,13 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.record.change import CHANGED, USUAL, clause, load_changes, smear, voltage_changes, without_gaps
+from tractexp.record.change import CHANGED, USUAL, Change, clause, load_changes, smear, voltage_changes, without_gaps
 from tractexp.record.record import Record
 
 REVERSED = 0.25  # of its range: a load that turns back by more swings
 REST = 0.5  # of its mean slope that a course has left at most where it has come to rest
 PARTS = 2, 4, 8  # the last half, quarter or eighth of a course may be at rest
 AT_THE_END = 0.1  # s before an event, to which the mean over its steady state is compared
+EARLY = 1.5, 0.5  # cycles before a dip within which a step of less than so much of the power is taken for its own
 HISTORY = 3.0  # s before an event in which steps are looked for
 
 
@@ -25,7 +26,8 @@ def steady_part(record: Record, part: slice, least: int) -> tuple[slice, list[st
     U, P, Q = (x[begin : part.stop] for x in (record.U, record.P, record.Q))
     notes: list[str] = []
     first = part.start
-    if last := [c for c in load_changes(U, P, Q, cycle) if begin + c.stop > first][-1:]:
+    steps = [c for c in load_changes(U, P, Q, cycle) if begin + c.stop > first and not _early(c, len(U), cycle)]
+    if last := steps[-1:]:
         first, what = begin + last[0].stop, clause(record, begin, last[0])
         lasts = (part.stop - first) * record.step
         if part.stop - first < least:
@@ -44,15 +46,19 @@ def steady_part(record: Record, part: slice, least: int) -> tuple[slice, list[st
     return _at_rest(record, slice(first, part.stop), least, notes)
 
 
+def _early(change: Change, dip: int, cycle: float) -> bool:
+    """Whether a small step right before a dip may be the dip itself, where P and Q are stamped earlier than U."""
+    return dip - change.stop < EARLY[0] * cycle and abs(change.ratio - 1) < EARLY[1]
+
+
 def _at_rest(record: Record, part: slice, least: int, notes: list[str]) -> tuple[slice, list[str]]:
     """The part in which a load that came to rest rests; what is said of one that does not."""
-    cycle, whole = smear(record), part
-    course = course_of(record.P[part], record.Q[part], cycle)
+    whole, course = part, _course(record, part)
     while course is not None and not course.swings:
-        rest = next((late for late in _late(part, least) if _rests(record, late, course, part)), None)
+        rest = next((late for late in _late(part, least) if _rests(record, late, course)), None)
         if rest is None:
             break
-        part, course = rest, course_of(record.P[rest], record.Q[rest], cycle)
+        part, course = rest, _course(record, rest)
     lasts = (part.stop - part.start) * record.step
     if part != whole:
         notes = [*notes, f"the load comes to rest before the dip: its steady state is that of the last {lasts:.2g} s"]
@@ -76,11 +82,17 @@ def _late(part: slice, least: int) -> Iterator[slice]:
             yield late
 
 
-def _rests(record: Record, late: slice, course: "Course", part: slice) -> bool:
+def _rests(record: Record, late: slice, course: "Course") -> bool:
     """Whether a load moves so much less in a late part of its course that it has come to rest there."""
-    rest = course_of(record.P[late], record.Q[late], smear(record), at_all=True)
-    share = (late.stop - late.start) / (part.stop - part.start)
-    return rest is not None and rest.span < REST * share * course.span
+    rest = _course(record, late, at_all=True)
+    return rest is not None and rest.span / rest.samples < REST * course.span / course.samples
+
+
+def _course(record: Record, part: slice, at_all: bool = False) -> "Course | None":
+    """How the load moves in samples before a dip, without those that may show the dip early."""
+    cycle = smear(record)
+    part = slice(part.start, part.stop - round(EARLY[0] * cycle))
+    return course_of(record.P[part], record.Q[part], cycle, at_all)
 
 
 @dataclass(frozen=True)
@@ -91,6 +103,7 @@ class Course:
     change: str  # rises, falls or swings
     span: float
     size: float  # apparent power
+    samples: int  # within which it moves so far
 
     @property
     def swings(self) -> bool:
@@ -116,7 +129,7 @@ def course_of(P: np.ndarray, Q: np.ndarray, cycle: float, at_all: bool = False) 
     if not at_all and span <= max(CHANGED * size, USUAL * noise):
         return None
     change = "swings" if _turns(course, REVERSED * span) else "rises" if course[-1] > course[0] else "falls"
-    return Course(name, change, span, size)
+    return Course(name, change, span, size, len(course))
 
 
 def _turns(x: np.ndarray, least: float) -> bool:
