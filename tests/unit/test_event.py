@@ -1,5 +1,7 @@
 """Where a dip is found, how deep, and what is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -302,6 +304,11 @@ class TestFuse:
     def test_it_is_refused_by_its_name(self, left, U2):
         with pytest.raises(UserError, match="while the current stays as it was: a fuse of the voltage transformers"):
             detect(self.record(left, U2))
+
+    def test_a_fault_that_lasts_to_the_end_is_none(self):
+        made = self.record(0.79, 0.21)
+        with pytest.raises(UserError, match="the record is shorter than the dip"):
+            detect(replace(made.part(slice(0, 1250)), name="short"))
 
     @pytest.mark.parametrize(("left", "U2"), [(2 / 3, 1 / 3), (1e-3, None)])
     def test_a_current_that_goes_with_the_voltage_is_none(self, left, U2):

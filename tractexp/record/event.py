@@ -19,6 +19,7 @@ RECOVERED = 0.2  # of the depth: the dip ends when no more than this is missing,
 FEWEST_BEFORE = 10  # samples before a dip, for the steady state and the noise
 MERGED = 0.02  # s: dips closer than one cycle are one
 OPEN_POLE = 0.25  # of the voltage: negative sequence of an open pole, of a fault as well
+PHASE_GONE = 0.42  # the same where next to nothing of a phase is left
 UNCLEARED = 1.5  # s: back-up protection clears a fault within about a second
 SAME_CURRENT = 0.1  # of a current that stays: how far it moves, and for how much of the time it may move farther
 STEP_AT_MOST = 0.15  # of the voltage: a tap changer or a switched line moves it no farther
@@ -322,9 +323,9 @@ def _current_stays(record: Record, start: int, end: int) -> bool:
     if inside.stop - inside.start < max(3 * edge, FEWEST_INSIDE):
         return False
     U = record.U[inside]
+    share = 0.0 if record.U2 is None else float(np.median(record.U2[inside] / np.maximum(U, 1e-12)))
     gone = float(np.median(U)) < DEAD * float(record.U[:start].mean())
-    unbalanced = record.U2 is not None and float(np.median(record.U2[inside] / np.maximum(U, 1e-12))) > OPEN_POLE
-    if not gone and not (unbalanced and (end == record.samples or (end - start) * record.step > UNCLEARED)):
+    if not gone and not share > (OPEN_POLE if (end - start) * record.step > UNCLEARED else PHASE_GONE):
         return False
     usual, current = (np.hypot(record.P[at], record.Q[at]) / np.maximum(record.U[at], 1e-12) for at in (before, inside))
     level = float(np.nanmedian(usual)) if np.isfinite(usual).any() else 0.0

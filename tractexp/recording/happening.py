@@ -29,7 +29,8 @@ INRUSH_CYCLES = 5.0  # so long at least: the offset of a fault current lasts les
 CLEAN = 0.5  # of a current's energy is in its fundamental and second harmonic, or it is noise
 LISTED = 0.2  # of the apparent power: a smaller step of a load is no event
 SAME = 0.1  # of a current: within it the current stays while a voltage is lost
-LOST_VOLTAGE, UNTOUCHED = 0.7, 0.03  # of a phase: less is left where a fuse has blown; how little the others change
+BLOWN = 0.1  # of a phase: less is left where a fuse has blown
+LOST_VOLTAGE, UNTOUCHED = 0.7, 0.03  # the same, longer than a fault lasts; how little the others change
 FUSE_CYCLES = 3.0  # so long at least
 FUSE_SAMPLES = 50  # half cycles before it, whose median it is compared with
 CARRIES = 0.05  # of the record's greatest current: what is less is no load
@@ -155,8 +156,8 @@ def _fuse(trace: Trace, e: Excursion) -> Excursion | None:
         return None
     stays = np.abs(trace.I[:, inside] - current[:, None]) < SAME * current[:, None]
     left = np.median(trace.phases[:, inside], axis=1) / voltage
-    gone, others = left < LOST_VOLTAGE, np.abs(left - 1) < UNTOUCHED
-    lasts = end == len(trace.t) or (end - e.start) * trace.step > UNCLEARED
+    lasts = (end - e.start) * trace.step > UNCLEARED
+    gone, others = left < (LOST_VOLTAGE if lasts else BLOWN), np.abs(left - 1) < UNTOUCHED
     alone = gone.any() and not gone.all() and ((gone | others).all() or lasts)
     blown = stays.mean() > 1 - CARRIES and ((left < DEAD).all() or alone)
     return replace(e, end=min(end, len(trace.t) - 1)) if blown else None
