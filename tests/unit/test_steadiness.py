@@ -100,3 +100,8 @@ def test_nothing_is_said_of_the_shipped_records(name):
     for event in tractexp.read(name):
         assert event.steady == slice(0, event.start)
         assert not [note for note in event.record.notes if "steady" in note or "the load " in note]
+
+
+def test_times_in_a_wrong_unit_end_in_no_traceback():
+    made = record()
+    assert detect(replace(made, t=1e9 * made.t)).steady.stop > 0

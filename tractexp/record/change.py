@@ -40,6 +40,8 @@ def load_changes(U: np.ndarray, P: np.ndarray, Q: np.ndarray, cycle: float) -> l
     """The steps of P + jQ (N,), of more than 5 %, that the voltage U (N,) does not explain; `cycle` in samples."""
     S, n = without_gaps(P) + 1j * without_gaps(Q), max(1, round(cycle))
     (before, after), (low, high) = _levels(S, n), _levels(U.astype(complex), n)
+    if not len(before):
+        return []
     size = np.maximum(np.maximum(np.abs(before), np.abs(after)), SMALL * _greatest(S))
     answer = ANSWERED * np.abs(high - low) / np.maximum(np.abs(low), 1e-300)
     return list(_steps(before, after, size, answer, CHANGED, n))

@@ -318,7 +318,7 @@ def _no_such_dip(record: Record, start: int, end: int) -> str:
 
 def _current_stays(record: Record, start: int, end: int) -> bool:
     """Whether a voltage that is gone, or unbalanced for longer than a fault lasts, leaves the current as it was."""
-    edge = round(smear(record))
+    edge = max(1, round(smear(record)))
     inside, before = slice(start + edge, end - edge * (end < record.samples)), slice(max(0, start - 10 * edge), start)
     if inside.stop - inside.start < max(3 * edge, FEWEST_INSIDE):
         return False

@@ -22,7 +22,7 @@ def steady_part(record: Record, part: slice, least: int) -> tuple[slice, list[st
 
     From the last step of the load or of its voltage on. Raises `UserError` where fewer than `least` samples are left.
     """
-    begin, cycle = max(0, part.stop - round(HISTORY * record.rate)), smear(record)
+    begin, cycle = max(0, min(part.start, part.stop - round(HISTORY * record.rate))), smear(record)
     U, P, Q = (x[begin : part.stop] for x in (record.U, record.P, record.Q))
     notes: list[str] = []
     first = part.start
@@ -91,7 +91,7 @@ def _rests(record: Record, late: slice, course: "Course") -> bool:
 def _course(record: Record, part: slice, at_all: bool = False) -> "Course | None":
     """How the load moves in samples before a dip, without those that may show the dip early."""
     cycle = smear(record)
-    part = slice(part.start, part.stop - round(EARLY[0] * cycle))
+    part = slice(part.start, max(part.start, part.stop - round(EARLY[0] * cycle)))
     return course_of(record.P[part], record.Q[part], cycle, at_all)
 
 
