@@ -51,6 +51,19 @@ def test_the_samples_that_are_fitted_begin_after_the_step_too(tmp_path):
     assert event.P0 * event.record.base.power == POWER
 
 
+def test_the_headline_is_that_before_a_dip_that_is_not_worth_fitting_too(tmp_path):
+    path = saved(tmp_path / "near.cfg", course(constant(start=1.2, end=1.4, length=3.0), (0.0, 3.0), (1.13, 1.0)))
+    shown = tractexp.look(path)
+    assert shown.feeders.rows[0]["P"] == POWER
+    assert "no steady state of 100 ms comes before it" in shown.events.rows[1]["why"]
+
+
+def test_a_dip_that_leaves_nothing_of_the_load_is_not_worth_fitting(tmp_path):
+    [event] = tractexp.look(saved(tmp_path / "all.cfg", course(constant(length=2.0), (0.6, 0.0)))).events
+    assert not event["worth"]
+    assert "the load is switched off in it" in event["why"]
+
+
 def test_a_load_that_is_lost_in_the_dip_is_worth_it_only_with_that_word(tmp_path):
     [event] = tractexp.look(saved(tmp_path / "lost.cfg", course(constant(length=2.0), (0.6, 6 / 32)))).events
     assert "the load loses 81 % of its power in the dip (P 40" in event["why"]

@@ -27,6 +27,7 @@ OPEN_CYCLES = 3.0  # so long at least
 SECOND = 0.15  # of the fundamental: second harmonic of an inrush (IEEE C37.91, usual restraint of differential relays)
 INRUSH_CYCLES = 5.0  # so long at least: the offset of a fault current lasts less
 CLEAN = 0.5  # of a current's energy is in its fundamental and second harmonic, or it is noise
+OF_LOADS = ("load loss", "load step")  # kinds of which the voltage shows nothing
 LISTED = 0.2  # of the apparent power: a smaller step of a load is no event
 SAME = 0.1  # of a current: within it the current stays while a voltage is lost
 BLOWN = 0.1  # of a phase: less is left where a fuse has blown
@@ -298,7 +299,7 @@ def _describe(trace: Trace, kind: str, e: Excursion, bounds: list[tuple[int, int
     U2 = trace.U2[inside][edge : -edge or None] if e.end - e.start > 3 * edge else trace.U2[inside]
     depth = -e.worst if e.new_level or e.dead else 1 - _extreme(trace.U[inside], e.worst) / e.reference
     last = min(e.end, len(trace.t) - 1)
-    worth, why = _worth(trace, kind, e, depth, first, before)
+    worth, why = _worth(trace, kind, e, depth, first, (before, after))
     return Happening(
         kind, float(trace.t[e.start]), float(trace.t[last]), float(depth), trace.jump(e.start),
         float(np.nanmax(U2) / e.reference) if np.isfinite(U2).any() else float("nan"), before, after, worth, why,
@@ -317,9 +318,10 @@ def _power(trace: Trace, first: int, stop: int) -> tuple[float, float]:
 
 
 def _worth(
-    trace: Trace, kind: str, e: Excursion, depth: float, first: int, before: tuple[float, float]
+    trace: Trace, kind: str, e: Excursion, depth: float, first: int, powers: tuple[tuple[float, float], ...]
 ) -> tuple[bool, str]:
-    """Whether a load model can be fitted to it, and why (not)."""
+    """Whether a load model can be fitted to it, and why (not); `powers` are P and Q before and after."""
+    before, after = powers
     if kind != "dip":
         return False, NO_FIT[kind]
     lead = (e.start - first) * trace.step
@@ -339,6 +341,8 @@ def _worth(
     noise = len(trace.I) and not np.median(_clean(trace)[:, first : e.start], axis=1).any()
     if not np.isfinite(before[0]) or np.hypot(*before) == 0 or noise:
         return False, f"{size}, but no load current flows before it"
+    if np.hypot(*after) < CARRIES * np.hypot(*before):
+        return False, f"{size}, but the load is switched off in it: nothing is left of it after"
     if not e.sudden:
         return False, f"{size}, but slowly: it determines only the static part of the load"
     if before[0] < 0:

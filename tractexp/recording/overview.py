@@ -14,7 +14,7 @@ from tractexp.record.dips import FileDip
 from tractexp.record.phasor import Phasors
 from tractexp.recording.arrangement import arranged
 from tractexp.recording.feeder import Feeder, propose
-from tractexp.recording.happening import Happening, happenings, happenings_of
+from tractexp.recording.happening import OF_LOADS, Happening, happenings, happenings_of
 from tractexp.recording.measure import phasors_of, waves_of
 from tractexp.recording.quality import Quality, quality
 from tractexp.recording.reader import WaveformReader
@@ -68,9 +68,9 @@ class Sight:
         return self.record is not None and self.record.base.voltage == self.record.base.power == 1
 
     def powers(self) -> tuple[float, float, float] | None:
-        """Voltage [kV], P [MW] and Q [Mvar] before the dip that is worth fitting, else at the beginning.
+        """Voltage [kV], P [MW] and Q [Mvar] before the dip that is worth fitting, else before the first event.
 
-        The beginning ends with the first event. None without measurements.
+        Of a load's own steps, what it draws after the last before that. None without measurements.
         """
         for event in (each.event for each in self.events if each.worth):
             if event is not None:
@@ -83,9 +83,14 @@ class Sight:
         if not self.phasors:
             return None
         p = self.phasors[0]
-        before = p.t < (self.events[0].what.start if self.events else np.inf)
-        first = slice(0, max(1, min(int(np.count_nonzero(before)), len(p.t))))
-        return tuple(float(np.median(v[first])) for v in (p.U, np.real(p.S), np.imag(p.S)))  # type: ignore[return-value]
+        changes = [each.what for each in self.events]
+        first = next((what for what in changes if what.kind not in OF_LOADS), changes[0] if changes else None)
+        stop = np.inf if first is None else first.start
+        begin = max((what.end for what in changes if what.end < stop), default=-np.inf)
+        before = np.flatnonzero((p.t > begin) & (p.t < stop))
+        if not len(before):
+            before = slice(0, 1)
+        return tuple(float(np.median(v[before])) for v in (p.U, np.real(p.S), np.imag(p.S)))  # type: ignore[return-value]
 
 
 @dataclass(frozen=True, eq=False)
