@@ -15,6 +15,7 @@ from tractexp.extend.files import (
     Sidecar,
     Tabular,
     beside,
+    check_load,
     check_numbers,
     chosen,
     counted,
@@ -157,6 +158,8 @@ class CSV(Tabular, Reader):
                     f"{record.where}: P and Q are zero or missing before the first dip, so they give no base; say it: "
                     "data.base_power (MVA)"
                 )
+            if made.absolute["U"]:
+                check_load(record.where, U, S if made.absolute["P"] else 0.0)
             if voltage is None and made.absolute["U"]:
                 voltage = U
                 told_by.append(f"{U:.4g} kV line to line")

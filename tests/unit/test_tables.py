@@ -132,6 +132,27 @@ class TestNamesAndUnits:
         same(read(content, units={"P": "MW", "Q": "Mvar"}))
         same(read(content, base_voltage=27.5, base_power=20.0))
 
+    @pytest.mark.parametrize("header", ["t [kV],U,P,Q", "t,U [kV],P [Hz],Q", "t,U [s],P,Q"])
+    def test_a_unit_of_another_quantity_is_refused(self, header):
+        with pytest.raises(UserError, match=r"is no unit; say another column, .*data.units=\{"):
+            read(text(in_units(), header))
+
+    @pytest.mark.parametrize(
+        ("units", "by"),
+        [
+            ({"U": "volts", "P": "MW", "Q": "Mvar"}, 1.0),  # 27.5 V
+            ({"U": "kV", "P": "MW", "Q": "Mvar"}, 1e3),  # 27,500 kV
+        ],
+    )
+    def test_a_load_that_no_network_feeds_ends_in_a_question(self, units, by):
+        with pytest.raises(UserError, match=r"before the first dip is .*say .*data.units=\{U: "):
+            read(text(in_units() * [1, by, 1, 1]), units=units)
+        assert read(text(in_units() * [1, 1e3, 1, 1]), units=units | {"U": "V"}).base.voltage == pytest.approx(27.5)
+
+    def test_a_base_in_volts_is_refused(self):
+        with pytest.raises(UserError, match=r"base_voltage=27500.* at most 1500"):
+            read(text(in_units() * [1, 1e3, 1, 1]), base_voltage=27500.0, base_power=20.0)
+
     def test_a_phase_voltage_is_said_to_be_taken_as_such(self):
         record = read(text(in_units() / [1, np.sqrt(3), 1, 1], "t,Ua [kV],P [MW],Q [Mvar]"), columns={"U": "Ua"})
         same(record)
@@ -196,6 +217,10 @@ class TestNamesAndUnits:
             ({"columns": {"U": 9}}, "dip.csv has 4 columns, counted from 0"),
             ({"units": {"U": "parsec"}}, "data.units: U=parsec is not a unit"),
             ({"units": {"X": "kV"}}, "data.units names 'X'"),
+            ({"units": {"t": "kV"}}, "data.units: t=kV is no unit of t; one is s, ms"),
+            ({"units": {"U": "MW"}}, "data.units: U=MW is no unit of U; one is kV, V, pu"),
+            ({"units": {"P": "Mvar"}}, "data.units: P=Mvar is no unit of P"),
+            ({"units": {"angle": "Hz"}}, "data.units: angle=Hz is no unit of angle"),
             ({"decimal": ";"}, "data.decimal=; is not one of"),
             ({"header": 0}, "data.header=0 is no line"),
             ({"header": 300}, "there are no rows of numbers below the header line|column t"),

@@ -19,6 +19,7 @@ from tractexp.progress import Progress, staged
 from tractexp.record import Event, Record
 from tractexp.record.wave_event import COARSEST, smeared
 from tractexp.recording.overview import LoadEvent, Sight, View, sight_of, view_of
+from tractexp.recording.recording import unit_of
 
 EARLIER = 3.0  # cycles that a fit of samples needs before the dip, and one that the estimator of phasors leaves out
 
@@ -264,7 +265,7 @@ def _channel(view: View, number: int) -> dict[str, Any]:
     return {
         "number": number, "name": channel.name, "phase": channel.phase, "unit": channel.unit,
         "quantity": channel.quantity, "magnitude": told.level,
-        "primary_unit": {"voltage": "kV", "current": "kA"}.get(channel.quantity, channel.unit),
+        "primary_unit": {"voltage": "kV", "current": "kA"}.get(unit_of(channel.unit)[0], channel.unit),
         "noise_share": share, **asdict(told),
     }  # fmt: skip
 

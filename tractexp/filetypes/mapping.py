@@ -6,8 +6,9 @@ from typing import Any
 
 from tractexp.errors import UserError, among, nearest
 from tractexp.filetypes.cells import is_number, is_time
-from tractexp.filetypes.columns import Role, is_unit, role
+from tractexp.filetypes.columns import Role, fits, is_unit, role
 from tractexp.filetypes.table import TableFile
+from tractexp.recording.unit import amount
 
 CONTRACT = ("t", "U", "P", "Q", "f", "U2")
 PHASES = ("a", "b", "c")
@@ -17,7 +18,11 @@ KEYS = (
     *(x + p for x in "PQ" for p in PHASES),
 )  # fmt: skip
 ANGLES = tuple(f"{key}_angle" for key in KEYS if key[0] in "UI")
-QUANTITIES = ("t", "U", "I", "P", "Q", "f", "angle")  # as data.units names them
+OF: Mapping[str, tuple[str, ...]] = {  # {quantity as data.units names it: units of it}
+    "t": ("s", "ms", "us", "ns"), "U": ("kV", "V", "pu"), "I": ("kA", "A", "pu"), "P": ("MW", "kW", "W", "pu"),
+    "Q": ("Mvar", "kvar", "var", "pu"), "f": ("Hz", "mHz"), "angle": ("deg", "rad"),
+}  # fmt: skip
+QUANTITIES = tuple(OF)
 
 
 @dataclass(frozen=True)
@@ -63,6 +68,8 @@ def mapped(
             )
         chosen[key] = options[key][0]
     chosen = {key: _with_unit(one, units) for key, one in chosen.items()}
+    for one in chosen.values():
+        _check_unit(table, one)
     return Mapped(kind, chosen, tuple(_notes(table, chosen, other_columns)))
 
 
@@ -76,11 +83,13 @@ def check_mapping(columns: Mapping[str, Any], units: Mapping[str, str]) -> None:
     for quantity, unit in units.items():
         if quantity not in QUANTITIES:
             raise UserError(f"data.units names '{quantity}'{among(quantity, QUANTITIES, 'Quantities')}")
-        if not is_unit(str(unit)):
+        if not is_unit(amount(str(unit))[1]):
             raise UserError(
                 f"data.units: {quantity}={unit} is not a unit; one is e.g. kV, V, kA, A, MW, kW, Mvar, Hz, s, ms, "
                 "deg, rad, pu"
             )
+        if not fits(quantity, str(unit), exact=True):
+            raise UserError(f"data.units: {quantity}={unit} is no unit of {quantity}; one is {', '.join(OF[quantity])}")
 
 
 def _key(name: str) -> str:
@@ -267,6 +276,17 @@ def _with_unit(one: MappedColumn, units: Mapping[str, str]) -> MappedColumn:
     """The user's unit goes before that in the header."""
     quantity = one.role.quantity
     return replace(one, role=replace(one.role, unit=str(units[quantity]))) if quantity in units else one
+
+
+def _check_unit(table: TableFile, one: MappedColumn) -> None:
+    """Raise `UserError` for a column whose unit is one of another quantity."""
+    quantity = one.role.quantity
+    if one.role.unit and is_unit(one.role.unit) and not fits(quantity, one.role.unit):
+        raise UserError(
+            f"{table.source}: column {one.label} is read as {one.role.key}, of which {one.role.unit} is no unit; say "
+            f"another column, data.columns={{{one.role.key}: ...}}, or the unit, "
+            f"data.units={{{quantity}: {OF.get(quantity, ('',))[0]}}}"
+        )
 
 
 def _notes(table: TableFile, chosen: Mapping[str, MappedColumn], other_columns: Collection[str]) -> list[str]:

@@ -17,6 +17,7 @@ from tractexp.filetypes.table import TableFile, TableForm, open_table
 from tractexp.record.phasor import sequences
 from tractexp.record.record import JITTER
 from tractexp.recording.recording import Channel, Recording, Segment
+from tractexp.recording.unit import in_units
 
 FORWARD = np.sqrt(3) * np.exp(1j * np.pi / 6)  # the positive sequence of line voltages over that of phase voltages
 VOLTS = 1000.0  # a voltage without a unit that is above it is in V
@@ -250,12 +251,8 @@ def recording(table: TableFile, mapping: Mapped, nominal: float) -> Recording:
     segments, odd = _segments(table, time)
     named = {one.number: key for key, one in mapping.columns.items()}
     channels = [_channel(table, mapping, k, cells[k].values, named.get(k, "")) for k in numbers]
-    bare = [c.name for c in channels if c.quantity and not c.unit]
-    if bare:
-        odd.append(f"no unit of {', '.join(bare)}: taken as V and A (data.units={{U: kV, I: kA}} says else)")
-    return Recording(
-        table.source, channels, segments, nominal, start=cells[t.number].start, notes=[*table.notes, *note, *odd]
-    )
+    start, notes = cells[t.number].start, [*table.notes, *note, *odd]
+    return in_units(Recording(table.source, channels, segments, nominal, start=start, notes=notes), {}, {})
 
 
 def _numeric(table: TableFile, number: int) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 from tractexp.errors import UserError
 from tractexp.record.event import detect, find_dips, steady
 from tractexp.record.reader import Events
-from tractexp.record.record import Record
+from tractexp.record.record import GREATEST_CURRENT, SIZES, Record
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,22 @@ def level(record: Record) -> tuple[float, float]:
     P, Q = (values[before][np.isfinite(values[before])] for values in (record.P, record.Q))
     S = float(np.hypot(P.mean(), Q.mean())) if len(P) and len(Q) else 0.0
     return float(record.U[before].mean()), S
+
+
+def check_load(where: str, U: float, S: float = 0.0) -> None:
+    """Raise `UserError` for a load of U [kV] and S [MVA] that no network feeds: another unit was meant."""
+    low, high = SIZES["voltage"]
+    if not low <= U <= high:
+        raise UserError(
+            f"{where}: the voltage before the first dip is {U:.4g} kV, and a network's is at most {high:g} kV; if the "
+            "numbers are in V, say so: data.units={U: V}"
+        )
+    if np.sqrt(3) * U * GREATEST_CURRENT < S:
+        raise UserError(
+            f"{where}: {S:.4g} MVA at {U:.4g} kV before the first dip is a current of {S / np.sqrt(3) / U:.4g} kA, and "
+            "no load draws as much; say the units of voltage and of current or power, such as data.units={U: kV, I: A} "
+            "or data.units={U: kV, P: kW, Q: kvar}"
+        )
 
 
 def chosen(where: str, dips: Sequence[FileDip], train: Sequence[int] | None, validate: Sequence[int] | None,

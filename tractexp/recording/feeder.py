@@ -35,6 +35,11 @@ class Feeder:
     loaded: bool = True
 
     @property
+    def channels(self) -> dict[str, tuple[int, ...]]:
+        """Numbers of its channels by the letter of their quantity."""
+        return {"U": self.voltages, "I": self.currents}
+
+    @property
     def settings(self) -> dict[str, Any]:
         """The settings of a reader that reads this load."""
         result: dict[str, Any] = {"voltages": list(self.voltages), "currents": list(self.currents)}

@@ -24,6 +24,11 @@ COUNTER = re.compile(r"^[a-z]{0,2}\d+[-_. :)]+")  # "12-Ia", "F5-VA": a number o
 PLACE = {"ab": 0, "bc": 1, "ca": 2, "ba": 0, "cb": 1, "ac": 2}
 SURE = 3.0  # score of a mark right after the letter of a quantity: "Ia", "UL1", "U21"
 NO_WAVE = re.compile(r"(?<![a-z])(?:mag|magnitude|rms|ang|angle|diff|bias)(?![a-z])")
+OTHER_UNITS = frozenset((  # of what is neither voltage nor current, whatever its name begins with
+    "hz", "mhz", "hz/s", "w", "kw", "mw", "gw", "var", "kvar", "mvar", "va", "kva", "mva", "wh", "kwh", "deg", "°",
+    "degree", "degrees", "rad", "s", "ms", "us", "min", "h", "%", "rpm", "1/min", "°c", "bar", "pa", "kpa", "ohm", "ω",
+    "cos", "pf", "dimensionless",
+))  # fmt: skip
 ROMAN = {"i": "1", "ii": "2", "iii": "3", "iv": "4", "v": "5", "vi": "6"}
 
 
@@ -54,7 +59,7 @@ def kind(channel: Channel) -> str:
         return ""
     if channel.quantity:
         return channel.quantity if channel.quantity in ("voltage", "current") else ""
-    if channel.unit.strip().lower() not in ("", "pu", "p.u.", "none"):
+    if channel.unit.strip().lower() in OTHER_UNITS:
         return ""
     letter = re.search(r"(?<![a-z])(u|v|i)(?=[_ ]?(?:l?[123]|l?[abcrstuvwn]{1,2})(?![a-z]))", plain(channel.name))
     return "" if letter is None else "current" if letter[1] == "i" else "voltage"
