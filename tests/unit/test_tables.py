@@ -68,6 +68,11 @@ def noted(record, *words):
     return next(note for note in record.notes if all(word in note for word in words))
 
 
+def says(record, *words):
+    """Whether one note has all those words."""
+    return any(all(word in note for word in words) for note in record.notes)
+
+
 class TestNamesAndUnits:
     @pytest.mark.parametrize(
         "header",
@@ -148,6 +153,44 @@ class TestNamesAndUnits:
         with pytest.raises(UserError, match=r"before the first dip is .*say .*data.units=\{U: "):
             read(text(in_units() * [1, by, 1, 1]), units=units)
         assert read(text(in_units() * [1, 1e3, 1, 1]), units=units | {"U": "V"}).base.voltage == pytest.approx(27.5)
+
+    @pytest.mark.parametrize(("f", "nominal"), [(59.9, 60), (60.02, 60), (49.8, 50), (16.7, 50 / 3)])
+    def test_the_frequency_recorded_says_which_is_nominal(self, f, nominal):
+        table = np.column_stack([in_units(), np.full(400, f)])
+        record = read(text(table, "t,U [kV],P [MW],Q [Mvar],f [Hz]"))
+        assert record.base.frequency == pytest.approx(nominal)
+        assert (record.f == f).all()
+        assert says(record, "is taken for nominal") == (nominal != 50)
+
+    @pytest.mark.parametrize(("header", "f"), [("FREQ 101", 0.0), ("f", -0.02), ("df [mHz]", 15.0), ("f", 1.0)])
+    def test_a_deviation_is_no_frequency(self, header, f):
+        record = read(text(np.column_stack([dip(), np.full(400, f)]), f"t,U,P,Q,{header}"))
+        assert record.f is None
+        assert header == "df [mHz]" or noted(record, "a deviation from the nominal frequency", "not used")
+        same(record)
+
+    def test_a_frequency_per_unit_is_said_to_be_one(self):
+        table = np.column_stack([dip(), np.full(400, 0.998)])
+        assert read(text(table, "t,U,P,Q,f [pu]")).f[0] == pytest.approx(49.9)
+        assert read(text(table, "t,U,P,Q,f"), units={"f": "pu"}).f[0] == pytest.approx(49.9)
+
+    def test_a_column_can_be_left_out(self):
+        table = np.column_stack([dip(), np.full(400, 33.0)])
+        with pytest.raises(UserError, match=r"f = 33 .*data.columns=\{f: null\}"):
+            read(text(table, "t,U,P,Q,f"))
+        assert read(text(table, "t,U,P,Q,f"), columns={"f": None}).f is None
+
+    def test_a_load_counted_out_of_itself_is_refused_and_turned_by_the_setting(self):
+        t, U, P, Q = dip().T
+        turned = text(np.column_stack([t, U, -P * U, -Q]))
+        with pytest.raises(UserError, match=r"P is -0.8 before the first dip: .*set data.reverse_current=true"):
+            read(turned)
+        assert read(turned, reverse_current=True).P[0] == pytest.approx(0.8)
+
+    def test_powers_that_may_be_exchanged_are_said_to_be_so(self):
+        t, U, P, Q = dip().T
+        assert noted(read(text(np.column_stack([t, U, Q, P]))), "may be exchanged (data.columns={P: ...")
+        assert not says(read(text()), "exchanged")
 
     def test_a_base_in_volts_is_refused(self):
         with pytest.raises(UserError, match=r"base_voltage=27500.* at most 1500"):
@@ -518,6 +561,26 @@ class TestPhasors:
         same(record, atol=1e-5)
         assert (record.f == 49.98).all()
         assert record.U2 is None
+
+    @pytest.mark.parametrize(
+        ("name", "size", "said"),
+        [
+            ("V", 1.0, "taken as phase to ground: times sqrt(3) it is 27.5 kV"),
+            ("V", np.sqrt(3), "taken as line to line: 27.5 kV"),
+            ("V LL", np.sqrt(3), ""),
+            ("V LL", 0.9 * np.sqrt(3), ""),
+            ("V1", 0.9, ""),
+        ],
+    )
+    def test_one_voltage_is_line_or_phase_by_its_name_or_its_size(self, name, size, said):
+        t, V1, _, I1 = self.stream()
+        table = np.column_stack([t, size * np.abs(V1), np.angle(V1), np.abs(I1), np.angle(I1)])
+        record = read(text(table, f"t,{name} [V],{name} angle [rad],I [A],I angle [rad]"))
+        by = size / (np.sqrt(3) if size > 1 else 1)
+        assert record.base.voltage == pytest.approx(27.5 * by)
+        assert record.base.power == pytest.approx(20.0 * by)
+        assert says(record, "taken as") == bool(said)
+        assert says(record, said)
 
     def test_line_voltages_are_taken_to_phases(self):
         t, V1, _, I1 = self.stream()

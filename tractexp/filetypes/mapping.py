@@ -20,7 +20,7 @@ KEYS = (
 ANGLES = tuple(f"{key}_angle" for key in KEYS if key[0] in "UI")
 OF: Mapping[str, tuple[str, ...]] = {  # {quantity as data.units names it: units of it}
     "t": ("s", "ms", "us", "ns"), "U": ("kV", "V", "pu"), "I": ("kA", "A", "pu"), "P": ("MW", "kW", "W", "pu"),
-    "Q": ("Mvar", "kvar", "var", "pu"), "f": ("Hz", "mHz"), "angle": ("deg", "rad"),
+    "Q": ("Mvar", "kvar", "var", "pu"), "f": ("Hz", "mHz", "pu"), "angle": ("deg", "rad"),
 }  # fmt: skip
 QUANTITIES = tuple(OF)
 
@@ -50,13 +50,17 @@ class Mapped:
 def mapped(
     table: TableFile, columns: Mapping[str, Any], units: Mapping[str, str], other_columns: Collection[str] = ()
 ) -> Mapped:
-    """What the columns of a table are, by the user's `columns` {key: name or number from 0}, `units` {quantity: unit}.
+    """What the columns of a table are, by the user's `columns` {key: name, number from 0, or None to leave it
+    out}, `units` {quantity: unit}.
 
     No note mentions `other_columns`, which serve elsewhere. Raises `UserError` for a chosen column that is not there,
     for one that is missing, and where several columns fit one key.
     """
-    numbers = {_key(key): _column_number(table, key, choice) for key, choice in columns.items()}
+    numbers = {_key(key): _column_number(table, key, choice) for key, choice in columns.items() if choice is not None}
     options = _options(table, numbers)
+    for key, choice in columns.items():
+        if choice is None:  # left out
+            options.pop(_key(key), None)
     kind, keys = _kind(table, options, numbers)
     chosen: dict[str, MappedColumn] = {}
     for key in keys:

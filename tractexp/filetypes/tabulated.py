@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import Any
 
@@ -11,17 +11,25 @@ import numpy as np
 from tractexp.errors import UserError
 from tractexp.filetypes.cells import is_number
 from tractexp.filetypes.columns import PER_UNIT, factor, role
-from tractexp.filetypes.mapping import LINES, PHASES, Mapped, check_mapping, mapped
+from tractexp.filetypes.mapping import LINES, PHASES, Mapped, MappedColumn, check_mapping, mapped
 from tractexp.filetypes.sidecar import Sidecar, beside
 from tractexp.filetypes.table import TableFile, TableForm, open_table
 from tractexp.record.phasor import sequences
 from tractexp.record.record import JITTER
 from tractexp.recording.recording import Channel, Recording, Segment
+from tractexp.recording.snapshot import OTHER_FREQUENCY, nearest_nominal
 from tractexp.recording.unit import in_units
 
 FORWARD = np.sqrt(3) * np.exp(1j * np.pi / 6)  # the positive sequence of line voltages over that of phase voltages
 VOLTS = 1000.0  # a voltage without a unit that is above it is in V
 NEAR_ONE = (0.3, 3.0)  # and within these it is per unit
+ALIVE = 0.5  # of the median voltage: at less the frequency is noise
+SLOWEST = 10.0  # Hz: no network's frequency is lower
+# kV line to line (IEC 60038, EN 50163, China, North America), and 27.5 kV of traction substations
+NOMINAL_VOLTAGES = (
+    0.23, 0.4, 0.48, 0.69, 1.0, 3.0, 3.3, 6.0, 6.6, 10.0, 11.0, 13.8, 15.0, 20.0, 22.0, 25.0, 27.5, 33.0, 35.0, 66.0,
+    69.0, 110.0, 115.0, 132.0, 138.0, 150.0, 161.0, 220.0, 230.0, 275.0, 330.0, 345.0, 380.0, 400.0, 500.0, 765.0,
+)  # fmt: skip
 GAP = 1.5  # usual steps: a longer one parts two segments
 EPOCH = 1e6  # s: times beyond it are counted from the first
 HUGE = 1e38  # of a value: no unit makes sense of a greater one
@@ -72,6 +80,7 @@ class Powers:
     columns: dict[str, np.ndarray]
     absolute: dict[str, bool | None]  # of U and of P; None where no unit says
     notes: tuple[str, ...]
+    frequency: float = 50.0  # Hz, nominal: as f shows it, else as declared
 
 
 def powers(table: TableFile, mapping: Mapped, nominal: float, reverse: bool, kilovolts: bool) -> Powers:
@@ -91,7 +100,28 @@ def powers(table: TableFile, mapping: Mapped, nominal: float, reverse: bool, kil
         )
     if reverse:
         result.columns["P"], result.columns["Q"] = -result.columns["P"], -result.columns["Q"]
-    return result
+    return _tuned(result, nominal, mapping.columns.get("f"))
+
+
+def _tuned(result: Powers, declared: float, source: MappedColumn | None) -> Powers:
+    """The same with the nominal frequency that f shows, and without an f that is none; both with a note."""
+    if "f" not in result.columns or source is None:
+        return replace(result, frequency=declared)
+    columns, U = {**result.columns}, result.columns["U"]
+    f = columns["f"] if source.role.unit.strip().lower() not in PER_UNIT else columns["f"] * declared
+    alive = ALIVE * np.nanmedian(U) < U
+    level = float(np.median(f[alive])) if alive.any() else declared
+    if level < SLOWEST:
+        del columns["f"]
+        note = (
+            f"{source.label} is about {level:.3g}, a deviation from the nominal frequency or per unit of it: not used"
+        )
+        return replace(result, columns=columns, notes=(*result.notes, note), frequency=declared)
+    columns["f"], nominal = f, nearest_nominal(level)
+    if nominal is None or abs(nominal / declared - 1) < OTHER_FREQUENCY:
+        return replace(result, columns=columns, frequency=declared)
+    note = f"f is {level:.5g} Hz: {nominal:.3g} Hz is taken for nominal, where {declared:g} Hz stands in the settings"
+    return replace(result, columns=columns, notes=(*result.notes, note), frequency=nominal)
 
 
 def _of_powers(table: TableFile, mapping: Mapped, kilovolts: bool) -> Powers:
@@ -163,19 +193,40 @@ def _of_phasors(table: TableFile, mapping: Mapped, nominal: float) -> Powers:
     (V1, V2), (I1, _) = _sequences(V, keys["U"]), _sequences(I, keys["I"])
     absolute = _absolute(mapping, keys["U"][0])
     absolute = absolute if absolute is not None else not NEAR_ONE[0] < np.nanmedian(np.abs(V1)) < NEAR_ONE[1]
+    V1, sort = _to_ground(mapping.columns[keys["U"][0]], V1) if absolute else (V1, [])
     size, three = (np.sqrt(3), 3.0) if absolute else (1.0, 1.0)
     S = three * V1 * I1.conj()
     columns = {"t": values["t"], "U": size * np.abs(V1), "P": S.real, "Q": S.imag}
     if V2 is not None:
         columns["U2"] = size * np.abs(V2)
     source = "U, P, Q from phasors" + (", positive sequence" if V2 is not None else "")
-    notes = [*mapping.notes, *note, *angle_notes, source]
+    notes = [*mapping.notes, *note, *angle_notes, *sort, source]
     if "f" in values:
         columns["f"] = values["f"] if np.median(values["f"]) > nominal / 2 else nominal + values["f"]
     else:
         columns["f"] = nominal + np.gradient(np.unwrap(np.angle(V1)), values["t"]) / (2 * np.pi)
         notes.append(f"f from the angle of the voltage, which stands still at {nominal:g} Hz")
     return Powers(columns, {"U": bool(absolute), "P": bool(absolute)}, (*table.notes, *notes))
+
+
+def _to_ground(one: MappedColumn, V: np.ndarray) -> tuple[np.ndarray, list[str]]:
+    """The phasors (N,) of one voltage, to ground, and what they were taken for where its name does not say it."""
+    if one.role.key != "U" or one.role.line is False:
+        return V, []
+    level = float(np.nanmedian(np.abs(V)))
+    if one.role.line:
+        return V / np.sqrt(3), []
+    line = _off_nominal(level) <= _off_nominal(np.sqrt(3) * level)
+    if line:
+        why = f"taken as line to line: {level:.4g} kV is nearer to a nominal voltage than {np.sqrt(3) * level:.4g} kV"
+        return V / np.sqrt(3), [f"{one.label} {why} (data.columns={{U1: ..., U1_angle: ...}} says phase to ground)"]
+    why = f"taken as phase to ground: times sqrt(3) it is {np.sqrt(3) * level:.4g} kV, nearer to a nominal voltage"
+    return V, [f"{one.label} {why} (a name with LL says line to line)"]
+
+
+def _off_nominal(voltage: float) -> float:
+    """How far a line voltage [kV] is off the nearest nominal one, as a natural logarithm."""
+    return min(abs(float(np.log(voltage / each))) for each in NOMINAL_VOLTAGES) if voltage > 0 else np.inf
 
 
 def _in_units(table: TableFile, mapping: Mapped, values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

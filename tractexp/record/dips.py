@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import UserError
+from tractexp.record.direction import OUTWARD, direction
 from tractexp.record.event import detect, find_dips, steady
 from tractexp.record.reader import Events
 from tractexp.record.record import GREATEST_CURRENT, SIZES, Record
@@ -75,6 +76,26 @@ def check_load(where: str, U: float, S: float = 0.0) -> None:
             "no load draws as much; say the units of voltage and of current or power, such as data.units={U: kV, I: A} "
             "or data.units={U: kV, P: kW, Q: kvar}"
         )
+
+
+def signs(record: Record) -> list[str]:
+    """What is odd about P and Q of a table before its first dip, one sentence each.
+
+    Raises `UserError` for a load that is counted out of itself for certain.
+    """
+    calm = np.zeros(record.samples, bool)
+    calm[steady(record)] = True
+    P, Q = (float(np.nanmedian(x[calm])) if np.isfinite(x[calm]).any() else 0.0 for x in (record.P, record.Q))
+    reason = direction(record.U, record.P, record.Q, calm=calm)
+    if OUTWARD in reason:
+        raise UserError(f"{record.where}: P is {record.base.power * P:.4g} before the first dip: {reason}")
+    said = [f"P is {record.base.power * P:.4g} before the first dip: {reason}"] if reason else []
+    if abs(Q) > abs(P):
+        said.append(
+            f"Q ({record.base.power * Q:.4g}) is greater than P ({record.base.power * P:.4g}) before the first dip: "
+            "the two columns may be exchanged (data.columns={P: ..., Q: ...} says which is which)"
+        )
+    return said
 
 
 def chosen(where: str, dips: Sequence[FileDip], train: Sequence[int] | None, validate: Sequence[int] | None,

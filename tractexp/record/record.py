@@ -266,5 +266,6 @@ class Record:
             i = int(np.argmax(off))
             raise UserError(
                 f"{self.where}: {self._place(i)}: f = {self.f[i]:g} is more than 20 % off the nominal "
-                f"{self.base.frequency:g} Hz at a voltage of {self.U[i]:.3g}; f must be in Hz"
+                f"{self.base.frequency:g} Hz at a voltage of {self.U[i]:.3g}; f must be in Hz; say its unit, "
+                "data.units={f: mHz}, the nominal frequency, data.frequency=60, or leave f out, data.columns={f: null}"
             )
