@@ -18,6 +18,7 @@ from tractexp.overrides import typed
 from tractexp.progress import Progress, staged
 from tractexp.record import Event, Record
 from tractexp.record.wave_event import COARSEST, smeared
+from tractexp.recording.feeder import unrecognised
 from tractexp.recording.overview import LoadEvent, Sight, View, sight_of, view_of
 from tractexp.recording.recording import unit_of
 
@@ -252,7 +253,8 @@ def _content(view: View) -> dict[str, Any]:
             "frequency": made.frequency, "rates": [s.rate for s in made.segments],
             "seconds": last.start + (last.stop - last.first) / last.rate,
             "segments": [{"rate": s.rate, "start": s.start, "samples": s.stop - s.first} for s in made.segments],
-            "notes": list(made.notes), "channels": [_channel(view, number) for number in range(len(made.channels))],
+            "notes": [*made.notes, *([] if view.sights else [f"no load was recognised: {unrecognised(made)}"])],
+            "channels": [_channel(view, number) for number in range(len(made.channels))],
         }  # fmt: skip
     known["measured_frequency"] = view.frequency
     return known | {"feeders": [_feeder(view, shown) for shown in view.sights]}

@@ -156,6 +156,12 @@ def _stretches(data: ByteRange, header: Header, samples: Samples, remarks: Remar
     if header.kind != "ASCII":
         stamps += 2.0**32 * np.cumsum(np.diff(stamps, prepend=stamps[0]) < -(2.0**31))  # the counter ran over
     result = timeline.from_stamps((stamps - stamps[0]) * unit, unit, str(data.path))
+    if header.timemult != 1:
+        rates = ", ".join(f"{s.segment.rate:g}" for s in result[:3])
+        remarks.add(
+            f"sampled at {rates} Hz, by the time stamps and the time multiplier {header.timemult:g}; if that is wrong, "
+            "correct the multiplier"
+        )
     if len(result) > 1:
         gaps = ", ".join(f"{s.segment.start:.6g}" for s in result[1:6]) + (" ..." if len(result) > 6 else "")
         remarks.add(f"the steps between time stamps change: a new segment begins at {gaps} s")

@@ -147,17 +147,19 @@ def _live_phasors(recording: Recording, feeder: Feeder) -> _LivePhasors | None:
     size, load = (np.linalg.norm(x, axis=0) for x in (V, I))
     if not V.shape[1] or size.max() == 0 or load.max() == 0:
         return None
-    alive = (size > ALIVE * np.percentile(size, 90)) & (load > LOADED * np.percentile(load, 50))
-    if not alive.any():
-        return None
-    V, I, size = V[:, alive], I[:, alive], size[alive]
-    even = np.ones(len(size), bool)
+    alive = size > ALIVE * np.percentile(size, 90)
     if len(V) == 3:
         small, large = np.sort(np.abs(sequences(V)), axis=0)  # whatever the order is
-        even = small_share if (small_share := small < UNBALANCED * large).any() else even
+        even = alive & (small < UNBALANCED * large)
+        even = even if even.any() else alive
+    else:
+        even = alive
     calm = np.zeros(len(size), bool)
     calm[even] = at_level(size[even], CALM)
-    return _LivePhasors(V, I, calm)
+    alive &= load > LOADED * np.median(load[calm])  # not of all: a fault may last longer than the calm
+    if not (alive & calm).any():
+        return None
+    return _LivePhasors(V[:, alive], I[:, alive], calm[alive])
 
 
 def _zero(x: np.ndarray) -> np.ndarray:

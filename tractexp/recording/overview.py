@@ -134,7 +134,8 @@ def overview(reader: WaveformReader, recording: Recording) -> list[Sight]:
         said = ()
         try:
             check_known(recording, feeder.channels)
-            feeder = arranged(recording, feeder)
+            if feeder.loaded or not loaded:
+                feeder = arranged(recording, feeder)
         except UserError as error:
             said = (str(error),)
         shown = sight(reader, recording, feeder, events=feeder.loaded or not loaded)

@@ -17,7 +17,7 @@ from tractexp.record.record import LOAD
 from tractexp.recording.arrangement import arranged, tuned
 from tractexp.recording.connection import usual
 from tractexp.recording.estimator import estimator_of
-from tractexp.recording.feeder import Feeder, propose
+from tractexp.recording.feeder import Feeder, propose, unrecognised
 from tractexp.recording.label import order
 from tractexp.recording.measure import FeederWaves, phasors_of
 from tractexp.recording.recording import Recording
@@ -161,13 +161,22 @@ class WaveformReader(Reader):
             check_known(recording, only.channels)
             reverse = only.reverse_current != self.reverse_current
             return arranged(recording, replace(only, reverse_current=reverse, why=why))
-        every = ", ".join(f"{i} '{c.name}' [{c.unit}]" for i, c in enumerate(recording.channels))
+        if not proposed:
+            every = ", ".join(f"{i} '{c.name}' [{c.unit}]" for i, c in enumerate(recording.channels))
+            noted = f" (noted while reading: {'; '.join(recording.notes)})" if recording.notes else ""
+            raise UserError(
+                f"{recording.source} shows no load by itself: {unrecognised(recording)}{noted}; data.voltages and "
+                f"data.currents name one; its channels: {every}"
+            )
         loads = "; ".join(
             f"{f.name}: {shlex.join(assigned(f'data.{key}', value) for key, value in f.settings.items())}"
             for f in proposed
         )
-        shown = f"{len(proposed)} loads; choose one: {loads}" if proposed else f"none by itself; its channels: {every}"
-        raise UserError(f"data.voltages and data.currents are missing, and {recording.source} shows {shown}")
+        asked = "".join(f"{question}; " for question in sorted({f.question for f in proposed if f.question}))
+        raise UserError(
+            f"data.voltages and data.currents are missing, and {recording.source} shows {len(proposed)} loads; {asked}"
+            f"choose one: {loads}"
+        )
 
     def _streams(self, recording: Recording, feeder: Feeder) -> list[Stream]:
         """The phasors and the waves of each segment that holds waveforms."""
