@@ -389,6 +389,16 @@ class TestTimes:
         rows = [f"2024-01-31,{_clock(3600 + t)},{U},{P},{Q}" for t, U, P, Q in dip().tolist()]
         same(read("\n".join(["Date,Time,U,P,Q", *rows])), atol=2e-6)
 
+    @pytest.mark.parametrize("power", [0, 3, 6, 9])
+    def test_digits_say_what_is_counted_since_1970(self, power):
+        table = dip()
+        first = 17 * 10 ** (8 + power)
+        rows = [f"{first + round(t * 10**power)}" if power else f"{first + t:.3f}" for t in table[:, 0]]
+        lines = [f"{t},{U:.6g},{P:.6g},{Q:.6g}" for t, (_, U, P, Q) in zip(rows, table, strict=True)]
+        record = read("\n".join(["timestamp,U,P,Q", *lines]))
+        assert record.step == pytest.approx(0.005, rel=1e-4)
+        assert power == 0 or says(record, f"t is in {['ms', 'us', 'ns'][power // 3 - 1]} since 1970")
+
     def test_the_day_is_told_in_a_note(self):
         rows = [f"2024-01-31T12:00:0{t:.3f},{U},{P},{Q}" for t, U, P, Q in dip().tolist()]
         assert noted(read("\n".join(["t,U,P,Q", *rows])), "t counted from 2024-01-31T12:00:00")

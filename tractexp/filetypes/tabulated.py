@@ -3,7 +3,6 @@
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from datetime import datetime
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from tractexp.filetypes.cells import is_number
 from tractexp.filetypes.columns import PER_UNIT, factor, role
 from tractexp.filetypes.mapping import LINES, PHASES, Mapped, MappedColumn, check_mapping, mapped
 from tractexp.filetypes.sidecar import Sidecar, beside
-from tractexp.filetypes.table import TableFile, TableForm, open_table
+from tractexp.filetypes.table import TableColumn, TableFile, TableForm, open_table
 from tractexp.record.phasor import sequences
 from tractexp.record.record import JITTER
 from tractexp.recording.recording import Channel, Recording, Segment
@@ -32,6 +31,8 @@ NOMINAL_VOLTAGES = (
 )  # fmt: skip
 GAP = 1.5  # usual steps: a longer one parts two segments
 EPOCH = 1e6  # s: times beyond it are counted from the first
+LATEST = 2.6e9  # s since 1970, of a record: 2052
+SINCE_1970 = {"ms": 1.0, "us": 1e3, "ns": 1e6}  # {unit of times: how many times larger than s they are at least}
 HUGE = 1e38  # of a value: no unit makes sense of a greater one
 
 
@@ -164,10 +165,9 @@ def _read(table: TableFile, mapping: Mapped) -> tuple[dict[str, np.ndarray], lis
     values |= {
         key: values[key] * by
         for key, one in mapping.columns.items()
-        if not key.endswith("_angle") and (by := factor(one.role.unit)) != 1 and not cells[one.number].clock
+        if not key.endswith("_angle") and key != "t" and (by := factor(one.role.unit)) != 1
     }
-    time = cells[mapping.columns["t"].number]
-    values["t"], note = _counted(values["t"], time.start)
+    values["t"], note = _seconds(cells[mapping.columns["t"].number], mapping.columns["t"].role.unit)
     return values, note
 
 
@@ -175,11 +175,23 @@ def _wanted(key: str) -> str:
     return "time" if key == "t" else "gaps" if key[0] in "PQ" else "number"
 
 
-def _counted(t: np.ndarray, start: datetime | None) -> tuple[np.ndarray, list[str]]:
-    """Times from the first row on where they have a date or are seconds since long ago; a note on it."""
-    if start is not None:
-        return t, [f"t counted from {start.isoformat()}, the first row"]
-    if len(t) and abs(t[0]) > EPOCH:
+def _seconds(time: TableColumn, unit: str) -> tuple[np.ndarray, list[str]]:
+    """Times [s], from the first row on where they have a date or are counted from long ago; a note on it.
+
+    Without a unit, numbers too large for seconds since 1970 are its milli-, micro- or nanoseconds.
+    """
+    t = time.values
+    if time.start is not None:
+        return t, [f"t counted from {time.start.isoformat()}, the first row"]
+    if time.clock or not len(t):
+        return t, []
+    first = float(t[0])
+    since = next((u for u, by in SINCE_1970.items() if by * LATEST < abs(first) <= 1e3 * by * LATEST), "")
+    if not unit and since:
+        note = f"t is in {since} since 1970 by its size: counted from {first:.0f} {since}, the first row"
+        return (t - first) * factor(since), [note]
+    t = t * factor(unit)
+    if abs(t[0]) > EPOCH:
         return t - t[0], [f"t counted from {t[0]:.6f} s, the first row"]
     return t, []
 
@@ -298,7 +310,7 @@ def recording(table: TableFile, mapping: Mapped, nominal: float) -> Recording:
             raise table.refuse(
                 i, k, f"{cells[k].values[i]:g} is not a value up to {HUGE:g}; leave the row out, or correct it"
             )
-    time, note = _counted(cells[t.number].values * (1.0 if cells[t.number].clock else factor(t.role.unit)), None)
+    time, note = _seconds(replace(cells[t.number], start=None), t.role.unit)
     segments, odd = _segments(table, time)
     named = {one.number: key for key, one in mapping.columns.items()}
     channels = [_channel(table, mapping, k, cells[k].values, named.get(k, "")) for k in numbers]
