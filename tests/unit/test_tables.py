@@ -174,6 +174,33 @@ class TestNamesAndUnits:
         assert read(text(table, "t,U,P,Q,f [pu]")).f[0] == pytest.approx(49.9)
         assert read(text(table, "t,U,P,Q,f"), units={"f": "pu"}).f[0] == pytest.approx(49.9)
 
+    @pytest.mark.parametrize(
+        ("header", "says"),
+        [
+            (
+                "time,SFS_UfRel,SFS_UgRel,SFS_PRel",
+                r"say which is which: .*\{U: \.\.\., P: \.\.\., Q: \.\.\.\}",
+            ),
+            (
+                "time,voltage_A,real_power,reactive_power",
+                r"if voltage_A is meant, say so: .*\{U: 'voltage_A'",
+            ),
+            ("time,U,Pa,x", r"column P, Q is missing; .*if Pa is meant, say so: data.columns=\{P: 'Pa', Q: \.\.\.\}"),
+            ("C1MAG,U,P,x", r"column t, Q is missing; .*: data.columns=\{t: 'C1MAG', Q: \.\.\.\}"),
+        ],
+    )
+    def test_a_hint_names_what_is_of_the_quantity_or_nothing(self, header, says):
+        with pytest.raises(UserError, match=says):
+            read(text(header=header))
+
+    def test_a_hint_on_a_name_given_is_no_column_of_another_quantity(self):
+        with pytest.raises(UserError, match=r"has no such column\. Columns: t, Voltage, I_MAG, Q"):
+            read(text(header="t,Voltage,I_MAG,Q"), columns={"U": "C_MAG"})
+
+    @pytest.mark.parametrize("header", ["t,v Bus 5,Ppq PQ 5,Qpq PQ 5", "Time(s),VOLT 5,POWR 5 TO 6,VARS 5 TO 6"])
+    def test_the_names_of_simulators(self, header):
+        same(read(text(header=header)))
+
     def test_a_column_can_be_left_out(self):
         table = np.column_stack([dip(), np.full(400, 33.0)])
         with pytest.raises(UserError, match=r"f = 33 .*data.columns=\{f: null\}"):
@@ -571,6 +598,13 @@ class TestPhasors:
         same(record, atol=1e-5)
         assert (record.f == 49.98).all()
         assert record.U2 is None
+
+    def test_the_names_of_a_micro_pmu(self):
+        t, V1, _, I1 = self.stream()
+        table = [t, np.abs(V1), np.degrees(np.angle(V1)), np.abs(I1), np.degrees(np.angle(I1))]
+        record = read(text(np.column_stack(table), "t,L1MAG,L1ANG,C1MAG,C1ANG"), units={"angle": "deg"})
+        same(record, atol=1e-5)
+        assert says(record, "U1 = 'L1MAG'", "I1_angle = 'C1ANG'")
 
     @pytest.mark.parametrize(
         ("name", "size", "said"),

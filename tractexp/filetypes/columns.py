@@ -52,10 +52,10 @@ WORDS: Mapping[str, str] = {
                      "spannung", "напряжение", "电压", "tension", "tensión"), "U"),
     **dict.fromkeys(("i", "im", "current", "curr", "irms", "strom", "ток", "电流", "courant", "corriente"),
                     "I"),
-    **dict.fromkeys(("p", "ptot", "psum", "ptotal", "pload", "pl", "pelec", "plod", "powr", "active", "real",
+    **dict.fromkeys(("p", "ptot", "psum", "ptotal", "pload", "pl", "pelec", "plod", "powr", "ppq", "active", "real",
                      "wirkleistung", "активная", "有功", "有功功率"), "P"),
-    **dict.fromkeys(("q", "qtot", "qsum", "qtotal", "qload", "ql", "qelec", "qlod", "vars", "reactive", "blindleistung",
-                     "реактивная", "无功", "无功功率"), "Q"),
+    **dict.fromkeys(("q", "qtot", "qsum", "qtotal", "qload", "ql", "qelec", "qlod", "vars", "qpq", "reactive",
+                     "blindleistung", "реактивная", "无功", "无功功率"), "Q"),
     **dict.fromkeys(("f", "fe", "freq", "frequency", "fehz", "fq", "frequenz", "frq", "частота", "频率"), "f"),
     **dict.fromkeys(("dfdt", "df", "rocof", "dfreq"), "dfdt"),
 }  # fmt: skip

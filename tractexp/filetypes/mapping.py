@@ -1,5 +1,7 @@
 """Which columns of a table are time, voltage, power, ...: as the user says, else by their names."""
 
+import itertools
+import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -118,8 +120,11 @@ def _column_number(table: TableFile, key: str, choice: Any) -> int:
     matches = [k for k, name in enumerate(names) if _squeezed(name) == wanted]
     matches = matches or [k for k, name in enumerate(names) if _squeezed(name + units[k]) == wanted]
     if not matches:
+        roles = (role(name, unit) for name, unit in zip(names, units, strict=True))
+        fitting = [n for n, r in zip(names, roles, strict=True) if r is None or r.quantity == Role(key).quantity]
         raise UserError(
-            f"data.columns: {key}={choice}: {table.source} has no such column{among(str(choice), names, 'Columns')}"
+            f"data.columns: {key}={choice}: {table.source} has no such column{nearest(str(choice), fitting) or '.'} "
+            f"Columns: {', '.join(names)}"
         )
     if len(matches) > 1:
         raise UserError(
@@ -142,7 +147,8 @@ def _options(table: TableFile, numbers: Mapping[str, int]) -> dict[str, list[Map
         line = label.line if label and label.quantity == "U" else None
         options[key] = [MappedColumn(number, table.label(number), Role(key, heading.units[number], line))]
     free = [k for k in range(len(heading.names)) if k not in numbers.values() and heading.names[k]]
-    roles = {k: one for k in free if (one := role(heading.names[k], heading.units[k]))}
+    names = _spelled(heading.names)
+    roles = {k: one for k in free if (one := role(names[k], heading.units[k]))}
     exact = {key for key in CONTRACT if key in [heading.names[k] for k in free]}
     if "U" not in exact and "U" not in numbers:
         exact.discard("U2")  # of U1, U2, U3
@@ -155,6 +161,17 @@ def _options(table: TableFile, numbers: Mapping[str, int]) -> dict[str, list[Map
         line = None if key == "U" and name == "U" else one.line
         options.setdefault(key, []).append(MappedColumn(k, name, replace(one, key=key, line=line)))
     return _timed(table, options)
+
+
+def _spelled(names: Sequence[str]) -> Sequence[str]:
+    """The names with those of a micro-PMU, L1MAG and C1ANG, as they are meant: voltage and current of a phase."""
+    parts = [re.fullmatch(r"([LC])([123])_?(MAG|ANG)", name.strip(), re.IGNORECASE) for name in names]
+    if {match[1].upper() for match in parts if match} != {"L", "C"}:
+        return names
+    letters = {"L": "V", "C": "I"}
+    return [
+        f"{letters[m[1].upper()]}{m[2]} {m[3].lower()}" if m else name for m, name in zip(parts, names, strict=True)
+    ]
 
 
 def _numbered(roles: Mapping[int, Role]) -> dict[str, str]:
@@ -263,17 +280,39 @@ def _lacking(table: TableFile, options: Mapping[str, Any], groups: Mapping[str, 
             f"{table.source}: no line names the columns; add one, such as t,U,P,Q, or name them by number, from 0: "
             "data.columns={t: 0, U: 1, P: 2, Q: 3}"
         )
-    if groups:
-        missing = [key for key in ("t",) if key not in options] or ["what data.columns names"]
-    else:
-        missing = [key for key in ("t", "P", "Q") if not _has(options, key)]
-        missing[len(missing) and missing[0] == "t" : 0] = [] if _set(options, "U", ("U", "U1")) else ["U"]
-    hint = nearest(missing[0], names)
-    meant = hint.partition("'")[2].rpartition("'")[0] or names[-1]
-    return (
-        f"{table.source}: column {', '.join(missing)} is missing; the header line names {', '.join(names)}{hint}; if "
-        f"another name is meant, say so: data.columns={{{missing[0]}: '{meant}'}}"
-    )
+    listed = f"the header line names {', '.join(names)}"
+    if groups and "t" in options:
+        return (
+            f"{table.source}: what data.columns names makes no table of powers, phasors or waveforms with the others; "
+            f"{listed}; name all that are needed: data.columns={{t: ..., U: ..., P: ..., Q: ...}}"
+        )
+    missing = [key for key in ("t",) if key not in options]
+    if not groups:
+        missing += [] if _set(options, "U", ("U", "U1")) else ["U"]
+        missing += [key for key in ("P", "Q") if not _has(options, key)]
+    meant = {key: name for key in missing if (name := _meant(table, options, key))}
+    said = ", ".join(f"{key}: '{meant[key]}'" if key in meant else f"{key}: ..." for key in missing)
+    which = f"if {', '.join(meant.values())} is meant, say so" if meant else "say which is which"
+    return f"{table.source}: column {', '.join(missing)} is missing; {listed}; {which}: data.columns={{{said}}}"
+
+
+def _meant(table: TableFile, options: Mapping[str, list[MappedColumn]], key: str) -> str:
+    """The one column that may be meant by a key that is missing: of its quantity by name, or that counts up as t does.
+
+    "" where there is none or several: a name that only looks alike says nothing.
+    """
+    if key != "t":
+        alike = {c.number: c for k, several in options.items() if k[0] == key and "_" not in k for c in several}
+        return next(iter(alike.values())).name if len(alike) == 1 else ""
+    taken = {c.number for several in options.values() for c in several}
+    free = [k for k, name in enumerate(table.heading.names) if name and k not in taken and _increases(table, k)]
+    return table.label(free[0]) if len(free) == 1 else ""
+
+
+def _increases(table: TableFile, number: int) -> bool:
+    cells = [row[number] for row in table.sample if number < len(row)]
+    values = [float(str(cell).replace(",", ".")) for cell in cells if is_number(cell) or is_number(cell, ",")]
+    return len(values) == len(cells) > 1 and all(a < b for a, b in itertools.pairwise(values))
 
 
 def _with_unit(one: MappedColumn, units: Mapping[str, str]) -> MappedColumn:

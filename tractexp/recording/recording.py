@@ -164,7 +164,9 @@ class Recording:
                 )
             return each
         if str(each) not in names:
-            raise UserError(f"{where}: {self.source} has no analog channel '{each}'{nearest(str(each), names)}")
+            other = {"data.voltages": "current", "data.currents": "voltage"}.get(where)
+            fitting = [name for name, c in zip(names, self.channels, strict=True) if c.quantity != other]
+            raise UserError(f"{where}: {self.source} has no analog channel '{each}'{nearest(str(each), fitting)}")
         if names.count(str(each)) > 1:
             raise UserError(f"{where}: {self.source} has several channels '{each}'; give the number, from 0")
         return names.index(str(each))
