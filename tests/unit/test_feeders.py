@@ -128,6 +128,15 @@ class TestWhichVoltages:
         assert "27.5 kV, P = " in found[0].question
         assert len({f.name for f in found}) == 2
 
+    def test_a_bus_that_the_currents_follow_is_taken_though_two_others_have_names_more_alike(self):
+        other = wave(T, phases(0.02 * dip(T, start=0.2, end=0.3)))
+        names = [f"{bus} U{p}" for bus in ("main", "QF2 out", "QF3 out") for p in "abc"] + [
+            f"QF1 out I{p}" for p in "abc"
+        ]
+        waves = [*V, *other, *(1.2 * other), *I]
+        (feeder,) = propose(recording(waves, names=names, units=["kV"] * 9 + ["kA"] * 3))
+        assert feeder.voltages == (0, 1, 2)
+
     def test_names_that_say_it_are_believed(self):
         names = [*(f"{side} U{p}" for side in ("HV", "LV") for p in "abc"), *(f"LV I{p}" for p in "abc")]
         (feeder,) = self.two(wave(T, phases(0.25 * dip(T))), names=names)

@@ -137,6 +137,11 @@ class TestNamesAndUnits:
         same(read(content, units={"P": "MW", "Q": "Mvar"}))
         same(read(content, base_voltage=27.5, base_power=20.0))
 
+    @pytest.mark.parametrize("header", ["t,U [kV],P [kW],Q", "t,U [kV],P,Q [Mvar]"])
+    def test_powers_of_which_one_has_no_unit_are_asked_for(self, header):
+        with pytest.raises(UserError, match=r"has no unit, and other columns of P and Q have one; say them, .*Q: Mvar"):
+            read(text(in_units(), header))
+
     @pytest.mark.parametrize("header", ["t [kV],U,P,Q", "t,U [kV],P [Hz],Q", "t,U [s],P,Q"])
     def test_a_unit_of_another_quantity_is_refused(self, header):
         with pytest.raises(UserError, match=r"is no unit; say another column, .*data.units=\{"):
@@ -598,6 +603,19 @@ class TestPhasors:
         same(record, atol=1e-5)
         assert (record.f == 49.98).all()
         assert record.U2 is None
+
+    @pytest.mark.parametrize("units", [("[kV]", ""), ("", "[A]"), ("[pu]", "[A]"), ("[V]", "")])
+    def test_units_of_one_quantity_alone_are_no_answer(self, units):
+        t, V1, _, I1 = self.stream()
+        table = [t, 0.4 * np.abs(V1) / np.abs(V1[0]), np.angle(V1), np.abs(I1), np.angle(I1)]
+        with pytest.raises(UserError, match=r"say the units, e.g. data.units=\{U: kV, I: A\}"):
+            read(text(np.column_stack(table), f"t,V1 {units[0]},V1 angle [rad],I1 {units[1]},I1 angle [rad]"))
+
+    def test_a_kilovolt_without_a_unit_is_not_per_unit(self):
+        t, V1, _, I1 = self.stream()
+        table = [t, 1200 * np.abs(V1) / np.abs(V1[0]), np.angle(V1), np.abs(I1), np.angle(I1)]
+        record = read(text(np.column_stack(table), "t,V1,V1 angle [rad],I1,I1 angle [rad]"))
+        assert record.base.voltage == pytest.approx(1.2 * np.sqrt(3))
 
     def test_the_names_of_a_micro_pmu(self):
         t, V1, _, I1 = self.stream()

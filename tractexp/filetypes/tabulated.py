@@ -126,6 +126,7 @@ def _tuned(result: Powers, declared: float, source: MappedColumn | None) -> Powe
 
 
 def _of_powers(table: TableFile, mapping: Mapped, kilovolts: bool) -> Powers:
+    _check_power_units(table, mapping)
     values, start = _read(table, mapping)
     columns, notes = {"t": values["t"]}, [*mapping.notes, *start]
     for letter in "UPQ":
@@ -141,6 +142,18 @@ def _of_powers(table: TableFile, mapping: Mapped, kilovolts: bool) -> Powers:
     if absolute["U"] or (absolute["U"] is None and kilovolts):
         notes += _to_lines(columns, mapping.columns[first].role.line, first)
     return Powers(columns, absolute, (*table.notes, *notes))
+
+
+def _check_power_units(table: TableFile, mapping: Mapped) -> None:
+    """Raise `UserError` where some columns of P and Q have a unit and others none: it could be a thousand times off."""
+    ours = {key: one for key, one in mapping.columns.items() if key[0] in "PQ"}
+    bare = [one for one in ours.values() if not one.role.unit.strip()]
+    if bare and len(bare) < len(ours):
+        units = ", ".join(f"{letter}: {unit}" for letter, unit in (("P", "MW"), ("Q", "Mvar")))
+        raise UserError(
+            f"{table.source}: {bare[0].label} has no unit, and other columns of P and Q have one; say them, e.g. "
+            f"data.units={{{units}}}"
+        )
 
 
 def _to_lines(columns: dict[str, np.ndarray], line: bool | None, key: str) -> list[str]:
@@ -198,13 +211,11 @@ def _seconds(time: TableColumn, unit: str) -> tuple[np.ndarray, list[str]]:
 
 def _of_phasors(table: TableFile, mapping: Mapped, nominal: float) -> Powers:
     values, note = _read(table, mapping)
-    values = _in_units(table, mapping, values)
+    values, absolute = _in_units(table, mapping, values)
     keys = {letter: [k for k in values if k[0] == letter and not k.endswith("_angle")] for letter in "UI"}
     scale, angle_notes = _radians(table, mapping, values)
     V, I = (np.array([values[k] * np.exp(1j * scale * values[f"{k}_angle"]) for k in keys[letter]]) for letter in "UI")
     (V1, V2), (I1, _) = _sequences(V, keys["U"]), _sequences(I, keys["I"])
-    absolute = _absolute(mapping, keys["U"][0])
-    absolute = absolute if absolute is not None else not NEAR_ONE[0] < np.nanmedian(np.abs(V1)) < NEAR_ONE[1]
     V1, sort = _to_ground(mapping.columns[keys["U"][0]], V1) if absolute else (V1, [])
     size, three = (np.sqrt(3), 3.0) if absolute else (1.0, 1.0)
     S = three * V1 * I1.conj()
@@ -218,7 +229,7 @@ def _of_phasors(table: TableFile, mapping: Mapped, nominal: float) -> Powers:
     else:
         columns["f"] = nominal + np.gradient(np.unwrap(np.angle(V1)), values["t"]) / (2 * np.pi)
         notes.append(f"f from the angle of the voltage, which stands still at {nominal:g} Hz")
-    return Powers(columns, {"U": bool(absolute), "P": bool(absolute)}, (*table.notes, *notes))
+    return Powers(columns, {"U": absolute, "P": absolute}, (*table.notes, *notes))
 
 
 def _to_ground(one: MappedColumn, V: np.ndarray) -> tuple[np.ndarray, list[str]]:
@@ -241,21 +252,26 @@ def _off_nominal(voltage: float) -> float:
     return min(abs(float(np.log(voltage / each))) for each in NOMINAL_VOLTAGES) if voltage > 0 else np.inf
 
 
-def _in_units(table: TableFile, mapping: Mapped, values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Magnitudes without a unit as V and A where a voltage can be nothing else, as per unit where it is near one."""
-    result = dict(values)
-    for key, one in mapping.columns.items():
-        if key[0] not in "UI" or key.endswith("_angle") or one.role.unit:
-            continue
-        level = float(np.nanmedian(np.abs(values[next(k for k in values if k[0] == "U")])))
-        if level > VOLTS:
-            result[key] = values[key] * 1e-3
-        elif not NEAR_ONE[0] < level < NEAR_ONE[1]:
-            raise UserError(
-                f"{table.source}: {one.label} has no unit, and its voltage is {level:.4g}: say the units, "
-                "e.g. data.units={U: kV, I: A}"
-            )
-    return result
+def _in_units(
+    table: TableFile, mapping: Mapped, values: Mapping[str, np.ndarray]
+) -> tuple[dict[str, np.ndarray], bool]:
+    """(magnitudes in kV and kA or per unit, whether they are in kV and kA).
+
+    Without units they are in V and A where a voltage can be nothing else, per unit where it is near one. Raises
+    `UserError` where neither is so, and where one has a unit and another none, or one per unit.
+    """
+    sizes = {key: one for key, one in mapping.columns.items() if key[0] in "UI" and not key.endswith("_angle")}
+    stated = {_absolute(mapping, key) for key in sizes}
+    level = float(np.nanmedian(np.abs(values[next(key for key in sizes if key[0] == "U")])))
+    if stated == {None} and level > VOLTS:
+        return {**values, **{key: values[key] * 1e-3 for key in sizes}}, True
+    if stated == {None} and NEAR_ONE[0] < level < NEAR_ONE[1]:
+        return {**values}, False
+    if len(stated) > 1 or None in stated:
+        odd = next((one for key, one in sizes.items() if _absolute(mapping, key) is None), next(iter(sizes.values())))
+        what = "is per unit and others are not" if odd.role.unit else f"has no unit, and its voltage is {level:.4g}"
+        raise UserError(f"{table.source}: {odd.label} {what}: say the units, e.g. data.units={{U: kV, I: A}}")
+    return {**values}, bool(stated.pop())
 
 
 def _radians(table: TableFile, mapping: Mapped, values: Mapping[str, np.ndarray]) -> tuple[float, list[str]]:

@@ -258,13 +258,14 @@ def _buses(
     apart = max(_apart(phasors, a, b) for a, b in combinations(ties, 2))
     if apart < SAME_BUS:
         return [(ties[0], f"{len(ties)} groups of voltages differ by at most {100 * apart:.2g} %, the first is taken")]
-    stray = [_stray(phasors, bus, load) for bus in ties]
-    best = int(np.argmin(stray))
-    others = [b for b, off in zip(ties, stray, strict=True) if FOLLOWS * off < stray[best] and b is not ties[best]]
-    others = [b for b in others if _apart(phasors, ties[best], b) >= SAME_BUS] if loaded else []
-    if not others:
-        return [(ties[best], "the currents follow these voltages best")]
-    return [(bus, "the currents may follow them") for bus in ties if bus is ties[best] or bus in others]
+    stray = {id(bus): _stray(phasors, bus, load) for bus in buses}
+    best = min(buses, key=lambda bus: stray[id(bus)])
+    if FOLLOWS * min(stray[id(bus)] for bus in ties) <= stray[id(best)]:  # one of those whose names say as much
+        best = min(ties, key=lambda bus: stray[id(bus)])
+    others = [b for b in ties if FOLLOWS * stray[id(b)] < stray[id(best)] and _apart(phasors, best, b) >= SAME_BUS]
+    if not (others and loaded):
+        return [(best, "the currents follow these voltages best")]
+    return [(bus, "the currents may follow them") for bus in buses if bus is best or bus in others]
 
 
 def _named_alike(recording: Recording, load: Group, buses: Sequence[Group]) -> tuple[list[Group], str]:
