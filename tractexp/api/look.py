@@ -44,7 +44,9 @@ class Listed(Tabulated):
     def to_frame(self) -> Any:
         import pandas
 
-        return pandas.DataFrame(list(self.rows))
+        frame = pandas.DataFrame(list(self.rows))
+        unknown = [name for name in frame if frame[name].isna().all()]
+        return frame.astype(dict.fromkeys(unknown, float))  # what no row has is nan, as where some rows have it
 
 
 def _cell(value: Any) -> Any:

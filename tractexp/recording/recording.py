@@ -35,7 +35,8 @@ FEWEST_PER_CYCLE = 10  # samples: a slower segment holds no waveform but magnitu
 
 def unit_of(text: str) -> tuple[str, float]:
     """(quantity, factor to kV or kA) of a unit as a file writes it; ("", 1.0) for another."""
-    text = unicodedata.normalize("NFKC", text).strip(" []().")
+    text = unicodedata.normalize("NFKC", text).strip(" .")
+    text = text[1:-1].strip() if (text[:1], text[-1:]) in (("[", "]"), ("(", ")")) else text
     latin = text.translate(CYRILLIC)
     return MEGA.get(latin) or UNITS.get(text.lower()) or UNITS.get(latin.lower(), ("", 1.0))
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from tractexp.errors import UserError, among
 from tractexp.recording.label import kind
-from tractexp.recording.recording import Channel, Recording, unit_of
+from tractexp.recording.recording import Channel, Recording, quantity_of, unit_of
 
 PLAIN = {"U": ("voltage", "V", "kV"), "I": ("current", "A", "kA")}  # by letter of the setting
 GREATEST = {"U": 1500.0, "I": 100.0}  # RMS in kV, kA: no network has more, so that a larger number is in V, A
@@ -101,15 +101,26 @@ def in_doubt(channel: Channel) -> bool:
 
 def check_known(recording: Recording, numbers: Mapping[str, Sequence[int]]) -> None:
     """Raise `UserError` where a channel of {U: ..., I: ...} is in doubt: the question, and the setting that answers."""
-    for letter, ours in numbers.items():
-        odd = [i for i in ours if in_doubt(recording.channels[i])]
-        if not odd:
-            continue
-        first, (_, small, large) = recording.channels[odd[0]], PLAIN[letter]
-        unit = first.unit.strip()
-        says = f"has the unit '{unit}', which may be {small} or {large}" if unit else "has no unit"
-        raise UserError(
-            f"{recording.source}: channel {odd[0]} '{first.name.strip()}' {says}, and its numbers have an RMS of "
-            f"{_size(first):.4g}: say the unit, data.units={{{letter}: {small}}} or {{{letter}: {large}}}, or what one "
-            f"of its units stands for, data.units={{{letter}: '1.5 {large}'}}"
-        )
+    odd = {x: [recording.channels[i] for i in ours if in_doubt(recording.channels[i])] for x, ours in numbers.items()}
+    odd = {letter: channels[0] for letter, channels in odd.items() if channels}
+    if not odd:
+        return
+    said = "; ".join(
+        f"'{c.name.strip()}' has {_unit_said(c, letter)} and numbers of an RMS of {_size(c):.4g}"
+        for letter, c in odd.items()
+    )
+    plainly = ", ".join(f"{letter}: {PLAIN[letter][2]}" for letter in odd)
+    stands = ", ".join(f"{letter}: '1.5 {PLAIN[letter][2]}'" for letter in odd)
+    raise UserError(
+        f"{recording.source}: {said}: say the unit, data.units={{{plainly}}} or V, A, or what one of the file's units, "
+        f"or one per unit, stands for, data.units={{{stands}}}"
+    )
+
+
+def _unit_said(channel: Channel, letter: str) -> str:
+    """The unit of a channel that is in doubt, and what is open about it."""
+    unit = channel.unit.strip()
+    if not unit:
+        return "no unit"
+    open_question = f", which may be {PLAIN[letter][1]} or {PLAIN[letter][2]}," if quantity_of(unit) else ""
+    return f"the unit '{unit}'{open_question}"
