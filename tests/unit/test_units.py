@@ -45,7 +45,8 @@ RIGHT = pytest.approx((KV, MW, MVAR), rel=2e-3)
         ("кВ", ("voltage", 1.0)), ("В", ("voltage", 1e-3)), ("А", ("current", 1e-3)), ("кА", ("current", 1.0)),
         ("мВ", ("voltage", 1e-6)), ("МВ", ("voltage", 1e3)), ("㎸", ("voltage", 1.0)), ("ｋＶ", ("voltage", 1.0)),
         ("[kV]", ("voltage", 1.0)), ("kilovolts", ("voltage", 1.0)), ("千伏", ("voltage", 1.0)),
-        ("кA", ("current", 1.0)), ("pu", ("", 1.0)), ("V/kV", ("", 1.0)), ("", ("", 1.0)), ("W", ("", 1.0)), ("kV]", ("", 1.0)),
+        ("кA", ("current", 1.0)), ("pu", ("", 1.0)), ("V/kV", ("", 1.0)), ("", ("", 1.0)), ("W", ("", 1.0)),
+        ("kV]", ("", 1.0)),
     ],
 )  # fmt: skip
 def test_units_as_files_write_them(text, unit):

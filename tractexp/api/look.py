@@ -45,7 +45,7 @@ class Listed(Tabulated):
         import pandas
 
         frame = pandas.DataFrame(list(self.rows))
-        unknown = [name for name in frame if frame[name].isna().all()]
+        unknown = [name for name in frame if all(row[name] is None for row in self.rows)]
         return frame.astype(dict.fromkeys(unknown, float))  # what no row has is nan, as where some rows have it
 
 
