@@ -137,6 +137,14 @@ class TestWhichVoltages:
         (feeder,) = propose(recording(waves, names=names, units=["kV"] * 9 + ["kA"] * 3))
         assert feeder.voltages == (0, 1, 2)
 
+    def test_where_names_say_nothing_every_bus_that_the_currents_may_follow_is_a_candidate(self):
+        volts = [f"{bus} U{p}" for bus in ("main", "QF2 out", "QF3 out") for p in "abc"]
+        names = [*volts, *(f"QF1 out I{p}" for p in "abc")]
+        waves = [*V, *(0.01 * V), *(0.008 * np.roll(V, 1, axis=0)), *I]
+        found = propose(recording(waves, names=names, units=["kV"] * 9 + ["kA"] * 3))
+        assert {f.voltages for f in found} == {(0, 1, 2), (3, 4, 5), (6, 7, 8)}
+        assert "110 kV, P = 33 MW" in found[0].question
+
     def test_names_that_say_it_are_believed(self):
         names = [*(f"{side} U{p}" for side in ("HV", "LV") for p in "abc"), *(f"LV I{p}" for p in "abc")]
         (feeder,) = self.two(wave(T, phases(0.25 * dip(T))), names=names)

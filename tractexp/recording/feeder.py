@@ -262,8 +262,8 @@ def _buses(
     best = min(buses, key=lambda bus: stray[id(bus)])
     if FOLLOWS * min(stray[id(bus)] for bus in ties) <= stray[id(best)]:  # one of those whose names say as much
         best = min(ties, key=lambda bus: stray[id(bus)])
-    others = [b for b in ties if FOLLOWS * stray[id(b)] < stray[id(best)] and _apart(phasors, best, b) >= SAME_BUS]
-    if not (others and loaded):
+    others = [b for b in buses if FOLLOWS * stray[id(b)] < stray[id(best)] and _apart(phasors, best, b) >= SAME_BUS]
+    if not (loaded and any(b in ties for b in others)):
         return [(best, "the currents follow these voltages best")]
     return [(bus, "the currents may follow them") for bus in buses if bus is best or bus in others]
 
