@@ -36,8 +36,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     gc.set_threshold(*SELDOM)
     try:
         if arguments[:1] and (place := COMMANDS.get(arguments[0])):
-            module, _, function = place.partition(":")
-            return getattr(importlib.import_module(module), function)(arguments[1:])
+            return _command(place, arguments[1:])
+        if arguments[:1] and _is_file(arguments[0]):
+            return _command(COMMANDS["look"], arguments)
         if {"--help", "-h"} & {*arguments}:
             from tractexp.usage import usage
 
@@ -61,6 +62,22 @@ def main(argv: Sequence[str] | None = None) -> int:
     finally:
         gc.freeze()  # nor at the end, when everything goes anyway
     return 2
+
+
+def _command(place: str, arguments: list[str]) -> int:
+    module, _, function = place.partition(":")
+    return getattr(importlib.import_module(module), function)(arguments)
+
+
+def _is_file(argument: str) -> bool:
+    """Whether an argument names a file to look at, one that may be missing, and is no setting."""
+    if "=" in argument or argument.startswith("-"):
+        return False
+    if os.path.isfile(argument):
+        return True
+    from tractexp.record.reader import endings
+
+    return os.path.splitext(argument)[1].lower() in endings()
 
 
 def terminated(*_: object) -> None:

@@ -326,6 +326,15 @@ def test_addresses_are_absolute_and_the_default_is_below_outputs(tmp_path, monke
         assert tracking.address(given) == given
 
 
+def test_the_store_of_mlflows_own_variable_is_used_unless_another_is_chosen(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MLFLOW_TRACKING_URI", "sqlite:///team.db")
+    assert tracking.address(None) == f"sqlite:///{tmp_path.as_posix()}/team.db"
+    assert tracking.address("sqlite:///x.db") == f"sqlite:///{tmp_path.as_posix()}/x.db"
+    monkeypatch.setenv("MLFLOW_TRACKING_URI", " ")
+    assert tracking.address(None) == tracking.default_uri(tmp_path)
+
+
 def test_a_server_that_does_not_answer_is_reported_at_once():
     with socket.socket() as taken:  # bound but not listening: connections are refused
         taken.bind(("127.0.0.1", 0))

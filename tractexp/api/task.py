@@ -294,7 +294,9 @@ class Job:
     @property
     def look(self) -> str:
         """The command that shows what was logged."""
-        uri = self.config["tracking"]["uri"]
+        from tractexp import tracking
+
+        uri = tracking.chosen_uri(self.config["tracking"]["uri"])
         return f"tractexp ui --uri {uri}" if uri else "tractexp ui"
 
     def send(self, run: Any) -> None:

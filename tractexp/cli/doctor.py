@@ -27,7 +27,7 @@ def doctor(arguments: list[str]) -> int:
     """Check and heal; returns the exit code, 2 where something is left that is wrong."""
     parser = argparse.ArgumentParser(prog="tractexp doctor", description=DOES)
     parser.add_argument("folder", nargs="?", type=Path, default=FOLDER, help=f"of runs; default: {FOLDER}")
-    parser.add_argument("--uri", help="the MLflow store; default: outputs/mlflow.db of the current folder")
+    parser.add_argument("--uri", help="the MLflow store; default: MLFLOW_TRACKING_URI, else outputs/mlflow.db here")
     chosen = parser.parse_args(arguments)
     from tractexp import tracking
 

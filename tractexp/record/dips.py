@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.errors import UserError
+from tractexp.record.direction import OUTWARD, direction
 from tractexp.record.event import detect, find_dips, steady
 from tractexp.record.reader import Events
-from tractexp.record.record import Record
+from tractexp.record.record import GREATEST_CURRENT, SIZES, Record
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,42 @@ def level(record: Record) -> tuple[float, float]:
     P, Q = (values[before][np.isfinite(values[before])] for values in (record.P, record.Q))
     S = float(np.hypot(P.mean(), Q.mean())) if len(P) and len(Q) else 0.0
     return float(record.U[before].mean()), S
+
+
+def check_load(where: str, U: float, S: float = 0.0) -> None:
+    """Raise `UserError` for a load of U [kV] and S [MVA] that no network feeds: another unit was meant."""
+    low, high = SIZES["voltage"]
+    if not low <= U <= high:
+        raise UserError(
+            f"{where}: the voltage before the first dip is {U:.4g} kV, and a network's is at most {high:g} kV; if the "
+            "numbers are in V, say so: data.units={U: V}"
+        )
+    if np.sqrt(3) * U * GREATEST_CURRENT < S:
+        raise UserError(
+            f"{where}: {S:.4g} MVA at {U:.4g} kV before the first dip is a current of {S / np.sqrt(3) / U:.4g} kA, and "
+            "no load draws as much; say the units of voltage and of current or power, such as data.units={U: kV, I: A} "
+            "or data.units={U: kV, P: kW, Q: kvar}"
+        )
+
+
+def signs(record: Record) -> list[str]:
+    """What is odd about P and Q of a table before its first dip, one sentence each.
+
+    Raises `UserError` for a load that is counted out of itself for certain.
+    """
+    calm = np.zeros(record.samples, bool)
+    calm[steady(record)] = True
+    P, Q = (float(np.nanmedian(x[calm])) if np.isfinite(x[calm]).any() else 0.0 for x in (record.P, record.Q))
+    reason = direction(record.U, record.P, record.Q, calm=calm)
+    if OUTWARD in reason:
+        raise UserError(f"{record.where}: P is {record.base.power * P:.4g} before the first dip: {reason}")
+    said = [f"P is {record.base.power * P:.4g} before the first dip: {reason}"] if reason else []
+    if abs(Q) > abs(P):
+        said.append(
+            f"Q ({record.base.power * Q:.4g}) is greater than P ({record.base.power * P:.4g}) before the first dip: "
+            "the two columns may be exchanged (data.columns={P: ..., Q: ...} says which is which)"
+        )
+    return said
 
 
 def chosen(where: str, dips: Sequence[FileDip], train: Sequence[int] | None, validate: Sequence[int] | None,

@@ -10,7 +10,7 @@ import numpy as np
 from tractexp.errors import UserError
 from tractexp.plugin import build
 from tractexp.record import Event, Record, detect, find_dips
-from tractexp.record.dips import FileDip
+from tractexp.record.dips import FileDip, check_load
 from tractexp.record.phasor import Phasors
 from tractexp.recording.arrangement import arranged
 from tractexp.recording.feeder import Feeder, propose
@@ -19,6 +19,7 @@ from tractexp.recording.measure import phasors_of, waves_of
 from tractexp.recording.quality import Quality, quality
 from tractexp.recording.reader import WaveformReader
 from tractexp.recording.recording import Recording
+from tractexp.recording.unit import check_known, in_doubt
 
 ALIVE = 0.5  # of the greatest voltage: at less the frequency is not measured
 APART = 0.06  # s: three cycles, within which what happened and the dip that is fitted begin
@@ -144,7 +145,9 @@ def overview(reader: WaveformReader, recording: Recording) -> list[Sight]:
     for feeder in feeders:
         said = ()
         try:
-            feeder = arranged(recording, feeder)
+            check_known(recording, feeder.channels)
+            if feeder.loaded or not loaded:
+                feeder = arranged(recording, feeder)
         except UserError as error:
             said = (str(error),)
         shown = sight(reader, recording, feeder, events=feeder.loaded or not loaded)
@@ -159,6 +162,8 @@ def sight(reader: WaveformReader, recording: Recording, feeder: Feeder, events: 
     """
     phasors, changes, said = [], [], []
     blank = Sight(feeder.name or "load", feeder=feeder, settings=feeder.settings)
+    if any(in_doubt(recording.channels[i]) for i in (*feeder.voltages, *feeder.currents)):
+        return blank  # no kV, no MW
     try:
         segments = recording.waveforms()
     except UserError as error:
@@ -179,7 +184,18 @@ def sight(reader: WaveformReader, recording: Recording, feeder: Feeder, events: 
     except UserError as error:
         refused = str(error)
     numbered = _numbered(changes, dips, reader.path, refused)
-    return replace(blank, phasors=tuple(phasors), events=tuple(numbered), said=tuple(said))
+    shown = replace(blank, phasors=tuple(phasors), events=tuple(numbered), said=tuple(said))
+    return replace(shown, said=(*said, *_improbable(reader.path, shown)))
+
+
+def _improbable(where: str, shown: Sight) -> list[str]:
+    """What is said of a load that no network feeds."""
+    try:
+        if (load := shown.powers()) is not None and shown.feeder is not None and shown.feeder.loaded:
+            check_load(where, load[0], float(np.hypot(*load[1:])))
+    except UserError as error:
+        return [str(error)]
+    return []
 
 
 def sight_of(record: Record, dips: Sequence[FileDip] | None = None) -> Sight:

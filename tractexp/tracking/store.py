@@ -21,6 +21,7 @@ from tractexp.errors import UserError
 from tractexp.tracking.owner import close_quietly
 
 PATIENCE = 15.0  # s to wait for a process that writes to the database
+VARIABLE = "MLFLOW_TRACKING_URI"  # by which MLflow's own tools choose the store
 HELD = 120.0  # s to wait for another process that makes the store or opens it
 
 
@@ -29,8 +30,14 @@ def default_uri(folder: Path) -> str:
     return f"sqlite:///{(Path(folder).absolute() / 'outputs' / 'mlflow.db').as_posix()}"
 
 
-def address(chosen: str | None) -> str:
+def chosen_uri(setting: str | None) -> str:
+    """The store that a setting chooses, else MLflow's own variable; "" where neither does."""
+    return setting or os.environ.get(VARIABLE, "").strip()
+
+
+def address(setting: str | None) -> str:
     """The store that was chosen, or the default one; both from the current folder, as an absolute address."""
+    chosen = chosen_uri(setting)
     if not chosen:
         return default_uri(Path.cwd())
     database = database_of(chosen)
