@@ -10,7 +10,7 @@ from pathlib import Path
 from types import UnionType
 from typing import Any, ClassVar, NamedTuple, TypeVar, Union, get_args, get_origin
 
-from tractexp import provenance
+from tractexp import provenance, quoting
 from tractexp.blocks.terminal import show
 from tractexp.errors import UserError
 from tractexp.outcome import Written
@@ -295,7 +295,7 @@ class Job:
     def look(self) -> str:
         """The command that shows what was logged."""
         uri = self.config["tracking"]["uri"]
-        return f"tractexp ui --uri {uri}" if uri else "tractexp ui"
+        return quoting.shell("tractexp", "ui", *(["--uri", uri] if uri else []))
 
     def send(self, run: Any) -> None:
         """Log a run (`tracking.Run`), and say how to look at it.

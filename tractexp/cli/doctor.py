@@ -10,7 +10,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from tractexp import files
+from tractexp import files, quoting
 from tractexp.cli.sync import FOLDER, brought
 from tractexp.errors import UserError
 from tractexp.progress import say
@@ -66,7 +66,8 @@ def versions() -> Iterator[Finding]:
         except PackageNotFoundError:
             wrong.append(f"{needed.name} is not installed, and {needed} is needed")
     for sentence in wrong:
-        yield WRONG, f"{sentence}: pip install '{sentence.rpartition('and ')[2].removesuffix(' is needed')}'"
+        needed = sentence.rpartition("and ")[2].removesuffix(" is needed")
+        yield WRONG, f"{sentence}: {quoting.shell('pip', 'install', needed)}"
     if not wrong:
         yield SOUND, "every package is of a version that is known to work"
 

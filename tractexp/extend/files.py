@@ -5,6 +5,7 @@ from tractexp.filetypes import cev, comtrade, tidy
 from tractexp.filetypes.sidecar import Sidecar, beside
 from tractexp.filetypes.tabulated import Powers, Tabular, kind_of, powers, recording
 from tractexp.filetypes.tidy import restored
+from tractexp.overrides import survey_of
 from tractexp.record.dips import FileDip, check_numbers, chosen, level, numbered
 from tractexp.record.record import DECLARATION, LOAD, SIZES
 from tractexp.recording.archive import records
@@ -35,5 +36,6 @@ __all__ = [
     "recording",
     "records",
     "restored",
+    "survey_of",
     "tidy",
 ]

@@ -1,13 +1,12 @@
 """Readers of waveform files: from channels to the dips of one load, numbered in order of time."""
 
-import shlex
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from tractexp import plugin
+from tractexp import plugin, quoting
 from tractexp.errors import UserError, check_range
 from tractexp.overrides import assigned
 from tractexp.record import Base, Events, Reader, Record, Waves, detect
@@ -152,7 +151,7 @@ class WaveformReader(Reader):
             return arranged(recording, replace(only, reverse_current=reverse, why=why))
         every = ", ".join(f"{i} '{c.name}' [{c.unit}]" for i, c in enumerate(recording.channels))
         loads = "; ".join(
-            f"{f.name}: {shlex.join(assigned(f'data.{key}', value) for key, value in f.settings.items())}"
+            f"{f.name}: {quoting.shell(*(assigned(f'data.{key}', value) for key, value in f.settings.items()))}"
             for f in proposed
         )
         shown = f"{len(proposed)} loads; choose one: {loads}" if proposed else f"none by itself; its channels: {every}"

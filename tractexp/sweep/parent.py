@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from tractexp import provenance
+from tractexp import provenance, quoting
 from tractexp.errors import UserError
 from tractexp.files import write_json
 from tractexp.progress import say
@@ -96,5 +96,5 @@ def _described(folder: Path, jobs: list[Any], overrides: list[str]) -> Any:
         name=f"sweep {folder.name}",
         parameters=shared,
         tags={"task": first.choices["task"], "sweep": " ".join(overrides), "git_commit": provenance.commit()},
-        description=f"A sweep of {len(jobs)} jobs: `{' '.join(overrides)}`",
+        description=f"A sweep of {len(jobs)} jobs: {quoting.markdown(' '.join(overrides))}",
     )

@@ -297,7 +297,7 @@ def _experiment(client: Any, name: str, uri: str) -> str:
     experiment = client.get_experiment_by_name(name)
     if experiment is None:
         database = database_of(uri)
-        folder = re.sub(r"[^\w.-]+", "_", name)
+        folder = re.sub(r"[^\w.-]+|^\.+", "_", name)
         location = (database.parent / "mlartifacts" / folder).as_uri() if database else None
         try:
             return client.create_experiment(name, artifact_location=location)

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tractexp import files
+from tractexp import files, quoting
 from tractexp.errors import UserError
 from tractexp.tracking.owner import close_quietly
 
@@ -158,8 +158,9 @@ def sentences(uri: str) -> Iterator[None]:
         reason = str(error).strip().partition("\n")[0]
         if "database schema" in reason or "Can't locate revision" in reason:
             raise UserError(
-                f"the MLflow store {uri} comes from another version of MLflow: 'mlflow db upgrade {uri}' brings an "
-                "older one up to date (keep a copy), a newer one needs the newer MLflow"
+                f"the MLflow store {uri} comes from another version of MLflow: '"
+                f"{quoting.shell('mlflow', 'db', 'upgrade', uri)}' brings an older one up to date (keep a copy), a "
+                "newer one needs the newer MLflow"
             ) from error
         raise UserError(f"the MLflow store {uri} cannot be used: {reason}") from error
 
