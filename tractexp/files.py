@@ -145,6 +145,16 @@ def _locked(file: IO[bytes]) -> bool:
     return True
 
 
+def inside(path: Path, folder: Path) -> bool:
+    """Whether a file or folder, with everything below it, lies below `folder`, wherever links lead; no pipes."""
+    whole = folder.resolve()
+    try:
+        every = [path, *path.rglob("*")] if path.is_dir() else [path]
+        return all(one.resolve().is_relative_to(whole) and (one.is_file() or one.is_dir()) for one in every)
+    except (OSError, RuntimeError, ValueError):  # a link to itself; a name that is none
+        return False
+
+
 def leftovers(folder: Path, older: float = 3600.0) -> list[Path]:
     """Partial files of killed processes in `folder` and below, at least `older` seconds old."""
     now = time.time()

@@ -1,6 +1,7 @@
 """Nothing is lost: by a kill, by a signal, by a store that is away, locked, cut short or of another version."""
 
 import contextlib
+import importlib
 import json
 import os
 import shutil
@@ -186,6 +187,111 @@ def test_a_store_that_is_locked_or_torn_is_told_before_mlflow_tries_for_minutes(
         other.execute("BEGIN EXCLUSIVE")
     with contextlib.closing(other), pytest.raises(UserError, match=f"cannot be used: .*{reason}"):
         tracking.prepare(uri)
+
+
+# Folders of others
+
+
+def hostile(folder: Path, run: Run, uri: str) -> Path:
+    """A folder that somebody else gave us: its file was written by hand."""
+    save(folder, run, uri)
+    return folder / FILE
+
+
+def names(uri: str, name: str) -> list[str]:
+    """The artifacts of a run, those within folders, too."""
+    client, (found,) = open_store(uri), [r for r in runs(uri) if r.info.run_name == name]
+    listed = client.list_artifacts(found.info.run_id)
+    listed += [
+        one for folder in listed if folder.is_dir for one in client.list_artifacts(found.info.run_id, folder.path)
+    ]
+    return [one.path for one in listed if not one.is_dir]
+
+
+@pytest.mark.parametrize("command", ["sync", "doctor"])
+def test_of_a_received_folder_only_its_own_files_are_sent(command, tmp_path, uri, capsys, monkeypatch):
+    from tractexp.cli import doctor
+
+    monkeypatch.setattr(doctor, "cores", lambda: iter(()))
+    key, folder = tmp_path / "home" / "id_rsa", tmp_path / "given" / "run"
+    (folder / "figures").mkdir(parents=True)
+    key.parent.mkdir()
+    for path in (key, folder / "own.txt", folder / "figures" / "own.svg"):
+        path.write_text(path.name)
+    (folder / "link.txt").symlink_to(key)
+    (folder / "home").symlink_to(key.parent)
+    (folder / "figures" / "deep").symlink_to(key)
+    (folder / "again.txt").symlink_to(folder / "own.txt")
+    os.mkfifo(folder / "pipe")
+    ways = [str(key), "../../home/id_rsa", "link.txt", "home", "home/id_rsa", "figures", "pipe", "../run/../../home"]
+    given = json.loads(hostile(folder, run(children=[run("below")]), uri).read_text())
+    given["run"] |= {"artifacts": [*ways, "own.txt", "again.txt", "figures/own.svg"], "model": str(key)}
+    given["run"]["children"][0] |= {"artifacts": [*ways, "own.txt"], "model": "link.txt"}
+    (folder / FILE).write_text(json.dumps(given))
+    getattr(importlib.import_module(f"tractexp.cli.{command}"), command)([str(tmp_path / "given"), "--uri", uri])
+    assert sorted(names(uri, "one")) == ["again.txt", "own.svg", "own.txt"]
+    assert names(uri, "below") == ["own.txt"]
+    said = capsys.readouterr().out
+    assert f"{key} is not sent: it does not lie in the folder {folder} of its run" in " ".join(said.split())
+    store = Path(uri.removeprefix("sqlite:///")).parent
+    assert [p for p in store.rglob("*") if p.is_file() and p.name == key.name] == []
+
+
+def test_the_page_of_a_received_sweep_may_be_a_link_to_anything(tmp_path, uri):
+    (tmp_path / "key").write_text("secret")
+    hostile(tmp_path / "sweep", Run("e", "a sweep"), uri)
+    save(tmp_path / "sweep", Run("e", "a sweep"), uri, sweep=True)
+    (tmp_path / "sweep" / "comparison.html").symlink_to(tmp_path / "key")
+    assert sync(tmp_path) == {BROUGHT: 1}
+    assert names(uri, "a sweep") == []
+
+
+@pytest.mark.parametrize("command", ["sync", "doctor"])
+def test_no_store_is_used_that_only_a_folder_names(command, tmp_path, capsys, monkeypatch):
+    from tractexp.cli import doctor
+
+    monkeypatch.setattr(doctor, "cores", lambda: iter(()))
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    foreign = f"sqlite:///{tmp_path / 'foreign' / 'mlflow.db'}"
+    hostile(tmp_path / "given" / "run", run(), foreign)
+    assert getattr(importlib.import_module(f"tractexp.cli.{command}"), command)([str(tmp_path / "given")]) == 2
+    said = " ".join(capsys.readouterr().out.split())
+    assert f"where it is yours, tractexp sync --uri {foreign} sends it there" in said
+    assert "1 not logged" in said
+    assert not (tmp_path / "foreign").exists()
+
+
+def test_a_received_file_changes_no_run_that_is_not_its_own(tmp_path, uri):
+    mine = save(tmp_path / "mine", run("mine"), uri)
+    sweep = save(tmp_path / "sweep", Run("e", "my sweep", tags={"sweep": "seed=1,2"}), uri, sweep=True)
+    assert sync(tmp_path) == {BROUGHT: 2}
+    ids = {name: read(tmp_path / name).run_id for name in ("mine", "sweep")}
+    before = {r.info.run_id: r.to_dictionary() for r in runs(uri)}
+    given = tmp_path / "given"
+    for k, (name, run_id) in enumerate(ids.items()):
+        hostile(given / str(k), run("other", status="KILLED"), uri)
+        content = json.loads((given / str(k) / FILE).read_text()) | {"run_id": run_id, "sweep": name == "sweep"}
+        (given / str(k) / FILE).write_text(json.dumps(content))
+    hostile(given / "2", run("other", status="KILLED", key=mine.run.key), uri)
+    (given / "sweep.json").write_text(json.dumps({"run": ids["sweep"]}))
+    sync(given)
+    assert {r.info.run_id: r.to_dictionary() for r in runs(uri) if r.info.run_id in before} == before
+    assert sweep.run.name == "my sweep"
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [("uri", 5), ("run_id", ["x"]), ("key", "x' or 1=1"), ("key", None), ("name", 3), ("artifacts", 7), ("model", 7),
+     ("status", {}), ("children", [1]), ("curves", [1])],
+)  # fmt: skip
+def test_a_file_that_no_run_wrote_is_a_sentence(place, value, tmp_path, uri):
+    given = json.loads(hostile(tmp_path / "run", run(), uri).read_text())
+    (given if place in given else given["run"])[place] = value
+    (tmp_path / "run" / FILE).write_text(json.dumps(given))
+    told = []
+    assert sync(tmp_path, uri, tell=told.append) == {NOT: 1}
+    assert "is damaged" in told[0]
 
 
 # Commands

@@ -315,7 +315,8 @@ class Job:
             entry.logged(run_id)
         except UserError as error:
             say(f"not logged: {error}")
-            later = "; 'tractexp sync' logs them when that is mended" if entry else ""
+            named = f", by {quoting.shell('--uri', uri)}" if (uri := self.config["tracking"]["uri"]) else ""
+            later = f"; 'tractexp sync' logs them when that is mended{named}" if entry else ""
             say(f"  the results are in {self.folder}{later}")
             return
         say(f"logged in experiment '{run.experiment}'; to see it: {self.look}")

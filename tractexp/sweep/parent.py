@@ -72,7 +72,7 @@ def _closed(folder: Path, run: Any, run_id: str | None, uri: str) -> None:
     except UserError as error:
         say(f"not logged: {error}")
     left = waiting(folder)
-    if left and sync(folder, tell=lambda line: None)[NOT]:
+    if left and sync(folder, uri, tell=lambda line: None)[NOT]:
         say(f"{left} runs are not logged; they are kept in {folder}, and 'tractexp sync' logs them")
 
 

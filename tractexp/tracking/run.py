@@ -147,7 +147,7 @@ def _whole_run(client: Any, run: Run) -> str:
     """The run of this key where the store has it whole, else ""; the rest of an earlier attempt is deleted."""
     experiments = [one.experiment_id for one in client.search_experiments()]
     for one in client.search_runs(experiments, f"tags.`{KEY}` = '{run.key}'") if run.key else ():
-        if one.info.status == run.status:
+        if one.info.status in (run.status, STATUSES[0]):
             return one.info.run_id
         for child in client.search_runs(experiments, f"tags.`mlflow.parentRunId` = '{one.info.run_id}'"):
             client.delete_run(child.info.run_id)
