@@ -10,6 +10,7 @@ import io
 import json
 import math
 import os
+import re
 import tempfile
 import time
 from collections.abc import Iterator
@@ -19,7 +20,8 @@ from typing import IO, Any
 from tractexp.errors import UserError
 
 PACKAGE = "pkg://"  # starts the path of a file inside an installed package
-PART = ".part"  # ends the name of a file that is being written
+PART = ".tractexp.part"  # ends the name of a file that is being written
+OWN = re.compile(r"\..*\.[a-z0-9_]{8}" + re.escape(PART), re.DOTALL)  # that name: nobody else gives a file such a one
 
 
 def located(path: str) -> Path:
@@ -156,12 +158,13 @@ def inside(path: Path, folder: Path) -> bool:
 
 
 def leftovers(folder: Path, older: float = 3600.0) -> list[Path]:
-    """Partial files of killed processes in `folder` and below, at least `older` seconds old."""
+    """Partial files of killed processes of ours in `folder` and below, at least `older` seconds old."""
     now = time.time()
     halves = []
     for path in folder.rglob(f"*{PART}"):
         with contextlib.suppress(OSError):
-            if path.is_file() and now - path.stat().st_mtime > older:
+            ours = OWN.fullmatch(path.name) and path.is_file() and not path.is_symlink()
+            if ours and now - path.stat().st_mtime > older:
                 halves.append(path)
     return halves
 

@@ -364,6 +364,27 @@ def test_the_doctor_closes_stale_runs_sets_a_damaged_store_aside_and_makes_it_an
         assert store.execute("select name, status from runs").fetchall() == [("one", "FINISHED")]
 
 
+@pytest.mark.parametrize("content", [b"notes of mine\n", "another program's database"])
+def test_the_doctor_touches_nothing_that_is_not_ours(content, tmp_path, capsys, monkeypatch):
+    from tractexp.cli import doctor as module
+
+    monkeypatch.setattr(module, "cores", lambda: iter(()))
+    mine, database = tmp_path / "runs" / "film.part", tmp_path / "runs" / "mine.db"
+    mine.parent.mkdir()
+    mine.write_text("half a download")
+    os.utime(mine, (0, 0))
+    if isinstance(content, bytes):
+        database.write_bytes(content)
+    else:
+        with contextlib.closing(sqlite3.connect(database)) as other:
+            other.execute("CREATE TABLE mine (a)")
+    before = {path: path.read_bytes() for path in (mine, database)}
+    code, told = doctor(tmp_path / "runs", "--uri", f"sqlite:///{database}", capsys=capsys)
+    assert code == 2
+    assert f"WRONG {database} is no MLflow store" in told
+    assert {path: path.read_bytes() for path in (tmp_path / "runs").iterdir()} == before
+
+
 def test_the_doctor_says_what_it_cannot_heal(tmp_path, uri, capsys, monkeypatch):
     from tractexp.cli import doctor as module
 
