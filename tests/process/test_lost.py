@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import run_command
 
 from tractexp import tracking
 from tractexp.errors import UserError
@@ -48,6 +49,8 @@ def runs(uri: str, **more):
 
 WRITER = """
 import os, sys
+from command_line import run_command
+
 from tractexp import tracking
 from tractexp.tracking import run
 def stops(*_, **__):
@@ -545,3 +548,75 @@ def test_a_run_reaches_a_server_on_postgresql_also_one_made_while_that_was_away(
         assert len(client.get_metric_history(run_id, "fitness")) == 3
     with pytest.raises(UserError, match=f"{address} cannot be used"):
         tracking.log(run("too late"), address)  # in seconds, not MLflow's minutes
+
+
+# A folder that holds an earlier run
+
+SEARCH = ("optimizer=multistart_least_squares", "budget=200", "tracking.enabled=false", "hydra.run.dir=run")
+
+
+def state(folder: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+@pytest.fixture(scope="module")
+def earlier(tmp_path_factory):
+    """A folder with a finished run, and what an engineer put beside it."""
+    folder = tmp_path_factory.mktemp("earlier")
+    done = run_command(*SEARCH, "seed=1", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    (folder / "run" / "notes.txt").write_text("mine")
+    return folder
+
+
+def seed_of(folder: Path) -> str:
+    return next(line for line in (folder / ".hydra" / "overrides.yaml").read_text().split() if "seed" in line)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="ends a run by a signal")
+@pytest.mark.parametrize("way", [signal.SIGKILL, signal.SIGTERM])
+def test_a_run_killed_in_an_old_folder_leaves_no_result_under_its_own_configuration(earlier, way, tmp_path):
+    shutil.copytree(earlier / "run", tmp_path / "run")
+    command = [sys.executable, "-m", "tractexp", *SEARCH, "seed=2", "optimizer=pso", "optimizer.iterations=10000000"]
+    command = [word for word in command if word not in ("budget=200", "optimizer=multistart_least_squares")]
+    job = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while "optimizer: pso" not in (line := job.stdout.readline()):
+        assert line, job.stderr.read()
+    time.sleep(1.0)
+    job.send_signal(way)
+    job.communicate(timeout=60)
+    left = state(tmp_path / "run")
+    if way == signal.SIGKILL:
+        assert {k: v for k, v in left.items() if ".next" not in k} == state(earlier / "run")
+    else:  # what was found so far is the result then
+        assert seed_of(tmp_path / "run") == "seed=2"
+        assert "result.json" not in left
+        assert {"interrupted.json", "notes.txt"} <= left.keys()
+    assert (run_command(*SEARCH, "seed=3", cwd=tmp_path)).returncode == 0
+    assert seed_of(tmp_path / "run") == "seed=3"
+    assert {p.name for p in (tmp_path / "run").iterdir()} == {p.name for p in (earlier / "run").iterdir()}
+
+
+def test_a_run_that_is_refused_in_an_old_folder_leaves_it_as_it_was(earlier):
+    before = state(earlier / "run")
+    for wrong in (("data=csv", "data.train=[absent.csv]"), ("budget=0",), ("model.bounds.C=[2,1]",)):
+        assert run_command(*SEARCH, "seed=2", *wrong, cwd=earlier).returncode == 2
+        assert state(earlier / "run") == before
+
+
+def test_the_results_of_another_task_go_and_those_that_a_task_reads_stay(earlier, tmp_path):
+    shutil.copytree(earlier / "run", tmp_path / "run")
+    result = (tmp_path / "run" / "result.json").read_bytes()
+    export = ("task=export", "task.parameters=run/result.json", "task.format=modelica", "hydra.run.dir=run")
+    assert run_command(*export, cwd=tmp_path).returncode == 0
+    assert state(tmp_path / "run").keys() == {*state(earlier / "run"), "load.mo"}
+    assert seed_of(tmp_path / "run") == "seed=1"  # of the result that is there
+    simulate = (*SIMULATE, "tracking.enabled=false")
+    of_result = ["task.parameters=run/result.json" if "values" in word else word for word in simulate]
+    assert run_command(*of_result, cwd=tmp_path).returncode == 0
+    assert (tmp_path / "run" / "result.json").read_bytes() == result
+    assert not (tmp_path / "run" / "history.csv").exists()
+    assert run_command(*simulate, cwd=tmp_path).returncode == 0
+    names = {p.name for p in (tmp_path / "run").iterdir()}
+    assert not {"result.json", "history.csv", "report.html", ".hydra.next"} & names
+    assert {"response.csv", "load.mo", "notes.txt", ".hydra"} <= names

@@ -110,7 +110,9 @@ class Task(Plugin):
 
     def run(self, job: "Job") -> None:
         """Do the task. Raises `UserError` before anything is logged where the input is wrong."""
-        self.conclude(job, self.perform(job))
+        result = self.perform(job)
+        job.begin()
+        self.conclude(job, result)
 
     def conclude(self, job: "Job", result: Written) -> None:
         """Write a result, show it, draw it, log it."""
@@ -169,6 +171,10 @@ def variant(optimizer: str, chosen: Mapping[str, str]) -> str:
     return " ".join([optimizer, *(re.sub(r"[^\s,\[=']*/", "", part) for part in parts)])
 
 
+def _nothing() -> None:
+    """What a job begins with whose folder was emptied before."""
+
+
 @dataclass(frozen=True)
 class Job:
     """One run: its configuration as plain data, and the folder it writes to."""
@@ -181,6 +187,7 @@ class Job:
     given: Mapping[str, str] = field(
         default_factory=dict
     )  # what the user chose, {"optimizer": "pso"}: not the defaults
+    begin: Callable[[], None] = _nothing  # before the first result is written: those of an earlier run go
 
     @functools.cached_property
     def events(self) -> Any:
