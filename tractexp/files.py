@@ -35,17 +35,20 @@ def located(path: str) -> Path:
         raise UserError(f"{path}: there is no installed package '{package}'") from error
 
 
-def write(path: Path | str, content: str | bytes, *, lasting: bool = True, modified: float | None = None) -> Path:
+def write(
+    path: Path | str, content: str | bytes, *, lasting: bool = True, modified: float | None = None,
+    private: bool = False,
+) -> Path:  # fmt: skip
     """Write a file in one move and return its path: a reader never sees half of it, a full disk leaves none.
 
     What is `lasting` has reached the disk when this returns, and outlives a loss of power; a cache or a log need not
-    wait for that. `modified` [s since 1970] is a time stamp to give it.
+    wait for that. `modified` [s since 1970] is a time stamp to give it. What is `private` nobody else can read.
     Raises `UserError` where the folder or the file cannot be written.
     """
     path = Path(path)
     data = content.encode() if isinstance(content, str) else content
     with _as_user_error(path), _beside(path) as temporary:
-        _fill(temporary, data, lasting)
+        _fill(temporary, data, lasting, private)
         if modified is not None:
             os.utime(temporary, (modified, modified))
         os.replace(temporary, path)
@@ -190,13 +193,14 @@ def _beside(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def _fill(temporary: Path, data: bytes, lasting: bool) -> None:
+def _fill(temporary: Path, data: bytes, lasting: bool, private: bool = False) -> None:
     with temporary.open("wb") as file:
         file.write(data)
         file.flush()
         if lasting:
             os.fsync(file.fileno())
-    os.chmod(temporary, 0o666 & ~_umask())
+    if not private:  # as a temporary file is
+        os.chmod(temporary, 0o666 & ~_umask())
 
 
 def _settle(folder: Path) -> None:
@@ -213,9 +217,10 @@ def _settle(folder: Path) -> None:
         os.close(handle)
 
 
-def write_json(path: Path | str, content: Any) -> Path:
+def write_json(path: Path | str, content: Any, *, private: bool = False) -> Path:
     """Write JSON that any reader takes: numbers that do not exist (nan, infinity) become null."""
-    return write(path, json.dumps(plain(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    text = json.dumps(plain(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return write(path, text, private=private)
 
 
 def plain(content: Any) -> Any:

@@ -620,3 +620,72 @@ def test_the_results_of_another_task_go_and_those_that_a_task_reads_stay(earlier
     names = {p.name for p in (tmp_path / "run").iterdir()}
     assert not {"result.json", "history.csv", "report.html", ".hydra.next"} & names
     assert {"response.csv", "load.mo", "notes.txt", ".hydra"} <= names
+
+
+# Passwords
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        (*SIMULATE, "tracking.uri=http://me:hunter2@127.0.0.1:9"), (*SIMULATE, "tracking.url=http://me:hunter2@h"),
+        ("-m", "seed=1,2", "hydra.sweep.dir=run", "tracking.uri=postgresql://me:hunter2@127.0.0.1:9/db"),
+        ("ui", "--uri", "http://me:hunter2@127.0.0.1:9"), ("sync", ".", "--uri=http://me:hunter2@127.0.0.1:9"),
+        ("doctor", "--uri", "http://hunter2@127.0.0.1:9"), ("sync", "http://me:hunter2@127.0.0.1:9"),
+        ("--config-dir=own", "+mine=store", *SIMULATE),
+        ("--config-dir=own", "+mine=store", *SIMULATE[:-1], "hydra.run.dir=old"),
+        ("-m", "--config-dir=own", "+mine=store", "seed=1,2", "hydra.sweep.dir=run"),
+        (*SIMULATE, "tracking.uri=${oc.env:STORE}"),
+    ],
+)  # fmt: skip
+def test_a_password_is_neither_printed_nor_written(arguments, tmp_path):
+    own = tmp_path / "own" / "mine" / "store.yaml"
+    own.parent.mkdir(parents=True)
+    own.write_text("# @package _global_\ntracking:\n  uri: http://me:hunter2@127.0.0.1:9\n")
+    (tmp_path / "old" / ".hydra").mkdir(parents=True)
+    done = run_command(*arguments, cwd=tmp_path, STORE="http://me:hunter2@127.0.0.1:9")
+    assert done.returncode == 2
+    assert "MLFLOW_TRACKING_PASSWORD" in done.stderr
+    assert "hunter2" not in done.stdout + done.stderr
+    assert [p for p in tmp_path.rglob("*") if p.is_file() and p != own and b"hunter2" in p.read_bytes()] == []
+
+
+def test_a_store_that_an_earlier_version_wrote_down_with_its_password_is_not_repeated(tmp_path, capsys):
+    from tractexp.cli.sync import sync as command
+
+    save(tmp_path / "run", run(), "http://me:hunter2@127.0.0.1:9")
+    assert command([str(tmp_path)]) == 2
+    assert "hunter2" not in capsys.readouterr().out
+
+
+@pytest.mark.skipif(os.name == "nt", reason="looks at permissions")
+def test_what_names_the_store_is_for_the_user_alone(tmp_path, uri):
+    save(tmp_path / "sweep", Run("e", "a sweep"), uri, sweep=True)
+    sync(tmp_path)
+    assert {p.stat().st_mode & 0o777 for p in (tmp_path / "sweep").glob("*.json")} == {0o600}
+
+
+def test_a_server_is_given_the_password_of_the_environment_or_of_a_netrc(tmp_path):
+    """What the refusal recommends: MLflow sends either."""
+    script = """
+import sys, threading; from http.server import BaseHTTPRequestHandler, HTTPServer
+asked = []
+class Server(BaseHTTPRequestHandler):
+    def do_GET(self):
+        asked.append(self.headers.get("Authorization"))
+        self.send_response(200); self.send_header("Content-Type", "application/json"); self.end_headers()
+        self.wfile.write(b"{}")
+    do_POST = do_GET
+    def log_message(self, *_): pass
+server = HTTPServer(("127.0.0.1", 0), Server)
+threading.Thread(target=server.serve_forever, daemon=True).start()
+from tractexp.tracking.store import open_store
+open_store(f"http://127.0.0.1:{server.server_port}").search_experiments()
+print(*sorted({str(each) for each in asked[1:]}))"""
+    netrc = tmp_path / ".netrc"
+    netrc.write_text("machine 127.0.0.1 login me password hunter2\n")
+    netrc.chmod(0o600)
+    names = {"MLFLOW_TRACKING_USERNAME": "me", "MLFLOW_TRACKING_PASSWORD": "hunter2"}
+    for more in (names, {"NETRC": str(netrc)}):
+        done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=os.environ | more)
+        assert done.stdout.strip() == "Basic bWU6aHVudGVyMg==", done.stderr

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from tractexp import credentials
 from tractexp.api.task import Job
 from tractexp.cli import configuration
 from tractexp.cli.chosen import given, refuse_unread
@@ -20,9 +21,11 @@ def run(config: Any) -> None:
 
     hydra = HydraConfig.get()
     folder, choices = Path(hydra.runtime.output_dir), dict(hydra.runtime.choices)
-    begin = configuration.written(folder, config)
+    begin: Callable[[], None] | None = None
     try:
         plain: Any = OmegaConf.to_container(config, resolve=True)
+        credentials.check("", plain)
+        begin = configuration.written(folder, config)
         perform(Job(plain, choices, folder, given=given(hydra.overrides.task, choices), begin=begin))
         configuration.concluded(folder)
     except UserError:
@@ -38,9 +41,9 @@ def _how(stop: KeyboardInterrupt) -> str:
     return "ended by SIGTERM" if getattr(stop, "code", 130) == TERMINATED else "interrupted"
 
 
-def so_far(stop: KeyboardInterrupt, folder: Path, begin: Callable[[], None]) -> str:
+def so_far(stop: KeyboardInterrupt, folder: Path, begin: Callable[[], None] | None) -> str:
     """Keep what a search had found when it was stopped; a sentence on it, "" where there is nothing."""
-    if (found := getattr(stop, "result", None)) is None:
+    if begin is None or (found := getattr(stop, "result", None)) is None:
         return ""
     from tractexp.identification.result import write_history
 

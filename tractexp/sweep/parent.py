@@ -30,7 +30,7 @@ def parent_run(folder: Path, jobs: list[Any], overrides: list[str], afresh: bool
 
     uri, run = tracking.address(node["uri"]), _described(folder, jobs, overrides)
     run_id = _opened(folder, run, uri, afresh)
-    write_json(folder / FILE, {"run": run_id, "uri": uri, "jobs": len(jobs), "overrides": overrides})
+    write_json(folder / FILE, {"run": run_id, "uri": uri, "jobs": len(jobs), "overrides": overrides}, private=True)
     status = "FAILED"
     try:
         yield

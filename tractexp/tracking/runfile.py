@@ -37,7 +37,7 @@ class RunFile:
     def write(self) -> "RunFile":
         """Write it. Raises `UserError` where that is impossible."""
         content = {"uri": self.uri, "run_id": self.run_id, "sweep": self.sweep, "run": _plain(self.run, self.folder)}
-        files.write(self.folder / FILE, json.dumps(content, ensure_ascii=False, default=str) + "\n")
+        files.write(self.folder / FILE, json.dumps(content, ensure_ascii=False, default=str) + "\n", private=True)
         return self
 
     def logged(self, run_id: str, uri: str | None = None) -> "RunFile":

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tractexp import files, quoting
+from tractexp import credentials, files, quoting
 from tractexp.errors import UserError
 from tractexp.tracking.owner import close_quietly
 
@@ -30,9 +30,13 @@ def default_uri(folder: Path) -> str:
 
 
 def address(chosen: str | None) -> str:
-    """The store that was chosen, or the default one; both from the current folder, as an absolute address."""
+    """The store that was chosen, or the default one; both from the current folder, as an absolute address.
+
+    Raises `UserError` where it holds a password.
+    """
     if not chosen:
         return default_uri(Path.cwd())
+    credentials.check("the MLflow store", chosen)
     database = database_of(chosen)
     return f"sqlite:///{database.as_posix()}" if database else chosen
 
@@ -56,6 +60,7 @@ def open_store(uri: str) -> Any:
 
     Runs still marked as running by processes that have ended are closed.
     """
+    credentials.check("the MLflow store", uri)
     if not uri.strip():
         raise UserError("tracking: the address of the MLflow store is empty; it is like sqlite:////folder/mlflow.db")
     database = database_of(uri)

@@ -116,7 +116,9 @@ def _sweep(one: RunFile, run_there: Any, uri: str) -> str:
     finish_parent(run_id, uri, one.run.status, one.run.metrics, pages)
     one.logged(run_id, uri)
     sweep_file = one.folder / FILE
-    files.write_json(sweep_file, {"run": run_id, "uri": uri, "overrides": one.run.tags.get("sweep", "").split()})
+    files.write_json(
+        sweep_file, {"run": run_id, "uri": uri, "overrides": one.run.tags.get("sweep", "").split()}, private=True
+    )
     return BROUGHT
 
 
