@@ -21,7 +21,7 @@ from command_line import run_command
 
 from tractexp import tracking
 from tractexp.errors import UserError
-from tractexp.tracking import Run, owner
+from tractexp.tracking import TrackedRun, owner
 from tractexp.tracking.runfile import FILE, read, save
 from tractexp.tracking.store import open_store
 from tractexp.tracking.sync import BROUGHT, DELETED, NOT, THERE, sync
@@ -35,9 +35,9 @@ def tractexp(*arguments, cwd, **more):
     return subprocess.run(command, cwd=cwd, capture_output=True, text=True, **more)
 
 
-def run(name="one", **more) -> Run:
+def run(name="one", **more) -> TrackedRun:
     curve = (np.arange(1, 4), np.array([3.0, 2.0, 1.0]))
-    return Run("e", name, parameters={"a": 1}, metrics={"x": 1.5}, curves={"fitness": curve}, **more)
+    return TrackedRun("e", name, parameters={"a": 1}, metrics={"x": 1.5}, curves={"fitness": curve}, **more)
 
 
 def runs(uri: str, **more):
@@ -49,15 +49,13 @@ def runs(uri: str, **more):
 
 WRITER = """
 import os, sys
-from command_line import run_command
-
 from tractexp import tracking
 from tractexp.tracking import run
 def stops(*_, **__):
     print("in the middle", flush=True)
     os.kill(os.getpid(), 9)
 run._write = stops
-tracking.log(tracking.Run("e", "killed"), sys.argv[1])"""
+tracking.log(tracking.TrackedRun("e", "killed"), sys.argv[1])"""
 
 
 def test_a_run_whose_writer_was_killed_is_closed_when_the_store_is_opened_next(uri):
@@ -72,8 +70,8 @@ def test_a_run_whose_writer_was_killed_is_closed_when_the_store_is_opened_next(u
 
 def test_a_run_whose_writer_lives_or_cannot_be_seen_is_left(uri):
     client = open_store(uri)
-    parent = tracking.start_parent(Run("e", "a sweep that runs"), uri)
-    far = tracking.start_parent(Run("e", "on another computer"), uri)
+    parent = tracking.start_parent(TrackedRun("e", "a sweep that runs"), uri)
+    far = tracking.start_parent(TrackedRun("e", "on another computer"), uri)
     client.set_tag(far, owner.TAG, "elsewhere/0123 boot pid:[1] 4711 99")
     assert owner.close_stale(client) == []
     client.set_tag(parent, owner.TAG, owner.signature().rpartition(" ")[0] + " 17")  # this number, an earlier process
@@ -100,7 +98,7 @@ def test_what_is_kept_is_the_run_again_wherever_the_folder_is(tmp_path):
     folder = tmp_path / "before"
     folder.mkdir()
     (folder / "result.json").write_text("{}")
-    child = Run("e", "child", metrics={"y": float("inf")})
+    child = TrackedRun("e", "child", metrics={"y": float("inf")})
     told = run(artifacts=[folder / "result.json", tmp_path], model=folder / "result.json", children=[child])
     kept = save(folder, told, "sqlite:////x.db")
     after = folder.rename(tmp_path / "after")
@@ -118,7 +116,7 @@ def test_what_is_kept_is_the_run_again_wherever_the_folder_is(tmp_path):
 def test_runs_that_wait_are_brought_in_once_under_the_run_of_their_sweep(tmp_path, uri):
     sweep = tmp_path / "sweep"
     ended = time.time() - 86_400
-    save(sweep, Run("e", "the sweep", ended=ended), uri, sweep=True)
+    save(sweep, TrackedRun("e", "the sweep", ended=ended), uri, sweep=True)
     (sweep / "sweep.json").write_text('{"run": null}')
     for k in range(2):
         save(sweep / str(k), run(f"job {k}", ended=ended, seconds=2.0, children=[run("below")]), uri)
@@ -138,8 +136,8 @@ def test_runs_that_wait_are_brought_in_once_under_the_run_of_their_sweep(tmp_pat
 
 def test_what_an_attempt_left_half_done_goes_when_the_run_is_brought_in(tmp_path, uri):
     one = save(tmp_path / "job", run(), uri)
-    half = tracking.start_parent(Run("e", "half", key=one.run.key), uri)
-    tracking.log(Run("e", "its child", parent=half), uri)
+    half = tracking.start_parent(TrackedRun("e", "half", key=one.run.key), uri)
+    tracking.log(TrackedRun("e", "its child", parent=half), uri)
     assert sync(tmp_path) == {BROUGHT: 1}
     assert [r.info.run_name for r in runs(uri)] == ["one"]
     whole = read(tmp_path / "job")
@@ -195,7 +193,7 @@ def test_a_store_that_is_locked_or_torn_is_told_before_mlflow_tries_for_minutes(
 # Folders of others
 
 
-def hostile(folder: Path, run: Run, uri: str) -> Path:
+def hostile(folder: Path, run: TrackedRun, uri: str) -> Path:
     """A folder that somebody else gave us: its file was written by hand."""
     save(folder, run, uri)
     return folder / FILE
@@ -242,8 +240,8 @@ def test_of_a_received_folder_only_its_own_files_are_sent(command, tmp_path, uri
 
 def test_the_page_of_a_received_sweep_may_be_a_link_to_anything(tmp_path, uri):
     (tmp_path / "key").write_text("secret")
-    hostile(tmp_path / "sweep", Run("e", "a sweep"), uri)
-    save(tmp_path / "sweep", Run("e", "a sweep"), uri, sweep=True)
+    hostile(tmp_path / "sweep", TrackedRun("e", "a sweep"), uri)
+    save(tmp_path / "sweep", TrackedRun("e", "a sweep"), uri, sweep=True)
     (tmp_path / "sweep" / "comparison.html").symlink_to(tmp_path / "key")
     assert sync(tmp_path) == {BROUGHT: 1}
     assert names(uri, "a sweep") == []
@@ -267,7 +265,7 @@ def test_no_store_is_used_that_only_a_folder_names(command, tmp_path, capsys, mo
 
 def test_a_received_file_changes_no_run_that_is_not_its_own(tmp_path, uri):
     mine = save(tmp_path / "mine", run("mine"), uri)
-    sweep = save(tmp_path / "sweep", Run("e", "my sweep", tags={"sweep": "seed=1,2"}), uri, sweep=True)
+    sweep = save(tmp_path / "sweep", TrackedRun("e", "my sweep", tags={"sweep": "seed=1,2"}), uri, sweep=True)
     assert sync(tmp_path) == {BROUGHT: 2}
     ids = {name: read(tmp_path / name).run_id for name in ("mine", "sweep")}
     before = {r.info.run_id: r.to_dictionary() for r in runs(uri)}
@@ -350,7 +348,7 @@ def test_the_doctor_closes_stale_runs_sets_a_damaged_store_aside_and_makes_it_an
     save(tmp_path / "outputs" / "job", run(), uri)
     sync(tmp_path)
     database = Path(uri.removeprefix("sqlite:///"))
-    stale = tracking.start_parent(Run("e", "stale"), uri)
+    stale = tracking.start_parent(TrackedRun("e", "stale"), uri)
     open_store(uri).set_tag(stale, owner.TAG, owner.signature().rpartition(" ")[0] + " 17")
     code, told = doctor(tmp_path, "--uri", uri, capsys=capsys)
     assert code == 0, told
@@ -393,7 +391,7 @@ def test_the_doctor_says_what_it_cannot_heal(tmp_path, uri, capsys, monkeypatch)
 
     monkeypatch.setattr(module, "cores", lambda: iter(()))
     monkeypatch.setattr(module, "BUSY", 0.1)
-    far = tracking.start_parent(Run("e", "far"), uri)
+    far = tracking.start_parent(TrackedRun("e", "far"), uri)
     open_store(uri).set_tag(far, owner.TAG, "elsewhere/0123 boot pid:[1] 4711 99")
     code, told = doctor(tmp_path / "none", "--uri", uri, capsys=capsys)
     assert code == 2
@@ -448,9 +446,9 @@ def test_a_search_that_is_ended_keeps_what_it_found_and_says_so(way, code, tmp_p
 @pytest.mark.skipif(os.name == "nt", reason="ends a process by a signal")
 def test_the_process_that_logs_finishes_its_run_when_the_job_is_ended(uri):
     script = """
-import sys, time; from tractexp.tracking import Run; from tractexp.tracking.process import Logger
+import sys, time; from tractexp.tracking import TrackedRun; from tractexp.tracking.process import Logger
 logger = Logger(sys.argv[1])
-logger._tell(Run("e", "r", key="k"))
+logger._tell(TrackedRun("e", "r", key="k"))
 print(logger._process.pid, flush=True)
 time.sleep(60)"""
     job = subprocess.Popen([sys.executable, "-c", script, uri], stdout=-1, stderr=-1, text=True)
@@ -660,7 +658,7 @@ def test_a_store_that_an_earlier_version_wrote_down_with_its_password_is_not_rep
 
 @pytest.mark.skipif(os.name == "nt", reason="looks at permissions")
 def test_what_names_the_store_is_for_the_user_alone(tmp_path, uri):
-    save(tmp_path / "sweep", Run("e", "a sweep"), uri, sweep=True)
+    save(tmp_path / "sweep", TrackedRun("e", "a sweep"), uri, sweep=True)
     sync(tmp_path)
     assert {p.stat().st_mode & 0o777 for p in (tmp_path / "sweep").glob("*.json")} == {0o600}
 

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from tractexp import quoting
 from tractexp.blocks.block import (
     Block,
-    Chart,
+    ChartBlock,
     Charts,
-    Code,
+    CodeBlock,
     Equation,
     Figure,
     Fold,
@@ -17,7 +17,7 @@ from tractexp.blocks.block import (
     Paragraphs,
     Report,
     Table,
-    Verdict,
+    VerdictBlock,
 )  # fmt: skip
 
 
@@ -33,11 +33,11 @@ def _parts(block: Block) -> Iterator[str]:
             yield f"{'#' * level} {quoting.markdown(text)}"
         case Paragraphs(texts):
             yield from map(quoting.markdown, texts)
-        case Verdict(texts):
+        case VerdictBlock(texts):
             yield "\n>\n".join(f"> {quoting.markdown(text)}" for text in texts)
         case Items(texts):
             yield "\n".join(f"- {quoting.markdown(text)}" for text in texts)
-        case Code(text):
+        case CodeBlock(text):
             yield quoting.fenced(text)
         case Equation(latex):
             yield f"$$ {latex} $$"
@@ -45,7 +45,7 @@ def _parts(block: Block) -> Iterator[str]:
             yield _table(block)
             if block.caption:
                 yield quoting.markdown(block.caption)
-        case Chart(_, caption) | Figure(_, caption):
+        case ChartBlock(_, caption) | Figure(_, caption):
             yield f"*Chart of the page: {quoting.markdown(caption)}*"
         case Markup():
             return

@@ -10,7 +10,7 @@ from typing import Any
 from tractexp import files, quoting
 from tractexp.errors import UserError
 from tractexp.tracking import runfile
-from tractexp.tracking.run import KEY, Run, finish_parent, log, reopen_parent, run_of, start_parent
+from tractexp.tracking.run import KEY, TrackedRun, finish_parent, log, reopen_parent, run_of, start_parent
 from tractexp.tracking.runfile import RunFile
 from tractexp.tracking.store import address, open_store, sentences
 from tractexp.tracking.sweepfile import FILE, parent_of
@@ -63,7 +63,7 @@ def _named(uri: str) -> str:
     return f"where it is yours, {quoting.shell('tractexp', 'sync', '--uri', uri)} sends it there"
 
 
-def _within(run: Run, folder: Path, tell: Callable[[str], None]) -> Run:
+def _within(run: TrackedRun, folder: Path, tell: Callable[[str], None]) -> TrackedRun:
     """The run with those of its files, and of the runs below it, that are there and lie in its folder."""
 
     def lies(path: Path) -> bool:
