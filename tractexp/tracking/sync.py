@@ -13,9 +13,8 @@ from tractexp.tracking import runfile
 from tractexp.tracking.run import KEY, TrackedRun, finish_parent, log, reopen_parent, run_of, start_parent
 from tractexp.tracking.runfile import RunFile
 from tractexp.tracking.store import address, open_store, sentences
-from tractexp.tracking.sweepfile import FILE, parent_of
+from tractexp.tracking.sweepfile import FILE, PAGES, parent_of
 
-PAGES = ("comparison.json", "comparison.html")  # of a sweep, written when its jobs have ended
 THERE, BROUGHT, DELETED, NOT = "already there", "brought in", "deleted in MLflow and left so", "not logged"
 
 
