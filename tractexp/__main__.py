@@ -12,6 +12,7 @@ from collections.abc import Sequence
 for library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
+from tractexp import credentials  # noqa: E402
 from tractexp.errors import Stopped, UserError  # noqa: E402
 
 UNLOGGED = (
@@ -35,6 +36,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     traceback = os.environ.get(FULL_ERROR, "0") not in ("", "0")
     gc.set_threshold(*SELDOM)
     try:
+        for argument in arguments:
+            key, equals, _ = argument.partition("://")[0].rpartition("=")
+            credentials.check(key if equals else "what is given", argument)
         if arguments[:1] and (place := COMMANDS.get(arguments[0])):
             return _command(place, arguments[1:])
         if arguments[:1] and _is_file(arguments[0]):

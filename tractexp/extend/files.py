@@ -6,6 +6,7 @@ from tractexp.filetypes.mapping import QUANTITIES
 from tractexp.filetypes.sidecar import Sidecar, beside
 from tractexp.filetypes.tabulated import Powers, Tabular, kind_of, powers, recording
 from tractexp.filetypes.tidy import restored
+from tractexp.overrides import survey_of
 from tractexp.record.dips import FileDip, check_load, check_numbers, chosen, level, numbered, signs
 from tractexp.record.record import DECLARATION, LOAD, SIZES
 from tractexp.recording.archive import records
@@ -39,5 +40,6 @@ __all__ = [
     "records",
     "restored",
     "signs",
+    "survey_of",
     "tidy",
 ]

@@ -1,13 +1,12 @@
 """Readers of waveform files: from channels to the dips of one load, numbered in order of time."""
 
-import shlex
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
-from tractexp import plugin
+from tractexp import plugin, quoting
 from tractexp.errors import UserError, check_range
 from tractexp.overrides import assigned
 from tractexp.record import Base, Events, Reader, Record, Waves, detect
@@ -169,7 +168,7 @@ class WaveformReader(Reader):
                 f"data.currents name one; its channels: {every}"
             )
         loads = "; ".join(
-            f"{f.name}: {shlex.join(assigned(f'data.{key}', value) for key, value in f.settings.items())}"
+            f"{f.name}: {quoting.shell(*(assigned(f'data.{key}', value) for key, value in f.settings.items()))}"
             for f in proposed
         )
         asked = "".join(f"{question}; " for question in sorted({f.question for f in proposed if f.question}))
