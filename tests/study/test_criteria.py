@@ -13,7 +13,7 @@ from tractexp.discrepancy.chance import Chance
 from tractexp.discrepancy.coordinates import Coordinates
 from tractexp.discrepancy.criteria import CHOSEN, DERIVED, Criteria
 from tractexp.discrepancy.disagreement import Disagreement
-from tractexp.discrepancy.families import near, worth
+from tractexp.discrepancy.families import worth
 from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.gap import GapTest
 from tractexp.discrepancy.held_out import Assessment
@@ -123,14 +123,6 @@ def proposed(closed=0.9, left=1.0, p=1e-6):
     return Weighed(None, before, before, p, None)
 
 
-def near_members(c):
-    """How many members are tried beside a name that suffices, of a family whose textbook explains 35 % as much."""
-    member = SimpleNamespace(effect=SimpleNamespace(family="other"))
-    best = refitted(0.0, 1)
-    fits = {(): refitted(1000.0, 0), ("one",): best, ("other",): Refit(("other",), np.zeros(0), 650.0, 1)}
-    return len(near(SimpleNamespace(criteria=c, catalogue=SimpleNamespace(members=(member,))), best, fits))
-
-
 CASES = {  # criterion: a looser value, the decision, what it is by default
     "false_alarms": (0.06, lambda c: at_fit(c, 0.022).asks_for_more, False),
     "naming_share": (0.45, lambda c: at_fit(c, 0.021).asks_for_more, False),
@@ -138,7 +130,6 @@ CASES = {  # criterion: a looser value, the decision, what it is by default
     "second_name_p": (3e-5, lambda c: at_fit(c, 2e-5, names=("one",)).asks_for_more, False),
     "third_name_p": (3e-9, lambda c: at_fit(c, 2e-9, names=("one", "two")).asks_for_more, False),
     "family_p": (3e-5, lambda c: worth(refitted(181.8, 2), refitted(200.0, 1), c.family_p), False),
-    "near_family": (0.3, near_members, 0),
     "other_valley": (0.7, lambda c: c.promises(75.0, 100.0), False),
     "beside_measurement": (0.2, lambda c: at_fit(c, 0.003, fault_p=1e-9).asks_for_more, False),
     "rejected": (3.0, lambda c: c.rejects(10.0, 1.0, 2, 100.0), False),

@@ -1,5 +1,6 @@
 """Families of effects: another place or another law is named where the catalogue's leaves something, and only there."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,15 +8,16 @@ import pytest
 from scipy.optimize import least_squares
 from test_discrepancy import LOUD, base, bench, events
 
-from tractexp.discrepancy import families, fitting, survivors
+from tractexp.discrepancy import families, fitting, held_out, survivors
+from tractexp.discrepancy.all_events import JointFit
 from tractexp.discrepancy.catalogue import catalogue
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.explanations import worth_another
-from tractexp.discrepancy.families import against_members, near, open_settings, starts, worth
+from tractexp.discrepancy.families import against_members, open_settings, starts, worth
 from tractexp.discrepancy.fitting import Refit, scattered
 from tractexp.discrepancy.forms import forms
 from tractexp.discrepancy.gap import GapTest
-from tractexp.discrepancy.held_out import Assessment, HeldOut, searched_again
+from tractexp.discrepancy.held_out import Assessment, HeldOut, searched_again, weighed
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.linearization import tangent
 from tractexp.domain import PHASORS
@@ -36,12 +38,12 @@ def found(effect, size, seed, only, **settings):
     return investigate(base(), made[:2], made[2:], {}, {}, only=only)
 
 
-def test_the_catalogues_own_trip_keeps_its_name():
+def test_the_catalogues_own_trip_keeps_its_name_beside_its_members():
     made = found("undervoltage_trip", 1.0, 800011, TRIPS)
     assert made.names == ("undervoltage_trip",)
     (form,) = forms(made)
     assert form.law == "catalogue"
-    assert not any(set(names) & set(MEMBERS) for names in made.explanations.refits)
+    assert {("static_trip",), ("motor_trip",)} & set(made.explanations.refits)
 
 
 def test_nothing_is_tried_where_nothing_is_missing(monkeypatch):
@@ -107,23 +109,6 @@ def test_a_bounded_flux_is_a_saturation_with_a_round_corner(seed, least):
     assert told.validate.explained > least
 
 
-def test_members_of_other_families_that_come_near_are_tried_beside_a_name_that_suffices():
-    """A compensator may suffice where a saturation has another law: only families near it, and never its own."""
-    at = bench(base(), events(), ("magnetic_saturation", "static_var_compensator", "undervoltage_trip"))
-    refits = {
-        f.names: f
-        for f in (
-            fit(1000.0, 0),
-            fit(100.0, 4, "static_var_compensator"),
-            fit(500.0, 1, "magnetic_saturation"),
-            fit(680.0, 6, "undervoltage_trip"),
-        )
-    }
-    best = refits["static_var_compensator",]
-    assert {m.name for m in near(at, best, refits)} == {"saturation_curve"}  # 500 of 900, and 320 of 900
-    assert not near(at, fit(90.0, 5, "magnetic_saturation", "static_var_compensator"), refits)
-
-
 @pytest.mark.parametrize(("better", "named"), [(60.0, True), (99.0, False)])
 def test_a_name_that_suffices_gives_way_to_a_member_that_explains_more_and_leaves_nothing(monkeypatch, better, named):
     """Where it does not, the member is held against it: both may explain what is there."""
@@ -183,6 +168,48 @@ def test_a_saturation_with_a_knee_that_a_compensator_explains_as_well_is_tied_wi
     told = investigate(base(), made[:3], made[3:], {}, {}, only=("static_var_compensator", *CORE))
     assert told.explanations.chosen.names == ("static_var_compensator",)
     assert set(told.verdict.sets) == {("static_var_compensator",), ("saturation_curve",)}
+
+
+def test_a_place_that_the_textbooks_trip_imitates_is_named_where_the_held_out_dip_denies_that():
+    """That of the whole load leaves nothing of the fitted dips; of the held-out one only that of the motors does."""
+    made = events("motor_share_trip", 0.269, 762707680, count=4, noise=LOUD)
+    told = investigate(base(), made[:3], made[3:], {}, {}, only=TRIPS)
+    assert told.explanations.refits["undervoltage_trip",].deviance > told.explanations.refits["motor_trip",].deviance
+    assert told.names == ("motor_trip",)
+
+
+def compared(costs, p_left=(1.0, 1.0), helps=(True, True)):
+    """What becomes of two explanations that cost so much in a fit to all events, the base model 500."""
+    at = SimpleNamespace(criteria=Criteria(), events=(), catalogue=SimpleNamespace(textbook=lambda names: names))
+    fits = [fit(0.0, 1, name) for name in ("one", "other")]
+    joint = [JointFit(replace(f, deviance=cost - 2), 10.0, p) for f, cost, p in zip(fits, costs, p_left, strict=True)]
+    both = SimpleNamespace(
+        fitted=at, events=(), bare=None, plain=SimpleNamespace(cost=500.0), compared=lambda *_: joint,
+        undoubted=lambda fits: False,
+    )  # fmt: skip
+    gains = {f.names: 100.0 if good else -100.0 for f, good in zip(fits, helps, strict=True)}
+    judged = lambda context, events, bare, fits: {  # noqa: E731
+        f.names: Assessment(GapTest(None, None, gains[f.names], 10.0, 100.0, 10.8, None), at, ()) for f in fits
+    }
+    return both, {f.names: f for f in fits}, judged
+
+
+@pytest.mark.parametrize(
+    ("costs", "p_left", "helps", "standing", "again"),
+    [
+        ((100.0, 110.0), (1.0, 1.0), (True, True), ["one", "other"], []),
+        ((100.0, 125.0), (1.0, 1.0), (True, True), ["one"], []),  # the other is too far behind on all events
+        ((125.0, 100.0), (1.0, 1.0), (True, False), [], ["other"]),  # what was open of it, all events tell
+        ((100.0, 110.0), (1.0, 0.04), (True, False), ["one"], []),  # it leaves something of all events
+        ((100.0, 110.0), (1.0, 0.04), (False, False), [], ["one", "other"]),  # no other is there
+    ],
+)
+def test_explanations_are_compared_on_all_events(monkeypatch, costs, p_left, helps, standing, again):
+    both, extended, judged = compared(costs, p_left, helps)
+    monkeypatch.setattr(held_out, "judged_on", judged)
+    assessments, fits = weighed(both, extended, 0, doubted=True)
+    assert [names[0] for names, one in assessments.items() if one.helps] == standing
+    assert [f.names[0] for f in fits] == again
 
 
 @pytest.mark.parametrize(

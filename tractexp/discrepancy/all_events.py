@@ -80,6 +80,19 @@ class AllEvents:
         fits = best_of(better for fit in alone for better in self._refitted(fit, anew=anew))
         return each_apart(lambda fit: self._joint_fit(fit, by_name[fit.names], seed), fits)
 
+    def undoubted(self, fits: Sequence[Refit]) -> bool:
+        """Whether there is one explanation only, a single effect by the textbook's law."""
+        names = fits[0].names
+        return len(fits) == 1 and len(names) + len(self.faults) == 1 and names == self.fitted.catalogue.textbook(names)
+
+    def compared(self, alone: Sequence[Refit], seed: int) -> list[JointFit]:
+        """Explanations fitted to all events from where they were, and what leaves something there from every setting,
+        too."""
+        joint = {t.fit.names: t for t in self.together(alone, seed)}
+        doubtful = [f for f in alone if joint[f.names].p_left < self.fitted.criteria.stands]
+        better = [t for t in self.together(doubtful, seed, anew=True) if t.fit.cost < joint[t.fit.names].fit.cost]
+        return list({**joint, **{t.fit.names: t for t in better}}.values())
+
     def searched(self, local_minima: Sequence[np.ndarray], seed: int) -> Survivors:
         """What explains all events, searched for as in the fitted ones; `local_minima` (D,) of the base model there."""
         context = self.context

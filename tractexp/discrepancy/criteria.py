@@ -53,11 +53,6 @@ class Criteria:
         " parameters paid for; at 0 none is tried", CHOSEN,
         "as for a second name; what decides is that it leaves nothing",
     )  # fmt: skip
-    near_family: float = _criterion(
-        0.4, (0.0, 1.0), "part of what a name that suffices explains that the textbook effect of another family must"
-        " explain for its members to be rivals", CHOSEN,
-        "a right effect by a wrong formula explains less than a wrong effect that suffices, but not far less",
-    )  # fmt: skip
     other_valley: float = _criterion(
         0.8, (0.0, 1.0), "part of what a name that suffices explains that another effect must promise where the base"
         " model fits nearly as well", CHOSEN,

@@ -1,13 +1,13 @@
 """Members of families: the kind of a textbook effect at another place, or its place with another law.
 
-All are tried where the best single textbook effect leaves something; where it does not, those of other families whose
-own textbook effect comes near it, for the wrong formula may suffice where the right one has another law. A member takes
-its place where it explains more beyond what its further parameters cost, and leaves nothing. Beside an effect that
-suffices those that were searched are rivals, whether or not they explain more.
+All are tried beside the best single textbook effect, whether or not that leaves nothing: a wrong formula may suffice
+where the right one is that of a member. A member takes its place where it explains more beyond what its further
+parameters cost, and leaves nothing. Beside an effect that suffices those that were searched are rivals, whether or not
+they explain more.
 """
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 
 import numpy as np
 from scipy.special import chdtrc
@@ -17,6 +17,7 @@ from tractexp.discrepancy.catalogue import Candidate
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.disagreement import Disagreement, examined
 from tractexp.discrepancy.fitting import Refit, Start, off_bounds, wide_refits
+from tractexp.noise import Noise
 
 NEAREST = 4  # members that are searched to the end
 EXAMINED = 3  # members whose remainder is tested
@@ -30,31 +31,34 @@ def against_members(
 ) -> tuple[Disagreement, list[Refit]]:
     """The tests at the best member that leaves nothing and explains more than the best textbook effect, or `tests`.
 
-    With the fits of the members that are held against it: none where neither leaves nothing.
+    With the fits of the members that are held against it: none where neither leaves nothing, nor where nothing is
+    missing.
     """
-    context, noise, family = base.context, tests.noise, base.context.kernels.family
-    wanted = near(context, tests.fit, refits) if tests.suffices else context.catalogue.members
-    if not wanted:
+    if tests.suffices and not tests.fit.names:
         return tests, []
-    context.effort.say(f"trying {len(wanted)} other places and laws")
-    family.compile_members([m.name for m in wanted], context.effort.say)
-    fits = wide_refits(context, noise, [starts(context, member, refits) for member in wanted], NEAREST)
+    context, noise = base.context, tests.noise
+    fits = member_fits(context, noise, refits, {m.effect.family for m in context.catalogue.members})
     for k, fit in enumerate(fits[:EXAMINED]):
-        if not worth(fit, tests.fit, context.criteria.family_p) or not family.joins(fit.names[0]):
+        if not worth(fit, tests.fit, context.criteria.family_p):
             continue
-        family.compile_members(fit.names, context.effort.say, whole=True)
+        context.kernels.family.compile_members(fit.names, context.effort.say, whole=True)
         there = examined(base.quiet, fit, noise, seed + k)
         if there.suffices:
-            return there, [there.fit, *(f for f in fits if f is not fit and family.joins(f.names[0]))]
-    return tests, [f for f in fits if family.joins(f.names[0])] if tests.suffices else []
+            return there, [there.fit, *(f for f in fits if f is not fit)]
+    return tests, fits if tests.suffices else []
 
 
-def near(context: Context, best: Refit, refits: Mapping[Names, Refit]) -> list[Candidate]:
-    """Members of families whose textbook effect comes near the best single one, that one's own left out."""
-    bare = refits[()].deviance
-    least = bare - context.criteria.near_family * (bare - best.deviance)
-    families = {f.names[0] for f in refits.values() if len(f.names) == 1 and f.deviance < least} - {*best.names}
-    return [m for m in context.catalogue.members if m.effect.family in families] if len(best.names) == 1 else []
+def member_fits(
+    context: Context, noise: Noise, refits: Mapping[Names, Refit], families: Container[str]
+) -> list[Refit]:  # fmt: skip
+    """Members of some families that join the whole model, the nearest of them searched to the end; the best first."""
+    kernels = context.kernels.family
+    members = [m for m in context.catalogue.members if m.effect.family in families and kernels.joins(m.name)]
+    if not members or not context.domain.calibrated:
+        return []
+    context.effort.say(f"trying {len(members)} other places and laws")
+    kernels.compile_members([m.name for m in members], context.effort.say)
+    return wide_refits(context, noise, [starts(context, member, refits) for member in members], NEAREST)
 
 
 def worth(member: Refit, textbook: Refit, p: float) -> bool:

@@ -27,20 +27,22 @@ Names = tuple[str, ...]
 class Assessment:
     """The gap of one explanation on the held-out events, and the coordinates of both models there.
 
-    `p_left` tells how often chance leaves as much as a fit to all events does, where that was asked.
+    Where it was fitted to all events, `p_left` tells how often chance leaves as much, and `behind` whether another
+    explanation is too far ahead there.
     """
 
     gap: GapTest
     context: Context
     units: tuple[np.ndarray, np.ndarray]
     p_left: float = 1.0
+    behind: bool = False
 
     @property
     def helps(self) -> bool:
         """Whether the explanation is worth having beyond the events it was fitted to."""
         criteria = self.context.criteria
         least = criteria.stands if self.gap.telling else criteria.adequate_p  # a mild event denies nothing
-        return self.gap.helps and self.p_left >= least
+        return self.gap.helps and self.p_left >= least and not self.behind
 
     @property
     def convincing(self) -> bool:
@@ -50,7 +52,8 @@ class Assessment:
     @property
     def tolerable(self) -> bool:
         """Whether it is kept beside one that helps: what would not do for a name is not enough to deny a rival."""
-        return self.convincing and self.gap.helps and self.p_left >= self.context.criteria.adequate_p
+        least = self.context.criteria.adequate_p
+        return self.convincing and self.gap.helps and not self.behind and self.p_left >= least
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,32 +146,30 @@ def telling(explained: Explanations, bare: Refit) -> Names:
 def weighed(
     both: AllEvents, extended: Mapping[Names, Refit], seed: int, *, doubted: bool
 ) -> tuple[dict[Names, Assessment], list[Refit]]:
-    """Judge explanations on held-out events; where none helps as it was fitted, also those that all events confirm.
+    """Judge explanations on held-out events, and all that are doubtful or have a rival by a fit to all events, too.
 
-    Where the base model is `doubted` all events need only bear with them: the held-out ones may not show them at all.
-    Several effects at once, chosen among hundreds of sets, must also leave nothing in a fit to all events, and so must
-    a single one that closes less of the gap there than a true one does, and one of another place or law. What leaves
-    something where that fit began is fitted anew from every setting.
+    A single textbook effect that has no rival stands if it closes as much of the gap there as a true one does. Any
+    other must leave nothing in a fit to all events and not be far behind the best one there. That fit may also bear
+    out what does not help as it was fitted, since the fitted events may leave a part of it open; it is returned as
+    fitted to all. Where the base model is `doubted` all events need only bear with it: the held-out ones may not show
+    it at all.
     """
-    context, events, fits = both.fitted, both.events, list(extended.values())
-    assessments = judged_on(context, events, both.bare, fits)
-    helping = [fit for fit in fits if assessments[fit.names].gap.helps]
-    if not helping:
-        again = [t.fit for t in both.together(fits, seed, anew=True) if t.confirmed(context.criteria, doubted)]
-        return assessments | (judged_on(context, events, both.bare, again) if again else {}), again
-    textbook = context.catalogue.textbook
-    doubtful = [
-        f for f in helping
-        if len(f.names) + len(both.faults) > 1 or f.names != textbook(f.names) or not assessments[f.names].convincing
+    context, criteria, fits = both.fitted, both.fitted.criteria, list(extended.values())
+    assessments = judged_on(context, both.events, both.bare, fits)
+    if both.undoubted(fits) and assessments[fits[0].names].convincing and assessments[fits[0].names].helps:
+        return assessments, []
+    joint = {t.fit.names: t for t in both.compared(fits, seed)}
+    best, plain = min(t.fit.cost for t in joint.values()), both.plain.cost
+    helping = {names for names, one in assessments.items() if one.gap.helps}
+    for names, fitted in joint.items():
+        behind = bool(criteria.rejects(fitted.fit.cost - best, 0.0, 0, plain - best))
+        assessments[names] = replace(assessments[names], p_left=fitted.p_left, behind=behind)
+    again = [
+        fitted.fit for names, fitted in joint.items()
+        if names not in helping and not assessments[names].behind and fitted.confirmed(criteria, doubted)
+        and (not helping or fitted.p_left >= criteria.stands)
     ]  # fmt: skip
-    p_left: dict[Names, float] = {}
-    for anew in (False, True):
-        for fitted in both.together(doubtful, seed, anew=anew):
-            names = fitted.fit.names
-            p_left[names] = max(fitted.p_left, p_left.get(names, 0.0))
-            assessments[names] = replace(assessments[names], p_left=p_left[names])
-        doubtful = [fit for fit in doubtful if not assessments[fit.names].helps]
-    return assessments, []
+    return assessments | (judged_on(context, both.events, both.bare, again) if again else {}), again
 
 
 def searched_again(result: HeldOut, both: AllEvents, seed: int) -> HeldOut:

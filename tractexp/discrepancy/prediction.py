@@ -27,7 +27,7 @@ from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.explanations import WIDELY, Explanations, Names, searched, wide_starts
-from tractexp.discrepancy.families import NEAREST, starts
+from tractexp.discrepancy.families import member_fits
 from tractexp.discrepancy.fitting import Refit, best_of, refit, settled, wide_refits
 from tractexp.discrepancy.least_squares import residual_noise
 from tractexp.discrepancy.noise_in_quiet import white
@@ -195,22 +195,12 @@ def _fits(explained: Explanations, noise: Noise) -> list[Refit]:
     if carried:
         add(refit(context, noise, [(f.names, f.unit) for f in carried]))
     singles = [f for f in best_of(refits.values()) if len(f.names) == 1]
-    add(_members(context, noise, singles[:FAMILIES], refits))
+    of_family = {context.catalogue.textbook(f.names)[0] for f in singles[:FAMILIES]}
+    add(member_fits(context, noise, refits, of_family))
     of_load = [f for f in singles if f.names[0] in context.catalogue.of_load]  # members of families have no columns
     for single in of_load[:FAMILIES]:
         add(searched([ground, ground.at(single, noise)], refits, 2, say))
     return list(refits.values())
-
-
-def _members(context: Context, noise: Noise, best: Sequence[Refit], refits: Mapping[Names, Refit]) -> list[Refit]:
-    """Other places and laws of the best single effects."""
-    families, kernels = {context.catalogue.textbook(f.names)[0] for f in best}, context.kernels.family
-    members = context.catalogue.members if context.domain.calibrated else ()
-    wanted = [m for m in members if m.effect.family in families and kernels.joins(m.name)]
-    if not wanted:
-        return []
-    kernels.compile_members([m.name for m in wanted], context.effort.say)
-    return wide_refits(context, noise, [starts(context, member, refits) for member in wanted], NEAREST)
 
 
 def _predicted(there: Context, fit: Refit) -> PredictionError:
