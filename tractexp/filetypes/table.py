@@ -1,6 +1,5 @@
 """Tables of any shape: text, Parquet, Excel. What columns they have, and the numbers in those that are wanted."""
 
-import io
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,6 +13,7 @@ from tractexp.files import located
 from tractexp.filetypes.cells import BadCell, is_number, is_time, numbers, times
 from tractexp.filetypes.columns import split_unit
 from tractexp.filetypes.heading import TableHeading, heading
+from tractexp.filetypes.workbook import BadWorkbook, Workbook
 
 SPREADSHEETS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")  # how .xlsx, .ods and .xls begin
 PARQUET = b"PAR1"
@@ -196,13 +196,16 @@ def _utc(chunked: Any) -> Any:
 
 def _sheet(path: str, data: bytes, form: TableForm) -> TableFile:
     """One sheet of a workbook: the chosen one, else the first with rows of numbers."""
-    import python_calamine
-
     try:
-        book = python_calamine.CalamineWorkbook.from_filelike(io.BytesIO(data))
-        names = list(book.sheet_names)
-    except (python_calamine.CalamineError, OSError, ValueError) as error:
-        raise UserError(f"{path}: not a workbook that can be read; save it as .xlsx, or the sheet as CSV") from error
+        with Workbook(data) as book:
+            return _sheet_of(path, book, form)
+    except BadWorkbook as bad:
+        why = str(bad) or "not a workbook that can be read; save it as .xlsx"
+        raise UserError(f"{path}: {why}, or the sheet as CSV") from bad
+
+
+def _sheet_of(path: str, book: Workbook, form: TableForm) -> TableFile:
+    names = book.names
     if form.sheet is not None:
         return _rows_of(path, book, _sheet_name(path, names, form.sheet), form)
     refused: list[UserError] = []
@@ -226,13 +229,13 @@ def _sheet_name(path: str, names: Sequence[str], sheet: str | int) -> str:
     raise UserError(f"data.sheet={sheet}: {path} has no such sheet{among(sheet, names, 'Sheets')}")
 
 
-def _rows_of(path: str, book: Any, name: str, form: TableForm) -> Rows:
-    import python_calamine
-
+def _rows_of(path: str, book: Workbook, name: str, form: TableForm) -> Rows:
     try:
-        rows = book.get_sheet_by_name(name).to_python(skip_empty_area=False)
-    except (python_calamine.CalamineError, OSError, ValueError) as error:
-        raise UserError(f"{path}: sheet '{name}' cannot be read; save it as CSV") from error
+        rows = book.rows(name)
+    except BadWorkbook as bad:
+        if str(bad):
+            raise
+        raise UserError(f"{path}: sheet '{name}' cannot be read; save it as CSV") from bad
     source = f"{path}: sheet '{name}'"
     filled = [i for i, row in enumerate(rows) if any(cell not in ("", None) for cell in row)]
     if not filled:
