@@ -10,7 +10,6 @@ import io
 import pickle
 import subprocess
 import sys
-from collections.abc import Callable
 from typing import Any, Self
 
 ROOM, PER_BYTE = 2 << 30, 40  # bytes of memory that a workbook may take, and more for each byte of its file
@@ -75,19 +74,29 @@ def _serve(limit: int) -> None:
         hard = resource.getrlimit(resource.RLIMIT_AS)[1]
         limit = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
         resource.setrlimit(resource.RLIMIT_AS, (limit, hard))
-    import python_calamine
-
-    def tried(answer: Callable[[Any], Any], question: Any) -> Any:
-        try:
-            return answer(question)
-        except (python_calamine.CalamineError, OSError, ValueError):
-            return None
-
-    book: Any = tried(lambda data: python_calamine.CalamineWorkbook.from_filelike(io.BytesIO(data)), _question())
-    _give(None if book is None else list(book.sheet_names))
+    book = _opened(_question())
+    _give(book and list(book.sheet_names))
     with contextlib.suppress(EOFError):
         while True:
-            _give(tried(lambda name: book.get_sheet_by_name(name).to_python(skip_empty_area=False), _question()))
+            _give(_rows(book, _question()))
+
+
+def _opened(data: bytes) -> Any:
+    import python_calamine
+
+    try:
+        return python_calamine.CalamineWorkbook.from_filelike(io.BytesIO(data))
+    except (python_calamine.CalamineError, OSError, ValueError):
+        return None
+
+
+def _rows(book: Any, name: str) -> list[list[Any]] | None:
+    import python_calamine
+
+    try:
+        return book.get_sheet_by_name(name).to_python(skip_empty_area=False)
+    except (python_calamine.CalamineError, OSError, ValueError):
+        return None
 
 
 def _question() -> Any:
