@@ -229,8 +229,8 @@ class Identification(Written):
             values = np.array([self.result.parameters[name] for name in self.model.model.names])
             (one,) = dips_of("event", event, least=1)[:1]
             return respond_to(self.model.model, values, one, self.result.base)
-        time, voltage = (np.asarray(values, dtype=float) for values in (t, U))
-        return Response("prediction", time, voltage, *self.result.predict(time, voltage, f, P0, Q0))
+        P, Q = self.result.predict(t, U, f, P0, Q0)
+        return Response("prediction", np.asarray(t, dtype=float), np.asarray(U, dtype=float), P, Q)
 
     def table(self) -> Table:
         """Estimates with intervals and verdicts, the search's end only where it lies outside."""
@@ -295,7 +295,7 @@ class Identification(Written):
         if found is not None:
             history = History(**{key: np.array(v, dtype=float) for key, v in found["history"].items()})
             found = SearchResult(**found | {"values": np.array(found["values"], dtype=float), "history": history})
-        return cls(Result(**content["result"]), setup and FitSpec.from_dict(setup), found)
+        return cls(Result.of(content["result"], "the saved result"), setup and FitSpec.from_dict(setup), found)
 
     def write_results(self, folder: Path) -> list[Path]:
         from tractexp.identification.result import write_history

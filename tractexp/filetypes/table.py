@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from tractexp import files
 from tractexp.errors import UserError, among, check_choice, nearest
 from tractexp.files import located
 from tractexp.filetypes.cells import BadCell, is_number, is_time, numbers, times
@@ -141,20 +142,14 @@ def content(path: str, limit: int | None = None) -> bytes:
     """The bytes of a file, or of one inside an installed package (`pkg://package/file.csv`); whole lines to a limit."""
     file = located(path)
     folder = file.parent
-    if not file.is_file():
+    if not files.there(file):
         if file.is_dir():
             raise UserError(f"{path} is a folder, not a file; give a file in it, or task=survey data.path={path}")
         names = [item.name for item in folder.iterdir() if not item.is_dir()] if folder.is_dir() else None
         hint = "; that folder does not exist" if names is None else nearest(file.name, names)
         raise UserError(f"{path}: there is no such file in {folder}{hint}")
-    try:
-        if limit is None:
-            return file.read_bytes()
-        with file.open("rb") as opened:
-            data = opened.read(limit)
-        return data if len(data) < limit else data[: data.rfind(b"\n") + 1] or data
-    except OSError as error:
-        raise UserError(f"{path} cannot be read: {error.strerror or 'it is no ordinary file'}") from error
+    data = files.read(file, limit)
+    return data if limit is None or len(data) < limit else data[: data.rfind(b"\n") + 1] or data
 
 
 def _parquet(path: str, data: bytes) -> TableFile:

@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from tractexp.errors import UserError, nearest
+from tractexp.files import read
 from tractexp.record import Record, endings, reader_of
 from tractexp.record.foreign import is_record
 from tractexp.recording.overview import LoadEvent, Sight, View, view_of
@@ -53,9 +54,8 @@ def _wanted(path: Path, readable: Collection[str], beside: Collection[str]) -> b
 def _prose(path: Path) -> bool:
     """Whether a file that would be read as a table holds words: not one row of numbers at its beginning."""
     try:
-        with path.open("rb") as file:
-            head = file.read(BEGINNING)
-    except OSError:
+        head = read(path, BEGINNING)
+    except (UserError, FileNotFoundError):
         return False  # its reader will say why it cannot be read
     return not any(_numbers(line) >= NUMBERS for line in head.replace(b"\0", b"").splitlines())
 
