@@ -18,6 +18,7 @@ from tractexp.filetypes.workbook import BadWorkbook, Workbook
 
 SPREADSHEETS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")  # how .xlsx, .ods and .xls begin
 PARQUET = b"PAR1"
+MOST = 200_000_000  # values of a table: a few bytes of a Parquet file may stand for millions
 FOREIGN = {  # how files begin that are no table, whatever they are called
     b"%PDF": "a PDF file", b"\x89PNG": "a picture", b"\x1f\x8b": "compressed; unpack it first", b"{": "JSON",
     b"\x89HDF": "an HDF5 file", b"SQLite": "a database", b"<": "XML or HTML; save the table as CSV",
@@ -157,7 +158,10 @@ def _parquet(path: str, data: bytes) -> TableFile:
     from pyarrow import parquet
 
     try:
-        parsed = parquet.read_table(pyarrow.BufferReader(data))
+        file = parquet.ParquetFile(pyarrow.BufferReader(data))
+        if (values := file.metadata.num_rows * file.metadata.num_columns) > MOST:
+            raise UserError(f"{path}: {values:,} values are more than the {MOST:,} that can be read; give a part of it")
+        parsed = file.read()
         names = [str(name) for name in parsed.column_names]
         columns = [_arrow(parsed.column(k)) for k in range(len(names))]
     except (pyarrow.ArrowException, OSError, ValueError) as error:

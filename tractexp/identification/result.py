@@ -194,12 +194,7 @@ class Result:
         return files.write(path, json.dumps(asdict(self), indent=2, ensure_ascii=False) + "\n")
 
     def predict(
-        self,
-        t: np.ndarray,
-        U: np.ndarray,
-        f: np.ndarray | None = None,
-        P0: float | None = None,
-        Q0: float | None = None,
+        self, t: Any, U: Any, f: Any = None, P0: float | None = None, Q0: float | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """P and Q [pu] for a new voltage U [pu] at uniform times t [s]; f [Hz] where the frequency is known.
 
