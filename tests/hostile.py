@@ -172,6 +172,22 @@ def database(path: Path) -> Path:
     return path
 
 
+def noisy(power: float) -> np.ndarray:
+    """A dip of a load that draws so much, with noise of 0.001 pu."""
+    values = columns(power=power)
+    values[:, 2:] += 0.001 * np.random.default_rng(1).standard_normal((ROWS, 2))
+    return values
+
+
+def waves(step: float, current: float = 100.0, voltage: float = 10_000.0, far: float = 0.0) -> np.ndarray:
+    """Three phases at 50 Hz [V, A] in 20 samples a cycle, `step` apart; the last one is `far` away."""
+    t = step * np.arange(ROWS)
+    angle = 2 * np.pi * (np.arange(ROWS)[:, None] / 20 - np.arange(3) / 3)
+    U = np.where((np.arange(ROWS) > 200) & (np.arange(ROWS) < 260), 0.6, 1.0)[:, None] * voltage * np.sin(angle)
+    t[-1] += far
+    return np.column_stack([t, U, current * np.sin(angle - 0.5)])
+
+
 def far_time() -> np.ndarray:
     values = columns(2e-12)
     values[-1, 0] = 10.0
@@ -277,6 +293,12 @@ INPUTS: dict[str, Callable[[Path], Path]] = {
     "surrogates.csv": written(text(VALUES, "t,U,P,Q,\udcff").encode(errors="surrogatepass")),
     "no_power.csv": written(text(columns(power=0.0))),
     "no_active_power.csv": written(text(VALUES * [1, 1, 0, 1])),
+    "no_reactive_power.csv": written(text(VALUES * [1, 1, 1, 0])),
+    "noise_for_power.csv": written(text(noisy(0.0))),
+    "waves_picoseconds.csv": written(text(waves(2e-12), "t,ua,ub,uc,ia,ib,ic")),
+    "waves_without_currents.csv": written(text(waves(1e-3, 0.0), "t,ua,ub,uc,ia,ib,ic")),
+    "waves_without_voltages.csv": written(text(waves(1e-3, voltage=0.0), "t,ua,ub,uc,ia,ib,ic")),
+    "waves_far.csv": written(text(waves(1e-3, far=1e12), "t,ua,ub,uc,ia,ib,ic")),
     "no_voltage.csv": written(text(VALUES * [1, 0, 1, 1])),
     "tiny_power.csv": written(text(columns(power=1e-300), digits=17)),
     "huge_power.csv": written(text(columns(power=1e300))),

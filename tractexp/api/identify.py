@@ -20,6 +20,7 @@ from tractexp.identification.result import Result, by_event
 from tractexp.outcome import Written
 from tractexp.plugin import plugin
 from tractexp.progress import Progress, tell
+from tractexp.wording import epsilon
 
 if TYPE_CHECKING:
     from tractexp.identification.adequacy import Adequacy
@@ -280,7 +281,8 @@ class Identification(Written):
         if not (s := self.result.search):
             return ""
         end = f"search: {self.result.optimizer} {s['status']}: objective {s['objective']:.4g} pu² (the estimate's is"
-        end += f" {self.result.objective:.4g}), epsilon_p {s['epsilon_p']:.3%}, epsilon_q {s['epsilon_q']:.3%},"
+        errors = ", ".join(f"{name} {epsilon(s[name])}" for name in ("epsilon_p", "epsilon_q"))
+        end += f" {self.result.objective:.4g}), {errors},"
         return f"{end} {s['simulations']} simulations in {s['seconds']:.2f} s"
 
     def to_dict(self) -> dict[str, Any]:

@@ -92,6 +92,8 @@ def sets_of(rivals: Any) -> list[list[str]]:
             " discrepancy.json of an investigation that ended tied"
         )
     investigation = files.read_json(path)
+    if not isinstance(investigation, dict) or "verdict" not in investigation:
+        raise UserError(f"task.rivals={rivals}: this is not the discrepancy.json of an investigation")
     if investigation.get("verdict") != "tied":
         raise UserError(
             f"task.rivals={rivals}: that investigation ended {investigation.get('verdict')}, not tied, so that there is"

@@ -35,7 +35,7 @@ class Dips(Tabulated, list[Event]):
         """One row for each event."""
         rows = [
             [e.record.name, e.t_start, f"{e.depth:.0%}", round(1000 * e.duration), round(e.rate), e.P0, e.Q0,
-             f"{e.noise_P / max(abs(e.P0), 1e-9):.2%}", " ".join(e.record.channels)]
+             "" if e.noise_share is None else f"{e.noise_share:.2%}", " ".join(e.record.channels)]
             for e in self
         ]  # fmt: skip
         columns = ["event", "starts [s]", "depth", "lasts [ms]", "rate [Hz]", "P0 [pu]", "Q0 [pu]", "noise of P",

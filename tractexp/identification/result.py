@@ -128,7 +128,7 @@ class Result:
         are missing or no finite numbers.
         """
         stored.check_fields(cls, content, where)
-        made = cls(**content)
+        made = cls(**stored.without_nulls(cls, content))
         for name in ("parameters", "per_event", "before", "bounds"):
             stored.check_numbers(f"{where}: {name}", getattr(made, name))
         try:
@@ -191,7 +191,7 @@ class Result:
 
     def write(self, path: Path) -> Path:
         """Write the file in one move, so that no half-written one is ever seen."""
-        return files.write(path, json.dumps(asdict(self), indent=2, ensure_ascii=False) + "\n")
+        return files.write(path, json.dumps(files.plain(asdict(self)), indent=2, ensure_ascii=False) + "\n")
 
     def predict(
         self, t: Any, U: Any, f: Any = None, P0: float | None = None, Q0: float | None = None

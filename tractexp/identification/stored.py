@@ -28,6 +28,12 @@ def check_fields(cls: type[Any], content: Any, where: str) -> None:
         check_kind(f"{where}: {name}", _numbered(value), kinds[name])
 
 
+def without_nulls(cls: type[Any], content: Mapping[str, Any]) -> dict[str, Any]:
+    """Content with nan in the place of a field's number that did not exist when it was saved."""
+    kinds = get_type_hints(cls)
+    return {key: math.nan if value is None and kinds[key] is float else value for key, value in content.items()}
+
+
 def _numbered(value: Any) -> Any:
     """A value with a number in the place of each that did not exist when it was saved, which JSON knows as null."""
     if isinstance(value, Mapping):
