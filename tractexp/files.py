@@ -43,9 +43,9 @@ def there(path: Path | str) -> bool:
     """
     name = str(path)
     try:
-        name.encode()
+        os.fsencode(name).decode()
         kind = stat.S_IFMT(os.stat(path).st_mode)
-    except UnicodeEncodeError:
+    except UnicodeError:
         raise UserError(f"{name}: this name is no UTF-8 text; rename the file") from None
     except (FileNotFoundError, NotADirectoryError):
         if os.path.islink(path):
@@ -99,7 +99,7 @@ def write(path: Path | str, content: str | bytes, *, lasting: bool = True, modif
     Raises `UserError` where the folder or the file cannot be written.
     """
     path = Path(path)
-    data = content.encode() if isinstance(content, str) else content
+    data = encoded(content)
     with _as_user_error(path), _beside(path) as temporary:
         _fill(temporary, data, lasting)
         if modified is not None:
@@ -110,10 +110,15 @@ def write(path: Path | str, content: str | bytes, *, lasting: bool = True, modif
     return path
 
 
+def encoded(content: str | bytes) -> bytes:
+    """Text as UTF-8; half a character, as in a name that is no text, becomes its escape."""
+    return content.encode(errors="backslashreplace") if isinstance(content, str) else content
+
+
 def offer(path: Path | str, content: str | bytes) -> None:
     """As `write`, but a file that is there already stays: of several processes the first one's stands."""
     path = Path(path)
-    data = content.encode() if isinstance(content, str) else content
+    data = encoded(content)
     with _as_user_error(path), _beside(path) as temporary:
         _fill(temporary, data, lasting=False)
         try:
@@ -273,7 +278,7 @@ def plain(content: Any) -> Any:
         return plain(content.tolist())
     if isinstance(content, float):
         return content if math.isfinite(content) else None
-    return content if isinstance(content, str | int | bool | None) else str(content)
+    return content if isinstance(content, int | bool | None) else encoded(str(content)).decode()
 
 
 def _umask() -> int:

@@ -45,7 +45,7 @@ def load(path: Path, encoding: str | None = None) -> Recording:
     """Read a compressed event report; raises `UserError` naming line, column and value of what is wrong."""
     path = Path(path)
     if not files.there(path):
-        raise UserError(f"{path}: there is no such file")
+        raise UserError(f"{path} is a folder, not a file" if path.is_dir() else f"{path}: there is no such file")
     if path.stat().st_size > LARGEST:
         raise UserError(f"{path}: {path.stat().st_size} bytes are no event report; the limit is {LARGEST}")
     content = files.read(path)

@@ -30,8 +30,10 @@ class Sidecar:
 def beside(path: str) -> Sidecar:
     """The sidecar of a table, an empty one where there is none; raises `UserError` for one that is no JSON."""
     own = located(path)
+    if own.suffix.lower() == ".json" or not files.there(own):
+        return Sidecar()
     file = own.with_name(f"{own.stem}.json")
-    if own.suffix.lower() == ".json" or not files.there(own) or not files.there(file):
+    if not files.there(file):
         return Sidecar()
     content = files.read_json(file)
     if not isinstance(content, dict):
